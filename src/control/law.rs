@@ -1,0 +1,69 @@
+//! Computed torque on the pose error.
+//!
+//! ```text
+//! e_p = C_d - C                 e_R = log(R_d R^T)       rotation vector in base axes, never angles
+//! v'_c     = v'_d     + Kd (v_d - v)           + Kp e_p
+//! omega'_c = omega'_d + Kd_r (omega_d - omega) + Kp_r e_R
+//! Gamma    = inverse dynamics at the present R, C, omega, v with (v'_c, omega'_c)
+//! ```
+//!
+//! Two instants meet here. The error is taken at the instant of the measurement, where both sides are
+//! known. The force is needed for the middle of the interval in which it will be held, about a period
+//! later. Mixing them would make every delay look like a tracking error of speed times delay. So the
+//! error is carried over unchanged, and "the present" is where the platform will be if the error stays as
+//! it is: the desired motion at that later instant, displaced by minus the error.
+
+use super::gains::Gains;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+
+/// Gains for position and orientation.
+#[derive(Clone, Copy, Debug)]
+pub struct Law {
+    pub position: Gains,
+    pub orientation: Gains,
+}
+
+/// Desired minus measured, base axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrackingError {
+    /// `[e_R; e_p]` \[rad\], \[m\].
+    pub pose: Twist,
+    /// `[omega_d - omega; v_d - v]` \[rad/s\], \[m/s\].
+    pub twist: Twist,
+}
+
+impl TrackingError {
+    /// The error at one instant.
+    pub fn new(desired: &Motion, pose: &Pose, twist: &Twist) -> Self {
+        Self {
+            pose: pose.displacement_to(&desired.pose),
+            twist: Twist {
+                angular: desired.twist.angular - twist.angular,
+                linear: desired.twist.linear - twist.linear,
+            },
+        }
+    }
+}
+
+impl Law {
+    /// The motion whose inverse dynamics are the forces: where the platform will be at the instant of
+    /// `desired` if `error` stays as it is, with the commanded acceleration.
+    pub fn command(&self, desired: &Motion, error: &TrackingError) -> Motion {
+        let (e, e_rate) = (&error.pose, &error.twist);
+        Motion {
+            pose: desired.pose.displaced(&Twist { angular: -e.angular, linear: -e.linear }),
+            twist: Twist {
+                angular: desired.twist.angular - e_rate.angular,
+                linear: desired.twist.linear - e_rate.linear,
+            },
+            acceleration: Acceleration {
+                angular: desired.acceleration.angular
+                    + e_rate.angular * self.orientation.damping
+                    + e.angular * self.orientation.stiffness,
+                linear: desired.acceleration.linear
+                    + e_rate.linear * self.position.damping
+                    + e.linear * self.position.stiffness,
+            },
+        }
+    }
+}

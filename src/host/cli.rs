@@ -1,0 +1,278 @@
+//! The command line. Part of the binary, not of the library: clap's derive needs `std` at the crate root,
+//! which the library denies itself.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use hexad::host::check::Check;
+use hexad::host::config::{Config, ConfigError};
+use hexad::host::demo::{self, Demo, DemoError};
+use hexad::host::offline::{self, OfflineError};
+use hexad::host::setpoints::{self, Score, SetpointError};
+use hexad::host::stop::Stop;
+use hexad::host::{daemon, plant};
+use hexad::scene::motions::Motion;
+
+/// Hard real-time computed-torque controller for Gough-Stewart platforms.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the controller daemon until SIGINT or SIGTERM
+    Run {
+        #[command(flatten)]
+        machine: MachineFile,
+        /// Write a JSON report at the end
+        #[arg(long, value_name = "FILE")]
+        report: Option<PathBuf>,
+    },
+    /// Simulate the hardware as a process of its own
+    Plant {
+        #[command(flatten)]
+        machine: MachineFile,
+    },
+    /// Play a motion or a trajectory as a setpoint source
+    Move {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        what: What,
+        /// Length of the motion [s]
+        #[arg(long, default_value_t = 8.0, value_parser = duration, conflicts_with = "trajectory")]
+        seconds: f64,
+    },
+    /// Run daemon, plant and setpoint source through a motion; print timing and tracking, draw pictures
+    Demo {
+        /// Machine file [default: the built-in fried2008]
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+        /// Machine file of the plant, if it shall differ from the controller's
+        #[arg(long, value_name = "FILE")]
+        plant_config: Option<PathBuf>,
+        /// The motion to make
+        #[arg(long, value_enum, default_value_t = MotionName::Paper)]
+        motion: MotionName,
+        /// Length of the motion [s]; approach and settling come on top
+        #[arg(long, default_value_t = 8.0, value_parser = duration)]
+        seconds: f64,
+        /// Rate of the loop [Hz], instead of the configured one
+        #[arg(long)]
+        rate_hz: Option<f64>,
+        /// Write a JSON report
+        #[arg(long, value_name = "FILE")]
+        report: Option<PathBuf>,
+        /// Folder for the pictures
+        #[arg(long, value_name = "FOLDER", default_value = "hexad-demo")]
+        charts: PathBuf,
+    },
+    /// Validate a machine file and show the machine at home
+    Check {
+        #[command(flatten)]
+        machine: MachineFile,
+    },
+    /// Forces, lengths and their derivatives for a file of motions
+    InverseDynamics {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        files: Files,
+        /// The dynamic model
+        #[arg(long, value_enum, default_value_t = ModelName::Exact)]
+        model: ModelName,
+    },
+    /// Poses, and twists if there are rates, for a file of leg lengths
+    ForwardKinematics {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        files: Files,
+        /// Where each row starts
+        #[arg(long, value_enum, default_value_t = Start::Previous)]
+        start: Start,
+    },
+}
+
+#[derive(Debug, Args)]
+struct MachineFile {
+    /// Machine file (TOML)
+    #[arg(long = "config", value_name = "FILE")]
+    path: PathBuf,
+}
+
+#[derive(Debug, Args)]
+struct Files {
+    /// CSV to read
+    #[arg(long, value_name = "FILE")]
+    input: PathBuf,
+    /// CSV to write
+    #[arg(long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct What {
+    /// A built-in motion
+    #[arg(long, value_enum)]
+    motion: Option<MotionName>,
+    /// A CSV file with t, X, X', X''
+    #[arg(long, value_name = "FILE")]
+    trajectory: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum MotionName {
+    /// Stand at home
+    Settle,
+    /// Moves along every axis in turn, there and back
+    MinimumJerk,
+    /// A sine on every axis
+    Sines,
+    /// A circle at constant orientation
+    Circle,
+    /// A spatial curve at the constant orientation 15, 10, 5 degrees
+    Paper,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ModelName {
+    /// Every term
+    Exact,
+    /// The paper's: legs that do not spin about their own axes
+    RigidLegs,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Start {
+    /// At the row before, the first at home
+    Previous,
+    /// At home
+    Home,
+}
+
+impl Cli {
+    /// Does what the command line asks for.
+    pub fn run(self) -> Result<(), Failure> {
+        match self.command {
+            Command::Run { machine, report } => {
+                let (config, stop) = (machine.load()?, stop()?);
+                daemon::run(&config, report.as_deref(), &stop).map(drop).map_err(Failure::could_not_begin)
+            }
+            Command::Plant { machine } => {
+                let (config, stop) = (machine.load()?, stop()?);
+                plant::run(&config, &stop).map_err(Failure::could_not_begin)
+            }
+            Command::Move { machine, what, seconds } => {
+                let config = machine.load()?;
+                let score = what.score(&config, seconds)?;
+                setpoints::run(&config, &score, &stop()?).map_err(Failure::could_not_begin)
+            }
+            Command::Demo { config, plant_config, motion, seconds, rate_hz, report, charts } => {
+                let motion = motion.to_possible_value().map_or_else(String::new, |v| v.get_name().into());
+                let demo = Demo { config, plant_config, motion, seconds, rate_hz, report, charts };
+                demo::run(&demo, &stop()?).map_err(Failure::from)
+            }
+            Command::Check { machine } => {
+                print!("{}", Check::new(&machine.load()?));
+                Ok(())
+            }
+            Command::InverseDynamics { machine, files, model } => {
+                let model = match model {
+                    ModelName::Exact => offline::ModelName::Exact,
+                    ModelName::RigidLegs => offline::ModelName::RigidLegs,
+                };
+                let machine = machine.load()?.machine;
+                Ok(offline::inverse_dynamics_file(&machine, model, &files.input, &files.output)?)
+            }
+            Command::ForwardKinematics { machine, files, start } => {
+                let start = match start {
+                    Start::Previous => offline::Start::Previous,
+                    Start::Home => offline::Start::Home,
+                };
+                let machine = machine.load()?.machine;
+                Ok(offline::forward_kinematics_file(&machine, start, &files.input, &files.output)?)
+            }
+        }
+    }
+}
+
+impl MachineFile {
+    fn load(&self) -> Result<Config, ConfigError> {
+        Config::load(&self.path)
+    }
+}
+
+impl What {
+    fn score(&self, config: &Config, seconds: f64) -> Result<Score, SetpointError> {
+        match (&self.trajectory, self.motion) {
+            (Some(path), _) => Score::trajectory(path),
+            (None, name) => {
+                let motion = match name.unwrap_or(MotionName::Settle) {
+                    MotionName::Settle => Motion::Settle,
+                    MotionName::MinimumJerk => Motion::MinimumJerk,
+                    MotionName::Sines => Motion::Sines,
+                    MotionName::Circle => Motion::Circle,
+                    MotionName::Paper => Motion::Paper,
+                };
+                Ok(Score::motion(&config.machine, motion, seconds))
+            }
+        }
+    }
+}
+
+/// Signals end the command in order instead of killing it.
+fn stop() -> Result<Stop, Failure> {
+    Stop::on_signals().map_err(Failure::could_not_begin)
+}
+
+fn duration(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(seconds) if (0.1..=86400.0).contains(&seconds) => Ok(seconds),
+        Ok(_) => Err("must be in [0.1, 86400] s".into()),
+        Err(_) => Err("must be a number".into()),
+    }
+}
+
+/// Why a command failed, and its exit code: 1 it ran and went wrong, 2 it could not begin.
+#[derive(Debug)]
+pub struct Failure {
+    pub code: u8,
+    pub what: String,
+}
+
+impl Failure {
+    fn could_not_begin(error: impl std::error::Error) -> Self {
+        Self { code: 2, what: error.to_string() }
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Self::could_not_begin(error)
+    }
+}
+
+impl From<SetpointError> for Failure {
+    fn from(error: SetpointError) -> Self {
+        Self::could_not_begin(error)
+    }
+}
+
+impl From<OfflineError> for Failure {
+    fn from(error: OfflineError) -> Self {
+        let code = if matches!(error, OfflineError::Unsolved { .. }) { 1 } else { 2 };
+        Self { code, what: error.to_string() }
+    }
+}
+
+impl From<DemoError> for Failure {
+    fn from(error: DemoError) -> Self {
+        let code = if matches!(error, DemoError::Config(_) | DemoError::File(_)) { 2 } else { 1 };
+        Self { code, what: error.to_string() }
+    }
+}

@@ -1,0 +1,224 @@
+//! The sections that say how a machine is run: `[realtime]`, `[control]`, `[timeouts]`, `[plant]`.
+//!
+//! Every key has a default that works at 1 kHz. Limits that follow from the rate are checked against the
+//! rate, defaults included: a slow loop must be given the gains and timeouts that it can carry.
+
+extern crate std;
+
+use std::{format, prelude::rust_2024::*};
+
+use super::bound::Bound;
+use super::machine::rounded;
+use super::reader::Reader;
+use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
+
+/// Slowest and fastest loop \[Hz\]. Above, one wake-up costs more than the period leaves.
+const RATE_HZ: Bound = Bound::Within(10.0, 20_000.0);
+/// Default of `late_wakeup_us` where half a period is longer; the wake-up latency of an ordinary kernel
+/// stays below at the 99th percentile.
+const LATE_WAKEUP_US: f64 = 200.0;
+/// CPUs count from 0; a `cpu_set_t` holds 1024.
+const LAST_CPU: i32 = 1023;
+/// Linux's range of `SCHED_FIFO`.
+const PRIORITY: (i32, i32) = (1, 99);
+/// Longest a peer may be silent \[ms\]. After a second, nobody knows where the platform is.
+const LONGEST_TIMEOUT_MS: f64 = 1000.0;
+/// Damping ratios that a control engineer would write down; beyond, it is a slip.
+const DAMPING_RATIO: Bound = Bound::Within(0.1, 10.0);
+/// Engaging further away than this is a motion, and needs a trajectory \[m\], \[rad\].
+const FURTHEST_ENGAGE_M: f64 = 0.1;
+const FURTHEST_ENGAGE_RAD: f64 = 0.2;
+/// Strongest brake \[m/s^2\]: a hundred times gravity is an impact.
+const STRONGEST_BRAKE_M_S2: f64 = 1000.0;
+/// The plant's step \[us\]: below, it cannot keep up; above, its drives are not stable.
+const STEP_US: Bound = Bound::Within(10.0, 1000.0);
+
+/// How a machine is run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deployment {
+    /// The cycle and its threads.
+    pub realtime: Realtime,
+    /// The control law.
+    pub control: Control,
+    /// Ages of messages.
+    pub timeouts: Timeouts,
+    /// The simulated hardware.
+    pub plant: Plant,
+}
+
+/// `[realtime]`: the cycle and its threads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Realtime {
+    /// Cycles per second.
+    pub rate_hz: f64,
+    /// CPU of the real-time thread; `None` leaves it to the scheduler.
+    pub cpu: Option<usize>,
+    /// CPU of the I/O thread; `None` leaves it to the scheduler.
+    pub io_cpu: Option<usize>,
+    /// `SCHED_FIFO` priority of the real-time thread.
+    pub priority: i32,
+    /// `SCHED_FIFO` priority of the I/O thread.
+    pub io_priority: i32,
+    /// Whether all memory is locked.
+    pub lock_memory: bool,
+    /// Whether to refuse to start where the system does not grant the above.
+    pub require_realtime: bool,
+    /// A wake-up later than this after its release time counts as missed.
+    pub late_wakeup_s: f64,
+}
+
+/// `[control]`: the law's error dynamics, and how near the set point must be to engage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Control {
+    /// Natural frequency of the position error.
+    pub position_bandwidth_hz: f64,
+    /// Damping ratio of the position error.
+    pub position_damping_ratio: f64,
+    /// Natural frequency of the orientation error.
+    pub orientation_bandwidth_hz: f64,
+    /// Damping ratio of the orientation error.
+    pub orientation_damping_ratio: f64,
+    /// Furthest the set point may be from the platform to engage.
+    pub engage_position_m: f64,
+    /// The same for the angle between them.
+    pub engage_orientation_rad: f64,
+}
+
+/// `[timeouts]`: how old the newest message may be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timeouts {
+    /// Of the set point.
+    pub setpoint_s: f64,
+    /// Of the measured lengths and rates.
+    pub measured_s: f64,
+}
+
+/// `[plant]`: the simulated hardware.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plant {
+    /// Without a force command for this long, the plant brakes by itself.
+    pub force_timeout_s: f64,
+    /// How hard the brakes decelerate each leg.
+    pub brake_deceleration_m_s2: f64,
+    /// Step of the integration.
+    pub step_s: f64,
+}
+
+impl Realtime {
+    /// Time from one release to the next.
+    pub fn period_s(&self) -> f64 {
+        1.0 / self.rate_hz
+    }
+}
+
+/// Reads and checks the four sections. Where a number was refused it is NaN.
+pub(super) fn read(root: &mut Reader) -> Deployment {
+    let realtime = realtime(root.section("realtime"));
+    let rate_hz = realtime.rate_hz;
+    Deployment {
+        realtime,
+        control: control(root.section("control"), rate_hz),
+        timeouts: timeouts(root.section("timeouts"), rate_hz),
+        plant: plant(root.section("plant"), rate_hz),
+    }
+}
+
+fn realtime(mut section: Reader) -> Realtime {
+    let rate_hz = section.number_or("rate_hz", 1000.0, RATE_HZ);
+    let half_period_us = 0.5e6 / rate_hz;
+    let late_wakeup_us =
+        section.number_or("late_wakeup_us", LATE_WAKEUP_US.min(half_period_us), Bound::Positive);
+    if late_wakeup_us > half_period_us {
+        let bound =
+            format!("must be at most {half_period_us} (half a period of realtime.rate_hz = {rate_hz})");
+        section.refuse("late_wakeup_us", bound);
+    }
+    let mut cpu = |key| section.integer(key, 0, LAST_CPU).and_then(|cpu| usize::try_from(cpu).ok());
+    let (cpu, io_cpu) = (cpu("cpu"), cpu("io_cpu"));
+    let (low, high) = PRIORITY;
+    let realtime = Realtime {
+        rate_hz,
+        cpu,
+        io_cpu,
+        priority: section.integer_or("priority", 80, low, high),
+        io_priority: section.integer_or("io_priority", 79, low, high),
+        lock_memory: section.flag_or("lock_memory", true),
+        require_realtime: section.flag_or("require_realtime", false),
+        late_wakeup_s: late_wakeup_us / 1e6,
+    };
+    section.finish();
+    realtime
+}
+
+fn control(mut section: Reader, rate_hz: f64) -> Control {
+    let [position_bandwidth_hz, position_damping_ratio] =
+        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], rate_hz);
+    let [orientation_bandwidth_hz, orientation_damping_ratio] =
+        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], rate_hz);
+    let control = Control {
+        position_bandwidth_hz,
+        position_damping_ratio,
+        orientation_bandwidth_hz,
+        orientation_damping_ratio,
+        engage_position_m: section.number_or("engage_position_m", 0.002, Bound::UpTo(FURTHEST_ENGAGE_M)),
+        engage_orientation_rad: section.number_or(
+            "engage_orientation_rad",
+            0.005,
+            Bound::UpTo(FURTHEST_ENGAGE_RAD),
+        ),
+    };
+    section.finish();
+    control
+}
+
+/// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry.
+fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], rate_hz: f64) -> [f64; 2] {
+    let bandwidth_hz = section.number_or(bandwidth_key, 10.0, Bound::Positive);
+    let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO);
+    let period_s = 1.0 / rate_hz;
+    let all_read = [bandwidth_hz, damping_ratio, period_s].iter().all(|x| x.is_finite());
+    if all_read && gain_margin(bandwidth_hz, damping_ratio, period_s) < MIN_GAIN_MARGIN {
+        // Rounded down, so that the number in the message is one that is accepted.
+        let largest = (max_bandwidth_hz(damping_ratio, period_s) * 1e3).floor() / 1e3;
+        let bound = format!(
+            "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
+             (gain margin of {MIN_GAIN_MARGIN})"
+        );
+        section.refuse(bandwidth_key, bound);
+    }
+    [bandwidth_hz, damping_ratio]
+}
+
+fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
+    let timeouts = Timeouts {
+        setpoint_s: timeout_s(&mut section, "setpoint_ms", 50.0, rate_hz),
+        measured_s: timeout_s(&mut section, "measured_ms", 20.0, rate_hz),
+    };
+    section.finish();
+    timeouts
+}
+
+fn plant(mut section: Reader, rate_hz: f64) -> Plant {
+    let brake = Bound::UpTo(STRONGEST_BRAKE_M_S2);
+    let plant = Plant {
+        force_timeout_s: timeout_s(&mut section, "force_timeout_ms", 50.0, rate_hz),
+        brake_deceleration_m_s2: section.number_or("brake_deceleration_m_s2", 9.81, brake),
+        step_s: section.number_or("step_us", 250.0, STEP_US) / 1e6,
+    };
+    section.finish();
+    plant
+}
+
+/// A peer that sends once a cycle is silent for one period: a timeout must be longer.
+fn timeout_s(section: &mut Reader, key: &'static str, default_ms: f64, rate_hz: f64) -> f64 {
+    let timeout_ms = section.number_or(key, default_ms, Bound::UpTo(LONGEST_TIMEOUT_MS));
+    let period_ms = 1e3 / rate_hz;
+    if timeout_ms <= period_ms {
+        let bound = format!(
+            "must be greater than {} (one period of realtime.rate_hz = {rate_hz})",
+            rounded(period_ms)
+        );
+        section.refuse(key, bound);
+    }
+    timeout_ms / 1e3
+}

@@ -1,0 +1,138 @@
+//! What the geometry as a whole must be: six distinct legs that can hold the platform at home.
+//!
+//! Each check runs on what has been read soundly; a value that was refused is NaN here, and NaN passes
+//! (see [`super::reader`]).
+
+extern crate std;
+
+use std::{format, prelude::rust_2024::*};
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::machine::{Leg, rounded};
+use super::reader::Reader;
+use crate::model::inverse_geometry::{leg_directions, leg_lengths};
+use crate::model::inverse_jacobian::condition;
+use crate::model::machine::{LEGS, Machine};
+use crate::model::rigid::Pose;
+use crate::model::task::TaskState;
+
+/// Points nearer than this share of the joints' radius are one point: a micrometre on a machine of a metre,
+/// less than any joint can be placed or measured. The equations would allow two joints in one place, as on
+/// the drawings of 6-3 platforms; a universal or spherical joint of two legs cannot be built.
+const COINCIDENT: f64 = 1e-6;
+
+/// Least sine of the angle between a leg at home and the first axis of its universal joint. Where they
+/// are parallel the joint locks; at a milliradian the leg spins a thousand times faster than it swings.
+const LEAST_UNIVERSAL_SINE: f64 = 1e-3;
+
+/// Largest condition number at home. There, an encoder's error of 1 um is up to 1 cm at the platform, and a
+/// leg may push 10,000 times the load. Machines that are meant to work have 2 to 100.
+const LARGEST_CONDITION: f64 = 1e4;
+
+/// Checks the joints, then the home pose.
+pub(super) fn check(machine: &Machine, legs: &[Leg], home: &Reader) {
+    let base_spans = check_joints(legs, "base_m", |leg| leg.base);
+    let platform_spans = check_joints(legs, "platform_m", |leg| leg.platform);
+
+    let pose = TaskState::at_rest(machine.home).motion().pose;
+    let complete = check_legs(machine, legs, &pose);
+    if base_spans && platform_spans && complete {
+        check_condition(machine, &pose, home);
+    }
+}
+
+/// Root mean square distances of points from their mean.
+struct Spread {
+    /// From the point itself.
+    radius: f64,
+    /// From the line that fits the points best.
+    off_line: f64,
+}
+
+impl Spread {
+    /// Of the points that have been read soundly.
+    fn of(points: impl Iterator<Item = Vector3<f64>> + Clone) -> Self {
+        let points = points.filter(is_finite);
+        let count = points.clone().count() as f64;
+        let mean = points.clone().sum::<Vector3<f64>>() / count;
+        let second_moment = points.map(|p| (p - mean) * (p - mean).transpose()).sum::<Matrix3<f64>>() / count;
+        if count == 0.0 {
+            return Self { radius: f64::NAN, off_line: f64::NAN };
+        }
+        let mut along: [f64; 3] = second_moment.symmetric_eigenvalues().into();
+        along.sort_by(f64::total_cmp);
+        let [least, middle, _] = along.map(|x| x.max(0.0));
+        Self { radius: second_moment.trace().sqrt(), off_line: (least + middle).sqrt() }
+    }
+}
+
+/// Refuses joints of one body that are all on one line, else any two in one place. False if on a line.
+fn check_joints(legs: &[Leg], key: &str, joint: fn(&Leg) -> Vector3<f64>) -> bool {
+    let spread = Spread::of(legs.iter().map(joint));
+    let least = COINCIDENT * spread.radius;
+    let all_read = legs.len() >= LEGS && legs.iter().map(joint).all(|point| is_finite(&point));
+    if let (true, true, Some(first)) = (all_read, spread.off_line <= least, legs.first()) {
+        let shown = format!("on one line with all others, to {:?} m", rounded(spread.off_line));
+        let bound = format!("must be off it by {COINCIDENT:?} of the radius: no leg resists a turn about it");
+        first.reader.refuse_as(key, shown, bound);
+        return false;
+    }
+    for (i, leg) in legs.iter().enumerate() {
+        for (earlier, other) in legs.iter().enumerate().take(i) {
+            let distance = (joint(leg) - joint(other)).norm();
+            if distance < least {
+                let shown = format!("{:?} m from leg[{}].{key}", rounded(distance), earlier + 1);
+                let bound =
+                    format!("must be at least {:?} m from it ({COINCIDENT:?} of the radius)", rounded(least));
+                leg.reader.refuse_as(key, shown, bound);
+            }
+        }
+    }
+    true
+}
+
+/// Checks each leg at home. Returns whether all have been read and have a direction.
+fn check_legs(machine: &Machine, legs: &[Leg], pose: &Pose) -> bool {
+    let least = COINCIDENT * Spread::of(legs.iter().map(|leg| leg.platform)).radius;
+    let (shortest, longest) = (machine.actuator.min_length, machine.actuator.max_length);
+    let stroke = format!("in [{shortest}, {longest}] (actuator.min_length_m, actuator.max_length_m)");
+    let mut complete = true;
+    for ((leg, length), direction) in
+        legs.iter().zip(leg_lengths(machine, pose)).zip(leg_directions(machine, pose))
+    {
+        let shown = format!("{:?} m long at home", rounded(length));
+        if length < least {
+            leg.reader.refuse_table(shown, "base_m and platform_m must not coincide at home");
+        } else if shortest < longest && !(shortest..=longest).contains(&length) && !length.is_nan() {
+            leg.reader.refuse_table(shown, format!("must be {stroke}"));
+        }
+        let sine = leg.universal_axis.cross(&direction).norm();
+        if sine < LEAST_UNIVERSAL_SINE {
+            leg.reader.refuse_as(
+                "universal_axis",
+                format!("{:?} rad from the leg at home", rounded(sine)),
+                format!("must be at least {LEAST_UNIVERSAL_SINE} rad from it"),
+            );
+        }
+        complete &= length >= least;
+    }
+    complete && legs.len() == LEGS
+}
+
+fn check_condition(machine: &Machine, pose: &Pose, home: &Reader) {
+    let condition = condition(machine, pose);
+    if condition > LARGEST_CONDITION {
+        home.refuse_as(
+            "pose",
+            format!("condition number {} of the legs' wrenches", rounded(condition)),
+            format!(
+                "must be at most {LARGEST_CONDITION}: the legs cannot hold the platform in every direction"
+            ),
+        );
+    }
+}
+
+fn is_finite(point: &Vector3<f64>) -> bool {
+    point.iter().all(|x| x.is_finite())
+}

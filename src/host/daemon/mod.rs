@@ -1,0 +1,245 @@
+//! `hexad run`: the daemon.
+//!
+//! Start: configuration, ports, threads, real-time set-up; only then the first release. Stop, in this
+//! order: the real-time thread ends its cycle and says that no force is valid, the io thread publishes
+//! that, the log thread empties its queue, the report is written.
+
+extern crate std;
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::boxed::Box;
+use std::io;
+use std::path::Path;
+use std::prelude::rust_2024::*;
+use std::sync::mpsc;
+use std::thread::{Builder, Scope, ScopedJoinHandle, scope};
+
+use heapless::spsc::Queue;
+use sd_notify::NotifyState;
+use tracing::{info, warn};
+
+use self::io_thread::{IoReport, Ports};
+use self::log_thread::LogReport;
+use super::config::Config;
+use super::config::deployment::{Deployment, Realtime};
+use super::files::FileError;
+use super::report::{DeadlineMisses, Report};
+use super::stop::Stop;
+use crate::control::controller::{Controller, Input, Measurement, Parameters, Setpoint};
+use crate::control::gains::Gains;
+use crate::control::law::Law;
+use crate::ipc::exchange::exchange;
+use crate::ipc::ports::{Bus, PortError};
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
+use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Timing};
+use crate::realtime::setup::{self, Shortfall};
+
+mod io_thread;
+mod log_thread;
+
+/// Stack of each thread: several times what they use, and small because locked memory holds all of it.
+const STACK: usize = 512 * 1024;
+
+/// Cycles computed before the first release, so that code and data are in memory and in the cache.
+const WARM_UP_CYCLES: u32 = 1000;
+
+/// Why the daemon did not run.
+#[derive(Debug, thiserror::Error)]
+pub enum DaemonError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error("cannot start a thread: {0}")]
+    Thread(#[from] io::Error),
+    #[error("realtime.require_realtime is set, and there is {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
+    NotRealtime(Vec<Shortfall>),
+    #[error("the {0} thread ended unexpectedly")]
+    Died(&'static str),
+    #[error(transparent)]
+    Report(#[from] FileError),
+}
+
+/// Runs until `stop`; writes the report if asked to.
+pub fn run(config: &Config, report_path: Option<&Path>, stop: &Stop) -> Result<Report, DaemonError> {
+    let report = run_threads(config, stop)?;
+    if let Some(path) = report_path {
+        report.write(path)?;
+    }
+    Ok(report)
+}
+
+fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
+    let Config { machine, deployment, .. } = config;
+    let controller = Controller::new(machine.clone(), parameters(deployment));
+    let timing = &timing(deployment);
+    let (realtime_side, io_side) = exchange();
+    let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
+    let (producer, consumer) = queue.split();
+    let [stop_loop, stop_io, stop_log] = &[const { AtomicBool::new(false) }; 3];
+    let (io_ready, ready) = mpsc::channel();
+    let realtime_ready = io_ready.clone();
+    let (go, go_ahead) = mpsc::channel::<()>();
+    let realtime = &deployment.realtime;
+
+    scope(|threads| {
+        // Also when a thread cannot be started the others must end.
+        let _stop_all = StopOnDrop([stop_loop, stop_io, stop_log]);
+        let log = spawn(threads, "hexad-log", || log_thread::run(consumer, stop_log))?;
+        let io = spawn(threads, "hexad-io", || {
+            // Ports belong to the thread that opens them.
+            let ports = Bus::join(&config.name).and_then(|bus| Ports::open(&bus));
+            let (ports, opened) =
+                ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
+            let shortfalls = opened.map(|()| prepare_thread(realtime.io_priority, realtime.io_cpu));
+            // Nobody listens only if the other thread failed first.
+            let _ = io_ready.send(shortfalls.map_err(DaemonError::from));
+            Some(io_thread::run(timing, &machine.home, ports?, io_side, stop_io))
+        })?;
+        let cyclic = spawn(threads, "hexad-rt", move || {
+            let _ = realtime_ready.send(Ok(prepare_thread(realtime.priority, realtime.cpu)));
+            warm_up(controller.clone(), machine);
+            // Without the word of the main thread no cycle must begin.
+            go_ahead.recv().ok()?;
+            Some(cyclic::run(timing, controller, realtime_side, producer, stop_loop))
+        })?;
+
+        let started = start(realtime, &ready, &go);
+        if started.is_ok() {
+            let _ = sd_notify::notify(&[NotifyState::Ready]);
+            info!(name = %config.name, rate_hz = realtime.rate_hz, "running");
+            stop.wait();
+            let _ = sd_notify::notify(&[NotifyState::Stopping]);
+            info!("stopping");
+        }
+        drop(go);
+        stop_loop.store(true, Ordering::Relaxed);
+        let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
+        stop_io.store(true, Ordering::Relaxed);
+        let io = io.join().map_err(|_| DaemonError::Died("io"));
+        stop_log.store(true, Ordering::Relaxed);
+        let log = log.join().map_err(|_| DaemonError::Died("log"));
+        started?;
+        let (cyclic, io, log) = (cyclic?.unwrap_or_default(), io?.unwrap_or_default(), log?);
+        Ok(summary(config, &cyclic, &io, log))
+    })
+}
+
+/// Sets every flag when dropped.
+struct StopOnDrop<'a>([&'a AtomicBool; 3]);
+
+impl Drop for StopOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.iter().for_each(|flag| flag.store(true, Ordering::Relaxed));
+    }
+}
+
+fn spawn<'scope, T: Send + 'scope>(
+    threads: &'scope Scope<'scope, '_>,
+    name: &str,
+    body: impl FnOnce() -> T + Send + 'scope,
+) -> io::Result<ScopedJoinHandle<'scope, T>> {
+    Builder::new().name(name.into()).stack_size(STACK).spawn_scoped(threads, body)
+}
+
+/// Collects what the threads lack, says it, and lets the loop begin if that is acceptable.
+fn start(
+    realtime: &Realtime,
+    ready: &mpsc::Receiver<Result<Vec<Shortfall>, DaemonError>>,
+    go: &mpsc::Sender<()>,
+) -> Result<(), DaemonError> {
+    let mut shortfalls = Vec::new();
+    for _ in ["io", "real-time"] {
+        shortfalls.extend(ready.recv().map_err(|_| DaemonError::Died("io or real-time"))??);
+    }
+    if realtime.lock_memory {
+        // Last, when all memory is there to be locked.
+        shortfalls.extend(setup::lock_memory().err());
+    }
+    shortfalls.dedup();
+    for shortfall in &shortfalls {
+        warn!("{shortfall}");
+    }
+    if realtime.require_realtime && !shortfalls.is_empty() {
+        return Err(DaemonError::NotRealtime(shortfalls));
+    }
+    go.send(()).map_err(|_| DaemonError::Died("real-time"))
+}
+
+fn prepare_thread(priority: i32, cpu: Option<usize>) -> Vec<Shortfall> {
+    setup::sharp_timers();
+    setup::touch_stack();
+    let bound = cpu.and_then(|cpu| setup::bind_to_cpu(cpu).err());
+    setup::fifo_priority(priority).err().into_iter().chain(bound).collect()
+}
+
+/// Runs a controller that nobody listens to, at rest at home.
+fn warm_up(mut controller: Controller, machine: &Machine) {
+    let task = TaskState::at_rest(machine.home);
+    let length = leg_lengths(machine, &task.motion().pose);
+    let input = Input {
+        release_ns: 1,
+        setpoint: Some(Setpoint { time_ns: 1, task }),
+        measurement: Some(Measurement { time_ns: 1, length, rate: [0.0; 6] }),
+    };
+    for _ in 0..WARM_UP_CYCLES {
+        core::hint::black_box(controller.step(core::hint::black_box(&input)));
+    }
+}
+
+fn parameters(deployment: &Deployment) -> Parameters {
+    let Deployment { control, timeouts, .. } = deployment;
+    Parameters {
+        period_ns: nanoseconds(deployment.realtime.period_s()),
+        law: Law {
+            position: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
+            orientation: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+        },
+        engage_position: control.engage_position_m,
+        engage_orientation: control.engage_orientation_rad,
+        setpoint_timeout_ns: nanoseconds(timeouts.setpoint_s),
+        measured_timeout_ns: nanoseconds(timeouts.measured_s),
+    }
+}
+
+fn timing(deployment: &Deployment) -> Timing {
+    let period_ns = nanoseconds(deployment.realtime.period_s());
+    Timing {
+        period_ns,
+        phase_ns: period_ns / 2,
+        late_wakeup_ns: nanoseconds(deployment.realtime.late_wakeup_s),
+    }
+}
+
+/// Seconds to nanoseconds, for durations that the configuration has bounded.
+pub(super) fn nanoseconds(seconds: f64) -> u64 {
+    (seconds * 1e9).round() as u64
+}
+
+fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Report {
+    let counters = &cyclic.counters;
+    for (count, what) in [
+        (counters.records_lost, "cycle records lost: the log thread was too slow"),
+        (io.send_failures, "messages could not be sent"),
+        (io.rejected, "messages passed over: other schema, older source, or seen before"),
+    ] {
+        if count > 0 {
+            warn!(count, "{what}");
+        }
+    }
+    Report {
+        cycles: counters.cycles,
+        rate_hz: config.deployment.realtime.rate_hz,
+        deadline_misses: DeadlineMisses {
+            late_wakeup: counters.late_wakeups,
+            overrun: counters.overruns,
+            skipped: counters.skipped,
+        },
+        wakeup_ns: log.wakeup.quantiles(),
+        compute_ns: log.compute.quantiles(),
+        end_to_end_ns: io.end_to_end.quantiles(),
+        tracking: log.tracking.tracking(),
+        rt_thread: cyclic.usage,
+        faults: log.faults,
+    }
+}

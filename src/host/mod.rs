@@ -1,0 +1,17 @@
+//! Everything around the loop: configuration, commands, charts. May use everything.
+//!
+//! Exit codes of the commands: 0 done, 1 it ran and went wrong (a fault, a row without solution), 2 it
+//! could not begin: bad command line, configuration, input or environment.
+
+pub mod charts;
+pub mod check;
+pub mod config;
+pub mod daemon;
+pub mod demo;
+pub mod files;
+pub mod offline;
+pub mod plant;
+pub mod report;
+pub mod setpoints;
+pub mod stop;
+pub mod table;

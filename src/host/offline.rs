@@ -1,0 +1,165 @@
+//! `hexad inverse-dynamics` and `hexad forward-kinematics`: the model on files, away from the loop.
+
+extern crate std;
+
+use std::path::Path;
+use std::prelude::rust_2024::*;
+use std::vec;
+
+use indicatif::{ProgressBar, ProgressIterator, ProgressStyle};
+use nalgebra::Vector6;
+
+use super::files::FileError;
+use super::table::{Table, TableError, Writer, coordinates, legs, six, trajectory_columns};
+use crate::model::active_forces::inverse_dynamics;
+use crate::model::forward_kinematics::Tracker;
+use crate::model::inverse_geometry::leg_motion;
+use crate::model::inverse_jacobian::twist_from_rates;
+use crate::model::leg::{Exact, RigidLegs};
+use crate::model::machine::{LEGS, Machine};
+use crate::model::rigid::{Motion, Twist};
+use crate::model::task::{TaskState, task_coordinates};
+
+/// Why an offline command failed.
+#[derive(Debug, thiserror::Error)]
+pub enum OfflineError {
+    #[error(transparent)]
+    Input(#[from] TableError),
+    #[error(transparent)]
+    Output(#[from] FileError),
+    /// The output is complete and marks the rows; nobody should miss it.
+    #[error("{count} of {rows} rows {what}, the first at t = {first:?}")]
+    Unsolved { count: usize, rows: usize, what: &'static str, first: f64 },
+}
+
+/// Which dynamic model to evaluate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModelName {
+    Exact,
+    RigidLegs,
+}
+
+impl ModelName {
+    fn forces(self, machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
+        match self {
+            Self::Exact => inverse_dynamics::<Exact>(machine, motion),
+            Self::RigidLegs => inverse_dynamics::<RigidLegs>(machine, motion),
+        }
+    }
+}
+
+/// Where each row of forward kinematics starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// At the row before; the first at home.
+    Previous,
+    /// At home.
+    Home,
+}
+
+/// X, X', X'' to forces, lengths and their derivatives. At a singular pose the forces are NaN.
+pub fn inverse_dynamics_file(
+    machine: &Machine,
+    model: ModelName,
+    input: &Path,
+    output: &Path,
+) -> Result<(), OfflineError> {
+    let table = Table::read(input, &trajectory_columns(), &[])?;
+    let mut columns = vec!["t".into()];
+    for stem in ["force", "length", "length_rate", "length_accel"] {
+        columns.extend(legs(stem));
+    }
+    let mut writer = Writer::new(&columns);
+    let mut unsolved = Unsolved::default();
+    for row in table.rows().iter().progress_with(progress(table.rows().len())) {
+        let t = row.first().copied().unwrap_or_default();
+        let motion = task_state(row).motion();
+        let forces = model.forces(machine, &motion);
+        unsolved.count(t, forces.is_some());
+        let motion = leg_motion(machine, &motion);
+        let forces = forces.unwrap_or([f64::NAN; LEGS]);
+        writer.row([t].into_iter().chain(forces).chain(motion.length).chain(motion.rate).chain(motion.accel));
+    }
+    writer.save(output)?;
+    unsolved.verdict(table.rows().len(), "are at singular poses and have no forces")
+}
+
+/// Lengths, and rates if the file has them, to poses and twists. `--start` says where a row begins.
+pub fn forward_kinematics_file(
+    machine: &Machine,
+    start: Start,
+    input: &Path,
+    output: &Path,
+) -> Result<(), OfflineError> {
+    let mut required = vec!["t".into()];
+    required.extend(legs("length"));
+    let rates = legs("length_rate");
+    let table = Table::read(input, &required, &rates)?;
+    let with_rates = table.rows().first().is_some_and(|row| row.len() > required.len());
+
+    let mut columns = vec!["t".into()];
+    columns.extend(coordinates(""));
+    columns.extend(["iterations", "converged"].map(String::from));
+    if with_rates {
+        columns.extend(["omega_x", "omega_y", "omega_z", "x_rate", "y_rate", "z_rate"].map(String::from));
+    }
+    let mut writer = Writer::new(&columns);
+    let mut unsolved = Unsolved::default();
+    let home = Tracker::new(machine, TaskState::at_rest(machine.home).motion().pose);
+    let (mut tracker, mut near) = (home, machine.home);
+    for row in table.rows().iter().progress_with(progress(table.rows().len())) {
+        if start == Start::Home {
+            (tracker, near) = (home, machine.home);
+        }
+        let t = row.first().copied().unwrap_or_default();
+        // A row without solution leaves the start of the next one where it was.
+        let mut walker = tracker;
+        let solution = walker.find(machine, &six(row, 1));
+        let x = task_coordinates(&solution.pose, &near);
+        if solution.converged {
+            (tracker, near) = (walker, x);
+        }
+        let twist = with_rates
+            .then(|| twist_from_rates(machine, &solution.pose, &six(row, 1 + LEGS)))
+            .map(|twist| twist.as_ref().map_or(Vector6::repeat(f64::NAN), Twist::vector));
+        unsolved.count(t, solution.converged);
+        let found = [f64::from(solution.iterations), f64::from(u8::from(solution.converged))];
+        writer.row([t].into_iter().chain(x).chain(found).chain(twist.iter().flatten().copied()));
+    }
+    writer.save(output)?;
+    unsolved.verdict(table.rows().len(), "did not converge (column converged)")
+}
+
+/// X, X', X'' of a row with the columns of [`trajectory_columns`].
+pub(super) fn task_state(row: &[f64]) -> TaskState {
+    TaskState { x: six(row, 1).into(), xd: six(row, 7).into(), xdd: six(row, 13).into() }
+}
+
+/// A bar on a terminal, nothing elsewhere.
+fn progress(rows: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:40} {human_pos} of {human_len} rows, {eta} left");
+    ProgressBar::new(rows as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// Counts the rows without solution.
+#[derive(Default)]
+struct Unsolved {
+    count: usize,
+    first: f64,
+}
+
+impl Unsolved {
+    fn count(&mut self, t: f64, solved: bool) {
+        if !solved {
+            if self.count == 0 {
+                self.first = t;
+            }
+            self.count += 1;
+        }
+    }
+
+    fn verdict(self, rows: usize, what: &'static str) -> Result<(), OfflineError> {
+        let Self { count, first } = self;
+        if count == 0 { Ok(()) } else { Err(OfflineError::Unsolved { count, rows, what, first }) }
+    }
+}

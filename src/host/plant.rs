@@ -1,0 +1,144 @@
+//! `hexad plant`: the simulated platform as a process of its own, in real time.
+//!
+//! It ticks on the multiples of the period. At each tick it lets the time since the last one pass, with
+//! every force applied from the instant its message was sent, as a drive would; then it publishes lengths
+//! and rates. A force is applied no longer than `plant.force_timeout_ms` after it was sent.
+
+extern crate std;
+
+use std::prelude::rust_2024::*;
+
+use tracing::{debug, info, warn};
+
+use super::config::Config;
+use super::daemon::nanoseconds;
+use super::stop::Stop;
+use crate::control::state::Cause;
+use crate::ipc::messages::{ForceMessage, MeasuredMessage};
+use crate::ipc::ports::{Bus, PortError};
+use crate::model::machine::LEGS;
+use crate::model::task::task_coordinates;
+use crate::plant::simulator::{Brakes, Simulator};
+use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use crate::realtime::setup;
+
+/// Forces kept between two ticks: 12.8 ms at 20 kHz, so that a late plant still applies each in its turn.
+const FORCE_DEPTH: usize = 256;
+
+/// After a longer pause (the process was stopped) simulated time goes on from now: nobody waits for a
+/// second of simulation.
+const LONGEST_PAUSE_NS: u64 = 1_000_000_000;
+
+/// Runs until `stop`.
+pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
+    let plant = &config.deployment.plant;
+    let bus = Bus::join(&config.name)?;
+    let mut forces = bus.sink::<ForceMessage>(FORCE_DEPTH)?;
+    let mut measured = bus.source::<MeasuredMessage>()?;
+    prepare_thread(config);
+
+    let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
+    let mut tick_ns = grid.next_after(monotonic_ns());
+    let mut driven = Driven {
+        simulator: Simulator::new(&config.machine, plant.brake_deceleration_m_s2, plant.step_s),
+        time_ns: tick_ns,
+        force: None,
+        cause: Cause::None,
+        timeout_ns: nanoseconds(plant.force_timeout_s),
+    };
+    info!(name = %config.name, "plant at rest at home, brakes closed");
+    while !stop.requested() {
+        sleep_until(tick_ns);
+        if tick_ns - driven.time_ns > LONGEST_PAUSE_NS {
+            warn!(seconds = (tick_ns - driven.time_ns) as f64 * 1e-9, "was paused; time goes on from now");
+            driven.time_ns = tick_ns;
+        }
+        let before = driven.simulator.brakes();
+        while let Some(message) = forces.receive() {
+            driven.receive(&message, tick_ns);
+        }
+        driven.advance_to(tick_ns);
+        tell(before, driven.simulator.brakes(), driven.cause);
+        measured.publish(tick_ns, measured_message(&driven.simulator))?;
+        // The newest grid point that is not in the future, or else the next.
+        let now_ns = monotonic_ns();
+        tick_ns = grid.next_after(tick_ns.max(now_ns.saturating_sub(grid.period_ns())));
+    }
+    Ok(())
+}
+
+/// A simulator and the force on it.
+struct Driven {
+    simulator: Simulator,
+    time_ns: u64,
+    /// Forces and the instant they expire.
+    force: Option<([f64; LEGS], u64)>,
+    /// What the newest message says about why there is no force.
+    cause: Cause,
+    timeout_ns: u64,
+}
+
+impl Driven {
+    /// Applies a message from the instant it was sent.
+    fn receive(&mut self, message: &ForceMessage, tick_ns: u64) {
+        self.advance_to(message.header.time_ns.min(tick_ns));
+        self.cause = Cause::from_number(message.fault).unwrap_or_default();
+        let usable = message.valid == 1 && message.force_n.iter().all(|force| force.is_finite());
+        self.force = usable.then_some((message.force_n, message.header.time_ns + self.timeout_ns));
+    }
+
+    fn advance_to(&mut self, time_ns: u64) {
+        if let Some((force, expires_ns)) = self.force {
+            self.pass(time_ns.min(expires_ns), Some(&force));
+            if time_ns > expires_ns {
+                self.force = None;
+            }
+        }
+        self.pass(time_ns, None);
+    }
+
+    fn pass(&mut self, time_ns: u64, force: Option<&[f64; LEGS]>) {
+        if time_ns > self.time_ns {
+            self.simulator.advance((time_ns - self.time_ns) as f64 * 1e-9, force);
+            self.time_ns = time_ns;
+        }
+    }
+}
+
+fn measured_message(simulator: &Simulator) -> MeasuredMessage {
+    let legs = simulator.leg_motion();
+    let state = simulator.state();
+    MeasuredMessage {
+        length_m: legs.length,
+        length_rate_m_s: legs.rate,
+        pose_valid: 1,
+        x: task_coordinates(&state.pose, &simulator.machine().home),
+        twist: state.twist.vector().into(),
+        ..MeasuredMessage::default()
+    }
+}
+
+fn tell(before: Brakes, now: Brakes, cause: Cause) {
+    match (before, now) {
+        (Brakes::Open, Brakes::Open) | (Brakes::EndStop { .. }, _) => {}
+        (Brakes::Open, Brakes::Closing { .. } | Brakes::Closed) => match cause {
+            Cause::None => warn!("forces stopped arriving: brakes closing"),
+            cause if cause.is_fault() => warn!("no valid force ({}): brakes closing", cause.name()),
+            cause => info!("no valid force ({}): brakes closing", cause.name()),
+        },
+        (_, Brakes::Open) => info!("valid force: brakes open"),
+        (_, Brakes::EndStop { leg }) => {
+            warn!(leg = leg + 1, "a leg reached its end stop: brakes closed for good")
+        }
+        (_, Brakes::Closed | Brakes::Closing { .. }) => debug!("brakes closed"),
+    }
+}
+
+/// Best effort: a simulator or a setpoint source below the daemon's priority, so that on a busy host it
+/// is as punctual as hardware.
+pub(super) fn prepare_thread(config: &Config) {
+    setup::sharp_timers();
+    if let Err(shortfall) = setup::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {
+        debug!("{shortfall}");
+    }
+}

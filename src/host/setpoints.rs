@@ -1,0 +1,189 @@
+//! `hexad move`: a setpoint source in real time.
+//!
+//! It starts where the platform stands (the daemon's status says where), moves it gently to the start of
+//! the scene, plays the scene and ends at rest. If the daemon gives up control on the way, it starts over
+//! from wherever the platform stands then.
+
+extern crate std;
+
+use std::path::{Path, PathBuf};
+use std::prelude::rust_2024::*;
+use std::{format, vec};
+
+use nalgebra::Vector6;
+use tracing::{info, warn};
+
+use super::config::Config;
+use super::daemon::nanoseconds;
+use super::offline::task_state;
+use super::plant::prepare_thread;
+use super::stop::Stop;
+use super::table::{Table, TableError, trajectory_columns};
+use crate::control::state::State;
+use crate::ipc::messages::{SetpointMessage, StatusMessage};
+use crate::ipc::ports::{Bus, PortError};
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
+use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use crate::scene::motions::{Motion, Scene, fit};
+use crate::scene::timeline::Timeline;
+use crate::scene::trajectory::{Knot, interpolate};
+
+/// Largest X' and X'' at the ends of a trajectory: what counts as at rest, per second.
+const REST_RATE: f64 = 1e-3;
+
+/// A daemon that has not said for this long that it is in control is not: the approach starts over \[ns\].
+const GIVEN_UP_NS: u64 = 200_000_000;
+
+/// Why no setpoints could be produced.
+#[derive(Debug, thiserror::Error)]
+pub enum SetpointError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error(transparent)]
+    Table(#[from] TableError),
+    #[error("{}: {what}", path.display())]
+    Trajectory { path: PathBuf, what: String },
+}
+
+/// What to play.
+#[derive(Clone, Debug)]
+pub enum Score {
+    Scene(Scene),
+    Trajectory(Vec<Knot>),
+}
+
+impl Score {
+    /// A built-in motion, as large as the machine can carry.
+    pub fn motion(machine: &Machine, motion: Motion, seconds: f64) -> Self {
+        Self::Scene(fit(machine, motion, seconds))
+    }
+
+    /// A trajectory from a CSV file. It must begin and end at rest, with times that increase.
+    pub fn trajectory(path: &Path) -> Result<Self, SetpointError> {
+        let table = Table::read(path, &trajectory_columns(), &[])?;
+        let knots: Vec<_> = table
+            .rows()
+            .iter()
+            .map(|row| Knot { t: row.first().copied().unwrap_or_default(), state: task_state(row) })
+            .collect();
+        let mut wrong = vec![];
+        for (before, after) in knots.iter().zip(knots.iter().skip(1)) {
+            if after.t <= before.t {
+                wrong.push(format!("t = {:?} after t = {:?}: must increase", after.t, before.t));
+            }
+        }
+        for (end, knot) in [("first", knots.first()), ("last", knots.last())] {
+            let fastest = knot.map_or(0.0, |knot| knot.state.xd.amax());
+            if fastest > REST_RATE {
+                wrong.push(format!("{end} row: rate {fastest:?}: must be at rest, at most {REST_RATE:?}"));
+            }
+        }
+        wrong.truncate(20);
+        if wrong.is_empty() {
+            return Ok(Self::Trajectory(knots));
+        }
+        Err(SetpointError::Trajectory { path: path.into(), what: wrong.join("; ") })
+    }
+
+    /// Seconds it takes.
+    fn duration(&self) -> f64 {
+        match self {
+            Self::Scene(scene) => scene.duration,
+            Self::Trajectory(knots) => knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t),
+        }
+    }
+
+    fn at(&self, t: f64) -> TaskState {
+        match self {
+            Self::Scene(scene) => scene.at(t),
+            Self::Trajectory(knots) => {
+                interpolate(knots, knots.first().map_or(0.0, |first| first.t) + t).unwrap_or_default()
+            }
+        }
+    }
+}
+
+/// Plays the score once, or until `stop`.
+pub fn run(config: &Config, score: &Score, stop: &Stop) -> Result<(), SetpointError> {
+    let bus = Bus::join(&config.name)?;
+    let mut setpoints = bus.source::<SetpointMessage>()?;
+    let mut status = bus.sink::<StatusMessage>(8)?;
+    prepare_thread(config);
+
+    let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
+    let mut player = Player::new(&config.machine, score);
+    info!(name = %config.name, seconds = score.duration(), "waiting for the daemon to know where the platform is");
+    let mut tick_ns = grid.next_after(monotonic_ns());
+    while !stop.requested() {
+        sleep_until(tick_ns);
+        match player.cue(tick_ns, status.newest().as_ref()) {
+            Cue::Silent => {}
+            Cue::Play(state) => setpoints.publish(tick_ns, message(&state))?,
+            Cue::Finished => break,
+        }
+        tick_ns = grid.next_after(tick_ns.max(monotonic_ns()));
+    }
+    Ok(())
+}
+
+/// What to do at a tick.
+enum Cue {
+    Silent,
+    Play(TaskState),
+    Finished,
+}
+
+/// Where in the score we are.
+struct Player<'a> {
+    machine: &'a Machine,
+    score: &'a Score,
+    /// The way to the score from where the platform stands, or stood when the daemon took control.
+    timeline: Option<Timeline>,
+    /// Since when the daemon is in control \[ns\].
+    engaged_ns: Option<u64>,
+    /// When the daemon last said that it is in control \[ns\].
+    last_active_ns: u64,
+}
+
+impl<'a> Player<'a> {
+    fn new(machine: &'a Machine, score: &'a Score) -> Self {
+        Self { machine, score, timeline: None, engaged_ns: None, last_active_ns: 0 }
+    }
+
+    fn cue(&mut self, now_ns: u64, status: Option<&StatusMessage>) -> Cue {
+        if let Some(status) = status {
+            self.listen(now_ns, status);
+        }
+        if self.engaged_ns.is_some() && now_ns.saturating_sub(self.last_active_ns) > GIVEN_UP_NS {
+            warn!("the daemon gave up control or is gone: starting over from where the platform stands");
+            (self.engaged_ns, self.timeline) = (None, None);
+        }
+        let Some(timeline) = &self.timeline else { return Cue::Silent };
+        // Until the daemon takes it, offer the pose at which the platform stands.
+        let t = self.engaged_ns.map_or(0.0, |engaged_ns| now_ns.saturating_sub(engaged_ns) as f64 * 1e-9);
+        if t > timeline.ends() { Cue::Finished } else { Cue::Play(timeline.at(t, |t| self.score.at(t))) }
+    }
+
+    fn listen(&mut self, now_ns: u64, status: &StatusMessage) {
+        if status.state == State::Active as u32 && self.timeline.is_some() {
+            self.last_active_ns = now_ns;
+            if self.engaged_ns.is_none() {
+                info!("the daemon is in control: moving");
+                self.engaged_ns = Some(now_ns);
+            }
+        } else if self.engaged_ns.is_none() && status.pose_valid == 1 {
+            let (from, to) = (Vector6::from(status.x), self.score.at(0.0).x);
+            self.timeline = Some(Timeline::new(self.machine, &from, &to, self.score.duration()));
+        }
+    }
+}
+
+fn message(state: &TaskState) -> SetpointMessage {
+    SetpointMessage {
+        x: state.x.into(),
+        x_rate: state.xd.into(),
+        x_accel: state.xdd.into(),
+        ..SetpointMessage::default()
+    }
+}

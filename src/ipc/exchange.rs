@@ -1,0 +1,39 @@
+//! Exchange between the io thread and the real-time thread: one wait-free triple buffer each way.
+//! The real-time thread never waits; a buffer always holds the newest value.
+
+use triple_buffer::{Input as Writer, Output as Reader};
+
+use crate::control::controller::{Input, Output};
+use crate::realtime::cyclic::Counters;
+
+/// What the real-time thread hands out.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CycleOutput {
+    /// Release of the cycle \[ns\]; 0 before the first.
+    pub release_ns: u64,
+    pub output: Output,
+    pub counters: Counters,
+}
+
+/// The real-time thread's ends.
+pub struct RealtimeSide {
+    pub inputs: Reader<Input>,
+    pub outputs: Writer<CycleOutput>,
+}
+
+/// The io thread's ends.
+pub struct IoSide {
+    /// The release in here is not used: the loop knows its own.
+    pub inputs: Writer<Input>,
+    pub outputs: Reader<CycleOutput>,
+}
+
+/// Makes both. Allocates; start-up only.
+pub fn exchange() -> (RealtimeSide, IoSide) {
+    let (inputs_writer, inputs_reader) = triple_buffer::triple_buffer(&Input::default());
+    let (outputs_writer, outputs_reader) = triple_buffer::triple_buffer(&CycleOutput::default());
+    (
+        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer },
+        IoSide { inputs: inputs_writer, outputs: outputs_reader },
+    )
+}

@@ -1,0 +1,139 @@
+//! Messages on the topics `hexad/<name>/...`: `#[repr(C)]`, plain numbers, SI units and radians.
+//!
+//! Each begins with a [`Header`]. iceoryx2 compares only name, size and alignment of a type, so the header
+//! carries a schema version; a reader ignores messages of another one. Python or C participants declare
+//! the same struct under the same type name.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Version of every struct in this file. Any change of layout or meaning raises it.
+pub const SCHEMA: u32 = 1;
+
+/// First field of every message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("hexad_header")]
+#[repr(C)]
+pub struct Header {
+    /// [`SCHEMA`]
+    pub schema: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Identifies one life of the source: its CLOCK_MONOTONIC start time \[ns\]. The newest life wins.
+    pub epoch: u64,
+    /// Counts the messages of this life, from 1.
+    pub sequence: u64,
+    /// CLOCK_MONOTONIC instant at which the content holds \[ns\].
+    pub time_ns: u64,
+}
+
+/// What carries a [`Header`] and the name of its topic.
+pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
+    /// Last part of the topic name.
+    const TOPIC: &'static str;
+    fn header(&self) -> &Header;
+    fn header_mut(&mut self) -> &mut Header;
+}
+
+/// Where the platform shall be: X = alpha, beta, gamma \[rad\], x, y, z \[m\], and derivatives.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("hexad_setpoint")]
+#[repr(C)]
+pub struct SetpointMessage {
+    pub header: Header,
+    pub x: [f64; 6],
+    pub x_rate: [f64; 6],
+    pub x_accel: [f64; 6],
+}
+
+/// What the drives measure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("hexad_measured")]
+#[repr(C)]
+pub struct MeasuredMessage {
+    pub header: Header,
+    /// L \[m\].
+    pub length_m: [f64; 6],
+    /// L' \[m/s\].
+    pub length_rate_m_s: [f64; 6],
+    /// 1 if `x` and `twist` are filled in (a simulator, an external tracker), else 0. The control loop
+    /// does not use them.
+    pub pose_valid: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// X.
+    pub x: [f64; 6],
+    /// omega \[rad/s\], then v \[m/s\], base axes.
+    pub twist: [f64; 6],
+}
+
+/// What the actuators shall push with. A driver applies `force_n` only if `valid` is 1 **and** the message
+/// is younger than its own watchdog allows; otherwise it brakes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("hexad_force")]
+#[repr(C)]
+pub struct ForceMessage {
+    pub header: Header,
+    /// Gamma \[N\]; positive pushes the platform away from the base. Zero unless valid.
+    pub force_n: [f64; 6],
+    /// 1 if the forces may be applied, else 0.
+    pub valid: u32,
+    /// Number of [`crate::control::state::State`].
+    pub state: u32,
+    /// Number of [`crate::control::state::Cause`].
+    pub fault: u32,
+    /// 1 if a force was cut to the actuators' limit.
+    pub limited: u32,
+    /// Release instant of the cycle that computed the forces \[ns\].
+    pub release_ns: u64,
+}
+
+/// How the daemon is doing; published every cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("hexad_status")]
+#[repr(C)]
+pub struct StatusMessage {
+    pub header: Header,
+    /// Number of [`crate::control::state::State`].
+    pub state: u32,
+    /// Number of [`crate::control::state::Cause`].
+    pub fault: u32,
+    /// 1 if `x` and `twist` are known.
+    pub pose_valid: u32,
+    /// 1 if `position_error_m` and `orientation_error_rad` are known.
+    pub error_valid: u32,
+    /// Measured pose as X, by forward kinematics.
+    pub x: [f64; 6],
+    /// Measured omega \[rad/s\], then v \[m/s\], base axes.
+    pub twist: [f64; 6],
+    /// C_d - C \[m\].
+    pub position_error_m: [f64; 3],
+    /// log(R_d R^T) \[rad\].
+    pub orientation_error_rad: [f64; 3],
+    /// Cycles since start.
+    pub cycles: u64,
+    /// Cycles that woke later than the configured threshold.
+    pub late_wakeups: u64,
+    /// Cycles still computing at their next release.
+    pub overruns: u64,
+    /// Grid points left out because the thread was not ready for them.
+    pub skipped: u64,
+}
+
+macro_rules! message {
+    ($type:ty, $topic:literal) => {
+        impl Message for $type {
+            const TOPIC: &'static str = $topic;
+            fn header(&self) -> &Header {
+                &self.header
+            }
+            fn header_mut(&mut self) -> &mut Header {
+                &mut self.header
+            }
+        }
+    };
+}
+
+message!(SetpointMessage, "setpoint");
+message!(MeasuredMessage, "measured");
+message!(ForceMessage, "force");
+message!(StatusMessage, "status");

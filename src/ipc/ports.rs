@@ -1,0 +1,181 @@
+//! iceoryx2 ports. One function defines the service of a topic for every process: quality-of-service
+//! values are set by whoever creates a service and stay until the last node leaves.
+//!
+//! A peer that comes or goes is handled inside the next send or receive here: allocations, system calls,
+//! up to 0.1 ms. No real-time thread may own a port.
+
+extern crate std;
+
+use core::marker::PhantomData;
+use core::time::Duration;
+use std::format;
+use std::prelude::rust_2024::*;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
+use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+use super::messages::{Header, Message, SCHEMA};
+use crate::realtime::clock::monotonic_ns;
+
+/// One life of a publisher is meant; one more may be stopped (SIGSTOP) or dying, two are reserve.
+const MAX_PUBLISHERS: usize = 4;
+/// Daemon, plant, recorder, monitors.
+const MAX_SUBSCRIBERS: usize = 16;
+const MAX_NODES: usize = 32;
+/// What a slow reader (a recorder) may fall behind: 256 messages are 12.8 ms at 20 kHz, 0.25 s at 1 kHz.
+const BUFFER: usize = 256;
+/// A port that cannot be opened (another user's) must not block the io thread for the default second.
+const CREATION_TIMEOUT: Duration = Duration::from_millis(5);
+
+/// Something about the shared memory did not work: what, and iceoryx2's own words.
+#[derive(Debug, thiserror::Error)]
+#[error("shared memory: {what}: {cause}")]
+pub struct PortError {
+    what: String,
+    cause: String,
+}
+
+fn failed<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
+    move |cause| PortError { what, cause: format!("{cause:?}") }
+}
+
+/// Participation of this process in the topics of one machine.
+pub struct Bus {
+    node: Node<ipc::Service>,
+    machine: String,
+    epoch: u64,
+}
+
+impl Bus {
+    /// Joins. `machine` is the configured name; the epoch of everything published is now.
+    pub fn join(machine: &str) -> Result<Self, PortError> {
+        // Its log goes to `tracing`; what it warns about (dead nodes cleaned up) is routine here.
+        set_log_level(LogLevel::Error);
+        let mut config = Config::default();
+        config.global.creation_timeout = CREATION_TIMEOUT;
+        let node = NodeBuilder::new()
+            // Signals belong to the command line, not to a library's wait loop.
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .config(&config)
+            .create::<ipc::Service>()
+            .map_err(failed("cannot create a node".into()))?;
+        Ok(Self { node, machine: machine.into(), epoch: monotonic_ns() })
+    }
+
+    fn service<T: Message>(&self) -> Result<PortFactory<ipc::Service, T, ()>, PortError> {
+        let name = format!("hexad/{}/{}", self.machine, T::TOPIC);
+        let service_name = name.as_str().try_into().map_err(failed(format!("bad topic {name}")))?;
+        self.node
+            .service_builder(&service_name)
+            .publish_subscribe::<T>()
+            .max_publishers(MAX_PUBLISHERS)
+            .max_subscribers(MAX_SUBSCRIBERS)
+            .max_nodes(MAX_NODES)
+            .subscriber_max_buffer_size(BUFFER)
+            .enable_safe_overflow(true)
+            .history_size(0)
+            .open_or_create()
+            .map_err(failed(format!("cannot open topic {name}")))
+    }
+
+    /// A publisher of `T`.
+    pub fn source<T: Message>(&self) -> Result<Source<T>, PortError> {
+        let publisher = self
+            .service::<T>()?
+            .publisher_builder()
+            .create()
+            .map_err(failed(format!("cannot publish {}", T::TOPIC)))?;
+        Ok(Source { publisher, epoch: self.epoch, sequence: 0 })
+    }
+
+    /// A subscriber to `T` that keeps up to `depth` messages.
+    pub fn sink<T: Message>(&self, depth: usize) -> Result<Sink<T>, PortError> {
+        let subscriber = self
+            .service::<T>()?
+            .subscriber_builder()
+            .buffer_size(depth.min(BUFFER))
+            .create()
+            .map_err(failed(format!("cannot subscribe to {}", T::TOPIC)))?;
+        Ok(Sink { subscriber, epoch: 0, sequence: 0, rejected: 0, topic: PhantomData })
+    }
+}
+
+/// Publishes one topic and numbers what it publishes.
+pub struct Source<T: Message> {
+    publisher: Publisher<ipc::Service, T, ()>,
+    epoch: u64,
+    sequence: u64,
+}
+
+impl<T: Message> Source<T> {
+    /// Fills in the header and sends. `time_ns` is the instant at which the content holds.
+    pub fn publish(&mut self, time_ns: u64, mut message: T) -> Result<(), PortError> {
+        self.sequence += 1;
+        *message.header_mut() =
+            Header { schema: SCHEMA, reserved: 0, epoch: self.epoch, sequence: self.sequence, time_ns };
+        let sample = self
+            .publisher
+            .loan_uninit()
+            .map_err(|cause| failed(format!("cannot loan {}", T::TOPIC))(cause))?;
+        sample
+            .write_payload(message)
+            .send()
+            .map(|_| ())
+            .map_err(|cause| failed(format!("cannot send {}", T::TOPIC))(cause))
+    }
+}
+
+/// Receives one topic, newest life of the source first.
+pub struct Sink<T: Message> {
+    subscriber: Subscriber<ipc::Service, T, ()>,
+    epoch: u64,
+    sequence: u64,
+    rejected: u64,
+    topic: PhantomData<T>,
+}
+
+impl<T: Message> Sink<T> {
+    /// The next message in order, if any. Passes over other schemas, older lives of the source and what
+    /// was seen already: after a publisher dies, its last sample may still arrive.
+    pub fn receive(&mut self) -> Option<T> {
+        // At most what the buffers of all publishers can hold: a flood cannot keep the caller here.
+        for _ in 0..MAX_PUBLISHERS * BUFFER {
+            let message = match self.subscriber.receive() {
+                Ok(Some(sample)) => *sample.payload(),
+                Ok(None) => return None,
+                Err(_) => {
+                    self.rejected += 1;
+                    return None;
+                }
+            };
+            let header = message.header();
+            let order = (header.epoch, header.sequence);
+            if header.schema == SCHEMA && order > (self.epoch, self.sequence) {
+                (self.epoch, self.sequence) = order;
+                return Some(message);
+            }
+            self.rejected += 1;
+        }
+        None
+    }
+
+    /// The newest message that arrived since the last call, if any.
+    pub fn newest(&mut self) -> Option<T> {
+        let mut newest = None;
+        for _ in 0..MAX_PUBLISHERS * BUFFER {
+            match self.receive() {
+                Some(message) => newest = Some(message),
+                None => break,
+            }
+        }
+        newest
+    }
+
+    /// How many messages were passed over.
+    pub fn rejected(&self) -> u64 {
+        self.rejected
+    }
+}

@@ -1,0 +1,45 @@
+//! Inverse Jacobian (paper, eq. 6-9).
+//!
+//! `J^-1` has the rows `[(b_i x n_i)^T  n_i^T]`, so `L' = J^-1 [omega; v]`. Its transpose
+//! `N = [b x n; n]`, a column per leg, takes leg forces to the wrench on the platform about C:
+//! `W = N Gamma`. The paper orders legs 6..1, this project 1..6.
+
+use fearless_simd::{Simd, dispatch};
+use nalgebra::{Matrix6, Vector6};
+
+use super::inverse_geometry::LegGeometry;
+use super::machine::{LEGS, Machine};
+use super::rigid::{Pose, Twist};
+
+/// N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],
+/// force rows below \[1\].
+pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
+    dispatch!(machine.level, simd => leg_wrench_columns(&LegGeometry::new(simd, machine, pose)))
+}
+
+#[inline(always)]
+pub(super) fn leg_wrench_columns<S: Simd>(legs: &LegGeometry<S>) -> Matrix6<f64> {
+    let moment = legs.arm.cross(legs.direction).store().map(|lane| lane.legs());
+    let direction = legs.direction.store().map(|lane| lane.legs());
+    let mut n = Matrix6::zeros();
+    for (mut row, values) in n.row_iter_mut().zip(moment.iter().chain(&direction)) {
+        row.copy_from_slice(values);
+    }
+    n
+}
+
+/// 2-norm condition number of N with torques divided by the characteristic length, so that metres and
+/// radians compare. Infinite at a singular pose. Not for the loop: it computes singular values.
+pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
+    let mut scaled = leg_wrenches(machine, pose);
+    scaled.fixed_rows_mut::<3>(0).unscale_mut(machine.joints.radius);
+    let singular_values = scaled.singular_values();
+    singular_values.max() / singular_values.min()
+}
+
+/// The twist that gives the measured leg rates: solves `J^-1 [omega; v] = L'`.
+///
+/// `None` at a singular pose. Errors of the rates are amplified by the condition of the pose.
+pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> Option<Twist> {
+    leg_wrenches(machine, pose).transpose().lu().solve(&Vector6::from(*rates)).map(|v| Twist::from_vector(&v))
+}

@@ -1,0 +1,140 @@
+//! The machine: every constant the equations need, validated once and immutable afterwards.
+//!
+//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`Lane`]): one array per
+//! coordinate, leg `i` in lane `i`, so that all six are evaluated by the same instructions.
+//!
+//! What this file does not do: read or judge values. `host::config` does, and names key, value and bound.
+
+use fearless_simd::Level;
+use nalgebra::{Matrix3, Vector3};
+
+use super::lanes::Lane;
+
+/// Number of legs.
+pub const LEGS: usize = 6;
+
+/// A machine as the controller or the plant sees it. SI units throughout.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    /// Acceleration of gravity in base axes, g \[m/s^2\].
+    pub gravity: Vector3<f64>,
+    /// All that moves with the end effector, payload included.
+    pub platform: Platform,
+    /// Joint centres and universal-joint axes.
+    pub joints: Joints,
+    /// Link 1, between the universal joint and the prismatic joint.
+    pub cylinder: Link,
+    /// Link 2, between the prismatic joint and the spherical joint.
+    pub rod: Link,
+    /// What moves link 2 along link 1.
+    pub actuator: Actuator,
+    /// Task coordinates X of the home pose: Bryan angles \[rad\], position \[m\].
+    pub home: [f64; 6],
+    /// The instruction set the lanes run on; detected once.
+    pub level: Level,
+}
+
+/// The mobile platform as a rigid body, in platform axes.
+#[derive(Clone, Debug)]
+pub struct Platform {
+    /// \[kg\]
+    pub mass: f64,
+    /// CG, from the platform origin C to the centre of mass \[m\].
+    pub center_of_mass: Vector3<f64>,
+    /// Inertia about the **centre of mass** \[kg m^2\].
+    pub inertia: Matrix3<f64>,
+}
+
+/// Joint centres as lanes.
+#[derive(Clone, Debug)]
+pub struct Joints {
+    /// `A_i`, joint centres on the base, in base axes \[m\].
+    pub base: [Lane; 3],
+    /// `CB_i`, joint centres on the platform, in platform axes \[m\].
+    pub platform: [Lane; 3],
+    /// `u_i`, first axis of the universal joint, fixed in the base, unit length.
+    pub universal_axis: [Lane; 3],
+    /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. Turns
+    /// radians into metres wherever a tolerance must not depend on the size of the machine.
+    pub radius: f64,
+}
+
+impl Joints {
+    /// Packs six legs into lanes and derives the characteristic length.
+    pub fn new(
+        base: &[Vector3<f64>; LEGS],
+        platform: &[Vector3<f64>; LEGS],
+        universal_axis: &[Vector3<f64>; LEGS],
+    ) -> Self {
+        let mean = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
+        let mean_square = platform.iter().map(|b| (b - mean).norm_squared()).sum::<f64>() / LEGS as f64;
+        Self {
+            base: Lane::pack(base),
+            platform: Lane::pack(platform),
+            universal_axis: Lane::pack(universal_axis),
+            radius: mean_square.sqrt(),
+        }
+    }
+}
+
+/// One link of a leg: a body of revolution about the leg's axis.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// \[kg\]
+    pub mass: f64,
+    /// Distance of the centre of mass from the link's own joint \[m\]: cylinder, `e1`, from `A_i`
+    /// toward `B_i`; rod, `e2`, from `B_i` back toward `A_i`.
+    pub center_of_mass: f64,
+    /// Inertia about the leg's axis \[kg m^2\].
+    pub axial_inertia: f64,
+    /// Inertia about any axis through the centre of mass and normal to the leg \[kg m^2\].
+    pub transverse_inertia: TransverseInertia,
+}
+
+/// Transverse inertia `constant + quadratic (L - reference_length)^2`, L the length of the leg.
+///
+/// With `quadratic != 0` (the paper's Table 1) the body is not rigid. The instantaneous value enters
+/// Newton-Euler, as in the paper; `dI/dt` terms are left out, so power does not balance exactly.
+#[derive(Clone, Debug)]
+pub struct TransverseInertia {
+    /// \[kg m^2\]
+    pub constant: f64,
+    /// \[kg\]
+    pub quadratic: f64,
+    /// \[m\]
+    pub reference_length: f64,
+}
+
+/// The prismatic joint and its drive.
+#[derive(Clone, Debug)]
+pub struct Actuator {
+    /// Shortest leg \[m\].
+    pub min_length: f64,
+    /// Longest leg \[m\].
+    pub max_length: f64,
+    /// Largest speed of the leg \[m/s\].
+    pub max_rate: f64,
+    /// Largest force \[N\].
+    pub max_force: f64,
+    /// Inertia of motor and screw, seen along the leg \[kg\].
+    pub reflected_mass: f64,
+    /// \[N s/m\]
+    pub viscous_friction: f64,
+    /// \[N\]
+    pub coulomb_friction: f64,
+    /// Speed above which the Coulomb force has its full value \[m/s\]; below it is proportional.
+    pub coulomb_smoothing: f64,
+}
+
+impl Actuator {
+    /// The `coulomb_smoothing` of a controller: sign(L') is exact above 0.1 mm/s, slow enough for a
+    /// telescope's legs, and one count of a usual encoder at 1 kHz does not make the force chatter.
+    pub const COULOMB_SMOOTHING_M_S: f64 = 1e-4;
+
+    /// Force the drive itself takes \[N\]: `reflected L'' + viscous L' + coulomb sign(L')`.
+    #[inline(always)]
+    pub fn drive_force(&self, rate: f64, accel: f64) -> f64 {
+        let sign = (rate / self.coulomb_smoothing).clamp(-1.0, 1.0);
+        self.reflected_mass * accel + self.viscous_friction * rate + self.coulomb_friction * sign
+    }
+}

@@ -1,0 +1,182 @@
+//! Pose, twist, acceleration and wrench of the mobile platform: distinct types for distinct things.
+
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// Where the platform is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// R, platform axes expressed in base axes.
+    pub rotation: Matrix3<f64>,
+    /// C, the platform origin in base axes \[m\].
+    pub position: Vector3<f64>,
+}
+
+/// How the platform moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Twist {
+    /// omega, base axes \[rad/s\].
+    pub angular: Vector3<f64>,
+    /// v, velocity of C, base axes \[m/s\].
+    pub linear: Vector3<f64>,
+}
+
+/// Time derivative of the twist, part by part.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Acceleration {
+    /// omega', base axes \[rad/s^2\].
+    pub angular: Vector3<f64>,
+    /// v', acceleration of C, base axes \[m/s^2\].
+    pub linear: Vector3<f64>,
+}
+
+/// What acts on the platform.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Torque about C, base axes \[N m\].
+    pub torque: Vector3<f64>,
+    /// Force, base axes \[N\].
+    pub force: Vector3<f64>,
+}
+
+/// Pose, twist and acceleration at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Motion {
+    pub pose: Pose,
+    pub twist: Twist,
+    pub acceleration: Acceleration,
+}
+
+impl Twist {
+    /// `[omega; v]`
+    pub fn vector(&self) -> Vector6<f64> {
+        stack(&self.angular, &self.linear)
+    }
+
+    /// Inverse of [`Twist::vector`].
+    pub fn from_vector(v: &Vector6<f64>) -> Self {
+        Self { angular: v.fixed_rows::<3>(0).into(), linear: v.fixed_rows::<3>(3).into() }
+    }
+}
+
+impl Acceleration {
+    /// `[omega'; v']`
+    pub fn vector(&self) -> Vector6<f64> {
+        stack(&self.angular, &self.linear)
+    }
+
+    /// Inverse of [`Acceleration::vector`].
+    pub fn from_vector(v: &Vector6<f64>) -> Self {
+        Self { angular: v.fixed_rows::<3>(0).into(), linear: v.fixed_rows::<3>(3).into() }
+    }
+}
+
+impl Wrench {
+    /// `[torque; force]`
+    pub fn vector(&self) -> Vector6<f64> {
+        stack(&self.torque, &self.force)
+    }
+}
+
+impl Pose {
+    /// The pose after the displacement `[dw; dv]`: `R <- exp(dw~) R`, `C <- C + dv`, both in base axes.
+    ///
+    /// R is brought back to an orthonormal matrix by one step of Newton's iteration for the polar factor,
+    /// so that millions of displacements in a row do not accumulate rounding.
+    pub fn displaced(&self, displacement: &Twist) -> Self {
+        Self {
+            rotation: orthonormalized(&(exp(&displacement.angular) * self.rotation)),
+            position: self.position + displacement.linear,
+        }
+    }
+
+    /// The displacement `[dw; dv]` that leads from `self` to `target`: `dw = log(R_target R^T)`.
+    pub fn displacement_to(&self, target: &Self) -> Twist {
+        Twist {
+            angular: log(&(target.rotation * self.rotation.transpose())),
+            linear: target.position - self.position,
+        }
+    }
+}
+
+/// Rotation by the rotation vector `w`: Rodrigues' formula, exact for every angle.
+pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
+    let angle_squared = w.norm_squared();
+    let angle = angle_squared.sqrt();
+    // Below 1e-4 rad the series to the second term is exact to rounding, and 0/0 is avoided.
+    let (a, b) = if angle < 1e-4 {
+        (1.0 - angle_squared / 6.0, 0.5 - angle_squared / 24.0)
+    } else {
+        let (sin, cos) = angle.sin_cos();
+        (sin / angle, (1.0 - cos) / angle_squared)
+    };
+    let tilde = w.cross_matrix();
+    Matrix3::identity() + tilde * a + tilde * tilde * b
+}
+
+/// Rotation vector of a rotation matrix, angle in \[0, pi\]; inverse of [`exp`].
+///
+/// Well conditioned below about 3 rad. At pi the axis is determined up to sign.
+pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
+    // twice the sine of the angle, times the axis
+    let axial = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12);
+    let twice_sin = axial.norm();
+    let twice_cos = r.trace() - 1.0;
+    let angle = twice_sin.atan2(twice_cos);
+    if twice_sin > 1e-4 {
+        return axial * (angle / twice_sin);
+    }
+    if twice_cos > 0.0 {
+        return axial * (0.5 + angle * angle / 12.0);
+    }
+    // Next to a half turn the axis comes from R + I = 2 a a^T.
+    let symmetric = r + r.transpose() + Matrix3::identity() * 2.0;
+    let column = symmetric.column(symmetric.diagonal().imax());
+    let axis = Vector3::from(column) / column.norm().max(f64::MIN_POSITIVE);
+    let sign = if axis.dot(&axial) < 0.0 { -1.0 } else { 1.0 };
+    axis * (angle * sign)
+}
+
+/// One step of Newton's iteration for the polar factor: `R (3 I - R^T R) / 2`.
+fn orthonormalized(r: &Matrix3<f64>) -> Matrix3<f64> {
+    r * (Matrix3::identity() * 3.0 - r.transpose() * r) * 0.5
+}
+
+fn stack(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn log_inverts_exp_up_to_a_half_turn() {
+        for axis in [Vector3::x(), Vector3::new(0.3, -0.9, 0.2), Vector3::new(-1.0, -1.0, 1.0)] {
+            for angle in [0.0, 1e-12, 1e-6, 0.9e-4, 1.1e-4, 0.1, 1.5, 3.0, 3.14] {
+                let w = axis.normalize() * angle;
+                let back = log(&exp(&w));
+                assert!((back - w).norm() < 1e-11, "{angle}: {back} for {w}");
+            }
+        }
+    }
+
+    #[test]
+    fn log_finds_the_axis_of_a_half_turn() {
+        for axis in [Vector3::x(), Vector3::new(0.3, -0.9, 0.2), Vector3::new(-1.0, -1.0, 1.0)] {
+            let w = axis.normalize() * core::f64::consts::PI;
+            let back = log(&exp(&w));
+            assert!((back - w).norm().min((back + w).norm()) < 1e-7, "{back} for {w}");
+        }
+    }
+
+    #[test]
+    fn many_displacements_keep_the_rotation_orthonormal() {
+        let mut pose = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
+        let step = Twist { angular: Vector3::new(1e-2, -2e-2, 3e-3), linear: Vector3::zeros() };
+        for _ in 0..100_000 {
+            pose = pose.displaced(&step);
+        }
+        let defect = (pose.rotation.transpose() * pose.rotation - Matrix3::identity()).amax();
+        assert!(defect < 1e-15, "{defect}");
+    }
+}

@@ -1,0 +1,142 @@
+//! Task coordinates `X = [alpha beta gamma x y z]` (paper, eq. 1) and the motion they stand for.
+//!
+//! `R = Rx(alpha) Ry(beta) Rz(gamma)`; `omega = E(alpha, beta) [alpha' beta' gamma']`. The columns of E
+//! are the three joint axes of the rotation, so E is always defined. Its inverse is not, at
+//! beta = +-90 deg: nothing in the loop needs it, angles are only read at its edges.
+
+use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
+
+use super::rigid::{Acceleration, Motion, Pose, Twist};
+
+/// X, X', X'' at one instant: Bryan angles \[rad\], position \[m\], and their time derivatives.
+///
+/// X' and X'' hold angle rates, not angular velocity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TaskState {
+    pub x: Vector6<f64>,
+    pub xd: Vector6<f64>,
+    pub xdd: Vector6<f64>,
+}
+
+impl TaskState {
+    /// At X without moving.
+    pub fn at_rest(x: [f64; 6]) -> Self {
+        Self { x: x.into(), ..Self::default() }
+    }
+
+    /// The state `dt` seconds later (or earlier) if X'' stays as it is.
+    pub fn after(&self, dt: f64) -> Self {
+        Self {
+            x: self.x + (self.xd + self.xdd * (0.5 * dt)) * dt,
+            xd: self.xd + self.xdd * dt,
+            xdd: self.xdd,
+        }
+    }
+
+    /// Pose, twist and acceleration in base axes.
+    pub fn motion(&self) -> Motion {
+        let [alpha, beta, gamma, x, y, z] = self.x.into();
+        let [alpha_rate, beta_rate, gamma_rate, vx, vy, vz] = self.xd.into();
+        let [alpha_accel, beta_accel, gamma_accel, ax, ay, az] = self.xdd.into();
+        let rx = rotation_x(alpha);
+        let rx_ry = rx * rotation_y(beta);
+        // Columns of E, and what turns each of them.
+        let e1 = Vector3::x();
+        let e2: Vector3<f64> = rx.column(1).into();
+        let e3: Vector3<f64> = rx_ry.column(2).into();
+        let omega_2 = e1 * alpha_rate;
+        let omega_3 = omega_2 + e2 * beta_rate;
+        Motion {
+            pose: Pose { rotation: rx_ry * rotation_z(gamma), position: Vector3::new(x, y, z) },
+            twist: Twist { angular: omega_3 + e3 * gamma_rate, linear: Vector3::new(vx, vy, vz) },
+            acceleration: Acceleration {
+                angular: e1 * alpha_accel
+                    + e2 * beta_accel
+                    + e3 * gamma_accel
+                    + omega_2.cross(&e2) * beta_rate
+                    + omega_3.cross(&e3) * gamma_rate,
+                linear: Vector3::new(ax, ay, az),
+            },
+        }
+    }
+
+    /// Whether every number is finite.
+    pub fn is_finite(&self) -> bool {
+        self.x.iter().chain(&self.xd).chain(&self.xdd).all(|value| value.is_finite())
+    }
+}
+
+/// Task coordinates of a pose. Of the two triples of Bryan angles (and their full turns) that give the
+/// same R, the one nearest to `near`, so that a continuous motion has continuous angles.
+///
+/// Conditioning: alpha and gamma lose `1 / cos(beta)`. At beta = +-90 deg only their sum or difference
+/// is determined; alpha is then taken from `near`.
+pub fn task_coordinates(pose: &Pose, near: &[f64; 6]) -> [f64; 6] {
+    let r = &pose.rotation;
+    let [near_alpha, near_beta, near_gamma, ..] = *near;
+    let cos_beta = r.m11.hypot(r.m12);
+    let beta = r.m13.atan2(cos_beta);
+    let (alpha, gamma) = if cos_beta > 1e-12 {
+        ((-r.m23).atan2(r.m33), (-r.m12).atan2(r.m11))
+    } else {
+        // R = Rx(alpha) Ry(+-90 deg) Rz(gamma): row 2 and 3 hold alpha +- gamma.
+        let rest = rotation_y(-beta) * rotation_x(-near_alpha) * r;
+        (near_alpha, rest.m21.atan2(rest.m22))
+    };
+    let pi = core::f64::consts::PI;
+    let nearest = |angle: f64, near: f64| angle + ((near - angle) / (2.0 * pi)).round() * 2.0 * pi;
+    let candidate = |alpha: f64, beta: f64, gamma: f64| {
+        [nearest(alpha, near_alpha), nearest(beta, near_beta), nearest(gamma, near_gamma)]
+    };
+    let distance =
+        |[a, b, c]: [f64; 3]| (a - near_alpha).powi(2) + (b - near_beta).powi(2) + (c - near_gamma).powi(2);
+    let first = candidate(alpha, beta, gamma);
+    let second = candidate(alpha + pi, pi - beta, gamma + pi);
+    let [alpha, beta, gamma] = if distance(first) <= distance(second) { first } else { second };
+    [alpha, beta, gamma, pose.position.x, pose.position.y, pose.position.z]
+}
+
+fn rotation_x(angle: f64) -> Matrix3<f64> {
+    Rotation3::from_axis_angle(&Vector3::x_axis(), angle).into_inner()
+}
+
+fn rotation_y(angle: f64) -> Matrix3<f64> {
+    Rotation3::from_axis_angle(&Vector3::y_axis(), angle).into_inner()
+}
+
+fn rotation_z(angle: f64) -> Matrix3<f64> {
+    Rotation3::from_axis_angle(&Vector3::z_axis(), angle).into_inner()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::FRAC_PI_2;
+
+    #[test]
+    fn rates_are_the_derivatives_of_the_pose() {
+        let state = TaskState {
+            x: Vector6::new(0.3, 1.5, -0.8, 0.1, 0.2, 1.0),
+            xd: Vector6::new(1.0, -2.0, 0.5, 0.3, 0.0, -0.1),
+            xdd: Vector6::new(-3.0, 1.0, 2.0, 0.0, 1.0, 0.5),
+        };
+        let h = 1e-5;
+        let (before, now, after) = (state.after(-h).motion(), state.motion(), state.after(h).motion());
+        let omega = before.pose.displacement_to(&after.pose).angular / (2.0 * h);
+        assert!((omega - now.twist.angular).norm() < 1e-8);
+        let alpha = (after.twist.angular - before.twist.angular) / (2.0 * h);
+        assert!((alpha - now.acceleration.angular).norm() < 1e-8);
+    }
+
+    #[test]
+    fn coordinates_invert_the_pose_through_gimbal_lock() {
+        for beta in [-1.4, 0.0, 1.5, FRAC_PI_2 - 1e-6, FRAC_PI_2, FRAC_PI_2 + 1e-6, 1.7, 3.0] {
+            let x = [2.9, beta, -2.0, 0.1, -0.2, 0.3];
+            let pose = TaskState::at_rest(x).motion().pose;
+            let back = task_coordinates(&pose, &x);
+            let again = TaskState::at_rest(back).motion().pose;
+            assert!((again.rotation - pose.rotation).amax() < 1e-14);
+            assert!(back.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-9), "{back:?} for {x:?}");
+        }
+    }
+}

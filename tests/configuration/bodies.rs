@@ -1,0 +1,133 @@
+//! Machines that cannot exist: inertia, stroke, joints, home.
+
+use hexad::host::config::Violation;
+
+use super::{FRIED, fried_with, refused, violations};
+
+#[test]
+fn bodies_must_be_possible() {
+    let inertia = "inertia_kg_m2 = { xx = 0.375, yy = 0.1875, zz = 0.1875 }";
+    let tensor = |t: &str| format!("inertia_kg_m2 = {t}");
+    refused(
+        inertia,
+        &tensor("{ xx = 0.38, yy = 0.1875, zz = 0.1875 }"),
+        "platform.inertia_kg_m2 = principal moments [0.1875, 0.1875, 0.38]: the greatest must be at most the \
+         sum of the others",
+    );
+    refused(
+        inertia,
+        &tensor("{ xx = 2, yy = 2, zz = 2, xy = 3 }"),
+        "platform.inertia_kg_m2 = principal moments [-1.0, 2.0, 5.0]: must all be greater than 0",
+    );
+    assert_eq!(violations(&fried_with(inertia, &tensor("{ xx = 2, yy = 2, zz = 2, xy = -1 }"))), []);
+    // A thin rod along the leg: as much as nothing about its axis, and a disc: twice as much as across.
+    let cylinder = "axial_inertia_kg_m2 = 0.0002\ntransverse_inertia_kg_m2 = 0.0038";
+    let with = |axial: f64, transverse: &str| {
+        format!("axial_inertia_kg_m2 = {axial}\ntransverse_inertia_kg_m2 = {transverse}")
+    };
+    for (axial, transverse) in [(0.0, "0"), (0.0, "0.1"), (0.2, "0.1")] {
+        assert_eq!(violations(&fried_with(cylinder, &with(axial, transverse))), []);
+    }
+    let refused_inertia = |axial: f64, transverse: &str, least: &str, bound: &str| {
+        let message = format!(
+            "cylinder.transverse_inertia_kg_m2 = {least} at its least over the stroke: must be at least {bound} \
+             (half of axial_inertia_kg_m2)"
+        );
+        refused(cylinder, &with(axial, transverse), &message);
+    };
+    refused_inertia(0.2, "0.0999", "0.0999", "0.1");
+    refused_inertia(0.2, "0", "0", "0.1");
+    // The least is at the reference length if that is within the stroke [0.85, 1.6], else at an end.
+    let at = |c: f64, q: f64, l: f64| {
+        format!("{{ constant_kg_m2 = {c}, quadratic_kg = {q}, reference_length_m = {l} }}")
+    };
+    refused_inertia(0.2, &at(0.05, 1.0, 1.2), "0.05", "0.1");
+    refused_inertia(0.2, &at(0.05, 1.0, 0.65), "0.09", "0.1");
+    refused_inertia(0.2, &at(1.05, -1.0, 0.6), "0.05", "0.1");
+    refused_inertia(0.2, &at(1.05, -1.0, 1.85), "0.05", "0.1");
+    refused_inertia(0.0, &at(-0.1, 1.0, 0.65), "-0.06", "0");
+    assert_eq!(violations(&fried_with(cylinder, &with(0.2, &at(0.05, 1.0, 0.6)))), []);
+}
+
+#[test]
+fn the_geometry_must_hold_the_platform() {
+    refused(
+        "min_length_m = 0.85\nmax_length_m = 1.6",
+        "min_length_m = 1.6\nmax_length_m = 1.6",
+        "actuator.max_length_m = 1.6: must be greater than 1.6 (actuator.min_length_m)",
+    );
+    refused(
+        "base_m = [0.0, -0.482090707265, 0.574533332339]",
+        "base_m = [-1.0, -0.482090707265, 0.574533332339]",
+        "leg[3] = 2.15591 m long at home: must be in [0.85, 1.6] (actuator.min_length_m, actuator.max_length_m)",
+    );
+    refused(
+        "base_m = [0.0, -0.482090707265, 0.574533332339]",
+        "base_m = [0.5, -0.482090707265, 0.574533332339]",
+        "leg[3] = 0.773283 m long at home: must be in [0.85, 1.6] (actuator.min_length_m, actuator.max_length_m)",
+    );
+    refused(
+        "base_m = [0.0, -0.482090707265, 0.574533332339]",
+        "base_m = [1.1, -0.492403876506, 0.086824088833]",
+        "leg[3] = 0.0 m long at home: base_m and platform_m must not coincide at home",
+    );
+    refused(
+        "platform_m = [0.0, -0.492403876506, 0.086824088833]",
+        "platform_m = [0.0, 0.171010071663, 0.469846310493]",
+        "leg[3].platform_m = 1e-10 m from leg[2].platform_m: must be at least 4.83425e-7 m from it (1e-6 of the \
+         radius)",
+    );
+    refused(
+        "base_m = [0.0, -0.482090707265, -0.574533332339]",
+        "base_m = [0.0, -0.482090707265, 0.574533332339]",
+        "leg[4].base_m = 0.0 m from leg[3].base_m: must be at least 7.25137e-7 m from it (1e-6 of the radius)",
+    );
+    let axis = |axis: &str| {
+        format!("[[leg]]\nuniversal_axis = {axis}\nbase_m = [0.0, 0.738605814759, 0.13023613325]")
+    };
+    let leg = "[[leg]]\nbase_m = [0.0, 0.738605814759, 0.13023613325]";
+    refused(
+        leg,
+        &axis("[0, 0, 0]"),
+        "leg[1].universal_axis = [0, 0, 0]: must not be zero: it is a direction",
+    );
+    refused(
+        leg,
+        &axis("[11.0, -4.17212, 2.53]"),
+        "leg[1].universal_axis = 0.000173796 rad from the leg at home: must be at least 0.001 rad from it",
+    );
+    assert_eq!(violations(&fried_with(leg, &axis("[11.0, -4.2, 2.53]"))), []);
+}
+
+/// A machine from twelve points, with a stroke for every length.
+fn machine_with(base: [[f64; 3]; 6], platform: [[f64; 3]; 6]) -> String {
+    let (head, _) = FRIED.split_once("[[leg]]").unwrap();
+    let legs =
+        base.iter().zip(&platform).map(|(b, p)| format!("[[leg]]\nbase_m = {b:?}\nplatform_m = {p:?}\n"));
+    head.replace("max_length_m = 1.6", "max_length_m = 16") + &legs.collect::<String>()
+}
+
+#[test]
+fn singular_machines_are_refused() {
+    let ring = |radius: f64, phase: f64| -> [[f64; 3]; 6] {
+        std::array::from_fn(|i| {
+            let angle = phase + i as f64 * std::f64::consts::FRAC_PI_3;
+            [0.0, radius * angle.cos(), radius * angle.sin()]
+        })
+    };
+    let line: [[f64; 3]; 6] = std::array::from_fn(|i| [0.0, i as f64 * 0.1, i as f64 * 0.3]);
+    let point = [[0.1; 3]; 6];
+    let only = |text: String, start: &str, end: &str| {
+        let found = violations(&text);
+        let message = found.first().map(Violation::to_string).unwrap_or_default();
+        assert!(found.len() == 1 && message.starts_with(start) && message.ends_with(end), "{found:#?}");
+    };
+    let bound = "of the radius: no leg resists a turn about it";
+    only(machine_with(ring(0.7, 0.0), line), "leg[1].platform_m = on one line with all others", bound);
+    only(machine_with(line, ring(0.5, 0.2)), "leg[1].base_m = on one line with all others", bound);
+    only(machine_with(ring(0.7, 0.0), point), "leg[1].platform_m = on one line with all others", bound);
+    // Two regular hexagons, one above the other: every leg meets the axis at the same angle.
+    let end = "must be at most 10000: the legs cannot hold the platform in every direction";
+    only(machine_with(ring(0.7, 0.0), ring(0.5, 0.0)), "home.pose = condition number ", end);
+    only(machine_with(ring(0.7, 0.0), ring(0.5, 1e-5)), "home.pose = condition number ", end);
+}

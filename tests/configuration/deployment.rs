@@ -1,0 +1,109 @@
+//! Deployment: bounds, and what follows from the rate.
+
+use hexad::host::config::{Config, Violation};
+
+use super::{FRIED, violations};
+
+#[test]
+fn deployment_is_refused_beyond_what_the_rate_carries() {
+    let refused = |text: &str, messages: &[&str]| {
+        let found: Vec<_> = violations(&format!("{FRIED}{text}")).iter().map(Violation::to_string).collect();
+        assert_eq!(found, messages, "after {text:?}");
+    };
+    refused("[realtime]\nrate_hz = 9", &["realtime.rate_hz = 9: must be in [10, 20000]"]);
+    refused("[realtime]\nrate_hz = 20001", &["realtime.rate_hz = 20001: must be in [10, 20000]"]);
+    refused("[realtime]\nrate_hz = 20_000", &[]);
+    refused("[realtime]\ncpu = -1", &["realtime.cpu = -1: must be an integer in [0, 1023]"]);
+    refused("[realtime]\nio_cpu = 1.0", &["realtime.io_cpu = 1.0: must be an integer in [0, 1023]"]);
+    refused("[realtime]\npriority = 100", &["realtime.priority = 100: must be an integer in [1, 99]"]);
+    refused(
+        "[realtime]\nio_priority = 99999999999999999999",
+        &["realtime.io_priority = 99999999999999999999: must be an integer in [1, 99]"],
+    );
+    refused("[realtime]\nlock_memory = 1", &["realtime.lock_memory = 1: must be true or false"]);
+    refused(
+        "[realtime]\nrequire_realtime = \"no\"",
+        &["realtime.require_realtime = \"no\": must be true or false"],
+    );
+    refused("[realtime]\nlate_wakeup_us = 0", &["realtime.late_wakeup_us = 0: must be greater than 0"]);
+    refused(
+        "[realtime]\nlate_wakeup_us = 501",
+        &["realtime.late_wakeup_us = 501: must be at most 500 (half a period of realtime.rate_hz = 1000)"],
+    );
+    refused(
+        "[control]\nposition_bandwidth_hz = 0",
+        &["control.position_bandwidth_hz = 0: must be greater than 0"],
+    );
+    for axis in ["position", "orientation"] {
+        let key = format!("{axis}_damping_ratio");
+        let text = format!("[control]\n{key} = 11");
+        refused(&text, &[&format!("control.{key} = 11: must be in [0.1, 10]")]);
+    }
+    refused(
+        "[control]\nengage_position_m = 0.2\nengage_orientation_rad = 0.3",
+        &[
+            "control.engage_position_m = 0.2: must be greater than 0 and at most 0.1",
+            "control.engage_orientation_rad = 0.3: must be greater than 0 and at most 0.2",
+        ],
+    );
+    refused(
+        "[timeouts]\nsetpoint_ms = 1001\nmeasured_ms = 1",
+        &[
+            "timeouts.setpoint_ms = 1001: must be greater than 0 and at most 1000",
+            "timeouts.measured_ms = 1: must be greater than 1 (one period of realtime.rate_hz = 1000)",
+        ],
+    );
+    refused(
+        "[plant]\nforce_timeout_ms = 0.5\nbrake_deceleration_m_s2 = 0\nstep_us = 5",
+        &[
+            "plant.force_timeout_ms = 0.5: must be greater than 1 (one period of realtime.rate_hz = 1000)",
+            "plant.brake_deceleration_m_s2 = 0: must be greater than 0 and at most 1000",
+            "plant.step_us = 5: must be in [10, 1000]",
+        ],
+    );
+    // Defaults too must fit the rate, and say that they are defaults.
+    refused(
+        "[realtime]\nrate_hz = 40\n[control]\nposition_bandwidth_hz = 1\norientation_bandwidth_hz = 1",
+        &[
+            "timeouts.measured_ms = 20 (default): must be greater than 25 (one period of realtime.rate_hz = 40)",
+        ],
+    );
+}
+
+#[test]
+fn the_largest_bandwidth_in_the_message_is_accepted() {
+    for (rate, damping) in [(1000.0, 1.0), (1000.0, 0.1), (100.0, 0.7), (50.0, 10.0), (20_000.0, 3.0)] {
+        for (axis, other) in [("position", "orientation"), ("orientation", "position")] {
+            let text = |bandwidth: f64| {
+                format!(
+                    "{FRIED}[realtime]\nrate_hz = {rate}\n[timeouts]\nmeasured_ms = 100\n[control]\n\
+                     {axis}_bandwidth_hz = {bandwidth}\n{axis}_damping_ratio = {damping}\n{other}_bandwidth_hz = 0.01\n"
+                )
+            };
+            let found = violations(&text(rate));
+            let [violation] = found.as_slice() else { panic!("{found:#?}") };
+            assert_eq!(violation.key, format!("control.{axis}_bandwidth_hz"));
+            let (_, bound) = violation.bound.split_once("must be at most ").unwrap();
+            let (largest, rest) = bound.split_once(' ').unwrap();
+            assert_eq!(
+                rest,
+                format!(
+                    "at realtime.rate_hz = {rate} and {axis}_damping_ratio = {damping} (gain margin of 2)"
+                )
+            );
+            let largest: f64 = largest.parse().unwrap();
+            assert_eq!(violations(&text(largest)), []);
+            assert_eq!(violations(&text(largest + 0.002)).len(), 1);
+        }
+    }
+}
+
+#[test]
+fn the_default_of_a_late_wakeup_is_within_half_a_period() {
+    for (rate_hz, late_wakeup_s) in [(100, 200e-6), (2500, 200e-6), (5000, 100e-6), (20_000, 25e-6)] {
+        let slow = "[timeouts]\nmeasured_ms = 50\n[control]\nposition_bandwidth_hz = 1\norientation_bandwidth_hz = 1";
+        let text = format!("{FRIED}[realtime]\nrate_hz = {rate_hz}\n{slow}");
+        let config = Config::parse(&text, "test.toml").unwrap();
+        assert_eq!(config.deployment.realtime.late_wakeup_s, late_wakeup_s);
+    }
+}
