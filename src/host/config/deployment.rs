@@ -1,7 +1,7 @@
 //! The sections that say how a machine is run: `[realtime]`, `[control]`, `[timeouts]`, `[plant]`.
 //!
-//! Every key has a default that works at 1 kHz. Limits that follow from the rate are checked against the
-//! rate, defaults included: a slow loop must be given the gains and timeouts that it can carry.
+//! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
+//! timeouts. What is given is checked against the limits that follow from the rate.
 
 extern crate std;
 
@@ -17,6 +17,11 @@ const RATE_HZ: Bound = Bound::Within(10.0, 20_000.0);
 /// Default of `late_wakeup_us` where half a period is longer; the wake-up latency of an ordinary kernel
 /// stays below at the 99th percentile.
 const LATE_WAKEUP_US: f64 = 200.0;
+/// Default of the bandwidths where the rate carries it \[Hz\]: stiff enough for micrometres, soft enough for
+/// a structure that is not quite rigid.
+const BANDWIDTH_HZ: f64 = 10.0;
+/// Defaults of the timeouts are no shorter than this many periods: one message late is not a peer lost.
+const LEAST_DEFAULT_PERIODS: f64 = 4.0;
 /// CPUs count from 0; a `cpu_set_t` holds 1024.
 const LAST_CPU: i32 = 1023;
 /// Linux's range of `SCHED_FIFO`.
@@ -173,13 +178,13 @@ fn control(mut section: Reader, rate_hz: f64) -> Control {
 
 /// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry.
 fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], rate_hz: f64) -> [f64; 2] {
-    let bandwidth_hz = section.number_or(bandwidth_key, 10.0, Bound::Positive);
     let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO);
     let period_s = 1.0 / rate_hz;
+    // Rounded down, so that the number in the message is one that is accepted.
+    let largest = (max_bandwidth_hz(damping_ratio, period_s) * 1e3).floor() / 1e3;
+    let bandwidth_hz = section.number_or(bandwidth_key, BANDWIDTH_HZ.min(largest), Bound::Positive);
     let all_read = [bandwidth_hz, damping_ratio, period_s].iter().all(|x| x.is_finite());
     if all_read && gain_margin(bandwidth_hz, damping_ratio, period_s) < MIN_GAIN_MARGIN {
-        // Rounded down, so that the number in the message is one that is accepted.
-        let largest = (max_bandwidth_hz(damping_ratio, period_s) * 1e3).floor() / 1e3;
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
              (gain margin of {MIN_GAIN_MARGIN})"
@@ -211,8 +216,9 @@ fn plant(mut section: Reader, rate_hz: f64) -> Plant {
 
 /// A peer that sends once a cycle is silent for one period: a timeout must be longer.
 fn timeout_s(section: &mut Reader, key: &'static str, default_ms: f64, rate_hz: f64) -> f64 {
-    let timeout_ms = section.number_or(key, default_ms, Bound::UpTo(LONGEST_TIMEOUT_MS));
     let period_ms = 1e3 / rate_hz;
+    let default_ms = default_ms.max(LEAST_DEFAULT_PERIODS * period_ms);
+    let timeout_ms = section.number_or(key, default_ms, Bound::UpTo(LONGEST_TIMEOUT_MS));
     if timeout_ms <= period_ms {
         let bound = format!(
             "must be greater than {} (one period of realtime.rate_hz = {rate_hz})",
