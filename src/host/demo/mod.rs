@@ -95,7 +95,7 @@ pub fn run(demo: &Demo, stop: &Stop) -> Result<(), DemoError> {
         return Err(DemoError::NotWell(format!("{} faults", report.faults.len())));
     }
     if tracking.count() == 0 {
-        return Err(DemoError::NotWell("the platform was never in motion".into()));
+        return Err(DemoError::NotWell("nothing was recorded".into()));
     }
     let control = &stage.config.deployment.control;
     let lost = report.tracking.position_max_m > control.engage_position_m.max(MAX_ERROR_M)

@@ -75,10 +75,13 @@ impl Recording {
         })
     }
 
-    /// Error between the desired pose and the plant's true one, over the instants in motion.
+    /// Error between the desired pose and the plant's true one, over the instants in motion; over all if
+    /// there was no motion.
     pub fn tracking(&self) -> TrackingSum {
+        let moves = |desired: &TaskState| desired.xd.amax() > 0.0;
+        let at_rest = !self.pairs().any(|(_, desired)| moves(&desired));
         let mut sum = TrackingSum::default();
-        for (measured, desired) in self.pairs().filter(|(_, desired)| desired.xd.amax() > 0.0) {
+        for (measured, desired) in self.pairs().filter(|(_, desired)| at_rest || moves(desired)) {
             let error = measured_pose(measured).displacement_to(&desired.motion().pose);
             sum.add(error.linear.norm(), error.angular.norm());
         }
