@@ -11,7 +11,6 @@ use crate::control::gains::{gain_margin, max_bandwidth_hz};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
-use crate::model::lanes::Lane;
 use crate::model::leg::Exact;
 use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
@@ -32,7 +31,8 @@ impl<'a> Check<'a> {
     pub fn new(config: &'a Config) -> Self {
         let machine = &config.machine;
         let motion = TaskState::at_rest(machine.home).motion();
-        let axes = Lane::unpack(&machine.joints.universal_axis);
+        let joints = &machine.joints;
+        let axes = joints.triples.unpack_vectors(&joints.universal_axis);
         let directions = leg_directions(machine, &motion.pose);
         let mut joint_angles = [0.0; LEGS];
         for (angle, (u, n)) in joint_angles.iter_mut().zip(axes.iter().zip(&directions)) {

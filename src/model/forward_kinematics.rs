@@ -14,12 +14,14 @@
 //! Conditioning: errors of the lengths are amplified by the condition of N. At a singular pose there is
 //! no solution to find and the result says not converged.
 
+use fearless_simd::{Simd, dispatch, f64x8};
 use nalgebra::Vector6;
 
-use super::inverse_geometry::leg_lengths;
-use super::inverse_jacobian::leg_wrenches;
+use super::balance::Balance;
+use super::inverse_geometry::{LegGeometry, leg_lengths};
+use super::lanes::{Eight, Lane};
 use super::machine::{LEGS, Machine};
-use super::rigid::{Pose, Twist};
+use super::rigid::Pose;
 
 /// Bound on Newton's iterations. Three suffice from one cycle to the next; beyond eight the start was not
 /// in the region of quadratic convergence and more of the same does not help.
@@ -49,16 +51,18 @@ pub struct Solution {
 
 /// The pose with these leg lengths \[m\] nearest to `start`, by at most eight iterations.
 pub fn solve(machine: &Machine, start: &Pose, lengths: &[f64; LEGS]) -> Solution {
-    let radius = machine.joints.radius;
-    let target = Vector6::from(*lengths);
+    let target = machine.joints.triples.pack(lengths);
+    dispatch!(machine.level, simd => newton::<_, f64x8<_>>(simd, machine, start, &target))
+}
+
+#[inline(always)]
+fn newton<S: Simd, V: Eight<S>>(simd: S, machine: &Machine, start: &Pose, target: &Lane) -> Solution {
+    let target = V::load(simd, target);
     let mut pose = *start;
     for iterations in 1..=MAX_ITERATIONS {
-        let residual = target - Vector6::from(leg_lengths(machine, &pose));
-        let step = leg_wrenches(machine, &pose).transpose().lu().solve(&residual);
-        let Some(step) = step.map(|v| Twist::from_vector(&v)) else {
-            return Solution { pose, iterations, converged: false };
-        };
-        let size = step.angular.norm() + step.linear.norm() / radius;
+        let legs = LegGeometry::<V>::new(simd, machine, &pose);
+        let step = Balance::new(simd, &legs).twist_once(target - legs.length);
+        let size = step.angular.norm() + step.linear.norm() / machine.joints.radius;
         // Also false when it is not a number.
         if !(size < TRUSTED_STEP) {
             return Solution { pose, iterations, converged: false };

@@ -4,28 +4,22 @@
 //! `N = [b x n; n]`, a column per leg, takes leg forces to the wrench on the platform about C:
 //! `W = N Gamma`. The paper orders legs 6..1, this project 1..6.
 
-use fearless_simd::{Simd, dispatch};
-use nalgebra::{Matrix6, Vector6};
+use fearless_simd::{dispatch, f64x8};
+use nalgebra::Matrix6;
 
+use super::balance::{Balance, wrench_columns};
 use super::inverse_geometry::LegGeometry;
+use super::lanes::Eight;
 use super::machine::{LEGS, Machine};
 use super::rigid::{Pose, Twist};
 
 /// N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],
 /// force rows below \[1\].
 pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
-    dispatch!(machine.level, simd => leg_wrench_columns(&LegGeometry::new(simd, machine, pose)))
-}
-
-#[inline(always)]
-pub(super) fn leg_wrench_columns<S: Simd>(legs: &LegGeometry<S>) -> Matrix6<f64> {
-    let moment = legs.arm.cross(legs.direction).store().map(|lane| lane.legs());
-    let direction = legs.direction.store().map(|lane| lane.legs());
-    let mut n = Matrix6::zeros();
-    for (mut row, values) in n.row_iter_mut().zip(moment.iter().chain(&direction)) {
-        row.copy_from_slice(values);
-    }
-    n
+    dispatch!(machine.level, simd => {
+        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, pose);
+        wrench_columns(&machine.joints.triples, legs.arm.cross(legs.direction), legs.direction)
+    })
 }
 
 /// 2-norm condition number of N with torques divided by the characteristic length, so that metres and
@@ -41,5 +35,10 @@ pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
 ///
 /// `None` at a singular pose. Errors of the rates are amplified by the condition of the pose.
 pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> Option<Twist> {
-    leg_wrenches(machine, pose).transpose().lu().solve(&Vector6::from(*rates)).map(|v| Twist::from_vector(&v))
+    let rates = machine.joints.triples.pack(rates);
+    let twist = dispatch!(machine.level, simd => {
+        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, pose);
+        Balance::new(simd, &legs).twist(Eight::load(simd, &rates))
+    });
+    twist.vector().iter().all(|value| value.is_finite()).then_some(twist)
 }

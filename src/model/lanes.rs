@@ -1,98 +1,259 @@
 //! Six legs as the lanes of one SIMD vector.
 //!
 //! This is today's form of the paper's parallel algorithm: one processor per leg becomes one lane per
-//! leg. Lanes 6 and 7 repeat legs 1 and 2, so that they never divide by zero; nobody reads them.
-//! [`Lanes3`] is a 3-vector per leg. Everything is generic over the instruction set `S` and inlined into
-//! the one function that was dispatched for it.
+//! leg. Eight lanes hold two triples of legs, each with a lane of padding that repeats the triple's first
+//! leg, so that it never divides by zero; nobody reads it:
+//!
+//! ```text
+//! lane   0    1    2    3       4    5    6    7
+//! leg   a    b    c   (a)      d    e    f   (d)          chosen per machine, see Triples
+//! ```
+//!
+//! Within a triple, determinants and inverses of 3 x 3 matrices are cross products of rotated lanes, which
+//! is what [`super::balance`] lives on. Everything is generic over the instruction set and over the
+//! precision ([`Eight`]: f64 or f32), and is inlined into the one function that was dispatched for both.
 
-use core::ops::{Add, Mul, Sub};
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
-use fearless_simd::{Simd, f64x8, prelude::*};
-use nalgebra::{Matrix3, Matrix3x6, RowVector6, Vector3};
+use fearless_simd::{Simd, f32x4, f32x8, f64x4, f64x8, prelude::*};
+use nalgebra::{Matrix3, Vector3};
 
 use super::machine::LEGS;
 
-/// One number per leg in memory; two lanes of padding.
+/// One number per lane in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
 pub struct Lane(pub [f64; 8]);
 
-impl Lane {
-    /// Six 3-vectors to three lanes: x, y, z.
-    pub fn pack(legs: &[Vector3<f64>; LEGS]) -> [Self; 3] {
-        core::array::from_fn(|axis| {
-            let mut lane = Self::default();
-            for (slot, leg) in lane.0.iter_mut().zip(legs.iter().cycle()) {
-                *slot = leg.as_slice().get(axis).copied().unwrap_or_default();
+/// Which leg is in which lane: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Triples {
+    /// Lane of each leg.
+    lanes: [usize; LEGS],
+}
+
+impl Triples {
+    /// The ten ways to split six legs in two, by the partners of the first leg.
+    pub const ALL: [Self; 10] = [
+        Self { lanes: [0, 1, 2, 4, 5, 6] },
+        Self { lanes: [0, 1, 4, 2, 5, 6] },
+        Self { lanes: [0, 1, 4, 5, 2, 6] },
+        Self { lanes: [0, 1, 4, 5, 6, 2] },
+        Self { lanes: [0, 4, 1, 2, 5, 6] },
+        Self { lanes: [0, 4, 1, 5, 2, 6] },
+        Self { lanes: [0, 4, 1, 5, 6, 2] },
+        Self { lanes: [0, 4, 5, 1, 2, 6] },
+        Self { lanes: [0, 4, 5, 1, 6, 2] },
+        Self { lanes: [0, 4, 5, 6, 1, 2] },
+    ];
+
+    /// One number per leg to lanes.
+    #[inline(always)]
+    pub fn pack(&self, legs: &[f64; LEGS]) -> Lane {
+        let mut lane = [0.0; 8];
+        for (index, value) in self.lanes.iter().zip(legs) {
+            if let Some(slot) = lane.get_mut(index % 8) {
+                *slot = *value;
             }
-            lane
-        })
+        }
+        let [a, b, c, _, d, e, f, _] = lane;
+        Lane([a, b, c, a, d, e, f, d])
     }
 
-    /// The six legs' numbers.
+    /// Lanes to one number per leg.
     #[inline(always)]
-    pub fn legs(&self) -> [f64; LEGS] {
-        let [a, b, c, d, e, f, ..] = self.0;
-        [a, b, c, d, e, f]
+    pub fn unpack(&self, lane: &Lane) -> [f64; LEGS] {
+        // The remainder tells the compiler that there is nothing to check.
+        self.lanes.map(|index| lane.0.get(index % 8).copied().unwrap_or_default())
+    }
+
+    /// Six 3-vectors to three lanes: x, y, z.
+    pub fn pack_vectors(&self, legs: &[Vector3<f64>; LEGS]) -> [Lane; 3] {
+        [self.pack(&legs.map(|v| v.x)), self.pack(&legs.map(|v| v.y)), self.pack(&legs.map(|v| v.z))]
     }
 
     /// Three lanes back to six 3-vectors.
-    pub fn unpack(lanes: &[Self; 3]) -> [Vector3<f64>; LEGS] {
-        let [x, y, z] = lanes.map(|lane| RowVector6::from(lane.legs()));
-        let columns = Matrix3x6::from_rows(&[x, y, z]);
-        core::array::from_fn(|i| columns.column(i).into())
-    }
-
-    #[inline(always)]
-    pub(super) fn load<S: Simd>(&self, simd: S) -> f64x8<S> {
-        f64x8::load_array_ref(simd, &self.0)
-    }
-
-    #[inline(always)]
-    pub(super) fn store<S: Simd>(value: f64x8<S>) -> Self {
-        Self(value.to_array())
+    pub fn unpack_vectors(&self, [x, y, z]: &[Lane; 3]) -> [Vector3<f64>; LEGS] {
+        let (x, y, z) = (self.unpack(x), self.unpack(y), self.unpack(z));
+        let mut legs = [Vector3::zeros(); LEGS];
+        for (leg, ((x, y), z)) in legs.iter_mut().zip(x.into_iter().zip(y).zip(z)) {
+            *leg = Vector3::new(x, y, z);
+        }
+        legs
     }
 }
 
-/// Sum over the six legs; the padding does not count.
-#[inline(always)]
-pub(super) fn sum_legs<S: Simd>(value: f64x8<S>) -> f64 {
-    Lane::store(value).legs().iter().sum()
+/// Arithmetic on all lanes of a vector.
+pub(super) trait Reals:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// `self a + b`, fused where the CPU can.
+    fn mul_add(self, a: Self, b: Self) -> Self;
+    /// `self a - b`, fused where the CPU can.
+    fn mul_sub(self, a: Self, b: Self) -> Self;
+    fn sqrt(self) -> Self;
+    fn max(self, b: Self) -> Self;
+    fn min(self, b: Self) -> Self;
 }
 
-/// A 3-vector per leg.
+/// Eight lanes: all legs.
+pub(super) trait Eight<S: Simd>: Reals {
+    /// One triple.
+    type Half: Four<S>;
+    /// Distance from 1 to the next number.
+    const EPSILON: f64;
+    fn splat(simd: S, value: f64) -> Self;
+    fn load(simd: S, lane: &Lane) -> Self;
+    fn store(self) -> Lane;
+    fn halves(self) -> (Self::Half, Self::Half);
+    /// In each lane, the next leg of its triple: `[1 2 0 - 5 6 4 -]`.
+    fn next(self, simd: S) -> Self;
+    /// In each lane, the leg before in its triple: `[2 0 1 - 6 4 5 -]`.
+    fn previous(self, simd: S) -> Self;
+    /// Sum over the six legs.
+    fn sum(self) -> f64;
+    fn join(first: Self::Half, second: Self::Half) -> Self;
+}
+
+/// Four lanes: one triple, and a lane of padding.
+pub(super) trait Four<S: Simd>: Reals {
+    fn splat(simd: S, value: f64) -> Self;
+    /// `[1 2 0 -]`, as [`Eight::next`].
+    fn next(self, simd: S) -> Self;
+    /// `[2 0 1 -]`, as [`Eight::previous`].
+    fn previous(self, simd: S) -> Self;
+    /// One leg's number in all lanes.
+    fn broadcast<const LEG: usize>(self, simd: S) -> Self;
+    /// Three triples, a vector for each i over the lanes j, to a vector for each j over the lanes i.
+    fn transposed(simd: S, rows: [Self; 3]) -> [Self; 3];
+    /// The triple's three numbers.
+    fn legs(self) -> [f64; 3];
+}
+
+macro_rules! reals {
+    ($($vector:ident),*) => {$(
+        impl<S: Simd> Reals for $vector<S> {
+            #[inline(always)]
+            fn mul_add(self, a: Self, b: Self) -> Self {
+                SimdFloat::mul_add(self, a, b)
+            }
+            #[inline(always)]
+            fn mul_sub(self, a: Self, b: Self) -> Self {
+                SimdFloat::mul_sub(self, a, b)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                SimdFloat::sqrt(self)
+            }
+            #[inline(always)]
+            fn max(self, b: Self) -> Self {
+                SimdBase::max(self, b)
+            }
+            #[inline(always)]
+            fn min(self, b: Self) -> Self {
+                SimdBase::min(self, b)
+            }
+        }
+    )*};
+}
+
+macro_rules! precision {
+    ($scalar:ty, $eight:ident, $four:ident) => {
+        impl<S: Simd> Eight<S> for $eight<S> {
+            type Half = $four<S>;
+            const EPSILON: f64 = <$scalar>::EPSILON as f64;
+            #[inline(always)]
+            fn splat(simd: S, value: f64) -> Self {
+                SimdBase::splat(simd, value as $scalar)
+            }
+            #[inline(always)]
+            fn load(simd: S, lane: &Lane) -> Self {
+                SimdBase::load_array(simd, lane.0.map(|value| value as $scalar))
+            }
+            #[inline(always)]
+            fn store(self) -> Lane {
+                Lane(self.to_array().map(f64::from))
+            }
+            #[inline(always)]
+            fn halves(self) -> (Self::Half, Self::Half) {
+                self.split()
+            }
+            #[inline(always)]
+            fn next(self, simd: S) -> Self {
+                let [a, b, c, _, d, e, f, _] = self.to_array();
+                SimdBase::load_array(simd, [b, c, a, b, e, f, d, e])
+            }
+            #[inline(always)]
+            fn previous(self, simd: S) -> Self {
+                let [a, b, c, _, d, e, f, _] = self.to_array();
+                SimdBase::load_array(simd, [c, a, b, c, f, d, e, f])
+            }
+            #[inline(always)]
+            fn sum(self) -> f64 {
+                let (first, second) = self.split();
+                let [a, b, c] = (first + second).legs();
+                a + b + c
+            }
+            #[inline(always)]
+            fn join(first: Self::Half, second: Self::Half) -> Self {
+                first.combine(second)
+            }
+        }
+
+        impl<S: Simd> Four<S> for $four<S> {
+            #[inline(always)]
+            fn splat(simd: S, value: f64) -> Self {
+                SimdBase::splat(simd, value as $scalar)
+            }
+            #[inline(always)]
+            fn next(self, simd: S) -> Self {
+                let [a, b, c, _] = self.to_array();
+                SimdBase::load_array(simd, [b, c, a, b])
+            }
+            #[inline(always)]
+            fn previous(self, simd: S) -> Self {
+                let [a, b, c, _] = self.to_array();
+                SimdBase::load_array(simd, [c, a, b, c])
+            }
+            #[inline(always)]
+            fn broadcast<const LEG: usize>(self, simd: S) -> Self {
+                let [a, b, c, _] = self.to_array();
+                SimdBase::splat(simd, if LEG == 0 { a } else if LEG == 1 { b } else { c })
+            }
+            #[inline(always)]
+            fn transposed(simd: S, rows: [Self; 3]) -> [Self; 3] {
+                let [[a, b, c, _], [d, e, f, _], [g, h, i, _]] = rows.map(|row| row.to_array());
+                [[a, d, g, a], [b, e, h, b], [c, f, i, c]].map(|column| SimdBase::load_array(simd, column))
+            }
+            #[inline(always)]
+            fn legs(self) -> [f64; 3] {
+                let [a, b, c, _] = self.to_array();
+                [a.into(), b.into(), c.into()]
+            }
+        }
+    };
+}
+
+reals!(f64x8, f64x4, f32x8, f32x4);
+precision!(f64, f64x8, f64x4);
+precision!(f32, f32x8, f32x4);
+
+/// A 3-vector per lane.
 #[derive(Clone, Copy)]
-pub(super) struct Lanes3<S: Simd> {
-    pub x: f64x8<S>,
-    pub y: f64x8<S>,
-    pub z: f64x8<S>,
+pub(super) struct Lanes3<V> {
+    pub x: V,
+    pub y: V,
+    pub z: V,
 }
 
-impl<S: Simd> Lanes3<S> {
-    /// A different vector for each leg.
+impl<V: Reals> Lanes3<V> {
     #[inline(always)]
-    pub fn load(simd: S, [x, y, z]: &[Lane; 3]) -> Self {
-        Self { x: x.load(simd), y: y.load(simd), z: z.load(simd) }
-    }
-
-    /// The same vector for every leg.
-    #[inline(always)]
-    pub fn splat(simd: S, v: &Vector3<f64>) -> Self {
-        Self { x: f64x8::splat(simd, v.x), y: f64x8::splat(simd, v.y), z: f64x8::splat(simd, v.z) }
-    }
-
-    /// `m self`, the same matrix for every leg.
-    #[inline(always)]
-    pub fn transformed(self, simd: S, m: &Matrix3<f64>) -> Self {
-        let row = |a: f64, b: f64, c: f64| {
-            let (a, b, c) = (f64x8::splat(simd, a), f64x8::splat(simd, b), f64x8::splat(simd, c));
-            a.mul_add(self.x, b.mul_add(self.y, c * self.z))
-        };
-        Self { x: row(m.m11, m.m12, m.m13), y: row(m.m21, m.m22, m.m23), z: row(m.m31, m.m32, m.m33) }
-    }
-
-    #[inline(always)]
-    pub fn dot(self, b: Self) -> f64x8<S> {
+    pub fn dot(self, b: Self) -> V {
         self.x.mul_add(b.x, self.y.mul_add(b.y, self.z * b.z))
     }
 
@@ -107,24 +268,91 @@ impl<S: Simd> Lanes3<S> {
 
     /// `self + s b`
     #[inline(always)]
-    pub fn plus_scaled(self, s: f64x8<S>, b: Self) -> Self {
+    pub fn plus_scaled(self, s: V, b: Self) -> Self {
         Self { x: s.mul_add(b.x, self.x), y: s.mul_add(b.y, self.y), z: s.mul_add(b.z, self.z) }
+    }
+
+    #[inline(always)]
+    pub fn map<W>(self, f: impl Fn(V) -> W) -> Lanes3<W> {
+        Lanes3 { x: f(self.x), y: f(self.y), z: f(self.z) }
+    }
+}
+
+impl<V> Lanes3<V> {
+    /// A different vector in each lane.
+    #[inline(always)]
+    pub fn load<S: Simd>(simd: S, [x, y, z]: &[Lane; 3]) -> Self
+    where
+        V: Eight<S>,
+    {
+        Self { x: V::load(simd, x), y: V::load(simd, y), z: V::load(simd, z) }
+    }
+
+    /// The same vector in all lanes.
+    #[inline(always)]
+    pub fn splat<S: Simd>(simd: S, v: &Vector3<f64>) -> Self
+    where
+        V: Eight<S>,
+    {
+        Self { x: V::splat(simd, v.x), y: V::splat(simd, v.y), z: V::splat(simd, v.z) }
+    }
+
+    /// `m self`, the same matrix in all lanes.
+    #[inline(always)]
+    pub fn transformed<S: Simd>(self, simd: S, m: &Matrix3<f64>) -> Self
+    where
+        V: Eight<S>,
+    {
+        let splat = |value| V::splat(simd, value);
+        let column = |x, y, z| Self { x: splat(x), y: splat(y), z: splat(z) };
+        let first = column(m.m13, m.m23, m.m33) * self.z;
+        let second = first.plus_scaled(self.y, column(m.m12, m.m22, m.m32));
+        second.plus_scaled(self.x, column(m.m11, m.m21, m.m31))
     }
 
     /// Back to memory.
     #[inline(always)]
-    pub fn store(self) -> [Lane; 3] {
-        [Lane::store(self.x), Lane::store(self.y), Lane::store(self.z)]
+    pub fn store<S: Simd>(self) -> [Lane; 3]
+    where
+        V: Eight<S>,
+    {
+        [self.x.store(), self.y.store(), self.z.store()]
     }
 
-    /// Sum over the six legs.
+    /// Sum over the six legs, per component; the padding does not count.
     #[inline(always)]
-    pub fn sum_legs(self) -> Vector3<f64> {
-        Vector3::new(sum_legs(self.x), sum_legs(self.y), sum_legs(self.z))
+    pub fn sum_legs<S: Simd>(self) -> Vector3<f64>
+    where
+        V: Eight<S>,
+    {
+        let (first, second) = self.halves();
+        (first + second).sum()
+    }
+
+    /// The two triples.
+    #[inline(always)]
+    pub fn halves<S: Simd>(self) -> (Lanes3<V::Half>, Lanes3<V::Half>)
+    where
+        V: Eight<S>,
+    {
+        let ((x0, x1), (y0, y1), (z0, z1)) = (self.x.halves(), self.y.halves(), self.z.halves());
+        (Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 })
     }
 }
 
-impl<S: Simd> Add for Lanes3<S> {
+impl<F> Lanes3<F> {
+    /// Sum over the three legs of a triple, per component.
+    #[inline(always)]
+    pub fn sum<S: Simd>(self) -> Vector3<f64>
+    where
+        F: Four<S>,
+    {
+        let sum = |value: F| value.legs().into_iter().sum();
+        Vector3::new(sum(self.x), sum(self.y), sum(self.z))
+    }
+}
+
+impl<V: Reals> Add for Lanes3<V> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
@@ -132,7 +360,7 @@ impl<S: Simd> Add for Lanes3<S> {
     }
 }
 
-impl<S: Simd> Sub for Lanes3<S> {
+impl<V: Reals> Sub for Lanes3<V> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
@@ -140,10 +368,10 @@ impl<S: Simd> Sub for Lanes3<S> {
     }
 }
 
-impl<S: Simd> Mul<f64x8<S>> for Lanes3<S> {
+impl<V: Reals> Mul<V> for Lanes3<V> {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, s: f64x8<S>) -> Self {
+    fn mul(self, s: V) -> Self {
         Self { x: self.x * s, y: self.y * s, z: self.z * s }
     }
 }

@@ -20,10 +20,10 @@
 //! That is exact only for `Ix = 0`; the effect is 1e-5 to 1e-2 of the force, larger near `u || n`, where
 //! the spin itself is singular. [`YY_MIN`] keeps the arithmetic finite there.
 
-use fearless_simd::{Simd, f64x8, prelude::*};
+use fearless_simd::Simd;
 
 use super::inverse_geometry::{LegAcceleration, LegGeometry, LegVelocity};
-use super::lanes::Lanes3;
+use super::lanes::{Eight, Lanes3};
 use super::machine::{Machine, TransverseInertia};
 
 /// What a dynamic model includes; known at compile time, so that a term left out costs nothing.
@@ -57,14 +57,14 @@ const YY_MIN: f64 = 1e-12;
 
 /// F per leg \[N\], base axes. `gravity` is g in base axes, one copy per leg.
 #[inline(always)]
-pub(super) fn leg_reaction<S: Simd, M: Model>(
+pub(super) fn leg_reaction<S: Simd, V: Eight<S>, M: Model>(
     simd: S,
     machine: &Machine,
-    legs: &LegGeometry<S>,
-    velocity: &LegVelocity<S>,
-    acceleration: &LegAcceleration<S>,
-) -> Lanes3<S> {
-    let splat = |value: f64| f64x8::splat(simd, value);
+    legs: &LegGeometry<V>,
+    velocity: &LegVelocity<V>,
+    acceleration: &LegAcceleration<V>,
+) -> Lanes3<V> {
+    let splat = |value: f64| V::splat(simd, value);
     let (cylinder, rod) = (&machine.cylinder, &machine.rod);
     let gravity = Lanes3::splat(simd, &machine.gravity);
     let (n, n_rate, n_accel) = (legs.direction, velocity.direction, acceleration.direction);
@@ -77,7 +77,7 @@ pub(super) fn leg_reaction<S: Simd, M: Model>(
         + transverse_inertia(simd, &cylinder.transverse_inertia, legs.length)
         + transverse_inertia(simd, &rod.transverse_inertia, legs.length);
     let mut q = (n_accel * jt)
-        .plus_scaled(m2_r * velocity.rate * 2.0, n_rate)
+        .plus_scaled(m2_r * (velocity.rate + velocity.rate), n_rate)
         .plus_scaled(-(m2_r + splat(m1_e1)), gravity);
     if M::SPIN {
         q = q + spin_moment(simd, machine, n, n_rate, n_accel);
@@ -89,28 +89,29 @@ pub(super) fn leg_reaction<S: Simd, M: Model>(
 
 /// `Ix ( wx n' + (un / yy) wx' y ) x n`
 #[inline(always)]
-fn spin_moment<S: Simd>(
+fn spin_moment<S: Simd, V: Eight<S>>(
     simd: S,
     machine: &Machine,
-    n: Lanes3<S>,
-    n_rate: Lanes3<S>,
-    n_accel: Lanes3<S>,
-) -> Lanes3<S> {
-    let ix = f64x8::splat(simd, machine.cylinder.axial_inertia + machine.rod.axial_inertia);
-    let u = Lanes3::load(simd, &machine.joints.universal_axis);
+    n: Lanes3<V>,
+    n_rate: Lanes3<V>,
+    n_accel: Lanes3<V>,
+) -> Lanes3<V> {
+    let ix = V::splat(simd, machine.cylinder.axial_inertia + machine.rod.axial_inertia);
+    let u = Lanes3::<V>::load(simd, &machine.joints.universal_axis);
     let un = u.dot(n);
     let un_rate = u.dot(n_rate);
     let y = u.plus_scaled(-un, n);
-    let yy = y.dot(y).max(YY_MIN);
+    let inverse_yy = V::splat(simd, 1.0) / y.dot(y).max(V::splat(simd, YY_MIN));
     let p = n.cross(n_rate).dot(u);
     let p_rate = n.cross(n_accel).dot(u);
-    let spin = un * p / yy;
-    let spin_rate = (un_rate * p + un * p_rate + spin * un * un_rate * 2.0) / yy;
-    (n_rate * spin).plus_scaled(un / yy * spin_rate, y).cross(n) * ix
+    let spin = un * p * inverse_yy;
+    let spin_un = spin * un;
+    let spin_rate = un_rate.mul_add(p + spin_un + spin_un, un * p_rate) * inverse_yy;
+    (n_rate * spin).plus_scaled(un * inverse_yy * spin_rate, y).cross(n) * ix
 }
 
 #[inline(always)]
-fn transverse_inertia<S: Simd>(simd: S, inertia: &TransverseInertia, length: f64x8<S>) -> f64x8<S> {
-    let d = length - f64x8::splat(simd, inertia.reference_length);
-    (d * inertia.quadratic).mul_add(d, f64x8::splat(simd, inertia.constant))
+fn transverse_inertia<S: Simd, V: Eight<S>>(simd: S, inertia: &TransverseInertia, length: V) -> V {
+    let d = length - V::splat(simd, inertia.reference_length);
+    (d * V::splat(simd, inertia.quadratic)).mul_add(d, V::splat(simd, inertia.constant))
 }

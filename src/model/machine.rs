@@ -1,14 +1,14 @@
 //! The machine: every constant the equations need, validated once and immutable afterwards.
 //!
 //! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`Lane`]): one array per
-//! coordinate, leg `i` in lane `i`, so that all six are evaluated by the same instructions.
+//! coordinate, so that all six are evaluated by the same instructions.
 //!
 //! What this file does not do: read or judge values. `host::config` does, and names key, value and bound.
 
 use fearless_simd::Level;
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::Lane;
+use super::lanes::{Lane, Triples};
 
 /// Number of legs.
 pub const LEGS: usize = 6;
@@ -48,6 +48,8 @@ pub struct Platform {
 /// Joint centres as lanes.
 #[derive(Clone, Debug)]
 pub struct Joints {
+    /// Which leg is in which lane.
+    pub triples: Triples,
     /// `A_i`, joint centres on the base, in base axes \[m\].
     pub base: [Lane; 3],
     /// `CB_i`, joint centres on the platform, in platform axes \[m\].
@@ -66,12 +68,14 @@ impl Joints {
         platform: &[Vector3<f64>; LEGS],
         universal_axis: &[Vector3<f64>; LEGS],
     ) -> Self {
+        let triples = Triples::ALL[0];
         let mean = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
         let mean_square = platform.iter().map(|b| (b - mean).norm_squared()).sum::<f64>() / LEGS as f64;
         Self {
-            base: Lane::pack(base),
-            platform: Lane::pack(platform),
-            universal_axis: Lane::pack(universal_axis),
+            triples,
+            base: triples.pack_vectors(base),
+            platform: triples.pack_vectors(platform),
+            universal_axis: triples.pack_vectors(universal_axis),
             radius: mean_square.sqrt(),
         }
     }
@@ -130,11 +134,4 @@ impl Actuator {
     /// The `coulomb_smoothing` of a controller: sign(L') is exact above 0.1 mm/s, slow enough for a
     /// telescope's legs, and one count of a usual encoder at 1 kHz does not make the force chatter.
     pub const COULOMB_SMOOTHING_M_S: f64 = 1e-4;
-
-    /// Force the drive itself takes \[N\]: `reflected L'' + viscous L' + coulomb sign(L')`.
-    #[inline(always)]
-    pub fn drive_force(&self, rate: f64, accel: f64) -> f64 {
-        let sign = (rate / self.coulomb_smoothing).clamp(-1.0, 1.0);
-        self.reflected_mass * accel + self.viscous_friction * rate + self.coulomb_friction * sign
-    }
 }

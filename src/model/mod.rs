@@ -19,6 +19,7 @@
 //! refer to the platform origin C.
 
 pub mod active_forces;
+mod balance;
 pub mod forward_kinematics;
 pub mod inverse_geometry;
 pub mod inverse_jacobian;

@@ -13,6 +13,7 @@ use super::machine::Machine;
 use super::rigid::{Motion, Wrench};
 
 /// Wrench about C that the platform needs for this motion, legs not counted.
+#[inline(always)]
 pub fn platform_wrench(machine: &Machine, motion: &Motion) -> Wrench {
     let body = &machine.platform;
     let r = &motion.pose.rotation;

@@ -1,0 +1,12 @@
+//! Controller and simulated platform in one loop, in simulated time: tracking, replay, faults.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+#[path = "../common/mod.rs"]
+mod common;
+mod faults;
+mod limits;
+mod poses;
+mod replay;
+mod rig;
+mod tracking;

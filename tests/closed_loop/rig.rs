@@ -1,0 +1,138 @@
+//! The loop without threads: measurement and setpoint at k T, release at k T + T / 2, force on the platform
+//! from 100 us after the release on.
+
+use hexad::control::controller::{Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::gains::Gains;
+use hexad::control::law::Law;
+use hexad::control::state::State;
+use hexad::host::config::Config;
+use hexad::model::machine::{LEGS, Machine};
+use hexad::model::task::TaskState;
+use hexad::plant::simulator::Simulator;
+use hexad::scene::motions::{Motion, Scene, fit};
+use hexad::scene::timeline::Timeline;
+
+use super::common::{Errors, angle_between};
+
+/// What reading, computing and sending take, about as on a common computer.
+const FORCE_DELAY_NS: u64 = 100_000;
+
+/// The first cycle; the clock of a computer that has been up for a while.
+const START_NS: u64 = 86_400_000_000_000;
+
+/// What a deployment's sections mean to the controller.
+pub fn parameters(config: &Config) -> Parameters {
+    let control = &config.deployment.control;
+    let nanoseconds = |seconds: f64| (seconds * 1e9).round() as u64;
+    Parameters {
+        period_ns: nanoseconds(config.deployment.realtime.period_s()),
+        law: Law {
+            position: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
+            orientation: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+        },
+        engage_position: control.engage_position_m,
+        engage_orientation: control.engage_orientation_rad,
+        setpoint_timeout_ns: nanoseconds(config.deployment.timeouts.setpoint_s),
+        measured_timeout_ns: nanoseconds(config.deployment.timeouts.measured_s),
+    }
+}
+
+/// A controller, a platform, and what is between them.
+pub struct Rig {
+    pub controller: Controller,
+    pub simulator: Simulator,
+    pub now_ns: u64,
+    period_ns: u64,
+    force: Option<[f64; LEGS]>,
+}
+
+/// How far the platform was from where it should have been.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tracking {
+    pub position: Errors,
+    pub orientation: Errors,
+}
+
+impl Rig {
+    /// The platform may differ from what the controller thinks.
+    pub fn new(config: &Config, platform: &Machine) -> Self {
+        let plant = &config.deployment.plant;
+        let parameters = parameters(config);
+        Self {
+            controller: Controller::new(config.machine.clone(), parameters),
+            simulator: Simulator::new(platform, plant.brake_deceleration_m_s2, plant.step_s),
+            now_ns: START_NS,
+            period_ns: parameters.period_ns,
+            force: None,
+        }
+    }
+
+    /// What the controller sees in this cycle, everything in order.
+    pub fn input(&self, task: &TaskState) -> Input {
+        let legs = self.simulator.leg_motion();
+        Input {
+            release_ns: self.now_ns + self.period_ns / 2,
+            setpoint: Some(Setpoint { time_ns: self.now_ns, task: *task }),
+            measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: legs.rate }),
+        }
+    }
+
+    /// One cycle of the controller and one period of the platform.
+    pub fn cycle(&mut self, input: &Input) -> Output {
+        let output = self.controller.step(input);
+        let before = self.period_ns / 2 + FORCE_DELAY_NS;
+        self.simulator.advance(before as f64 * 1e-9, self.force.as_ref());
+        self.force = (output.state == State::Active).then_some(output.force);
+        self.simulator.advance((self.period_ns - before) as f64 * 1e-9, self.force.as_ref());
+        self.now_ns += self.period_ns;
+        output
+    }
+
+    /// Plays a motion from home with approach and settling; each cycle goes to `watch`.
+    pub fn play(
+        &mut self,
+        machine: &Machine,
+        scene: &Scene,
+        mut watch: impl FnMut(&Input, &Output),
+    ) -> Tracking {
+        let timeline = Timeline::new(machine, &machine.home.into(), &scene.at(0.0).x, scene.duration);
+        let start_ns = self.now_ns;
+        let mut tracking = Tracking::default();
+        loop {
+            let t = (self.now_ns - start_ns) as f64 * 1e-9;
+            if t > timeline.ends() {
+                return tracking;
+            }
+            let task = timeline.at(t, |t| scene.at(t));
+            let (desired, actual) = (task.motion().pose, self.simulator.state().pose);
+            tracking.position.add((desired.position - actual.position).norm());
+            tracking.orientation.add(angle_between(&actual.rotation, &desired.rotation));
+            let input = self.input(&task);
+            let output = self.cycle(&input);
+            watch(&input, &output);
+        }
+    }
+}
+
+/// Plays a motion of `seconds` on a platform of its own; every cycle must be in control.
+pub fn track(config: &Config, platform: &Machine, motion: Motion, seconds: f64) -> Tracking {
+    let scene = fit(&config.machine, motion, seconds);
+    Rig::new(config, platform).play(&config.machine, &scene, |_, output| {
+        assert_eq!(output.state, State::Active, "{:?}", output.cause);
+        assert!(!output.limited);
+    })
+}
+
+/// A rig in the middle of a motion, and the task at its next cycle.
+pub fn in_motion(config: &Config) -> (Rig, TaskState) {
+    let mut rig = Rig::new(config, &config.machine);
+    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let period_s = rig.period_ns as f64 * 1e-9;
+    for k in 0..1500 {
+        let input = rig.input(&scene.at(period_s * f64::from(k)));
+        assert_eq!(rig.cycle(&input).state, State::Active);
+    }
+    let task = scene.at(period_s * 1500.0);
+    assert!(task.xd.amax() > 0.01, "{}", task.xd);
+    (rig, task)
+}

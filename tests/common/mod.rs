@@ -1,0 +1,142 @@
+//! What several tests share: the machines, tables of numbers, statistics of errors.
+
+#![allow(dead_code, reason = "every test uses a part of it")]
+
+use std::path::{Path, PathBuf};
+
+use hexad::host::config::Config;
+use hexad::model::machine::Machine;
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// The machines with vectors in `tests/data`.
+pub const MACHINES: [&str; 10] = [
+    "ceiling",
+    "fried2008",
+    "gimbal",
+    "motion_base",
+    "scattered",
+    "sideways_x_up",
+    "tabletop",
+    "telescope",
+    "tilted",
+    "tsai2000",
+];
+
+/// `tests/data/NAME.EXTENSION`.
+pub fn data(name: &str, extension: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name).with_extension(extension)
+}
+
+/// One of [`MACHINES`].
+pub fn machine(name: &str) -> Machine {
+    Config::load(&data(name, "toml")).unwrap_or_else(|error| panic!("{error}")).machine
+}
+
+/// A deployable machine of the folder `config`.
+pub fn deployed(name: &str) -> Config {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("config").join(name).with_extension("toml");
+    Config::load(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Mean, root mean square and maximum of errors.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Errors {
+    count: f64,
+    sum: f64,
+    squares: f64,
+    pub max: f64,
+}
+
+impl Errors {
+    pub fn add(&mut self, error: f64) {
+        assert!(error.is_finite(), "an error of {error}");
+        self.count += 1.0;
+        self.sum += error.abs();
+        self.squares += error * error;
+        self.max = self.max.max(error.abs());
+    }
+
+    pub fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+
+    pub fn rms(&self) -> f64 {
+        (self.squares / self.count).sqrt()
+    }
+
+    /// A few rows may reach `bound`; the typical one stays well below.
+    pub fn assert_within(&self, bound: f64, what: &str) {
+        let (mean, rms, max) = (self.mean(), self.rms(), self.max);
+        println!("{what}: mean {mean:.1e}, RMS {rms:.1e}, max {max:.1e}");
+        assert!(self.count > 0.0, "{what}: nothing compared");
+        assert!(max < bound && rms < 0.5 * bound && mean < 0.25 * bound, "{what}: {self:?} beyond {bound:e}");
+    }
+}
+
+/// The largest magnitude among these.
+pub fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |largest, value| f64::max(largest, value.abs()))
+}
+
+/// R of Bryan angles, multiplied out by hand.
+pub fn rotation(alpha: f64, beta: f64, gamma: f64) -> Matrix3<f64> {
+    let ((sa, ca), (sb, cb), (sg, cg)) = (alpha.sin_cos(), beta.sin_cos(), gamma.sin_cos());
+    Matrix3::new(
+        cb * cg,
+        -cb * sg,
+        sb,
+        ca * sg + sa * sb * cg,
+        ca * cg - sa * sb * sg,
+        -sa * cb,
+        sa * sg - ca * sb * cg,
+        sa * cg + ca * sb * sg,
+        ca * cb,
+    )
+}
+
+/// omega of angle rates, with E multiplied out by hand.
+pub fn angular_velocity(alpha: f64, beta: f64, rates: &Vector3<f64>) -> Vector3<f64> {
+    let ((sa, ca), (sb, cb)) = (alpha.sin_cos(), beta.sin_cos());
+    Vector3::new(rates.x + sb * rates.z, ca * rates.y - sa * cb * rates.z, sa * rates.y + ca * cb * rates.z)
+}
+
+/// Angle of the rotation from `a` to `b`; exact to rounding where it is small.
+pub fn angle_between(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
+    let r = b * a.transpose();
+    let twice_sin = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12).norm();
+    twice_sin.atan2(r.trace() - 1.0)
+}
+
+/// A CSV file as it is written.
+pub struct Table {
+    pub header: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub fn read(path: &Path) -> Self {
+        let text = std::fs::read_to_string(path).unwrap();
+        assert!(text.ends_with('\n'), "{} ends within a line", path.display());
+        let mut lines = text.lines().map(|line| line.split(',').map(String::from).collect::<Vec<_>>());
+        let header = lines.next().unwrap();
+        let rows: Vec<_> = lines.collect();
+        assert!(rows.iter().all(|row| row.len() == header.len()), "{} is not a table", path.display());
+        Self { header, rows }
+    }
+
+    pub fn number(&self, row: usize, column: &str) -> f64 {
+        let index = self.header.iter().position(|name| name == column);
+        self.rows[row][index.unwrap_or_else(|| panic!("no column {column}"))].parse().unwrap()
+    }
+
+    /// `stem_1 ... stem_6`.
+    pub fn legs(&self, row: usize, stem: &str) -> [f64; 6] {
+        core::array::from_fn(|i| self.number(row, &format!("{stem}_{}", i + 1)))
+    }
+
+    /// `alpha<suffix> ... z<suffix>`.
+    pub fn coordinates(&self, row: usize, suffix: &str) -> Vector6<f64> {
+        let names = ["alpha", "beta", "gamma", "x", "y", "z"];
+        Vector6::from(names.map(|name| self.number(row, &format!("{name}{suffix}"))))
+    }
+}

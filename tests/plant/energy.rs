@@ -1,0 +1,108 @@
+//! Energy of the machine, body by body: positions, velocities and angular velocities, nothing else.
+
+use hexad::model::lanes::Lane;
+use hexad::model::machine::{Link, Machine};
+use hexad::plant::integrator::PlantState;
+use nalgebra::Vector3;
+
+/// Energies \[J\].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Energy {
+    /// Of everything that moves, the spin of the legs and reflected masses included.
+    pub kinetic: f64,
+    /// Of which the legs' turning about their own axes.
+    pub spin: f64,
+    pub potential: f64,
+}
+
+impl Energy {
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.potential
+    }
+}
+
+/// Energy of the thirteen bodies.
+pub fn energy(machine: &Machine, state: &PlantState) -> Energy {
+    let (r, c) = (state.pose.rotation, state.pose.position);
+    let (omega, v) = (state.twist.angular, state.twist.linear);
+    let body = &machine.platform;
+    let arm = r * body.center_of_mass;
+    let inertia = r * body.inertia * r.transpose();
+    let mut sum = Energy {
+        kinetic: 0.5 * body.mass * (v + omega.cross(&arm)).norm_squared()
+            + 0.5 * omega.dot(&(inertia * omega)),
+        potential: -body.mass * machine.gravity.dot(&(c + arm)),
+        spin: 0.0,
+    };
+    let (base, platform) = (Lane::unpack(&machine.joints.base), Lane::unpack(&machine.joints.platform));
+    let axes = Lane::unpack(&machine.joints.universal_axis);
+    for ((a, b), u) in base.iter().zip(&platform).zip(&axes) {
+        let arm = r * b;
+        let leg = Leg { a: *a, b: c + arm, b_velocity: v + omega.cross(&arm), u: *u };
+        leg.add(machine, &mut sum);
+    }
+    sum
+}
+
+/// Where a leg's ends are and how they move.
+struct Leg {
+    a: Vector3<f64>,
+    b: Vector3<f64>,
+    b_velocity: Vector3<f64>,
+    u: Vector3<f64>,
+}
+
+impl Leg {
+    fn add(&self, machine: &Machine, sum: &mut Energy) {
+        let length = (self.b - self.a).norm();
+        let n = (self.b - self.a) / length;
+        let rate = n.dot(&self.b_velocity);
+        let n_rate = (self.b_velocity - n * rate) / length;
+        // The cross of the universal joint turns about u in the base and about w, normal to u and n, in the
+        // leg: the leg's angular velocity is a sum of turns about u and w. Its part across n is n x n'; the
+        // part along n is what leaves nothing along u x w.
+        let across = n.cross(&n_rate);
+        let forbidden = self.u.cross(&self.u.cross(&n));
+        let spin = -across.dot(&forbidden) / n.dot(&forbidden);
+        let angular = across + n * spin;
+
+        let cylinder = &machine.cylinder;
+        let at = self.a + n * cylinder.center_of_mass;
+        add_link(machine, cylinder, length, &n, &at, &(n_rate * cylinder.center_of_mass), &angular, sum);
+        let rod = &machine.rod;
+        let at = self.b - n * rod.center_of_mass;
+        add_link(
+            machine,
+            rod,
+            length,
+            &n,
+            &at,
+            &(self.b_velocity - n_rate * rod.center_of_mass),
+            &angular,
+            sum,
+        );
+        sum.kinetic += 0.5 * machine.actuator.reflected_mass * rate * rate;
+    }
+}
+
+#[allow(clippy::too_many_arguments, reason = "a body's whole state")]
+fn add_link(
+    machine: &Machine,
+    link: &Link,
+    length: f64,
+    axis: &Vector3<f64>,
+    at: &Vector3<f64>,
+    velocity: &Vector3<f64>,
+    angular: &Vector3<f64>,
+    sum: &mut Energy,
+) {
+    let inertia = &link.transverse_inertia;
+    let transverse = inertia.constant + inertia.quadratic * (length - inertia.reference_length).powi(2);
+    let along = angular.dot(axis);
+    let across = angular - axis * along;
+    let spin = 0.5 * link.axial_inertia * along * along;
+    sum.kinetic +=
+        0.5 * link.mass * velocity.norm_squared() + 0.5 * transverse * across.norm_squared() + spin;
+    sum.spin += spin;
+    sum.potential -= link.mass * machine.gravity.dot(at);
+}

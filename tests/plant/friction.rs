@@ -1,0 +1,89 @@
+//! Dry friction: stable at the default step, and it only ever takes energy.
+
+use hexad::model::machine::Machine;
+use hexad::plant::integrator::PlantState;
+use hexad::plant::simulator::{Brakes, Simulator};
+
+use super::common::machine;
+use super::energy::energy;
+use super::{DECELERATION, DEFAULT_STEP_S, shaking};
+
+/// A machine in space, pushed along at first, then left to its friction: kinetic energy after every step.
+fn coasting(machine: &Machine, seconds: f64) -> Vec<f64> {
+    let mut simulator = Simulator::new(machine, DECELERATION, DEFAULT_STEP_S);
+    let kinetic = |simulator: &Simulator| energy(machine, simulator.state()).kinetic;
+    for k in 0..1600 {
+        let t = DEFAULT_STEP_S * f64::from(k);
+        let force = shaking(machine, simulator.state(), t, 0.1, 1.0);
+        simulator.advance(DEFAULT_STEP_S, Some(&force));
+    }
+    let mut energies = vec![kinetic(&simulator)];
+    for _ in 0..(seconds / DEFAULT_STEP_S) as u32 {
+        simulator.advance(DEFAULT_STEP_S, Some(&[0.0; 6]));
+        energies.push(kinetic(&simulator));
+    }
+    assert_eq!(simulator.brakes(), Brakes::Open);
+    energies
+}
+
+#[test]
+fn dry_friction_takes_energy_and_nothing_chatters() {
+    for (name, coulomb) in
+        [("scattered", 75.0), ("fried2008", 3.0), ("tsai2000", 0.5), ("motion_base", 3000.0)]
+    {
+        let mut machine = machine(name);
+        machine.gravity.fill(0.0);
+        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = (0.0, coulomb);
+        // The energy of a rod whose inertia varies is not conserved to begin with.
+        machine.rod.transverse_inertia.quadratic = 0.0;
+        let energies = coasting(&machine, 2.0);
+        let (first, last) = (energies[0], energies[energies.len() - 1]);
+        println!("{name}: {first:.1e} J to {last:.1e} J");
+        assert!(
+            energies.iter().zip(&energies[1..]).all(|(a, b)| *b <= a + 1e-15 * first),
+            "{name} gained energy"
+        );
+        assert!(first > 1e-3 && last < 1e-9 * first, "{name}: {first} to {last}");
+    }
+}
+
+/// Friction that holds a platform against a small force: it creeps at the smoothing speed, no more.
+#[test]
+fn dry_friction_holds() {
+    let mut machine = machine("scattered");
+    machine.gravity.fill(0.0);
+    machine.actuator.viscous_friction = 0.0;
+    let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
+    let smoothing = simulator.machine().actuator.coulomb_smoothing;
+    let half = 0.5 * machine.actuator.coulomb_friction;
+    for _ in 0..1000 {
+        simulator.advance(1e-3, Some(&[half, -half, half, half, -half, -half]));
+        let fastest = super::common::largest(&simulator.leg_motion().rate);
+        assert!(fastest < smoothing, "{fastest} of {smoothing}");
+    }
+    let PlantState { twist, .. } = *simulator.state();
+    assert!(twist.vector().norm() > 0.0);
+}
+
+/// Viscous friction alone: the energy of a linear decay, known in closed form for legs that move alike.
+#[test]
+fn viscous_friction_dissipates_what_it_should() {
+    let mut machine = machine("motion_base");
+    machine.gravity.fill(0.0);
+    let mut simulator = Simulator::new(&machine, DECELERATION, DEFAULT_STEP_S);
+    simulator.advance(0.2, Some(&[300.0; 6]));
+    let start = energy(&machine, simulator.state()).kinetic;
+    let (mut dissipated, c) = (0.0, machine.actuator.viscous_friction);
+    let power =
+        |simulator: &Simulator| simulator.leg_motion().rate.iter().map(|rate| c * rate * rate).sum::<f64>();
+    for _ in 0..400 {
+        // Simpson's rule over two steps.
+        let before = power(&simulator);
+        simulator.advance(DEFAULT_STEP_S, Some(&[0.0; 6]));
+        let middle = power(&simulator);
+        simulator.advance(DEFAULT_STEP_S, Some(&[0.0; 6]));
+        dissipated += (before + 4.0 * middle + power(&simulator)) * DEFAULT_STEP_S / 3.0;
+    }
+    let lost = start - energy(&machine, simulator.state()).kinetic;
+    assert!(lost > 0.1 * start && (lost / dissipated - 1.0).abs() < 1e-9, "{lost} {dissipated}");
+}

@@ -1,0 +1,119 @@
+//! Identities of the inverse dynamics of one machine.
+
+use hexad::model::active_forces::{inverse_dynamics, task_load};
+use hexad::model::inverse_geometry::leg_motion;
+use hexad::model::inverse_jacobian::leg_wrenches;
+use hexad::model::leg::{Exact, RigidLegs};
+use hexad::model::machine::Machine;
+use hexad::model::rigid::{Acceleration, Motion, Twist};
+use nalgebra::{Vector3, Vector6};
+use proptest::prelude::*;
+
+use super::{cases, machine_in_motion, relative, vector6};
+
+fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
+    inverse_dynamics::<Exact>(machine, motion).unwrap().into()
+}
+
+proptest! {
+    #![proptest_config(cases(1000))]
+
+    #[test]
+    fn forces_are_linear_in_the_acceleration(
+        (machine, _, motion) in machine_in_motion(),
+        other in vector6(),
+        share in -3.0..3.0f64,
+    ) {
+        let r = machine.joints.radius;
+        let other = other.component_mul(&Vector6::new(20.0, 20.0, 20.0, 20.0 * r, 20.0 * r, 20.0 * r));
+        let one = motion.acceleration.vector();
+        let with = |a: Vector6<f64>| {
+            forces(&machine, &Motion { acceleration: Acceleration::from_vector(&a), ..motion })
+        };
+        let mixed = with(one * share + other * (1.0 - share));
+        let expected = with(one) * share + with(other) * (1.0 - share);
+        let scale = with(one).amax() * share.abs() + with(other).amax() * (1.0 - share).abs();
+        prop_assert!((mixed - expected).amax() < 1e-12 * scale);
+    }
+
+    /// Power of the actuators is power of the wrench, plus what the drives keep: `Gamma . L' = W . twist`.
+    #[test]
+    fn power_is_the_same_in_legs_and_in_the_platform((machine, _, motion) in machine_in_motion()) {
+        let load = task_load::<Exact>(&machine, &motion);
+        let rates = Vector6::from(leg_motion(&machine, &motion).rate);
+        let gamma = forces(&machine, &motion);
+        let power = (gamma - load.drive_forces).dot(&rates);
+        let expected = load.wrench.dot(&motion.twist.vector());
+        let scale = (gamma - load.drive_forces).component_mul(&rates).abs().sum();
+        prop_assert!((power - expected).abs() < 1e-12 * scale, "{power} {expected}");
+        prop_assert_eq!(load.leg_wrenches, leg_wrenches(&machine, &motion.pose));
+    }
+
+    /// At rest the forces are what gravity does to the bodies: the gradient of the potential.
+    #[test]
+    fn forces_at_rest_balance_gravity((machine, _, motion) in machine_in_motion()) {
+        let rest = Motion { twist: Twist::default(), acceleration: Acceleration::default(), ..motion };
+        let wrench = leg_wrenches(&machine, &rest.pose) * forces(&machine, &rest);
+        let (h, r) = (1e-4 * machine.joints.radius, machine.joints.radius);
+        for k in 0..6 {
+            let step = Vector6::ith(k, if k < 3 { h / r } else { h });
+            let at = |sign: f64| potential(&machine, &rest.pose.displaced(&Twist::from_vector(&(step * sign))));
+            let slope = (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / 12.0;
+            let work = wrench.dot(&step);
+            let scale = 9.81 * machine.platform.mass * h;
+            prop_assert!((slope - work).abs() < 1e-8 * scale, "{k}: {slope} {work}");
+        }
+    }
+
+    /// A motion run backwards through the same poses needs the same forces, friction aside.
+    #[test]
+    fn time_can_be_reversed((mut machine, _, motion) in machine_in_motion()) {
+        (machine.actuator.viscous_friction, machine.actuator.coulomb_friction) = (0.0, 0.0);
+        let Twist { angular, linear } = motion.twist;
+        let back = Motion { twist: Twist { angular: -angular, linear: -linear }, ..motion };
+        prop_assert!(relative(forces(&machine, &back).as_slice(), forces(&machine, &motion).as_slice()) < 1e-12);
+    }
+
+    #[test]
+    fn without_axial_inertia_the_models_agree((mut machine, _, motion) in machine_in_motion()) {
+        let spinning = forces(&machine, &motion);
+        (machine.cylinder.axial_inertia, machine.rod.axial_inertia) = (0.0, 0.0);
+        let exact = forces(&machine, &motion);
+        prop_assert_eq!(&exact, &Vector6::from(inverse_dynamics::<RigidLegs>(&machine, &motion).unwrap()));
+        prop_assert!(relative(spinning.as_slice(), exact.as_slice()) > 1e-9, "the spin costs something");
+    }
+
+    /// Each drive adds its own force and nothing to its neighbours.
+    #[test]
+    fn drives_add_their_force((machine, _, motion) in machine_in_motion()) {
+        let mut ideal = machine.clone();
+        ideal.actuator.reflected_mass = 0.0;
+        (ideal.actuator.viscous_friction, ideal.actuator.coulomb_friction) = (0.0, 0.0);
+        let legs = leg_motion(&machine, &motion);
+        let (with, without) = (forces(&machine, &motion), forces(&ideal, &motion));
+        let actuator = &machine.actuator;
+        for i in 0..6 {
+            let smooth = (legs.rate[i] / actuator.coulomb_smoothing).clamp(-1.0, 1.0);
+            let drive = actuator.reflected_mass * legs.accel[i]
+                + actuator.viscous_friction * legs.rate[i]
+                + actuator.coulomb_friction * smooth;
+            prop_assert!((with[i] - without[i] - drive).abs() < 1e-12 * with.amax().max(without.amax()));
+        }
+    }
+}
+
+/// Potential of all thirteen bodies.
+fn potential(machine: &Machine, pose: &hexad::model::rigid::Pose) -> f64 {
+    use hexad::model::lanes::Lane;
+    let height = |mass: f64, at: &Vector3<f64>| -mass * machine.gravity.dot(at);
+    let (base, platform) = (Lane::unpack(&machine.joints.base), Lane::unpack(&machine.joints.platform));
+    let body = &machine.platform;
+    let mut sum = height(body.mass, &(pose.position + pose.rotation * body.center_of_mass));
+    for (a, b) in base.iter().zip(&platform) {
+        let b = pose.position + pose.rotation * b;
+        let n = (b - a).normalize();
+        sum += height(machine.cylinder.mass, &(a + n * machine.cylinder.center_of_mass));
+        sum += height(machine.rod.mass, &(b - n * machine.rod.center_of_mass));
+    }
+    sum
+}

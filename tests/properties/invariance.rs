@@ -1,0 +1,194 @@
+//! What the forces must not depend on: the choice of axes, of units, of leg numbers, of instructions.
+
+use fearless_simd::Level;
+use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::inverse_geometry::leg_motion;
+use hexad::model::inverse_jacobian::condition;
+use hexad::model::lanes::Lane;
+use hexad::model::leg::Exact;
+use hexad::model::machine::{Joints, LEGS, Link, Machine};
+use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+
+use super::{cases, machine_in_motion, relative, rotation, vector3};
+
+fn forces(machine: &Machine, motion: &Motion) -> [f64; LEGS] {
+    inverse_dynamics::<Exact>(machine, motion).unwrap()
+}
+
+fn map(lanes: &[Lane; 3], f: impl FnMut(Vector3<f64>) -> Vector3<f64>) -> [Vector3<f64>; LEGS] {
+    Lane::unpack(lanes).map(f)
+}
+
+/// Base axes turned by `q` and their origin moved by `d`: the same machine in the same motion.
+fn moved_base(machine: &Machine, motion: &Motion, q: &Matrix3<f64>, d: &Vector3<f64>) -> (Machine, Motion) {
+    let joints = &machine.joints;
+    let machine = Machine {
+        gravity: q * machine.gravity,
+        joints: Joints::new(
+            &map(&joints.base, |a| q * a + d),
+            &map(&joints.platform, |b| b),
+            &map(&joints.universal_axis, |u| q * u),
+        ),
+        ..machine.clone()
+    };
+    let Motion { pose, twist, acceleration } = motion;
+    let motion = Motion {
+        pose: Pose { rotation: q * pose.rotation, position: q * pose.position + d },
+        twist: Twist { angular: q * twist.angular, linear: q * twist.linear },
+        acceleration: Acceleration { angular: q * acceleration.angular, linear: q * acceleration.linear },
+    };
+    (machine, motion)
+}
+
+/// Platform axes turned by `q` and their origin moved by `d` (in platform axes): the same machine in the
+/// same motion, with C another point of the platform.
+fn moved_platform(
+    machine: &Machine,
+    motion: &Motion,
+    q: &Matrix3<f64>,
+    d: &Vector3<f64>,
+) -> (Machine, Motion) {
+    let mut result = machine.clone();
+    let joints = &machine.joints;
+    let of_new = |v: Vector3<f64>| q.tr_mul(&(v - d));
+    result.joints = Joints::new(
+        &map(&joints.base, |a| a),
+        &map(&joints.platform, of_new),
+        &map(&joints.universal_axis, |u| u),
+    );
+    result.platform.center_of_mass = of_new(machine.platform.center_of_mass);
+    result.platform.inertia = q.transpose() * machine.platform.inertia * q;
+    let Motion { pose, twist, acceleration } = motion;
+    let arm = pose.rotation * d;
+    let motion = Motion {
+        pose: Pose { rotation: pose.rotation * q, position: pose.position + arm },
+        twist: Twist { angular: twist.angular, linear: twist.linear + twist.angular.cross(&arm) },
+        acceleration: Acceleration {
+            angular: acceleration.angular,
+            linear: acceleration.linear
+                + acceleration.angular.cross(&arm)
+                + twist.angular.cross(&twist.angular.cross(&arm)),
+        },
+    };
+    (result, motion)
+}
+
+/// Lengths times `s`, masses times `m`, times times `t`: forces are `m s / t^2` as large.
+fn rescaled(machine: &Machine, motion: &Motion, s: f64, m: f64, t: f64) -> (Machine, Motion) {
+    let mut result = machine.clone();
+    let joints = &machine.joints;
+    result.gravity *= s / (t * t);
+    result.joints = Joints::new(
+        &map(&joints.base, |a| a * s),
+        &map(&joints.platform, |b| b * s),
+        &map(&joints.universal_axis, |u| u),
+    );
+    result.platform.mass *= m;
+    result.platform.center_of_mass *= s;
+    result.platform.inertia *= m * s * s;
+    for link in [&mut result.cylinder, &mut result.rod] {
+        let Link { mass, center_of_mass, axial_inertia, transverse_inertia } = link;
+        *mass *= m;
+        *center_of_mass *= s;
+        *axial_inertia *= m * s * s;
+        transverse_inertia.constant *= m * s * s;
+        transverse_inertia.quadratic *= m;
+        transverse_inertia.reference_length *= s;
+    }
+    let actuator = &mut result.actuator;
+    actuator.reflected_mass *= m;
+    actuator.viscous_friction *= m / t;
+    actuator.coulomb_friction *= m * s / (t * t);
+    actuator.coulomb_smoothing *= s / t;
+    let Motion { pose, twist, acceleration } = motion;
+    let motion = Motion {
+        pose: Pose { rotation: pose.rotation, position: pose.position * s },
+        twist: Twist { angular: twist.angular / t, linear: twist.linear * (s / t) },
+        acceleration: Acceleration {
+            angular: acceleration.angular / (t * t),
+            linear: acceleration.linear * (s / (t * t)),
+        },
+    };
+    (result, motion)
+}
+
+/// Every instruction set this processor has.
+fn levels() -> Vec<Level> {
+    let best = Level::new();
+    #[cfg(target_arch = "x86_64")]
+    let others = [
+        best.as_sse2().map(Level::Sse2),
+        best.as_sse4_2().map(Level::Sse4_2),
+        best.as_avx2().map(Level::Avx2),
+        best.as_avx512().map(Level::Avx512),
+    ];
+    #[cfg(not(target_arch = "x86_64"))]
+    let others = [];
+    [Some(Level::baseline()), Some(best)].into_iter().chain(others).flatten().collect()
+}
+
+proptest! {
+    #![proptest_config(cases(1000))]
+
+    #[test]
+    fn base_axes_do_not_matter((machine, _, motion) in machine_in_motion(), q in rotation(), d in vector3()) {
+        let (other, other_motion) = moved_base(&machine, &motion, &q, &(d * machine.joints.radius));
+        prop_assert!(relative(&forces(&other, &other_motion), &forces(&machine, &motion)) < 1e-11);
+    }
+
+    #[test]
+    fn platform_axes_do_not_matter((machine, _, motion) in machine_in_motion(), q in rotation(), d in vector3()) {
+        let (other, other_motion) = moved_platform(&machine, &motion, &q, &(d * machine.joints.radius));
+        prop_assert!((other.joints.radius / machine.joints.radius - 1.0).abs() < 1e-13);
+        prop_assert!(relative(&forces(&other, &other_motion), &forces(&machine, &motion)) < 1e-11);
+    }
+
+    #[test]
+    fn units_do_not_matter(
+        (machine, _, motion) in machine_in_motion(),
+        s in 0.1..10.0f64,
+        m in 0.1..10.0f64,
+        t in 0.1..10.0f64,
+    ) {
+        let (other, other_motion) = rescaled(&machine, &motion, s, m, t);
+        let expected = forces(&machine, &motion).map(|force| force * m * s / (t * t));
+        prop_assert!(relative(&forces(&other, &other_motion), &expected) < 1e-12);
+        prop_assert!((other.joints.radius / (s * machine.joints.radius) - 1.0).abs() < 1e-14);
+        let k = condition(&machine, &motion.pose);
+        prop_assert!((condition(&other, &other_motion.pose) / k - 1.0).abs() < 1e-14 * k);
+    }
+
+    #[test]
+    fn leg_numbers_do_not_matter(
+        (machine, _, motion) in machine_in_motion(),
+        order in Just([0, 1, 2, 3, 4, 5]).prop_shuffle(),
+    ) {
+        let mut other = machine.clone();
+        let reordered = |lanes: &[Lane; 3]| order.map(|leg| Lane::unpack(lanes)[leg]);
+        let joints = &machine.joints;
+        other.joints = Joints::new(
+            &reordered(&joints.base),
+            &reordered(&joints.platform),
+            &reordered(&joints.universal_axis),
+        );
+        let expected = order.map(|leg| forces(&machine, &motion)[leg]);
+        prop_assert!(relative(&forces(&other, &motion), &expected) < 1e-12);
+        let expected = order.map(|leg| leg_motion(&machine, &motion).accel[leg]);
+        prop_assert_eq!(leg_motion(&other, &motion).accel, expected, "a lane is a lane");
+    }
+
+    #[test]
+    fn instruction_sets_do_not_matter((machine, _, motion) in machine_in_motion()) {
+        let reference = Machine { level: Level::baseline(), ..machine.clone() };
+        for level in levels() {
+            let other = Machine { level, ..machine.clone() };
+            prop_assert!(relative(&forces(&other, &motion), &forces(&reference, &motion)) < 1e-12);
+            let (a, b) = (leg_motion(&other, &motion), leg_motion(&reference, &motion));
+            prop_assert!(relative(&a.length, &b.length) < 1e-14);
+            prop_assert!(relative(&a.rate, &b.rate) < 1e-13);
+            prop_assert!(relative(&a.accel, &b.accel) < 1e-13);
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! Lengths, rates and accelerations of the legs, and the way back to pose and twist.
+
+use hexad::model::forward_kinematics::{Tracker, solve};
+use hexad::model::inverse_geometry::{leg_directions, leg_lengths, leg_motion};
+use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
+use hexad::model::lanes::Lane;
+use hexad::model::rigid::{Motion, Twist};
+use hexad::model::task::TaskState;
+use nalgebra::Vector6;
+use proptest::prelude::*;
+
+use super::common::{angle_between, largest};
+use super::{cases, machine_in_motion, vector6};
+
+/// Step of the differences \[s\]: truncation and rounding meet near 1e-9 of the scale of the motion.
+const STEP: f64 = 1e-4;
+
+/// (-f(2h) + 8 f(h) - 8 f(-h) + f(-2h)) / 12 h
+fn derivative(f: impl Fn(f64) -> [f64; 6]) -> Vector6<f64> {
+    let f = |t: f64| Vector6::from(f(t));
+    ((f(STEP) - f(-STEP)) * 8.0 - (f(2.0 * STEP) - f(-2.0 * STEP))) / (12.0 * STEP)
+}
+
+proptest! {
+    #![proptest_config(cases(1000))]
+
+    #[test]
+    fn lengths_are_distances_of_the_joints((machine, _, motion) in machine_in_motion()) {
+        let (base, platform) = (Lane::unpack(&machine.joints.base), Lane::unpack(&machine.joints.platform));
+        let lengths = leg_lengths(&machine, &motion.pose);
+        let directions = leg_directions(&machine, &motion.pose);
+        for i in 0..6 {
+            let b = motion.pose.position + motion.pose.rotation * platform[i];
+            prop_assert!(((b - base[i]).norm() / lengths[i] - 1.0).abs() < 1e-14);
+            prop_assert!((base[i] + directions[i] * lengths[i] - b).norm() < 1e-14 * lengths[i].max(1.0));
+        }
+    }
+
+    #[test]
+    fn rates_and_accels_are_the_derivatives_of_lengths((machine, state, motion) in machine_in_motion()) {
+        let legs = leg_motion(&machine, &motion);
+        let at = |t: f64| leg_motion(&machine, &state.after(t).motion());
+        let rates = derivative(|t| at(t).length);
+        let accels = derivative(|t| at(t).rate);
+        let scale = machine.joints.radius;
+        prop_assert!((rates - Vector6::from(legs.rate)).amax() < 1e-9 * scale.max(largest(&legs.length)));
+        prop_assert!((accels - Vector6::from(legs.accel)).amax() < 1e-8 * scale.max(largest(&legs.length)));
+    }
+
+    /// `L' = N^T [omega; v]`, and N belongs to the lengths: an imposed displacement changes them by `N^T d`.
+    #[test]
+    fn the_jacobian_is_the_derivative_of_the_lengths(
+        (machine, _, motion) in machine_in_motion(),
+        towards in vector6(),
+    ) {
+        let n = leg_wrenches(&machine, &motion.pose);
+        let rates = n.transpose() * motion.twist.vector();
+        prop_assert!((rates - Vector6::from(leg_motion(&machine, &motion).rate)).amax() < 1e-13 * rates.amax());
+        let way = Twist::from_vector(&towards);
+        let displaced = |t: f64| {
+            let step = Twist { angular: way.angular * t, linear: way.linear * t };
+            leg_lengths(&machine, &motion.pose.displaced(&step))
+        };
+        let scale = largest(&leg_lengths(&machine, &motion.pose)).max(1.0);
+        // A unit displacement is large beside a small machine: its fifth derivative is too.
+        let bound = 1e-9 * scale * (1.0 / machine.joints.radius).powi(4).max(1.0);
+        prop_assert!((derivative(displaced) - n.transpose() * towards).amax() < bound);
+    }
+
+    #[test]
+    fn twists_follow_from_rates((machine, _, motion) in machine_in_motion()) {
+        let rates = leg_motion(&machine, &motion).rate;
+        let twist = twist_from_rates(&machine, &motion.pose, &rates).unwrap().vector();
+        let wanted = motion.twist.vector();
+        let r = machine.joints.radius;
+        let scaled = |v: Vector6<f64>| v.component_mul(&Vector6::new(r, r, r, 1.0, 1.0, 1.0));
+        let bound = 1e-14 * condition(&machine, &motion.pose) * scaled(wanted).amax();
+        prop_assert!(scaled(twist - wanted).amax() < bound);
+    }
+
+    #[test]
+    fn forward_kinematics_inverts_inverse((machine, _, motion) in machine_in_motion()) {
+        let lengths = leg_lengths(&machine, &motion.pose);
+        let home = TaskState::at_rest(machine.home).motion().pose;
+        let mut tracker = Tracker::new(&machine, home);
+        let found = tracker.find(&machine, &lengths);
+        prop_assert!(found.converged);
+        let bound = 1e-14 * condition(&machine, &motion.pose) * largest(&lengths).max(1.0);
+        prop_assert!((found.pose.position - motion.pose.position).norm() < bound);
+        prop_assert!(angle_between(&found.pose.rotation, &motion.pose.rotation) < bound / machine.joints.radius);
+        prop_assert_eq!(tracker.pose, found.pose);
+
+        // What moves a platform in a millisecond takes three iterations.
+        let Motion { twist, .. } = motion;
+        let step = Twist { angular: twist.angular * 1e-3, linear: twist.linear * 1e-3 };
+        let next = solve(&machine, &motion.pose.displaced(&step), &lengths);
+        prop_assert!(next.converged && next.iterations <= 4, "{} iterations", next.iterations);
+        prop_assert!((next.pose.position - motion.pose.position).norm() < bound);
+    }
+}

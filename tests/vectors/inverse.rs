@@ -1,0 +1,83 @@
+//! `hexad inverse-dynamics`: forces, lengths and their derivatives.
+
+use super::common::{Errors, MACHINES, Table, data, largest};
+use super::{hexad_on_vectors, six_each, with_t};
+
+/// Of the largest force of the row.
+const FORCE_BOUND: f64 = 1e-12;
+
+/// Of each length; of the largest rate and of the largest acceleration of the row.
+const KINEMATICS_BOUND: f64 = 1e-13;
+
+/// Compares six columns with the reference, relative to the largest of the row.
+fn compare(ours: &Table, reference: &Table, stems: [&str; 2], bound: f64, what: &str) {
+    let mut errors = Errors::default();
+    for row in 0..reference.rows.len() {
+        let [ours, reference] = [ours.legs(row, stems[0]), reference.legs(row, stems[1])];
+        let scale = largest(&reference);
+        ours.iter().zip(reference).for_each(|(a, b)| errors.add((a - b) / scale));
+    }
+    errors.assert_within(bound, &format!("{what} {}", stems[0]));
+}
+
+fn check(name: &str, options: &[&str], forces: &str) {
+    let reference = Table::read(&data(name, "csv"));
+    let ran = hexad_on_vectors("inverse-dynamics", name, options);
+    let ours = ran.table();
+    assert_eq!(ran.message, "", "nothing to complain about");
+    let columns = six_each(&["force", "length", "length_rate", "length_accel"]);
+    assert_eq!(ours.header, [with_t(&[]), columns].concat());
+    assert_eq!(ours.rows.len(), reference.rows.len());
+    for (a, b) in ours.rows.iter().zip(&reference.rows) {
+        assert_eq!(a[0], b[0], "t is passed through");
+    }
+    let what = format!("{name} {}", options.join(" "));
+    compare(&ours, &reference, ["force", forces], FORCE_BOUND, &what);
+    for stem in ["length_rate", "length_accel"] {
+        compare(&ours, &reference, [stem, stem], KINEMATICS_BOUND, &what);
+    }
+    let mut errors = Errors::default();
+    for row in 0..reference.rows.len() {
+        let (ours, reference) = (ours.legs(row, "length"), reference.legs(row, "length"));
+        ours.iter().zip(reference).for_each(|(a, b)| errors.add(a / b - 1.0));
+    }
+    errors.assert_within(KINEMATICS_BOUND, &format!("{what} length"));
+}
+
+#[test]
+fn forces_agree_with_80_digits() {
+    for name in MACHINES {
+        check(name, &["--model", "exact"], "force");
+    }
+}
+
+#[test]
+fn forces_without_spin_agree_with_80_digits() {
+    for name in MACHINES {
+        check(name, &["--model", "rigid-legs"], "force_no_spin");
+    }
+}
+
+#[test]
+fn the_exact_model_is_the_default() {
+    let [by_default, exact, rigid] = [&[][..], &["--model", "exact"], &["--model", "rigid-legs"]]
+        .map(|options| hexad_on_vectors("inverse-dynamics", "motion_base", options).table().rows);
+    assert_eq!(by_default, exact);
+    assert_ne!(by_default, rigid, "the legs of this machine do spin");
+}
+
+/// The order of the columns does not matter, nor do other columns, blanks and the platform's line ends.
+#[test]
+fn columns_are_found_by_name() {
+    let reference = Table::read(&data("tilted", "csv"));
+    let mut text = String::new();
+    for row in [&reference.header].into_iter().chain(&reference.rows) {
+        let reversed: Vec<_> = row.iter().rev().map(String::as_str).collect();
+        text += &(reversed.join(" ,  ") + "\r\n");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("reversed.csv");
+    std::fs::write(&input, text).unwrap();
+    let ours = super::hexad("inverse-dynamics", &data("tilted", "toml"), &input, &[]).table();
+    assert_eq!(ours.rows, hexad_on_vectors("inverse-dynamics", "tilted", &[]).table().rows);
+}

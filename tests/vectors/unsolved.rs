@@ -1,0 +1,81 @@
+//! Rows without a solution: exit code 1, and a complete file that marks them.
+
+use std::fs;
+
+use super::common::{Table, data};
+use super::{Ran, hexad, hexad_on_vectors, six_each, with_t};
+
+/// Forward kinematics of the first rows of a machine, some rows with other lengths.
+fn with_lengths(name: &str, replaced: &[(usize, [f64; 6])], options: &[&str]) -> Ran {
+    let reference = Table::read(&data(name, "csv"));
+    let mut text = [with_t(&[]), six_each(&["length", "length_rate"])].concat().join(",") + "\n";
+    for row in 0..10 {
+        let other = replaced.iter().find(|(at, _)| *at == row).map(|(_, lengths)| *lengths);
+        let lengths = other.unwrap_or_else(|| reference.legs(row, "length"));
+        let numbers = [reference.number(row, "t")];
+        let numbers = numbers.iter().chain(&lengths).copied().chain(reference.legs(row, "length_rate"));
+        text += &(numbers.map(|value| format!("{value:?}")).collect::<Vec<_>>().join(",") + "\n");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("lengths.csv");
+    fs::write(&input, text).unwrap();
+    hexad("forward-kinematics", &data(name, "toml"), &input, options)
+}
+
+#[test]
+fn unreachable_lengths_are_marked_and_the_rest_is_solved() {
+    // No platform of this size can have one leg that long beside others that short.
+    let unreachable = [9.0, 0.9, 0.9, 0.9, 0.9, 0.9];
+    let far_apart = [0.9, 1e6, 0.9, 0.9, 0.9, 0.9];
+    let negative = [-1.0; 6];
+    for start in ["previous", "home"] {
+        let ran = with_lengths(
+            "fried2008",
+            &[(3, unreachable), (4, far_apart), (7, negative)],
+            &["--start", start],
+        );
+        assert_eq!(ran.code, Some(1), "{}", ran.message);
+        assert_eq!(
+            ran.message,
+            "hexad: 3 of 10 rows did not converge (column converged), the first at t = 0.003\n"
+        );
+        let ours = ran.complete_table();
+        let well = hexad_on_vectors("forward-kinematics", "fried2008", &["--start", start]).table();
+        assert_eq!((ours.rows.len(), &ours.header), (10, &well.header));
+        for row in 0..10 {
+            let solved = ![3, 4, 7].contains(&row);
+            assert_eq!(ours.number(row, "converged"), f64::from(u8::from(solved)), "row {row}");
+            let error = (ours.coordinates(row, "") - well.coordinates(row, "")).amax();
+            assert!(!solved || error < 1e-11, "row {row}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn no_row_may_be_solvable() {
+    let unreachable: Vec<_> = (0..10).map(|row| (row, [9.0, 0.9, 0.9, 0.9, 0.9, 0.9])).collect();
+    let ran = with_lengths("fried2008", &unreachable, &[]);
+    assert_eq!(ran.code, Some(1), "{}", ran.message);
+    assert!(ran.message.starts_with("hexad: 10 of 10 rows did not converge"), "{}", ran.message);
+    assert_eq!(ran.complete_table().rows.len(), 10);
+}
+
+/// All legs in one plane can carry nothing across it.
+#[test]
+fn singular_poses_have_no_forces() {
+    let reference = Table::read(&data("motion_base", "csv"));
+    let columns = reference.header[..19].join(",");
+    let flat = format!("0.5{}", ",0".repeat(18));
+    let sound = reference.rows[0][..19].join(",");
+    let folder = tempfile::tempdir().unwrap();
+    let input = folder.path().join("flat.csv");
+    fs::write(&input, format!("{columns}\n{flat}\n{sound}\n")).unwrap();
+    let ran = hexad("inverse-dynamics", &data("motion_base", "toml"), &input, &[]);
+    assert_eq!(ran.code, Some(1), "{}", ran.message);
+    let message = "hexad: 1 of 2 rows are at singular poses and have no forces, the first at t = 0.5\n";
+    assert_eq!(ran.message, message);
+    let ours = ran.complete_table();
+    assert!(ours.legs(0, "force").iter().all(|force| force.is_nan()));
+    assert!(ours.legs(0, "length").iter().all(|length| length.is_finite()));
+    assert!(ours.legs(1, "force").iter().all(|force| force.is_finite()));
+}
