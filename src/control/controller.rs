@@ -5,7 +5,7 @@
 
 use super::law::{Law, TrackingError};
 use super::state::{Cause, State};
-use crate::model::active_forces::inverse_dynamics;
+use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::{Tracked, Tracker};
 use crate::model::inverse_jacobian::twist_from_rates;
 use crate::model::leg::Exact;
@@ -73,7 +73,7 @@ pub struct Output {
 /// The controller of one machine.
 #[derive(Clone, Debug)]
 pub struct Controller {
-    machine: Machine,
+    model: InverseDynamics,
     parameters: Parameters,
     tracker: Tracker,
     state: State,
@@ -81,9 +81,9 @@ pub struct Controller {
 
 impl Controller {
     /// Waits at the home pose for a first measurement.
-    pub fn new(machine: Machine, parameters: Parameters) -> Self {
-        let tracker = home_tracker(&machine);
-        Self { machine, parameters, tracker, state: State::Waiting }
+    pub fn new(machine: &Machine, parameters: Parameters) -> Self {
+        let tracker = home_tracker(machine);
+        Self { model: InverseDynamics::new(machine), parameters, tracker, state: State::Waiting }
     }
 
     /// One cycle. Pure: depends on nothing but the state of the controller and `input`.
@@ -112,11 +112,11 @@ impl Controller {
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = input.release_ns.saturating_add(self.parameters.period_ns / 2);
         let command = self.parameters.law.command(&desired_at(middle_of_hold_ns), &error);
-        let force = inverse_dynamics::<Exact>(&self.machine, &command).ok_or(Cause::SingularPose)?;
+        let force = self.model.forces::<Exact>(&command).ok_or(Cause::SingularPose)?;
         if force.iter().any(|value| !value.is_finite()) {
             return Err(Cause::ForceNotFinite);
         }
-        let limit = self.machine.actuator.max_force;
+        let limit = self.model.machine().actuator.max_force;
         output.force = force.map(|value| value.clamp(-limit, limit));
         output.limited = output.force != force;
         Ok(())
@@ -148,19 +148,20 @@ impl Controller {
 
     /// The pose and twist of the platform, by one bounded step of forward kinematics.
     fn locate(&mut self, measurement: &Measurement) -> Result<(Pose, Twist), Cause> {
-        let (tracked, _) = self.tracker.advance(&self.machine, &measurement.length);
+        let machine = self.model.machine();
+        let (tracked, _) = self.tracker.advance(machine, &measurement.length);
         match tracked {
             Tracked::Found => {}
             Tracked::Approaching if self.state == State::Active => return Err(Cause::MeasurementJumped),
             Tracked::Approaching => return Err(Cause::FindingPose),
             Tracked::NotConverged => {
                 // Home is the one pose known to be on the right assembly mode: walk again from there.
-                self.tracker = home_tracker(&self.machine);
+                self.tracker = home_tracker(machine);
                 return Err(Cause::PoseNotFound);
             }
         }
         let pose = self.tracker.pose;
-        let twist = twist_from_rates(&self.machine, &pose, &measurement.rate).ok_or(Cause::SingularPose)?;
+        let twist = twist_from_rates(machine, &pose, &measurement.rate).ok_or(Cause::SingularPose)?;
         Ok((pose, twist))
     }
 

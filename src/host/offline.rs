@@ -11,7 +11,7 @@ use nalgebra::Vector6;
 
 use super::files::FileError;
 use super::table::{Table, TableError, Writer, coordinates, legs, six, trajectory_columns};
-use crate::model::active_forces::inverse_dynamics;
+use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::Tracker;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::inverse_jacobian::twist_from_rates;
@@ -40,10 +40,10 @@ pub enum ModelName {
 }
 
 impl ModelName {
-    fn forces(self, machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
+    fn forces(self, model: &InverseDynamics, motion: &Motion) -> Option<[f64; LEGS]> {
         match self {
-            Self::Exact => inverse_dynamics::<Exact>(machine, motion),
-            Self::RigidLegs => inverse_dynamics::<RigidLegs>(machine, motion),
+            Self::Exact => model.forces::<Exact>(motion),
+            Self::RigidLegs => model.forces::<RigidLegs>(motion),
         }
     }
 }
@@ -71,10 +71,11 @@ pub fn inverse_dynamics_file(
     }
     let mut writer = Writer::new(&columns);
     let mut unsolved = Unsolved::default();
+    let dynamics = InverseDynamics::new(machine);
     for row in table.rows().iter().progress_with(progress(table.rows().len())) {
         let t = row.first().copied().unwrap_or_default();
         let motion = task_state(row).motion();
-        let forces = model.forces(machine, &motion);
+        let forces = model.forces(&dynamics, &motion);
         unsolved.count(t, forces.is_some());
         let motion = leg_motion(machine, &motion);
         let forces = forces.unwrap_or([f64::NAN; LEGS]);

@@ -6,85 +6,116 @@
 //! Gamma_i += reflected L''_i + viscous L'_i + coulomb sign(L'_i)        the drives
 //! ```
 //!
+//! The part of `F_i` along the leg needs no balance, it is leg i's own: only the part across goes into W.
+//!
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
 use fearless_simd::{Simd, dispatch, f64x8};
 use nalgebra::{Matrix6, Vector6};
 
-use super::balance::{Balance, wrench_columns};
-use super::inverse_geometry::{LegAcceleration, LegGeometry, LegVelocity};
+use super::balance::{Balance, LaneWrench, wrench_columns};
+use super::inverse_geometry::LegGeometry;
 use super::lanes::Eight;
-use super::leg::{Model, leg_reaction};
-use super::machine::{LEGS, Machine};
-use super::platform::platform_wrench;
-use super::rigid::{Motion, Wrench};
+use super::leg::{LegConstants, LegReaction, Model};
+use super::machine::{Actuator, Joints, LEGS, Machine};
+use super::platform::{PrincipalAxes, acceleration_map};
+use super::rigid::Motion;
 
-/// The six actuator forces Gamma \[N\] for a motion of the platform, `None` at a singular pose.
-pub fn inverse_dynamics<M: Model>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
-    dispatch!(machine.level, simd => forces::<_, f64x8<_>, M>(simd, machine, motion))
+/// The inverse dynamic model of one machine: its constants, ready for the lanes.
+#[derive(Clone, Debug)]
+pub struct InverseDynamics {
+    machine: Machine,
+    joints: Joints,
+    legs: LegConstants,
+    axes: PrincipalAxes,
 }
 
-#[inline(always)]
-fn forces<S: Simd, V: Eight<S>, M: Model>(simd: S, machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
-    let legs = LegGeometry::<V>::new(simd, machine, &motion.pose);
-    let (wrench, drive) = load::<S, V, M>(simd, machine, motion, &legs);
-    Balance::new(simd, &legs).forces(&machine.joints.triples, &wrench, drive)
-}
-
-/// What the actuators have to balance: `N (Gamma - drive_forces) = wrench`.
+/// What the actuators have to balance: `N (Gamma - along) = wrench`.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskLoad {
     /// N, see [`super::inverse_jacobian::leg_wrenches`].
     pub leg_wrenches: Matrix6<f64>,
-    /// W, torque about C first \[N m\], \[N\].
+    /// W without what acts along the legs, torque about C first \[N m\], \[N\].
     pub wrench: Vector6<f64>,
-    /// What the drives themselves take, per leg \[N\].
-    pub drive_forces: Vector6<f64>,
+    /// What acts along each leg, drive included \[N\].
+    pub along: Vector6<f64>,
 }
 
-/// The load of a motion, before it is shared among the legs.
-pub fn task_load<M: Model>(machine: &Machine, motion: &Motion) -> TaskLoad {
-    dispatch!(machine.level, simd => {
-        let triples = &machine.joints.triples;
-        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, &motion.pose);
-        let (wrench, drive) = load::<_, _, M>(simd, machine, motion, &legs);
-        TaskLoad {
-            leg_wrenches: wrench_columns(triples, legs.arm.cross(legs.direction), legs.direction),
-            wrench: wrench.vector(),
-            drive_forces: triples.unpack(&drive.store()).into(),
+impl InverseDynamics {
+    /// Derives the constants. Not for the loop.
+    pub fn new(machine: &Machine) -> Self {
+        Self {
+            joints: machine.joints.with_point(&machine.platform.center_of_mass),
+            legs: LegConstants::new(machine),
+            axes: PrincipalAxes::new(machine),
+            machine: machine.clone(),
         }
-    })
+    }
+
+    /// The machine it was made for.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// The six actuator forces Gamma \[N\] for a motion of the platform, `None` at a singular pose.
+    pub fn forces<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
+        dispatch!(self.machine.level, simd => {
+            let legs = LegGeometry::<f64x8<_>>::new(simd, &self.joints, &motion.pose);
+            let balance = Balance::new(simd, &self.joints, &legs);
+            let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
+            balance.forces(&wrench, along)
+        })
+    }
+
+    /// The load of a motion, before it is shared among the legs.
+    pub fn load_of<M: Model>(&self, motion: &Motion) -> TaskLoad {
+        dispatch!(self.machine.level, simd => {
+            let triples = &self.joints.triples;
+            let legs = LegGeometry::<f64x8<_>>::new(simd, &self.joints, &motion.pose);
+            let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
+            TaskLoad {
+                leg_wrenches: wrench_columns(triples, legs.arm.cross(legs.direction), legs.direction),
+                wrench: wrench.sum().vector(),
+                along: triples.unpack(&along.store()).into(),
+            }
+        })
+    }
+
+    /// W, and what acts along the legs.
+    #[inline(always)]
+    fn load<S: Simd, V: Eight<S>, M: Model>(
+        &self,
+        simd: S,
+        motion: &Motion,
+        legs: &LegGeometry<V>,
+    ) -> (LaneWrench<V::Half>, V) {
+        let machine = &self.machine;
+        let map = acceleration_map(&motion.twist, &motion.acceleration);
+        let velocity = legs.velocity(simd, &motion.twist);
+        let joint_acceleration = legs.joint_acceleration(simd, &motion.acceleration, &map);
+        let reaction =
+            LegReaction::new::<S, M>(simd, machine, &self.legs, legs, &velocity, joint_acceleration);
+        let rotation = self.axes.torques::<S, V::Half>(simd, &motion.pose.rotation, &map);
+        let wrench = LaneWrench {
+            torque: legs.arm.cross(reaction.across).folded() + rotation,
+            force: reaction.across.folded(),
+        };
+        let accel = legs.accel(&velocity, joint_acceleration);
+        (wrench, reaction.along + drive_force(simd, &machine.actuator, velocity.rate, accel))
+    }
 }
 
-/// W, and what the drives take.
-#[inline(always)]
-fn load<S: Simd, V: Eight<S>, M: Model>(
-    simd: S,
-    machine: &Machine,
-    motion: &Motion,
-    legs: &LegGeometry<V>,
-) -> (Wrench, V) {
-    let velocity = legs.velocity(simd, &motion.twist);
-    let acceleration = legs.acceleration(simd, &motion.twist, &motion.acceleration, &velocity);
-    let reaction = leg_reaction::<S, V, M>(simd, machine, legs, &velocity, &acceleration);
-    let mut wrench = platform_wrench(machine, motion);
-    wrench.torque += legs.arm.cross(reaction).sum_legs();
-    wrench.force += reaction.sum_legs();
-    (wrench, drive_forces(simd, machine, &velocity, &acceleration))
+/// The forces of one motion, for those who need no second: a loop keeps an [`InverseDynamics`].
+pub fn inverse_dynamics<M: Model>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
+    InverseDynamics::new(machine).forces::<M>(motion)
 }
 
 /// `reflected L'' + viscous L' + coulomb sign(L')`, the sign proportional below the smoothing speed.
 #[inline(always)]
-fn drive_forces<S: Simd, V: Eight<S>>(
-    simd: S,
-    machine: &Machine,
-    velocity: &LegVelocity<V>,
-    acceleration: &LegAcceleration<V>,
-) -> V {
-    let actuator = &machine.actuator;
+fn drive_force<S: Simd, V: Eight<S>>(simd: S, actuator: &Actuator, rate: V, accel: V) -> V {
     let splat = |value: f64| V::splat(simd, value);
-    let sign = (velocity.rate * splat(1.0 / actuator.coulomb_smoothing)).max(splat(-1.0)).min(splat(1.0));
-    let friction = splat(actuator.viscous_friction).mul_add(velocity.rate, splat(actuator.coulomb_friction) * sign);
-    splat(actuator.reflected_mass).mul_add(acceleration.accel, friction)
+    let sign = (rate * splat(1.0 / actuator.coulomb_smoothing)).max(splat(-1.0)).min(splat(1.0));
+    let friction = splat(actuator.viscous_friction).mul_add(rate, splat(actuator.coulomb_friction) * sign);
+    splat(actuator.reflected_mass).mul_add(accel, friction)
 }

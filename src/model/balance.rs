@@ -13,129 +13,151 @@
 //! ```
 //!
 //! Every 3 x 3 inverse is cross products of rotated lanes: two divisions in all, where an LU of the 6 x 6
-//! matrix has six one after the other. A is the triple with the larger `|d|`, which is the pivoting.
-//! One step of iterative refinement follows; its size measures the error of the first solution. Where it
-//! is larger than the square root of the precision, which a second step would not mend (near singular
-//! poses), LU with partial pivoting takes over, so no result is worse than that method's.
+//! matrix has six one after the other. The pivoting is done in advance: [`Triples::best`] splits the legs
+//! so that A resists forces best at home. Where a pose comes too near to a singularity of A or of S (both
+//! determinants are at hand) LU with partial pivoting takes over, so no result is worse than that method's.
 
 use fearless_simd::Simd;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four, Lanes3, Reals, Triples};
-use super::machine::LEGS;
+use super::lanes::{Eight, Four, Lanes3, Triples};
+use super::machine::{Joints, LEGS};
 use super::rigid::{Twist, Wrench};
 
+/// Smallest `|dA|`, the volume spanned by three unit vectors, and smallest `|dS| / radius^3` for which the
+/// blocks are used. Their product bounds the growth of rounding errors, to about its inverse.
+const LEAST_DA: f64 = 1e-2;
+const LEAST_DS: f64 = 1e-3;
+
 /// `N^-1` and `N^-T` at one pose.
-pub(super) struct Balance<S: Simd, V: Eight<S>> {
+pub(super) struct Balance<'a, S: Simd, V: Eight<S>> {
     simd: S,
+    joints: &'a Joints,
     /// n and m of all legs.
     direction: Lanes3<V>,
     moment: Lanes3<V>,
-    /// Whether A is the second half of the lanes.
-    swapped: bool,
-    /// m of A, per leg and each in all lanes.
-    own_moment_a: Lanes3<V::Half>,
-    moment_a: [Lanes3<V::Half>; 3],
+    /// m of A.
+    moment_a: Lanes3<V::Half>,
     /// a / dA
     inverse_a: Lanes3<V::Half>,
-    /// X: a vector for each i over the lanes j, and a vector for each j over the lanes i.
+    /// X: a vector for each i over the lanes j.
     x: [V::Half; 3],
-    x_transposed: [V::Half; 3],
     /// c / dS
     inverse_s: Lanes3<V::Half>,
+    /// Both determinants are large enough.
+    sound: bool,
 }
 
-impl<S: Simd, V: Eight<S>> Balance<S, V> {
+/// A wrench about C as the sum of what is in four lanes.
+pub(super) struct LaneWrench<F> {
+    pub torque: Lanes3<F>,
+    pub force: Lanes3<F>,
+}
+
+impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
     /// Factorizes. At a singular pose the factors are not finite.
     #[inline(always)]
-    pub fn new(simd: S, legs: &LegGeometry<V>) -> Self {
+    pub fn new(simd: S, joints: &'a Joints, legs: &LegGeometry<V>) -> Self {
         let direction = legs.direction;
         let moment = legs.arm.cross(direction);
-        // Of both triples at once.
-        let next = direction.map(#[inline(always)] |component| component.next(simd));
-        let adjugate = next.cross(direction.map(#[inline(always)] |component| component.previous(simd)));
-        let (d0, d1) = direction.dot(adjugate).halves();
-        let ((n0, n1), (m0, m1), (a0, a1)) = (direction.halves(), moment.halves(), adjugate.halves());
-        let ([size0, ..], [size1, ..]) = (d0.legs(), d1.legs());
-        let swapped = size1.abs() > size0.abs();
-        let (a, d, n_b, m_a, m_b) = if swapped { (a1, d1, n0, m1, m0) } else { (a0, d0, n1, m0, m1) };
-        let inverse_a = a * (V::Half::splat(simd, 1.0) / d);
+        let ((n_a, n_b), (moment_a, m_b)) = (direction.halves(), moment.halves());
+        let one = V::Half::splat(simd, 1.0);
+
+        let a = adjugate(simd, n_a);
+        let d_a = n_a.dot(a);
+        let inverse_a = a * (one / d_a);
         let [i0, i1, i2] = broadcast_vectors(simd, inverse_a);
         let x = [i0.dot(n_b), i1.dot(n_b), i2.dot(n_b)];
-        let moment_a = broadcast_vectors(simd, m_a);
-        let s = minus_combination(m_b, &moment_a, &x);
-        let next = s.map(#[inline(always)] |component| component.next(simd));
-        let c = next.cross(s.map(#[inline(always)] |component| component.previous(simd)));
-        let inverse_s = c * (V::Half::splat(simd, 1.0) / s.dot(c));
-        let x_transposed = V::Half::transposed(simd, x);
-        Self { simd, direction, moment, swapped, own_moment_a: m_a, moment_a, inverse_a, x, x_transposed, inverse_s }
+        let [x0, x1, x2] = x;
+        let [m0, m1, m2] = broadcast_vectors(simd, moment_a);
+        let s = m_b.minus_scaled(x0, m0).minus_scaled(x1, m1).minus_scaled(x2, m2);
+        let c = adjugate(simd, s);
+        let d_s = s.dot(c);
+        let inverse_s = c * (one / d_s);
+
+        let ([d_a, ..], [d_s, ..]) = (d_a.legs(), d_s.legs());
+        let sound = d_a.abs() >= LEAST_DA && d_s.abs() >= LEAST_DS * joints.radius_cubed;
+        Self { simd, joints, direction, moment, moment_a, inverse_a, x, inverse_s, sound }
     }
 
-    /// Gamma with `N (Gamma - drive) = W`; `None` at a singular pose.
+    /// `Gamma + along` with `N Gamma = W`; `None` at a singular pose.
     #[inline(always)]
-    pub fn forces(&self, triples: &Triples, wrench: &Wrench, drive: V) -> Option<[f64; LEGS]> {
-        let first = self.forces_once(wrench);
-        let balanced = Wrench {
-            torque: (self.moment * first).sum_legs(),
-            force: (self.direction * first).sum_legs(),
-        };
-        let residual =
-            Wrench { torque: wrench.torque - balanced.torque, force: wrench.force - balanced.force };
-        let correction = self.forces_once(&residual);
-        let gamma = first + correction;
-        // Squares: so the share is the square root of the precision. False for what is not a number.
-        if (correction * correction).sum() <= V::EPSILON * (gamma * gamma).sum() {
-            return Some(triples.unpack(&(gamma + drive).store()));
+    pub fn forces(&self, wrench: &LaneWrench<V::Half>, along: V) -> Option<[f64; LEGS]> {
+        let simd = self.simd;
+        let triples = &self.joints.triples;
+        if !self.sound {
+            let n = wrench_columns(triples, self.moment, self.direction);
+            return forces_by_lu(&n, &wrench.sum(), &triples.unpack(&along.store()));
         }
-        let n = wrench_columns(triples, self.moment, self.direction);
-        let gamma = n.lu().solve(&wrench.vector())?;
-        Some((gamma + Vector6::from(triples.unpack(&drive.store()))).into())
-    }
-
-    #[inline(always)]
-    fn forces_once(&self, wrench: &Wrench) -> V {
-        let g = self.inverse_a.dot(splat(self.simd, &wrench.force));
-        let torque = minus_combination(splat(self.simd, &wrench.torque), &self.moment_a, &broadcasts(self.simd, g));
+        let force = wrench.force.map(
+            #[inline(always)]
+            |component| component.total(simd),
+        );
+        let g = self.inverse_a.dot(force);
+        // The lane of padding is nobody's force.
+        let g_of_legs = g * V::Half::load(simd, [1.0, 1.0, 1.0, 0.0]);
+        let torque = wrench.torque.minus_scaled(g_of_legs, self.moment_a);
+        let torque = torque.map(
+            #[inline(always)]
+            |component| component.total(simd),
+        );
         let gamma_b = self.inverse_s.dot(torque);
-        let [g0, g1, g2] = broadcasts(self.simd, gamma_b);
-        let [x0, x1, x2] = self.x_transposed;
-        let gamma_a = g - (g0 * x0 + g1 * x1 + g2 * x2);
-        if self.swapped { V::join(gamma_b, gamma_a) } else { V::join(gamma_a, gamma_b) }
+        let [g0, g1, g2] = broadcasts(simd, gamma_b);
+        let [x0, x1, x2] = V::Half::transposed(simd, self.x);
+        let gamma_a = g - g0 * x0 - g1 * x1 - g2 * x2;
+        Some(triples.unpack(&(V::join(gamma_a, gamma_b) + along).store()))
     }
 
-    /// `[omega; v]` with `N^T [omega; v] = rates`; not finite at a singular pose.
+    /// `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
     #[inline(always)]
-    pub fn twist(&self, rates: V) -> Twist {
-        let first = self.twist_once(rates);
-        let correction = self.twist_once(rates - self.rates(&first));
-        Twist {
-            angular: first.angular + correction.angular,
-            linear: first.linear + correction.linear,
+    pub fn twist(&self, rates: V) -> Option<Twist> {
+        if self.sound {
+            return Some(self.newton_step(rates));
         }
+        let triples = &self.joints.triples;
+        twist_by_lu(&wrench_columns(triples, self.moment, self.direction), &triples.unpack(&rates.store()))
     }
 
-    /// [`Balance::twist`] without refinement: for iterations that correct themselves.
+    /// [`Balance::twist`] by blocks at any pose, for iterations that correct themselves; not finite at a
+    /// singular one.
     #[inline(always)]
-    pub fn twist_once(&self, rates: V) -> Twist {
-        let (r0, r1) = rates.halves();
-        let (r_a, r_b) = if self.swapped { (r1, r0) } else { (r0, r1) };
-        let [g0, g1, g2] = broadcasts(self.simd, r_a);
+    pub fn newton_step(&self, rates: V) -> Twist {
+        let (r_a, r_b) = rates.halves();
+        let [r0, r1, r2] = broadcasts(self.simd, r_a);
         let [x0, x1, x2] = self.x;
-        let angular = (self.inverse_s * (r_b - (g0 * x0 + g1 * x1 + g2 * x2))).sum();
-        let own = self.own_moment_a.dot(splat(self.simd, &angular));
-        Twist { angular, linear: (self.inverse_a * (r_a - own)).sum() }
+        let angular = (self.inverse_s * (r_b - r0 * x0 - r1 * x1 - r2 * x2)).sum_legs();
+        let turning = self.moment_a.dot(splat(self.simd, &angular));
+        Twist { angular, linear: (self.inverse_a * (r_a - turning)).sum_legs() }
     }
+}
 
-    /// `N^T [omega; v]`
-    #[inline(always)]
-    fn rates(&self, twist: &Twist) -> V {
-        let (angular, linear) = (Lanes3::splat(self.simd, &twist.angular), Lanes3::splat(self.simd, &twist.linear));
-        self.moment.dot(angular) + self.direction.dot(linear)
+impl<F> LaneWrench<F> {
+    /// The wrench itself.
+    pub fn sum<S: Simd>(&self) -> Wrench
+    where
+        F: Four<S>,
+    {
+        Wrench { torque: self.torque.sum(), force: self.force.sum() }
     }
+}
+
+/// By LU with partial pivoting.
+#[cold]
+#[inline(never)]
+fn forces_by_lu(n: &Matrix6<f64>, wrench: &Wrench, along: &[f64; LEGS]) -> Option<[f64; LEGS]> {
+    Some((n.lu().solve(&wrench.vector())? + Vector6::from(*along)).into())
+}
+
+/// By LU with partial pivoting.
+#[cold]
+#[inline(never)]
+fn twist_by_lu(n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
+    n.transpose().lu().solve(&Vector6::from(*rates)).map(|v| Twist::from_vector(&v))
 }
 
 /// N, columns in the order of people.
+#[inline(always)]
 pub(super) fn wrench_columns<S: Simd, V: Eight<S>>(
     triples: &Triples,
     moment: Lanes3<V>,
@@ -147,6 +169,20 @@ pub(super) fn wrench_columns<S: Simd, V: Eight<S>>(
         row.copy_from_slice(&triples.unpack(lane));
     }
     n
+}
+
+/// `v_i+1 x v_i+2` in each lane i.
+#[inline(always)]
+fn adjugate<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> Lanes3<F> {
+    let next = v.map(
+        #[inline(always)]
+        |component| component.next(simd),
+    );
+    let previous = v.map(
+        #[inline(always)]
+        |component| component.previous(simd),
+    );
+    next.cross(previous)
 }
 
 /// Each leg's number in all lanes.
@@ -161,12 +197,6 @@ fn broadcast_vectors<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> [Lanes3<F>; 
     let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
         (broadcasts(simd, v.x), broadcasts(simd, v.y), broadcasts(simd, v.z));
     [Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 }, Lanes3 { x: x2, y: y2, z: z2 }]
-}
-
-/// `v - sum_i s_i u_i`
-#[inline(always)]
-fn minus_combination<F: Reals>(v: Lanes3<F>, [u0, u1, u2]: &[Lanes3<F>; 3], [s0, s1, s2]: &[F; 3]) -> Lanes3<F> {
-    v.plus_scaled(-*s0, *u0).plus_scaled(-*s1, *u1).plus_scaled(-*s2, *u2)
 }
 
 #[inline(always)]

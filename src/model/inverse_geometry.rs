@@ -3,17 +3,19 @@
 //! ```text
 //! b   = R CB                    s = C + b - A          L = |s|,   n = s / L
 //! vB  = v + omega x b           L'  = n . vB                      n'  = (vB - L' n) / L
-//! aB  = v' + omega' x b + omega x (omega x b)
-//!                               L'' = n . aB + L |n'|^2           n'' = (aB - L'' n - 2 L' n') / L
+//! aB  = v' + S b                L'' = n . aB + L |n'|^2           n'' = (aB - L'' n - 2 L' n') / L
 //! ```
+//!
+//! with `S b = omega' x b + omega x (omega x b)`; n'' itself is nowhere needed.
 //!
 //! Valid for L > 0. No leg angles appear, hence no joint-angle singularity.
 
 use fearless_simd::{Simd, dispatch, f64x8};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{Eight, Lanes3};
-use super::machine::{LEGS, Machine};
+use super::lanes::{Eight, Lanes3, Reals};
+use super::machine::{Joints, LEGS, Machine};
+use super::platform::acceleration_map;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 
 /// Geometry of the six legs at one pose.
@@ -38,23 +40,15 @@ pub(super) struct LegVelocity<V> {
     pub direction: Lanes3<V>,
 }
 
-/// Second time derivatives.
-#[derive(Clone, Copy)]
-pub(super) struct LegAcceleration<V> {
-    /// L''
-    pub accel: V,
-    /// n''
-    pub direction: Lanes3<V>,
-}
-
 impl<V> LegGeometry<V> {
     #[inline(always)]
-    pub fn new<S: Simd>(simd: S, machine: &Machine, pose: &Pose) -> Self
+    pub fn new<S: Simd>(simd: S, joints: &Joints, pose: &Pose) -> Self
     where
         V: Eight<S>,
     {
-        let arm = Lanes3::<V>::load(simd, &machine.joints.platform).transformed(simd, &pose.rotation);
-        let s = Lanes3::splat(simd, &pose.position) + arm - Lanes3::load(simd, &machine.joints.base);
+        let arm = Lanes3::<V>::load(simd, &joints.platform)
+            .transformed(&pose.rotation, |value| V::splat(simd, value));
+        let s = Lanes3::splat(simd, &pose.position) + arm - Lanes3::load(simd, &joints.base);
         let length = s.dot(s).sqrt();
         let inverse_length = V::splat(simd, 1.0) / length;
         Self { arm, direction: s * inverse_length, length, inverse_length }
@@ -71,26 +65,29 @@ impl<V> LegGeometry<V> {
         LegVelocity { rate, direction }
     }
 
+    /// aB, with `acceleration_map` from [`super::platform::acceleration_map`].
     #[inline(always)]
-    pub fn acceleration<S: Simd>(
+    pub fn joint_acceleration<S: Simd>(
         &self,
         simd: S,
-        twist: &Twist,
         acceleration: &Acceleration,
-        velocity: &LegVelocity<V>,
-    ) -> LegAcceleration<V>
+        acceleration_map: &Matrix3<f64>,
+    ) -> Lanes3<V>
     where
         V: Eight<S>,
     {
-        // omega' x b + omega x (omega x b) = (omega'~ + omega~ omega~) b: one 3 x 3 for all legs
-        let omega = twist.angular.cross_matrix();
-        let map = acceleration.angular.cross_matrix() + omega * omega;
-        let joint = Lanes3::splat(simd, &acceleration.linear) + self.arm.transformed(simd, &map);
+        let relative = self.arm.transformed(acceleration_map, |value| V::splat(simd, value));
+        Lanes3::splat(simd, &acceleration.linear) + relative
+    }
+
+    /// L''
+    #[inline(always)]
+    pub fn accel(&self, velocity: &LegVelocity<V>, joint_acceleration: Lanes3<V>) -> V
+    where
+        V: Reals,
+    {
         let turn = velocity.direction;
-        let accel = self.length.mul_add(turn.dot(turn), self.direction.dot(joint));
-        let direction = joint.plus_scaled(-accel, self.direction).plus_scaled(-(velocity.rate + velocity.rate), turn)
-            * self.inverse_length;
-        LegAcceleration { accel, direction }
+        self.length.mul_add(turn.dot(turn), self.direction.dot(joint_acceleration))
     }
 }
 
@@ -106,13 +103,14 @@ pub struct LegMotion {
 pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
     let unpack = |lane| machine.joints.triples.unpack(&lane);
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, &motion.pose);
+        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, &motion.pose);
         let velocity = legs.velocity(simd, &motion.twist);
-        let acceleration = legs.acceleration(simd, &motion.twist, &motion.acceleration, &velocity);
+        let map = acceleration_map(&motion.twist, &motion.acceleration);
+        let accel = legs.accel(&velocity, legs.joint_acceleration(simd, &motion.acceleration, &map));
         LegMotion {
             length: unpack(legs.length.store()),
             rate: unpack(velocity.rate.store()),
-            accel: unpack(acceleration.accel.store()),
+            accel: unpack(accel.store()),
         }
     })
 }
@@ -120,7 +118,7 @@ pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
 /// `L_i` \[m\].
 pub fn leg_lengths(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, pose);
+        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
         machine.joints.triples.unpack(&legs.length.store())
     })
 }
@@ -128,7 +126,7 @@ pub fn leg_lengths(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
 /// `n_i`, unit vectors from base to platform, base axes.
 pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, pose);
+        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
         machine.joints.triples.unpack_vectors(&legs.direction.store())
     })
 }

@@ -17,7 +17,7 @@ use super::rigid::{Pose, Twist};
 /// force rows below \[1\].
 pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, pose);
+        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
         wrench_columns(&machine.joints.triples, legs.arm.cross(legs.direction), legs.direction)
     })
 }
@@ -36,9 +36,8 @@ pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
 /// `None` at a singular pose. Errors of the rates are amplified by the condition of the pose.
 pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> Option<Twist> {
     let rates = machine.joints.triples.pack(rates);
-    let twist = dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, machine, pose);
-        Balance::new(simd, &legs).twist(Eight::load(simd, &rates))
-    });
-    twist.vector().iter().all(|value| value.is_finite()).then_some(twist)
+    dispatch!(machine.level, simd => {
+        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
+        Balance::new(simd, &machine.joints, &legs).twist(Eight::load(simd, &rates))
+    })
 }

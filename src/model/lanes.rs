@@ -25,6 +25,14 @@ use super::machine::LEGS;
 #[repr(align(64))]
 pub struct Lane(pub [f64; 8]);
 
+impl Lane {
+    /// Sets the first lane of padding.
+    pub(super) fn set_padding(&mut self, value: f64) {
+        let [_, _, _, padding, ..] = &mut self.0;
+        *padding = value;
+    }
+}
+
 /// Which leg is in which lane: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Triples {
@@ -34,7 +42,7 @@ pub struct Triples {
 
 impl Triples {
     /// The ten ways to split six legs in two, by the partners of the first leg.
-    pub const ALL: [Self; 10] = [
+    const ALL: [Self; 10] = [
         Self { lanes: [0, 1, 2, 4, 5, 6] },
         Self { lanes: [0, 1, 4, 2, 5, 6] },
         Self { lanes: [0, 1, 4, 5, 2, 6] },
@@ -47,6 +55,19 @@ impl Triples {
         Self { lanes: [0, 4, 5, 6, 1, 2] },
     ];
 
+    /// The split whose first triple spans the largest volume: of these directions of the legs, the three
+    /// that resist a force best go first.
+    pub fn best(directions: &[Vector3<f64>; LEGS]) -> Self {
+        let volume = |triples: &Self| {
+            let [x, y, z] = triples.pack_vectors(directions).map(|lane| lane.0);
+            let ([x0, x1, x2, ..], [y0, y1, y2, ..], [z0, z1, z2, ..]) = (x, y, z);
+            Matrix3::new(x0, x1, x2, y0, y1, y2, z0, z1, z2).determinant().abs()
+        };
+        let swapped = |triples: Self| Self { lanes: triples.lanes.map(|lane| (lane + 4) % 8) };
+        let all = Self::ALL.into_iter().chain(Self::ALL.into_iter().map(swapped));
+        all.max_by(|a, b| volume(a).total_cmp(&volume(b))).unwrap_or(Self::ALL[0])
+    }
+
     /// One number per leg to lanes.
     #[inline(always)]
     pub fn pack(&self, legs: &[f64; LEGS]) -> Lane {
@@ -58,6 +79,11 @@ impl Triples {
         }
         let [a, b, c, _, d, e, f, _] = lane;
         Lane([a, b, c, a, d, e, f, d])
+    }
+
+    /// The same number for every leg, in whatever lane, and others for the padding.
+    pub(super) fn uniform(leg: f64, [first, second]: [f64; 2]) -> Lane {
+        Lane([leg, leg, leg, first, leg, leg, leg, second])
     }
 
     /// Lanes to one number per leg.
@@ -85,12 +111,7 @@ impl Triples {
 
 /// Arithmetic on all lanes of a vector.
 pub(super) trait Reals:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// `self a + b`, fused where the CPU can.
     fn mul_add(self, a: Self, b: Self) -> Self;
@@ -105,28 +126,25 @@ pub(super) trait Reals:
 pub(super) trait Eight<S: Simd>: Reals {
     /// One triple.
     type Half: Four<S>;
-    /// Distance from 1 to the next number.
-    const EPSILON: f64;
     fn splat(simd: S, value: f64) -> Self;
     fn load(simd: S, lane: &Lane) -> Self;
     fn store(self) -> Lane;
     fn halves(self) -> (Self::Half, Self::Half);
-    /// In each lane, the next leg of its triple: `[1 2 0 - 5 6 4 -]`.
-    fn next(self, simd: S) -> Self;
-    /// In each lane, the leg before in its triple: `[2 0 1 - 6 4 5 -]`.
-    fn previous(self, simd: S) -> Self;
-    /// Sum over the six legs.
-    fn sum(self) -> f64;
     fn join(first: Self::Half, second: Self::Half) -> Self;
 }
 
 /// Four lanes: one triple, and a lane of padding.
 pub(super) trait Four<S: Simd>: Reals {
     fn splat(simd: S, value: f64) -> Self;
-    /// `[1 2 0 -]`, as [`Eight::next`].
+    fn load(simd: S, values: [f64; 4]) -> Self;
+    /// In each lane, the next leg of the triple: `[1 2 0 -]`.
     fn next(self, simd: S) -> Self;
-    /// `[2 0 1 -]`, as [`Eight::previous`].
+    /// In each lane, the leg before: `[2 0 1 -]`.
     fn previous(self, simd: S) -> Self;
+    /// The sum of all four lanes, in all lanes.
+    fn total(self, simd: S) -> Self;
+    /// All four lanes.
+    fn lanes(self) -> [f64; 4];
     /// One leg's number in all lanes.
     fn broadcast<const LEG: usize>(self, simd: S) -> Self;
     /// Three triples, a vector for each i over the lanes j, to a vector for each j over the lanes i.
@@ -166,7 +184,6 @@ macro_rules! precision {
     ($scalar:ty, $eight:ident, $four:ident) => {
         impl<S: Simd> Eight<S> for $eight<S> {
             type Half = $four<S>;
-            const EPSILON: f64 = <$scalar>::EPSILON as f64;
             #[inline(always)]
             fn splat(simd: S, value: f64) -> Self {
                 SimdBase::splat(simd, value as $scalar)
@@ -184,22 +201,6 @@ macro_rules! precision {
                 self.split()
             }
             #[inline(always)]
-            fn next(self, simd: S) -> Self {
-                let [a, b, c, _, d, e, f, _] = self.to_array();
-                SimdBase::load_array(simd, [b, c, a, b, e, f, d, e])
-            }
-            #[inline(always)]
-            fn previous(self, simd: S) -> Self {
-                let [a, b, c, _, d, e, f, _] = self.to_array();
-                SimdBase::load_array(simd, [c, a, b, c, f, d, e, f])
-            }
-            #[inline(always)]
-            fn sum(self) -> f64 {
-                let (first, second) = self.split();
-                let [a, b, c] = (first + second).legs();
-                a + b + c
-            }
-            #[inline(always)]
             fn join(first: Self::Half, second: Self::Half) -> Self {
                 first.combine(second)
             }
@@ -209,6 +210,10 @@ macro_rules! precision {
             #[inline(always)]
             fn splat(simd: S, value: f64) -> Self {
                 SimdBase::splat(simd, value as $scalar)
+            }
+            #[inline(always)]
+            fn load(simd: S, values: [f64; 4]) -> Self {
+                SimdBase::load_array(simd, values.map(|value| value as $scalar))
             }
             #[inline(always)]
             fn next(self, simd: S) -> Self {
@@ -223,7 +228,27 @@ macro_rules! precision {
             #[inline(always)]
             fn broadcast<const LEG: usize>(self, simd: S) -> Self {
                 let [a, b, c, _] = self.to_array();
-                SimdBase::splat(simd, if LEG == 0 { a } else if LEG == 1 { b } else { c })
+                SimdBase::splat(
+                    simd,
+                    if LEG == 0 {
+                        a
+                    } else if LEG == 1 {
+                        b
+                    } else {
+                        c
+                    },
+                )
+            }
+            #[inline(always)]
+            fn total(self, simd: S) -> Self {
+                let [a, b, c, d] = self.to_array();
+                let pairs = self + <Self as SimdBase<S>>::load_array(simd, [c, d, a, b]);
+                let [a, b, c, d] = pairs.to_array();
+                pairs + <Self as SimdBase<S>>::load_array(simd, [b, a, d, c])
+            }
+            #[inline(always)]
+            fn lanes(self) -> [f64; 4] {
+                self.to_array().map(f64::from)
             }
             #[inline(always)]
             fn transposed(simd: S, rows: [Self; 3]) -> [Self; 3] {
@@ -272,6 +297,21 @@ impl<V: Reals> Lanes3<V> {
         Self { x: s.mul_add(b.x, self.x), y: s.mul_add(b.y, self.y), z: s.mul_add(b.z, self.z) }
     }
 
+    /// `self - s b`
+    #[inline(always)]
+    pub fn minus_scaled(self, s: V, b: Self) -> Self {
+        self.plus_scaled(-s, b)
+    }
+
+    /// `m self`, the same matrix in all lanes; `splat` takes a number there.
+    #[inline(always)]
+    pub fn transformed(self, m: &Matrix3<f64>, splat: impl Fn(f64) -> V) -> Self {
+        let column = |x, y, z| Self { x: splat(x), y: splat(y), z: splat(z) };
+        (column(m.m13, m.m23, m.m33) * self.z)
+            .plus_scaled(self.y, column(m.m12, m.m22, m.m32))
+            .plus_scaled(self.x, column(m.m11, m.m21, m.m31))
+    }
+
     #[inline(always)]
     pub fn map<W>(self, f: impl Fn(V) -> W) -> Lanes3<W> {
         Lanes3 { x: f(self.x), y: f(self.y), z: f(self.z) }
@@ -297,19 +337,6 @@ impl<V> Lanes3<V> {
         Self { x: V::splat(simd, v.x), y: V::splat(simd, v.y), z: V::splat(simd, v.z) }
     }
 
-    /// `m self`, the same matrix in all lanes.
-    #[inline(always)]
-    pub fn transformed<S: Simd>(self, simd: S, m: &Matrix3<f64>) -> Self
-    where
-        V: Eight<S>,
-    {
-        let splat = |value| V::splat(simd, value);
-        let column = |x, y, z| Self { x: splat(x), y: splat(y), z: splat(z) };
-        let first = column(m.m13, m.m23, m.m33) * self.z;
-        let second = first.plus_scaled(self.y, column(m.m12, m.m22, m.m32));
-        second.plus_scaled(self.x, column(m.m11, m.m21, m.m31))
-    }
-
     /// Back to memory.
     #[inline(always)]
     pub fn store<S: Simd>(self) -> [Lane; 3]
@@ -317,16 +344,6 @@ impl<V> Lanes3<V> {
         V: Eight<S>,
     {
         [self.x.store(), self.y.store(), self.z.store()]
-    }
-
-    /// Sum over the six legs, per component; the padding does not count.
-    #[inline(always)]
-    pub fn sum_legs<S: Simd>(self) -> Vector3<f64>
-    where
-        V: Eight<S>,
-    {
-        let (first, second) = self.halves();
-        (first + second).sum()
     }
 
     /// The two triples.
@@ -338,16 +355,36 @@ impl<V> Lanes3<V> {
         let ((x0, x1), (y0, y1), (z0, z1)) = (self.x.halves(), self.y.halves(), self.z.halves());
         (Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 })
     }
+
+    /// Four lanes with the same sum.
+    #[inline(always)]
+    pub fn folded<S: Simd>(self) -> Lanes3<V::Half>
+    where
+        V: Eight<S>,
+    {
+        let (first, second) = self.halves();
+        first + second
+    }
 }
 
 impl<F> Lanes3<F> {
-    /// Sum over the three legs of a triple, per component.
+    /// Sum over the three legs of a triple, per component; the padding does not count.
+    #[inline(always)]
+    pub fn sum_legs<S: Simd>(self) -> Vector3<f64>
+    where
+        F: Four<S>,
+    {
+        let sum = |value: F| value.legs().into_iter().sum();
+        Vector3::new(sum(self.x), sum(self.y), sum(self.z))
+    }
+
+    /// Sum over all four lanes, per component.
     #[inline(always)]
     pub fn sum<S: Simd>(self) -> Vector3<f64>
     where
         F: Four<S>,
     {
-        let sum = |value: F| value.legs().into_iter().sum();
+        let sum = |value: F| value.lanes().into_iter().sum();
         Vector3::new(sum(self.x), sum(self.y), sum(self.z))
     }
 }

@@ -2,34 +2,43 @@
 //!
 //! The paper writes the leg's dynamics in joint coordinates, `D_i = M_i Qdd_i + C_i + G_i` (87), and takes
 //! them to the platform by `J_Bv^-T`. The closed vector form below is the same force without the joint
-//! angles: the moment balance of the leg about A, and the force balance of the rod along n.
+//! angles: the moment balance of the leg about A gives the part of F across the leg, the force balance of
+//! the rod the part along it.
 //!
 //! ```text
 //! r   = L - e2                         Jt = m1 e1^2 + m2 r^2 + It1 + It2
-//! Q   = Jt n'' + 2 m2 r L' n' - (m1 e1 + m2 r) g                            moment balance about A
-//! leg spin: u the universal joint's first axis, un = u.n, y = u - un n, Ix = Ix1 + Ix2
-//!     p   = (n x n').u           p'  = (n x n'').u                  (the other terms vanish)
-//!     yy  = 1 - un^2             yy' = -2 un un'
-//!     wx  = un p / yy            wx' = (un' p + un p' + 2 un^2 un' p / yy) / yy
-//!     Q  += Ix ( wx n' + (un / yy) wx' y ) x n
-//! F   = (Q - (Q.n) n) / L + m2 (L'' - r |n'|^2 - g.n) n
+//! Q   = Jt n'' + 2 m2 r L' n' - (m1 e1 + m2 r) g  (+ spin)                  moment balance about A
+//! F   = (Q - (Q.n) n) / L  +  m2 (L'' - r |n'|^2 - g.n) n
 //! ```
 //!
-//! F is what the platform exerts on the leg at B, without the actuator's force. The paper leaves the spin
-//! out: (74)-(82) give the leg no angular velocity about n, though the universal joint forces one on it.
-//! That is exact only for `Ix = 0`; the effect is 1e-5 to 1e-2 of the force, larger near `u || n`, where
+//! F is what the platform exerts on the leg at B, without the actuator's force. Written in the acceleration
+//! `aB` of the joint, with `proj(w) = w - (w.n) n`, and using `proj(n'') = (proj(aB) - 2 L' n') / L`:
+//!
+//! ```text
+//! across = proj(j aB - mu g) + 2 L' (m2 r / L - j) n' + spin / L       j = Jt / L^2,  mu = (m1 e1 + m2 r) / L
+//! along  = m2 (aB.n + e2 |n'|^2 - g.n)
+//! ```
+//!
+//! Spin: the universal joint, with first axis u, forces an angular velocity wx about n on the leg.
+//!
+//! ```text
+//! k  = u x n    un = u.n    un' = u.n'    yy = k.k    p = n'.k    p' = n''.k = (aB.k - 2 L' p) / L
+//! wx = un p / yy        wx' = (un' p + un p' + 2 un un' wx) / yy
+//! spin = (Ix1 + Ix2) ( wx n' x n + (un / yy) wx' k )
+//! ```
+//!
+//! The paper leaves the spin out: (74)-(82) give the leg no angular velocity about n. That is exact only
+//! for legs without axial inertia; the effect is 1e-5 to 1e-2 of the force, larger near `u || n`, where
 //! the spin itself is singular. [`YY_MIN`] keeps the arithmetic finite there.
 
 use fearless_simd::Simd;
 
-use super::inverse_geometry::{LegAcceleration, LegGeometry, LegVelocity};
-use super::lanes::{Eight, Lanes3};
-use super::machine::{Machine, TransverseInertia};
+use super::inverse_geometry::{LegGeometry, LegVelocity};
+use super::lanes::{Eight, Lane, Lanes3, Triples};
+use super::machine::Machine;
 
 /// What a dynamic model includes; known at compile time, so that a term left out costs nothing.
 pub trait Model {
-    /// Name on the command line.
-    const NAME: &'static str;
     /// Spin of the legs about their own axes.
     const SPIN: bool;
 }
@@ -43,75 +52,133 @@ pub struct Exact;
 pub struct RigidLegs;
 
 impl Model for Exact {
-    const NAME: &'static str = "exact";
     const SPIN: bool = true;
 }
 
 impl Model for RigidLegs {
-    const NAME: &'static str = "rigid-legs";
     const SPIN: bool = false;
 }
 
 /// Smallest `|u x n|^2`: a leg within 1e-6 rad of its universal joint's first axis.
 const YY_MIN: f64 = 1e-12;
 
-/// F per leg \[N\], base axes. `gravity` is g in base axes, one copy per leg.
+/// The constants of the legs as lanes.
+///
+/// The lanes of padding, which the six legs leave free, carry the platform's mass as one more point with a
+/// force `m (aB - g)`: its arm is the centre of mass, `j` and `mu` come out as m, and `legs_only` keeps it
+/// from being projected. See [`super::platform`].
+#[derive(Clone, Debug)]
+pub(super) struct LegConstants {
+    /// `Jt = jt[0] L^2 + jt[1] L + jt[2]`: the transverse inertias are quadratic in L as well.
+    jt: [Lane; 3],
+    /// m2, and `m1 e1 - m2 e2`.
+    rod_mass: Lane,
+    first_moment: Lane,
+    /// `m2 e2`
+    rod_moment: Lane,
+    /// `Ix1 + Ix2`
+    axial_inertia: Lane,
+    /// 1 for legs, 0 for padding.
+    legs_only: Lane,
+}
+
+impl LegConstants {
+    pub fn new(machine: &Machine) -> Self {
+        let (cylinder, rod) = (&machine.cylinder, &machine.rod);
+        let (m1, e1, m2, e2) = (cylinder.mass, cylinder.center_of_mass, rod.mass, rod.center_of_mass);
+        let (it1, it2) = (&cylinder.transverse_inertia, &rod.transverse_inertia);
+        let legs = |value: f64, platform: f64| Triples::uniform(value, [platform, 0.0]);
+        let linear = m2 * e2 + it1.quadratic * it1.reference_length + it2.quadratic * it2.reference_length;
+        let constant = m1 * e1 * e1
+            + m2 * e2 * e2
+            + it1.constant
+            + it2.constant
+            + it1.quadratic * it1.reference_length * it1.reference_length
+            + it2.quadratic * it2.reference_length * it2.reference_length;
+        let mass = machine.platform.mass;
+        Self {
+            jt: [
+                legs(m2 + it1.quadratic + it2.quadratic, mass),
+                legs(-2.0 * linear, 0.0),
+                legs(constant, 0.0),
+            ],
+            rod_mass: legs(m2, mass),
+            first_moment: legs(m1 * e1 - m2 * e2, 0.0),
+            rod_moment: legs(m2 * e2, 0.0),
+            axial_inertia: legs(cylinder.axial_inertia + rod.axial_inertia, 0.0),
+            legs_only: legs(1.0, 0.0),
+        }
+    }
+}
+
+/// F per leg \[N\], base axes, in two parts.
+pub(super) struct LegReaction<V> {
+    /// The part normal to the leg.
+    pub across: Lanes3<V>,
+    /// The part along n.
+    pub along: V,
+}
+
+impl<V> LegReaction<V> {
+    /// `joint_acceleration` is aB.
+    #[inline(always)]
+    pub fn new<S: Simd, M: Model>(
+        simd: S,
+        machine: &Machine,
+        constants: &LegConstants,
+        legs: &LegGeometry<V>,
+        velocity: &LegVelocity<V>,
+        joint_acceleration: Lanes3<V>,
+    ) -> Self
+    where
+        V: Eight<S>,
+    {
+        let load = |lane: &Lane| V::load(simd, lane);
+        let gravity = Lanes3::<V>::splat(simd, &machine.gravity);
+        let (n, n_rate, length, inverse_length) =
+            (legs.direction, velocity.direction, legs.length, legs.inverse_length);
+        let [jt2, jt1, jt0] = constants.jt.each_ref().map(load);
+        let (m2, m2_e2) = (load(&constants.rod_mass), load(&constants.rod_moment));
+
+        let j = jt2.mul_add(length, jt1).mul_add(length, jt0) * inverse_length * inverse_length;
+        let mu = m2.mul_add(length, load(&constants.first_moment)) * inverse_length;
+        let m2_r_over_l = m2 - m2_e2 * inverse_length;
+        let twice_rate = velocity.rate + velocity.rate;
+        let mut across = (joint_acceleration * j)
+            .minus_scaled(mu, gravity)
+            .plus_scaled(twice_rate * (m2_r_over_l - j), n_rate);
+        if M::SPIN {
+            let ix_over_l = load(&constants.axial_inertia) * inverse_length;
+            across = spin(simd, machine, legs, velocity, joint_acceleration, ix_over_l, across);
+        }
+        // n' and the spin are normal to n already: projecting them too costs nothing.
+        across = across.minus_scaled(across.dot(n) * load(&constants.legs_only), n);
+        let along = m2.mul_add((joint_acceleration - gravity).dot(n), m2_e2 * n_rate.dot(n_rate));
+        Self { across, along }
+    }
+}
+
+/// `sum + Ix / L ( wx n' x n + (un / yy) wx' k )`
 #[inline(always)]
-pub(super) fn leg_reaction<S: Simd, V: Eight<S>, M: Model>(
+fn spin<S: Simd, V: Eight<S>>(
     simd: S,
     machine: &Machine,
     legs: &LegGeometry<V>,
     velocity: &LegVelocity<V>,
-    acceleration: &LegAcceleration<V>,
+    joint_acceleration: Lanes3<V>,
+    ix_over_l: V,
+    sum: Lanes3<V>,
 ) -> Lanes3<V> {
-    let splat = |value: f64| V::splat(simd, value);
-    let (cylinder, rod) = (&machine.cylinder, &machine.rod);
-    let gravity = Lanes3::splat(simd, &machine.gravity);
-    let (n, n_rate, n_accel) = (legs.direction, velocity.direction, acceleration.direction);
-    let m1_e1 = cylinder.mass * cylinder.center_of_mass;
-    let m2 = splat(rod.mass);
-
-    let r = legs.length - splat(rod.center_of_mass);
-    let m2_r = m2 * r;
-    let jt = m2_r.mul_add(r, splat(m1_e1 * cylinder.center_of_mass))
-        + transverse_inertia(simd, &cylinder.transverse_inertia, legs.length)
-        + transverse_inertia(simd, &rod.transverse_inertia, legs.length);
-    let mut q = (n_accel * jt)
-        .plus_scaled(m2_r * (velocity.rate + velocity.rate), n_rate)
-        .plus_scaled(-(m2_r + splat(m1_e1)), gravity);
-    if M::SPIN {
-        q = q + spin_moment(simd, machine, n, n_rate, n_accel);
-    }
-    let q_transverse = q.plus_scaled(-q.dot(n), n);
-    let along = m2 * (acceleration.accel - r * n_rate.dot(n_rate) - gravity.dot(n));
-    (q_transverse * legs.inverse_length).plus_scaled(along, n)
-}
-
-/// `Ix ( wx n' + (un / yy) wx' y ) x n`
-#[inline(always)]
-fn spin_moment<S: Simd, V: Eight<S>>(
-    simd: S,
-    machine: &Machine,
-    n: Lanes3<V>,
-    n_rate: Lanes3<V>,
-    n_accel: Lanes3<V>,
-) -> Lanes3<V> {
-    let ix = V::splat(simd, machine.cylinder.axial_inertia + machine.rod.axial_inertia);
+    let (n, n_rate) = (legs.direction, velocity.direction);
     let u = Lanes3::<V>::load(simd, &machine.joints.universal_axis);
-    let un = u.dot(n);
-    let un_rate = u.dot(n_rate);
-    let y = u.plus_scaled(-un, n);
-    let inverse_yy = V::splat(simd, 1.0) / y.dot(y).max(V::splat(simd, YY_MIN));
-    let p = n.cross(n_rate).dot(u);
-    let p_rate = n.cross(n_accel).dot(u);
-    let spin = un * p * inverse_yy;
-    let spin_un = spin * un;
-    let spin_rate = un_rate.mul_add(p + spin_un + spin_un, un * p_rate) * inverse_yy;
-    (n_rate * spin).plus_scaled(un * inverse_yy * spin_rate, y).cross(n) * ix
-}
-
-#[inline(always)]
-fn transverse_inertia<S: Simd, V: Eight<S>>(simd: S, inertia: &TransverseInertia, length: V) -> V {
-    let d = length - V::splat(simd, inertia.reference_length);
-    (d * V::splat(simd, inertia.quadratic)).mul_add(d, V::splat(simd, inertia.constant))
+    let k = u.cross(n);
+    let inverse_yy = V::splat(simd, 1.0) / k.dot(k).max(V::splat(simd, YY_MIN));
+    let (un, un_rate, p) = (u.dot(n), u.dot(n_rate), n_rate.dot(k));
+    let twice_rate = velocity.rate + velocity.rate;
+    let p_rate = (joint_acceleration.dot(k) - twice_rate * p) * legs.inverse_length;
+    let un_over_yy = un * inverse_yy;
+    let wx = un_over_yy * p;
+    let wx_un = wx * un;
+    let wx_rate = un_rate.mul_add(p + wx_un + wx_un, un * p_rate) * inverse_yy;
+    sum.plus_scaled(ix_over_l * wx, n_rate.cross(n)).plus_scaled(ix_over_l * un_over_yy * wx_rate, k)
 }

@@ -9,6 +9,7 @@ use fearless_simd::Level;
 use nalgebra::{Matrix3, Vector3};
 
 use super::lanes::{Lane, Triples};
+use super::rigid::Pose;
 
 /// Number of legs.
 pub const LEGS: usize = 6;
@@ -59,25 +60,47 @@ pub struct Joints {
     /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. Turns
     /// radians into metres wherever a tolerance must not depend on the size of the machine.
     pub radius: f64,
+    /// Its cube.
+    pub(super) radius_cubed: f64,
 }
 
 impl Joints {
-    /// Packs six legs into lanes and derives the characteristic length.
+    /// Packs six legs into lanes, in the order that suits them at the home pose, and derives the
+    /// characteristic length.
     pub fn new(
         base: &[Vector3<f64>; LEGS],
         platform: &[Vector3<f64>; LEGS],
         universal_axis: &[Vector3<f64>; LEGS],
+        home: &Pose,
     ) -> Self {
-        let triples = Triples::ALL[0];
+        let mut directions = *base;
+        for (direction, joint) in directions.iter_mut().zip(platform) {
+            *direction = (home.position + home.rotation * joint - *direction).normalize();
+        }
+        let triples = Triples::best(&directions);
         let mean = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
         let mean_square = platform.iter().map(|b| (b - mean).norm_squared()).sum::<f64>() / LEGS as f64;
+        let radius = mean_square.sqrt();
         Self {
             triples,
             base: triples.pack_vectors(base),
             platform: triples.pack_vectors(platform),
             universal_axis: triples.pack_vectors(universal_axis),
-            radius: mean_square.sqrt(),
+            radius,
+            radius_cubed: radius * radius * radius,
         }
+    }
+
+    /// The same joints with a point of the platform (from C, in platform axes) in the first lane of
+    /// padding. The leg that ends there begins where no platform ever is.
+    pub(super) fn with_point(&self, point: &Vector3<f64>) -> Self {
+        let mut joints = self.clone();
+        for (lane, value) in joints.platform.iter_mut().zip(point.iter()) {
+            lane.set_padding(*value);
+        }
+        let far = 1e3 * (self.radius + point.norm());
+        joints.base.iter_mut().for_each(|lane| lane.set_padding(far));
+        joints
     }
 }
 

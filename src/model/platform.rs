@@ -1,30 +1,62 @@
 //! Mobile platform (paper, eq. 88-93): the wrench its own motion needs.
 //!
 //! ```text
-//! c = R CG        I = R I_G R^T        f = m (v' + omega' x c + omega x (omega x c) - g)
-//! [ I omega' + omega x I omega + c x f ;  f ]                    torque about C, then force
+//! S = omega'~ + omega~ omega~          acceleration of a point r of the platform: v' + S r
+//! f = m (v' + S c - g)                 c = R CG
+//! torque about C = c x f + sum_k p_k x S p_k                              then force: the paper's order
 //! ```
 //!
+//! The `p_k` are the principal axes of the mass distribution about its centre, in base axes, so long that
+//! `sum_k p_k p_k^T = integral of r r^T dm`; the sum is `I omega' + omega x I omega` with
+//! `I = sum_k (|p_k|^2 - p_k p_k^T)`. In this form the platform is made of points, which the lanes that
+//! evaluate the legs evaluate as well: the centre of mass is the point in their padding (see
+//! [`super::leg::LegConstants`]), the three axes are one triple of lanes of their own.
+//!
 //! Against the print: (88), (93) have g with the sign opposite to (74)-(81); (90), (91) put an inertia
-//! about the centre of mass beside moments about C. Here the inertia is about the centre of mass and the
-//! moment of f about C is explicit, which is the parallel-axis term.
+//! about the centre of mass beside moments about C, without the parallel-axis term, which here is `c x f`.
 
+use fearless_simd::Simd;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+use super::lanes::{Four, Lanes3};
 use super::machine::Machine;
-use super::rigid::{Motion, Wrench};
+use super::rigid::{Acceleration, Twist};
 
-/// Wrench about C that the platform needs for this motion, legs not counted.
+/// The `p_k` in platform axes: x, y, z over the lanes k.
+#[derive(Clone, Debug)]
+pub(super) struct PrincipalAxes([[f64; 4]; 3]);
+
+impl PrincipalAxes {
+    pub fn new(machine: &Machine) -> Self {
+        let inertia = &machine.platform.inertia;
+        let distribution = Matrix3::identity() * (0.5 * inertia.trace()) - inertia;
+        let SymmetricEigen { eigenvectors, eigenvalues } = distribution.symmetric_eigen();
+        // A flat plate has one eigenvalue of zero, or just below by rounding.
+        let axes = eigenvectors * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
+        let row = |x: &Vector3<f64>| [x.x, x.y, x.z, 0.0];
+        let rows = axes.transpose();
+        Self([row(&rows.column(0).into()), row(&rows.column(1).into()), row(&rows.column(2).into())])
+    }
+
+    /// `p_k x S p_k`, k in lanes; their sum is the torque of the rotation.
+    #[inline(always)]
+    pub fn torques<S: Simd, F: Four<S>>(
+        &self,
+        simd: S,
+        rotation: &Matrix3<f64>,
+        acceleration_map: &Matrix3<f64>,
+    ) -> Lanes3<F> {
+        let [x, y, z] = self.0.map(|row| F::load(simd, row));
+        let p = Lanes3 { x, y, z }.transformed(rotation, |value| F::splat(simd, value));
+        p.cross(p.transformed(acceleration_map, |value| F::splat(simd, value)))
+    }
+}
+
+/// S, which takes a point of the platform (from C, in base axes) to its acceleration relative to C.
 #[inline(always)]
-pub fn platform_wrench(machine: &Machine, motion: &Motion) -> Wrench {
-    let body = &machine.platform;
-    let r = &motion.pose.rotation;
-    let omega = &motion.twist.angular;
-    let omega_rate = &motion.acceleration.angular;
-    let c = r * body.center_of_mass;
-    let accel = motion.acceleration.linear + omega_rate.cross(&c) + omega.cross(&omega.cross(&c));
-    let force = (accel - machine.gravity) * body.mass;
-    // In platform axes the inertia is constant.
-    let omega_platform = r.tr_mul(omega);
-    let momentum = body.inertia * omega_platform;
-    let torque = body.inertia * r.tr_mul(omega_rate) + omega_platform.cross(&momentum);
-    Wrench { torque: r * torque + c.cross(&force), force }
+pub(super) fn acceleration_map(twist: &Twist, acceleration: &Acceleration) -> Matrix3<f64> {
+    let (w, a) = (&twist.angular, &acceleration.angular);
+    let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
+    let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
+    Matrix3::new(-yy - zz, xy - a.z, xz + a.y, xy + a.z, -xx - zz, yz - a.x, xz - a.y, yz + a.x, -xx - yy)
 }

@@ -14,7 +14,7 @@
 
 use nalgebra::{Cholesky, Matrix6, U6, Vector3, Vector6};
 
-use crate::model::active_forces::{TaskLoad, task_load};
+use crate::model::active_forces::{InverseDynamics, TaskLoad};
 use crate::model::leg::Exact;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
@@ -22,21 +22,21 @@ use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 /// Forward dynamics of one machine.
 #[derive(Clone, Debug)]
 pub struct ForwardDynamics {
-    machine: Machine,
+    model: InverseDynamics,
     /// The same machine without gravity, for M.
-    weightless: Machine,
+    weightless: InverseDynamics,
 }
 
 impl ForwardDynamics {
-    /// Keeps a copy of the machine.
+    /// Derives the constants.
     pub fn new(machine: &Machine) -> Self {
         let weightless = Machine { gravity: Vector3::zeros(), ..machine.clone() };
-        Self { machine: machine.clone(), weightless }
+        Self { model: InverseDynamics::new(machine), weightless: InverseDynamics::new(&weightless) }
     }
 
     /// The machine it stands for.
     pub fn machine(&self) -> &Machine {
-        &self.machine
+        self.model.machine()
     }
 
     /// M, 6 x 6, drives included.
@@ -49,7 +49,7 @@ impl ForwardDynamics {
                 twist: Twist::default(),
                 acceleration: Acceleration::from_vector(&unit),
             };
-            column.copy_from(&total_load(&task_load::<Exact>(&self.weightless, &motion)));
+            column.copy_from(&total_load(&self.weightless.load_of::<Exact>(&motion)));
         }
         mass
     }
@@ -57,7 +57,7 @@ impl ForwardDynamics {
     /// Acceleration under these forces; `None` if M is not positive definite (a pose that is not one).
     pub fn acceleration(&self, pose: &Pose, twist: &Twist, force: &[f64; LEGS]) -> Option<Acceleration> {
         let coasting = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::default() };
-        let load = task_load::<Exact>(&self.machine, &coasting);
+        let load = self.model.load_of::<Exact>(&coasting);
         let unbalanced = load.leg_wrenches * Vector6::from(*force) - total_load(&load);
         let mass: Cholesky<f64, U6> = Cholesky::new(self.mass_matrix(pose))?;
         Some(Acceleration::from_vector(&mass.solve(&unbalanced)))
@@ -66,14 +66,14 @@ impl ForwardDynamics {
     /// Smallest moving mass an actuator can feel \[kg\]: 1 / largest eigenvalue of `N^T M^-1 N`. It bounds
     /// how fast friction can act, hence the step of the integrator.
     pub fn smallest_leg_mass(&self, pose: &Pose) -> Option<f64> {
-        let n = crate::model::inverse_jacobian::leg_wrenches(&self.machine, pose);
+        let n = crate::model::inverse_jacobian::leg_wrenches(self.machine(), pose);
         let mass: Cholesky<f64, U6> = Cholesky::new(self.mass_matrix(pose))?;
         let mobility = n.transpose() * mass.solve(&n);
         Some(1.0 / mobility.symmetric_eigenvalues().max())
     }
 }
 
-/// `W + N drives`: everything the actuators have to balance, as a wrench.
+/// `W + N along`: everything the actuators have to balance, as a wrench.
 fn total_load(load: &TaskLoad) -> Vector6<f64> {
-    load.wrench + load.leg_wrenches * load.drive_forces
+    load.wrench + load.leg_wrenches * load.along
 }

@@ -9,7 +9,7 @@ use core::f64::consts::TAU;
 use nalgebra::Vector6;
 
 use super::minimum_jerk::{between, rise, scaled, window};
-use crate::model::active_forces::inverse_dynamics;
+use crate::model::active_forces::InverseDynamics;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::leg::Exact;
 use crate::model::machine::Machine;
@@ -137,9 +137,10 @@ pub fn fit(machine: &Machine, motion: Motion, duration: f64) -> Scene {
         home: machine.home.into(),
     };
     // Each step takes a fifth: 40 of them reach 1e-4 of the size, which no valid machine needs.
+    let model = InverseDynamics::new(machine);
     let mut share = 1.0;
     for _ in 0..40 {
-        if carries(machine, &sized(share)) {
+        if carries(&model, &sized(share)) {
             break;
         }
         share *= 0.8;
@@ -148,15 +149,16 @@ pub fn fit(machine: &Machine, motion: Motion, duration: f64) -> Scene {
 }
 
 /// Whether stroke, rates and forces keep their reserve, on a thousand samples.
-fn carries(machine: &Machine, scene: &Scene) -> bool {
+fn carries(model: &InverseDynamics, scene: &Scene) -> bool {
     const SAMPLES: u32 = 1000;
+    let machine = model.machine();
     let actuator = &machine.actuator;
     let margin = 0.5 * (1.0 - USABLE_SHARE) * (actuator.max_length - actuator.min_length);
     let stroke = (actuator.min_length + margin)..=(actuator.max_length - margin);
     (0..=SAMPLES).all(|k| {
         let motion = scene.at(scene.duration * f64::from(k) / f64::from(SAMPLES)).motion();
         let legs = leg_motion(machine, &motion);
-        let force = inverse_dynamics::<Exact>(machine, &motion);
+        let force = model.forces::<Exact>(&motion);
         legs.length.iter().all(|length| stroke.contains(length))
             && legs.rate.iter().all(|rate| rate.abs() <= USABLE_SHARE * actuator.max_rate)
             && force.is_some_and(|f| f.iter().all(|f| f.abs() <= USABLE_SHARE * actuator.max_force))

@@ -14,6 +14,7 @@ use super::bound::Bound;
 use super::geometry;
 use super::reader::Reader;
 use crate::model::machine::{Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia};
+use crate::model::task::TaskState;
 
 /// Strongest gravity \[m/s^2\]: ten times the Earth's is a slip of the unit, not a site.
 const STRONGEST_GRAVITY: f64 = 100.0;
@@ -47,8 +48,12 @@ pub(super) fn read(root: &mut Reader) -> Machine {
     let of_leg = |member: fn(&Leg) -> Vector3<f64>| -> [Vector3<f64>; LEGS] {
         core::array::from_fn(|i| legs.get(i).map_or(Vector3::repeat(f64::NAN), member))
     };
-    let joints =
-        Joints::new(&of_leg(|leg| leg.base), &of_leg(|leg| leg.platform), &of_leg(|leg| leg.universal_axis));
+    let joints = Joints::new(
+        &of_leg(|leg| leg.base),
+        &of_leg(|leg| leg.platform),
+        &of_leg(|leg| leg.universal_axis),
+        &TaskState::at_rest(home_pose).motion().pose,
+    );
     let level = Level::new();
     let machine = Machine { gravity, platform, joints, cylinder, rod, actuator, home: home_pose, level };
     geometry::check(&machine, &legs, &home);

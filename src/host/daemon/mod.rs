@@ -71,7 +71,7 @@ pub fn run(config: &Config, report_path: Option<&Path>, stop: &Stop) -> Result<R
 
 fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
     let Config { machine, deployment, .. } = config;
-    let controller = Controller::new(machine.clone(), parameters(deployment));
+    let controller = Controller::new(machine, parameters(deployment));
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
     let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());

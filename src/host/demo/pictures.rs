@@ -8,7 +8,7 @@ use std::{format, vec};
 
 use super::recording::{Recording, desired_motion, measured_pose};
 use crate::host::charts::{ChartError, Panel, Series, Stroke, write_svg};
-use crate::model::active_forces::inverse_dynamics;
+use crate::model::active_forces::InverseDynamics;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::leg::Exact;
 use crate::model::machine::{LEGS, Machine};
@@ -136,6 +136,7 @@ impl Signals {
         let mut signals =
             Self { commanded: Curves::default(), measured: Curves::default(), tracking: [vec![], vec![]] };
         let Self { commanded, measured, tracking } = &mut signals;
+        let model = InverseDynamics::new(machine);
         for setpoint in &recording.setpoints {
             let t = seconds(setpoint.header.time_ns);
             let motion = desired_motion(setpoint);
@@ -146,11 +147,7 @@ impl Signals {
             push(&mut commanded.length, t, legs.length);
             push(&mut commanded.rate, t, legs.rate);
             push(&mut commanded.accel, t, legs.accel);
-            push(
-                &mut commanded.force,
-                t,
-                inverse_dynamics::<Exact>(machine, &motion).unwrap_or([f64::NAN; LEGS]),
-            );
+            push(&mut commanded.force, t, model.forces::<Exact>(&motion).unwrap_or([f64::NAN; LEGS]));
         }
         // Before the first setpoint there is nothing to compare with.
         let in_range = recording.measured.iter().filter(|message| message.header.time_ns >= start_ns);
