@@ -1,5 +1,7 @@
 //! The systemd unit, judged by systemd itself.
 
+#![allow(clippy::expect_used, reason = "a test helper that fails is a failed test")]
+
 use std::process::Command;
 
 const UNIT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/deploy/hexad@.service");

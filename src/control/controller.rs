@@ -165,10 +165,14 @@ impl Controller {
         Ok((pose, twist))
     }
 
-    /// Control begins only where the first force would be no jolt.
+    /// Control begins only where the first force would be no jolt: near, and not passing by. An error of
+    /// velocity weighs as much as the error of pose that it is worth to the law, `wn` times as large.
     fn may_engage(&self, error: &TrackingError) -> Result<(), Cause> {
-        let near = error.pose.linear.norm() <= self.parameters.engage_position
-            && error.pose.angular.norm() <= self.parameters.engage_orientation;
+        let Parameters { law, engage_position, engage_orientation, .. } = &self.parameters;
+        let near = error.pose.linear.norm() <= *engage_position
+            && error.pose.angular.norm() <= *engage_orientation
+            && error.twist.linear.norm() <= engage_position * law.position.stiffness.sqrt()
+            && error.twist.angular.norm() <= engage_orientation * law.orientation.stiffness.sqrt();
         if self.state == State::Active || near { Ok(()) } else { Err(Cause::SetpointTooFar) }
     }
 }

@@ -43,7 +43,7 @@ pub enum Cause {
     NoSetpoint = 2,
     /// The pose is being found from the measured lengths, a bounded step per cycle.
     FindingPose = 3,
-    /// The setpoint is further from the platform than the engage tolerance.
+    /// The setpoint is further from the platform than the engage tolerance, or passing by.
     SetpointTooFar = 4,
     /// The setpoint source stopped while its setpoint was at rest.
     SetpointEnded = 5,

@@ -43,7 +43,7 @@ enum Command {
         #[command(flatten)]
         what: What,
         /// Length of the motion [s]
-        #[arg(long, default_value_t = 8.0, value_parser = duration, conflicts_with = "trajectory")]
+        #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
         seconds: f64,
     },
     /// Run daemon, plant and setpoint source through a motion; print timing and tracking, draw pictures
@@ -58,10 +58,10 @@ enum Command {
         #[arg(long, value_enum, default_value_t = MotionName::Paper)]
         motion: MotionName,
         /// Length of the motion [s]; approach and settling come on top
-        #[arg(long, default_value_t = 8.0, value_parser = duration)]
+        #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true)]
         seconds: f64,
         /// Rate of the loop [Hz], instead of the configured one
-        #[arg(long)]
+        #[arg(long, allow_negative_numbers = true)]
         rate_hz: Option<f64>,
         /// Write a JSON report
         #[arg(long, value_name = "FILE")]
@@ -246,7 +246,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    fn could_not_begin(error: impl std::error::Error) -> Self {
+    fn could_not_begin(error: impl core::error::Error) -> Self {
         Self { code: 2, what: error.to_string() }
     }
 }
@@ -272,7 +272,11 @@ impl From<OfflineError> for Failure {
 
 impl From<DemoError> for Failure {
     fn from(error: DemoError) -> Self {
-        let code = if matches!(error, DemoError::Config(_) | DemoError::File(_)) { 2 } else { 1 };
+        let code = if matches!(error, DemoError::Config(_) | DemoError::File(_) | DemoError::Port(_)) {
+            2
+        } else {
+            1
+        };
         Self { code, what: error.to_string() }
     }
 }

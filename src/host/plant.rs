@@ -46,6 +46,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
         cause: Cause::None,
         timeout_ns: nanoseconds(plant.force_timeout_s),
     };
+    let mut pending = None;
     info!(name = %config.name, "plant at rest at home, brakes closed");
     while !stop.requested() {
         sleep_until(tick_ns);
@@ -54,8 +55,13 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
             driven.time_ns = tick_ns;
         }
         let before = driven.simulator.brakes();
-        while let Some(message) = forces.receive() {
-            driven.receive(&message, tick_ns);
+        // A force sent after this tick waits for the next one.
+        while let Some(message) = pending.take().or_else(|| forces.receive()) {
+            if message.header.time_ns > tick_ns {
+                pending = Some(message);
+                break;
+            }
+            driven.receive(&message);
         }
         driven.advance_to(tick_ns);
         tell(before, driven.simulator.brakes(), driven.cause);
@@ -80,11 +86,12 @@ struct Driven {
 
 impl Driven {
     /// Applies a message from the instant it was sent.
-    fn receive(&mut self, message: &ForceMessage, tick_ns: u64) {
-        self.advance_to(message.header.time_ns.min(tick_ns));
+    fn receive(&mut self, message: &ForceMessage) {
+        self.advance_to(message.header.time_ns);
         self.cause = Cause::from_number(message.fault).unwrap_or_default();
         let usable = message.valid == 1 && message.force_n.iter().all(|force| force.is_finite());
-        self.force = usable.then_some((message.force_n, message.header.time_ns + self.timeout_ns));
+        self.force =
+            usable.then_some((message.force_n, message.header.time_ns.saturating_add(self.timeout_ns)));
     }
 
     fn advance_to(&mut self, time_ns: u64) {

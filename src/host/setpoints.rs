@@ -74,9 +74,13 @@ impl Score {
             }
         }
         for (end, knot) in [("first", knots.first()), ("last", knots.last())] {
-            let fastest = knot.map_or(0.0, |knot| knot.state.xd.amax());
-            if fastest > REST_RATE {
-                wrong.push(format!("{end} row: rate {fastest:?}: must be at rest, at most {REST_RATE:?}"));
+            let state = knot.map_or_else(TaskState::default, |knot| knot.state);
+            for (what, largest) in [("rate", state.xd.amax()), ("acceleration", state.xdd.amax())] {
+                if largest > REST_RATE {
+                    wrong.push(format!(
+                        "{end} row: {what} {largest:?}: must be at rest, at most {REST_RATE:?}"
+                    ));
+                }
             }
         }
         wrong.truncate(20);

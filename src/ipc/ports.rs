@@ -9,7 +9,10 @@ extern crate std;
 use core::marker::PhantomData;
 use core::time::Duration;
 use std::format;
+use std::fs::{File, TryLockError, create_dir_all};
+use std::path::Path;
 use std::prelude::rust_2024::*;
+use std::string::ToString;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
@@ -61,8 +64,31 @@ impl Bus {
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .config(&config)
             .create::<ipc::Service>()
-            .map_err(failed("cannot create a node".into()))?;
+            .map_err(failed(format!(
+                "cannot create a node; {} and the files iox2_* in /dev/shm must belong to this user: all \
+                 participants of a machine run as one user",
+                config.global.root_path()
+            )))?;
         Ok(Self { node, machine: machine.into(), epoch: monotonic_ns() })
+    }
+
+    /// Makes this process the only one that controls a machine, until the result is dropped or the process
+    /// dies, however it dies.
+    ///
+    /// Topics alone would let a second daemon take over, and leave the first one's forces ignored for good.
+    pub fn claim(machine: &str) -> Result<File, PortError> {
+        let folder = Config::default().global.root_path().to_string();
+        let path = Path::new(&folder).join(format!("hexad-{machine}.lock"));
+        let file = create_dir_all(&folder).and_then(|()| File::create(&path));
+        let file = file.map_err(failed(format!("cannot open {}", path.display())))?;
+        match file.try_lock() {
+            Ok(()) => Ok(file),
+            Err(TryLockError::WouldBlock) => Err(PortError {
+                what: format!("cannot control {machine}"),
+                cause: format!("another daemon does ({} is locked)", path.display()),
+            }),
+            Err(error) => Err(failed(format!("cannot lock {}", path.display()))(error)),
+        }
     }
 
     fn service<T: Message>(&self) -> Result<PortFactory<ipc::Service, T, ()>, PortError> {

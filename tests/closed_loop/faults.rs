@@ -154,7 +154,7 @@ fn the_last_cycle_of_all_is_a_cycle() {
     input.release_ns = u64::MAX;
     input.measurement.as_mut().unwrap().time_ns = u64::MAX;
     input.setpoint.as_mut().unwrap().time_ns = u64::MAX;
-    let output = Controller::new(config.machine.clone(), parameters(&config)).step(&input);
+    let output = Controller::new(&config.machine, parameters(&config)).step(&input);
     assert_eq!(output.state, State::Active);
 }
 

@@ -20,8 +20,7 @@ fn forces_are_cut_at_the_limit_and_say_so() {
     for push in 0..60 {
         let mut input = rig.input(&task);
         input.setpoint.as_mut().unwrap().task.xdd[push % 6] += 10.0 * push as f64 - 300.0;
-        let wanted =
-            engaged(Controller::new(unlimited.clone(), parameters(&config)), &rig.input(&task), &input);
+        let wanted = engaged(Controller::new(&unlimited, parameters(&config)), &rig.input(&task), &input);
         let output = rig.controller.clone().step(&input);
         assert_eq!(output.state, State::Active);
         for (force, wanted) in output.force.iter().zip(wanted) {

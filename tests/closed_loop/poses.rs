@@ -43,7 +43,7 @@ fn a_pose_far_from_home_is_found_in_bounded_steps() {
         assert!(cycles < 50);
     }
     assert!(cycles > 5, "{cycles}");
-    let mut fresh = Controller::new(config.machine.clone(), parameters(&config));
+    let mut fresh = Controller::new(&config.machine, parameters(&config));
     for _ in 0..cycles {
         let output = fresh.step(&input);
         assert_without_force(&output, Cause::FindingPose);
@@ -64,7 +64,7 @@ fn singular_poses_have_no_force() {
         let exact = leg_lengths(&config.machine, &flat);
         input.measurement.as_mut().unwrap().length =
             array::from_fn(|i| exact[i] + disturbance * (i as f64 - 2.2));
-        let mut controller = Controller::new(config.machine.clone(), parameters(&config));
+        let mut controller = Controller::new(&config.machine, parameters(&config));
         for _ in 0..3 {
             let output = controller.step(&input);
             assert!([Cause::PoseNotFound, Cause::SingularPose].contains(&output.cause), "{:?}", output.cause);

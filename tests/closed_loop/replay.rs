@@ -21,7 +21,7 @@ fn recorded_inputs_give_the_same_outputs_bit_for_bit() {
         rig.play(&config.machine, &scene, |input, output| record.push((*input, *output)));
         assert!(record.len() > 5000);
 
-        let mut fresh = Controller::new(config.machine.clone(), parameters(&config));
+        let mut fresh = Controller::new(&config.machine, parameters(&config));
         let mut twin = fresh.clone();
         for (input, output) in &record {
             let again = fresh.step(input);

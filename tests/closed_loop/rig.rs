@@ -59,7 +59,7 @@ impl Rig {
         let plant = &config.deployment.plant;
         let parameters = parameters(config);
         Self {
-            controller: Controller::new(config.machine.clone(), parameters),
+            controller: Controller::new(&config.machine, parameters),
             simulator: Simulator::new(platform, plant.brake_deceleration_m_s2, plant.step_s),
             now_ns: START_NS,
             period_ns: parameters.period_ns,

@@ -5,7 +5,8 @@
 use std::path::{Path, PathBuf};
 
 use hexad::host::config::Config;
-use hexad::model::machine::Machine;
+use hexad::model::machine::{Joints, LEGS, Machine};
+use hexad::model::task::TaskState;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// The machines with vectors in `tests/data`.
@@ -36,6 +37,34 @@ pub fn machine(name: &str) -> Machine {
 pub fn deployed(name: &str) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("config").join(name).with_extension("toml");
     Config::load(&path).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The joints of a machine, leg by leg.
+#[derive(Clone, Debug)]
+pub struct Legs {
+    /// `A_i`, base axes.
+    pub base: [Vector3<f64>; LEGS],
+    /// `CB_i`, platform axes.
+    pub platform: [Vector3<f64>; LEGS],
+    /// `u_i`, base axes.
+    pub universal_axis: [Vector3<f64>; LEGS],
+}
+
+impl Legs {
+    pub fn of(machine: &Machine) -> Self {
+        let joints = &machine.joints;
+        Self {
+            base: joints.triples.unpack_vectors(&joints.base),
+            platform: joints.triples.unpack_vectors(&joints.platform),
+            universal_axis: joints.triples.unpack_vectors(&joints.universal_axis),
+        }
+    }
+
+    /// `home` is the pose the joints are laid out for.
+    pub fn joints(&self, home: &[f64; 6]) -> Joints {
+        let home = TaskState::at_rest(*home).motion().pose;
+        Joints::new(&self.base, &self.platform, &self.universal_axis, &home)
+    }
 }
 
 /// Mean, root mean square and maximum of errors.

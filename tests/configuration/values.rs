@@ -21,10 +21,16 @@ fn values_arrive_where_they_belong() {
     assert_eq!(machine.cylinder.transverse_inertia.quadratic, 0.0);
     assert_eq!((machine.actuator.max_rate, machine.actuator.max_force), (2.0, 500.0));
     assert_eq!(machine.home, [0.0, 0.0, 0.0, 1.1, 0.0, 0.0]);
-    assert_eq!(machine.joints.base[2].legs()[1], 0.704769465589);
-    assert_eq!(machine.joints.platform[1].legs()[5], 0.321393804843);
-    assert_eq!(machine.joints.universal_axis[1].legs(), [0.6, 1.0, 1.0, 1.0, 1.0, 1.0]);
-    assert_eq!(machine.joints.universal_axis[2].legs(), [-0.8, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(machine.joints.triples.unpack(&machine.joints.base[2])[1], 0.704769465589);
+    assert_eq!(machine.joints.triples.unpack(&machine.joints.platform[1])[5], 0.321393804843);
+    assert_eq!(
+        machine.joints.triples.unpack(&machine.joints.universal_axis[1]),
+        [0.6, 1.0, 1.0, 1.0, 1.0, 1.0]
+    );
+    assert_eq!(
+        machine.joints.triples.unpack(&machine.joints.universal_axis[2]),
+        [-0.8, 0.0, 0.0, 0.0, 0.0, 0.0]
+    );
     let deployment = &config.deployment;
     assert_eq!((deployment.realtime.rate_hz, deployment.realtime.period_s()), (2000.0, 5e-4));
     assert_eq!((deployment.realtime.cpu, deployment.realtime.io_cpu), (Some(3), None));

@@ -1,9 +1,10 @@
 //! Energy of the machine, body by body: positions, velocities and angular velocities, nothing else.
 
-use hexad::model::lanes::Lane;
 use hexad::model::machine::{Link, Machine};
 use hexad::plant::integrator::PlantState;
 use nalgebra::Vector3;
+
+use super::common::Legs;
 
 /// Energies \[J\].
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,9 +35,8 @@ pub fn energy(machine: &Machine, state: &PlantState) -> Energy {
         potential: -body.mass * machine.gravity.dot(&(c + arm)),
         spin: 0.0,
     };
-    let (base, platform) = (Lane::unpack(&machine.joints.base), Lane::unpack(&machine.joints.platform));
-    let axes = Lane::unpack(&machine.joints.universal_axis);
-    for ((a, b), u) in base.iter().zip(&platform).zip(&axes) {
+    let Legs { base, platform, universal_axis } = Legs::of(machine);
+    for ((a, b), u) in base.iter().zip(&platform).zip(&universal_axis) {
         let arm = r * b;
         let leg = Leg { a: *a, b: c + arm, b_velocity: v + omega.cross(&arm), u: *u };
         leg.add(machine, &mut sum);

@@ -1,11 +1,10 @@
 //! Power balance: the work of the actuators is the change of energy, over a whole motion.
 
-use hexad::model::lanes::Lane;
-use hexad::model::machine::{Joints, Machine};
+use hexad::model::machine::Machine;
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::integrator::integrate;
 
-use super::common::machine;
+use super::common::{Legs, machine};
 use super::energy::{Energy, energy};
 use super::{DEFAULT_STEP_S, home, legs, shaking, without_drives};
 
@@ -60,8 +59,7 @@ fn fat_legs(mut machine: Machine) -> Machine {
         let across = n.cross(&machine.gravity).normalize();
         n * 0.3f64.cos() + across * 0.3f64.sin()
     });
-    let joints = &machine.joints;
-    machine.joints = Joints::new(&Lane::unpack(&joints.base), &Lane::unpack(&joints.platform), &axes);
+    machine.joints = Legs { universal_axis: axes, ..Legs::of(&machine) }.joints(&machine.home);
     machine
 }
 

@@ -1,6 +1,6 @@
 //! Identities of the inverse dynamics of one machine.
 
-use hexad::model::active_forces::{inverse_dynamics, task_load};
+use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::leg::{Exact, RigidLegs};
@@ -9,6 +9,7 @@ use hexad::model::rigid::{Acceleration, Motion, Twist};
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
 
+use super::common::Legs;
 use super::{cases, machine_in_motion, relative, vector6};
 
 fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
@@ -39,12 +40,12 @@ proptest! {
     /// Power of the actuators is power of the wrench, plus what the drives keep: `Gamma . L' = W . twist`.
     #[test]
     fn power_is_the_same_in_legs_and_in_the_platform((machine, _, motion) in machine_in_motion()) {
-        let load = task_load::<Exact>(&machine, &motion);
+        let load = InverseDynamics::new(&machine).load_of::<Exact>(&motion);
         let rates = Vector6::from(leg_motion(&machine, &motion).rate);
         let gamma = forces(&machine, &motion);
-        let power = (gamma - load.drive_forces).dot(&rates);
+        let power = (gamma - load.along).dot(&rates);
         let expected = load.wrench.dot(&motion.twist.vector());
-        let scale = (gamma - load.drive_forces).component_mul(&rates).abs().sum();
+        let scale = (gamma - load.along).component_mul(&rates).abs().sum();
         prop_assert!((power - expected).abs() < 1e-12 * scale, "{power} {expected}");
         prop_assert_eq!(load.leg_wrenches, leg_wrenches(&machine, &motion.pose));
     }
@@ -104,9 +105,8 @@ proptest! {
 
 /// Potential of all thirteen bodies.
 fn potential(machine: &Machine, pose: &hexad::model::rigid::Pose) -> f64 {
-    use hexad::model::lanes::Lane;
     let height = |mass: f64, at: &Vector3<f64>| -mass * machine.gravity.dot(at);
-    let (base, platform) = (Lane::unpack(&machine.joints.base), Lane::unpack(&machine.joints.platform));
+    let Legs { base, platform, .. } = Legs::of(machine);
     let body = &machine.platform;
     let mut sum = height(body.mass, &(pose.position + pose.rotation * body.center_of_mass));
     for (a, b) in base.iter().zip(&platform) {

@@ -4,35 +4,29 @@ use fearless_simd::Level;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::inverse_jacobian::condition;
-use hexad::model::lanes::Lane;
 use hexad::model::leg::Exact;
-use hexad::model::machine::{Joints, LEGS, Link, Machine};
+use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
+use super::common::Legs;
 use super::{cases, machine_in_motion, relative, rotation, vector3};
 
 fn forces(machine: &Machine, motion: &Motion) -> [f64; LEGS] {
     inverse_dynamics::<Exact>(machine, motion).unwrap()
 }
 
-fn map(lanes: &[Lane; 3], f: impl FnMut(Vector3<f64>) -> Vector3<f64>) -> [Vector3<f64>; LEGS] {
-    Lane::unpack(lanes).map(f)
-}
-
 /// Base axes turned by `q` and their origin moved by `d`: the same machine in the same motion.
 fn moved_base(machine: &Machine, motion: &Motion, q: &Matrix3<f64>, d: &Vector3<f64>) -> (Machine, Motion) {
-    let joints = &machine.joints;
-    let machine = Machine {
-        gravity: q * machine.gravity,
-        joints: Joints::new(
-            &map(&joints.base, |a| q * a + d),
-            &map(&joints.platform, |b| b),
-            &map(&joints.universal_axis, |u| q * u),
-        ),
-        ..machine.clone()
+    let legs = Legs::of(machine);
+    let legs = Legs {
+        base: legs.base.map(|a| q * a + d),
+        universal_axis: legs.universal_axis.map(|u| q * u),
+        ..legs
     };
+    let machine =
+        Machine { gravity: q * machine.gravity, joints: legs.joints(&machine.home), ..machine.clone() };
     let Motion { pose, twist, acceleration } = motion;
     let motion = Motion {
         pose: Pose { rotation: q * pose.rotation, position: q * pose.position + d },
@@ -51,13 +45,9 @@ fn moved_platform(
     d: &Vector3<f64>,
 ) -> (Machine, Motion) {
     let mut result = machine.clone();
-    let joints = &machine.joints;
     let of_new = |v: Vector3<f64>| q.tr_mul(&(v - d));
-    result.joints = Joints::new(
-        &map(&joints.base, |a| a),
-        &map(&joints.platform, of_new),
-        &map(&joints.universal_axis, |u| u),
-    );
+    let legs = Legs::of(machine);
+    result.joints = Legs { platform: legs.platform.map(of_new), ..legs }.joints(&result.home);
     result.platform.center_of_mass = of_new(machine.platform.center_of_mass);
     result.platform.inertia = q.transpose() * machine.platform.inertia * q;
     let Motion { pose, twist, acceleration } = motion;
@@ -78,13 +68,11 @@ fn moved_platform(
 /// Lengths times `s`, masses times `m`, times times `t`: forces are `m s / t^2` as large.
 fn rescaled(machine: &Machine, motion: &Motion, s: f64, m: f64, t: f64) -> (Machine, Motion) {
     let mut result = machine.clone();
-    let joints = &machine.joints;
     result.gravity *= s / (t * t);
-    result.joints = Joints::new(
-        &map(&joints.base, |a| a * s),
-        &map(&joints.platform, |b| b * s),
-        &map(&joints.universal_axis, |u| u),
-    );
+    let legs = Legs::of(machine);
+    let scaled = |legs: [Vector3<f64>; LEGS]| legs.map(|v| v * s);
+    result.joints =
+        Legs { base: scaled(legs.base), platform: scaled(legs.platform), ..legs }.joints(&result.home);
     result.platform.mass *= m;
     result.platform.center_of_mass *= s;
     result.platform.inertia *= m * s * s;
@@ -166,13 +154,13 @@ proptest! {
         order in Just([0, 1, 2, 3, 4, 5]).prop_shuffle(),
     ) {
         let mut other = machine.clone();
-        let reordered = |lanes: &[Lane; 3]| order.map(|leg| Lane::unpack(lanes)[leg]);
-        let joints = &machine.joints;
-        other.joints = Joints::new(
-            &reordered(&joints.base),
-            &reordered(&joints.platform),
-            &reordered(&joints.universal_axis),
-        );
+        let legs = Legs::of(&machine);
+        let legs = Legs {
+            base: order.map(|leg| legs.base[leg]),
+            platform: order.map(|leg| legs.platform[leg]),
+            universal_axis: order.map(|leg| legs.universal_axis[leg]),
+        };
+        other.joints = legs.joints(&other.home);
         let expected = order.map(|leg| forces(&machine, &motion)[leg]);
         prop_assert!(relative(&forces(&other, &motion), &expected) < 1e-12);
         let expected = order.map(|leg| leg_motion(&machine, &motion).accel[leg]);

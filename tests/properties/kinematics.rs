@@ -3,13 +3,12 @@
 use hexad::model::forward_kinematics::{Tracker, solve};
 use hexad::model::inverse_geometry::{leg_directions, leg_lengths, leg_motion};
 use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
-use hexad::model::lanes::Lane;
 use hexad::model::rigid::{Motion, Twist};
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 use proptest::prelude::*;
 
-use super::common::{angle_between, largest};
+use super::common::{Legs, angle_between, largest};
 use super::{cases, machine_in_motion, vector6};
 
 /// Step of the differences \[s\]: truncation and rounding meet near 1e-9 of the scale of the motion.
@@ -26,7 +25,7 @@ proptest! {
 
     #[test]
     fn lengths_are_distances_of_the_joints((machine, _, motion) in machine_in_motion()) {
-        let (base, platform) = (Lane::unpack(&machine.joints.base), Lane::unpack(&machine.joints.platform));
+        let Legs { base, platform, .. } = Legs::of(&machine);
         let lengths = leg_lengths(&machine, &motion.pose);
         let directions = leg_directions(&machine, &motion.pose);
         for i in 0..6 {

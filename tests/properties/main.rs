@@ -9,14 +9,14 @@ mod common;
 mod dynamics;
 mod invariance;
 mod kinematics;
+mod layouts;
 mod rotations;
 
 use std::sync::LazyLock;
 
-use common::{MACHINES, machine};
+use common::{Legs, MACHINES, machine};
 use hexad::model::inverse_jacobian::condition;
-use hexad::model::lanes::Lane;
-use hexad::model::machine::{Joints, LEGS, Link, Machine};
+use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -59,8 +59,7 @@ fn rotation() -> impl Strategy<Value = Matrix3<f64>> {
 }
 
 /// The six legs' vectors of a machine, disturbed by up to `size` each.
-fn disturbed(lanes: &[Lane; 3], by: &[Vector3<f64>; LEGS], size: f64) -> [Vector3<f64>; LEGS] {
-    let legs = Lane::unpack(lanes);
+fn disturbed(legs: &[Vector3<f64>; LEGS], by: &[Vector3<f64>; LEGS], size: f64) -> [Vector3<f64>; LEGS] {
     core::array::from_fn(|i| legs[i] + by[i] * size)
 }
 
@@ -85,11 +84,13 @@ fn any_machine() -> impl Strategy<Value = Machine> {
         |(which, (base, platform, axes), [body, cylinder, rod], links, drive, (offset, gravity))| {
             let mut machine = SOUND[which].clone();
             let radius = machine.joints.radius;
-            machine.joints = Joints::new(
-                &disturbed(&machine.joints.base, &base, 0.05 * radius),
-                &disturbed(&machine.joints.platform, &platform, 0.05 * radius),
-                &axes,
-            );
+            let legs = Legs::of(&machine);
+            let legs = Legs {
+                base: disturbed(&legs.base, &base, 0.05 * radius),
+                platform: disturbed(&legs.platform, &platform, 0.05 * radius),
+                universal_axis: axes,
+            };
+            machine.joints = legs.joints(&machine.home);
             machine.gravity = gravity * 9.81;
             machine.platform.mass *= body;
             machine.platform.center_of_mass += offset * (0.2 * radius);
@@ -128,7 +129,7 @@ fn machine_in_motion() -> impl Strategy<Value = (Machine, TaskState, Motion)> {
         })
         .prop_filter("near a singularity", |(machine, _, motion)| {
             let n = hexad::model::inverse_geometry::leg_directions(machine, &motion.pose);
-            let u = Lane::unpack(&machine.joints.universal_axis);
+            let u = Legs::of(machine).universal_axis;
             let sines = n.iter().zip(&u).map(|(n, u)| n.cross(u).norm());
             sines.fold(1.0, f64::min) > 0.2 && condition(machine, &motion.pose) < WORST_CONDITION
         })

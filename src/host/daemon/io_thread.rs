@@ -7,6 +7,7 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::control::controller::{Input, Measurement, Output, Setpoint};
+use crate::control::state::{Cause, State};
 use crate::host::report::Times;
 use crate::ipc::exchange::{CycleOutput, IoSide};
 use crate::ipc::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
@@ -57,8 +58,12 @@ impl Ports {
 }
 
 /// Runs until `stop`, then publishes the last output there is.
+///
+/// Forces computed more than `longest_hold_ns` ago are not valid any more: the process was held (stopped,
+/// or the host took the processor) between computing and sending them.
 pub fn run(
     timing: &Timing,
+    longest_hold_ns: u64,
     home: &[f64; 6],
     mut ports: Ports,
     mut side: IoSide,
@@ -81,7 +86,7 @@ pub fn run(
             let cycle = side.outputs.read();
             if cycle.release_ns > published {
                 published = cycle.release_ns;
-                publish(&mut ports, home, cycle, &mut report);
+                publish(&mut ports, home, cycle, longest_hold_ns, &mut report);
             }
             let now_ns = monotonic_ns();
             if published >= release_ns || now_ns + POLL_NS >= next_read_ns {
@@ -90,7 +95,7 @@ pub fn run(
             sleep_until(now_ns + POLL_NS);
         }
     }
-    publish(&mut ports, home, side.outputs.read(), &mut report);
+    publish(&mut ports, home, side.outputs.read(), longest_hold_ns, &mut report);
     report.rejected = ports.setpoint.rejected() + ports.measured.rejected();
     report
 }
@@ -111,11 +116,24 @@ fn read(ports: &mut Ports, input: &mut Input) {
     }
 }
 
-fn publish(ports: &mut Ports, home: &[f64; 6], cycle: &CycleOutput, report: &mut IoReport) {
+fn publish(
+    ports: &mut Ports,
+    home: &[f64; 6],
+    cycle: &CycleOutput,
+    longest_hold_ns: u64,
+    report: &mut IoReport,
+) {
+    let mut cycle = *cycle;
     let now_ns = monotonic_ns();
-    let sent = ports.force.publish(now_ns, force_message(cycle));
-    report.end_to_end.record(monotonic_ns().saturating_sub(cycle.release_ns));
-    let told = ports.status.publish(now_ns, status_message(home, cycle));
+    let held_ns = now_ns.saturating_sub(cycle.release_ns);
+    if held_ns > longest_hold_ns && cycle.output.state == State::Active {
+        cycle.output = Output { cause: Cause::MeasurementLost, ..Output::default() };
+    }
+    let sent = ports.force.publish(now_ns, force_message(&cycle));
+    if cycle.output.state == State::Active {
+        report.end_to_end.record(monotonic_ns().saturating_sub(cycle.release_ns));
+    }
+    let told = ports.status.publish(now_ns, status_message(home, &cycle));
     report.send_failures += u64::from(sent.is_err()) + u64::from(told.is_err());
 }
 
@@ -123,7 +141,7 @@ fn force_message(cycle: &CycleOutput) -> ForceMessage {
     let Output { state, cause, force, limited, .. } = cycle.output;
     ForceMessage {
         force_n: force,
-        valid: u32::from(state == crate::control::state::State::Active),
+        valid: u32::from(state == State::Active),
         state: state as u32,
         fault: cause as u32,
         limited: u32::from(limited),

@@ -62,6 +62,7 @@ pub enum DaemonError {
 
 /// Runs until `stop`; writes the report if asked to.
 pub fn run(config: &Config, report_path: Option<&Path>, stop: &Stop) -> Result<Report, DaemonError> {
+    let _only = Bus::claim(&config.name)?;
     let report = run_threads(config, stop)?;
     if let Some(path) = report_path {
         report.write(path)?;
@@ -94,7 +95,8 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
             let shortfalls = opened.map(|()| prepare_thread(realtime.io_priority, realtime.io_cpu));
             // Nobody listens only if the other thread failed first.
             let _ = io_ready.send(shortfalls.map_err(DaemonError::from));
-            Some(io_thread::run(timing, &machine.home, ports?, io_side, stop_io))
+            let longest_hold_ns = nanoseconds(deployment.timeouts.measured_s);
+            Some(io_thread::run(timing, longest_hold_ns, &machine.home, ports?, io_side, stop_io))
         })?;
         let cyclic = spawn(threads, "hexad-rt", move || {
             let _ = realtime_ready.send(Ok(prepare_thread(realtime.priority, realtime.cpu)));

@@ -1,0 +1,102 @@
+//! What is typed wrong is refused in one message, with exit code 2, before anything starts.
+
+use std::ffi::OsStr;
+
+use crate::support::children::run;
+use crate::support::machine::Machine;
+
+/// Runs a command line that must be refused with these words; nothing goes to standard output.
+fn refused(arguments: &[&str], words: &[&str]) {
+    let machine = Machine::patient("command-line");
+    let file = machine.file.display().to_string();
+    let arguments: Vec<_> =
+        arguments.iter().map(|word| if *word == "FILE" { &file } else { *word }).collect();
+    let ended = run(&machine, &arguments);
+    assert_eq!(ended.status.code(), Some(2), "{arguments:?}: {}", ended.stderr);
+    assert_eq!(ended.stdout, "", "{arguments:?}");
+    for word in words {
+        assert!(ended.stderr.contains(word), "{arguments:?}: {word:?} must be in\n{}", ended.stderr);
+    }
+    let errors = ended.stderr.matches("error: ").count() + ended.stderr.matches("hexad: ").count();
+    assert_eq!(errors, 1, "{arguments:?} must give one message:\n{}", ended.stderr);
+}
+
+#[test]
+fn what_is_typed_wrong_is_refused() {
+    refused(&["frobnicate"], &["unrecognized subcommand 'frobnicate'", "Usage: hexad <COMMAND>"]);
+    for command in ["run", "plant", "check"] {
+        refused(&[command], &["required arguments were not provided", "--config <FILE>"]);
+    }
+    refused(&["move", "--motion", "sines"], &["required arguments were not provided", "--config <FILE>"]);
+    refused(&["move", "--config", "FILE"], &["--motion <MOTION>|--trajectory <FILE>"]);
+    refused(
+        &["move", "--config", "FILE", "--motion", "sines", "--trajectory", "t.csv"],
+        &["'--motion <MOTION>' cannot be used with '--trajectory <FILE>'"],
+    );
+    refused(
+        &["move", "--config", "FILE", "--trajectory", "t.csv", "--seconds", "3"],
+        &["cannot be used with", "--seconds <SECONDS>"],
+    );
+    refused(&["move", "--config", "FILE", "--motion", "waltz"], &["'waltz'", "sines"]);
+    refused(&["run", "--config", "FILE", "--fast"], &["unexpected argument '--fast'"]);
+}
+
+#[test]
+fn bad_durations_are_refused_with_their_bound() {
+    for seconds in ["0", "0.09", "86401", "1e300", "inf", "NaN", "-1"] {
+        for command in ["move", "demo"] {
+            let option = format!("--seconds={seconds}");
+            let arguments = [command, "--config", "FILE", "--motion", "sines", &option];
+            refused(
+                &arguments,
+                &["--seconds <SECONDS>", &format!("'{seconds}'"), "must be in [0.1, 86400] s"],
+            );
+        }
+    }
+    refused(
+        &["move", "--config", "FILE", "--motion", "sines", "--seconds", "soon"],
+        &["'soon'", "--seconds <SECONDS>", "must be a number"],
+    );
+}
+
+#[test]
+fn machine_files_that_cannot_be_read_are_named() {
+    let machine = Machine::patient("unreadable");
+    let absent = machine.path("absent.toml").display().to_string();
+    let folder = machine.folder().display().to_string();
+    let binary = machine.path("binary.toml").display().to_string();
+    std::fs::write(&binary, [0xff, 0xfe, 0x00, 0x80]).expect("a file");
+    for (path, why) in [(&absent, "No such file"), (&folder, "Is a directory"), (&binary, "UTF-8")] {
+        for command in [&["run"] as &[_], &["plant"], &["check"], &["demo"], &["move", "--motion", "sines"]] {
+            let arguments: Vec<&str> = command.iter().copied().chain(["--config", path]).collect();
+            refused(&arguments, &[path, why]);
+        }
+    }
+}
+
+#[test]
+fn a_machine_file_with_mistakes_is_refused_with_all_of_them() {
+    let machine = Machine::with("mistakes", "[timeouts]\nsetpoint_ms = 0.5\nmeasured_s = 1\n");
+    let ended = run::<&OsStr>(&machine, &["run".as_ref(), "--config".as_ref(), machine.file.as_ref()]);
+    assert_eq!(ended.status.code(), Some(2), "{}", ended.stderr);
+    for words in [
+        &machine.file.display().to_string(),
+        "timeouts.setpoint_ms = 0.5: must be greater than 1",
+        "measured_s",
+    ] {
+        assert!(ended.stderr.contains(words), "{words:?} must be in\n{}", ended.stderr);
+    }
+}
+
+#[test]
+fn check_shows_a_good_machine() {
+    let machine = Machine::patient("check");
+    let ended = run::<&OsStr>(&machine, &["check".as_ref(), "--config".as_ref(), machine.file.as_ref()]);
+    assert_eq!((ended.status.code(), ended.stderr.as_str()), (Some(0), ""));
+    for words in
+        [&format!("{}: valid", machine.name), "length", "force", "condition of the Jacobian", "gain margin"]
+    {
+        assert!(ended.stdout.contains(words), "{words:?} must be in\n{}", ended.stdout);
+    }
+    assert_eq!(ended.stdout.matches(" deg\n").count(), 6, "a line for each leg:\n{}", ended.stdout);
+}

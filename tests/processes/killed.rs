@@ -1,0 +1,101 @@
+//! SIGKILL in full motion, then a restart, without anybody cleaning up.
+
+use hexad::control::state::Cause;
+use hexad::ipc::messages::MeasuredMessage;
+use hexad::realtime::clock::monotonic_ns;
+
+use crate::support::machine::PERIOD_NS;
+use crate::support::recorder::Recording;
+use crate::support::rules::stands;
+use crate::support::trio::{Trio, start_daemon, start_plant, start_setpoints, valid_after};
+use crate::support::turns;
+
+/// An outage: from the kill to the restart \[ns\].
+struct Outage {
+    from_ns: u64,
+    to_ns: u64,
+}
+
+#[test]
+fn a_killed_plant_comes_back() {
+    let _turn = turns::beside_others();
+    let mut trio = Trio::in_motion("killed-plant");
+    let from_ns = monotonic_ns();
+    trio.plant.kill();
+    trio.loses_force_for(Cause::MeasurementLost);
+    trio.daemon.says("fault: measurement lost; forces are no longer valid");
+    trio.setpoints.says("the daemon gave up control or is gone");
+    let to_ns = monotonic_ns();
+    trio.plant = start_plant(&trio.machine);
+    trio.moves_after(to_ns);
+    let recording = trio.finish();
+    lost_for(Cause::MeasurementLost, &Outage { from_ns, to_ns }, &recording);
+}
+
+#[test]
+fn a_killed_setpoint_source_comes_back() {
+    let _turn = turns::beside_others();
+    let mut trio = Trio::in_motion("killed-setpoints");
+    let from_ns = monotonic_ns();
+    trio.setpoints.kill();
+    trio.loses_force_for(Cause::SetpointLost);
+    trio.daemon.says("fault: setpoint lost in motion; forces are no longer valid");
+    trio.plant.says("no valid force (setpoint lost in motion): brakes closing");
+    trio.stands();
+    let to_ns = monotonic_ns();
+    trio.setpoints = start_setpoints(&trio.machine);
+    trio.moves_after(to_ns);
+    let recording = trio.finish();
+    let outage = Outage { from_ns, to_ns };
+    lost_for(Cause::SetpointLost, &outage, &recording);
+    comes_to_rest_and_stays(&outage, &recording);
+}
+
+#[test]
+fn a_killed_daemon_comes_back() {
+    let _turn = turns::beside_others();
+    let mut trio = Trio::in_motion("killed-daemon");
+    let from_ns = monotonic_ns();
+    trio.daemon.kill();
+    let killed_ns = monotonic_ns();
+    trio.plant.says("forces stopped arriving: brakes closing");
+    trio.setpoints.says("the daemon gave up control or is gone");
+    trio.stands();
+    let to_ns = monotonic_ns();
+    trio.daemon = start_daemon(&trio.machine);
+    trio.moves_after(to_ns);
+    let recording = trio.finish();
+    let outage = Outage { from_ns, to_ns };
+    let silent = |time_ns: u64| (killed_ns..to_ns).contains(&time_ns);
+    assert!(!recording.forces.iter().any(|force| silent(force.header.time_ns)), "the dead do not push");
+    comes_to_rest_and_stays(&outage, &recording);
+    let lives: Vec<_> = recording.forces.chunk_by(|a, b| a.header.epoch == b.header.epoch).collect();
+    assert_eq!(lives.len(), 2, "forces of one life, then of the other");
+    let first = lives[1][0];
+    assert_eq!((first.valid, first.header.sequence), (0, 1), "a new daemon begins without force: {first:#?}");
+}
+
+/// The last cause during the outage was this one, and control came back after it.
+fn lost_for(cause: Cause, outage: &Outage, recording: &Recording) {
+    let during = |time_ns: u64| (outage.from_ns..outage.to_ns).contains(&time_ns);
+    let last =
+        recording.forces.iter().rfind(|force| during(force.header.time_ns)).expect("the daemon ran on");
+    assert_eq!((last.valid, last.fault), (0, cause as u32), "{last:#?}");
+    assert!(recording.forces.iter().any(|force| valid_after(force, outage.to_ns)));
+}
+
+/// From the kill to the first valid force after the restart: the platform comes to rest and then stands.
+fn comes_to_rest_and_stays(outage: &Outage, recording: &Recording) {
+    let again = recording.forces.iter().find(|force| valid_after(force, outage.to_ns)).expect("it came back");
+    // A plant that was late applies a force from the last tick before it was sent on.
+    let until_ns = again.header.time_ns.min(again.release_ns) - PERIOD_NS;
+    let during: Vec<&MeasuredMessage> = recording
+        .measured
+        .iter()
+        .filter(|measured| (outage.from_ns..until_ns).contains(&measured.header.time_ns))
+        .collect();
+    let rest = during.iter().position(|measured| stands(measured)).expect("the platform comes to rest");
+    let moves = during[rest..].iter().find(|measured| !stands(measured));
+    assert!(moves.is_none(), "without a force, and it moves again: {moves:#?}");
+    assert!(during[0].length_rate_m_s != [0.0; 6], "the kill was to come in motion");
+}

@@ -1,0 +1,27 @@
+//! The command `hexad` as it is used: real processes over real shared memory with real signals.
+//!
+//! The host may take the processor away for many milliseconds. No test asserts an absolute time but for
+//! generous limits against hanging; timeouts are long where they are not what is tested; what is counted is
+//! compared with what the messages themselves say.
+//!
+//! `HEXAD_LONG=1` runs the locked-memory test for a minute instead of 20 seconds.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    reason = "a failed assertion is how a test speaks"
+)]
+#![allow(clippy::std_instead_of_core, reason = "tests of processes have an operating system")]
+
+mod support;
+
+mod command_line;
+mod demo;
+mod killed;
+mod locked_memory;
+mod orderly_stop;
+mod paused;
+mod trajectory;
+mod unprivileged;

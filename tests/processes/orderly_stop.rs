@@ -1,0 +1,103 @@
+//! SIGTERM and SIGINT: every process ends by itself, and the daemon takes its force away first.
+
+use std::fs;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use hexad::control::state::Cause;
+use hexad::host::report::Report;
+
+use crate::support::children::{HANG, Hexad};
+use crate::support::machine::Machine;
+use crate::support::recorder::Recorder;
+use crate::support::rules;
+use crate::support::trio::{Trio, fastest, start_daemon, start_setpoints};
+use crate::support::turns;
+
+/// A person waits no longer.
+const SOON: Duration = Duration::from_secs(2);
+
+#[test]
+fn sigterm_ends_each_process_in_order() {
+    let _turn = turns::beside_others();
+    stops_in_motion("TERM");
+}
+
+#[test]
+fn sigint_ends_each_process_in_order() {
+    let _turn = turns::beside_others();
+    stops_in_motion("INT");
+}
+
+/// The daemon first: the platform is in motion under its force.
+fn stops_in_motion(signal: &str) {
+    let Trio { setpoints, daemon, plant, recorder, machine } = Trio::in_motion("orderly-stop");
+    let ended = daemon.stops_on(signal, SOON);
+    assert!(ended.stderr.contains("stopping"), "{}", ended.stderr);
+    plant.says("no valid force (daemon stopping): brakes closing");
+    setpoints.stops_on(signal, SOON);
+    recorder.until("the platform stands", |recording| {
+        recording.measured.last().filter(|m| rules::stands(m)).map(drop)
+    });
+    plant.stops_on(signal, SOON);
+
+    let recording = recorder.finish();
+    rules::hold(&recording);
+    assert!(recording.measured.iter().any(|measured| fastest(measured) > 0.1), "it was in motion");
+    let last = recording.forces.last().expect("forces");
+    assert_eq!((last.valid, last.fault), (0, Cause::Stopping as u32), "{last:#?}");
+    let before = recording.forces.iter().rfind(|force| force.fault != Cause::Stopping as u32);
+    assert!(before.is_some_and(|force| force.valid == 1), "valid until it stopped: {before:#?}");
+    let report = Report::read(&machine.path("report.json")).expect("the report");
+    assert!(report.faults.is_empty() && report.cycles > 0, "{report:#?}");
+    assert_eq!(last.header.sequence, recording.statuses.last().map_or(0, |status| status.header.sequence));
+}
+
+#[test]
+fn processes_that_wait_for_others_stop_as_well() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("waiting-stop");
+    let daemon = start_daemon(&machine);
+    daemon.says("waiting: no measurement");
+    let setpoints = start_setpoints(&machine);
+    setpoints.says("waiting for the daemon");
+    setpoints.stops_on("INT", SOON);
+    daemon.stops_on("TERM", SOON);
+    let report = fs::read_to_string(machine.path("report.json")).expect("the report");
+    let report: Report = serde_json::from_str(&report).expect("JSON");
+    assert_eq!(report.tracking.position_max_m, 0.0, "nothing was tracked");
+}
+
+#[test]
+fn an_interrupted_demo_takes_its_processes_with_it() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("demo-stop");
+    let charts = machine.path("charts");
+    let demo = Hexad::start(
+        &machine,
+        "demo",
+        &["--seconds".as_ref(), "60".as_ref(), "--charts".as_ref(), charts.as_os_str()],
+    );
+    let name = format!("{}-demo-{}", machine.name, demo.id());
+    let recorder = Recorder::start(&name);
+    recorder
+        .until("forces are valid", |recording| recording.forces.last().filter(|f| f.valid == 1).map(drop));
+    demo.signal("INT");
+    let ended = demo.ends_within(HANG);
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+    assert!(ended.stderr.contains("stopped by a signal"), "{}", ended.stderr);
+    // The daemon is told to stop when the demo is gone; nobody sends after that.
+    let count = || {
+        let recording = recorder.so_far();
+        (recording.measured.len(), recording.statuses.len())
+    };
+    let start = Instant::now();
+    loop {
+        let before = count();
+        sleep(Duration::from_millis(200));
+        if count() == before {
+            break;
+        }
+        assert!(start.elapsed() < HANG, "its children run on");
+    }
+}

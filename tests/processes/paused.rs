@@ -1,0 +1,60 @@
+//! SIGSTOP and SIGCONT: a process that is away for a while and does not know it.
+
+use std::time::Duration;
+
+use crate::support::recorder::Recording;
+use crate::support::trio::{Trio, let_pass, valid_after};
+use crate::support::turns;
+
+/// Longer than every timeout of the machine file.
+const PAUSE: Duration = Duration::from_millis(300);
+
+/// Grid points within the pause, less those that a signal needs to arrive.
+const LEAST_SKIPPED: u64 = 290;
+
+#[test]
+fn a_paused_daemon_counts_what_it_missed_and_recovers() {
+    let _turn = turns::beside_others();
+    let trio = Trio::in_motion("paused-daemon");
+    let before = trio.recorder.so_far().statuses.last().copied().expect("a status");
+    trio.daemon.signal("STOP");
+    let (from_ns, _) = let_pass(PAUSE);
+    trio.daemon.signal("CONT");
+    trio.plant.says("forces stopped arriving: brakes closing");
+    trio.recorder.until("skipped cycles are counted", |recording| {
+        let status = recording.statuses.last()?;
+        (status.skipped >= before.skipped + LEAST_SKIPPED).then_some(())
+    });
+    let (_, recovered_ns) = let_pass(Duration::from_millis(500));
+    trio.moves_after(recovered_ns);
+    let recording = trio.finish();
+    let after = recording.statuses.last().expect("a status");
+    println!("daemon stopped for 300 ms at 1 kHz: {} skipped", after.skipped - before.skipped);
+    brakes_held_until_control_was_taken_anew(from_ns, &recording);
+}
+
+#[test]
+fn a_paused_plant_recovers() {
+    let _turn = turns::beside_others();
+    let trio = Trio::in_motion("paused-plant");
+    let before = trio.recorder.so_far().statuses.last().copied().expect("a status");
+    trio.plant.signal("STOP");
+    let (from_ns, _) = let_pass(PAUSE);
+    trio.plant.signal("CONT");
+    trio.daemon.says("fault: measurement lost; forces are no longer valid");
+    let (_, recovered_ns) = let_pass(Duration::from_millis(500));
+    trio.moves_after(recovered_ns);
+    let recording = trio.finish();
+    let after = recording.statuses.last().expect("a status");
+    println!("plant stopped for 300 ms: {} cycles of the daemon skipped", after.skipped - before.skipped);
+    brakes_held_until_control_was_taken_anew(from_ns, &recording);
+}
+
+/// Whoever was away, the plant's brakes closed: the loop may not go on as if nothing had happened, but lets
+/// go first and engages again from where the platform stands.
+fn brakes_held_until_control_was_taken_anew(from_ns: u64, recording: &Recording) {
+    let after: Vec<_> = recording.forces.iter().filter(|force| force.release_ns > from_ns).collect();
+    let let_go = after.iter().position(|force| force.valid == 0).expect("the daemon let go of the platform");
+    let again = after[let_go..].iter().any(|force| valid_after(force, from_ns));
+    assert!(again, "the loop became active again");
+}

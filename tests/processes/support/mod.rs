@@ -1,0 +1,10 @@
+//! What the tests share.
+
+pub mod children;
+pub mod machine;
+pub mod recorder;
+pub mod rules;
+pub mod stalls;
+pub mod trio;
+pub mod turns;
+pub mod xml;

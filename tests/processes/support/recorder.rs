@@ -1,0 +1,116 @@
+//! A participant that only listens, and keeps everything.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, mpsc};
+use std::thread::{JoinHandle, sleep, spawn};
+use std::time::{Duration, Instant};
+
+use hexad::ipc::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage};
+use hexad::ipc::ports::{Bus, Sink};
+use hexad::realtime::setup;
+
+use super::children::HANG;
+
+/// The topics hold 256 ms at 1 kHz.
+const POLL: Duration = Duration::from_millis(1);
+
+/// Everything that was said, in order.
+#[derive(Clone, Default)]
+pub struct Recording {
+    pub setpoints: Vec<SetpointMessage>,
+    pub measured: Vec<MeasuredMessage>,
+    pub forces: Vec<ForceMessage>,
+    pub statuses: Vec<StatusMessage>,
+}
+
+/// Listens in a thread of its own, which owns the ports.
+pub struct Recorder {
+    recording: Arc<Mutex<Recording>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Recorder {
+    /// Returns when every port is open.
+    pub fn start(machine: &str) -> Self {
+        let recording = Arc::new(Mutex::new(Recording::default()));
+        let stop = Arc::new(AtomicBool::new(false));
+        let (ready, opened) = mpsc::channel();
+        let thread = {
+            let (recording, stop, machine) = (recording.clone(), stop.clone(), machine.to_owned());
+            spawn(move || {
+                // So that a busy machine does not keep it from listening for a quarter of a second.
+                let _ = setup::fifo_priority(1);
+                let bus = Bus::join(&machine).expect("to join");
+                let mut listen = Listener::new(&bus);
+                ready.send(()).expect("the test waits");
+                while !stop.load(Ordering::Relaxed) {
+                    listen.take(&mut recording.lock().expect("no panic while it was held"));
+                    sleep(POLL);
+                }
+                listen.take(&mut recording.lock().expect("no panic while it was held"));
+            })
+        };
+        opened.recv().expect("the ports of the recorder");
+        Self { recording, stop, thread: Some(thread) }
+    }
+
+    /// What there is so far.
+    pub fn so_far(&self) -> MutexGuard<'_, Recording> {
+        self.recording.lock().expect("no panic while it was held")
+    }
+
+    /// Waits until the recording shows something.
+    pub fn until<T>(&self, what: &str, shown: impl Fn(&Recording) -> Option<T>) -> T {
+        let start = Instant::now();
+        loop {
+            let recording = self.so_far();
+            if let Some(found) = shown(&recording) {
+                return found;
+            }
+            let last = (recording.forces.last().copied(), recording.measured.last().copied());
+            drop(recording);
+            assert!(start.elapsed() < HANG, "it never happens that {what}; the last messages: {last:#?}");
+            sleep(POLL);
+        }
+    }
+
+    /// Everything.
+    pub fn finish(mut self) -> Recording {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.take().expect("taken only here").join().expect("the recorder");
+        self.so_far().clone()
+    }
+}
+
+impl Drop for Recorder {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
+}
+
+struct Listener {
+    setpoints: Sink<SetpointMessage>,
+    measured: Sink<MeasuredMessage>,
+    forces: Sink<ForceMessage>,
+    statuses: Sink<StatusMessage>,
+}
+
+impl Listener {
+    fn new(bus: &Bus) -> Self {
+        Self { setpoints: sink(bus), measured: sink(bus), forces: sink(bus), statuses: sink(bus) }
+    }
+
+    fn take(&mut self, recording: &mut Recording) {
+        // Answers before questions: what a force was computed from is then in the recording with it.
+        recording.statuses.extend(std::iter::from_fn(|| self.statuses.receive()));
+        recording.forces.extend(std::iter::from_fn(|| self.forces.receive()));
+        recording.measured.extend(std::iter::from_fn(|| self.measured.receive()));
+        recording.setpoints.extend(std::iter::from_fn(|| self.setpoints.receive()));
+    }
+}
+
+fn sink<T: Message>(bus: &Bus) -> Sink<T> {
+    bus.sink(usize::MAX).expect("to subscribe")
+}

@@ -1,0 +1,111 @@
+//! Plant, daemon and setpoint source of one machine, in motion, and somebody who listens.
+
+use std::time::Duration;
+
+use hexad::control::state::Cause;
+use hexad::ipc::messages::{ForceMessage, MeasuredMessage};
+use hexad::realtime::clock::monotonic_ns;
+
+use super::children::{HANG, Hexad};
+use super::machine::Machine;
+use super::recorder::{Recorder, Recording};
+use super::rules;
+
+/// A leg faster than this is in motion \[m/s\]. The fastest legs of the motion exceed it several times over.
+const IN_MOTION: f64 = 0.1;
+
+/// Longer than any test; the setpoint source is stopped when the test is done.
+const MOTION: [&str; 4] = ["--motion", "sines", "--seconds", "100"];
+
+/// Fields are dropped in this order: the processes before the one that listens, the files last.
+pub struct Trio {
+    pub setpoints: Hexad,
+    pub daemon: Hexad,
+    pub plant: Hexad,
+    pub recorder: Recorder,
+    pub machine: Machine,
+}
+
+impl Trio {
+    /// Starts all three and waits until the platform is in full motion.
+    pub fn in_motion(test: &str) -> Self {
+        let machine = Machine::patient(test);
+        let recorder = Recorder::start(&machine.name);
+        let plant = start_plant(&machine);
+        let daemon = start_daemon(&machine);
+        let setpoints = start_setpoints(&machine);
+        let trio = Self { setpoints, daemon, plant, recorder, machine };
+        trio.moves_after(0);
+        trio
+    }
+
+    /// Waits until the platform moves under forces computed after an instant.
+    pub fn moves_after(&self, instant_ns: u64) {
+        self.recorder.until("the platform is in motion under a valid force", |recording| {
+            let force = recording.forces.last().filter(|force| valid_after(force, instant_ns))?;
+            let measured =
+                recording.measured.last().filter(|measured| measured.header.time_ns > instant_ns)?;
+            (force.valid == 1 && fastest(measured) > IN_MOTION).then_some(())
+        });
+    }
+
+    /// Waits until no force is valid any more, for this reason.
+    pub fn loses_force_for(&self, cause: Cause) {
+        self.recorder.until("the daemon marks its forces as not valid", |recording| {
+            recording.forces.last().filter(|force| force.valid == 0 && force.fault == cause as u32).copied()
+        });
+    }
+
+    /// Waits until the platform stands, and then a while longer: it must not only pass through.
+    pub fn stands(&self) {
+        let since_ns = self.recorder.until("the platform stands", |recording| {
+            recording.measured.last().filter(|measured| rules::stands(measured)).map(|m| m.header.time_ns)
+        });
+        self.recorder.until("the plant goes on measuring", |recording| {
+            let newest_ns = recording.measured.last()?.header.time_ns;
+            (newest_ns > since_ns + 300_000_000).then_some(())
+        });
+    }
+
+    /// Ends everything in order; the recording has passed the rules.
+    pub fn finish(mut self) -> Recording {
+        for process in [&mut self.setpoints, &mut self.daemon, &mut self.plant] {
+            process.must_run();
+        }
+        self.setpoints.stops_on("TERM", HANG);
+        self.daemon.stops_on("TERM", HANG);
+        self.plant.stops_on("TERM", HANG);
+        let recording = self.recorder.finish();
+        rules::hold(&recording);
+        recording
+    }
+}
+
+pub fn start_plant(machine: &Machine) -> Hexad {
+    Hexad::start::<&str>(machine, "plant", &[])
+}
+
+pub fn start_daemon(machine: &Machine) -> Hexad {
+    Hexad::start(machine, "run", &["--report".into(), machine.path("report.json")])
+}
+
+pub fn start_setpoints(machine: &Machine) -> Hexad {
+    Hexad::start(machine, "move", &MOTION)
+}
+
+/// Whether a force is valid and was computed after an instant.
+pub fn valid_after(force: &ForceMessage, instant_ns: u64) -> bool {
+    force.valid == 1 && force.release_ns > instant_ns
+}
+
+/// Speed of the fastest leg \[m/s\].
+pub fn fastest(measured: &MeasuredMessage) -> f64 {
+    measured.length_rate_m_s.iter().fold(0.0, |fastest, rate| fastest.max(rate.abs()))
+}
+
+/// Lets real time pass, at least this much, measured: from and to \[ns\].
+pub fn let_pass(duration: Duration) -> (u64, u64) {
+    let from_ns = monotonic_ns();
+    std::thread::sleep(duration);
+    (from_ns, monotonic_ns())
+}
