@@ -8,7 +8,7 @@ use super::state::{Cause, State};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::{Tracked, Tracker};
 use crate::model::inverse_jacobian::twist_from_rates;
-use crate::model::leg::Exact;
+use crate::model::ladder::Exact;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
 use crate::model::task::TaskState;

@@ -11,7 +11,7 @@ use crate::control::gains::{gain_margin, max_bandwidth_hz};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
-use crate::model::leg::Exact;
+use crate::model::ladder::Exact;
 use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
 

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hexad::host::check::Check;
 use hexad::host::config::{Config, ConfigError};
@@ -11,6 +12,7 @@ use hexad::host::offline::{self, OfflineError};
 use hexad::host::setpoints::{self, Score, SetpointError};
 use hexad::host::stop::Stop;
 use hexad::host::{daemon, plant};
+use hexad::model::ladder::Rung;
 use hexad::scene::motions::Motion;
 
 /// Hard real-time computed-torque controller for Gough-Stewart platforms.
@@ -82,8 +84,8 @@ enum Command {
         #[command(flatten)]
         files: Files,
         /// The dynamic model
-        #[arg(long, value_enum, default_value_t = ModelName::Exact)]
-        model: ModelName,
+        #[arg(long, default_value = Rung::Exact.name(), value_parser = rungs())]
+        model: Rung,
     },
     /// Poses, and twists if there are rates, for a file of leg lengths
     ForwardKinematics {
@@ -140,14 +142,6 @@ enum MotionName {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum ModelName {
-    /// Every term
-    Exact,
-    /// The paper's: legs that do not spin about their own axes
-    RigidLegs,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 enum Start {
     /// At the row before, the first at home
     Previous,
@@ -182,10 +176,6 @@ impl Cli {
                 Ok(())
             }
             Command::InverseDynamics { machine, files, model } => {
-                let model = match model {
-                    ModelName::Exact => offline::ModelName::Exact,
-                    ModelName::RigidLegs => offline::ModelName::RigidLegs,
-                };
                 let machine = machine.load()?.machine;
                 Ok(offline::inverse_dynamics_file(&machine, model, &files.input, &files.output)?)
             }
@@ -223,6 +213,12 @@ impl What {
             }
         }
     }
+}
+
+/// The ladder of models by name.
+fn rungs() -> impl TypedValueParser<Value = Rung> {
+    PossibleValuesParser::new(Rung::ALL.map(Rung::name))
+        .map(|name| Rung::ALL.into_iter().find(|rung| rung.name() == name).unwrap_or(Rung::Exact))
 }
 
 /// Signals end the command in order instead of killing it.

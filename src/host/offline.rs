@@ -15,9 +15,9 @@ use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::Tracker;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::inverse_jacobian::twist_from_rates;
-use crate::model::leg::{Exact, RigidLegs};
+use crate::model::ladder::Rung;
 use crate::model::machine::{LEGS, Machine};
-use crate::model::rigid::{Motion, Twist};
+use crate::model::rigid::Twist;
 use crate::model::task::{TaskState, task_coordinates};
 
 /// Why an offline command failed.
@@ -32,22 +32,6 @@ pub enum OfflineError {
     Unsolved { count: usize, rows: usize, what: &'static str, first: f64 },
 }
 
-/// Which dynamic model to evaluate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ModelName {
-    Exact,
-    RigidLegs,
-}
-
-impl ModelName {
-    fn forces(self, model: &InverseDynamics, motion: &Motion) -> Option<[f64; LEGS]> {
-        match self {
-            Self::Exact => model.forces::<Exact>(motion),
-            Self::RigidLegs => model.forces::<RigidLegs>(motion),
-        }
-    }
-}
-
 /// Where each row of forward kinematics starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Start {
@@ -60,7 +44,7 @@ pub enum Start {
 /// X, X', X'' to forces, lengths and their derivatives. At a singular pose the forces are NaN.
 pub fn inverse_dynamics_file(
     machine: &Machine,
-    model: ModelName,
+    rung: Rung,
     input: &Path,
     output: &Path,
 ) -> Result<(), OfflineError> {
@@ -75,7 +59,7 @@ pub fn inverse_dynamics_file(
     for row in table.rows().iter().progress_with(progress(table.rows().len())) {
         let t = row.first().copied().unwrap_or_default();
         let motion = task_state(row).motion();
-        let forces = model.forces(&dynamics, &motion);
+        let forces = dynamics.forces_of(rung, &motion);
         unsolved.count(t, forces.is_some());
         let motion = leg_motion(machine, &motion);
         let forces = forces.unwrap_or([f64::NAN; LEGS]);

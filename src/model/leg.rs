@@ -33,31 +33,11 @@
 
 use fearless_simd::Simd;
 
-use super::inverse_geometry::{LegGeometry, LegVelocity};
+use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
+use super::ladder::{Legs, Model};
 use super::lanes::{Eight, Lane, Lanes3, Triples};
-use super::machine::Machine;
-
-/// What a dynamic model includes; known at compile time, so that a term left out costs nothing.
-pub trait Model {
-    /// Spin of the legs about their own axes.
-    const SPIN: bool;
-}
-
-/// Every term.
-#[derive(Clone, Copy, Debug)]
-pub struct Exact;
-
-/// The paper's model: rigid legs that do not spin about their own axes. Allowed for thin legs.
-#[derive(Clone, Copy, Debug)]
-pub struct RigidLegs;
-
-impl Model for Exact {
-    const SPIN: bool = true;
-}
-
-impl Model for RigidLegs {
-    const SPIN: bool = false;
-}
+use super::machine::{LEGS, Machine};
+use super::task::TaskState;
 
 /// Smallest `|u x n|^2`: a leg within 1e-6 rad of its universal joint's first axis.
 const YY_MIN: f64 = 1e-12;
@@ -80,6 +60,10 @@ pub(super) struct LegConstants {
     axial_inertia: Lane,
     /// 1 for legs, 0 for padding.
     legs_only: Lane,
+    /// What of the leg hangs on B in the lumped model; the platform's mass in its padding.
+    lumped_mass: Lane,
+    /// The padding alone.
+    platform_mass: Lane,
 }
 
 impl LegConstants {
@@ -107,8 +91,19 @@ impl LegConstants {
             rod_moment: legs(m2 * e2, 0.0),
             axial_inertia: legs(cylinder.axial_inertia + rod.axial_inertia, 0.0),
             legs_only: legs(1.0, 0.0),
+            lumped_mass: legs(lumped_mass(machine), mass),
+            platform_mass: legs(0.0, mass),
         }
     }
+}
+
+/// The mass at B that, with the rest at A, has the mass and the centre of mass of a leg of its length at
+/// home: `(m1 e1 + m2 (L - e2)) / L`.
+fn lumped_mass(machine: &Machine) -> f64 {
+    let (cylinder, rod) = (&machine.cylinder, &machine.rod);
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    let length = leg_lengths(machine, &home).iter().sum::<f64>() / LEGS as f64;
+    (cylinder.mass * cylinder.center_of_mass + rod.mass * (length - rod.center_of_mass)) / length
 }
 
 /// F per leg \[N\], base axes, in two parts.
@@ -135,6 +130,12 @@ impl<V> LegReaction<V> {
     {
         let load = |lane: &Lane| V::load(simd, lane);
         let gravity = Lanes3::<V>::splat(simd, &machine.gravity);
+        if M::LEGS != Legs::Links {
+            // Points at B, the platform's among them: nothing is projected.
+            let mass =
+                if M::LEGS == Legs::Lumped { &constants.lumped_mass } else { &constants.platform_mass };
+            return Self { across: (joint_acceleration - gravity) * load(mass), along: V::splat(simd, 0.0) };
+        }
         let (n, n_rate, length, inverse_length) =
             (legs.direction, velocity.direction, legs.length, legs.inverse_length);
         let [jt2, jt1, jt0] = constants.jt.each_ref().map(load);
@@ -142,18 +143,22 @@ impl<V> LegReaction<V> {
 
         let j = jt2.mul_add(length, jt1).mul_add(length, jt0) * inverse_length * inverse_length;
         let mu = m2.mul_add(length, load(&constants.first_moment)) * inverse_length;
-        let m2_r_over_l = m2 - m2_e2 * inverse_length;
-        let twice_rate = velocity.rate + velocity.rate;
-        let mut across = (joint_acceleration * j)
-            .minus_scaled(mu, gravity)
-            .plus_scaled(twice_rate * (m2_r_over_l - j), n_rate);
+        let mut across = (joint_acceleration * j).minus_scaled(mu, gravity);
+        if M::VELOCITY {
+            let m2_r_over_l = m2 - m2_e2 * inverse_length;
+            let twice_rate = velocity.rate + velocity.rate;
+            across = across.plus_scaled(twice_rate * (m2_r_over_l - j), n_rate);
+        }
         if M::SPIN {
             let ix_over_l = load(&constants.axial_inertia) * inverse_length;
             across = spin(simd, machine, legs, velocity, joint_acceleration, ix_over_l, across);
         }
         // n' and the spin are normal to n already: projecting them too costs nothing.
         across = across.minus_scaled(across.dot(n) * load(&constants.legs_only), n);
-        let along = m2.mul_add((joint_acceleration - gravity).dot(n), m2_e2 * n_rate.dot(n_rate));
+        let mut along = m2 * (joint_acceleration - gravity).dot(n);
+        if M::VELOCITY {
+            along = m2_e2.mul_add(n_rate.dot(n_rate), along);
+        }
         Self { across, along }
     }
 }

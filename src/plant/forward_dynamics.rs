@@ -15,7 +15,7 @@
 use nalgebra::{Cholesky, Matrix6, U6, Vector3, Vector6};
 
 use crate::model::active_forces::{InverseDynamics, TaskLoad};
-use crate::model::leg::Exact;
+use crate::model::ladder::Exact;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 

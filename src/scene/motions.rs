@@ -11,7 +11,7 @@ use nalgebra::Vector6;
 use super::minimum_jerk::{between, rise, scaled, window};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::leg::Exact;
+use crate::model::ladder::Exact;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 

@@ -1,7 +1,7 @@
 //! Brakes and end stops.
 
 use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::leg::Exact;
+use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::plant::simulator::{Brakes, Simulator};

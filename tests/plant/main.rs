@@ -14,7 +14,7 @@ mod power;
 
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::leg::Exact;
+use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::model::task::TaskState;

@@ -10,7 +10,7 @@ use super::recording::{Recording, desired_motion, measured_pose};
 use crate::host::charts::{ChartError, Panel, Series, Stroke, write_svg};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::leg::Exact;
+use crate::model::ladder::Exact;
 use crate::model::machine::{LEGS, Machine};
 
 /// Values of six coordinates over time.

@@ -1,0 +1,104 @@
+//! The ladder of models: which terms of the dynamics are evaluated, known at compile time.
+//!
+//! All rungs share one code path; a term that a rung leaves out costs nothing. Every rung above gravity
+//! keeps the drives (reflected mass, friction), which belong to the actuator and not to a link.
+//!
+//! | rung | leaves out | allowed when |
+//! | --- | --- | --- |
+//! | [`Gravity`] | every acceleration and velocity, drives included | the platform only holds or creeps |
+//! | [`MasslessLegs`] | mass and inertia of the legs | the platform outweighs the legs |
+//! | [`LumpedLegs`] | inertia of the legs but for points at A and B that have their mass and centre | legs turn little |
+//! | [`NoVelocity`] | centrifugal and Coriolis forces and the spin of the legs; friction stays | slow motion, whatever the acceleration |
+//! | [`RigidLegs`] | spin of the legs about their own axes: the paper's model | thin legs, or joints across the legs |
+//! | [`Exact`] | nothing | always |
+
+/// How the legs enter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Legs {
+    /// Not at all.
+    Massless,
+    /// As a point mass at B.
+    Lumped,
+    /// As two links.
+    Links,
+}
+
+/// A rung of the ladder.
+pub trait Model {
+    const LEGS: Legs;
+    /// Accelerations, and with them the drives.
+    const ACCELERATION: bool;
+    /// Centrifugal and Coriolis forces.
+    const VELOCITY: bool;
+    /// Spin of the legs about their own axes.
+    const SPIN: bool;
+}
+
+macro_rules! rung {
+    ($(#[$doc:meta])* $name:ident, $legs:ident, $acceleration:literal, $velocity:literal, $spin:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        pub struct $name;
+
+        impl Model for $name {
+            const LEGS: Legs = Legs::$legs;
+            const ACCELERATION: bool = $acceleration;
+            const VELOCITY: bool = $velocity;
+            const SPIN: bool = $spin;
+        }
+    };
+}
+
+rung!(
+    /// Weight of platform and legs only.
+    Gravity, Links, false, false, false
+);
+rung!(
+    /// Rigid platform on legs without mass.
+    MasslessLegs, Massless, true, true, false
+);
+rung!(
+    /// Each leg as a point mass at B and one at A, the first part of the platform.
+    LumpedLegs, Lumped, true, true, false
+);
+rung!(
+    /// All masses, no forces that grow with velocity but friction.
+    NoVelocity, Links, true, false, false
+);
+rung!(
+    /// The paper's model: rigid legs that do not spin.
+    RigidLegs, Links, true, true, false
+);
+rung!(
+    /// Every term.
+    Exact, Links, true, true, true
+);
+
+/// A rung chosen at run time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rung {
+    Gravity,
+    MasslessLegs,
+    LumpedLegs,
+    NoVelocity,
+    RigidLegs,
+    Exact,
+}
+
+impl Rung {
+    /// From the cheapest to the exact one.
+    pub const ALL: [Self; 6] =
+        [Self::Gravity, Self::MasslessLegs, Self::LumpedLegs, Self::NoVelocity, Self::RigidLegs, Self::Exact];
+
+    /// Name on the command line and in configurations.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gravity => "gravity",
+            Self::MasslessLegs => "massless-legs",
+            Self::LumpedLegs => "lumped-legs",
+            Self::NoVelocity => "no-velocity",
+            Self::RigidLegs => "rigid-legs",
+            Self::Exact => "exact",
+        }
+    }
+}
