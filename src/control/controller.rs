@@ -22,6 +22,10 @@ pub struct Parameters {
     pub engage_position: f64,
     /// Largest orientation error at which control may begin \[rad\].
     pub engage_orientation: f64,
+    /// Largest position error while active \[m\].
+    pub following_position: f64,
+    /// Largest orientation error while active \[rad\].
+    pub following_orientation: f64,
     /// A setpoint older than this is lost.
     pub setpoint_timeout_ns: u64,
     /// A measurement older than this is lost.
@@ -107,7 +111,7 @@ impl Controller {
             |time_ns: u64| setpoint.task.after(seconds_between(setpoint.time_ns, time_ns)).motion();
         let error = TrackingError::new(&desired_at(measurement.time_ns), &pose, &twist);
         output.error = Some(error);
-        self.may_engage(&error)?;
+        self.may_control(&error)?;
 
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = input.release_ns.saturating_add(self.parameters.period_ns / 2);
@@ -165,15 +169,23 @@ impl Controller {
         Ok((pose, twist))
     }
 
-    /// Control begins only where the first force would be no jolt: near, and not passing by. An error of
-    /// velocity weighs as much as the error of pose that it is worth to the law, `wn` times as large.
-    fn may_engage(&self, error: &TrackingError) -> Result<(), Cause> {
-        let Parameters { law, engage_position, engage_orientation, .. } = &self.parameters;
-        let near = error.pose.linear.norm() <= *engage_position
-            && error.pose.angular.norm() <= *engage_orientation
-            && error.twist.linear.norm() <= engage_position * law.position.stiffness.sqrt()
-            && error.twist.angular.norm() <= engage_orientation * law.orientation.stiffness.sqrt();
-        if self.state == State::Active || near { Ok(()) } else { Err(Cause::SetpointTooFar) }
+    /// Control begins only where the first force would be no jolt: near, and not passing by (an error of
+    /// velocity weighs as much as the error of pose that it is worth to the law, `wn` times as large). It
+    /// goes on only while the platform follows: a setpoint that jumps must not throw it.
+    fn may_control(&self, error: &TrackingError) -> Result<(), Cause> {
+        let limits = &self.parameters;
+        let (position, orientation) = (error.pose.linear.norm(), error.pose.angular.norm());
+        if self.state == State::Active {
+            let on_path =
+                position <= limits.following_position && orientation <= limits.following_orientation;
+            return if on_path { Ok(()) } else { Err(Cause::OffPath) };
+        }
+        let Law { position: law_position, orientation: law_orientation } = &limits.law;
+        let near = position <= limits.engage_position
+            && orientation <= limits.engage_orientation
+            && error.twist.linear.norm() <= limits.engage_position * law_position.stiffness.sqrt()
+            && error.twist.angular.norm() <= limits.engage_orientation * law_orientation.stiffness.sqrt();
+        if near { Ok(()) } else { Err(Cause::SetpointTooFar) }
     }
 }
 

@@ -65,11 +65,13 @@ pub enum Cause {
     SingularPose = 106,
     /// The force was not finite.
     ForceNotFinite = 107,
+    /// The platform was further from the setpoint than the following-error limit.
+    OffPath = 108,
 }
 
 impl Cause {
     /// Every cause, in the order of their numbers.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::None,
         Self::NoMeasurement,
         Self::NoSetpoint,
@@ -85,6 +87,7 @@ impl Cause {
         Self::MeasurementJumped,
         Self::SingularPose,
         Self::ForceNotFinite,
+        Self::OffPath,
     ];
 
     /// Whether losing control for this cause is a fault.
@@ -110,6 +113,7 @@ impl Cause {
             Self::MeasurementJumped => "measured lengths jumped",
             Self::SingularPose => "singular pose",
             Self::ForceNotFinite => "force not finite",
+            Self::OffPath => "platform off the path",
         }
     }
 

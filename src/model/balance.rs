@@ -112,23 +112,17 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
     /// `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
     #[inline(always)]
     pub fn twist(&self, rates: V) -> Option<Twist> {
-        if self.sound {
-            return Some(self.newton_step(rates));
+        if !self.sound {
+            let triples = &self.joints.triples;
+            let n = wrench_columns(triples, self.moment, self.direction);
+            return twist_by_lu(&n, &triples.unpack(&rates.store()));
         }
-        let triples = &self.joints.triples;
-        twist_by_lu(&wrench_columns(triples, self.moment, self.direction), &triples.unpack(&rates.store()))
-    }
-
-    /// [`Balance::twist`] by blocks at any pose, for iterations that correct themselves; not finite at a
-    /// singular one.
-    #[inline(always)]
-    pub fn newton_step(&self, rates: V) -> Twist {
         let (r_a, r_b) = rates.halves();
         let [r0, r1, r2] = broadcasts(self.simd, r_a);
         let [x0, x1, x2] = self.x;
         let angular = (self.inverse_s * (r_b - r0 * x0 - r1 * x1 - r2 * x2)).sum_legs();
         let turning = self.moment_a.dot(splat(self.simd, &angular));
-        Twist { angular, linear: (self.inverse_a * (r_a - turning)).sum_legs() }
+        Some(Twist { angular, linear: (self.inverse_a * (r_a - turning)).sum_legs() })
     }
 }
 

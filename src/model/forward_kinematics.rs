@@ -61,7 +61,8 @@ fn newton<S: Simd, V: Eight<S>>(simd: S, machine: &Machine, start: &Pose, target
     let mut pose = *start;
     for iterations in 1..=MAX_ITERATIONS {
         let legs = LegGeometry::<V>::new(simd, &machine.joints, &pose);
-        let step = Balance::new(simd, &machine.joints, &legs).newton_step(target - legs.length);
+        let step = Balance::new(simd, &machine.joints, &legs).twist(target - legs.length);
+        let Some(step) = step else { return Solution { pose, iterations, converged: false } };
         let size = step.angular.norm() + step.linear.norm() / machine.joints.radius;
         // Also false when it is not a number.
         if !(size < TRUSTED_STEP) {

@@ -121,6 +121,21 @@ fn a_setpoint_lost_in_motion_is_a_fault_and_one_that_ended_at_rest_is_not() {
 }
 
 #[test]
+fn a_platform_off_the_path_is_a_fault() {
+    let parameters = parameters(&deployed("fried2008"));
+    assert!(Cause::OffPath.is_fault());
+    let jumps = |input: &mut Input, k: usize, share: f64| {
+        let limit = if k < 3 { parameters.following_orientation } else { parameters.following_position };
+        input.setpoint.as_mut().unwrap().task.x[k] += share * limit;
+    };
+    // Alpha turns about a base axis whatever the pose; the other angles need a little more.
+    for k in 0..6 {
+        lost(Cause::OffPath, |input| jumps(input, k, 1.05));
+        assert_eq!(after(|input| jumps(input, k, 0.95)).0.state, State::Active);
+    }
+}
+
+#[test]
 fn an_old_measurement_is_lost() {
     let timeout_ns = parameters(&deployed("fried2008")).measured_timeout_ns;
     let old = |input: &mut Input, age_ns: u64| {

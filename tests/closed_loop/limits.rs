@@ -1,7 +1,7 @@
 //! Forces stay within what the actuators can do, whatever comes in.
 
 use hexad::control::controller::{Controller, Input};
-use hexad::control::state::State;
+use hexad::control::state::{Cause, State};
 use hexad::model::machine::LEGS;
 use hexad::scene::motions::{Motion, fit};
 
@@ -45,7 +45,9 @@ fn engaged(mut controller: Controller, good: &Input, input: &Input) -> [f64; LEG
 fn a_hopeless_platform_gets_no_more_than_the_limit() {
     let mut limited = 0;
     for name in ["fried2008", "motion_base", "tsai2000"] {
-        let config = deployed(name);
+        let mut config = deployed(name);
+        config.deployment.control.following_position_m = f64::INFINITY;
+        config.deployment.control.following_orientation_rad = f64::INFINITY;
         let limit = config.machine.actuator.max_force;
         let mut platform = config.machine.clone();
         platform.platform.mass *= 5.0;
@@ -101,6 +103,8 @@ fn a_setpoint_far_away_gets_no_more_than_the_limit() {
             [&mut task.x, &mut task.xd, &mut task.xdd][k / 6][k % 6] += away;
             let output = rig.controller.clone().step(&input);
             assert!(largest(&output.force) <= limit);
+            let off_path = k < 6 && away.abs() >= 1.0;
+            assert_eq!(output.cause == Cause::OffPath, off_path, "{away} on {k}: {output:?}");
             assert!(output.state == State::Active || output.force == [0.0; LEGS]);
         }
     }

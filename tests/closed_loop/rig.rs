@@ -32,6 +32,8 @@ pub fn parameters(config: &Config) -> Parameters {
         },
         engage_position: control.engage_position_m,
         engage_orientation: control.engage_orientation_rad,
+        following_position: control.following_position_m,
+        following_orientation: control.following_orientation_rad,
         setpoint_timeout_ns: nanoseconds(config.deployment.timeouts.setpoint_s),
         measured_timeout_ns: nanoseconds(config.deployment.timeouts.measured_s),
     }

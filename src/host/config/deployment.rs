@@ -33,6 +33,9 @@ const DAMPING_RATIO: Bound = Bound::Within(0.1, 10.0);
 /// Engaging further away than this is a motion, and needs a trajectory \[m\], \[rad\].
 const FURTHEST_ENGAGE_M: f64 = 0.1;
 const FURTHEST_ENGAGE_RAD: f64 = 0.2;
+/// Following further away than this is not following \[m\], \[rad\].
+const FURTHEST_FOLLOWING_M: f64 = 1.0;
+const FURTHEST_FOLLOWING_RAD: f64 = 1.0;
 /// Strongest brake \[m/s^2\]: a hundred times gravity is an impact.
 const STRONGEST_BRAKE_M_S2: f64 = 1000.0;
 /// The plant's step \[us\]: below, it cannot keep up; above, its drives are not stable.
@@ -87,6 +90,10 @@ pub struct Control {
     pub engage_position_m: f64,
     /// The same for the angle between them.
     pub engage_orientation_rad: f64,
+    /// Furthest the platform may be from the set point while it is controlled.
+    pub following_position_m: f64,
+    /// The same for the angle between them.
+    pub following_orientation_rad: f64,
 }
 
 /// `[timeouts]`: how old the newest message may be.
@@ -170,6 +177,16 @@ fn control(mut section: Reader, rate_hz: f64) -> Control {
             "engage_orientation_rad",
             0.005,
             Bound::UpTo(FURTHEST_ENGAGE_RAD),
+        ),
+        following_position_m: section.number_or(
+            "following_position_m",
+            0.02,
+            Bound::UpTo(FURTHEST_FOLLOWING_M),
+        ),
+        following_orientation_rad: section.number_or(
+            "following_orientation_rad",
+            0.05,
+            Bound::UpTo(FURTHEST_FOLLOWING_RAD),
         ),
     };
     section.finish();
