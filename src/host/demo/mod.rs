@@ -31,6 +31,9 @@ const DEFAULT_MACHINE: &str = include_str!("../../../config/fried2008.toml");
 /// How often the topics are emptied: a fraction of what they can hold at 20 kHz.
 const POLL: Duration = Duration::from_millis(3);
 
+/// Timeouts of a demonstration \[ms\]: four times the longest pause seen on a busy virtual machine.
+const PATIENCE_MS: f64 = 200.0;
+
 /// Seconds for processes to start and for the approach, beyond the motion itself, before something is
 /// wrong.
 const GRACE_S: f64 = 20.0;
@@ -237,14 +240,26 @@ fn read(path: Option<&Path>) -> Result<(String, String), FileError> {
 }
 
 /// The configuration under another name and rate. The text has been parsed before.
+///
+/// A desktop takes the processor away for tens of milliseconds now and then. That is no fault of the loop,
+/// so where the file sets no timeouts a demonstration is more patient than a deployment.
 fn adapted(text: &str, name: &str, rate_hz: Option<f64>) -> String {
     let mut table: toml::Table = toml::from_str(text).unwrap_or_default();
     table.insert("name".into(), name.into());
-    if let Some(rate_hz) = rate_hz {
-        let realtime = table.entry("realtime").or_insert_with(|| toml::Table::new().into());
-        if let Some(realtime) = realtime.as_table_mut() {
-            realtime.insert("rate_hz".into(), rate_hz.into());
+    let mut set = |section: &str, key: &str, value: f64, replace: bool| {
+        let section = table.entry(section).or_insert_with(|| toml::Table::new().into());
+        if let Some(section) = section.as_table_mut().filter(|section| replace || !section.contains_key(key))
+        {
+            section.insert(key.into(), value.into());
         }
+    };
+    for (section, key) in
+        [("timeouts", "setpoint_ms"), ("timeouts", "measured_ms"), ("plant", "force_timeout_ms")]
+    {
+        set(section, key, PATIENCE_MS, false);
+    }
+    if let Some(rate_hz) = rate_hz {
+        set("realtime", "rate_hz", rate_hz, true);
     }
     table.to_string()
 }
