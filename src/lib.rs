@@ -41,3 +41,8 @@ pub mod model;
 pub mod plant;
 pub mod realtime;
 pub mod scene;
+
+/// The driver in the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
