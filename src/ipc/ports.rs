@@ -9,8 +9,9 @@ extern crate std;
 use core::marker::PhantomData;
 use core::time::Duration;
 use std::format;
-use std::fs::{File, TryLockError, create_dir_all};
-use std::path::Path;
+use std::fs::{File, TryLockError, create_dir_all, metadata};
+use std::os::unix::fs::MetadataExt;
+use std::path::PathBuf;
 use std::prelude::rust_2024::*;
 use std::string::ToString;
 
@@ -19,6 +20,8 @@ use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+use tracing::info;
 
 use super::messages::{Header, Message, SCHEMA};
 use crate::realtime::clock::monotonic_ns;
@@ -45,6 +48,24 @@ fn failed<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
     move |cause| PortError { what, cause: format!("{cause:?}") }
 }
 
+/// Where the shared memory lives: iceoryx2's usual places, or, where these belong to another user, places
+/// of this user's own. Another user's could not be opened, and root and others may well use one host.
+fn domain() -> Result<Config, SemanticStringError> {
+    let mut config = Config::default();
+    config.global.creation_timeout = CREATION_TIMEOUT;
+    let usual = config.global.root_path().to_string();
+    let owner = |path: &str| metadata(path).map(|found| found.uid()).ok();
+    if let (Some(owner), Some(user)) = (owner(&usual), owner("/proc/self"))
+        && owner != user
+    {
+        let own = format!("{}-{user}", usual.trim_end_matches('/'));
+        info!("{usual} belongs to user {owner}: using {own} and the prefix iox2_{user}_");
+        config.global.set_root_path(&Path::new(own.as_bytes())?);
+        config.global.prefix = FileName::new(format!("iox2_{user}_").as_bytes())?;
+    }
+    Ok(config)
+}
+
 /// Participation of this process in the topics of one machine.
 pub struct Bus {
     node: Node<ipc::Service>,
@@ -57,8 +78,7 @@ impl Bus {
     pub fn join(machine: &str) -> Result<Self, PortError> {
         // Its log goes to `tracing`; what it warns about (dead nodes cleaned up) is routine here.
         set_log_level(LogLevel::Error);
-        let mut config = Config::default();
-        config.global.creation_timeout = CREATION_TIMEOUT;
+        let config = domain().map_err(failed("cannot name the shared memory".into()))?;
         let node = NodeBuilder::new()
             // Signals belong to the command line, not to a library's wait loop.
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -77,8 +97,9 @@ impl Bus {
     ///
     /// Topics alone would let a second daemon take over, and leave the first one's forces ignored for good.
     pub fn claim(machine: &str) -> Result<File, PortError> {
-        let folder = Config::default().global.root_path().to_string();
-        let path = Path::new(&folder).join(format!("hexad-{machine}.lock"));
+        let config = domain().map_err(failed("cannot name the shared memory".into()))?;
+        let folder = config.global.root_path().to_string();
+        let path = PathBuf::from(&folder).join(format!("hexad-{machine}.lock"));
         let file = create_dir_all(&folder).and_then(|()| File::create(&path));
         let file = file.map_err(failed(format!("cannot open {}", path.display())))?;
         match file.try_lock() {

@@ -25,7 +25,7 @@ const TICKS_PER_S: f64 = 100.0;
 #[test]
 fn the_real_time_thread_uses_nothing_it_did_not_have() {
     let _turn = turns::beside_others();
-    let seconds = if env::var_os("HEXAD_LONG").is_some_and(|value| value == "1") { 57.0 } else { 17.0 };
+    let seconds = if env::var_os("HEXAD_LONG").is_some_and(|value| value == "1") { 59.0 } else { 17.0 };
     let machine = Machine::patient("locked-memory");
     let recorder = Recorder::start(&machine.name);
     let plant = start_plant(&machine);
