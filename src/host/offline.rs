@@ -9,6 +9,7 @@ use std::vec;
 use indicatif::{ProgressBar, ProgressIterator, ProgressStyle};
 use nalgebra::Vector6;
 
+use super::batch;
 use super::files::FileError;
 use super::table::{Table, TableError, Writer, coordinates, legs, six, trajectory_columns};
 use crate::model::active_forces::InverseDynamics;
@@ -53,17 +54,19 @@ pub fn inverse_dynamics_file(
     for stem in ["force", "length", "length_rate", "length_accel"] {
         columns.extend(legs(stem));
     }
+    let motions: Vec<_> = table.rows().iter().map(|row| task_state(row).motion()).collect();
+    let mut forces = vec![None; motions.len()];
+    let bar = progress(motions.len());
+    batch::forces(&InverseDynamics::new(machine), rung, &motions, &mut forces, &bar);
+    bar.finish_and_clear();
     let mut writer = Writer::new(&columns);
     let mut unsolved = Unsolved::default();
-    let dynamics = InverseDynamics::new(machine);
-    for row in table.rows().iter().progress_with(progress(table.rows().len())) {
+    for (row, (motion, forces)) in table.rows().iter().zip(motions.iter().zip(forces)) {
         let t = row.first().copied().unwrap_or_default();
-        let motion = task_state(row).motion();
-        let forces = dynamics.forces_of(rung, &motion);
         unsolved.count(t, forces.is_some());
-        let motion = leg_motion(machine, &motion);
         let forces = forces.unwrap_or([f64::NAN; LEGS]);
-        writer.row([t].into_iter().chain(forces).chain(motion.length).chain(motion.rate).chain(motion.accel));
+        let legs = leg_motion(machine, motion);
+        writer.row([t].into_iter().chain(forces).chain(legs.length).chain(legs.rate).chain(legs.accel));
     }
     writer.save(output)?;
     unsolved.verdict(table.rows().len(), "are at singular poses and have no forces")

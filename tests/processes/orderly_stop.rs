@@ -53,6 +53,24 @@ fn stops_in_motion(signal: &str) {
     assert_eq!(last.header.sequence, recording.statuses.last().map_or(0, |status| status.header.sequence));
 }
 
+/// Two of them would fight for the forces.
+#[test]
+fn a_second_daemon_of_the_same_machine_is_refused() {
+    let _turn = turns::beside_others();
+    let Trio { setpoints, daemon, plant, recorder, machine } = Trio::in_motion("second");
+    let second = start_daemon(&machine).ends_within(HANG);
+    assert_eq!(second.status.code(), Some(2), "{}", second.stderr);
+    assert!(second.stderr.contains("another daemon does"), "{}", second.stderr);
+    daemon.stops_on("KILL", SOON);
+    // The lock dies with its holder.
+    let third = start_daemon(&machine);
+    third.says("active: forces are valid");
+    third.stops_on("TERM", SOON);
+    setpoints.stops_on("TERM", SOON);
+    plant.stops_on("TERM", SOON);
+    rules::hold(&recorder.finish());
+}
+
 #[test]
 fn processes_that_wait_for_others_stop_as_well() {
     let _turn = turns::beside_others();
