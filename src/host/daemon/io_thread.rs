@@ -15,6 +15,7 @@ use crate::ipc::ports::{Bus, PortError, Sink, Source};
 use crate::model::task::{TaskState, task_coordinates};
 use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
 use crate::realtime::cyclic::Timing;
+use crate::realtime::usage::ThreadUsage;
 
 /// Inputs are read this long before the release, or a quarter of the period if that is less. It covers
 /// the wake-up of this thread (about 50 us) and the reading.
@@ -43,6 +44,8 @@ pub struct IoReport {
     pub send_failures: u64,
     /// Messages passed over: other schema, older life of the source, seen before.
     pub rejected: u64,
+    /// From the first cycle on. It allocates only while a peer comes or goes.
+    pub usage: ThreadUsage,
 }
 
 impl Ports {
@@ -70,6 +73,7 @@ pub fn run(
     stop: &AtomicBool,
 ) -> IoReport {
     let mut report = IoReport::default();
+    let at_start = ThreadUsage::of_this_thread();
     let grid = Grid::new(timing.period_ns, timing.phase_ns);
     let lead_ns = LEAD_NS.min(timing.period_ns / 4);
     let mut input = Input::default();
@@ -96,6 +100,7 @@ pub fn run(
         }
     }
     publish(&mut ports, home, side.outputs.read(), longest_hold_ns, &mut report);
+    report.usage = ThreadUsage::of_this_thread().since(&at_start);
     report.rejected = ports.setpoint.rejected() + ports.measured.rejected();
     report
 }

@@ -16,7 +16,7 @@ use std::thread::{Builder, Scope, ScopedJoinHandle, scope};
 
 use heapless::spsc::Queue;
 use sd_notify::NotifyState;
-use tracing::{info, warn};
+use tracing::{debug, info, warn};
 
 use self::io_thread::{IoReport, Ports};
 use self::log_thread::LogReport;
@@ -222,6 +222,7 @@ pub(super) fn nanoseconds(seconds: f64) -> u64 {
 
 fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Report {
     let counters = &cyclic.counters;
+    debug!(allocations = io.usage.allocations, "io thread, peers that came and went included");
     for (count, what) in [
         (counters.records_lost, "cycle records lost: the log thread was too slow"),
         (io.send_failures, "messages could not be sent"),
