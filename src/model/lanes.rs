@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Within a triple, determinants and inverses of 3 x 3 matrices are cross products of rotated lanes, which
-//! is what [`super::balance`] lives on. Everything is generic over the instruction set and over the
-//! precision ([`Eight`]: f64 or f32), and is inlined into the one function that was dispatched for both.
+//! is what `super::balance` lives on. Everything is generic over the instruction set and over the
+//! precision (f64 or f32), and is inlined into the one function that was dispatched for both.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -29,7 +29,7 @@
 //!
 //! The paper leaves the spin out: (74)-(82) give the leg no angular velocity about n. That is exact only
 //! for legs without axial inertia; the effect is 1e-5 to 1e-2 of the force, larger near `u || n`, where
-//! the spin itself is singular. [`YY_MIN`] keeps the arithmetic finite there.
+//! the spin itself is singular. `YY_MIN` keeps the arithmetic finite there.
 
 use fearless_simd::Simd;
 

@@ -10,7 +10,7 @@
 //! `sum_k p_k p_k^T = integral of r r^T dm`; the sum is `I omega' + omega x I omega` with
 //! `I = sum_k (|p_k|^2 - p_k p_k^T)`. In this form the platform is made of points, which the lanes that
 //! evaluate the legs evaluate as well: the centre of mass is the point in their padding (see
-//! [`super::leg::LegConstants`]), the three axes are one triple of lanes of their own.
+//! `super::leg::LegConstants`), the three axes are one triple of lanes of their own.
 //!
 //! Against the print: (88), (93) have g with the sign opposite to (74)-(81); (90), (91) put an inertia
 //! about the centre of mass beside moments about C, without the parallel-axis term, which here is `c x f`.
