@@ -43,6 +43,13 @@ pub struct TaskLoad {
     pub along: Vector6<f64>,
 }
 
+impl TaskLoad {
+    /// `W + N along`: everything the actuators have to balance, as a wrench about C \[N m\], \[N\].
+    pub fn total(&self) -> Vector6<f64> {
+        self.wrench + self.leg_wrenches * self.along
+    }
+}
+
 impl InverseDynamics {
     /// Derives the constants. Not for the loop.
     pub fn new(machine: &Machine) -> Self {

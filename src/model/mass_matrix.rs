@@ -1,0 +1,58 @@
+//! Mass matrix of the whole machine in task space.
+//!
+//! ```text
+//! N Gamma = M(R, C) [omega'; v'] + h(R, C, omega, v)           M = d(N Gamma) / d[omega'; v']
+//! x^T M x / 2 = kinetic energy of platform, legs and drives at the twist x
+//! ```
+//!
+//! In the paper's terms, M is the platform's matrix plus `sum_i [b_i~ ; U] J_Bv^-T M_i J_Bv^-1 [b_i~ ; U]^T`
+//! of the legs (73), (88)-(97). It is not assembled from those: column k is the load of unit acceleration k
+//! at rest without gravity, by the same code that the controller runs, so the two cannot disagree, and
+//! nothing cancels.
+//!
+//! Angular parts first, about C, in base axes: the blocks are \[kg m^2\], \[kg m\] and \[kg\]. M is symmetric
+//! to rounding and positive definite at every pose with legs of positive length, singular ones included
+//! (N is not inverted), as long as the platform has mass and inertia. Reflected masses are part of it:
+//! `N diag(reflected) N^T`.
+//!
+//! What it does not do: links whose inertia varies with the length have their instantaneous value.
+//!
+//! Cost: six evaluations of the load. Not for a loop that only needs forces; it is what the simulated
+//! platform spends its time on.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use super::active_forces::InverseDynamics;
+use super::ladder::Exact;
+use super::machine::Machine;
+use super::rigid::{Acceleration, Motion, Pose, Twist};
+
+/// M of one machine, as a function of the pose.
+#[derive(Clone, Debug)]
+pub struct MassMatrix {
+    /// The machine without gravity.
+    weightless: InverseDynamics,
+}
+
+impl MassMatrix {
+    /// Derives the constants.
+    pub fn new(machine: &Machine) -> Self {
+        let weightless = Machine { gravity: Vector3::zeros(), ..machine.clone() };
+        Self { weightless: InverseDynamics::new(&weightless) }
+    }
+
+    /// M, 6 x 6, drives included.
+    pub fn at(&self, pose: &Pose) -> Matrix6<f64> {
+        let mut mass = Matrix6::zeros();
+        for (k, mut column) in mass.column_iter_mut().enumerate() {
+            let unit = Vector6::ith(k, 1.0);
+            let motion = Motion {
+                pose: *pose,
+                twist: Twist::default(),
+                acceleration: Acceleration::from_vector(&unit),
+            };
+            column.copy_from(&self.weightless.load_of::<Exact>(&motion).total());
+        }
+        mass
+    }
+}
