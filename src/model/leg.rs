@@ -40,7 +40,7 @@ use super::machine::{LEGS, Machine};
 use super::task::TaskState;
 
 /// Smallest `|u x n|^2`: a leg within 1e-6 rad of its universal joint's first axis.
-const YY_MIN: f64 = 1e-12;
+pub(super) const YY_MIN: f64 = 1e-12;
 
 /// The constants of the legs as lanes.
 ///

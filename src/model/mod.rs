@@ -12,7 +12,7 @@
 //! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
-//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`ladder`], [`rigid`], [`lanes`], [`machine`] |
+//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`ladder`], [`rigid`], [`lanes`], [`machine`] |
 //!
 //! Frames: base axes unless a name says otherwise. `rotation` is R, platform axes expressed in base axes,
 //! so `v_base = R v_platform`. Units: SI, radians. Twists and wrenches have the angular part first and
@@ -29,5 +29,6 @@ pub mod leg;
 pub mod machine;
 pub mod mass_matrix;
 pub mod platform;
+pub mod regressor;
 pub mod rigid;
 pub mod task;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use hexad::host::config::Config;
 use hexad::model::machine::{Joints, LEGS, Machine};
+use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
@@ -31,6 +32,17 @@ pub fn data(name: &str, extension: &str) -> PathBuf {
 /// One of [`MACHINES`].
 pub fn machine(name: &str) -> Machine {
     Config::load(&data(name, "toml")).unwrap_or_else(|error| panic!("{error}")).machine
+}
+
+/// The motions of a machine's vectors.
+pub fn motions(name: &str) -> Vec<Motion> {
+    let table = Table::read(&data(name, "csv"));
+    let state = |row| TaskState {
+        x: table.coordinates(row, ""),
+        xd: table.coordinates(row, "_rate"),
+        xdd: table.coordinates(row, "_accel"),
+    };
+    (0..table.rows.len()).map(|row| state(row).motion()).collect()
 }
 
 /// A deployable machine of the folder `config`.

@@ -3,24 +3,12 @@
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::ladder::Exact;
 use hexad::model::rigid::{Acceleration, Motion, Twist};
-use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::integrator::PlantState;
 use nalgebra::{Matrix6, Vector6};
 
-use super::common::{Errors, MACHINES, Table, data, machine};
+use super::common::{Errors, MACHINES, machine, motions};
 use super::energy::energy;
-
-/// The states of a machine's vectors.
-fn motions(name: &str) -> Vec<Motion> {
-    let table = Table::read(&data(name, "csv"));
-    let state = |row| TaskState {
-        x: table.coordinates(row, ""),
-        xd: table.coordinates(row, "_rate"),
-        xdd: table.coordinates(row, "_accel"),
-    };
-    (0..table.rows.len()).map(|row| state(row).motion()).collect()
-}
 
 #[test]
 fn the_mass_matrix_is_symmetric_and_positive_definite() {

@@ -10,6 +10,7 @@ mod dynamics;
 mod invariance;
 mod kinematics;
 mod layouts;
+mod regressor;
 mod rotations;
 
 use std::sync::LazyLock;

@@ -1,0 +1,139 @@
+//! The regressor form: exact, linear, and blind in the directions it names.
+
+use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::ladder::Exact;
+use hexad::model::machine::Machine;
+use hexad::model::regressor::{
+    INDISTINGUISHABLE, PARAMETERS, Parameters, Regressor, parameters_of, regressor, rod_mass_in_platform,
+};
+use hexad::model::rigid::Motion;
+use nalgebra::{DMatrix, Matrix3, Vector3, Vector6};
+use proptest::prelude::*;
+
+use super::common::{Errors, MACHINES, machine, motions};
+use super::{any_machine, cases, machine_in_motion, state_near_home, vector3, vector6};
+
+fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
+    inverse_dynamics::<Exact>(machine, motion).unwrap().into()
+}
+
+/// `|Y| |p|`: what is summed up to a force, hence what rounding is a share of.
+fn summed(y: &Regressor, p: &Parameters) -> f64 {
+    (y.abs() * p.abs()).amax()
+}
+
+#[test]
+fn the_regressor_gives_the_forces_of_the_vectors() {
+    for name in MACHINES {
+        let machine = machine(name);
+        let p = parameters_of(&machine);
+        let mut errors = Errors::default();
+        for motion in motions(name) {
+            let expected = forces(&machine, &motion);
+            let found = regressor(&machine, &motion).unwrap() * p;
+            errors.add((found - expected).amax() / expected.amax());
+        }
+        errors.assert_within(1e-12, &format!("{name} regressor"));
+    }
+}
+
+/// The machine that has these parameters, on the geometry of another.
+fn with_parameters(mut machine: Machine, p: &Parameters) -> Machine {
+    let at = |index: usize| p[index];
+    let center = Vector3::new(at(1), at(2), at(3)) / at(0);
+    let about_c = Matrix3::new(at(4), at(7), at(8), at(7), at(5), at(9), at(8), at(9), at(6));
+    let shift = Matrix3::identity() * center.norm_squared() - center * center.transpose();
+    machine.platform.mass = at(0);
+    machine.platform.center_of_mass = center;
+    machine.platform.inertia = about_c - shift * at(0);
+    // The mass of the cylinder is not felt: any will do.
+    machine.cylinder.mass = 3.0;
+    machine.rod.mass = at(14);
+    for (link, moment) in [(&mut machine.cylinder, 10), (&mut machine.rod, 15)] {
+        link.center_of_mass = at(moment) / link.mass;
+        link.transverse_inertia.constant = at(moment + 1) - at(moment) * link.center_of_mass;
+        link.axial_inertia = at(moment + 2);
+        link.transverse_inertia.quadratic = at(moment + 3);
+    }
+    machine.actuator.reflected_mass = at(19);
+    machine.actuator.viscous_friction = at(20);
+    machine.actuator.coulomb_friction = at(21);
+    machine
+}
+
+proptest! {
+    #![proptest_config(cases(1000))]
+
+    /// Another machine of the same geometry needs the forces that the same Y predicts.
+    #[test]
+    fn forces_are_linear_in_the_parameters(
+        (machine, _, motion) in machine_in_motion(),
+        other in any_machine(),
+        quadratic in [0.0..5.0f64, 0.0..5.0],
+        turned in vector3(),
+    ) {
+        let y = regressor(&machine, &motion).unwrap();
+        let mut other = Machine { joints: machine.joints.clone(), gravity: machine.gravity, ..other };
+        other.actuator.coulomb_smoothing = machine.actuator.coulomb_smoothing;
+        let turn = nalgebra::Rotation3::from_scaled_axis(turned).into_inner();
+        other.platform.inertia = turn * other.platform.inertia * turn.transpose();
+        for (other, (one, q)) in [&mut other.cylinder, &mut other.rod]
+            .into_iter()
+            .zip([&machine.cylinder, &machine.rod].into_iter().zip(quadratic))
+        {
+            other.transverse_inertia.reference_length = one.transverse_inertia.reference_length;
+            other.transverse_inertia.quadratic = q;
+        }
+        for machine in [&machine, &other] {
+            let p = parameters_of(machine);
+            let difference = (y * p - forces(machine, &motion)).amax();
+            prop_assert!(difference < 1e-12 * summed(&y, &p), "{difference:e} of {:e}", summed(&y, &p));
+        }
+        // And p says all there is to say about a machine.
+        let p = parameters_of(&other);
+        let rebuilt = with_parameters(machine, &p);
+        prop_assert!((parameters_of(&rebuilt) - p).amax() < 1e-12 * p.amax());
+        prop_assert!((forces(&rebuilt, &motion) - forces(&other, &motion)).amax() < 1e-11 * summed(&y, &p));
+    }
+
+    #[test]
+    fn some_parameters_show_only_in_combination((machine, _, motion) in machine_in_motion()) {
+        let y = regressor(&machine, &motion).unwrap();
+        for [a, b] in INDISTINGUISHABLE {
+            prop_assert_eq!(y.column(a), y.column(b));
+        }
+        let hidden = rod_mass_in_platform(&machine);
+        prop_assert!((y * hidden).amax() < 1e-12 * summed(&y, &hidden));
+    }
+}
+
+proptest! {
+    #![proptest_config(cases(30))]
+
+    /// Over many motions of one machine, what is not named as hidden is seen: rank 19, or 18 where q1 and
+    /// q2 have the same reference length.
+    #[test]
+    fn everything_else_can_be_identified(
+        machine in any_machine(),
+        at in proptest::collection::vec([vector6(), vector6(), vector6()], 60),
+    ) {
+        for (apart, rank) in [(0.3 * machine.joints.radius, 19), (0.0, 18)] {
+            let mut machine = machine.clone();
+            let reference = machine.rod.transverse_inertia.reference_length;
+            machine.cylinder.transverse_inertia.reference_length = reference + apart;
+            let mut stacked = DMatrix::zeros(6 * at.len(), PARAMETERS);
+            for (i, at) in at.iter().enumerate() {
+                let mut state = state_near_home(&machine, at);
+                state.xd *= 3.0;
+                if let Some(y) = regressor(&machine, &state.motion()) {
+                    stacked.rows_mut(6 * i, 6).copy_from(&(y / y.amax()));
+                }
+            }
+            // Columns of length one: units do not count.
+            stacked.column_iter_mut().for_each(|mut column| column.unscale_mut(column.norm()));
+            let mut values: Vec<f64> = stacked.singular_values().iter().copied().collect();
+            values.sort_by(|a, b| b.total_cmp(a));
+            prop_assert!(values[rank - 1] > 1e-6 && values[rank] < 1e-13, "{values:?}");
+        }
+    }
+}
