@@ -1,0 +1,192 @@
+//! Poses on their way to a singular one.
+
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::inverse_jacobian::{condition, leg_wrenches};
+use hexad::model::machine::Machine;
+use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
+use hexad::model::task::TaskState;
+use hexad::plant::forward_dynamics::ForwardDynamics;
+use nalgebra::{Vector3, Vector6};
+
+use super::common::{Legs, MACHINES, machine};
+use super::determinants;
+
+/// A motion through a pose.
+pub struct Scene {
+    pub family: &'static str,
+    pub model: InverseDynamics,
+    pub motion: Motion,
+    /// For `twist_from_rates`.
+    pub rates: Vector6<f64>,
+    pub condition: f64,
+}
+
+/// Numbers that are the same in every run (splitmix64).
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    /// Evenly in -1..1.
+    pub fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-52) - 1.0
+    }
+
+    pub fn vector(&mut self) -> Vector3<f64> {
+        Vector3::new(self.unit(), self.unit(), self.unit())
+    }
+
+    pub fn vector6(&mut self) -> Vector6<f64> {
+        Vector6::from_fn(|_, _| self.unit())
+    }
+}
+
+/// A straight way of the platform: rotation vector and displacement per unit of s.
+struct Way {
+    start: Pose,
+    turn: Vector3<f64>,
+    shift: Vector3<f64>,
+}
+
+impl Way {
+    fn at(&self, s: f64) -> Pose {
+        Pose {
+            rotation: exp(&(self.turn * s)) * self.start.rotation,
+            position: self.start.position + self.shift * s,
+        }
+    }
+
+    /// Where `f` changes its sign first, if it does before s = 1.
+    fn crossing(&self, f: impl Fn(&Pose) -> f64) -> Option<f64> {
+        let steps = 40;
+        let mut last = f(&self.at(0.0));
+        for k in 1..=steps {
+            let s = f64::from(k) / f64::from(steps);
+            let now = f(&self.at(s));
+            if (now > 0.0) != (last > 0.0) {
+                let (mut low, mut high) = (s - 1.0 / f64::from(steps), s);
+                for _ in 0..60 {
+                    let middle = 0.5 * (low + high);
+                    if (f(&self.at(middle)) > 0.0) == (last > 0.0) { low = middle } else { high = middle }
+                }
+                return Some(high);
+            }
+            last = now;
+        }
+        None
+    }
+}
+
+fn home(machine: &Machine) -> Pose {
+    TaskState::at_rest(machine.home).motion().pose
+}
+
+/// Random joints on the machine's masses, laid out for a pose that is not the one to come.
+fn random_layout(numbers: &mut Numbers) -> Machine {
+    let mut machine = machine("scattered");
+    let legs = Legs {
+        base: core::array::from_fn(|_| numbers.vector()),
+        platform: core::array::from_fn(|_| numbers.vector() * 0.6),
+        universal_axis: core::array::from_fn(|_| {
+            (numbers.vector() + Vector3::new(0.1, 0.2, 0.3)).normalize()
+        }),
+    };
+    machine.home = [0.0, 0.0, 0.0, 0.2 * numbers.unit(), 0.2 * numbers.unit(), 1.0 + 0.5 * numbers.unit()];
+    machine.joints = legs.joints(&machine.home);
+    machine
+}
+
+/// Motions near the poses of a way, closer and closer to `s`.
+fn approach(
+    family: &'static str,
+    machine: &Machine,
+    way: &Way,
+    s: f64,
+    numbers: &mut Numbers,
+    visit: &mut dyn FnMut(&Scene),
+) {
+    let model = InverseDynamics::new(machine);
+    let dynamics = ForwardDynamics::new(machine);
+    for power in 0..28 {
+        for _ in 0..2 {
+            let distance = 10f64.powf(-0.5 * f64::from(power) + 0.25 * numbers.unit());
+            let pose = way.at(s - distance);
+            let condition = condition(machine, &pose);
+            if !(condition < 1e13) {
+                continue;
+            }
+            let r = machine.joints.radius;
+            let twist = Twist { angular: numbers.vector(), linear: numbers.vector() * r };
+            // A load without regard to the pose, and one that moderate forces balance.
+            let any = Acceleration { angular: numbers.vector() * 10.0, linear: numbers.vector() * 10.0 * r };
+            let force = numbers.vector6() * (10.0 * machine.platform.mass);
+            let smooth = dynamics.acceleration(&pose, &twist, &force.into());
+            let rates = numbers.vector6();
+            let moderate = leg_wrenches(machine, &pose).transpose() * twist.vector();
+            let motion = |acceleration| Motion { pose, twist, acceleration };
+            let mut visit =
+                |motion, rates| visit(&Scene { family, model: model.clone(), motion, rates, condition });
+            visit(motion(any), rates);
+            if let Some(smooth) = smooth {
+                visit(motion(smooth), moderate);
+            }
+        }
+    }
+}
+
+/// All of them.
+pub fn scenes(visit: &mut dyn FnMut(&Scene)) {
+    let mut numbers = Numbers(2008);
+    let det = |machine: &Machine, pose: &Pose| leg_wrenches(machine, pose).determinant();
+    for name in MACHINES {
+        let machine = machine(name);
+        let r = machine.joints.radius;
+        let start = home(&machine);
+        let up = start.rotation.column(2).into_owned();
+        // Turns about the vertical, about axes across it, screws.
+        let mut ways = vec![(up, Vector3::zeros()), (-up, Vector3::zeros())];
+        ways.extend(
+            [Vector3::x(), Vector3::y(), -Vector3::x(), -Vector3::y()]
+                .map(|axis| (start.rotation * axis, Vector3::zeros())),
+        );
+        for _ in 0..30 {
+            ways.push((numbers.vector().normalize(), numbers.vector() * r * 0.3));
+        }
+        for (k, (axis, shift)) in ways.into_iter().enumerate() {
+            let way = Way { start, turn: axis * 2.6, shift };
+            let family = if k < 2 {
+                "vertical turn"
+            } else if k < 6 {
+                "roll or pitch"
+            } else {
+                "screw"
+            };
+            if let Some(s) = way.crossing(|pose| det(&machine, pose)) {
+                approach(family, &machine, &way, s, &mut numbers, visit);
+            }
+            if let Some(s) = way.crossing(|pose| determinants(&machine, pose).0) {
+                approach("coplanar A", &machine, &way, s, &mut numbers, visit);
+            }
+        }
+        // The platform sinks into the plane of its base (for flat ones a rank of three).
+        let legs = Legs::of(&machine);
+        let sink = legs.base.iter().sum::<Vector3<f64>>() / 6.0
+            - start.position
+            - start.rotation * (legs.platform.iter().sum::<Vector3<f64>>() / 6.0);
+        let depth = start.rotation.column(2).dot(&sink);
+        let way = Way { start, turn: Vector3::zeros(), shift: start.rotation.column(2) * depth };
+        approach("coplanar legs", &machine, &way, 1.0, &mut numbers, visit);
+    }
+    for _ in 0..150 {
+        let machine = random_layout(&mut numbers);
+        let way = Way { start: home(&machine), turn: numbers.vector() * 3.0, shift: numbers.vector() * 0.3 };
+        if let Some(s) = way.crossing(|pose| det(&machine, pose)) {
+            approach("random layout", &machine, &way, s, &mut numbers, visit);
+        }
+        if let Some(s) = way.crossing(|pose| determinants(&machine, pose).0) {
+            approach("coplanar A", &machine, &way, s, &mut numbers, visit);
+        }
+    }
+}
