@@ -71,8 +71,9 @@ impl InverseDynamics {
         dispatch!(self.machine.level, simd => self.balanced::<_, f64x8<_>, M>(simd, motion))
     }
 
-    /// [`InverseDynamics::forces`] with lanes of single precision: errors of 1e-6 of the largest force
-    /// instead of 1e-15, more for a platform far from the base.
+    /// [`InverseDynamics::forces`] with lanes of single precision: errors below 1e-6 of the largest
+    /// force instead of 1e-15, times `1 + d / L` for a base at the distance d from the origin of the base
+    /// frame, where differences of coordinates lose digits.
     pub fn forces_f32<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
         dispatch!(self.machine.level, simd => self.balanced::<_, f32x8<_>, M>(simd, motion))
     }

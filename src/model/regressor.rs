@@ -149,8 +149,7 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
     let mut wrenches = Regressor::zeros();
     add_platform(&mut wrenches, machine, motion, &map);
     let per_leg = length.into_iter().zip(rate).zip(accel);
-    for (((joint, n), u), ((length, rate), accel)) in
-        platform.iter().zip(&directions).zip(&axes).zip(per_leg)
+    for (((joint, n), u), ((length, rate), accel)) in platform.iter().zip(&directions).zip(&axes).zip(per_leg)
     {
         let arm = motion.pose.rotation * joint;
         let joint_velocity = motion.twist.linear + motion.twist.angular.cross(&arm);
@@ -230,10 +229,7 @@ impl Leg {
             (*n_accel, 0.0),
             (spin, 0.0),
             (quadratic(machine.cylinder.transverse_inertia.reference_length), 0.0),
-            (
-                (n_accel * *length + n_rate * (2.0 * rate) - g) * *length,
-                accel - length * turning - g.dot(n),
-            ),
+            ((n_accel * *length + n_rate * (2.0 * rate) - g) * *length, accel - length * turning - g.dot(n)),
             (g - n_accel * (2.0 * length) - n_rate * (2.0 * rate), turning),
             (*n_accel, 0.0),
             (spin, 0.0),

@@ -1,0 +1,261 @@
+//! Each rung of the ladder leaves out what it says: the difference to the exact model is that, computed
+//! without the rung, by the regressor form (which shares no code with the ladder) or from the vectors.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+mod common;
+
+use common::{Errors, Legs, MACHINES, Table, data, machine, motions};
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::ladder::{Exact, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs, Rung};
+use hexad::model::machine::{Link, Machine, Platform, TransverseInertia};
+use hexad::model::regressor::{Parameters, Regressor, parameters_of, regressor, rod_mass_in_platform};
+use hexad::model::rigid::{Acceleration, Motion, Twist};
+use hexad::model::task::TaskState;
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// Of the largest force of the row: rounding, times the condition.
+const ROUNDING: f64 = 1e-12;
+
+/// One motion of one machine.
+struct Row<'a> {
+    model: &'a InverseDynamics,
+    motion: Motion,
+}
+
+impl Row<'_> {
+    fn machine(&self) -> &Machine {
+        self.model.machine()
+    }
+
+    fn forces<M: Model>(&self) -> Vector6<f64> {
+        self.model.forces::<M>(&self.motion).unwrap().into()
+    }
+
+    fn regressor(&self) -> Regressor {
+        regressor(self.machine(), &self.motion).unwrap()
+    }
+
+    fn regressor_at_rest(&self) -> Regressor {
+        regressor(self.machine(), &Motion { twist: Twist::default(), ..self.motion }).unwrap()
+    }
+
+    /// The share of some parameters in the forces.
+    fn share(&self, y: &Regressor, parameters: impl Fn(usize) -> bool) -> Vector6<f64> {
+        let all = parameters_of(self.machine());
+        y * Parameters::from_fn(|k, _| if parameters(k) { all[k] } else { 0.0 })
+    }
+}
+
+/// Exact minus rung is what `left_out` says, on every row of the vectors of every machine; `nothing_at`
+/// names machines where that is nothing.
+fn check<M: Model>(rung: &str, nothing_at: &[&str], left_out: impl Fn(&Row) -> Vector6<f64>) {
+    for name in MACHINES {
+        let model = InverseDynamics::new(&machine(name));
+        let (mut errors, mut sizes) = (Errors::default(), Errors::default());
+        for motion in motions(name) {
+            let row = Row { model: &model, motion };
+            let exact = row.forces::<Exact>();
+            let difference = exact - row.forces::<M>();
+            errors.add((difference - left_out(&row)).amax() / exact.amax());
+            sizes.add(difference.amax() / exact.amax());
+        }
+        println!("{name} {rung} leaves out RMS {:.1e}, max {:.1e}", sizes.rms(), sizes.max);
+        errors.assert_within(ROUNDING, &format!("{name} {rung}"));
+        assert_eq!(sizes.max < 1e3 * ROUNDING, nothing_at.contains(&name), "{name} {rung}: {sizes:?}");
+    }
+}
+
+/// The legs' parameters in the regressor.
+fn of_legs(index: usize) -> bool {
+    (10..19).contains(&index)
+}
+
+/// The axial inertias.
+fn of_spin(index: usize) -> bool {
+    index == 12 || index == 17
+}
+
+#[test]
+fn gravity_leaves_out_all_but_weight() {
+    check::<Gravity>("gravity", &[], |row| {
+        let held = Motion { twist: Twist::default(), acceleration: Acceleration::default(), ..row.motion };
+        let weight = regressor(row.machine(), &held).unwrap() * parameters_of(row.machine());
+        row.regressor() * parameters_of(row.machine()) - weight
+    });
+}
+
+#[test]
+fn massless_legs_leave_out_the_legs() {
+    check::<MasslessLegs>("massless-legs", &[], |row| row.share(&row.regressor(), of_legs));
+}
+
+#[test]
+fn lumped_legs_leave_out_all_but_points_in_the_platform() {
+    check::<LumpedLegs>("lumped-legs", &[], |row| {
+        let y = row.regressor();
+        let points = y * rod_mass_in_platform(row.machine()) - y.column(14);
+        row.share(&y, of_legs) + points * lumped_mass(row.machine())
+    });
+}
+
+#[test]
+fn no_velocity_leaves_out_what_grows_with_it_but_friction_and_the_spin() {
+    check::<NoVelocity>("no-velocity", &[], |row| {
+        let (y, at_rest) = (row.regressor(), row.regressor_at_rest());
+        let friction = row.share(&y, |k| k >= 20);
+        (y - at_rest) * parameters_of(row.machine()) - friction + row.share(&at_rest, of_spin)
+    });
+}
+
+#[test]
+fn rigid_legs_leave_out_the_spin() {
+    check::<RigidLegs>("rigid-legs", &SPINLESS, |row| row.share(&row.regressor(), of_spin));
+}
+
+/// Machines whose legs have no axial inertia.
+const SPINLESS: [&str; 1] = ["tsai2000"];
+
+/// The same against numbers with 80 digits that know of no regressor.
+#[test]
+fn rigid_legs_are_those_of_the_vectors() {
+    for name in MACHINES {
+        let table = Table::read(&data(name, "csv"));
+        let model = InverseDynamics::new(&machine(name));
+        let mut errors = Errors::default();
+        for (index, motion) in motions(name).into_iter().enumerate() {
+            let row = Row { model: &model, motion };
+            let [exact, rigid] =
+                ["force", "force_no_spin"].map(|stem| Vector6::from(table.legs(index, stem)));
+            let difference = row.forces::<Exact>() - row.forces::<RigidLegs>();
+            errors.add((difference - (exact - rigid)).amax() / exact.amax());
+        }
+        errors.assert_within(ROUNDING, &format!("{name} spin"));
+    }
+}
+
+/// What hangs on B: with the rest of the leg's mass at A, the mass and the centre of mass of a leg of the
+/// mean length at home.
+fn lumped_mass(machine: &Machine) -> f64 {
+    let Machine { cylinder, rod, .. } = machine;
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    let length = leg_lengths(machine, &home).iter().sum::<f64>() / 6.0;
+    (cylinder.mass * cylinder.center_of_mass + rod.mass * (length - rod.center_of_mass)) / length
+}
+
+fn nothing() -> Link {
+    let transverse_inertia = TransverseInertia { constant: 0.0, quadratic: 0.0, reference_length: 0.0 };
+    Link { mass: 0.0, center_of_mass: 0.0, axial_inertia: 0.0, transverse_inertia }
+}
+
+/// A body and points of this mass at the `B_i`, by Steiner's theorem.
+fn with_points(machine: &Machine, mass: f64) -> Platform {
+    let points = Legs::of(machine).platform.map(|b| (mass, b, Matrix3::zeros()));
+    let Platform { mass, center_of_mass, inertia } = machine.platform;
+    let parts: Vec<_> = [(mass, center_of_mass, inertia)].into_iter().chain(points).collect();
+    let mass: f64 = parts.iter().map(|part| part.0).sum();
+    let center_of_mass: Vector3<f64> =
+        parts.iter().map(|(mass, at, _)| at * *mass).sum::<Vector3<f64>>() / mass;
+    let about_center = |(mass, at, own): &(f64, Vector3<f64>, Matrix3<f64>)| {
+        let r: Vector3<f64> = at - center_of_mass;
+        own + (Matrix3::identity() * r.norm_squared() - r * r.transpose()) * *mass
+    };
+    Platform { mass, center_of_mass, inertia: parts.iter().map(about_center).sum() }
+}
+
+/// The simple rungs are the exact model of another machine.
+#[test]
+fn rungs_without_links_are_exact_for_a_machine_without_them() {
+    for name in MACHINES {
+        let machine = machine(name);
+        let bare = Machine { cylinder: nothing(), rod: nothing(), ..machine.clone() };
+        let lumped = Machine { platform: with_points(&machine, lumped_mass(&machine)), ..bare.clone() };
+        let [machine, bare, lumped] = [machine, bare, lumped].map(|machine| InverseDynamics::new(&machine));
+        let mut errors = Errors::default();
+        for motion in motions(name) {
+            for (rung, other) in [(Rung::MasslessLegs, &bare), (Rung::LumpedLegs, &lumped)] {
+                let rung = Vector6::from(machine.forces_of(rung, &motion).unwrap());
+                let other = Vector6::from(other.forces::<Exact>(&motion).unwrap());
+                errors.add((rung - other).amax() / other.amax());
+            }
+        }
+        errors.assert_within(ROUNDING, &format!("{name} without links"));
+    }
+}
+
+/// Errors of all rungs over the vectors, with the velocities and accelerations of a motion that runs
+/// `faster` times as fast; shares of the peak force.
+fn errors_of_rungs(name: &str, faster: f64) -> [Errors; 6] {
+    let model = InverseDynamics::new(&machine(name));
+    let mut all = [Errors::default(); 6];
+    let faster = motions(name).into_iter().map(|motion| Motion {
+        twist: Twist::from_vector(&(motion.twist.vector() * faster)),
+        acceleration: Acceleration::from_vector(&(motion.acceleration.vector() * faster * faster)),
+        ..motion
+    });
+    let motions: Vec<_> = faster.collect();
+    let exact: Vec<_> =
+        motions.iter().map(|motion| Vector6::from(model.forces::<Exact>(motion).unwrap())).collect();
+    let peak = exact.iter().map(Vector6::amax).fold(0.0, f64::max);
+    for (errors, rung) in all.iter_mut().zip(Rung::ALL) {
+        for (motion, exact) in motions.iter().zip(&exact) {
+            errors.add((Vector6::from(model.forces_of(rung, motion).unwrap()) - exact).amax() / peak);
+        }
+    }
+    all
+}
+
+/// On fast scenes every step up the ladder pays.
+#[test]
+fn on_fast_scenes_the_rungs_are_ordered() {
+    for name in MACHINES {
+        let [gravity, massless, lumped, no_velocity, rigid, exact] =
+            errors_of_rungs(name, 3.0).map(|e| e.rms());
+        println!("{name}: {gravity:.1e} {massless:.1e} {lumped:.1e} {no_velocity:.1e} {rigid:.1e}");
+        assert!(gravity > massless.max(no_velocity), "{name}");
+        assert!(massless > lumped, "{name}");
+        assert!(no_velocity > rigid, "{name}");
+        assert!(lumped > rigid, "{name}");
+        assert!(rigid > 0.0 || SPINLESS.contains(&name), "{name}");
+        assert_eq!(exact, 0.0);
+    }
+}
+
+/// Single precision rounds by 6e-8. Some thirty roundings in a row, amplified by the condition, stay below
+/// 2e-6 of the largest force where C and the base are near the origin: five digits and more. Joints are
+/// differences of coordinates, so with the base `far` from the origin this much of the legs' directions is
+/// lost before the dynamics begin: `far / L` times as much as otherwise.
+#[test]
+fn single_precision_is_good_for_five_digits() {
+    for name in MACHINES {
+        for far in [0.0, 10.0, 100.0] {
+            let machine = moved(&machine(name), far);
+            let model = InverseDynamics::new(&machine);
+            let mut errors = Errors::default();
+            let mut shortest = f64::INFINITY;
+            for mut motion in motions(name) {
+                motion.pose.position += away(far);
+                let single = Vector6::from(model.forces_f32::<Exact>(&motion).unwrap());
+                let exact = Vector6::from(model.forces::<Exact>(&motion).unwrap());
+                errors.add((single - exact).amax() / exact.amax());
+                shortest = leg_lengths(&machine, &motion.pose).into_iter().fold(shortest, f64::min);
+            }
+            errors.assert_within(2e-6 * (1.0 + far / shortest), &format!("{name} in f32, {far} m away"));
+            assert!(errors.max > 1e-8, "{name}: that was not single precision");
+        }
+    }
+}
+
+fn away(distance: f64) -> Vector3<f64> {
+    Vector3::new(0.6, -0.64, 0.48) * distance
+}
+
+/// The machine with its base moved within the base frame.
+fn moved(machine: &Machine, distance: f64) -> Machine {
+    let mut legs = Legs::of(machine);
+    legs.base.iter_mut().for_each(|a| *a += away(distance));
+    let mut home = machine.home;
+    home[3..].iter_mut().zip(away(distance).iter()).for_each(|(x, d)| *x += d);
+    Machine { joints: legs.joints(&home), home, ..machine.clone() }
+}
