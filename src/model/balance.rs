@@ -15,7 +15,8 @@
 //! Every 3 x 3 inverse is cross products of rotated lanes: two divisions in all, where an LU of the 6 x 6
 //! matrix has six one after the other. The pivoting is done in advance: [`Triples::best`] splits the legs
 //! so that A resists forces best at home. Where a pose comes too near to a singularity of A or of S (both
-//! determinants are at hand) LU with partial pivoting takes over: no result is worse than twice that method's.
+//! determinants are at hand) LU with partial pivoting takes over: over many poses
+//! no worse than twice that method.
 
 use fearless_simd::Simd;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -28,9 +29,9 @@ use super::rigid::{Twist, Wrench};
 /// Smallest `|dA|`, the volume spanned by the three unit vectors of A, for which the blocks are used.
 ///
 /// Measured (`tests/near_singular`, 53 830 motions, condition 1 to 1e13): largest error per decade of the
-/// condition, over that of LU with partial pivoting, forces / twist: 27 / 28 with 0.03, 4.2 / 2.7 with 0.1,
-/// 4.2 / 2.6 with 0.15, **1.3 / 1.5 with 0.2**, the same with 0.25; RMS 0.8 to 1.0. The ten machines of
-/// `tests/data` have 0.22 to 0.98 in their vectors.
+/// condition, over that of LU with partial pivoting, forces / twist: 28 / 28 with 0.03 (and dS 1e-2),
+/// 4.2 / 3.4 with 0.1, 4.2 / 2.6 with 0.15, **1.3 / 1.5 with 0.2**, the same with 0.25; RMS 0.7 to 1.0. The
+/// ten machines of `tests/data` have 0.22 to 0.98 in their vectors.
 const LEAST_DA: f64 = 0.2;
 
 /// Smallest `|dS| / radius^3`. Given a sound A the blocks lose nothing as S becomes singular (each lane is
