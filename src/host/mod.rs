@@ -3,6 +3,7 @@
 //! Exit codes of the commands: 0 done, 1 it ran and went wrong (a fault, a row without solution), 2 it
 //! could not begin: bad command line, configuration, input or environment.
 
+pub mod advise;
 pub mod batch;
 pub mod charts;
 pub mod check;

@@ -5,6 +5,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod advise;
 mod dense;
 mod envelope;
 mod scenes;
