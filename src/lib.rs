@@ -8,7 +8,7 @@
 //! model     mathematics of the machine           uses nothing
 //! control   control law, limits, one cycle       uses model
 //! plant     simulated platform                   uses model
-//! scene     motions                              uses model
+//! scene     motions, and the model they need     uses model
 //! ipc       messages, ports, exchange            uses control, model, realtime::clock
 //! realtime  threads, clock, cyclic loop          uses control, ipc::exchange
 //! host      configuration, commands, charts      uses everything

@@ -8,7 +8,7 @@ use super::state::{Cause, State};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::{Tracked, Tracker};
 use crate::model::inverse_jacobian::twist_from_rates;
-use crate::model::ladder::Exact;
+use crate::model::ladder::Rung;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
 use crate::model::task::TaskState;
@@ -18,6 +18,9 @@ use crate::model::task::TaskState;
 pub struct Parameters {
     pub period_ns: u64,
     pub law: Law,
+    /// Which terms of the dynamics are evaluated. It must have inertia: what the law commands is an
+    /// acceleration, and without inertia there would be no feedback.
+    pub rung: Rung,
     /// Largest position error at which control may begin \[m\].
     pub engage_position: f64,
     /// Largest orientation error at which control may begin \[rad\].
@@ -116,7 +119,7 @@ impl Controller {
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = input.release_ns.saturating_add(self.parameters.period_ns / 2);
         let command = self.parameters.law.command(&desired_at(middle_of_hold_ns), &error);
-        let force = self.model.forces::<Exact>(&command).ok_or(Cause::SingularPose)?;
+        let force = self.model.forces_of(self.parameters.rung, &command).ok_or(Cause::SingularPose)?;
         if force.iter().any(|value| !value.is_finite()) {
             return Err(Cause::ForceNotFinite);
         }

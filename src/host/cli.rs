@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use hexad::host::advise::{Advice, AdviseError};
 use hexad::host::check::Check;
 use hexad::host::config::{Config, ConfigError};
 use hexad::host::demo::{self, Demo, DemoError};
@@ -76,6 +77,14 @@ enum Command {
     Check {
         #[command(flatten)]
         machine: MachineFile,
+    },
+    /// Show what each model of the ladder costs over a scene, and recommend one
+    Advise {
+        #[command(flatten)]
+        machine: MachineFile,
+        /// A CSV file with t, X, X', X'', instead of the envelope
+        #[arg(long, value_name = "FILE")]
+        trajectory: Option<PathBuf>,
     },
     /// Forces, lengths and their derivatives for a file of motions
     InverseDynamics {
@@ -175,6 +184,10 @@ impl Cli {
                 print!("{}", Check::new(&machine.load()?));
                 Ok(())
             }
+            Command::Advise { machine, trajectory } => {
+                print!("{}", Advice::new(&machine.load()?, trajectory.as_deref())?);
+                Ok(())
+            }
             Command::InverseDynamics { machine, files, model } => {
                 let machine = machine.load()?.machine;
                 Ok(offline::inverse_dynamics_file(&machine, model, &files.input, &files.output)?)
@@ -255,6 +268,12 @@ impl From<ConfigError> for Failure {
 
 impl From<SetpointError> for Failure {
     fn from(error: SetpointError) -> Self {
+        Self::could_not_begin(error)
+    }
+}
+
+impl From<AdviseError> for Failure {
+    fn from(error: AdviseError) -> Self {
         Self::could_not_begin(error)
     }
 }

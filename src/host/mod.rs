@@ -3,13 +3,16 @@
 //! Exit codes of the commands: 0 done, 1 it ran and went wrong (a fault, a row without solution), 2 it
 //! could not begin: bad command line, configuration, input or environment.
 
+pub mod advise;
 pub mod batch;
 pub mod charts;
 pub mod check;
 pub mod config;
 pub mod daemon;
 pub mod demo;
+pub mod fidelity;
 pub mod files;
+mod numbers;
 pub mod offline;
 pub mod plant;
 pub mod report;

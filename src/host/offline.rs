@@ -124,7 +124,7 @@ pub(super) fn task_state(row: &[f64]) -> TaskState {
 }
 
 /// A bar on a terminal, nothing elsewhere.
-fn progress(rows: usize) -> ProgressBar {
+pub(super) fn progress(rows: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {human_pos} of {human_len} rows, {eta} left");
     ProgressBar::new(rows as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }

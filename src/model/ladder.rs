@@ -103,4 +103,22 @@ impl Rung {
             Self::Exact => "exact",
         }
     }
+
+    /// What it leaves out, in a few words.
+    pub fn leaves_out(self) -> &'static str {
+        match self {
+            Self::Gravity => "motion and drives",
+            Self::MasslessLegs => "mass of the legs",
+            Self::LumpedLegs => "extent of the legs",
+            Self::NoVelocity => "velocity terms and spin",
+            Self::RigidLegs => "spin of the legs",
+            Self::Exact => "nothing",
+        }
+    }
+
+    /// Whether accelerations make forces. Without, a control law has nothing to act through: what it
+    /// commands is an acceleration.
+    pub fn has_inertia(self) -> bool {
+        self != Self::Gravity
+    }
 }

@@ -9,4 +9,5 @@ mod limits;
 mod poses;
 mod replay;
 mod rig;
+mod rungs;
 mod tracking;

@@ -6,6 +6,8 @@ use hexad::control::gains::Gains;
 use hexad::control::law::Law;
 use hexad::control::state::State;
 use hexad::host::config::Config;
+use hexad::host::config::deployment::Fidelity;
+use hexad::model::ladder::Rung;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::task::TaskState;
 use hexad::plant::simulator::Simulator;
@@ -29,6 +31,10 @@ pub fn parameters(config: &Config) -> Parameters {
         law: Law {
             position: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
             orientation: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+        },
+        rung: match control.fidelity {
+            Fidelity::Fixed(rung) => rung,
+            Fidelity::Auto => Rung::Exact,
         },
         engage_position: control.engage_position_m,
         engage_orientation: control.engage_orientation_rad,

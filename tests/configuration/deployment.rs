@@ -1,7 +1,8 @@
 //! Deployment: bounds, and what follows from the rate.
 
-use hexad::host::config::deployment::Deployment;
+use hexad::host::config::deployment::{Deployment, Fidelity};
 use hexad::host::config::{Config, Violation};
+use hexad::model::ladder::Rung;
 
 use super::{FRIED, violations};
 
@@ -60,6 +61,78 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
             "plant.force_timeout_ms = 0.5: must be greater than 1 (one period of realtime.rate_hz = 1000)",
             "plant.brake_deceleration_m_s2 = 0: must be greater than 0 and at most 1000",
             "plant.step_us = 5: must be in [10, 1000]",
+        ],
+    );
+}
+
+#[test]
+fn fidelity_is_auto_or_a_rung_with_inertia() {
+    let read = |text: &str| Config::parse(&format!("{FRIED}[control]\n{text}"), "test.toml").unwrap();
+    let fidelity = |text: &str| read(text).deployment.control.fidelity;
+    assert_eq!(fidelity(""), Fidelity::Fixed(Rung::Exact));
+    assert_eq!(fidelity("fidelity = \"auto\""), Fidelity::Auto);
+    for rung in &Rung::ALL[1..] {
+        assert_eq!(fidelity(&format!("fidelity = \"{}\"", rung.name())), Fidelity::Fixed(*rung));
+    }
+    assert_eq!(read("fidelity_tolerance = 1").deployment.control.fidelity_tolerance, 1.0);
+    let refused = |text: &str, message: &str| {
+        let found = violations(&format!("{FRIED}[control]\n{text}"));
+        assert_eq!(found.iter().map(Violation::to_string).collect::<Vec<_>>(), [message]);
+    };
+    let names = "must be one of \"exact\", \"rigid-legs\", \"no-velocity\", \"lumped-legs\", \"massless-legs\", \
+                 \"auto\"";
+    for value in ["\"gravity\"", "\"Exact\"", "\"\"", "1", "[\"auto\"]"] {
+        refused(&format!("fidelity = {value}"), &format!("control.fidelity = {value}: {names}"));
+    }
+    for value in ["0", "1.001", "-0.1"] {
+        let message = format!("control.fidelity_tolerance = {value}: must be greater than 0 and at most 1");
+        refused(&format!("fidelity_tolerance = {value}"), &message);
+    }
+}
+
+#[test]
+fn an_envelope_is_complete_and_about_home() {
+    const GOOD: &str = "[envelope]
+pose_min = [-0.1, -3.2, 0, -1, 0, -0.3]
+pose_max = [0.1, 3.2, 0, 1, 0, 0.3]
+velocity = [1, 2, 3, 4, 5, 6]
+acceleration = [0, 0, 0, 0, 0, 9.81]
+";
+    let limits = Config::parse(&format!("{FRIED}{GOOD}"), "test.toml").unwrap().deployment.envelope.unwrap();
+    assert_eq!(limits.pose_min, [-0.1, -3.2, 0.0, -1.0, 0.0, -0.3]);
+    assert_eq!(limits.pose_max, [0.1, 3.2, 0.0, 1.0, 0.0, 0.3]);
+    assert_eq!(limits.velocity, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    assert_eq!(limits.acceleration, [0.0, 0.0, 0.0, 0.0, 0.0, 9.81]);
+    assert_eq!(Config::parse(FRIED, "test.toml").unwrap().deployment.envelope, None);
+
+    let refused = |from: &str, to: &str, messages: &[&str]| {
+        assert_eq!(GOOD.matches(from).count(), 1, "{from}");
+        let found = violations(&format!("{FRIED}{}", GOOD.replace(from, to)));
+        assert_eq!(found.iter().map(Violation::to_string).collect::<Vec<_>>(), messages, "after {to}");
+    };
+    refused("[-0.1,", "[0.05,", &["envelope.pose_min[1] = 0.05: must be in [-3.2, 0]"]);
+    // Degrees.
+    refused("[0.1,", "[6,", &["envelope.pose_max[1] = 6: must be in [0, 3.2]"]);
+    refused("-0.3]", "0.01]", &["envelope.pose_min[6] = 0.01: must be at most 0"]);
+    refused("0.3]\nvel", "-0.3]\nvel", &["envelope.pose_max[6] = -0.3: must be at least 0"]);
+    refused("[1, 2,", "[1, -2,", &["envelope.velocity[2] = -2: must be at least 0"]);
+    let infinite = "envelope.acceleration[6] = inf: must be a finite number, at most 1e12 in magnitude";
+    refused("9.81", "inf", &[infinite]);
+    refused("5, 6]", "5]", &["envelope.velocity = [1, 2, 3, 4, 5]: must be an array of 6 numbers"]);
+    refused(
+        "velocity = [1, 2, 3, 4, 5, 6]",
+        "velocity = 1",
+        &["envelope.velocity = 1: must be an array of 6 numbers"],
+    );
+    let missing = "envelope.velocity: missing, must be given with the other keys of the section";
+    refused("velocity = [1, 2, 3, 4, 5, 6]\n", "", &[missing]);
+    refused(
+        "velocity =",
+        "speed =",
+        &[
+            missing,
+            "envelope.speed = [1, 2, 3, 4, 5, 6]: unknown key, must be one \
+         of: pose_min, pose_max, velocity, acceleration",
         ],
     );
 }

@@ -19,6 +19,7 @@ mod support;
 
 mod command_line;
 mod demo;
+mod fidelity;
 mod killed;
 mod locked_memory;
 mod orderly_stop;

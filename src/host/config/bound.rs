@@ -16,6 +16,7 @@ pub(super) enum Bound {
     Finite,
     Positive,
     NotNegative,
+    NotPositive,
     /// Above 0 and up to the limit.
     UpTo(f64),
     /// Both ends included.
@@ -35,6 +36,7 @@ impl Bound {
             Self::Finite => true,
             Self::Positive => x > 0.0,
             Self::NotNegative => x >= 0.0,
+            Self::NotPositive => x <= 0.0,
             Self::UpTo(high) => x > 0.0 && x <= high,
             Self::Within(low, high) => (low..=high).contains(&x),
         };
@@ -52,6 +54,7 @@ impl fmt::Display for Bound {
             Self::Finite => write!(f, "a finite number"),
             Self::Positive => write!(f, "greater than 0"),
             Self::NotNegative => write!(f, "at least 0"),
+            Self::NotPositive => write!(f, "at most 0"),
             Self::UpTo(high) => write!(f, "greater than 0 and at most {high}"),
             Self::Within(low, high) => write!(f, "in [{low}, {high}]"),
         }

@@ -1,4 +1,5 @@
-//! The sections that say how a machine is run: `[realtime]`, `[control]`, `[timeouts]`, `[plant]`.
+//! The sections that say how a machine is run: `[realtime]`, `[control]`, `[timeouts]`, `[plant]`,
+//! `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
 //! timeouts. What is given is checked against the limits that follow from the rate.
@@ -11,6 +12,8 @@ use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
 use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
+use crate::model::ladder::Rung;
+use crate::scene::envelope::Limits;
 
 /// Slowest and fastest loop \[Hz\]. Above, one wake-up costs more than the period leaves.
 const RATE_HZ: Bound = Bound::Within(10.0, 20_000.0);
@@ -40,6 +43,8 @@ const FURTHEST_FOLLOWING_RAD: f64 = 1.0;
 const STRONGEST_BRAKE_M_S2: f64 = 1000.0;
 /// The plant's step \[us\]: below, it cannot keep up; above, its drives are not stable.
 const STEP_US: Bound = Bound::Within(10.0, 1000.0);
+/// Largest angle of an envelope \[rad\], just over half a turn: beyond, it is a slip of the unit.
+const HALF_TURN: f64 = 3.2;
 
 /// How a machine is run.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +57,8 @@ pub struct Deployment {
     pub timeouts: Timeouts,
     /// The simulated hardware.
     pub plant: Plant,
+    /// What the platform will be asked to do; `None` if nobody has said.
+    pub envelope: Option<Limits>,
 }
 
 /// `[realtime]`: the cycle and its threads.
@@ -94,6 +101,19 @@ pub struct Control {
     pub following_position_m: f64,
     /// The same for the angle between them.
     pub following_orientation_rad: f64,
+    /// Which terms of the dynamics are evaluated.
+    pub fidelity: Fidelity,
+    /// Largest error [`Fidelity::Auto`] may make, as a share of the peak force of the envelope.
+    pub fidelity_tolerance: f64,
+}
+
+/// `control.fidelity`: which terms of the dynamics are evaluated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fidelity {
+    /// As many as the envelope needs.
+    Auto,
+    /// Those of one rung, which has inertia.
+    Fixed(Rung),
 }
 
 /// `[timeouts]`: how old the newest message may be.
@@ -123,7 +143,7 @@ impl Realtime {
     }
 }
 
-/// Reads and checks the four sections. Where a number was refused it is NaN.
+/// Reads and checks the five sections. Where a number was refused it is NaN.
 pub(super) fn read(root: &mut Reader) -> Deployment {
     let realtime = realtime(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
@@ -132,6 +152,7 @@ pub(super) fn read(root: &mut Reader) -> Deployment {
         control: control(root.section("control"), rate_hz),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant(root.section("plant"), rate_hz),
+        envelope: envelope(root.section("envelope")),
     }
 }
 
@@ -188,9 +209,17 @@ fn control(mut section: Reader, rate_hz: f64) -> Control {
             0.05,
             Bound::UpTo(FURTHEST_FOLLOWING_RAD),
         ),
+        fidelity: fidelity(&mut section),
+        fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
     };
     section.finish();
     control
+}
+
+fn fidelity(section: &mut Reader) -> Fidelity {
+    let rungs = Rung::ALL.into_iter().rev().filter(|rung| rung.has_inertia());
+    let options = rungs.map(|rung| (rung.name(), Fidelity::Fixed(rung))).chain([("auto", Fidelity::Auto)]);
+    section.choice_or("fidelity", Fidelity::Fixed(Rung::Exact), &options.collect::<Vec<_>>())
 }
 
 /// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry.
@@ -229,6 +258,26 @@ fn plant(mut section: Reader, rate_hz: f64) -> Plant {
     };
     section.finish();
     plant
+}
+
+/// All four keys, or none.
+fn envelope(mut section: Reader) -> Option<Limits> {
+    let pose = |angle: Bound, position: Bound| [angle, angle, angle, position, position, position];
+    let keys = [
+        ("pose_min", pose(Bound::Within(-HALF_TURN, 0.0), Bound::NotPositive)),
+        ("pose_max", pose(Bound::Within(0.0, HALF_TURN), Bound::NotNegative)),
+        ("velocity", [Bound::NotNegative; 6]),
+        ("acceleration", [Bound::NotNegative; 6]),
+    ];
+    let found = keys.map(|(key, bounds)| section.vector_within(key, &bounds));
+    for ((key, _), value) in keys.iter().zip(&found) {
+        if value.is_none() && found.iter().any(Option::is_some) {
+            section.refuse(key, "missing, must be given with the other keys of the section");
+        }
+    }
+    section.finish();
+    let [Some(pose_min), Some(pose_max), Some(velocity), Some(acceleration)] = found else { return None };
+    Some(Limits { pose_min, pose_max, velocity, acceleration })
 }
 
 /// A peer that sends once a cycle is silent for one period: a timeout must be longer.

@@ -115,6 +115,18 @@ impl<'t> Reader<'t> {
         flag.unwrap_or(default)
     }
 
+    /// One of a few names; need not be there.
+    pub fn choice_or<T: Copy>(&mut self, key: &'static str, default: T, options: &[(&str, T)]) -> T {
+        let Some(value) = self.find(key, None) else { return default };
+        let name = value.get_ref().as_str();
+        let chosen = options.iter().find(|(option, _)| name == Some(option));
+        if chosen.is_none() {
+            let names: Vec<_> = options.iter().map(|(option, _)| format!("\"{option}\"")).collect();
+            self.refuse(key, format!("must be one of {}", names.join(", ")));
+        }
+        chosen.map_or(default, |(_, choice)| *choice)
+    }
+
     /// A name of letters, digits, `_` and `-`.
     pub fn name(&mut self, key: &'static str, longest: usize) -> String {
         let bound = format!("a name of 1 to {longest} characters, each one of A-Z a-z 0-9 _ -");
@@ -129,13 +141,22 @@ impl<'t> Reader<'t> {
     /// `N` finite numbers that must be there.
     pub fn vector<const N: usize>(&mut self, key: &'static str) -> [f64; N] {
         let found = self.required(key, format!("an array of {N} numbers"));
-        found.map_or([f64::NAN; N], |value| self.components(key, value))
+        found.map_or([f64::NAN; N], |value| self.components(key, value, &[Bound::Finite; N]))
     }
 
     /// `N` finite numbers that need not be there.
     pub fn vector_or<const N: usize>(&mut self, key: &'static str, default: [f64; N]) -> [f64; N] {
         let found = self.find(key, Some(format!("{default:?}")));
-        found.map_or(default, |value| self.components(key, value))
+        found.map_or(default, |value| self.components(key, value, &[Bound::Finite; N]))
+    }
+
+    /// `N` numbers, each with a bound of its own, or `None`.
+    pub fn vector_within<const N: usize>(
+        &mut self,
+        key: &'static str,
+        bounds: &[Bound; N],
+    ) -> Option<[f64; N]> {
+        self.find(key, None).map(|value| self.components(key, value, bounds))
     }
 
     /// Whether the value of `key` is a table, for keys that may also be a number.
@@ -237,12 +258,18 @@ impl<'t> Reader<'t> {
         x
     }
 
-    fn components<const N: usize>(&self, key: &str, value: &Spanned<DeValue>) -> [f64; N] {
+    fn components<const N: usize>(
+        &self,
+        key: &str,
+        value: &Spanned<DeValue>,
+        bounds: &[Bound; N],
+    ) -> [f64; N] {
         let mut vector = [f64::NAN; N];
         match value.get_ref().as_array() {
             Some(items) if items.len() == N => {
-                for (i, (slot, item)) in vector.iter_mut().zip(items.iter()).enumerate() {
-                    *slot = self.checked(format!("{}[{}]", self.key(key), i + 1), item, Bound::Finite);
+                for (i, (slot, (item, bound))) in vector.iter_mut().zip(items.iter().zip(bounds)).enumerate()
+                {
+                    *slot = self.checked(format!("{}[{}]", self.key(key), i + 1), item, *bound);
                 }
             }
             _ => self.refuse(key, format!("must be an array of {N} numbers")),

@@ -22,6 +22,7 @@ use self::io_thread::{IoReport, Ports};
 use self::log_thread::LogReport;
 use super::config::Config;
 use super::config::deployment::{Deployment, Realtime};
+use super::fidelity;
 use super::files::FileError;
 use super::report::{DeadlineMisses, Report};
 use super::stop::Stop;
@@ -31,6 +32,7 @@ use crate::control::law::Law;
 use crate::ipc::exchange::exchange;
 use crate::ipc::ports::{Bus, PortError};
 use crate::model::inverse_geometry::leg_lengths;
+use crate::model::ladder::Rung;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Timing};
@@ -72,7 +74,7 @@ pub fn run(config: &Config, report_path: Option<&Path>, stop: &Stop) -> Result<R
 
 fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
     let Config { machine, deployment, .. } = config;
-    let controller = Controller::new(machine, parameters(deployment));
+    let controller = Controller::new(machine, parameters(deployment, fidelity::rung(config)));
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
     let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
@@ -189,7 +191,7 @@ fn warm_up(mut controller: Controller, machine: &Machine) {
     }
 }
 
-fn parameters(deployment: &Deployment) -> Parameters {
+fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
     let Deployment { control, timeouts, .. } = deployment;
     Parameters {
         period_ns: nanoseconds(deployment.realtime.period_s()),
@@ -197,6 +199,7 @@ fn parameters(deployment: &Deployment) -> Parameters {
             position: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
             orientation: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
         },
+        rung,
         engage_position: control.engage_position_m,
         engage_orientation: control.engage_orientation_rad,
         following_position: control.following_position_m,

@@ -1,0 +1,136 @@
+//! The choice holds where the chooser did not look.
+
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::ladder::Rung;
+use hexad::model::machine::Machine;
+use hexad::scene::envelope::{CORNERS, Envelope, Shares};
+use hexad::scene::fidelity::Judgement;
+use hexad::scene::reach;
+use hexad::scene::tally::{Sample, Tally};
+
+use super::common::{MACHINES, machine};
+use super::scenes::{Scene, scenes};
+
+/// Motions per set.
+const DENSE: u32 = 200_000;
+
+/// SplitMix64 (Steele, Lea and Flood, 2014): nothing in common with the chooser's spread.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+fn tally(scene: &Scene, mut shares: impl FnMut() -> Shares) -> Tally {
+    let mut tally = Tally::default();
+    for _ in 0..DENSE {
+        tally.add(&Sample::take(&scene.model, &scene.envelope.at(&shares())));
+    }
+    tally
+}
+
+/// Anywhere in the envelope, and at any of its 262,144 corners.
+fn dense(scene: &Scene) -> [Tally; 2] {
+    let mut random = Random(2008);
+    let inside = tally(scene, || Shares::from_fn(|_, _| random.unit()));
+    let corners = tally(scene, || {
+        let bits = random.next();
+        Shares::from_fn(|k, _| ((bits >> k) & 1) as f64)
+    });
+    [inside, corners]
+}
+
+#[test]
+fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
+    let mut choices = vec![];
+    for scene in scenes() {
+        let judgement = Judgement::of_envelope(&scene.model, &scene.envelope);
+        let [inside, corners] = dense(&scene);
+        assert!(inside.judged > u64::from(DENSE) / 10, "{}: {inside:?}", scene.name);
+        // 1e-9 to 1, ten to a decade.
+        for step in 0..=90 {
+            let tolerance = 10_f64.powf(-0.1 * f64::from(step));
+            let choice = judgement.choice(tolerance);
+            let number = Rung::ALL.iter().position(|rung| *rung == choice).unwrap();
+            // In each set against its own peak: whoever looks at one alone must find it so.
+            for (what, seen) in [("inside", &inside), ("corners", &corners)] {
+                let share = seen.errors[number].max / seen.peak;
+                let name = &scene.name;
+                assert!(
+                    seen.judged == 0 || share <= 1.1 * tolerance,
+                    "{name}, {what}: {choice:?} is off by {share:.3e} for {tolerance:.3e}"
+                );
+            }
+            choices.push(choice);
+        }
+    }
+    choices.sort_by_key(|rung| *rung as u8);
+    choices.dedup();
+    assert_eq!(choices, &Rung::ALL[1..], "every rung with inertia is a choice for somebody");
+}
+
+/// Where every corner can be reached the errors are largest at one of them, or nearly.
+#[test]
+fn the_worst_that_is_reported_exists() {
+    for scene in scenes() {
+        let judgement = Judgement::of_envelope(&scene.model, &scene.envelope);
+        if ["wide", "moog", "camera"].iter().any(|kind| scene.name.ends_with(kind)) {
+            continue;
+        }
+        assert_eq!(judgement.all.outside, 0, "{}", scene.name);
+        let [inside, corners] = dense(&scene);
+        for ((price, inside), corners) in judgement.prices.iter().zip(&inside.errors).zip(&corners.errors) {
+            let (seen, name) = (inside.max.max(corners.max), &scene.name);
+            assert!(seen >= 0.95 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.rung, price.max);
+            assert!(seen <= 1.05 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.rung, price.max);
+        }
+    }
+}
+
+#[test]
+fn what_is_out_of_reach_is_counted_and_passed_over() {
+    let scenes = scenes();
+    let moog = scenes.iter().find(|scene| scene.name == "motion_base moog").unwrap();
+    let judgement = Judgement::of_envelope(&moog.model, &moog.envelope);
+    assert!(judgement.all.outside > 1000 && judgement.all.judged > 32_768, "{:?}", judgement.all);
+    let own = Judgement::of_envelope(&scenes[0].model, &scenes[0].envelope);
+    assert_eq!((own.all.outside, own.all.singular), (0, 0));
+    assert_eq!(own.all.judged, 32_768 + u64::from(CORNERS));
+}
+
+#[test]
+fn every_machine_has_an_envelope_of_its_own() {
+    for name in MACHINES {
+        let mut machine = machine(name);
+        let envelope_of = |machine: &Machine| reach::envelope(&InverseDynamics::new(machine));
+        let full = envelope_of(&machine);
+        assert!(full.limits().pose_max.iter().all(|x| *x > 0.0), "{name}: {full:?}");
+        assert!(full.limits().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
+        for k in 0..CORNERS {
+            let sample = Sample::take(&InverseDynamics::new(&machine), &full.at(&full.corner(k)));
+            assert!(sample.is_ok_and(|s| s.peak < 0.8 * machine.actuator.max_force), "{name}, corner {k}");
+        }
+        // Too weak to hold itself, or without room: it stays at home, and still there is a choice.
+        machine.actuator.max_force = 1e-3;
+        assert_eq!(envelope_of(&machine).limits().velocity, [0.0; 6]);
+        let length = leg_lengths(&machine, &full.at(&full.rest()).motion().pose);
+        machine.actuator.max_length = length.iter().copied().fold(0.0, f64::max);
+        let none = envelope_of(&machine);
+        assert_eq!(none.limits().pose_max, [0.0; 6], "{name}");
+        let judgement = Judgement::of_envelope(&InverseDynamics::new(&machine), &none);
+        assert!(judgement.all.judged > 0, "{name}");
+        assert!(judgement.choice(0.0) as u8 >= Rung::NoVelocity as u8, "{name}: {:?}", judgement.choice(0.0));
+        assert_eq!(none, Envelope::new(&machine.home, *none.limits()));
+    }
+}

@@ -1,0 +1,11 @@
+//! How much of the model a scene needs: judged, chosen, advised.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod advise;
+mod dense;
+mod envelope;
+mod scenes;
