@@ -13,6 +13,7 @@ pub mod files;
 pub mod offline;
 pub mod plant;
 pub mod report;
+pub mod scatter;
 pub mod setpoints;
 pub mod stop;
 pub mod table;
