@@ -11,6 +11,7 @@ use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, pareto_fro
 use hexad::model::ladder::Rung;
 
 use super::Failure;
+use super::methods::BASELINE;
 use super::results::{PAPER, Row};
 use super::scenes::Pace;
 
@@ -18,6 +19,9 @@ const DOUBLE: usize = 0;
 const SINGLE: usize = 1;
 const DENSE: usize = 2;
 const PEER: usize = 3;
+
+/// A front goes down by at least this factor: one rounding error is as good as another.
+const BETTER: f64 = 0.5;
 
 /// What is drawn of one method.
 struct Item {
@@ -40,8 +44,8 @@ enum Side {
 pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
     let items = items(rows);
     let (mut points, mut lines) = (vec![], vec![]);
-    let fast = pareto_front(items.iter().map(|item| (item.ns, item.fast)));
-    let slow = pareto_front(items.iter().filter_map(|item| Some((item.ns, item.slow?))));
+    let fast = pareto_front(items.iter().map(|item| (item.ns, item.fast)), BETTER);
+    let slow = pareto_front(items.iter().filter_map(|item| Some((item.ns, item.slow?))), BETTER);
     lines.push(Line { points: fast, style: Stroke::Solid, color: DOUBLE, wide: true });
     lines.push(Line { points: slow, style: Stroke::Dashed, color: DOUBLE, wide: true });
     for item in &items {
@@ -65,8 +69,8 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
     let chart = Scatter {
         title: &title,
         x_label: "time of one evaluation, one core [ns]",
-        y_label: "largest error of a force / largest force of its row [1]",
-        x: 20.0..50e3,
+        y_label: "largest error of a force / largest force",
+        x: 10.0..50e3,
         y: 1e-16..10.0,
         points,
         lines,
@@ -107,7 +111,7 @@ fn items(rows: &[Row]) -> Vec<Item> {
         let times = rows.iter().map(|row| row.samples.throughput());
         let (color, side) = match (rung, precision) {
             (true, "f32") => (SINGLE, if exact { Side::Flag } else { Side::None }),
-            (true, _) => (DOUBLE, if exact { Side::Flag } else { Side::Left }),
+            (true, _) => (DOUBLE, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
             (false, _) => (if peer { PEER } else { DENSE }, Side::Flag),
         };
         let name = match (rung, exact, precision) {

@@ -83,14 +83,15 @@ pub enum Sample {
     Line(Stroke, usize),
 }
 
-/// The steps along the points that no other one beats in both coordinates.
-pub fn pareto_front(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+/// The steps along the points that no other one beats in both coordinates; each step multiplies y by `better`
+/// or less.
+pub fn pareto_front(points: impl Iterator<Item = (f64, f64)>, better: f64) -> Vec<(f64, f64)> {
     let mut sorted: Vec<_> = points.collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut steps: Vec<(f64, f64)> = vec![];
     for (x, y) in sorted {
         match steps.last() {
-            Some((_, lowest)) if y >= *lowest => {}
+            Some((_, lowest)) if y > better * lowest => {}
             Some((_, lowest)) => steps.extend([(x, *lowest), (x, y)]),
             None => steps.push((x, y)),
         }
@@ -282,7 +283,7 @@ mod tests {
 
     #[test]
     fn the_front_keeps_what_nothing_beats() {
-        let points = [(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (4.0, 2.0)];
-        assert_eq!(pareto_front(points.into_iter()), [(1.0, 5.0), (3.0, 5.0), (3.0, 1.0)]);
+        let points = [(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (4.0, 0.9)];
+        assert_eq!(pareto_front(points.into_iter(), 0.8), [(1.0, 5.0), (3.0, 5.0), (3.0, 1.0)]);
     }
 }
