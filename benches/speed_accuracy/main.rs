@@ -97,13 +97,15 @@ fn main() -> ExitCode {
 /// Evaluates one method so many times, on the fast scene of the first machine.
 fn count(arguments: &Arguments, rung: &str) -> Result<(), Failure> {
     let rung = Rung::ALL.into_iter().find(|known| known.name() == rung);
-    let rung = rung.ok_or_else(|| format!("no such rung; one of {}", Rung::ALL.map(Rung::name).join(", ")))?;
-    let sets = instruction_sets();
+    let rung =
+        rung.ok_or_else(|| format!("no such rung; one of {}", Rung::ALL.map(Rung::name).join(", ")))?;
+    let precision = if arguments.single { Precision::F32 } else { Precision::F64 };
+    let sets = instruction_sets(precision);
     let wanted = |name: &str| arguments.isa.as_ref().is_none_or(|isa| isa == name);
     let names = sets.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let set = sets.into_iter().find(|(name, _)| wanted(name));
     let (isa, level) = set.ok_or_else(|| format!("not on this CPU; one of {names}"))?;
-    let method = Method::new(rung, if arguments.single { Precision::F32 } else { Precision::F64 });
+    let method = Method::new(rung, precision);
     let scene = Scene::of_machines()?.into_iter().nth(1).ok_or("no scene")?;
     let dynamics = InverseDynamics::new(&scene.machine_on(level));
     let passes = arguments.evaluations.div_ceil(scene.motions.len());
@@ -161,17 +163,10 @@ fn scenes() -> Result<Vec<Scene>, Failure> {
 fn contenders(scenes: &[Scene]) -> Result<Vec<Contender>, Failure> {
     let mut contenders = vec![];
     for (index, scene) in scenes.iter().enumerate() {
-        for (isa, level) in instruction_sets() {
-            for precision in Precision::ALL {
-                for rung in Rung::ALL {
-                    contenders.push(Contender::hexad(
-                        scene,
-                        index,
-                        Method::new(rung, precision),
-                        isa,
-                        level,
-                    ));
-                }
+        for precision in Precision::ALL {
+            for (isa, level) in instruction_sets(precision) {
+                let methods = Rung::ALL.map(|rung| Method::new(rung, precision));
+                contenders.extend(methods.map(|method| Contender::hexad(scene, index, method, isa, level)));
             }
         }
         contenders.extend(Contender::paper(scene, index));
@@ -218,8 +213,7 @@ impl Contender {
         let exact = Method::new(Rung::Exact, Precision::F64).forces;
         let errors = match scene.pace {
             scenes::Pace::Slow => scene.errors(scene.motions.iter().map(|motion| exact(&dynamics, motion))),
-            _ => scene
-                .errors(scene.states.iter().map(|state| Some(paper::forces(machine, state).into()))),
+            _ => scene.errors(scene.states.iter().map(|state| Some(paper::forces(machine, state).into()))),
         };
         let row = Row {
             method: results::PAPER,

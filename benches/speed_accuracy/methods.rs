@@ -74,17 +74,18 @@ impl Method {
     }
 }
 
-/// Instruction sets of this CPU, the best first.
-pub fn instruction_sets() -> Vec<(&'static str, Level)> {
+/// Instruction sets of this CPU that are used for a precision, the best first. Single precision has no use
+/// for AVX-512.
+pub fn instruction_sets(precision: Precision) -> Vec<(&'static str, Level)> {
     let best = Level::new();
     #[cfg(target_arch = "x86_64")]
     let sets = [
-        ("avx512", best.as_avx512().map(Level::Avx512)),
+        ("avx512", best.as_avx512().filter(|_| precision == Precision::F64).map(Level::Avx512)),
         ("avx2", best.as_avx2().map(Level::Avx2)),
         ("sse2", best.as_sse2().map(Level::Sse2)),
     ];
     #[cfg(not(target_arch = "x86_64"))]
-    let sets = [(BASELINE, Some(best))];
+    let sets = [(BASELINE, Some(best).filter(|_| Precision::ALL.contains(&precision)))];
     sets.into_iter().filter_map(|(name, level)| Some((name, level?))).collect()
 }
 

@@ -67,8 +67,13 @@ impl Peer {
         let figures = said.lines().find_map(|line| line.strip_prefix("csv,")?.strip_prefix(self.bench));
         let figures = figures.unwrap_or_default().split(',').filter_map(|figure| figure.parse().ok());
         match figures.collect::<Vec<f64>>()[..] {
-            [throughput, latency, max, rms] => Ok(Report { throughput, latency, errors: Errors { max, rms } }),
-            _ => Err(format!("{} does not report {}; build it again: {BUILD}", self.program, self.bench).into()),
+            [throughput, latency, max, rms] => {
+                Ok(Report { throughput, latency, errors: Errors { max, rms } })
+            }
+            _ => {
+                Err(format!("{} does not report {}; build it again: {BUILD}", self.program, self.bench)
+                    .into())
+            }
         }
     }
 }

@@ -66,7 +66,10 @@ pub fn print_ratios(rows: &[Row]) {
     // The best instruction set comes first.
     let Some(exact) = at_peers.find(|row| row.is_exact("f64")) else { return };
     println!("\nThe peers' machine and inputs, exact model, f64; hexad on {}:", exact.isa);
-    println!("{:<26}{:>10}{:>9}{:>10}{:>9}{:>8}{:>12}", "", "ns", "ratio", "fenced", "ratio", "goal", "max error");
+    println!(
+        "{:<26}{:>10}{:>9}{:>10}{:>9}{:>8}{:>12}",
+        "", "ns", "ratio", "fenced", "ratio", "goal", "max error"
+    );
     let others = |row: &&Row| PEERS.iter().any(|peer| peer.name == row.method) || row.is_exact("f64");
     for row in rows.iter().filter(|row| row.pace == Pace::Peers).filter(others) {
         let name = if row.is_exact("f64") { format!("hexad {}", row.isa) } else { row.method.into() };

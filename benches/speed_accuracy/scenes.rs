@@ -112,7 +112,8 @@ impl Scene {
                 nalgebra::Vector3::new(x, y, z)
             };
             let mut motion = TaskState::default().motion();
-            motion.pose.rotation = nalgebra::Matrix3::from_columns(&[three(0), three(3), three(6)]).transpose();
+            motion.pose.rotation =
+                nalgebra::Matrix3::from_columns(&[three(0), three(3), three(6)]).transpose();
             motion.pose.position = three(9);
             motion.twist.angular = three(12);
             motion.twist.linear = three(15);

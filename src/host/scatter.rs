@@ -197,7 +197,7 @@ fn draw_labels(root: &Area, points: &[(&Point, (i32, i32))]) -> Result<(), DrawE
     // From the top down, none closer than a line to the one above.
     let mut left: Vec<_> = by_label(|label| matches!(label, Label::Left(_))).collect();
     left.sort_by_key(|(_, at)| at.1);
-    let column = left.iter().map(|(_, (x, _))| *x - SIDESTEP).min().unwrap_or(0);
+    let column = points.iter().map(|(_, (x, _))| *x - SIDESTEP).min().unwrap_or(0);
     let mut next = i32::MIN;
     for (label, (x, y)) in left {
         let Label::Left(name) = label else { continue };
@@ -273,7 +273,11 @@ impl Ranged for LogAxis {
 
 impl ValueFormatter<f64> for LogAxis {
     fn format_ext(&self, value: &f64) -> String {
-        if (1.0..1e5).contains(value) { format!("{value:.0}") } else { power_of_ten(value.log10().round() as i32) }
+        if (1.0..1e5).contains(value) {
+            format!("{value:.0}")
+        } else {
+            power_of_ten(value.log10().round() as i32)
+        }
     }
 }
 

@@ -11,13 +11,13 @@
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
-use fearless_simd::{Simd, dispatch, f32x8, f64x8};
+use fearless_simd::{Level, Simd, dispatch, f32x8, f64x8};
 use nalgebra::{Matrix6, Vector6};
 
 use super::balance::{Balance, LaneWrench, wrench_columns};
 use super::inverse_geometry::LegGeometry;
 use super::ladder::{Exact, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs, Rung};
-use super::lanes::{Constant, Eight, Triples};
+use super::lanes::{Constant, Eight, Lane, Triples};
 use super::leg::{LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, LEGS, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
@@ -63,16 +63,19 @@ impl InverseDynamics {
 
     /// The six actuator forces Gamma \[N\] for a motion of the platform, `None` at a singular pose.
     pub fn forces<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
-        dispatch!(self.machine.level, simd => self.balanced::<_, f64x8<_>, M>(simd, motion))
+        let lane = dispatch!(self.machine.level, simd => self.balanced::<_, f64x8<_>, M>(simd, motion))?;
+        Some(self.joints.triples.unpack(&lane))
     }
 
     /// [`InverseDynamics::forces`] with lanes of single precision: errors of 1e-6 of the largest force
-    /// instead of 1e-15, more for a platform far from the base.
+    /// instead of 1e-15, more for a platform far from the base; a fifth faster.
     pub fn forces_f32<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
         // Outside of the lanes, so that they find its numbers in memory, ready to be spread: a third of the
         // time went into converting and spreading them one by one.
         let motion = &motion.single();
-        dispatch!(self.machine.level, simd => self.balanced::<_, f32x8<_>, M>(simd, motion))
+        let level = at_most_256_bits(self.machine.level);
+        let lane = dispatch!(level, simd => self.balanced::<_, f32x8<_>, M>(simd, motion))?;
+        Some(self.joints.triples.unpack(&lane))
     }
 
     /// [`InverseDynamics::forces`] of a rung chosen at run time.
@@ -87,12 +90,10 @@ impl InverseDynamics {
         }
     }
 
+    /// In lanes: sorting them is left to code for any CPU, which loads one number after the other. With
+    /// AVX-512 the compiler would gather them, and a gather has to wait until what it reads is in the cache.
     #[inline(always)]
-    fn balanced<S: Simd, V: Eight<S>, M: Model>(
-        &self,
-        simd: S,
-        motion: &Motion<V::Scalar>,
-    ) -> Option<[f64; LEGS]> {
+    fn balanced<S: Simd, V: Eight<S>, M: Model>(&self, simd: S, motion: &Motion<V::Scalar>) -> Option<Lane> {
         let legs = LegGeometry::<V>::new(simd, &self.joints, &motion.pose);
         let balance = Balance::new(simd, &self.joints, &legs);
         let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
@@ -142,6 +143,16 @@ impl InverseDynamics {
         }
         (wrench, reaction.along + self.drives.force(simd, velocity.rate, accel))
     }
+}
+
+/// Eight numbers of single precision fill a register of AVX2. The same lanes compiled for AVX-512 take a third
+/// longer, because of a few instructions of 512 bits at their edges.
+fn at_most_256_bits(level: Level) -> Level {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(avx2) = level.as_avx2() {
+        return Level::Avx2(avx2);
+    }
+    level
 }
 
 /// The forces of one motion, for those who need no second: a loop keeps an [`InverseDynamics`].

@@ -59,7 +59,8 @@ impl<V> LegGeometry<V> {
     where
         V: Eight<S>,
     {
-        let joint = Lanes3::spread(simd, &twist.linear) + Lanes3::spread(simd, &twist.angular).cross(self.arm);
+        let joint =
+            Lanes3::spread(simd, &twist.linear) + Lanes3::spread(simd, &twist.angular).cross(self.arm);
         let rate = self.direction.dot(joint);
         let direction = joint.plus_scaled(-rate, self.direction) * self.inverse_length;
         LegVelocity { rate, direction }

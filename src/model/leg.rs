@@ -92,7 +92,8 @@ impl LegConstants {
             first_moment: legs(m1 * e1 - m2 * e2, 0.0),
             rod_moment: legs(m2 * e2, 0.0),
             axial_inertia: legs(cylinder.axial_inertia + rod.axial_inertia, 0.0),
-            gravity: [machine.gravity.x, machine.gravity.y, machine.gravity.z].map(|g| Triples::uniform(g, [g; 2])),
+            gravity: [machine.gravity.x, machine.gravity.y, machine.gravity.z]
+                .map(|g| Triples::uniform(g, [g; 2])),
             legs_only: legs(1.0, 0.0),
             lumped_mass: legs(lumped_mass(machine), mass),
             platform_mass: legs(0.0, mass),
