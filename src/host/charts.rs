@@ -33,6 +33,8 @@ const CHART_POINTS: usize = 22_000;
 pub(super) const PALETTE: [u32; 6] = [0x0A6FD6, 0xB98A00, 0x008573, 0xC8430F, 0x4897E0, 0xC77BA8];
 pub(super) const INK: u32 = 0x59636E;
 const INK_ON_DARK: u32 = 0xB1BAC4;
+/// Dashed lines that lie on no other one; readable on both pages as it is.
+pub(super) const DASHED_INK: u32 = 0x6E7781;
 pub(super) const GRID: u32 = 0x8B949E;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -290,7 +292,7 @@ pub(super) fn rgb(color: u32) -> RGBColor {
 }
 
 /// A commanded line has a quarter of the brightness of the measured one. So it shows on top of it.
-pub(super) fn commanded(color: u32) -> u32 {
+fn commanded(color: u32) -> u32 {
     (color >> 2) & 0x3F_3F3F
 }
 
@@ -300,16 +302,19 @@ pub(super) fn text(size: i32, anchor: HPos) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&rgb(INK)).pos(Pos::new(anchor, VPos::Center))
 }
 
+const DASH: &str = "stroke-dasharray:60 50";
+
 /// Scales units to pixels, and adds the style that the backend cannot express.
 pub(super) fn finish(svg: &str, height: i32) -> String {
     let rule = |part: &str, of: u32, rule: &str| format!("[{part}=\"#{of:06X}\"]{{{rule}}}");
     let paint = |part: &str, from: u32, to: u32| rule(part, from, &format!("{part}:#{to:06X}"));
     let mut style =
         String::from("text{font-family:Helvetica,Arial,sans-serif}polyline{stroke-linejoin:round}");
+    style += &rule("stroke", DASHED_INK, DASH);
     let mut dark = paint("fill", INK, INK_ON_DARK) + &paint("stroke", INK, INK_ON_DARK);
     for color in PALETTE {
         let line = commanded(color);
-        style += &rule("stroke", line, "stroke-dasharray:60 50");
+        style += &rule("stroke", line, DASH);
         // Dark shades would vanish here, so they become light ones.
         dark += &paint("stroke", line, line + 0xC0_C0C0);
     }

@@ -10,8 +10,8 @@ use std::path::Path;
 use std::{format, prelude::rust_2024::*, vec};
 
 use super::charts::{
-    Area, ChartError, DrawError, GRID, INK, LEGEND_LINE, MARGIN, PALETTE, SAMPLE, Stroke, TICK, TITLE_HEIGHT,
-    UNIT, WIDTH, X_LABELS, Y_LABELS, commanded, finish, power_of_ten, rgb, save, text,
+    Area, ChartError, DASHED_INK, DrawError, GRID, INK, LEGEND_LINE, MARGIN, PALETTE, SAMPLE, Stroke, TICK,
+    TITLE_HEIGHT, UNIT, WIDTH, X_LABELS, Y_LABELS, finish, power_of_ten, rgb, save, text,
 };
 
 const HEIGHT: i32 = 560 * UNIT;
@@ -56,6 +56,7 @@ pub struct Point<'a> {
 pub struct Line {
     pub points: Vec<(f64, f64)>,
     pub style: Stroke,
+    /// Index into the palette; dashed lines are grey.
     pub color: usize,
     /// Wide and pale, or thin.
     pub wide: bool,
@@ -170,7 +171,7 @@ impl Line {
     fn stroke(&self) -> ShapeStyle {
         let color = palette(self.color);
         match (self.style, self.wide) {
-            (Stroke::Dashed, _) => rgb(commanded(color)).stroke_width(12),
+            (Stroke::Dashed, _) => rgb(DASHED_INK).stroke_width(15),
             (Stroke::Solid, true) => rgb(color).mix(0.35).stroke_width(60),
             (Stroke::Solid, false) => rgb(color).mix(0.6).stroke_width(10),
         }
