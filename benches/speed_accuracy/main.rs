@@ -259,7 +259,7 @@ impl Contender {
                 });
             }
             Way::Peer(peer) => {
-                if round % PEER_INTERVAL == 0 {
+                if round.is_multiple_of(PEER_INTERVAL) {
                     let report = peer.run(PEER_REPETITIONS, PEER_SAMPLE_S)?;
                     samples.add(report.throughput, report.latency);
                 }
