@@ -20,7 +20,7 @@ pub struct Peer {
 /// From the fastest to the slowest.
 pub const PEERS: [Peer; 8] = [
     Peer { name: "hand-lanes", program: "hand_vec", bench: "hand_soa_autovec+gauss6", goal: Some(1.9) },
-    Peer { name: "hand-scalar", program: "hand_scalar", bench: "hand_eigen_scalar+EigenLU", goal: Some(1.9) },
+    Peer { name: "hand-scalar", program: "hand_scalar", bench: "hand_eigen_scalar+gauss6", goal: Some(1.9) },
     Peer { name: "casadi-lu", program: "cas_bench", bench: "casadi_codegen_full_LU(fixed piv)", goal: None },
     Peer { name: "casadi-qr", program: "cas_bench", bench: "casadi_codegen_full_QR", goal: Some(3.5) },
     Peer {
