@@ -40,7 +40,7 @@ use timing::{Samples, sample};
 /// Anything that ends the run.
 type Failure = Box<dyn Error>;
 
-/// Samples of each method on each scene, spread over the run: a minute and a half, or half a minute.
+/// Samples of each method on each scene, spread over the run: in all a minute, or ten seconds.
 const ROUNDS: usize = 101;
 const QUICK_ROUNDS: usize = 15;
 

@@ -70,8 +70,8 @@ impl InverseDynamics {
     /// [`InverseDynamics::forces`] with lanes of single precision: errors of 1e-6 of the largest force
     /// instead of 1e-15, more for a platform far from the base; a fifth faster.
     pub fn forces_f32<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
-        // Outside of the lanes, so that they find its numbers in memory, ready to be spread: a third of the
-        // time went into converting and spreading them one by one.
+        // Outside of the lanes, so that they find its numbers in memory, ready to be spread: converting
+        // and spreading them one by one takes ten nanoseconds.
         let motion = &motion.single();
         let level = at_most_256_bits(self.machine.level);
         let lane = dispatch!(level, simd => self.balanced::<_, f32x8<_>, M>(simd, motion))?;
