@@ -11,17 +11,17 @@ use std::path::Path;
 use std::{format, fs, io, prelude::rust_2024::*, vec};
 
 /// Drawing units per pixel. The backend knows whole units only, and whole pixels would draw stairs.
-const UNIT: i32 = 10;
-const WIDTH: i32 = 900 * UNIT;
-const TITLE_HEIGHT: i32 = 28 * UNIT;
+pub(super) const UNIT: i32 = 10;
+pub(super) const WIDTH: i32 = 900 * UNIT;
+pub(super) const TITLE_HEIGHT: i32 = 28 * UNIT;
 const PLOT_HEIGHT: i32 = 230 * UNIT;
 const PANEL_GAP: i32 = 16 * UNIT;
-const TICK: i32 = 4 * UNIT;
-const MARGIN: i32 = 6 * UNIT;
-const X_LABELS: i32 = 42 * UNIT;
-const Y_LABELS: i32 = 78 * UNIT;
-const LEGEND_LINE: i32 = 19 * UNIT;
-const SAMPLE: i32 = 26 * UNIT;
+pub(super) const TICK: i32 = 4 * UNIT;
+pub(super) const MARGIN: i32 = 6 * UNIT;
+pub(super) const X_LABELS: i32 = 42 * UNIT;
+pub(super) const Y_LABELS: i32 = 78 * UNIT;
+pub(super) const LEGEND_LINE: i32 = 19 * UNIT;
+pub(super) const SAMPLE: i32 = 26 * UNIT;
 
 /// Most points drawn of one series, and of all together. The second bounds the size of the file.
 const SERIES_POINTS: usize = 1500;
@@ -30,13 +30,15 @@ const CHART_POINTS: usize = 22_000;
 /// Six legs. These have a contrast of at least 3:1 on white as well as on a dark page, because not every
 /// viewer tells the image which of the two it lies on. They differ in lightness too, for colour-blind
 /// readers.
-const PALETTE: [u32; 6] = [0x0A6FD6, 0xB98A00, 0x008573, 0xC8430F, 0x4897E0, 0xC77BA8];
-const INK: u32 = 0x59636E;
+pub(super) const PALETTE: [u32; 6] = [0x0A6FD6, 0xB98A00, 0x008573, 0xC8430F, 0x4897E0, 0xC77BA8];
+pub(super) const INK: u32 = 0x59636E;
 const INK_ON_DARK: u32 = 0xB1BAC4;
-const GRID: u32 = 0x8B949E;
+/// Dashed lines that lie on no other one; readable on both pages as it is.
+pub(super) const DASHED_INK: u32 = 0x6E7781;
+pub(super) const GRID: u32 = 0x8B949E;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type DrawError = DrawingAreaErrorKind<io::Error>;
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type DrawError = DrawingAreaErrorKind<io::Error>;
 
 /// Why a chart was not written.
 #[derive(Debug, thiserror::Error)]
@@ -110,7 +112,11 @@ pub struct Panel<'a> {
 ///
 /// The file appears complete or not at all.
 pub fn write_svg(path: &Path, title: &str, x_label: &str, panels: &[Panel]) -> Result<(), ChartError> {
-    let svg = draw(title, x_label, panels)?;
+    save(path, &draw(title, x_label, panels)?)
+}
+
+/// Writes the file, complete or not at all.
+pub(super) fn save(path: &Path, svg: &str) -> Result<(), ChartError> {
     let part = path.with_extension("svg.part");
     fs::write(&part, svg).and_then(|()| fs::rename(&part, path)).inspect_err(|_| {
         // Nothing more can be done if this fails as well.
@@ -239,12 +245,10 @@ impl Axis {
         if self.exponent == 0 {
             return label.into();
         }
-        let raised = |digit: u32| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize);
-        let digits = format!("{}", self.exponent);
-        let power: String = digits.chars().map(|c| c.to_digit(10).and_then(raised).unwrap_or('⁻')).collect();
+        let power = power_of_ten(self.exponent);
         match label.split_once('[') {
-            Some((quantity, unit)) => format!("{quantity}[10{power} {unit}"),
-            None => format!("{label} [10{power}]"),
+            Some((quantity, unit)) => format!("{quantity}[{power} {unit}"),
+            None => format!("{label} [{power}]"),
         }
     }
 }
@@ -274,7 +278,15 @@ impl ValueFormatter<f64> for Axis {
     }
 }
 
-fn rgb(color: u32) -> RGBColor {
+/// `10⁻⁶`
+pub(super) fn power_of_ten(exponent: i32) -> String {
+    let raised = |digit: u32| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit as usize);
+    let digits = format!("{exponent}");
+    let power: String = digits.chars().map(|c| c.to_digit(10).and_then(raised).unwrap_or('⁻')).collect();
+    format!("10{power}")
+}
+
+pub(super) fn rgb(color: u32) -> RGBColor {
     let [_, red, green, blue] = color.to_be_bytes();
     RGBColor(red, green, blue)
 }
@@ -284,22 +296,25 @@ fn commanded(color: u32) -> u32 {
     (color >> 2) & 0x3F_3F3F
 }
 
-fn text(size: i32, anchor: HPos) -> TextStyle<'static> {
+pub(super) fn text(size: i32, anchor: HPos) -> TextStyle<'static> {
     // The backend divides by the line height.
     let size = f64::from(size * UNIT) * 1.24;
     ("sans-serif", size).into_font().color(&rgb(INK)).pos(Pos::new(anchor, VPos::Center))
 }
 
+const DASH: &str = "stroke-dasharray:60 50";
+
 /// Scales units to pixels, and adds the style that the backend cannot express.
-fn finish(svg: &str, height: i32) -> String {
+pub(super) fn finish(svg: &str, height: i32) -> String {
     let rule = |part: &str, of: u32, rule: &str| format!("[{part}=\"#{of:06X}\"]{{{rule}}}");
     let paint = |part: &str, from: u32, to: u32| rule(part, from, &format!("{part}:#{to:06X}"));
     let mut style =
         String::from("text{font-family:Helvetica,Arial,sans-serif}polyline{stroke-linejoin:round}");
+    style += &rule("stroke", DASHED_INK, DASH);
     let mut dark = paint("fill", INK, INK_ON_DARK) + &paint("stroke", INK, INK_ON_DARK);
     for color in PALETTE {
         let line = commanded(color);
-        style += &rule("stroke", line, "stroke-dasharray:60 50");
+        style += &rule("stroke", line, DASH);
         // Dark shades would vanish here, so they become light ones.
         dark += &paint("stroke", line, line + 0xC0_C0C0);
     }

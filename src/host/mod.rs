@@ -16,6 +16,7 @@ mod numbers;
 pub mod offline;
 pub mod plant;
 pub mod report;
+pub mod scatter;
 pub mod setpoints;
 pub mod stop;
 pub mod table;

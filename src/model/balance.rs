@@ -22,7 +22,7 @@ use fearless_simd::Simd;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four, Lanes3, Triples};
+use super::lanes::{Eight, Four, Lane, Lanes3, Triples};
 use super::machine::{Joints, LEGS};
 use super::rigid::{Twist, Wrench};
 
@@ -92,14 +92,15 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
         Self { simd, joints, direction, moment, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, sound }
     }
 
-    /// `Gamma + along` with `N Gamma = W`; `None` at a singular pose.
+    /// `Gamma + along` with `N Gamma = W`, still in lanes; `None` at a singular pose.
     #[inline(always)]
-    pub fn forces(&self, wrench: &LaneWrench<V::Half>, along: V) -> Option<[f64; LEGS]> {
+    pub fn forces(&self, wrench: &LaneWrench<V::Half>, along: V) -> Option<Lane> {
         let simd = self.simd;
         let triples = &self.joints.triples;
         if !self.sound {
             let n = wrench_columns(triples, self.moment, self.direction);
-            return forces_by_lu(&n, &wrench.sum(), &triples.unpack(&along.store()));
+            let forces = forces_by_lu(&n, &wrench.sum(), &triples.unpack(&along.store()))?;
+            return Some(triples.pack(&forces));
         }
         let force = wrench.force.map(
             #[inline(always)]
@@ -117,7 +118,7 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
         let [g0, g1, g2] = broadcasts(simd, gamma_b);
         let [x0, x1, x2] = V::Half::transposed(simd, self.x);
         let gamma_a = g - g0 * x0 - g1 * x1 - g2 * x2;
-        Some(triples.unpack(&(V::join(gamma_a, gamma_b) + along).store()))
+        Some((V::join(gamma_a, gamma_b) + along).store())
     }
 
     /// `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.

@@ -56,7 +56,12 @@ pub fn solve(machine: &Machine, start: &Pose, lengths: &[f64; LEGS]) -> Solution
 }
 
 #[inline(always)]
-fn newton<S: Simd, V: Eight<S>>(simd: S, machine: &Machine, start: &Pose, target: &Lane) -> Solution {
+fn newton<S: Simd, V: Eight<S, Scalar = f64>>(
+    simd: S,
+    machine: &Machine,
+    start: &Pose,
+    target: &Lane,
+) -> Solution {
     let target = V::load(simd, target);
     let mut pose = *start;
     for iterations in 1..=MAX_ITERATIONS {

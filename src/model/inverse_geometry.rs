@@ -13,7 +13,7 @@
 use fearless_simd::{Simd, dispatch, f64x8};
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{Eight, Lanes3, Reals};
+use super::lanes::{Eight, Lane, Lanes3, Reals};
 use super::machine::{Joints, LEGS, Machine};
 use super::platform::acceleration_map;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
@@ -42,24 +42,25 @@ pub(super) struct LegVelocity<V> {
 
 impl<V> LegGeometry<V> {
     #[inline(always)]
-    pub fn new<S: Simd>(simd: S, joints: &Joints, pose: &Pose) -> Self
+    pub fn new<S: Simd>(simd: S, joints: &Joints, pose: &Pose<V::Scalar>) -> Self
     where
         V: Eight<S>,
     {
-        let arm = Lanes3::<V>::load(simd, &joints.platform)
-            .transformed(&pose.rotation, |value| V::splat(simd, value));
-        let s = Lanes3::splat(simd, &pose.position) + arm - Lanes3::load(simd, &joints.base);
+        let arm = Lanes3::<V>::constant(simd, &joints.platform)
+            .transformed(&pose.rotation, |value| V::spread(simd, value));
+        let s = Lanes3::spread(simd, &pose.position) + arm - Lanes3::constant(simd, &joints.base);
         let length = s.dot(s).sqrt();
         let inverse_length = V::splat(simd, 1.0) / length;
         Self { arm, direction: s * inverse_length, length, inverse_length }
     }
 
     #[inline(always)]
-    pub fn velocity<S: Simd>(&self, simd: S, twist: &Twist) -> LegVelocity<V>
+    pub fn velocity<S: Simd>(&self, simd: S, twist: &Twist<V::Scalar>) -> LegVelocity<V>
     where
         V: Eight<S>,
     {
-        let joint = Lanes3::splat(simd, &twist.linear) + Lanes3::splat(simd, &twist.angular).cross(self.arm);
+        let joint =
+            Lanes3::spread(simd, &twist.linear) + Lanes3::spread(simd, &twist.angular).cross(self.arm);
         let rate = self.direction.dot(joint);
         let direction = joint.plus_scaled(-rate, self.direction) * self.inverse_length;
         LegVelocity { rate, direction }
@@ -70,14 +71,14 @@ impl<V> LegGeometry<V> {
     pub fn joint_acceleration<S: Simd>(
         &self,
         simd: S,
-        acceleration: &Acceleration,
-        acceleration_map: &Matrix3<f64>,
+        acceleration: &Acceleration<V::Scalar>,
+        acceleration_map: &Matrix3<V::Scalar>,
     ) -> Lanes3<V>
     where
         V: Eight<S>,
     {
-        let relative = self.arm.transformed(acceleration_map, |value| V::splat(simd, value));
-        Lanes3::splat(simd, &acceleration.linear) + relative
+        let relative = self.arm.transformed(acceleration_map, |value| V::spread(simd, value));
+        Lanes3::spread(simd, &acceleration.linear) + relative
     }
 
     /// L''
@@ -101,7 +102,7 @@ pub struct LegMotion {
 
 /// Lengths, rates and accelerations of the six legs for a motion of the platform.
 pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
-    let unpack = |lane| machine.joints.triples.unpack(&lane);
+    let unpack = |lane: Lane| machine.joints.triples.unpack(&lane);
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, &motion.pose);
         let velocity = legs.velocity(simd, &motion.twist);

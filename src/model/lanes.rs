@@ -13,10 +13,11 @@
 //! is what `super::balance` lives on. Everything is generic over the instruction set and over the
 //! precision (f64 or f32), and is inlined into the one function that was dispatched for both.
 
+use core::borrow::Borrow;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use fearless_simd::{Simd, f32x4, f32x8, f64x4, f64x8, prelude::*};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, RealField, Vector3};
 
 use super::machine::LEGS;
 
@@ -25,11 +26,31 @@ use super::machine::LEGS;
 #[repr(align(64))]
 pub struct Lane(pub [f64; 8]);
 
-impl Lane {
-    /// Sets the first lane of padding.
-    pub(super) fn set_padding(&mut self, value: f64) {
-        let [_, _, _, padding, ..] = &mut self.0;
-        *padding = value;
+/// A constant of the machine, one number per lane, ready for either precision: converting it anew for
+/// each evaluation would cost more than single precision saves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Constant {
+    double: Lane,
+    single: [f32; 8],
+}
+
+impl Constant {
+    /// With the first lane of padding set to `value`.
+    pub(super) fn with_padding(&self, value: f64) -> Self {
+        let [a, b, c, _, d, e, f, g] = self.double.0;
+        Lane([a, b, c, value, d, e, f, g]).into()
+    }
+}
+
+impl From<Lane> for Constant {
+    fn from(double: Lane) -> Self {
+        Self { double, single: double.0.map(|value| value as f32) }
+    }
+}
+
+impl Borrow<Lane> for Constant {
+    fn borrow(&self) -> &Lane {
+        &self.double
     }
 }
 
@@ -82,13 +103,14 @@ impl Triples {
     }
 
     /// The same number for every leg, in whatever lane, and others for the padding.
-    pub(super) fn uniform(leg: f64, [first, second]: [f64; 2]) -> Lane {
-        Lane([leg, leg, leg, first, leg, leg, leg, second])
+    pub(super) fn uniform(leg: f64, [first, second]: [f64; 2]) -> Constant {
+        Lane([leg, leg, leg, first, leg, leg, leg, second]).into()
     }
 
     /// Lanes to one number per leg.
     #[inline(always)]
-    pub fn unpack(&self, lane: &Lane) -> [f64; LEGS] {
+    pub fn unpack(&self, lane: &impl Borrow<Lane>) -> [f64; LEGS] {
+        let lane = lane.borrow();
         // The remainder tells the compiler that there is nothing to check.
         self.lanes.map(|index| lane.0.get(index % 8).copied().unwrap_or_default())
     }
@@ -99,8 +121,8 @@ impl Triples {
     }
 
     /// Three lanes back to six 3-vectors.
-    pub fn unpack_vectors(&self, [x, y, z]: &[Lane; 3]) -> [Vector3<f64>; LEGS] {
-        let (x, y, z) = (self.unpack(x), self.unpack(y), self.unpack(z));
+    pub fn unpack_vectors(&self, [x, y, z]: &[impl Borrow<Lane>; 3]) -> [Vector3<f64>; LEGS] {
+        let (x, y, z) = (self.unpack(x.borrow()), self.unpack(y.borrow()), self.unpack(z.borrow()));
         let mut legs = [Vector3::zeros(); LEGS];
         for (leg, ((x, y), z)) in legs.iter_mut().zip(x.into_iter().zip(y).zip(z)) {
             *leg = Vector3::new(x, y, z);
@@ -124,10 +146,16 @@ pub(super) trait Reals:
 
 /// Eight lanes: all legs.
 pub(super) trait Eight<S: Simd>: Reals {
+    /// One number.
+    type Scalar: RealField + Copy + Default;
     /// One triple.
-    type Half: Four<S>;
+    type Half: Four<S, Scalar = Self::Scalar>;
+    /// A constant in all lanes.
     fn splat(simd: S, value: f64) -> Self;
+    /// A number in all lanes.
+    fn spread(simd: S, value: Self::Scalar) -> Self;
     fn load(simd: S, lane: &Lane) -> Self;
+    fn constant(simd: S, constant: &Constant) -> Self;
     fn store(self) -> Lane;
     fn halves(self) -> (Self::Half, Self::Half);
     fn join(first: Self::Half, second: Self::Half) -> Self;
@@ -135,7 +163,12 @@ pub(super) trait Eight<S: Simd>: Reals {
 
 /// Four lanes: one triple, and a lane of padding.
 pub(super) trait Four<S: Simd>: Reals {
+    /// One number.
+    type Scalar: RealField + Copy + Default;
+    /// A constant in all lanes.
     fn splat(simd: S, value: f64) -> Self;
+    /// A number in all lanes.
+    fn spread(simd: S, value: Self::Scalar) -> Self;
     fn load(simd: S, values: [f64; 4]) -> Self;
     /// In each lane, the next leg of the triple: `[1 2 0 -]`.
     fn next(self, simd: S) -> Self;
@@ -181,9 +214,14 @@ macro_rules! reals {
 }
 
 macro_rules! precision {
-    ($scalar:ty, $eight:ident, $four:ident) => {
+    ($scalar:ty, $eight:ident, $four:ident, $constant:expr) => {
         impl<S: Simd> Eight<S> for $eight<S> {
+            type Scalar = $scalar;
             type Half = $four<S>;
+            #[inline(always)]
+            fn spread(simd: S, value: $scalar) -> Self {
+                SimdBase::splat(simd, value)
+            }
             #[inline(always)]
             fn splat(simd: S, value: f64) -> Self {
                 SimdBase::splat(simd, value as $scalar)
@@ -191,6 +229,11 @@ macro_rules! precision {
             #[inline(always)]
             fn load(simd: S, lane: &Lane) -> Self {
                 SimdBase::load_array(simd, lane.0.map(|value| value as $scalar))
+            }
+            #[inline(always)]
+            fn constant(simd: S, constant: &Constant) -> Self {
+                let lanes: fn(&Constant) -> [$scalar; 8] = $constant;
+                SimdBase::load_array(simd, lanes(constant))
             }
             #[inline(always)]
             fn store(self) -> Lane {
@@ -207,6 +250,11 @@ macro_rules! precision {
         }
 
         impl<S: Simd> Four<S> for $four<S> {
+            type Scalar = $scalar;
+            #[inline(always)]
+            fn spread(simd: S, value: $scalar) -> Self {
+                SimdBase::splat(simd, value)
+            }
             #[inline(always)]
             fn splat(simd: S, value: f64) -> Self {
                 SimdBase::splat(simd, value as $scalar)
@@ -265,8 +313,8 @@ macro_rules! precision {
 }
 
 reals!(f64x8, f64x4, f32x8, f32x4);
-precision!(f64, f64x8, f64x4);
-precision!(f32, f32x8, f32x4);
+precision!(f64, f64x8, f64x4, |constant| constant.double.0);
+precision!(f32, f32x8, f32x4, |constant| constant.single);
 
 /// A 3-vector per lane.
 #[derive(Clone, Copy)]
@@ -303,10 +351,10 @@ impl<V: Reals> Lanes3<V> {
         self.plus_scaled(-s, b)
     }
 
-    /// `m self`, the same matrix in all lanes; `splat` takes a number there.
+    /// `m self`, the same matrix in all lanes; `spread` takes a number there.
     #[inline(always)]
-    pub fn transformed(self, m: &Matrix3<f64>, splat: impl Fn(f64) -> V) -> Self {
-        let column = |x, y, z| Self { x: splat(x), y: splat(y), z: splat(z) };
+    pub fn transformed<T: RealField + Copy>(self, m: &Matrix3<T>, spread: impl Fn(T) -> V) -> Self {
+        let column = |x, y, z| Self { x: spread(x), y: spread(y), z: spread(z) };
         (column(m.m13, m.m23, m.m33) * self.z)
             .plus_scaled(self.y, column(m.m12, m.m22, m.m32))
             .plus_scaled(self.x, column(m.m11, m.m21, m.m31))
@@ -321,20 +369,20 @@ impl<V: Reals> Lanes3<V> {
 impl<V> Lanes3<V> {
     /// A different vector in each lane.
     #[inline(always)]
-    pub fn load<S: Simd>(simd: S, [x, y, z]: &[Lane; 3]) -> Self
+    pub fn constant<S: Simd>(simd: S, [x, y, z]: &[Constant; 3]) -> Self
     where
         V: Eight<S>,
     {
-        Self { x: V::load(simd, x), y: V::load(simd, y), z: V::load(simd, z) }
+        Self { x: V::constant(simd, x), y: V::constant(simd, y), z: V::constant(simd, z) }
     }
 
     /// The same vector in all lanes.
     #[inline(always)]
-    pub fn splat<S: Simd>(simd: S, v: &Vector3<f64>) -> Self
+    pub fn spread<S: Simd>(simd: S, v: &Vector3<V::Scalar>) -> Self
     where
         V: Eight<S>,
     {
-        Self { x: V::splat(simd, v.x), y: V::splat(simd, v.y), z: V::splat(simd, v.z) }
+        Self { x: V::spread(simd, v.x), y: V::spread(simd, v.y), z: V::spread(simd, v.z) }
     }
 
     /// Back to memory.

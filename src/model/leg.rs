@@ -35,7 +35,7 @@ use fearless_simd::Simd;
 
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
 use super::ladder::{Legs, Model};
-use super::lanes::{Eight, Lane, Lanes3, Triples};
+use super::lanes::{Constant, Eight, Lanes3, Triples};
 use super::machine::{LEGS, Machine};
 use super::task::TaskState;
 
@@ -50,20 +50,22 @@ pub(super) const YY_MIN: f64 = 1e-12;
 #[derive(Clone, Debug)]
 pub(super) struct LegConstants {
     /// `Jt = jt[0] L^2 + jt[1] L + jt[2]`: the transverse inertias are quadratic in L as well.
-    jt: [Lane; 3],
+    jt: [Constant; 3],
     /// m2, and `m1 e1 - m2 e2`.
-    rod_mass: Lane,
-    first_moment: Lane,
+    rod_mass: Constant,
+    first_moment: Constant,
     /// `m2 e2`
-    rod_moment: Lane,
+    rod_moment: Constant,
     /// `Ix1 + Ix2`
-    axial_inertia: Lane,
+    axial_inertia: Constant,
+    /// g in every lane.
+    gravity: [Constant; 3],
     /// 1 for legs, 0 for padding.
-    legs_only: Lane,
+    legs_only: Constant,
     /// What of the leg hangs on B in the lumped model; the platform's mass in its padding.
-    lumped_mass: Lane,
+    lumped_mass: Constant,
     /// The padding alone.
-    platform_mass: Lane,
+    platform_mass: Constant,
 }
 
 impl LegConstants {
@@ -90,6 +92,8 @@ impl LegConstants {
             first_moment: legs(m1 * e1 - m2 * e2, 0.0),
             rod_moment: legs(m2 * e2, 0.0),
             axial_inertia: legs(cylinder.axial_inertia + rod.axial_inertia, 0.0),
+            gravity: [machine.gravity.x, machine.gravity.y, machine.gravity.z]
+                .map(|g| Triples::uniform(g, [g; 2])),
             legs_only: legs(1.0, 0.0),
             lumped_mass: legs(lumped_mass(machine), mass),
             platform_mass: legs(0.0, mass),
@@ -128,8 +132,8 @@ impl<V> LegReaction<V> {
     where
         V: Eight<S>,
     {
-        let load = |lane: &Lane| V::load(simd, lane);
-        let gravity = Lanes3::<V>::splat(simd, &machine.gravity);
+        let load = |lane: &Constant| V::constant(simd, lane);
+        let gravity = Lanes3::<V>::constant(simd, &constants.gravity);
         if M::LEGS != Legs::Links {
             // Points at B, the platform's among them: nothing is projected.
             let mass =
@@ -175,7 +179,7 @@ fn spin<S: Simd, V: Eight<S>>(
     sum: Lanes3<V>,
 ) -> Lanes3<V> {
     let (n, n_rate) = (legs.direction, velocity.direction);
-    let u = Lanes3::<V>::load(simd, &machine.joints.universal_axis);
+    let u = Lanes3::<V>::constant(simd, &machine.joints.universal_axis);
     let k = u.cross(n);
     let inverse_yy = V::splat(simd, 1.0) / k.dot(k).max(V::splat(simd, YY_MIN));
     let (un, un_rate, p) = (u.dot(n), u.dot(n_rate), n_rate.dot(k));

@@ -1,6 +1,6 @@
 //! The machine: every constant the equations need, validated once and immutable afterwards.
 //!
-//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`Lane`]): one array per
+//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`Constant`]): one array per
 //! coordinate, so that all six are evaluated by the same instructions.
 //!
 //! What this file does not do: read or judge values. `host::config` does, and names key, value and bound.
@@ -8,7 +8,7 @@
 use fearless_simd::Level;
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{Lane, Triples};
+use super::lanes::{Constant, Triples};
 use super::rigid::Pose;
 
 /// Number of legs.
@@ -52,11 +52,11 @@ pub struct Joints {
     /// Which leg is in which lane.
     pub triples: Triples,
     /// `A_i`, joint centres on the base, in base axes \[m\].
-    pub base: [Lane; 3],
+    pub base: [Constant; 3],
     /// `CB_i`, joint centres on the platform, in platform axes \[m\].
-    pub platform: [Lane; 3],
+    pub platform: [Constant; 3],
     /// `u_i`, first axis of the universal joint, fixed in the base, unit length.
-    pub universal_axis: [Lane; 3],
+    pub universal_axis: [Constant; 3],
     /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. Turns
     /// radians into metres wherever a tolerance must not depend on the size of the machine.
     pub radius: f64,
@@ -83,9 +83,9 @@ impl Joints {
         let radius = mean_square.sqrt();
         Self {
             triples,
-            base: triples.pack_vectors(base),
-            platform: triples.pack_vectors(platform),
-            universal_axis: triples.pack_vectors(universal_axis),
+            base: triples.pack_vectors(base).map(Constant::from),
+            platform: triples.pack_vectors(platform).map(Constant::from),
+            universal_axis: triples.pack_vectors(universal_axis).map(Constant::from),
             radius,
             radius_cubed: radius * radius * radius,
         }
@@ -96,10 +96,10 @@ impl Joints {
     pub(super) fn with_point(&self, point: &Vector3<f64>) -> Self {
         let mut joints = self.clone();
         for (lane, value) in joints.platform.iter_mut().zip(point.iter()) {
-            lane.set_padding(*value);
+            *lane = lane.with_padding(*value);
         }
         let far = 1e3 * (self.radius + point.norm());
-        joints.base.iter_mut().for_each(|lane| lane.set_padding(far));
+        joints.base = joints.base.map(|lane| lane.with_padding(far));
         joints
     }
 }

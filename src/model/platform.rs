@@ -16,7 +16,7 @@
 //! about the centre of mass beside moments about C, without the parallel-axis term, which here is `c x f`.
 
 use fearless_simd::Simd;
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, RealField, SymmetricEigen, Vector3};
 
 use super::lanes::{Four, Lanes3};
 use super::machine::Machine;
@@ -43,18 +43,21 @@ impl PrincipalAxes {
     pub fn torques<S: Simd, F: Four<S>>(
         &self,
         simd: S,
-        rotation: &Matrix3<f64>,
-        acceleration_map: &Matrix3<f64>,
+        rotation: &Matrix3<F::Scalar>,
+        acceleration_map: &Matrix3<F::Scalar>,
     ) -> Lanes3<F> {
         let [x, y, z] = self.0.map(|row| F::load(simd, row));
-        let p = Lanes3 { x, y, z }.transformed(rotation, |value| F::splat(simd, value));
-        p.cross(p.transformed(acceleration_map, |value| F::splat(simd, value)))
+        let p = Lanes3 { x, y, z }.transformed(rotation, |value| F::spread(simd, value));
+        p.cross(p.transformed(acceleration_map, |value| F::spread(simd, value)))
     }
 }
 
 /// S, which takes a point of the platform (from C, in base axes) to its acceleration relative to C.
 #[inline(always)]
-pub(super) fn acceleration_map(twist: &Twist, acceleration: &Acceleration) -> Matrix3<f64> {
+pub(super) fn acceleration_map<T: RealField + Copy>(
+    twist: &Twist<T>,
+    acceleration: &Acceleration<T>,
+) -> Matrix3<T> {
     let (w, a) = (&twist.angular, &acceleration.angular);
     let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
     let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);

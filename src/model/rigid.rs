@@ -1,32 +1,32 @@
 //! Pose, twist, acceleration and wrench of the mobile platform: distinct types for distinct things.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, RealField, Vector3, Vector6};
 
 /// Where the platform is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub struct Pose<T: RealField + Copy = f64> {
     /// R, platform axes expressed in base axes.
-    pub rotation: Matrix3<f64>,
+    pub rotation: Matrix3<T>,
     /// C, the platform origin in base axes \[m\].
-    pub position: Vector3<f64>,
+    pub position: Vector3<T>,
 }
 
 /// How the platform moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Twist {
+pub struct Twist<T: RealField + Copy = f64> {
     /// omega, base axes \[rad/s\].
-    pub angular: Vector3<f64>,
+    pub angular: Vector3<T>,
     /// v, velocity of C, base axes \[m/s\].
-    pub linear: Vector3<f64>,
+    pub linear: Vector3<T>,
 }
 
 /// Time derivative of the twist, part by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Acceleration {
+pub struct Acceleration<T: RealField + Copy = f64> {
     /// omega', base axes \[rad/s^2\].
-    pub angular: Vector3<f64>,
+    pub angular: Vector3<T>,
     /// v', acceleration of C, base axes \[m/s^2\].
-    pub linear: Vector3<f64>,
+    pub linear: Vector3<T>,
 }
 
 /// What acts on the platform.
@@ -40,10 +40,25 @@ pub struct Wrench {
 
 /// Pose, twist and acceleration at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion {
-    pub pose: Pose,
-    pub twist: Twist,
-    pub acceleration: Acceleration,
+pub struct Motion<T: RealField + Copy = f64> {
+    pub pose: Pose<T>,
+    pub twist: Twist<T>,
+    pub acceleration: Acceleration<T>,
+}
+
+impl Motion {
+    /// Rounded to single precision.
+    pub fn single(&self) -> Motion<f32> {
+        let Self { pose, twist, acceleration } = self;
+        Motion {
+            pose: Pose { rotation: pose.rotation.cast(), position: pose.position.cast() },
+            twist: Twist { angular: twist.angular.cast(), linear: twist.linear.cast() },
+            acceleration: Acceleration {
+                angular: acceleration.angular.cast(),
+                linear: acceleration.linear.cast(),
+            },
+        }
+    }
 }
 
 impl Twist {

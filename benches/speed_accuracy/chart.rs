@@ -1,0 +1,158 @@
+//! The figure: time of one evaluation against its largest error.
+//!
+//! One point per method: the mean time over the scenes and the worst error of the three machines, a disc for
+//! the fast scenes and a ring for the slow ones, joined where they differ. The peers have their own scene.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use hexad::host::charts::Stroke;
+use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, pareto_front};
+use hexad::model::ladder::Rung;
+
+use super::Failure;
+use super::methods::BASELINE;
+use super::results::{PAPER, Row};
+use super::scenes::Pace;
+
+const DOUBLE: usize = 0;
+const SINGLE: usize = 1;
+const DENSE: usize = 2;
+const PEER: usize = 3;
+
+/// A front goes down by at least this factor: one rounding error is as good as another.
+const BETTER: f64 = 0.5;
+
+/// What is drawn of one method.
+struct Item {
+    name: String,
+    ns: f64,
+    /// Largest errors.
+    fast: f64,
+    slow: Option<f64>,
+    color: usize,
+    side: Side,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Left,
+    Flag,
+    None,
+}
+
+pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
+    let items = items(rows);
+    let (mut points, mut lines) = (vec![], vec![]);
+    let fast = pareto_front(items.iter().map(|item| (item.ns, item.fast)), BETTER);
+    let slow = pareto_front(items.iter().filter_map(|item| Some((item.ns, item.slow?))), BETTER);
+    lines.push(Line { points: fast, style: Stroke::Solid, color: DOUBLE, wide: true });
+    lines.push(Line { points: slow, style: Stroke::Dashed, color: DOUBLE, wide: true });
+    for item in &items {
+        let label = match item.side {
+            Side::Left => Label::Left(&item.name),
+            Side::Flag => Label::Flag(&item.name),
+            Side::None => Label::None,
+        };
+        let color = item.color;
+        points.push(Point { at: (item.ns, item.fast), mark: Mark::Disc, color, label });
+        // A ring on top of its disc says nothing.
+        if let Some(slow) = item.slow.filter(|slow| *slow < 0.5 * item.fast) {
+            points.push(Point { at: (item.ns, slow), mark: Mark::Ring, color, label: Label::None });
+            let points = vec![(item.ns, item.fast), (item.ns, slow)];
+            lines.push(Line { points, style: Stroke::Solid, color, wide: false });
+        }
+    }
+    let best = |precision| written(best_isa(rows, precision));
+    let double_fast = format!("hexad f64 on {}, fast scenes", best("f64"));
+    let single_fast = format!("hexad f32 on {}, fast scenes", best("f32"));
+    let chart = Scatter {
+        title: "Inverse dynamics of a hexapod: time and error of one evaluation",
+        x_label: "time of one evaluation, one core [ns]",
+        y_label: "largest error of a force / largest force",
+        x: 10.0..50e3,
+        y: 1e-16..10.0,
+        points,
+        lines,
+        legend: vec![
+            (Sample::Mark(Mark::Disc, DOUBLE), &double_fast),
+            (Sample::Mark(Mark::Ring, DOUBLE), "slow scenes"),
+            (Sample::Mark(Mark::Disc, SINGLE), &single_fast),
+            (Sample::Mark(Mark::Disc, PEER), "others, exact, f64"),
+            (Sample::Mark(Mark::Disc, DENSE), "the paper's dense matrices"),
+            (Sample::Line(Stroke::Solid, DOUBLE), "Pareto front, fast"),
+            (Sample::Line(Stroke::Dashed, DOUBLE), "Pareto front, slow"),
+        ],
+    };
+    chart.write_svg(path)?;
+    Ok(())
+}
+
+/// Of hexad every rung on the best instruction set, and the exact model on all of them.
+fn items(rows_of_all: &[Row]) -> Vec<Item> {
+    let mut methods: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
+    for row in rows_of_all {
+        methods.entry((row.method, row.precision, row.isa)).or_default().push(row);
+    }
+    let mut items = vec![];
+    for ((method, precision, isa), rows) in methods {
+        let rung = Rung::ALL.iter().any(|rung| rung.name() == method);
+        let exact = method == "exact";
+        let best = best_isa(rows_of_all, precision);
+        if rung && isa != best && !(exact && precision == "f64") {
+            continue;
+        }
+        let peer = !rung && method != PAPER;
+        // A peer has no machine but its own; hexad has errors on the other three.
+        let worst = |pace: Pace| {
+            let errors = rows.iter().filter(|row| row.pace == pace).map(|row| row.errors.max);
+            errors.reduce(f64::max)
+        };
+        let times = rows.iter().map(|row| row.samples.throughput());
+        let (color, side) = match (rung, precision) {
+            (true, "f32") => (SINGLE, if exact { Side::Flag } else { Side::None }),
+            (true, _) => (DOUBLE, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
+            (false, _) => (if peer { PEER } else { DENSE }, Side::Flag),
+        };
+        let name = match (rung, exact, precision) {
+            (true, true, "f32") => "exact, f32".into(),
+            (true, true, _) => format!("exact, {}", written(isa)),
+            _ => written(method),
+        };
+        items.push(Item {
+            name,
+            ns: times.sum::<f64>() / rows.len() as f64,
+            fast: worst(if peer { Pace::Peers } else { Pace::Fast }).unwrap_or(f64::NAN),
+            slow: if peer { None } else { worst(Pace::Slow) },
+            color,
+            side,
+        });
+    }
+    items
+}
+
+/// The best instruction set of a precision: its rows begin with it.
+fn best_isa(rows: &[Row], precision: &str) -> &'static str {
+    rows.iter().find(|row| row.precision == precision).map_or("", |row| row.isa)
+}
+
+/// As people write it.
+fn written(name: &str) -> String {
+    let known = [
+        ("avx512", "AVX-512"),
+        ("avx2", "AVX2"),
+        ("sse2", "SSE2"),
+        ("neon", "NEON"),
+        ("hand-lanes", "C++ by hand, lanes"),
+        ("hand-scalar", "C++ by hand, scalar"),
+        ("casadi-lu", "CasADi, fixed LU"),
+        ("casadi-qr", "CasADi, QR"),
+        ("pinocchio-typed", "Pinocchio, typed"),
+        ("pinocchio-rnea", "Pinocchio, rnea"),
+        ("mujoco-lean", "MuJoCo, lean"),
+        ("mujoco-inverse", "MuJoCo, mj_inverse"),
+        (PAPER, "dense form"),
+    ];
+    let found = known.iter().find(|(known, _)| *known == name);
+    found.map_or_else(|| name.replace('-', " "), |(_, written)| (*written).into())
+}

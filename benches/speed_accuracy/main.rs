@@ -1,0 +1,282 @@
+//! How long one evaluation of the inverse dynamics takes, and how far its forces are from the right ones:
+//! `cargo bench --bench speed_accuracy`.
+//!
+//! Every rung of the ladder in both precisions on every instruction set of this CPU, the paper's own dense
+//! form, and, once `benches/peers/run.sh` has built them, what others would use. On a slow and a fast scene
+//! of three machines and on the peers' own (see `scenes.rs`). Writes `benches/charts/speed_accuracy.csv` and
+//! `.svg`, and prints how many times faster the exact model is than each peer in the same run.
+//!
+//! `-- --quick` takes fewer samples. `-- --count exact` only evaluates, for instruction counts:
+//!
+//! ```text
+//! valgrind --tool=callgrind target/release/deps/speed_accuracy-* --count exact --evaluations 10000
+//! ```
+
+mod chart;
+mod methods;
+mod paper;
+mod peers;
+mod results;
+mod scenes;
+mod timing;
+
+use std::error::Error;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use fearless_simd::Level;
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::ladder::Rung;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use methods::{BASELINE, Method, Precision, instruction_sets};
+use peers::{PEERS, Peer};
+use results::{Row, print_ratios, write_csv};
+use scenes::Scene;
+use timing::{Samples, sample};
+
+/// Anything that ends the run.
+type Failure = Box<dyn Error>;
+
+/// Samples of each method on each scene, spread over the run: in all a minute, or ten seconds.
+const ROUNDS: usize = 101;
+const QUICK_ROUNDS: usize = 15;
+
+/// Length of one sample \[s\]: a thousand times what reading the clock takes.
+const SAMPLE_S: f64 = 0.3e-3;
+
+/// Every so many rounds the peers run as well; each run of theirs is a median of so many samples of theirs.
+const PEER_INTERVAL: usize = 3;
+const PEER_REPETITIONS: usize = 15;
+const PEER_SAMPLE_S: f64 = 1e-3;
+
+/// Largest error of the exact model against the peers' reference: they do the same work, or the comparison
+/// of their times means nothing.
+const AGREEMENT: f64 = 1e-14;
+
+/// Speed and accuracy of the inverse dynamics.
+#[derive(Parser)]
+struct Arguments {
+    /// Fewer samples: within 40 s.
+    #[arg(long)]
+    quick: bool,
+    /// Evaluates one rung (its name on the command line of hexad) and nothing else.
+    #[arg(long, value_name = "RUNG")]
+    count: Option<String>,
+    /// Single precision; with --count.
+    #[arg(long, requires = "count")]
+    single: bool,
+    /// Instruction set, the best if absent; with --count.
+    #[arg(long, requires = "count")]
+    isa: Option<String>,
+    /// How many; with --count.
+    #[arg(long, requires = "count", default_value_t = 10_000)]
+    evaluations: usize,
+    /// What `cargo bench` adds.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match &arguments.count {
+        Some(rung) => count(&arguments, rung),
+        None => compare(arguments.quick),
+    };
+    outcome.map_or_else(
+        |failure| {
+            eprintln!("{failure}");
+            ExitCode::FAILURE
+        },
+        |()| ExitCode::SUCCESS,
+    )
+}
+
+/// Evaluates one method so many times, on the fast scene of the first machine.
+fn count(arguments: &Arguments, rung: &str) -> Result<(), Failure> {
+    let rung = Rung::ALL.into_iter().find(|known| known.name() == rung);
+    let rung =
+        rung.ok_or_else(|| format!("no such rung; one of {}", Rung::ALL.map(Rung::name).join(", ")))?;
+    let precision = if arguments.single { Precision::F32 } else { Precision::F64 };
+    let sets = instruction_sets(precision);
+    let wanted = |name: &str| arguments.isa.as_ref().is_none_or(|isa| isa == name);
+    let names = sets.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let set = sets.into_iter().find(|(name, _)| wanted(name));
+    let (isa, level) = set.ok_or_else(|| format!("not on this CPU; one of {names}"))?;
+    let method = Method::new(rung, precision);
+    let scene = Scene::of_machines()?.into_iter().nth(1).ok_or("no scene")?;
+    let dynamics = InverseDynamics::new(&scene.machine_on(level));
+    let passes = arguments.evaluations.div_ceil(scene.motions.len());
+    (method.sample)(&dynamics, &scene.motions, passes, false);
+    println!("{} {isa}: {} evaluations", rung.name(), passes * scene.motions.len());
+    Ok(())
+}
+
+/// Everything against everything.
+fn compare(quick: bool) -> Result<(), Failure> {
+    let begin = Instant::now();
+    let scenes = scenes()?;
+    let mut contenders = contenders(&scenes)?;
+    let rounds = if quick { QUICK_ROUNDS } else { ROUNDS };
+    let style = ProgressStyle::with_template("{bar:40} {pos} of {len} rounds, {eta} left")?;
+    let bar = ProgressBar::new(rounds as u64).with_style(style);
+    for round in 0..rounds {
+        for contender in &mut contenders {
+            contender.take(&scenes, round)?;
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let rows: Vec<Row> = contenders.into_iter().map(|contender| contender.row).collect();
+
+    agree(&rows)?;
+    print_ratios(&rows);
+    println!("{} methods on scenes, {rounds} rounds, {:.0} s", rows.len(), begin.elapsed().as_secs_f64());
+    if cfg!(debug_assertions) {
+        println!("a debug build: these times mean nothing and nothing was written; use cargo bench");
+        return Ok(());
+    }
+    let charts = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/charts");
+    std::fs::create_dir_all(&charts)?;
+    write_csv(&charts.join("speed_accuracy.csv"), &rows)?;
+    chart::write(&charts.join("speed_accuracy.svg"), &rows)?;
+    println!("written: {}/speed_accuracy.csv and .svg", charts.display());
+    Ok(())
+}
+
+/// Those of the machines, and the peers' where they have been built.
+fn scenes() -> Result<Vec<Scene>, Failure> {
+    let mut scenes = Scene::of_machines()?;
+    if let Some(inputs) = peers::inputs()? {
+        scenes.push(Scene::of_peers(&inputs)?);
+    }
+    let missing: Vec<_> = PEERS.iter().filter(|peer| !peer.is_built()).map(|peer| peer.name).collect();
+    if !missing.is_empty() {
+        println!("without {}: not built; {} does it", missing.join(", "), peers::BUILD);
+    }
+    Ok(scenes)
+}
+
+/// Who takes part, with errors known and times still to be measured.
+fn contenders(scenes: &[Scene]) -> Result<Vec<Contender>, Failure> {
+    let mut contenders = vec![];
+    for (index, scene) in scenes.iter().enumerate() {
+        for precision in Precision::ALL {
+            for (isa, level) in instruction_sets(precision) {
+                let methods = Rung::ALL.map(|rung| Method::new(rung, precision));
+                contenders.extend(methods.map(|method| Contender::hexad(scene, index, method, isa, level)));
+            }
+        }
+        contenders.extend(Contender::paper(scene, index));
+    }
+    for peer in PEERS.iter().filter(|peer| peer.is_built()) {
+        contenders.push(Contender::peer(peer)?);
+    }
+    Ok(contenders)
+}
+
+/// A row in the making.
+struct Contender {
+    row: Row,
+    way: Way,
+}
+
+/// What is timed.
+enum Way {
+    Hexad { scene: usize, method: Method, dynamics: Box<InverseDynamics> },
+    Paper { scene: usize },
+    Peer(&'static Peer),
+}
+
+impl Contender {
+    fn hexad(scene: &Scene, index: usize, method: Method, isa: &'static str, level: Level) -> Self {
+        let dynamics = Box::new(InverseDynamics::new(&scene.machine_on(level)));
+        let errors = scene.errors(scene.motions.iter().map(|motion| (method.forces)(&dynamics, motion)));
+        let row = Row {
+            method: method.rung.name(),
+            precision: method.precision.name(),
+            isa,
+            scene: scene.name.clone(),
+            pace: scene.pace,
+            samples: Samples::default(),
+            errors,
+        };
+        Self { row, way: Way::Hexad { scene: index, method, dynamics } }
+    }
+
+    /// The dense form: its slow scenes are compared with the exact model, because it is their reference.
+    fn paper(scene: &Scene, index: usize) -> Option<Self> {
+        let machine = scene.paper_machine.as_ref()?;
+        let dynamics = InverseDynamics::new(&scene.machine);
+        let exact = Method::new(Rung::Exact, Precision::F64).forces;
+        let errors = match scene.pace {
+            scenes::Pace::Slow => scene.errors(scene.motions.iter().map(|motion| exact(&dynamics, motion))),
+            _ => scene.errors(scene.states.iter().map(|state| Some(paper::forces(machine, state).into()))),
+        };
+        let row = Row {
+            method: results::PAPER,
+            precision: "f64",
+            isa: BASELINE,
+            scene: scene.name.clone(),
+            pace: scene.pace,
+            samples: Samples::default(),
+            errors,
+        };
+        Some(Self { row, way: Way::Paper { scene: index } })
+    }
+
+    fn peer(peer: &'static Peer) -> Result<Self, Failure> {
+        let row = Row {
+            method: peer.name,
+            precision: "f64",
+            isa: "native",
+            scene: "peers".into(),
+            pace: scenes::Pace::Peers,
+            samples: Samples::default(),
+            errors: peer.run(1, 0.0)?.errors,
+        };
+        Ok(Self { row, way: Way::Peer(peer) })
+    }
+
+    /// One sample of each kind.
+    fn take(&mut self, scenes: &[Scene], round: usize) -> Result<(), Failure> {
+        let samples = &mut self.row.samples;
+        match &self.way {
+            Way::Hexad { scene, method, dynamics } => {
+                let Some(Scene { motions, .. }) = scenes.get(*scene) else { return Ok(()) };
+                samples.take(motions.len(), SAMPLE_S, |passes, fenced| {
+                    (method.sample)(dynamics, motions, passes, fenced)
+                });
+            }
+            Way::Paper { scene } => {
+                let Some(Scene { states, paper_machine: Some(machine), .. }) = scenes.get(*scene) else {
+                    return Ok(());
+                };
+                samples.take(states.len(), SAMPLE_S, |passes, fenced| {
+                    sample(states, passes, fenced, |state| paper::forces(machine, state))
+                });
+            }
+            Way::Peer(peer) => {
+                if round.is_multiple_of(PEER_INTERVAL) {
+                    let report = peer.run(PEER_REPETITIONS, PEER_SAMPLE_S)?;
+                    samples.add(report.throughput, report.latency);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The exact model and the peers do the same work.
+fn agree(rows: &[Row]) -> Result<(), Failure> {
+    let exact = |row: &&Row| row.is_exact("f64") && row.pace == scenes::Pace::Peers;
+    for row in rows.iter().filter(exact) {
+        let error = row.errors.max;
+        if !(error <= AGREEMENT) {
+            return Err(format!("{} {}: {error:e} from the peers' reference", row.method, row.isa).into());
+        }
+    }
+    Ok(())
+}

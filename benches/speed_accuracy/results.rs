@@ -1,0 +1,86 @@
+//! What was measured: as a file, and as a table of ratios.
+
+use std::path::Path;
+
+use hexad::host::files::write_whole;
+
+use super::Failure;
+use super::peers::PEERS;
+use super::scenes::{Errors, Pace};
+use super::timing::Samples;
+
+/// The dense form's name.
+pub const PAPER: &str = "paper-dense";
+
+/// One method on one scene.
+pub struct Row {
+    pub method: &'static str,
+    pub precision: &'static str,
+    pub isa: &'static str,
+    pub scene: String,
+    pub pace: Pace,
+    pub samples: Samples,
+    pub errors: Errors,
+}
+
+impl Row {
+    /// hexad with every term.
+    pub fn is_exact(&self, precision: &str) -> bool {
+        self.method == "exact" && self.precision == precision
+    }
+}
+
+/// `method, precision, isa, scene, ns_median, ns_latency, error_max_rel, error_rms_rel`
+pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), Failure> {
+    let mut csv = csv::Writer::from_writer(vec![]);
+    csv.write_record([
+        "method",
+        "precision",
+        "isa",
+        "scene",
+        "ns_median",
+        "ns_latency",
+        "error_max_rel",
+        "error_rms_rel",
+    ])?;
+    for row in rows {
+        let Errors { max, rms } = row.errors;
+        csv.write_record([
+            row.method,
+            row.precision,
+            row.isa,
+            &row.scene,
+            &format!("{:.1}", row.samples.throughput()),
+            &format!("{:.1}", row.samples.latency()),
+            &format!("{max:.2e}"),
+            &format!("{rms:.2e}"),
+        ])?;
+    }
+    write_whole(path, &csv.into_inner()?)?;
+    Ok(())
+}
+
+/// How many times longer the peers take than the exact model on the same inputs.
+pub fn print_ratios(rows: &[Row]) {
+    let mut at_peers = rows.iter().filter(|row| row.pace == Pace::Peers);
+    // The best instruction set comes first.
+    let Some(exact) = at_peers.find(|row| row.is_exact("f64")) else { return };
+    println!("\nThe peers' machine and inputs, exact model, f64; hexad on {}:", exact.isa);
+    println!(
+        "{:<26}{:>10}{:>9}{:>10}{:>9}{:>8}{:>12}",
+        "", "ns", "ratio", "fenced", "ratio", "goal", "max error"
+    );
+    let others = |row: &&Row| PEERS.iter().any(|peer| peer.name == row.method) || row.is_exact("f64");
+    for row in rows.iter().filter(|row| row.pace == Pace::Peers).filter(others) {
+        let name = if row.is_exact("f64") { format!("hexad {}", row.isa) } else { row.method.into() };
+        let goal = PEERS.iter().find(|peer| peer.name == row.method).and_then(|peer| peer.goal);
+        let (ns, fenced) = (row.samples.throughput(), row.samples.latency());
+        println!(
+            "{name:<26}{ns:>10.1}{:>9.2}{fenced:>10.1}{:>9.2}{:>8}{:>12.1e}",
+            ns / exact.samples.throughput(),
+            fenced / exact.samples.latency(),
+            goal.map_or(String::new(), |goal| format!("{goal:.1}")),
+            row.errors.max,
+        );
+    }
+}
