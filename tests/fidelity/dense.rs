@@ -1,7 +1,7 @@
 //! The choice holds where the chooser did not look.
 
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::ladder::Rung;
 use hexad::model::machine::Machine;
 use hexad::scene::envelope::{CORNERS, Envelope, Shares};
@@ -120,6 +120,12 @@ fn every_machine_has_an_envelope_of_its_own() {
         for k in 0..CORNERS {
             let sample = Sample::take(&InverseDynamics::new(&machine), &full.at(&full.corner(k)));
             assert!(sample.is_ok_and(|s| s.peak < 0.8 * machine.actuator.max_force), "{name}, corner {k}");
+            let rates = leg_motion(&machine, &full.at(&full.corner(k)).motion()).rate;
+            // Only the telescope's legs are so slow that this decides.
+            assert!(
+                rates.iter().all(|rate| rate.abs() <= 0.8 * machine.actuator.max_rate),
+                "{name}: {rates:?}"
+            );
         }
         // Too weak to hold itself, or without room: it stays at home, and still there is a choice.
         machine.actuator.max_force = 1e-3;
