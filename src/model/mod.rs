@@ -14,6 +14,22 @@
 //! | (94)-(97), active forces | [`active_forces`] |
 //! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`ladder`], [`rigid`], [`lanes`], [`machine`] |
 //!
+//! # Errata of the print
+//!
+//! Size: largest error of a force as a share of the largest force of its row, on the states of `tests/data`.
+//! `tests/paper` has the paper's dense matrices as an oracle, measures each of these, and says what of the
+//! print is not known.
+//!
+//! | | equation | printed | right | size |
+//! | --- | --- | --- | --- | --- |
+//! | 1 | (25), (27), (39) | `v_B = R_b [L', L gamma', -L beta']` with Euler rates | `-L beta' cos(gamma)` | fried2008 4e-2, tsai2000 4e-1 |
+//! | 2 | (43), (45), last term | units do not fit | `+ R_b L'~ L~ R_b^T / L^2` on the leg's angular velocity | fried2008 2e-2 for L instead of L^2 |
+//! | 3 | (74)-(82), H_1 | legs do not spin | they do, [`leg`] | scattered 1e-2, motion_base 1e-3, fried2008 1e-4 |
+//! | 4 | (88), (93) | g with the other sign than (74)-(81) | `v' - g` everywhere | fried2008 1.2 |
+//! | 5 | (90), (91) | inertia about the centre of mass, moments about C | parallel-axis term, [`platform`] | motion_base 1e-1 |
+//! | 6 | (92) | sign of the centrifugal term | `+ m omega x (omega x CG)` | motion_base 7e-2 |
+//! | 7 | Table 1 | a link whose inertia varies with L, as if rigid | `dI/dt omega`, `-1/2 dI/dL omega^2` too | fried2008 7e-3; kept as printed |
+//!
 //! Frames: base axes unless a name says otherwise. `rotation` is R, platform axes expressed in base axes,
 //! so `v_base = R v_platform`. Units: SI, radians. Twists and wrenches have the angular part first and
 //! refer to the platform origin C.
