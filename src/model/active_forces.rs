@@ -17,11 +17,12 @@ use nalgebra::{Matrix6, Vector6};
 use super::balance::{Balance, LaneWrench, wrench_columns};
 use super::inverse_geometry::LegGeometry;
 use super::ladder::{Exact, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs, Rung};
-use super::lanes::{Constant, Eight, Lane, Triples};
+use super::lanes::Eight;
 use super::leg::{LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, LEGS, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
+use super::triples::{Constant, Lane, Triples};
 
 /// The inverse dynamic model of one machine: its constants, ready for the lanes.
 #[derive(Clone, Debug)]

@@ -22,9 +22,11 @@ use fearless_simd::Simd;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four, Lane, Lanes3, Triples};
+use super::lanes::{Eight, Four};
+use super::lanes3::Lanes3;
 use super::machine::{Joints, LEGS};
 use super::rigid::{Twist, Wrench};
+use super::triples::{Lane, Triples};
 
 /// Smallest `|dA|`, the volume spanned by the three unit vectors of A, for which the blocks are used.
 ///

@@ -19,9 +19,10 @@ use nalgebra::Vector6;
 
 use super::balance::Balance;
 use super::inverse_geometry::{LegGeometry, leg_lengths};
-use super::lanes::{Eight, Lane};
+use super::lanes::Eight;
 use super::machine::{LEGS, Machine};
 use super::rigid::Pose;
+use super::triples::Lane;
 
 /// Bound on Newton's iterations. Three suffice from one cycle to the next; beyond eight the start was not
 /// in the region of quadratic convergence and more of the same does not help.

@@ -13,10 +13,12 @@
 use fearless_simd::{Simd, dispatch, f64x8};
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{Eight, Lane, Lanes3, Reals};
+use super::lanes::{Eight, Reals};
+use super::lanes3::Lanes3;
 use super::machine::{Joints, LEGS, Machine};
 use super::platform::acceleration_map;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
+use super::triples::Lane;
 
 /// Geometry of the six legs at one pose.
 #[derive(Clone, Copy)]

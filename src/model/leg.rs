@@ -35,9 +35,11 @@ use fearless_simd::Simd;
 
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
 use super::ladder::{Legs, Model};
-use super::lanes::{Constant, Eight, Lanes3, Triples};
+use super::lanes::Eight;
+use super::lanes3::Lanes3;
 use super::machine::{LEGS, Machine};
 use super::task::TaskState;
+use super::triples::{Constant, Triples};
 
 /// Smallest `|u x n|^2`: a leg within 1e-6 rad of its universal joint's first axis.
 pub(super) const YY_MIN: f64 = 1e-12;

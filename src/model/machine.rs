@@ -8,8 +8,8 @@
 use fearless_simd::Level;
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{Constant, Triples};
 use super::rigid::Pose;
+use super::triples::{Constant, Triples};
 
 /// Number of legs.
 pub const LEGS: usize = 6;

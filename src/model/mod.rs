@@ -12,7 +12,7 @@
 //! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
-//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`ladder`], [`rigid`], [`lanes`], [`machine`] |
+//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`ladder`], [`rigid`], [`triples`], `lanes`, `lanes3`, `balance`, [`machine`] |
 //!
 //! # Errata of the print
 //!
@@ -40,7 +40,8 @@ pub mod forward_kinematics;
 pub mod inverse_geometry;
 pub mod inverse_jacobian;
 pub mod ladder;
-pub mod lanes;
+mod lanes;
+mod lanes3;
 pub mod leg;
 pub mod machine;
 pub mod mass_matrix;
@@ -48,3 +49,4 @@ pub mod platform;
 pub mod regressor;
 pub mod rigid;
 pub mod task;
+pub mod triples;

@@ -18,7 +18,8 @@
 use fearless_simd::Simd;
 use nalgebra::{Matrix3, RealField, SymmetricEigen, Vector3};
 
-use super::lanes::{Four, Lanes3};
+use super::lanes::Four;
+use super::lanes3::Lanes3;
 use super::machine::Machine;
 use super::rigid::{Acceleration, Twist};
 

@@ -2,11 +2,10 @@
 //! from 100 us after the release on.
 
 use hexad::control::controller::{Controller, Input, Measurement, Output, Parameters, Setpoint};
-use hexad::control::gains::Gains;
-use hexad::control::law::Law;
 use hexad::control::state::State;
 use hexad::host::config::Config;
 use hexad::host::config::deployment::Fidelity;
+use hexad::host::daemon;
 use hexad::model::ladder::Rung;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::task::TaskState;
@@ -24,25 +23,11 @@ const START_NS: u64 = 86_400_000_000_000;
 
 /// What a deployment's sections mean to the controller.
 pub fn parameters(config: &Config) -> Parameters {
-    let control = &config.deployment.control;
-    let nanoseconds = |seconds: f64| (seconds * 1e9).round() as u64;
-    Parameters {
-        period_ns: nanoseconds(config.deployment.realtime.period_s()),
-        law: Law {
-            position: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
-            orientation: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
-        },
-        rung: match control.fidelity {
-            Fidelity::Fixed(rung) => rung,
-            Fidelity::Auto => Rung::Exact,
-        },
-        engage_position: control.engage_position_m,
-        engage_orientation: control.engage_orientation_rad,
-        following_position: control.following_position_m,
-        following_orientation: control.following_orientation_rad,
-        setpoint_timeout_ns: nanoseconds(config.deployment.timeouts.setpoint_s),
-        measured_timeout_ns: nanoseconds(config.deployment.timeouts.measured_s),
-    }
+    let rung = match config.deployment.control.fidelity {
+        Fidelity::Fixed(rung) => rung,
+        Fidelity::Auto => Rung::Exact,
+    };
+    daemon::parameters(&config.deployment, rung)
 }
 
 /// A controller, a platform, and what is between them.

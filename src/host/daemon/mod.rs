@@ -191,7 +191,8 @@ fn warm_up(mut controller: Controller, machine: &Machine) {
     }
 }
 
-fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
+/// What a deployment means to the controller; `rung` is what its fidelity came to.
+pub fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
     let Deployment { control, timeouts, .. } = deployment;
     Parameters {
         period_ns: nanoseconds(deployment.realtime.period_s()),

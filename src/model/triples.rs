@@ -1,0 +1,125 @@
+//! Which leg is in which lane, and numbers per lane in memory.
+//!
+//! Eight lanes hold two triples of legs, each with a lane of padding that repeats the triple's first leg, so
+//! that it never divides by zero; nobody reads it:
+//!
+//! ```text
+//! lane   0    1    2    3       4    5    6    7
+//! leg    a    b    c   (a)      d    e    f   (d)         chosen per machine, see Triples::best
+//! ```
+
+use core::borrow::Borrow;
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::machine::LEGS;
+
+/// One number per lane in memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(align(64))]
+pub struct Lane(pub [f64; 8]);
+
+/// A constant of the machine, one number per lane, ready for either precision: converting it anew for
+/// each evaluation would cost more than single precision saves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Constant {
+    pub(super) double: Lane,
+    pub(super) single: [f32; 8],
+}
+
+impl Constant {
+    /// With the first lane of padding set to `value`.
+    pub(super) fn with_padding(&self, value: f64) -> Self {
+        let [a, b, c, _, d, e, f, g] = self.double.0;
+        Lane([a, b, c, value, d, e, f, g]).into()
+    }
+}
+
+impl From<Lane> for Constant {
+    fn from(double: Lane) -> Self {
+        Self { double, single: double.0.map(|value| value as f32) }
+    }
+}
+
+impl Borrow<Lane> for Constant {
+    fn borrow(&self) -> &Lane {
+        &self.double
+    }
+}
+
+/// Which leg is in which lane: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Triples {
+    /// Lane of each leg.
+    lanes: [usize; LEGS],
+}
+
+impl Triples {
+    /// The ten ways to split six legs in two, by the partners of the first leg.
+    const ALL: [Self; 10] = [
+        Self { lanes: [0, 1, 2, 4, 5, 6] },
+        Self { lanes: [0, 1, 4, 2, 5, 6] },
+        Self { lanes: [0, 1, 4, 5, 2, 6] },
+        Self { lanes: [0, 1, 4, 5, 6, 2] },
+        Self { lanes: [0, 4, 1, 2, 5, 6] },
+        Self { lanes: [0, 4, 1, 5, 2, 6] },
+        Self { lanes: [0, 4, 1, 5, 6, 2] },
+        Self { lanes: [0, 4, 5, 1, 2, 6] },
+        Self { lanes: [0, 4, 5, 1, 6, 2] },
+        Self { lanes: [0, 4, 5, 6, 1, 2] },
+    ];
+
+    /// The split whose first triple spans the largest volume: of these directions of the legs, the three
+    /// that resist a force best go first.
+    pub fn best(directions: &[Vector3<f64>; LEGS]) -> Self {
+        let volume = |triples: &Self| {
+            let [x, y, z] = triples.pack_vectors(directions).map(|lane| lane.0);
+            let ([x0, x1, x2, ..], [y0, y1, y2, ..], [z0, z1, z2, ..]) = (x, y, z);
+            Matrix3::new(x0, x1, x2, y0, y1, y2, z0, z1, z2).determinant().abs()
+        };
+        let swapped = |triples: Self| Self { lanes: triples.lanes.map(|lane| (lane + 4) % 8) };
+        let all = Self::ALL.into_iter().chain(Self::ALL.into_iter().map(swapped));
+        all.max_by(|a, b| volume(a).total_cmp(&volume(b))).unwrap_or(Self::ALL[0])
+    }
+
+    /// One number per leg to lanes.
+    #[inline(always)]
+    pub fn pack(&self, legs: &[f64; LEGS]) -> Lane {
+        let mut lane = [0.0; 8];
+        for (index, value) in self.lanes.iter().zip(legs) {
+            if let Some(slot) = lane.get_mut(index % 8) {
+                *slot = *value;
+            }
+        }
+        let [a, b, c, _, d, e, f, _] = lane;
+        Lane([a, b, c, a, d, e, f, d])
+    }
+
+    /// The same number for every leg, in whatever lane, and others for the padding.
+    pub(super) fn uniform(leg: f64, [first, second]: [f64; 2]) -> Constant {
+        Lane([leg, leg, leg, first, leg, leg, leg, second]).into()
+    }
+
+    /// Lanes to one number per leg.
+    #[inline(always)]
+    pub fn unpack(&self, lane: &impl Borrow<Lane>) -> [f64; LEGS] {
+        let lane = lane.borrow();
+        // The remainder tells the compiler that there is nothing to check.
+        self.lanes.map(|index| lane.0.get(index % 8).copied().unwrap_or_default())
+    }
+
+    /// Six 3-vectors to three lanes: x, y, z.
+    pub fn pack_vectors(&self, legs: &[Vector3<f64>; LEGS]) -> [Lane; 3] {
+        [self.pack(&legs.map(|v| v.x)), self.pack(&legs.map(|v| v.y)), self.pack(&legs.map(|v| v.z))]
+    }
+
+    /// Three lanes back to six 3-vectors.
+    pub fn unpack_vectors(&self, [x, y, z]: &[impl Borrow<Lane>; 3]) -> [Vector3<f64>; LEGS] {
+        let (x, y, z) = (self.unpack(x.borrow()), self.unpack(y.borrow()), self.unpack(z.borrow()));
+        let mut legs = [Vector3::zeros(); LEGS];
+        for (leg, ((x, y), z)) in legs.iter_mut().zip(x.into_iter().zip(y).zip(z)) {
+            *leg = Vector3::new(x, y, z);
+        }
+        legs
+    }
+}
