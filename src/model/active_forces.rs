@@ -11,7 +11,7 @@
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
-use fearless_simd::{Level, Simd, dispatch, f32x8, f64x8};
+use fearless_simd::{Simd, dispatch, f32x8, f64x8};
 use nalgebra::{Matrix6, Vector6};
 
 use super::balance::{Balance, LaneWrench, wrench_columns};
@@ -19,7 +19,7 @@ use super::inverse_geometry::LegGeometry;
 use super::ladder::{Exact, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs, Rung};
 use super::lanes::Eight;
 use super::leg::{LegConstants, LegReaction};
-use super::machine::{Actuator, Joints, LEGS, Machine};
+use super::machine::{Actuator, Joints, LEGS, Machine, at_most_256_bits};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
 use super::triples::{Constant, Lane, Triples};
@@ -152,16 +152,6 @@ impl InverseDynamics {
         }
         (wrench, reaction.along + self.drives.force(simd, velocity.rate, accel))
     }
-}
-
-/// Eight numbers of single precision fill a register of AVX2. The same lanes compiled for AVX-512 take a third
-/// longer, because of a few instructions of 512 bits at their edges.
-fn at_most_256_bits(level: Level) -> Level {
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    if let Some(avx2) = level.as_avx2() {
-        return Level::Avx2(avx2);
-    }
-    level
 }
 
 /// The forces of one motion, for those who need no second: a loop keeps an [`InverseDynamics`].

@@ -31,8 +31,21 @@ pub struct Machine {
     pub actuator: Actuator,
     /// Task coordinates X of the home pose: Bryan angles \[rad\], position \[m\].
     pub home: [f64; 6],
-    /// The instruction set the lanes run on; detected once.
+    /// The instruction set the lanes run on; detected once. See [`at_most_256_bits`].
     pub level: Level,
+}
+
+/// The instruction set to use on a CPU that has `level`: no lanes beyond 256 bits.
+///
+/// Measured: 512-bit lanes take as long in throughput and an eighth longer for one evaluation alone (single
+/// precision: a third longer). The 3 x 3 half of the work has no use for them, and while they are at work
+/// the second port for narrower vectors is shut.
+pub fn at_most_256_bits(level: Level) -> Level {
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    if let Some(avx2) = level.as_avx2() {
+        return Level::Avx2(avx2);
+    }
+    level
 }
 
 /// The mobile platform as a rigid body, in platform axes.

@@ -13,7 +13,9 @@ use nalgebra::{Matrix3, Vector3};
 use super::bound::Bound;
 use super::geometry;
 use super::reader::Reader;
-use crate::model::machine::{Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia};
+use crate::model::machine::{
+    Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia, at_most_256_bits,
+};
 use crate::model::task::TaskState;
 
 /// Strongest gravity \[m/s^2\]: ten times the Earth's is a slip of the unit, not a site.
@@ -54,7 +56,7 @@ pub(super) fn read(root: &mut Reader) -> Machine {
         &of_leg(|leg| leg.universal_axis),
         &TaskState::at_rest(home_pose).motion().pose,
     );
-    let level = Level::new();
+    let level = at_most_256_bits(Level::new());
     let machine = Machine { gravity, platform, joints, cylinder, rod, actuator, home: home_pose, level };
     geometry::check(&machine, &legs, &home);
     home.finish();
