@@ -2,13 +2,14 @@
 
 extern crate std;
 
+use super::files::{FileError, write_whole};
 use core::ops::Range;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::Path;
-use std::{format, fs, io, prelude::rust_2024::*, vec};
+use std::{format, io, prelude::rust_2024::*, vec};
 
 /// Drawing units per pixel. The backend knows whole units only, and whole pixels would draw stairs.
 pub(super) const UNIT: i32 = 10;
@@ -46,7 +47,7 @@ pub enum ChartError {
     #[error("cannot draw the chart: {0}")]
     Draw(#[from] DrawError),
     #[error("cannot write the chart: {0}")]
-    Write(#[from] io::Error),
+    Write(#[from] FileError),
 }
 
 /// How a line is drawn. Dashed lines lie on top, so both are seen where they coincide.
@@ -112,17 +113,21 @@ pub struct Panel<'a> {
 ///
 /// The file appears complete or not at all.
 pub fn write_svg(path: &Path, title: &str, x_label: &str, panels: &[Panel]) -> Result<(), ChartError> {
-    save(path, &draw(title, x_label, panels)?)
+    Ok(write_whole(path, draw(title, x_label, panels)?.as_bytes())?)
 }
 
-/// Writes the file, complete or not at all.
-pub(super) fn save(path: &Path, svg: &str) -> Result<(), ChartError> {
-    let part = path.with_extension("svg.part");
-    fs::write(&part, svg).and_then(|()| fs::rename(&part, path)).inspect_err(|_| {
-        // Nothing more can be done if this fails as well.
-        let _ = fs::remove_file(&part);
-    })?;
-    Ok(())
+/// Axes, grid and labels as in every chart.
+pub(super) fn house_style<'a, X, Y, DB: DrawingBackend>(
+    mesh: &mut plotters::chart::MeshStyle<'a, '_, X, Y, DB>,
+) where
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
+    mesh.axis_style(rgb(INK).stroke_width(10))
+        .bold_line_style(rgb(GRID).mix(0.3).stroke_width(10))
+        .set_all_tick_mark_size(TICK)
+        .label_style(text(12, HPos::Center))
+        .axis_desc_style(text(13, HPos::Center));
 }
 
 fn draw(title: &str, x_label: &str, panels: &[Panel]) -> Result<String, DrawError> {
@@ -172,14 +177,9 @@ impl Panel<'_> {
             .x_label_area_size(x_label.map_or(TICK, |_| X_LABELS))
             .y_label_area_size(Y_LABELS)
             .build_cartesian_2d(x.clone(), y.clone())?;
-        chart
-            .configure_mesh()
-            .axis_style(rgb(INK).stroke_width(10))
-            .bold_line_style(rgb(GRID).mix(0.3).stroke_width(10))
-            .set_all_tick_mark_size(TICK)
-            .label_style(text(12, HPos::Center))
-            .axis_desc_style(text(13, HPos::Center))
-            .x_label_formatter(&|value| x_label.map_or(String::new(), |_| x.format_ext(value)))
+        let mut mesh = chart.configure_mesh();
+        house_style(&mut mesh);
+        mesh.x_label_formatter(&|value| x_label.map_or(String::new(), |_| x.format_ext(value)))
             .x_desc(x_label.map_or(String::new(), |label| x.label(label)))
             .y_desc(y.label(self.y_label))
             .draw()?;

@@ -10,9 +10,10 @@ use std::path::Path;
 use std::{format, prelude::rust_2024::*, vec};
 
 use super::charts::{
-    Area, ChartError, DASHED_INK, DrawError, GRID, INK, LEGEND_LINE, MARGIN, PALETTE, SAMPLE, Stroke, TICK,
-    TITLE_HEIGHT, UNIT, WIDTH, X_LABELS, Y_LABELS, finish, power_of_ten, rgb, save, text,
+    Area, ChartError, DASHED_INK, DrawError, GRID, INK, LEGEND_LINE, MARGIN, PALETTE, SAMPLE, Stroke,
+    TITLE_HEIGHT, UNIT, WIDTH, X_LABELS, Y_LABELS, finish, house_style, power_of_ten, rgb, text,
 };
+use super::files::write_whole;
 
 const HEIGHT: i32 = 560 * UNIT;
 const RADIUS: i32 = 45;
@@ -103,7 +104,7 @@ pub fn pareto_front(points: impl Iterator<Item = (f64, f64)>, better: f64) -> Ve
 impl Scatter<'_> {
     /// Writes the chart as an SVG file, complete or not at all.
     pub fn write_svg(&self, path: &Path) -> Result<(), ChartError> {
-        save(path, &self.draw()?)
+        Ok(write_whole(path, self.draw()?.as_bytes())?)
     }
 
     fn draw(&self) -> Result<String, DrawError> {
@@ -122,14 +123,9 @@ impl Scatter<'_> {
                 .x_label_area_size(X_LABELS)
                 .y_label_area_size(Y_LABELS)
                 .build_cartesian_2d(x.clone(), y.clone())?;
-            chart
-                .configure_mesh()
-                .axis_style(rgb(INK).stroke_width(10))
-                .bold_line_style(rgb(GRID).mix(0.3).stroke_width(10))
-                .set_all_tick_mark_size(TICK)
-                .label_style(text(12, HPos::Center))
-                .axis_desc_style(text(13, HPos::Center))
-                .x_label_formatter(&|value| x.format_ext(value))
+            let mut mesh = chart.configure_mesh();
+            house_style(&mut mesh);
+            mesh.x_label_formatter(&|value| x.format_ext(value))
                 .y_label_formatter(&|value| y.format_ext(value))
                 .x_desc(self.x_label)
                 .y_desc(self.y_label)
