@@ -7,6 +7,7 @@
 pub mod allocation;
 pub mod clock;
 pub mod cyclic;
+pub mod overrun;
 pub mod process;
 pub mod setup;
 pub mod usage;

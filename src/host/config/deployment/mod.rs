@@ -8,6 +8,7 @@ extern crate std;
 
 use std::{format, prelude::rust_2024::*};
 
+pub use self::realtime::Realtime;
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
@@ -15,20 +16,13 @@ use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
 use crate::model::ladder::Rung;
 use crate::scene::envelope::Limits;
 
-/// Slowest and fastest loop \[Hz\]. Above, one wake-up costs more than the period leaves.
-const RATE_HZ: Bound = Bound::Within(10.0, 20_000.0);
-/// Default of `late_wakeup_us` where half a period is longer; the wake-up latency of an ordinary kernel
-/// stays below at the 99th percentile.
-const LATE_WAKEUP_US: f64 = 200.0;
+mod realtime;
+
 /// Default of the bandwidths where the rate carries it \[Hz\]: stiff enough for micrometres, soft enough for
 /// a structure that is not quite rigid.
 const BANDWIDTH_HZ: f64 = 10.0;
 /// Defaults of the timeouts are no shorter than this many periods: one message late is not a peer lost.
 const LEAST_DEFAULT_PERIODS: f64 = 4.0;
-/// CPUs count from 0; a `cpu_set_t` holds 1024.
-const LAST_CPU: i32 = 1023;
-/// Linux's range of `SCHED_FIFO`.
-const PRIORITY: (i32, i32) = (1, 99);
 /// Longest a peer may be silent \[ms\]. After a second, nobody knows where the platform is.
 const LONGEST_TIMEOUT_MS: f64 = 1000.0;
 /// Damping ratios that a control engineer would write down; beyond, it is a slip.
@@ -59,27 +53,6 @@ pub struct Deployment {
     pub plant: Plant,
     /// What the platform will be asked to do; `None` if nobody has said.
     pub envelope: Option<Limits>,
-}
-
-/// `[realtime]`: the cycle and its threads.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Realtime {
-    /// Cycles per second.
-    pub rate_hz: f64,
-    /// CPU of the real-time thread; `None` leaves it to the scheduler.
-    pub cpu: Option<usize>,
-    /// CPU of the I/O thread; `None` leaves it to the scheduler.
-    pub io_cpu: Option<usize>,
-    /// `SCHED_FIFO` priority of the real-time thread.
-    pub priority: i32,
-    /// `SCHED_FIFO` priority of the I/O thread.
-    pub io_priority: i32,
-    /// Whether all memory is locked.
-    pub lock_memory: bool,
-    /// Whether to refuse to start where the system does not grant the above.
-    pub require_realtime: bool,
-    /// A wake-up later than this after its release time counts as missed.
-    pub late_wakeup_s: f64,
 }
 
 /// `[control]`: the law's error dynamics, and how near the set point must be to engage.
@@ -136,16 +109,9 @@ pub struct Plant {
     pub step_s: f64,
 }
 
-impl Realtime {
-    /// Time from one release to the next.
-    pub fn period_s(&self) -> f64 {
-        1.0 / self.rate_hz
-    }
-}
-
 /// Reads and checks the five sections. Where a number was refused it is NaN.
 pub(super) fn read(root: &mut Reader) -> Deployment {
-    let realtime = realtime(root.section("realtime"));
+    let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     Deployment {
         realtime,
@@ -154,33 +120,6 @@ pub(super) fn read(root: &mut Reader) -> Deployment {
         plant: plant(root.section("plant"), rate_hz),
         envelope: envelope(root.section("envelope")),
     }
-}
-
-fn realtime(mut section: Reader) -> Realtime {
-    let rate_hz = section.number_or("rate_hz", 1000.0, RATE_HZ);
-    let half_period_us = 0.5e6 / rate_hz;
-    let late_wakeup_us =
-        section.number_or("late_wakeup_us", LATE_WAKEUP_US.min(half_period_us), Bound::Positive);
-    if late_wakeup_us > half_period_us {
-        let bound =
-            format!("must be at most {half_period_us} (half a period of realtime.rate_hz = {rate_hz})");
-        section.refuse("late_wakeup_us", bound);
-    }
-    let mut cpu = |key| section.integer(key, 0, LAST_CPU).and_then(|cpu| usize::try_from(cpu).ok());
-    let (cpu, io_cpu) = (cpu("cpu"), cpu("io_cpu"));
-    let (low, high) = PRIORITY;
-    let realtime = Realtime {
-        rate_hz,
-        cpu,
-        io_cpu,
-        priority: section.integer_or("priority", 80, low, high),
-        io_priority: section.integer_or("io_priority", 79, low, high),
-        lock_memory: section.flag_or("lock_memory", true),
-        require_realtime: section.flag_or("require_realtime", false),
-        late_wakeup_s: late_wakeup_us / 1e6,
-    };
-    section.finish();
-    realtime
 }
 
 fn control(mut section: Reader, rate_hz: f64) -> Control {
