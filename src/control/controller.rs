@@ -59,6 +59,8 @@ pub struct Input {
     pub setpoint: Option<Setpoint>,
     /// The newest measurement, if one ever arrived.
     pub measurement: Option<Measurement>,
+    /// Cycles were missed since the last one, and the deployment calls that a fault.
+    pub deadline_missed: bool,
 }
 
 /// Result of a cycle.
@@ -115,6 +117,9 @@ impl Controller {
         let error = TrackingError::new(&desired_at(measurement.time_ns), &pose, &twist);
         output.error = Some(error);
         self.may_control(&error)?;
+        if input.deadline_missed {
+            return Err(Cause::DeadlineMissed);
+        }
 
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = input.release_ns.saturating_add(self.parameters.period_ns / 2);

@@ -67,11 +67,13 @@ pub enum Cause {
     ForceNotFinite = 107,
     /// The platform was further from the setpoint than the following-error limit.
     OffPath = 108,
+    /// Cycles were missed, and `realtime.on_overrun` is `fault`.
+    DeadlineMissed = 109,
 }
 
 impl Cause {
     /// Every cause, in the order of their numbers.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::None,
         Self::NoMeasurement,
         Self::NoSetpoint,
@@ -88,6 +90,7 @@ impl Cause {
         Self::SingularPose,
         Self::ForceNotFinite,
         Self::OffPath,
+        Self::DeadlineMissed,
     ];
 
     /// Whether losing control for this cause is a fault.
@@ -114,6 +117,7 @@ impl Cause {
             Self::SingularPose => "singular pose",
             Self::ForceNotFinite => "force not finite",
             Self::OffPath => "platform off the path",
+            Self::DeadlineMissed => "deadline missed",
         }
     }
 

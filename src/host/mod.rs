@@ -12,6 +12,7 @@ pub mod daemon;
 pub mod demo;
 pub mod fidelity;
 pub mod files;
+pub mod histogram;
 mod numbers;
 pub mod offline;
 pub mod plant;

@@ -5,14 +5,11 @@ extern crate std;
 use std::path::Path;
 use std::prelude::rust_2024::*;
 
-use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 
 use super::files::{FileError, write_whole};
+use crate::ipc::statistics::{Times, WorstCycle};
 use crate::realtime::usage::ThreadUsage;
-
-/// Times above this are counted as this \[ns\].
-const LONGEST_NS: u64 = 60_000_000_000;
 
 /// Everything a run says about itself.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -21,13 +18,21 @@ pub struct Report {
     pub rate_hz: f64,
     pub deadline_misses: DeadlineMisses,
     /// Release to the first instruction of the cycle.
-    pub wakeup_ns: Quantiles,
+    pub wakeup_ns: Times,
     /// First instruction of the cycle to its output.
-    pub compute_ns: Quantiles,
+    pub compute_ns: Times,
+    /// Age of the measurement at the release.
+    pub measured_age_ns: Times,
     /// Release to the force message sent.
-    pub end_to_end_ns: Quantiles,
+    pub end_to_end_ns: Times,
+    /// The worst first.
+    pub worst_cycles: Vec<WorstCycle>,
     pub tracking: Tracking,
     pub rt_thread: ThreadUsage,
+    /// It allocates only while a peer comes or goes.
+    pub io_thread: ThreadUsage,
+    /// It allocates only to tell of a change of state.
+    pub log_thread: ThreadUsage,
     pub faults: Vec<Fault>,
 }
 
@@ -36,15 +41,8 @@ pub struct DeadlineMisses {
     pub late_wakeup: u64,
     pub overrun: u64,
     pub skipped: u64,
-}
-
-/// Quantiles of a time; zero where nothing was recorded.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct Quantiles {
-    pub p50: u64,
-    pub p99: u64,
-    pub p999: u64,
-    pub max: u64,
+    /// Cycles run at once because their release had passed; not misses of their own.
+    pub caught_up: u64,
 }
 
 /// Desired minus actual pose.
@@ -75,41 +73,6 @@ impl Report {
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = std::fs::read(path).map_err(FileError::on(path))?;
         serde_json::from_slice(&text).map_err(|e| FileError::on(path)(e.into()))
-    }
-}
-
-/// A histogram of times; recording allocates nothing.
-#[derive(Debug)]
-pub struct Times(Option<Histogram<u64>>);
-
-impl Times {
-    /// Three digits from 1 ns to a minute.
-    pub fn new() -> Self {
-        // Fails only for bounds that make no sense, and these are constants.
-        Self(Histogram::new_with_bounds(1, LONGEST_NS, 3).ok())
-    }
-
-    /// Counts one time.
-    pub fn record(&mut self, time_ns: u64) {
-        if let Some(histogram) = &mut self.0 {
-            histogram.saturating_record(time_ns);
-        }
-    }
-
-    /// The quantiles of everything recorded.
-    pub fn quantiles(&self) -> Quantiles {
-        self.0.as_ref().map_or_else(Quantiles::default, |histogram| Quantiles {
-            p50: histogram.value_at_quantile(0.5),
-            p99: histogram.value_at_quantile(0.99),
-            p999: histogram.value_at_quantile(0.999),
-            max: histogram.max(),
-        })
-    }
-}
-
-impl Default for Times {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

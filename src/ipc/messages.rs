@@ -6,8 +6,10 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 
+use super::statistics::Statistics;
+
 /// Version of every struct in this file. Any change of layout or meaning raises it.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// First field of every message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -83,7 +85,8 @@ pub struct ForceMessage {
     pub fault: u32,
     /// 1 if a force was cut to the actuators' limit.
     pub limited: u32,
-    /// Release instant of the cycle that computed the forces \[ns\].
+    /// Instant for which the forces were computed \[ns\]: the cycle's release, or with external release the
+    /// time of the measurement that released it.
     pub release_ns: u64,
 }
 
@@ -117,6 +120,15 @@ pub struct StatusMessage {
     pub overruns: u64,
     /// Grid points left out because the thread was not ready for them.
     pub skipped: u64,
+    /// Cycles run at once because their release had passed.
+    pub caught_up: u64,
+    /// Calls of the real-time thread to the allocator since its first cycle: zero.
+    pub allocations: u64,
+    /// The same of the io thread: they come with peers that come and go.
+    pub io_allocations: u64,
+    /// Messages passed over: other schema, older life of the source, seen before.
+    pub rejected: u64,
+    pub statistics: Statistics,
 }
 
 macro_rules! message {

@@ -3,3 +3,4 @@
 pub mod exchange;
 pub mod messages;
 pub mod ports;
+pub mod statistics;

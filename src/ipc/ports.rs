@@ -146,7 +146,7 @@ impl Bus {
             .buffer_size(depth.min(BUFFER))
             .create()
             .map_err(failed(format!("cannot subscribe to {}", T::TOPIC)))?;
-        Ok(Sink { subscriber, epoch: 0, sequence: 0, rejected: 0, topic: PhantomData })
+        Ok(Sink { subscriber, epoch: 0, sequence: 0, received: 0, rejected: 0, topic: PhantomData })
     }
 }
 
@@ -180,6 +180,7 @@ pub struct Sink<T: Message> {
     subscriber: Subscriber<ipc::Service, T, ()>,
     epoch: u64,
     sequence: u64,
+    received: u64,
     rejected: u64,
     topic: PhantomData<T>,
 }
@@ -202,6 +203,7 @@ impl<T: Message> Sink<T> {
             let order = (header.epoch, header.sequence);
             if header.schema == SCHEMA && order > (self.epoch, self.sequence) {
                 (self.epoch, self.sequence) = order;
+                self.received += 1;
                 return Some(message);
             }
             self.rejected += 1;
@@ -219,6 +221,11 @@ impl<T: Message> Sink<T> {
             }
         }
         newest
+    }
+
+    /// How many messages were accepted.
+    pub fn received(&self) -> u64 {
+        self.received
     }
 
     /// How many messages were passed over.

@@ -27,6 +27,28 @@ pub fn sleep_until(instant_ns: u64) {
     {}
 }
 
+/// What the loop needs of time; a test's own clock makes every delay exact.
+pub trait Clock {
+    /// The present instant \[ns\].
+    fn now_ns(&mut self) -> u64;
+    /// Returns at `instant_ns` or later; at once if it has passed.
+    fn sleep_until(&mut self, instant_ns: u64);
+}
+
+/// CLOCK_MONOTONIC.
+#[derive(Clone, Copy, Debug)]
+pub struct Monotonic;
+
+impl Clock for Monotonic {
+    fn now_ns(&mut self) -> u64 {
+        monotonic_ns()
+    }
+
+    fn sleep_until(&mut self, instant_ns: u64) {
+        sleep_until(instant_ns);
+    }
+}
+
 /// Points in time `k * period + phase`.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {

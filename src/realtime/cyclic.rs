@@ -1,21 +1,25 @@
 //! The cyclic loop of the real-time thread.
 //!
-//! Releases lie on an absolute grid, so that the loop cannot drift. A cycle that ends after its next
-//! release leaves out the grid points it missed: a late cycle is never followed by a burst.
+//! A cycle is released by a point of an absolute grid, so that the loop cannot drift, or from outside, by a
+//! measured message. Every grid point is run or counted as skipped: cycles + skipped = points passed.
 //!
-//! | miss | counted when |
+//! | counter | counted when |
 //! | --- | --- |
-//! | late wake-up | the thread woke later after its release than the threshold |
-//! | overrun | it woke before its next release and was still computing at it |
-//! | skipped | per grid point left out, whatever the reason |
+//! | late wake-up | a cycle that was waited for began later after its release than the threshold |
+//! | overrun | a cycle began before its next release and was still computing at it |
+//! | skipped | per grid point, or with external release per message, that no cycle was run for |
+//! | caught up | a cycle was run at once because its release had passed ([`OnOverrun::CatchUp`]) |
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
 
-use super::clock::{Grid, monotonic_ns, sleep_until};
+use super::clock::{Clock, Grid};
+use super::doorbell;
+use super::overrun::OnOverrun;
 use super::usage::ThreadUsage;
-use crate::control::controller::{Controller, Output};
+use super::waiter::Waiter;
+use crate::control::controller::{Input, Output};
 use crate::control::state::{Cause, State};
 use crate::ipc::exchange::{CycleOutput, RealtimeSide};
 
@@ -25,11 +29,24 @@ pub const RECORDS: usize = 1024;
 /// When to run and what to call late.
 #[derive(Clone, Copy, Debug)]
 pub struct Timing {
+    /// With external release: the expected distance of two messages.
     pub period_ns: u64,
     /// Offset of the grid from the multiples of the period.
     pub phase_ns: u64,
+    pub release: Release,
+    pub on_overrun: OnOverrun,
     /// A wake-up later than this after its release is a miss.
     pub late_wakeup_ns: u64,
+}
+
+/// What begins a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Release {
+    /// A point of the grid. The last `max_lead_ns` at most are spun; 0 sleeps.
+    Grid { max_lead_ns: u64 },
+    /// A measured message, rung for by the io thread. When none comes for `timeout_ns`, a cycle is run all
+    /// the same, so that the loss is noticed.
+    External { timeout_ns: u64 },
 }
 
 /// Totals since start.
@@ -39,8 +56,11 @@ pub struct Counters {
     pub late_wakeups: u64,
     pub overruns: u64,
     pub skipped: u64,
+    pub caught_up: u64,
     /// Records that found the queue to the log full.
     pub records_lost: u64,
+    /// Calls of the real-time thread to the allocator. Zero, or something is wrong.
+    pub allocations: u64,
 }
 
 /// One cycle, for statistics and log.
@@ -48,8 +68,14 @@ pub struct Counters {
 pub struct CycleRecord {
     /// Number of the cycle, from 1.
     pub cycle: u64,
+    /// CLOCK_MONOTONIC instant at which it was due \[ns\].
+    pub due_ns: u64,
     pub wakeup_ns: u64,
     pub compute_ns: u64,
+    /// Age of the measurement at the release, if there is one.
+    pub measured_age_ns: Option<u64>,
+    /// The io thread had handed in nothing new since the last cycle.
+    pub io_late: bool,
     pub state: State,
     pub cause: Cause,
     /// Norms of the tracking error while active \[m\], \[rad\].
@@ -67,52 +93,150 @@ pub struct LoopReport {
 /// Runs cycles until `stop`, then hands out one last output that is not valid.
 ///
 /// This is the real-time path: nothing below the first release allocates, locks, logs or calls the system,
-/// but for the sleep.
+/// but for the sleep. `step` is the controller's; a test may burn time in it.
 pub fn run(
+    clock: &mut impl Clock,
     timing: &Timing,
-    mut controller: Controller,
-    mut side: RealtimeSide,
-    mut records: Producer<'_, CycleRecord>,
+    step: impl FnMut(&Input) -> Output,
+    side: RealtimeSide,
+    records: Producer<'_, CycleRecord>,
     stop: &AtomicBool,
 ) -> LoopReport {
-    let grid = Grid::new(timing.period_ns, timing.phase_ns);
-    let mut counters = Counters::default();
     let at_start = ThreadUsage::of_this_thread();
-    let mut release_ns = grid.next_after(monotonic_ns());
-    while !stop.load(Ordering::Relaxed) {
-        sleep_until(release_ns);
-        let woke_ns = monotonic_ns();
-        let wakeup_ns = woke_ns.saturating_sub(release_ns);
-        // Held for whole periods: the ages of the inputs are judged by what time it is now.
-        let missed = wakeup_ns / timing.period_ns.max(1);
-        release_ns += missed * timing.period_ns;
-        counters.skipped += missed;
-        let mut input = *side.inputs.read();
+    let counters = Counters::default();
+    let mut cycles =
+        Cycles { clock, timing, step, side, records, counters, allocations: at_start.allocations };
+    let last = match timing.release {
+        Release::Grid { max_lead_ns } => cycles.run_on_grid(Waiter::new(max_lead_ns), stop),
+        Release::External { timeout_ns } => cycles.run_on_messages(timeout_ns, stop),
+    };
+    let Cycles { mut side, counters, .. } = cycles;
+    let usage = ThreadUsage::of_this_thread().since(&at_start);
+    let output = Output { cause: Cause::Stopping, ..Output::default() };
+    side.outputs.write(CycleOutput { due_ns: last.due_ns, release_ns: last.release_ns, output, counters });
+    LoopReport { counters, usage }
+}
+
+/// The beginning of one cycle.
+#[derive(Clone, Copy, Default)]
+struct Begin {
+    due_ns: u64,
+    /// The instant it is computed for.
+    release_ns: u64,
+    woke_ns: u64,
+    /// How much later than its release it woke. Larger than `woke_ns - due_ns` where points were skipped.
+    wakeup_ns: u64,
+    /// It was waited for.
+    waited: bool,
+    /// Points were skipped before it, or the cycle before overran.
+    missed: bool,
+    io_late: bool,
+}
+
+struct Cycles<'a, C, S> {
+    clock: &'a mut C,
+    timing: &'a Timing,
+    step: S,
+    side: RealtimeSide,
+    records: Producer<'a, CycleRecord>,
+    counters: Counters,
+    /// Of this thread, before the first cycle.
+    allocations: u64,
+}
+
+impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
+    fn run_on_grid(&mut self, mut waiter: Waiter, stop: &AtomicBool) -> Begin {
+        let Timing { phase_ns, on_overrun, .. } = *self.timing;
+        let period_ns = self.timing.period_ns.max(1);
+        let mut done_ns = self.clock.now_ns();
+        let mut due_ns = Grid::new(period_ns, phase_ns).next_after(done_ns);
+        let mut missed = false;
+        let mut begin = Begin::default();
+        while !stop.load(Ordering::Relaxed) {
+            let waited = due_ns > done_ns;
+            let woke_ns = waiter.until(self.clock, due_ns);
+            let wakeup_ns = woke_ns.saturating_sub(due_ns);
+            // Held for whole periods: the ages of the inputs are judged by what time it is now.
+            let skipped = on_overrun.skipped(wakeup_ns / period_ns);
+            due_ns += skipped * period_ns;
+            self.counters.skipped += skipped;
+            missed |= skipped > 0;
+            let io_late = !self.side.inputs.update();
+            begin = Begin { due_ns, release_ns: due_ns, woke_ns, wakeup_ns, waited, missed, io_late };
+            done_ns = self.run_one(&begin);
+
+            let next_ns = due_ns + period_ns;
+            let passed = if done_ns < next_ns { 0 } else { (done_ns - next_ns) / period_ns + 1 };
+            let left_out = on_overrun.skipped(passed);
+            missed = passed > 0;
+            due_ns = next_ns + left_out * period_ns;
+            self.counters.skipped += left_out;
+        }
+        begin
+    }
+
+    fn run_on_messages(&mut self, timeout_ns: u64, stop: &AtomicBool) -> Begin {
+        let mut done_ns = self.clock.now_ns();
+        let mut begin = Begin::default();
+        let mut seen = None;
+        let mut missed = false;
+        while !stop.load(Ordering::Relaxed) {
+            let timeout_at_ns = done_ns + timeout_ns;
+            let rung = doorbell::wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
+            let woke_ns = self.clock.now_ns();
+            let handed = self.side.inputs.output_buffer();
+            let measured = handed.input.measurement.filter(|_| rung);
+            // Those before the first cycle were not missed.
+            let skipped = seen.map_or(0, |seen| handed.measurements.saturating_sub(seen + 1));
+            seen = Some(handed.measurements);
+            let due_ns = if rung { handed.handed_ns } else { timeout_at_ns };
+            // Without a message, the drive's clock is taken to have gone on as this one did.
+            let release_ns = measured.map_or_else(
+                || begin.release_ns + due_ns.saturating_sub(begin.due_ns),
+                |measurement| measurement.time_ns,
+            );
+            let wakeup_ns = woke_ns.saturating_sub(due_ns);
+            missed |= skipped > 0;
+            begin = Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited: true, missed, io_late: !rung };
+            self.counters.skipped += skipped;
+            done_ns = self.run_one(&begin);
+            missed = done_ns >= due_ns + self.timing.period_ns;
+        }
+        begin
+    }
+
+    /// One cycle; returns the instant at which it was done.
+    fn run_one(&mut self, begin: &Begin) -> u64 {
+        let Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited, missed, io_late } = *begin;
+        let Timing { period_ns, on_overrun, late_wakeup_ns, .. } = *self.timing;
+        let mut input = self.side.inputs.output_buffer().input;
         input.release_ns = release_ns;
-        let output = controller.step(&input);
+        input.deadline_missed = missed && on_overrun == OnOverrun::Fault;
+        let output = (self.step)(&input);
+
+        let counters = &mut self.counters;
         counters.cycles += 1;
-        counters.late_wakeups += u64::from(wakeup_ns > timing.late_wakeup_ns);
-        side.outputs.write(CycleOutput { release_ns, output, counters });
-        let done_ns = monotonic_ns();
+        counters.late_wakeups += u64::from(waited && wakeup_ns > late_wakeup_ns);
+        counters.caught_up += u64::from(!waited);
+        counters.allocations = ThreadUsage::allocations_of_this_thread() - self.allocations;
+        self.side.outputs.write(CycleOutput { due_ns, release_ns, output, counters: *counters });
+        let done_ns = self.clock.now_ns();
+        let next_ns = due_ns + period_ns;
+        counters.overruns += u64::from(woke_ns < next_ns && done_ns >= next_ns);
         let record = CycleRecord {
             cycle: counters.cycles,
+            due_ns,
             wakeup_ns,
             compute_ns: done_ns.saturating_sub(woke_ns),
+            measured_age_ns: input.measurement.map(|it| release_ns.saturating_sub(it.time_ns)),
+            io_late,
             state: output.state,
             cause: output.cause,
             error: tracking_error(&output),
         };
-        counters.records_lost += u64::from(records.enqueue(record).is_err());
-
-        let deadline_ns = release_ns + timing.period_ns;
-        counters.overruns += u64::from(woke_ns < deadline_ns && done_ns >= deadline_ns);
-        release_ns = if done_ns < deadline_ns { deadline_ns } else { grid.next_after(done_ns) };
-        counters.skipped += (release_ns - deadline_ns) / timing.period_ns.max(1);
+        counters.records_lost += u64::from(self.records.enqueue(record).is_err());
+        done_ns
     }
-    let usage = ThreadUsage::of_this_thread().since(&at_start);
-    let output = Output { cause: Cause::Stopping, ..Output::default() };
-    side.outputs.write(CycleOutput { release_ns, output, counters });
-    LoopReport { counters, usage }
 }
 
 fn tracking_error(output: &Output) -> Option<(f64, f64)> {

@@ -7,7 +7,9 @@
 pub mod allocation;
 pub mod clock;
 pub mod cyclic;
+pub mod doorbell;
 pub mod overrun;
 pub mod process;
 pub mod setup;
 pub mod usage;
+pub mod waiter;

@@ -14,6 +14,11 @@ pub struct ThreadUsage {
 }
 
 impl ThreadUsage {
+    /// Calls to the allocator alone: no system call.
+    pub fn allocations_of_this_thread() -> u64 {
+        calls_of_this_thread()
+    }
+
     /// Since the calling thread began. A system call.
     pub fn of_this_thread() -> Self {
         // SAFETY: all-zero is a valid rusage, a plain struct of integers.

@@ -67,6 +67,7 @@ impl Rig {
             release_ns: self.now_ns + self.period_ns / 2,
             setpoint: Some(Setpoint { time_ns: self.now_ns, task: *task }),
             measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: legs.rate }),
+            deadline_missed: false,
         }
     }
 

@@ -27,6 +27,32 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
         "[realtime]\nrequire_realtime = \"no\"",
         &["realtime.require_realtime = \"no\": must be true or false"],
     );
+    refused(
+        "[realtime]\nrelease = \"spin\"",
+        &["realtime.release = \"spin\": must be one of \"sleep\", \"hybrid\", \"external\""],
+    );
+    refused(
+        "[realtime]\nrelease = \"external\"\non_overrun = \"catch_up\"",
+        &[
+            "realtime.on_overrun = \"catch_up\": must be one of \"skip\", \"fault\" with realtime.release = \"external\" (only the newest message is kept)",
+        ],
+    );
+    refused("[realtime]\nmax_catch_up = 0", &["realtime.max_catch_up = 0: must be an integer in [1, 100]"]);
+    refused(
+        "[realtime]\nmax_lead_us = 501",
+        &["realtime.max_lead_us = 501: must be at most 500 (half a period of realtime.rate_hz = 1000)"],
+    );
+    refused("[realtime]\nio_lead_us = 0", &["realtime.io_lead_us = 0: must be greater than 0"]);
+    refused(
+        "[realtime]\ncpu = 0\nscheduler = \"deadline\"",
+        &[
+            "realtime.cpu = 0: must not be given with realtime.scheduler = \"deadline\" (Linux places such threads itself)",
+        ],
+    );
+    refused(
+        "[realtime]\ncpu_dma_latency_us = -1",
+        &["realtime.cpu_dma_latency_us = -1: must be an integer in [0, 1000000]"],
+    );
     refused("[realtime]\nlate_wakeup_us = 0", &["realtime.late_wakeup_us = 0: must be greater than 0"]);
     refused(
         "[realtime]\nlate_wakeup_us = 501",

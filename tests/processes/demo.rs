@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use hexad::host::report::{Quantiles, Report};
+use hexad::host::report::Report;
+use hexad::ipc::statistics::Times;
 use serde_json::{Map, Value};
 
 use crate::support::children::{HANG, Hexad, hexad};
@@ -132,19 +133,20 @@ impl Demonstration {
 }
 
 fn has_exactly_the_fields_of_the_contract(report: &Value) {
-    let quantiles = ["max", "p50", "p99", "p999"];
-    let fields: [(&str, &[&str]); 6] = [
-        ("deadline_misses", &["late_wakeup", "overrun", "skipped"]),
-        ("wakeup_ns", &quantiles),
-        ("compute_ns", &quantiles),
-        ("end_to_end_ns", &quantiles),
+    let times = ["count", "max", "mean", "min", "p50", "p90", "p99", "p999", "p9999"];
+    let usage = ["allocations", "involuntary_switches", "major_faults", "minor_faults", "voluntary_switches"];
+    let fields: [(&str, &[&str]); 9] = [
+        ("deadline_misses", &["caught_up", "late_wakeup", "overrun", "skipped"]),
+        ("wakeup_ns", &times),
+        ("compute_ns", &times),
+        ("measured_age_ns", &times),
+        ("end_to_end_ns", &times),
         ("tracking", &["orientation_max_rad", "orientation_rms_rad", "position_max_m", "position_rms_m"]),
-        (
-            "rt_thread",
-            &["allocations", "involuntary_switches", "major_faults", "minor_faults", "voluntary_switches"],
-        ),
+        ("rt_thread", &usage),
+        ("io_thread", &usage),
+        ("log_thread", &usage),
     ];
-    let mut top = vec!["cycles", "rate_hz", "faults"];
+    let mut top = vec!["cycles", "rate_hz", "worst_cycles", "faults"];
     top.extend(fields.iter().map(|(name, _)| *name));
     top.sort_unstable();
     assert_eq!(keys(report), top);
@@ -171,10 +173,15 @@ fn is_sane(report: &Report, wall_s: f64) {
         "{seconds} s of cycles in {wall_s} s: {report:#?}"
     );
     assert!(*cycles as f64 > 0.9 * SECONDS * rate_hz, "{report:#?}");
-    for times in [&report.wakeup_ns, &report.compute_ns, &report.end_to_end_ns] {
-        let Quantiles { p50, p99, p999, max } = times;
-        assert!(0 < *p50 && p50 <= p99 && p99 <= p999 && p999 <= max, "{report:#?}");
+    for times in [&report.wakeup_ns, &report.compute_ns, &report.measured_age_ns, &report.end_to_end_ns] {
+        let Times { count, min, mean, p50, p90, p99, p999, p9999, max } = *times;
+        let rising = [1, min, p50, p90, p99, p999, p9999, max].is_sorted();
+        assert!(rising && (min..=max).contains(&mean) && count <= *cycles, "{report:#?}");
     }
+    let worst = &report.worst_cycles;
+    assert_eq!(worst.len(), 8);
+    assert!(worst.iter().all(|cycle| (1..=*cycles).contains(&cycle.cycle)), "{worst:#?}");
+    assert!(worst.is_sorted_by_key(|cycle| u64::MAX - cycle.wakeup_ns - cycle.compute_ns), "{worst:#?}");
     assert!(report.end_to_end_ns.p50 > report.compute_ns.p50, "the way out takes time too: {report:#?}");
     assert_eq!((rt_thread.allocations, rt_thread.major_faults), (0, 0), "{rt_thread:#?}");
     // A sleep each cycle; what makes a cycle without is a wake-up that came late.

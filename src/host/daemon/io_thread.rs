@@ -1,31 +1,42 @@
 //! The io thread: owner of every port of the daemon, in phase with the cycle.
 //!
 //! It reads the newest messages a lead before the release and publishes when the output of the cycle
-//! appears. When a peer comes or goes, the port calls here allocate and block for a moment; the real-time
-//! thread meanwhile runs on with data it knows the age of.
+//! appears; with external release it waits for measured messages and rings for the real-time thread. When
+//! a peer comes or goes, the port calls here allocate and block for a moment; the real-time thread
+//! meanwhile runs on with data it knows the age of.
+
+extern crate std;
 
 use core::sync::atomic::{AtomicBool, Ordering};
+use std::thread::Thread;
 
-use crate::control::controller::{Input, Measurement, Output, Setpoint};
+use heapless::spsc::Producer;
+use triple_buffer::Output as Reader;
+
+use crate::control::controller::{Measurement, Output, Setpoint};
 use crate::control::state::{Cause, State};
-use crate::host::report::Times;
-use crate::ipc::exchange::{CycleOutput, IoSide};
+use crate::ipc::exchange::{CycleInput, CycleOutput, IoSide};
 use crate::ipc::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use crate::ipc::ports::{Bus, PortError, Sink, Source};
+use crate::ipc::statistics::Statistics;
 use crate::model::task::{TaskState, task_coordinates};
-use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
-use crate::realtime::cyclic::Timing;
+use crate::realtime::clock::{Clock, Grid, Monotonic, monotonic_ns, sleep_until};
+use crate::realtime::cyclic::{Release, Timing};
 use crate::realtime::usage::ThreadUsage;
+use crate::realtime::waiter::Waiter;
 
-/// Inputs are read this long before the release, or a quarter of the period if that is less. It covers
-/// the wake-up of this thread (about 50 us) and the reading.
-const LEAD_NS: u64 = 100_000;
-
-/// Pause between two looks for the output: short against the wake-up latency it adds to.
+/// Pause between two looks for something that does not come at once.
 const POLL_NS: u64 = 10_000;
+
+/// Before that it looks without a pause for this long, or an eighth of the period if that is less: an
+/// output comes one wake-up latency after the release, and a pause costs as much again.
+const AWAKE_NS: u64 = 50_000;
 
 /// Messages kept per input between two reads. Only the newest counts.
 const INPUT_DEPTH: usize = 8;
+
+/// Length of the queue of delays to the log thread, as of the cycle records.
+pub const DELAYS: usize = 1024;
 
 /// The ports of the daemon.
 pub struct Ports {
@@ -35,11 +46,32 @@ pub struct Ports {
     status: Source<StatusMessage>,
 }
 
+/// What the io thread shares with the others.
+pub struct Sides<'a> {
+    pub exchange: IoSide,
+    /// Release to force sent \[ns\], to the log thread.
+    pub sent: Producer<'a, u64>,
+    /// From the log thread.
+    pub statistics: Reader<Statistics>,
+    /// To ring for, with external release.
+    pub realtime: Thread,
+}
+
+/// What it needs to know.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    pub timing: Timing,
+    /// Inputs are read this long before the release.
+    pub lead_ns: u64,
+    /// Forces computed longer ago are not valid any more: the process was held (stopped, or the host took
+    /// the processor) between computing and sending them.
+    pub longest_hold_ns: u64,
+    pub home: [f64; 6],
+}
+
 /// What the io thread saw.
 #[derive(Debug, Default)]
 pub struct IoReport {
-    /// Release to force sent.
-    pub end_to_end: Times,
     /// Messages that could not be sent.
     pub send_failures: u64,
     /// Messages passed over: other schema, older life of the source, seen before.
@@ -61,85 +93,166 @@ impl Ports {
 }
 
 /// Runs until `stop`, then publishes the last output there is.
-///
-/// Forces computed more than `longest_hold_ns` ago are not valid any more: the process was held (stopped,
-/// or the host took the processor) between computing and sending them.
-pub fn run(
-    timing: &Timing,
-    longest_hold_ns: u64,
-    home: &[f64; 6],
-    mut ports: Ports,
-    mut side: IoSide,
-    stop: &AtomicBool,
-) -> IoReport {
-    let mut report = IoReport::default();
+pub fn run(settings: &Settings, ports: Ports, sides: Sides<'_>, stop: &AtomicBool) -> IoReport {
     let at_start = ThreadUsage::of_this_thread();
-    let grid = Grid::new(timing.period_ns, timing.phase_ns);
-    let lead_ns = LEAD_NS.min(timing.period_ns / 4);
-    let mut input = Input::default();
-    let mut published = 0;
-    while !stop.load(Ordering::Relaxed) {
-        let release_ns = grid.next_after(monotonic_ns() + lead_ns);
-        sleep_until(release_ns - lead_ns);
-        read(&mut ports, &mut input);
-        side.inputs.write(input);
+    let mut io = Io {
+        settings,
+        ports,
+        sides,
+        input: CycleInput::default(),
+        published: 0,
+        send_failures: 0,
+        allocations: at_start.allocations,
+    };
+    match settings.timing.release {
+        Release::Grid { max_lead_ns } => io.run_in_phase(max_lead_ns, stop),
+        Release::External { .. } => io.run_on_messages(stop),
+    }
+    io.publish_newest();
+    IoReport {
+        send_failures: io.send_failures,
+        rejected: io.rejected(),
+        usage: ThreadUsage::of_this_thread().since(&at_start),
+    }
+}
 
-        sleep_until(release_ns);
-        let next_read_ns = release_ns + timing.period_ns - lead_ns;
+struct Io<'a> {
+    settings: &'a Settings,
+    ports: Ports,
+    sides: Sides<'a>,
+    input: CycleInput,
+    /// The cycle that was published last.
+    published: u64,
+    send_failures: u64,
+    /// Of this thread, before the first cycle.
+    allocations: u64,
+}
+
+impl Io<'_> {
+    fn run_in_phase(&mut self, max_lead_ns: u64, stop: &AtomicBool) {
+        let Settings { timing: Timing { period_ns, phase_ns, .. }, lead_ns, .. } = *self.settings;
+        let grid = Grid::new(period_ns, phase_ns);
+        let mut waiter = Waiter::new(max_lead_ns);
         while !stop.load(Ordering::Relaxed) {
-            let cycle = side.outputs.read();
-            if cycle.release_ns > published {
-                published = cycle.release_ns;
-                publish(&mut ports, home, cycle, longest_hold_ns, &mut report);
+            let release_ns = grid.next_after(monotonic_ns() + lead_ns);
+            waiter.until(&mut Monotonic, release_ns - lead_ns);
+            self.read();
+            self.hand_in();
+            if max_lead_ns == 0 {
+                sleep_until(release_ns);
             }
-            let now_ns = monotonic_ns();
-            if published >= release_ns || now_ns + POLL_NS >= next_read_ns {
-                break;
+            let give_up_ns = release_ns + period_ns - lead_ns;
+            let mut pause = Pause::new(monotonic_ns().max(release_ns), period_ns);
+            while self.publish_new() < release_ns && monotonic_ns() + POLL_NS < give_up_ns {
+                if stop.load(Ordering::Relaxed) {
+                    return;
+                }
+                pause.pause();
             }
+        }
+    }
+
+    fn run_on_messages(&mut self, stop: &AtomicBool) {
+        let period_ns = self.settings.timing.period_ns;
+        let mut pause = Pause::new(monotonic_ns(), period_ns);
+        while !stop.load(Ordering::Relaxed) {
+            let published = self.published;
+            let measured = self.read();
+            if measured {
+                self.hand_in();
+                self.sides.realtime.unpark();
+            }
+            self.publish_new();
+            if measured || self.published > published {
+                pause = Pause::new(monotonic_ns(), period_ns);
+            }
+            pause.pause();
+        }
+    }
+
+    /// Takes in the newest messages; true if a measurement is among them.
+    fn read(&mut self) -> bool {
+        let input = &mut self.input.input;
+        if let Some(message) = self.ports.setpoint.newest() {
+            input.setpoint = Some(Setpoint {
+                time_ns: message.header.time_ns,
+                task: TaskState {
+                    x: message.x.into(),
+                    xd: message.x_rate.into(),
+                    xdd: message.x_accel.into(),
+                },
+            });
+        }
+        let measured = self.ports.measured.newest();
+        if let Some(message) = &measured {
+            input.measurement = Some(Measurement {
+                time_ns: message.header.time_ns,
+                length: message.length_m,
+                rate: message.length_rate_m_s,
+            });
+        }
+        measured.is_some()
+    }
+
+    fn hand_in(&mut self) {
+        self.input.measurements = self.ports.measured.received();
+        self.input.handed_ns = monotonic_ns();
+        self.sides.exchange.inputs.write(self.input);
+    }
+
+    /// Publishes the newest output unless it has been; returns when it was due.
+    fn publish_new(&mut self) -> u64 {
+        let CycleOutput { due_ns, counters, .. } = *self.sides.exchange.outputs.read();
+        if counters.cycles > self.published {
+            self.published = counters.cycles;
+            self.publish_newest();
+        }
+        due_ns
+    }
+
+    fn publish_newest(&mut self) {
+        let mut cycle = *self.sides.exchange.outputs.output_buffer();
+        let now_ns = monotonic_ns();
+        let held_ns = now_ns.saturating_sub(cycle.due_ns);
+        if held_ns > self.settings.longest_hold_ns && cycle.output.state == State::Active {
+            cycle.output = Output { cause: Cause::MeasurementLost, ..Output::default() };
+        }
+        let sent = self.ports.force.publish(now_ns, force_message(&cycle));
+        if cycle.output.state == State::Active {
+            // Full only if the log thread is held; it loses statistics, not forces.
+            let _ = self.sides.sent.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
+        }
+        let mut status = status_message(&self.settings.home, &cycle);
+        status.io_allocations = ThreadUsage::allocations_of_this_thread() - self.allocations;
+        status.rejected = self.rejected();
+        status.statistics = *self.sides.statistics.read();
+        let told = self.ports.status.publish(now_ns, status);
+        self.send_failures += u64::from(sent.is_err()) + u64::from(told.is_err());
+    }
+
+    fn rejected(&self) -> u64 {
+        self.ports.setpoint.rejected() + self.ports.measured.rejected()
+    }
+}
+
+/// Between two looks: awake at first, then asleep.
+struct Pause {
+    awake_until_ns: u64,
+}
+
+impl Pause {
+    fn new(now_ns: u64, period_ns: u64) -> Self {
+        Self { awake_until_ns: now_ns + AWAKE_NS.min(period_ns / 8) }
+    }
+
+    fn pause(&mut self) {
+        let now_ns = Monotonic.now_ns();
+        if now_ns < self.awake_until_ns {
+            core::hint::spin_loop();
+        } else {
             sleep_until(now_ns + POLL_NS);
         }
     }
-    publish(&mut ports, home, side.outputs.read(), longest_hold_ns, &mut report);
-    report.usage = ThreadUsage::of_this_thread().since(&at_start);
-    report.rejected = ports.setpoint.rejected() + ports.measured.rejected();
-    report
-}
-
-fn read(ports: &mut Ports, input: &mut Input) {
-    if let Some(message) = ports.setpoint.newest() {
-        input.setpoint = Some(Setpoint {
-            time_ns: message.header.time_ns,
-            task: TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() },
-        });
-    }
-    if let Some(message) = ports.measured.newest() {
-        input.measurement = Some(Measurement {
-            time_ns: message.header.time_ns,
-            length: message.length_m,
-            rate: message.length_rate_m_s,
-        });
-    }
-}
-
-fn publish(
-    ports: &mut Ports,
-    home: &[f64; 6],
-    cycle: &CycleOutput,
-    longest_hold_ns: u64,
-    report: &mut IoReport,
-) {
-    let mut cycle = *cycle;
-    let now_ns = monotonic_ns();
-    let held_ns = now_ns.saturating_sub(cycle.release_ns);
-    if held_ns > longest_hold_ns && cycle.output.state == State::Active {
-        cycle.output = Output { cause: Cause::MeasurementLost, ..Output::default() };
-    }
-    let sent = ports.force.publish(now_ns, force_message(&cycle));
-    if cycle.output.state == State::Active {
-        report.end_to_end.record(monotonic_ns().saturating_sub(cycle.release_ns));
-    }
-    let told = ports.status.publish(now_ns, status_message(home, &cycle));
-    report.send_failures += u64::from(sent.is_err()) + u64::from(told.is_err());
 }
 
 fn force_message(cycle: &CycleOutput) -> ForceMessage {
@@ -164,6 +277,8 @@ fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMessage {
         late_wakeups: counters.late_wakeups,
         overruns: counters.overruns,
         skipped: counters.skipped,
+        caught_up: counters.caught_up,
+        allocations: counters.allocations,
         ..StatusMessage::default()
     };
     if let Some((pose, twist)) = &output.measured {

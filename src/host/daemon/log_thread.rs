@@ -1,43 +1,67 @@
-//! The log thread: turns the records of the real-time thread into statistics and into words.
-
-use core::sync::atomic::{AtomicBool, Ordering};
-use core::time::Duration;
+//! The log thread: turns the records of the other two threads into statistics and into words.
 
 extern crate std;
 
-use heapless::spsc::Consumer;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
 use std::prelude::rust_2024::*;
+use std::sync::OnceLock;
 use std::thread;
+use std::time::Instant;
+
+use heapless::spsc::Consumer;
 use tracing::{info, warn};
+use triple_buffer::Input as Writer;
 
+use super::hints::{Hints, ThreadFiles};
+use super::statistics::Collector;
 use crate::control::state::{Cause, State};
-use crate::host::report::{Fault, Times, TrackingSum};
+use crate::host::report::{Fault, TrackingSum};
+use crate::ipc::statistics::Statistics;
 use crate::realtime::cyclic::CycleRecord;
+use crate::realtime::usage::ThreadUsage;
 
-/// How often the queue is emptied: well before it is full at the highest rate.
+/// How often the queues are emptied: well before they are full at the highest rate.
 const PERIOD: Duration = Duration::from_millis(20);
+
+/// Length of a window of the statistics.
+const WINDOW: Duration = Duration::from_secs(1);
 
 /// Faults kept for the report; a machine that faults more often has told enough.
 const MAX_FAULTS: usize = 1000;
 
+/// What the log thread reads and where it tells.
+pub struct Sides<'a> {
+    pub records: Consumer<'a, CycleRecord>,
+    /// Release to force sent \[ns\], from the io thread.
+    pub sent: Consumer<'a, u64>,
+    /// For the status message.
+    pub statistics: Writer<Statistics>,
+    /// Of the real-time thread, once it has begun.
+    pub files: &'a OnceLock<ThreadFiles>,
+}
+
 /// Statistics of a run.
 #[derive(Debug, Default)]
 pub struct LogReport {
-    pub wakeup: Times,
-    pub compute: Times,
+    pub statistics: Statistics,
     pub tracking: TrackingSum,
     pub faults: Vec<Fault>,
+    pub usage: ThreadUsage,
 }
 
-/// Runs until `stop` and until the queue is empty.
-pub fn run(mut records: Consumer<'_, CycleRecord>, stop: &AtomicBool) -> LogReport {
-    let mut report = LogReport::default();
+/// Runs until `stop` and until the queues are empty.
+pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
+    let mut collector = Collector::default();
+    let mut report = LogReport { faults: Vec::with_capacity(MAX_FAULTS), ..LogReport::default() };
     let mut last = (State::Waiting, Cause::None);
+    let mut hints = Hints::default();
+    let mut window_began = Instant::now();
+    let at_start = ThreadUsage::of_this_thread();
     loop {
         let stopping = stop.load(Ordering::Relaxed);
-        while let Some(record) = records.dequeue() {
-            report.wakeup.record(record.wakeup_ns);
-            report.compute.record(record.compute_ns);
+        while let Some(record) = sides.records.dequeue() {
+            collector.add(&record);
             if let Some((position, orientation)) = record.error {
                 report.tracking.add(position, orientation);
             }
@@ -47,7 +71,21 @@ pub fn run(mut records: Consumer<'_, CycleRecord>, stop: &AtomicBool) -> LogRepo
                 last = now;
             }
         }
+        while let Some(end_to_end_ns) = sides.sent.dequeue() {
+            collector.add_sent(end_to_end_ns);
+        }
+        if let Some(files) = sides.files.get() {
+            let now = files.read();
+            collector.hint(&now.since(&hints));
+            hints = now;
+        }
+        if window_began.elapsed() >= WINDOW {
+            window_began = Instant::now();
+            sides.statistics.write(collector.end_window());
+        }
         if stopping {
+            report.statistics = collector.statistics();
+            report.usage = ThreadUsage::of_this_thread().since(&at_start);
             return report;
         }
         thread::sleep(PERIOD);

@@ -11,17 +11,19 @@ use std::boxed::Box;
 use std::io;
 use std::path::Path;
 use std::prelude::rust_2024::*;
-use std::sync::mpsc;
+use std::sync::{OnceLock, mpsc};
 use std::thread::{Builder, Scope, ScopedJoinHandle, scope};
 
 use heapless::spsc::Queue;
 use sd_notify::NotifyState;
-use tracing::{debug, info, warn};
+use tracing::{info, warn};
+use triple_buffer::triple_buffer;
 
-use self::io_thread::{IoReport, Ports};
+use self::hints::ThreadFiles;
+use self::io_thread::{DELAYS, IoReport, Ports, Settings};
 use self::log_thread::LogReport;
 use super::config::Config;
-use super::config::deployment::{Deployment, Realtime};
+use super::config::deployment::{Deployment, Realtime, ReleaseKey};
 use super::fidelity;
 use super::files::FileError;
 use super::report::{DeadlineMisses, Report};
@@ -31,15 +33,19 @@ use crate::control::gains::Gains;
 use crate::control::law::Law;
 use crate::ipc::exchange::exchange;
 use crate::ipc::ports::{Bus, PortError};
+use crate::ipc::statistics::Statistics;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::ladder::Rung;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Timing};
+use crate::realtime::clock::Monotonic;
+use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Release, Timing};
 use crate::realtime::setup::{self, Shortfall};
 
+mod hints;
 mod io_thread;
 mod log_thread;
+mod statistics;
 
 /// Stack of each thread: several times what they use, and small because locked memory holds all of it.
 const STACK: usize = 512 * 1024;
@@ -74,22 +80,45 @@ pub fn run(config: &Config, report_path: Option<&Path>, stop: &Stop) -> Result<R
 
 fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
     let Config { machine, deployment, .. } = config;
-    let controller = Controller::new(machine, parameters(deployment, fidelity::rung(config)));
+    let mut controller = Controller::new(machine, parameters(deployment, fidelity::rung(config)));
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
     let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
-    let (producer, consumer) = queue.split();
+    let (records_in, records) = queue.split();
+    let mut delays = Box::new(Queue::<u64, DELAYS>::new());
+    let (sent_in, sent) = delays.split();
+    let (statistics_in, statistics) = triple_buffer(&Statistics::default());
+    let files = &OnceLock::new();
     let [stop_loop, stop_io, stop_log] = &[const { AtomicBool::new(false) }; 3];
     let (io_ready, ready) = mpsc::channel();
     let realtime_ready = io_ready.clone();
     let (go, go_ahead) = mpsc::channel::<()>();
     let realtime = &deployment.realtime;
+    let settings = Settings {
+        timing: *timing,
+        lead_ns: nanoseconds(realtime.io_lead_s),
+        longest_hold_ns: nanoseconds(deployment.timeouts.measured_s),
+        home: machine.home,
+    };
 
     scope(|threads| {
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop([stop_loop, stop_io, stop_log]);
-        let log = spawn(threads, "hexad-log", || log_thread::run(consumer, stop_log))?;
-        let io = spawn(threads, "hexad-io", || {
+        let log = spawn(threads, "hexad-log", || {
+            log_thread::run(log_thread::Sides { records, sent, statistics: statistics_in, files }, stop_log)
+        })?;
+        let cyclic = spawn(threads, "hexad-rt", move || {
+            let _ = realtime_ready.send(Ok(prepare_thread(realtime.priority, realtime.cpu)));
+            // Without them the worst cycles carry no hints.
+            let _ = ThreadFiles::of_this_thread().map(|found| files.set(found));
+            warm_up(controller.clone(), machine);
+            // Without the word of the main thread no cycle must begin.
+            go_ahead.recv().ok()?;
+            let step = |input: &Input| controller.step(input);
+            Some(cyclic::run(&mut Monotonic, timing, step, realtime_side, records_in, stop_loop))
+        })?;
+        let realtime_thread = cyclic.thread().clone();
+        let io = spawn(threads, "hexad-io", move || {
             // Ports belong to the thread that opens them.
             let ports = Bus::join(&config.name).and_then(|bus| Ports::open(&bus));
             let (ports, opened) =
@@ -97,15 +126,9 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
             let shortfalls = opened.map(|()| prepare_thread(realtime.io_priority, realtime.io_cpu));
             // Nobody listens only if the other thread failed first.
             let _ = io_ready.send(shortfalls.map_err(DaemonError::from));
-            let longest_hold_ns = nanoseconds(deployment.timeouts.measured_s);
-            Some(io_thread::run(timing, longest_hold_ns, &machine.home, ports?, io_side, stop_io))
-        })?;
-        let cyclic = spawn(threads, "hexad-rt", move || {
-            let _ = realtime_ready.send(Ok(prepare_thread(realtime.priority, realtime.cpu)));
-            warm_up(controller.clone(), machine);
-            // Without the word of the main thread no cycle must begin.
-            go_ahead.recv().ok()?;
-            Some(cyclic::run(timing, controller, realtime_side, producer, stop_loop))
+            let sides =
+                io_thread::Sides { exchange: io_side, sent: sent_in, statistics, realtime: realtime_thread };
+            Some(io_thread::run(&settings, ports?, sides, stop_io))
         })?;
 
         let started = start(realtime, &ready, &go);
@@ -118,6 +141,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
         }
         drop(go);
         stop_loop.store(true, Ordering::Relaxed);
+        cyclic.thread().unpark();
         let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
         stop_io.store(true, Ordering::Relaxed);
         let io = io.join().map_err(|_| DaemonError::Died("io"));
@@ -185,6 +209,7 @@ fn warm_up(mut controller: Controller, machine: &Machine) {
         release_ns: 1,
         setpoint: Some(Setpoint { time_ns: 1, task }),
         measurement: Some(Measurement { time_ns: 1, length, rate: [0.0; 6] }),
+        deadline_missed: false,
     };
     for _ in 0..WARM_UP_CYCLES {
         core::hint::black_box(controller.step(core::hint::black_box(&input)));
@@ -211,11 +236,18 @@ pub fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
 }
 
 fn timing(deployment: &Deployment) -> Timing {
-    let period_ns = nanoseconds(deployment.realtime.period_s());
+    let Deployment { realtime, timeouts, .. } = deployment;
+    let period_ns = nanoseconds(realtime.period_s());
     Timing {
         period_ns,
         phase_ns: period_ns / 2,
-        late_wakeup_ns: nanoseconds(deployment.realtime.late_wakeup_s),
+        release: match realtime.release {
+            ReleaseKey::Sleep => Release::Grid { max_lead_ns: 0 },
+            ReleaseKey::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
+            ReleaseKey::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
+        },
+        on_overrun: realtime.on_overrun,
+        late_wakeup_ns: nanoseconds(realtime.late_wakeup_s),
     }
 }
 
@@ -226,7 +258,6 @@ pub(super) fn nanoseconds(seconds: f64) -> u64 {
 
 fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Report {
     let counters = &cyclic.counters;
-    debug!(allocations = io.usage.allocations, "io thread, peers that came and went included");
     for (count, what) in [
         (counters.records_lost, "cycle records lost: the log thread was too slow"),
         (io.send_failures, "messages could not be sent"),
@@ -236,6 +267,7 @@ fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) 
             warn!(count, "{what}");
         }
     }
+    let Statistics { total, worst, .. } = log.statistics;
     Report {
         cycles: counters.cycles,
         rate_hz: config.deployment.realtime.rate_hz,
@@ -243,12 +275,17 @@ fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) 
             late_wakeup: counters.late_wakeups,
             overrun: counters.overruns,
             skipped: counters.skipped,
+            caught_up: counters.caught_up,
         },
-        wakeup_ns: log.wakeup.quantiles(),
-        compute_ns: log.compute.quantiles(),
-        end_to_end_ns: io.end_to_end.quantiles(),
+        wakeup_ns: total.wakeup_ns,
+        compute_ns: total.compute_ns,
+        measured_age_ns: total.measured_age_ns,
+        end_to_end_ns: total.end_to_end_ns,
+        worst_cycles: worst.into_iter().filter(|cycle| cycle.cycle > 0).collect(),
         tracking: log.tracking.tracking(),
         rt_thread: cyclic.usage,
+        io_thread: io.usage,
+        log_thread: log.usage,
         faults: log.faults,
     }
 }

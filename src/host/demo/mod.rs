@@ -17,9 +17,10 @@ use self::recording::{Recorder, Recording};
 use super::charts::ChartError;
 use super::config::{Config, ConfigError};
 use super::files::{FileError, write_whole};
-use super::report::{Quantiles, Report};
+use super::report::Report;
 use super::stop::Stop;
 use crate::ipc::ports::{Bus, PortError};
+use crate::ipc::statistics::Times;
 
 pub mod children;
 mod pictures;
@@ -289,7 +290,7 @@ impl fmt::Display for Summary<'_> {
             ("compute", &self.report.compute_ns),
             ("end to end", &self.report.end_to_end_ns),
         ] {
-            let Quantiles { p50, p99, p999, max } = *times;
+            let Times { p50, p99, p999, max, .. } = *times;
             let [p50, p99, p999, max] = [p50, p99, p999, max].map(|ns| ns as f64 * 1e-3);
             writeln!(f, "  {name:<11} {p50:>10.1} {p99:>10.1} {p999:>10.1} {max:>10.1}")?;
         }

@@ -35,7 +35,7 @@ pub struct Realtime {
     /// Cycles per second.
     pub rate_hz: f64,
     /// What begins a cycle.
-    pub release: Release,
+    pub release: ReleaseKey,
     /// Longest spin before a release, where there is one.
     pub max_lead_s: f64,
     /// What follows a cycle that was not done at its next release.
@@ -64,7 +64,7 @@ pub struct Realtime {
 
 /// `realtime.release`: what begins a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Release {
+pub enum ReleaseKey {
     /// A point of the grid, slept for.
     Sleep,
     /// A point of the grid, slept for but for a lead that is spun.
@@ -91,9 +91,10 @@ impl Realtime {
 
 pub(super) fn read(mut section: Reader) -> Realtime {
     let rate_hz = section.number_or("rate_hz", 1000.0, RATE_HZ);
-    let releases = [("sleep", Release::Sleep), ("hybrid", Release::Hybrid), ("external", Release::External)];
-    let release = section.choice_or("release", Release::Sleep, &releases);
-    let io_lead_us = if release == Release::Hybrid { IO_LEAD_AWAKE_US } else { IO_LEAD_US };
+    let releases =
+        [("sleep", ReleaseKey::Sleep), ("hybrid", ReleaseKey::Hybrid), ("external", ReleaseKey::External)];
+    let release = section.choice_or("release", ReleaseKey::Sleep, &releases);
+    let io_lead_us = if release == ReleaseKey::Hybrid { IO_LEAD_AWAKE_US } else { IO_LEAD_US };
     let schedulers = [("fifo", Scheduler::Fifo), ("deadline", Scheduler::Deadline)];
     let scheduler = section.choice_or("scheduler", Scheduler::Fifo, &schedulers);
     let (low, high) = PRIORITY;
@@ -122,6 +123,12 @@ pub(super) fn read(mut section: Reader) -> Realtime {
         section.refuse(
             "cpu",
             "must not be given with realtime.scheduler = \"deadline\" (Linux places such threads itself)",
+        );
+    }
+    if realtime.release == ReleaseKey::External && matches!(realtime.on_overrun, OnOverrun::CatchUp { .. }) {
+        section.refuse(
+            "on_overrun",
+            "must be one of \"skip\", \"fault\" with realtime.release = \"external\" (only the newest message is kept)",
         );
     }
     section.finish();

@@ -1,0 +1,137 @@
+//! Waiting for an instant: asleep, or asleep and for the last moment awake.
+//!
+//! A sleeping thread wakes some tens of microseconds late. A thread that wakes a lead earlier and spins is
+//! on time within a fraction of a microsecond, for the price of the lead in processor time. The lead
+//! follows the wake-up latency that is seen: up at once, down slowly. It never exceeds its bound, so no
+//! period is ever spun as a whole, and Linux's real-time throttle (950 ms of each second) is never met.
+
+use super::clock::Clock;
+
+/// The lead forgets a high latency with this time constant \[cycles\]: about the 99.9th percentile stays
+/// covered.
+const MEMORY: u64 = 1024;
+
+/// From the end of a sleep to the first look at the clock, and from a look to the next \[ns\].
+const MARGIN_NS: u64 = 1_000;
+
+/// Waits; knows how long before an instant it has to wake.
+#[derive(Clone, Copy, Debug)]
+pub struct Waiter {
+    lead_ns: u64,
+    max_lead_ns: u64,
+}
+
+impl Waiter {
+    /// Spins at most `max_lead_ns` before an instant; 0 only sleeps.
+    pub fn new(max_lead_ns: u64) -> Self {
+        Self { lead_ns: max_lead_ns, max_lead_ns }
+    }
+
+    /// Waits until `instant_ns` and returns the present instant: that one or later.
+    pub fn until(&mut self, clock: &mut impl Clock, instant_ns: u64) -> u64 {
+        let wake_ns = instant_ns.saturating_sub(self.lead_ns);
+        let mut now_ns = clock.now_ns();
+        if now_ns < wake_ns {
+            clock.sleep_until(wake_ns);
+            now_ns = clock.now_ns();
+            self.adapt(now_ns.saturating_sub(wake_ns));
+        }
+        while now_ns < instant_ns {
+            core::hint::spin_loop();
+            now_ns = clock.now_ns();
+        }
+        now_ns
+    }
+
+    /// What is spun at present \[ns\].
+    pub fn lead_ns(&self) -> u64 {
+        self.lead_ns
+    }
+
+    fn adapt(&mut self, latency_ns: u64) {
+        let needed_ns = latency_ns + MARGIN_NS;
+        if needed_ns > self.max_lead_ns {
+            // No lead within the bound helps against this one; nothing is learned from it.
+            return;
+        }
+        let forgotten_ns = self.lead_ns - self.lead_ns.saturating_sub(needed_ns).div_ceil(MEMORY);
+        self.lead_ns = forgotten_ns.max(needed_ns);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A clock whose sleeps end late by a fixed time and whose every look costs one nanosecond.
+    struct Late {
+        now_ns: u64,
+        latency_ns: u64,
+        slept_ns: u64,
+    }
+
+    impl Clock for Late {
+        fn now_ns(&mut self) -> u64 {
+            self.now_ns += 1;
+            self.now_ns
+        }
+
+        fn sleep_until(&mut self, instant_ns: u64) {
+            let end_ns = self.now_ns.max(instant_ns + self.latency_ns);
+            self.slept_ns += end_ns - self.now_ns;
+            self.now_ns = end_ns;
+        }
+    }
+
+    fn lateness(waiter: &mut Waiter, clock: &mut Late, cycles: u64) -> u64 {
+        let wait = |k| {
+            let instant_ns = 1_000_000 * (clock.now_ns / 1_000_000 + 1) + k % 2;
+            waiter.until(clock, instant_ns) - instant_ns
+        };
+        (0..cycles).map(wait).max().unwrap()
+    }
+
+    #[test]
+    fn without_a_lead_the_latency_of_the_sleep_is_there() {
+        let mut clock = Late { now_ns: 0, latency_ns: 50_000, slept_ns: 0 };
+        assert!((50_000..50_010).contains(&lateness(&mut Waiter::new(0), &mut clock, 100)));
+    }
+
+    #[test]
+    fn with_a_lead_it_is_hidden_and_the_spin_shrinks_to_what_is_needed() {
+        let mut clock = Late { now_ns: 0, latency_ns: 50_000, slept_ns: 0 };
+        let mut waiter = Waiter::new(200_000);
+        assert!(lateness(&mut waiter, &mut clock, 20_000) <= 1);
+        assert!((51_000..52_000).contains(&waiter.lead_ns()), "{waiter:?}");
+        clock.latency_ns = 90_000;
+        assert!(lateness(&mut waiter, &mut clock, 1) > 30_000, "the first one cannot be known");
+        assert!(lateness(&mut waiter, &mut clock, 100) <= 1);
+        clock.latency_ns = 10_000;
+        assert!(lateness(&mut waiter, &mut clock, 10_000) <= 1);
+        assert!((11_000..12_000).contains(&waiter.lead_ns()), "{waiter:?}");
+    }
+
+    #[test]
+    fn a_pause_of_the_host_does_not_raise_the_lead_and_no_latency_raises_it_over_its_bound() {
+        let mut clock = Late { now_ns: 0, latency_ns: 50_000, slept_ns: 0 };
+        let mut waiter = Waiter::new(200_000);
+        lateness(&mut waiter, &mut clock, 20_000);
+        let before_ns = waiter.lead_ns();
+        for latency_ns in [7_000_000, 199_000, 250_000] {
+            clock.latency_ns = latency_ns;
+            lateness(&mut waiter, &mut clock, 1);
+            assert_eq!(waiter.lead_ns(), before_ns);
+        }
+        clock.latency_ns = 198_999;
+        lateness(&mut waiter, &mut clock, 10);
+        assert_eq!(waiter.lead_ns(), 200_000);
+    }
+
+    #[test]
+    fn an_instant_that_has_passed_is_not_slept_for_and_teaches_nothing() {
+        let mut clock = Late { now_ns: 5_000_000, latency_ns: 50_000, slept_ns: 0 };
+        let mut waiter = Waiter::new(200_000);
+        assert_eq!(waiter.until(&mut clock, 4_000_000), 5_000_001);
+        assert_eq!((clock.slept_ns, waiter.lead_ns()), (0, 200_000));
+    }
+}
