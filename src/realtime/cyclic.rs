@@ -180,9 +180,12 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
         let mut begin = Begin::default();
         let mut seen = None;
         let mut missed = false;
-        while !stop.load(Ordering::Relaxed) {
+        loop {
             let timeout_at_ns = done_ns + timeout_ns;
             let rung = doorbell::wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
             let woke_ns = self.clock.now_ns();
             let handed = self.side.inputs.output_buffer();
             let measured = handed.input.measurement.filter(|_| rung);
