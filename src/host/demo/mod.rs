@@ -3,7 +3,6 @@
 
 extern crate std;
 
-use core::fmt;
 use core::time::Duration;
 use std::path::{Path, PathBuf};
 use std::prelude::rust_2024::*;
@@ -14,17 +13,18 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use self::children::Process;
 use self::recording::{Recorder, Recording};
+use self::summary::Summary;
 use super::charts::ChartError;
 use super::config::{Config, ConfigError};
 use super::files::{FileError, write_whole};
 use super::report::Report;
 use super::stop::Stop;
 use crate::ipc::ports::{Bus, PortError};
-use crate::ipc::statistics::Times;
 
 pub mod children;
 mod pictures;
 mod recording;
+mod summary;
 
 /// The machine of a demonstration without `--config`.
 const DEFAULT_MACHINE: &str = include_str!("../../../config/fried2008.toml");
@@ -263,53 +263,4 @@ fn adapted(text: &str, name: &str, rate_hz: Option<f64>) -> String {
         set("realtime", "rate_hz", rate_hz, true);
     }
     table.to_string()
-}
-
-/// The table printed at the end.
-struct Summary<'a> {
-    title: &'a str,
-    report: &'a Report,
-}
-
-impl fmt::Display for Summary<'_> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Report { cycles, rate_hz, deadline_misses, tracking, rt_thread, faults, .. } = self.report;
-        writeln!(f, "{}: {cycles} cycles at {rate_hz} Hz\n", self.title)?;
-        writeln!(f, "tracking               RMS          max")?;
-        let (position, orientation) = (tracking.position_rms_m, tracking.orientation_rms_rad);
-        writeln!(f, "  position    {:>9.3} µm {:>9.3} µm", position * 1e6, tracking.position_max_m * 1e6)?;
-        writeln!(
-            f,
-            "  orientation {:>9.3} µrad {:>7.3} µrad\n",
-            orientation * 1e6,
-            tracking.orientation_max_rad * 1e6
-        )?;
-        writeln!(f, "time [µs]            p50        p99      p99.9        max")?;
-        for (name, times) in [
-            ("wake-up", &self.report.wakeup_ns),
-            ("compute", &self.report.compute_ns),
-            ("end to end", &self.report.end_to_end_ns),
-        ] {
-            let Times { p50, p99, p999, max, .. } = *times;
-            let [p50, p99, p999, max] = [p50, p99, p999, max].map(|ns| ns as f64 * 1e-3);
-            writeln!(f, "  {name:<11} {p50:>10.1} {p99:>10.1} {p999:>10.1} {max:>10.1}")?;
-        }
-        writeln!(
-            f,
-            "\ndeadline misses  {} late wake-ups, {} overruns, {} skipped cycles",
-            deadline_misses.late_wakeup, deadline_misses.overrun, deadline_misses.skipped
-        )?;
-        writeln!(
-            f,
-            "real-time thread {} allocations, {} page faults, {} involuntary switches",
-            rt_thread.allocations,
-            rt_thread.minor_faults + rt_thread.major_faults,
-            rt_thread.involuntary_switches
-        )?;
-        writeln!(f, "faults           {}", faults.len())?;
-        for fault in faults {
-            writeln!(f, "  cycle {}: {} {}", fault.cycle, fault.number, fault.name)?;
-        }
-        Ok(())
-    }
 }
