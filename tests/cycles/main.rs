@@ -4,6 +4,8 @@
 //! against a second implementation that walks the grid point by point. On the real clock the loop must
 //! agree with what the test itself saw, whatever the host did meanwhile.
 
+#![allow(clippy::expect_used, clippy::unreachable, clippy::indexing_slicing, reason = "helpers of tests")]
+
 mod external;
 mod oracle;
 mod policies;
