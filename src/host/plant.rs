@@ -20,7 +20,7 @@ use crate::model::machine::LEGS;
 use crate::model::task::task_coordinates;
 use crate::plant::simulator::{Brakes, Simulator};
 use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
-use crate::realtime::setup;
+use crate::realtime::setup::scheduling;
 
 /// Forces kept between two ticks: 12.8 ms at 20 kHz, so that a late plant still applies each in its turn.
 const FORCE_DEPTH: usize = 256;
@@ -144,8 +144,8 @@ fn tell(before: Brakes, now: Brakes, cause: Cause) {
 /// Best effort: a simulator or a setpoint source below the daemon's priority, so that on a busy host it
 /// is as punctual as hardware.
 pub(super) fn prepare_thread(config: &Config) {
-    setup::sharp_timers();
-    if let Err(shortfall) = setup::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {
+    scheduling::sharp_timers();
+    if let Err(shortfall) = scheduling::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {
         debug!("{shortfall}");
     }
 }

@@ -22,36 +22,32 @@ use triple_buffer::triple_buffer;
 use self::hints::ThreadFiles;
 use self::io_thread::{DELAYS, IoReport, Ports, Settings};
 use self::log_thread::LogReport;
+use self::start::{prepare_io, prepare_loop, start, warm_up};
 use super::config::Config;
-use super::config::deployment::{Deployment, Realtime, ReleaseKey};
+use super::config::deployment::{Deployment, ReleaseKey};
 use super::fidelity;
 use super::files::FileError;
 use super::report::{DeadlineMisses, Report};
 use super::stop::Stop;
-use crate::control::controller::{Controller, Input, Measurement, Parameters, Setpoint};
+use crate::control::controller::{Controller, Input, Parameters};
 use crate::control::gains::Gains;
 use crate::control::law::Law;
 use crate::ipc::exchange::exchange;
 use crate::ipc::ports::{Bus, PortError};
 use crate::ipc::statistics::Statistics;
-use crate::model::inverse_geometry::leg_lengths;
 use crate::model::ladder::Rung;
-use crate::model::machine::Machine;
-use crate::model::task::TaskState;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Release, Timing};
-use crate::realtime::setup::{self, Shortfall};
+use crate::realtime::setup::{Shortfall, deadline, memory};
 
 mod hints;
 mod io_thread;
 mod log_thread;
+pub mod start;
 mod statistics;
 
 /// Stack of each thread: several times what they use, and small because locked memory holds all of it.
 const STACK: usize = 512 * 1024;
-
-/// Cycles computed before the first release, so that code and data are in memory and in the cache.
-const WARM_UP_CYCLES: u32 = 1000;
 
 /// Why the daemon did not run.
 #[derive(Debug, thiserror::Error)]
@@ -94,6 +90,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
     let realtime_ready = io_ready.clone();
     let (go, go_ahead) = mpsc::channel::<()>();
     let realtime = &deployment.realtime;
+    memory::keep_heap();
     let settings = Settings {
         timing: *timing,
         lead_ns: nanoseconds(realtime.io_lead_s),
@@ -108,10 +105,10 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
             log_thread::run(log_thread::Sides { records, sent, statistics: statistics_in, files }, stop_log)
         })?;
         let cyclic = spawn(threads, "hexad-rt", move || {
-            let _ = realtime_ready.send(Ok(prepare_thread(realtime.priority, realtime.cpu)));
+            let shortfalls = prepare_loop(realtime, || warm_up(controller.clone(), machine));
+            let _ = realtime_ready.send(Ok(shortfalls));
             // Without them the worst cycles carry no hints.
             let _ = ThreadFiles::of_this_thread().map(|found| files.set(found));
-            warm_up(controller.clone(), machine);
             // Without the word of the main thread no cycle must begin.
             go_ahead.recv().ok()?;
             let step = |input: &Input| controller.step(input);
@@ -123,7 +120,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
             let ports = Bus::join(&config.name).and_then(|bus| Ports::open(&bus));
             let (ports, opened) =
                 ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
-            let shortfalls = opened.map(|()| prepare_thread(realtime.io_priority, realtime.io_cpu));
+            let shortfalls = opened.map(|()| prepare_io(realtime));
             // Nobody listens only if the other thread failed first.
             let _ = io_ready.send(shortfalls.map_err(DaemonError::from));
             let sides =
@@ -147,7 +144,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
         let io = io.join().map_err(|_| DaemonError::Died("io"));
         stop_log.store(true, Ordering::Relaxed);
         let log = log.join().map_err(|_| DaemonError::Died("log"));
-        started?;
+        let _shallow_sleep = started?;
         let (cyclic, io, log) = (cyclic?.unwrap_or_default(), io?.unwrap_or_default(), log?);
         Ok(summary(config, &cyclic, &io, log))
     })
@@ -168,52 +165,6 @@ fn spawn<'scope, T: Send + 'scope>(
     body: impl FnOnce() -> T + Send + 'scope,
 ) -> io::Result<ScopedJoinHandle<'scope, T>> {
     Builder::new().name(name.into()).stack_size(STACK).spawn_scoped(threads, body)
-}
-
-/// Collects what the threads lack, says it, and lets the loop begin if that is acceptable.
-fn start(
-    realtime: &Realtime,
-    ready: &mpsc::Receiver<Result<Vec<Shortfall>, DaemonError>>,
-    go: &mpsc::Sender<()>,
-) -> Result<(), DaemonError> {
-    let mut shortfalls = Vec::new();
-    for _ in ["io", "real-time"] {
-        shortfalls.extend(ready.recv().map_err(|_| DaemonError::Died("io or real-time"))??);
-    }
-    if realtime.lock_memory {
-        // Last, when all memory is there to be locked.
-        shortfalls.extend(setup::lock_memory().err());
-    }
-    shortfalls.dedup();
-    for shortfall in &shortfalls {
-        warn!("{shortfall}");
-    }
-    if realtime.require_realtime && !shortfalls.is_empty() {
-        return Err(DaemonError::NotRealtime(shortfalls));
-    }
-    go.send(()).map_err(|_| DaemonError::Died("real-time"))
-}
-
-fn prepare_thread(priority: i32, cpu: Option<usize>) -> Vec<Shortfall> {
-    setup::sharp_timers();
-    setup::touch_stack();
-    let bound = cpu.and_then(|cpu| setup::bind_to_cpu(cpu).err());
-    setup::fifo_priority(priority).err().into_iter().chain(bound).collect()
-}
-
-/// Runs a controller that nobody listens to, at rest at home.
-fn warm_up(mut controller: Controller, machine: &Machine) {
-    let task = TaskState::at_rest(machine.home);
-    let length = leg_lengths(machine, &task.motion().pose);
-    let input = Input {
-        release_ns: 1,
-        setpoint: Some(Setpoint { time_ns: 1, task }),
-        measurement: Some(Measurement { time_ns: 1, length, rate: [0.0; 6] }),
-        deadline_missed: false,
-    };
-    for _ in 0..WARM_UP_CYCLES {
-        core::hint::black_box(controller.step(core::hint::black_box(&input)));
-    }
 }
 
 /// What a deployment means to the controller; `rung` is what its fidelity came to.
@@ -259,6 +210,7 @@ pub(super) fn nanoseconds(seconds: f64) -> u64 {
 fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Report {
     let counters = &cyclic.counters;
     for (count, what) in [
+        (deadline::times_exhausted(), "times, at least, the budget of SCHED_DEADLINE was used up: the loop was held"),
         (counters.records_lost, "cycle records lost: the log thread was too slow"),
         (io.send_failures, "messages could not be sent"),
         (io.rejected, "messages passed over: other schema, older source, or seen before"),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use hexad::ipc::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage};
 use hexad::ipc::ports::{Bus, Sink};
-use hexad::realtime::setup;
+use hexad::realtime::setup::scheduling;
 
 use super::children::HANG;
 
@@ -40,7 +40,7 @@ impl Recorder {
             let (recording, stop, machine) = (recording.clone(), stop.clone(), machine.to_owned());
             spawn(move || {
                 // So that a busy machine does not keep it from listening for a quarter of a second.
-                let _ = setup::fifo_priority(1);
+                let _ = scheduling::fifo_priority(1);
                 let bus = Bus::join(&machine).expect("to join");
                 let mut listen = Listener::new(&bus);
                 ready.send(()).expect("the test waits");

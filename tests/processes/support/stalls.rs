@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{JoinHandle, available_parallelism, sleep, spawn};
 use std::time::{Duration, Instant};
 
-use hexad::realtime::setup;
+use hexad::realtime::setup::scheduling;
 
 const NAP: Duration = Duration::from_millis(1);
 
@@ -40,7 +40,7 @@ impl Watchdog {
 
 fn watch(cpu: usize, stop: &AtomicBool, largest_ns: &AtomicU64) {
     // Best effort: without the right to it, the watchdog sees at least as much as the host does.
-    let _ = (setup::fifo_priority(PRIORITY), setup::bind_to_cpu(cpu));
+    let _ = (scheduling::fifo_priority(PRIORITY), scheduling::bind_to_cpu(cpu));
     while !stop.load(Ordering::Relaxed) {
         let before = Instant::now();
         sleep(NAP);

@@ -1,0 +1,107 @@
+//! The real-time budget of a cgroup, where the kernel has them (CONFIG_RT_GROUP_SCHED).
+
+extern crate std;
+
+use core::fmt::Debug;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::prelude::rust_2024::*;
+
+/// What the cgroup of this process leaves to FIFO threads.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum GroupBudget {
+    /// Not limited by group: no such kernel, or the root group.
+    None,
+    /// cgroup v1 \[us\] per period; with 0 every FIFO thread is refused.
+    Of { file: PathBuf, budget_us: i64 },
+    /// A group of cgroup v2, which has no file for it: a kernel with such budgets gives it none.
+    Unseen { group: PathBuf },
+}
+
+impl GroupBudget {
+    /// Of the cgroup of this process.
+    pub fn of_this_process() -> Self {
+        let [groups, mounts] = ["/proc/self/cgroup", "/proc/self/mountinfo"]
+            .map(|path| fs::read_to_string(path).unwrap_or_default());
+        if let Some(folder) = folder(&groups, &mounts, Hierarchy::Cpu) {
+            let file = folder.join("cpu.rt_runtime_us");
+            let budget_us = fs::read_to_string(&file).ok().and_then(|text| text.trim().parse().ok());
+            return budget_us.map_or(Self::None, |budget_us| Self::Of { file, budget_us });
+        }
+        // The root group alone has no type.
+        folder(&groups, &mounts, Hierarchy::Unified)
+            .filter(|folder| folder.join("cgroup.type").exists())
+            .map_or(Self::None, |group| Self::Unseen { group })
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Hierarchy {
+    /// cgroup v1, controller `cpu`.
+    Cpu,
+    /// cgroup v2.
+    Unified,
+}
+
+impl Hierarchy {
+    /// Whether `controllers` of a line of `/proc/self/cgroup` is this.
+    fn is(self, number: &str, controllers: &str) -> bool {
+        match self {
+            Self::Cpu => controllers.split(',').any(|controller| controller == "cpu"),
+            Self::Unified => number == "0",
+        }
+    }
+
+    fn is_mounted_as(self, kind: &str, options: &str) -> bool {
+        match self {
+            Self::Cpu => kind == "cgroup" && options.split(',').any(|option| option == "cpu"),
+            Self::Unified => kind == "cgroup2",
+        }
+    }
+}
+
+/// The folder of this process' group.
+fn folder(groups: &str, mounts: &str, hierarchy: Hierarchy) -> Option<PathBuf> {
+    let path = groups.lines().find_map(|line| {
+        let mut fields = line.splitn(3, ':');
+        let (number, controllers, path) = (fields.next()?, fields.next()?, fields.next()?);
+        hierarchy.is(number, controllers).then_some(path)
+    })?;
+    let (root, mount_point) = mounts.lines().find_map(|line| {
+        let (mount, kind) = line.split_once(" - ")?;
+        let (mut mount, mut kind) = (mount.split(' ').skip(3), kind.split(' '));
+        let place = (mount.next()?, mount.next()?);
+        let (kind, options) = (kind.next()?, kind.nth(1)?);
+        hierarchy.is_mounted_as(kind, options).then_some(place)
+    })?;
+    // A container may see only its own branch, mounted as the whole.
+    let below = Path::new(path).strip_prefix(root).unwrap_or(Path::new(""));
+    Some(Path::new(mount_point).join(below))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const V1: &str = "32 31 0:29 / /sys/fs/cgroup/cpu rw,relatime - cgroup cgroup rw,cpu,cpuacct\n\
+                      41 31 0:38 / /sys/fs/cgroup/unified rw,relatime - cgroup2 cgroup2 rw\n";
+    const BRANCH: &str = "32 31 0:29 /docker/5e /sys/fs/cgroup/cpu ro - cgroup cgroup rw,cpu\n";
+    const V2: &str = "30 23 0:26 / /sys/fs/cgroup rw,nosuid shared:9 - cgroup2 cgroup2 rw,nsdelegate\n";
+
+    #[test]
+    fn the_folder_of_a_group_is_found() {
+        let in_v1 = "4:cpu,cpuacct:/machine\n0::/unit\n";
+        let in_branch = "4:cpu:/docker/5e\n";
+        let in_v2 = "0::/system.slice/hexad.service\n";
+        for (groups, mounts, hierarchy, expected) in [
+            (in_v1, V1, Hierarchy::Cpu, Some("/sys/fs/cgroup/cpu/machine")),
+            (in_v1, V1, Hierarchy::Unified, Some("/sys/fs/cgroup/unified/unit")),
+            (in_branch, BRANCH, Hierarchy::Cpu, Some("/sys/fs/cgroup/cpu")),
+            (in_v2, V2, Hierarchy::Cpu, None),
+            (in_v2, V2, Hierarchy::Unified, Some("/sys/fs/cgroup/system.slice/hexad.service")),
+            ("", "", Hierarchy::Unified, None),
+        ] {
+            assert_eq!(folder(groups, mounts, hierarchy).as_deref(), expected.map(Path::new), "{groups}");
+        }
+    }
+}

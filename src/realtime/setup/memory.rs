@@ -1,0 +1,60 @@
+//! Stack, heap and locked memory: no page is met for the first time in a cycle.
+
+extern crate std;
+
+use std::prelude::rust_2024::*;
+use std::vec;
+
+use super::Shortfall;
+use super::permissions::Permissions;
+use super::refusals::{self, Step};
+
+/// Stack touched in advance by a real-time thread: more than a cycle uses.
+const STACK_TOUCHED: usize = 128 * 1024;
+
+/// Heap touched in advance by a thread that allocates while a peer connects: many times what it then uses.
+const HEAP_TOUCHED: usize = 1024 * 1024;
+
+/// Keeps every present and future page of the process in memory.
+///
+/// Not tried with a limit that leaves peers no room: a peer that connected later could not be served.
+pub fn lock_all() -> Result<(), Shortfall> {
+    if let Some(shortfall) = Permissions::of_this_process().against(&Step::LockedMemory) {
+        return Err(shortfall);
+    }
+    // SAFETY: takes flags only; affects where pages live, not what they hold.
+    if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0 {
+        return Ok(());
+    }
+    Err(refusals::of(&Step::LockedMemory))
+}
+
+/// Has the allocator keep what it once had from the kernel: freed memory is not given back, and large blocks
+/// come from the heap instead of mappings of their own. For the whole process, before its threads start.
+#[cfg(target_env = "gnu")]
+pub fn keep_heap() {
+    // SAFETY: plain numbers, set under the lock of the allocator. They only decide where blocks come from.
+    unsafe {
+        // -1: never.
+        libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
+        libc::mallopt(libc::M_MMAP_MAX, 0);
+    }
+}
+
+/// Other allocators have no such setting: a thread that allocates may meet new pages.
+#[cfg(not(target_env = "gnu"))]
+pub fn keep_heap() {}
+
+/// Touches heap for the calling thread; after [`keep_heap`] its allocations up to that size meet no page
+/// for the first time.
+pub fn touch_heap() {
+    // Not zero: the kernel's own zero pages would do for that, untouched.
+    drop(core::hint::black_box(vec![1_u8; HEAP_TOUCHED]));
+}
+
+/// Touches the stack of the calling thread down to what a cycle may need.
+#[inline(never)]
+pub fn touch_stack() {
+    let pages = [0_u8; STACK_TOUCHED];
+    core::hint::black_box(&pages);
+}

@@ -1,0 +1,222 @@
+//! Why a step is refused, and what cures that.
+//!
+//! The reasons are looked for in the order in which the kernel checks them, so that who follows a remedy
+//! gets one step further each time.
+
+extern crate std;
+
+use core::fmt::{self, Display, Formatter};
+use std::format;
+use std::fs;
+use std::io::Error;
+use std::os::unix::fs::MetadataExt;
+use std::prelude::rust_2024::*;
+use std::string::ToString;
+
+use super::Shortfall;
+use super::budget::GroupBudget;
+use super::deadline::Reservation;
+use super::permissions::{CPU_DMA_LATENCY, Permissions};
+
+/// Locked memory that the ports of peers may still add \[kB\]: with a limit below, one that connects later
+/// could not be served.
+const ROOM_FOR_PEERS_KB: u64 = 16 * 1024;
+
+/// A step of the set-up that the kernel may refuse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// SCHED_FIFO at this priority.
+    Fifo(i32),
+    /// SCHED_DEADLINE.
+    Deadline(Reservation),
+    /// One CPU for the thread.
+    Cpu(usize),
+    /// Every page in memory, now and later.
+    LockedMemory,
+    /// Processors kept out of deep idle states.
+    ShallowSleep,
+}
+
+impl Display for Step {
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fifo(priority) => write!(out, "FIFO priority {priority}"),
+            Self::Deadline(reservation) => write!(out, "deadline scheduling with {reservation}"),
+            Self::Cpu(cpu) => write!(out, "binding to CPU {cpu}"),
+            Self::LockedMemory => out.write_str("locked memory"),
+            Self::ShallowSleep => out.write_str("bound on idle states"),
+        }
+    }
+}
+
+/// A reason and its remedy.
+type Why = (String, String);
+
+impl Permissions {
+    /// What stands against a step; `None` if nothing does that can be seen.
+    pub fn against(&self, step: &Step) -> Option<Shortfall> {
+        let why = match step {
+            Step::Fifo(priority) => self.why_no_fifo(*priority),
+            Step::Deadline(reservation) => self.why_no_deadline(reservation),
+            Step::Cpu(cpu) => self.why_no_cpu(*cpu),
+            Step::LockedMemory => self.why_no_locked_memory(),
+            Step::ShallowSleep => self.why_no_shallow_sleep(),
+        };
+        why.map(|why| shortfall(step, why))
+    }
+
+    fn why_no_fifo(&self, priority: i32) -> Option<Why> {
+        let limit = self.priority_limit;
+        if !self.sys_nice && limit < u64::try_from(priority).unwrap_or_default() {
+            let reason = format!("{}, and RLIMIT_RTPRIO is {limit}", self.without("CAP_SYS_NICE"));
+            let remedy = match (self.user_namespace, self.container) {
+                (true, _) => format!("start the container with --ulimit rtprio={priority}"),
+                (_, true) => {
+                    format!("start the container with --cap-add=SYS_NICE or --ulimit rtprio={priority}")
+                }
+                _ => format!("give CAP_SYS_NICE or LimitRTPRIO={priority} (ulimit -r {priority})"),
+            };
+            return Some((reason, remedy));
+        }
+        match &self.group_budget {
+            GroupBudget::Of { file, budget_us: 0 } => Some((
+                format!("its cgroup has no real-time budget ({} is 0)", file.display()),
+                "write one there, in the groups above it first (echo 950000), or start it in another cgroup"
+                    .into(),
+            )),
+            _ => None,
+        }
+    }
+
+    fn why_no_deadline(&self, reservation: &Reservation) -> Option<Why> {
+        let fifo = "or choose realtime.scheduler = \"fifo\"";
+        if !self.sys_nice {
+            let remedy = match (self.user_namespace, self.container) {
+                (true, _) => "choose realtime.scheduler = \"fifo\"".into(),
+                (_, true) => format!("start the container with --cap-add=SYS_NICE, {fifo}"),
+                _ => format!("give CAP_SYS_NICE (AmbientCapabilities=CAP_SYS_NICE), {fifo}"),
+            };
+            return Some((format!("{}, and no limit replaces it", self.without("CAP_SYS_NICE")), remedy));
+        }
+        let (shortest, longest) = self.deadline_period_us;
+        let period_us = reservation.period_ns / 1000;
+        if period_us < shortest || period_us > longest {
+            return Some((
+                format!("a period of {period_us} us is not within the kernel's {shortest} to {longest} us"),
+                format!("set kernel.sched_deadline_period_min_us and _max_us (sysctl), {fifo}"),
+            ));
+        }
+        let missing = self.cpus_online.without(&self.cpus_isolated).without(&self.cpus);
+        (!missing.is_empty()).then(|| {
+            (
+                format!("it may run on CPU {} only, and such threads must be free to run on all", self.cpus),
+                format!("allow it CPU {missing} too (CPUAffinity=, taskset, cpuset), {fifo}"),
+            )
+        })
+    }
+
+    fn why_no_cpu(&self, cpu: usize) -> Option<Why> {
+        let Self { cpus_online, cpus_permitted, .. } = self;
+        if !cpus_online.contains(cpu) {
+            return Some((
+                format!("it is not online ({cpus_online} are)"),
+                "choose one that is, or boot with it".into(),
+            ));
+        }
+        (!cpus_permitted.contains(cpu)).then(|| {
+            (
+                format!("the cpuset of its cgroup allows only {cpus_permitted}"),
+                "choose one of these, or allow it there (AllowedCPUs=, docker --cpuset-cpus)".into(),
+            )
+        })
+    }
+
+    fn why_no_locked_memory(&self) -> Option<Why> {
+        let limit_kb = self.locked_limit_kb.filter(|_| !self.ipc_lock)?;
+        let needed_kb = self.mapped_kb + ROOM_FOR_PEERS_KB;
+        (limit_kb < needed_kb).then(|| {
+            let capability = self.without("CAP_IPC_LOCK");
+            let remedy = match (self.user_namespace, self.container) {
+                (true, _) => "start the container with --ulimit memlock=-1",
+                (_, true) => "start the container with --cap-add=IPC_LOCK or --ulimit memlock=-1",
+                _ => "give CAP_IPC_LOCK or LimitMEMLOCK=infinity (ulimit -l unlimited)",
+            };
+            (
+                format!(
+                    "{capability}, and RLIMIT_MEMLOCK is {limit_kb} kB of the {needed_kb} kB that it takes"
+                ),
+                remedy.into(),
+            )
+        })
+    }
+
+    fn why_no_shallow_sleep(&self) -> Option<Why> {
+        Some(match self.cpu_dma_latency.err()? {
+            libc::ENOENT => (
+                format!("there is no {CPU_DMA_LATENCY}"),
+                if self.container {
+                    format!("start the container with --device={CPU_DMA_LATENCY}")
+                } else {
+                    "use a kernel with CONFIG_CPU_IDLE".into()
+                },
+            ),
+            libc::EACCES => (
+                format!("{CPU_DMA_LATENCY} is {}", owner_and_mode()),
+                format!("give this user's group the right to it (chgrp and chmod 660 {CPU_DMA_LATENCY})"),
+            ),
+            // The file allows it: what refuses is the list of devices of the cgroup.
+            libc::EPERM => (
+                format!("the cgroup does not allow {CPU_DMA_LATENCY}"),
+                format!("allow it (DeviceAllow={CPU_DMA_LATENCY} rw, docker --device={CPU_DMA_LATENCY})"),
+            ),
+            number => (Error::from_raw_os_error(number).to_string(), format!("look at {CPU_DMA_LATENCY}")),
+        })
+    }
+
+    /// "no CAP", or why the one it seems to have is none.
+    fn without(&self, capability: &str) -> String {
+        let where_ = if self.user_namespace { " of the host (this is a user namespace)" } else { "" };
+        format!("no {capability}{where_}")
+    }
+
+    /// For a refusal that `against` does not foresee.
+    fn unforeseen(&self, step: &Step, error: &Error) -> Why {
+        let fifo = matches!(step, Step::Fifo(_));
+        match (error.raw_os_error(), &self.group_budget) {
+            (Some(libc::EPERM), _) if self.filtered => (
+                "a filter of system calls refuses it".into(),
+                "RestrictRealtime=no in the unit; in a container, a seccomp profile that allows it".into(),
+            ),
+            (Some(libc::EPERM), GroupBudget::Unseen { group }) if fifo => (
+                format!("cgroup {} has no real-time budget (CONFIG_RT_GROUP_SCHED)", group.display()),
+                "boot with rt_group_sched=0 (Linux 6.16 and newer), or start it in the root cgroup".into(),
+            ),
+            (Some(libc::EBUSY), _) => (
+                "other deadline threads leave less than that of what the kernel admits in total".into(),
+                "end some, or raise kernel.sched_rt_runtime_us (sysctl)".into(),
+            ),
+            _ => (error.to_string(), "see sched(7) and mlock(2)".into()),
+        }
+    }
+}
+
+/// The last system call of this thread was refused: why.
+pub(super) fn of(step: &Step) -> Shortfall {
+    explained(step, &Error::last_os_error())
+}
+
+/// This error was the answer to a step: why.
+pub(super) fn explained(step: &Step, error: &Error) -> Shortfall {
+    let facts = Permissions::of_this_process();
+    facts.against(step).unwrap_or_else(|| shortfall(step, facts.unforeseen(step, error)))
+}
+
+fn shortfall(step: &Step, (reason, remedy): Why) -> Shortfall {
+    Shortfall { what: step.to_string(), reason, remedy }
+}
+
+/// As `ls` shows it.
+fn owner_and_mode() -> String {
+    let Ok(about) = fs::metadata(CPU_DMA_LATENCY) else { return "not to be seen".into() };
+    format!("of user {} and group {}, mode {:o}", about.uid(), about.gid(), about.mode() & 0o777)
+}
