@@ -62,7 +62,7 @@ impl Cpus {
         fs::read_to_string(path).ok().and_then(|list| Self::parse(&list)).unwrap_or_default()
     }
 
-    fn parse(list: &str) -> Option<Self> {
+    pub(super) fn parse(list: &str) -> Option<Self> {
         let mut cpus = BTreeSet::new();
         for range in list.trim().split(',').filter(|range| !range.is_empty()) {
             let (first, last) = range.split_once('-').unwrap_or((range, range));

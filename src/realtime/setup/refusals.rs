@@ -143,8 +143,8 @@ impl Permissions {
             };
             (
                 format!(
-                    "{capability}, and RLIMIT_MEMLOCK is {limit_kb} kB of the {needed_kb} kB that it takes"
-                ),
+"{capability}, and RLIMIT_MEMLOCK is {limit_kb} kB, of {needed_kb} kB of address space with room for peers"
+),
                 remedy.into(),
             )
         })
@@ -219,4 +219,97 @@ fn shortfall(step: &Step, (reason, remedy): Why) -> Shortfall {
 fn owner_and_mode() -> String {
     let Ok(about) = fs::metadata(CPU_DMA_LATENCY) else { return "not to be seen".into() };
     format!("of user {} and group {}, mode {:o}", about.uid(), about.gid(), about.mode() & 0o777)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::realtime::setup::cpus::Cpus;
+
+    /// Two processors, no right at all, in a container that does not see the host's.
+    fn contained() -> Permissions {
+        let cpus = || Cpus::parse("0-1").unwrap();
+        Permissions {
+            sys_nice: false,
+            ipc_lock: false,
+            user_namespace: false,
+            container: true,
+            filtered: false,
+            priority_limit: 0,
+            locked_limit_kb: Some(8192),
+            mapped_kb: 1000,
+            cpus: cpus(),
+            cpus_permitted: cpus(),
+            cpus_online: cpus(),
+            cpus_isolated: Cpus::default(),
+            group_budget: GroupBudget::None,
+            deadline_period_us: (100, 4_194_304),
+            cpu_dma_latency: Err(libc::ENOENT),
+        }
+    }
+
+    const DEADLINE: Step = Step::Deadline(Reservation { budget_ns: 400_000, period_ns: 1_000_000 });
+
+    #[test]
+    fn a_container_is_told_how_to_start_it() {
+        let facts = contained();
+        for (step, reason, remedy) in [
+            (
+                Step::Fifo(80),
+                "no CAP_SYS_NICE, and RLIMIT_RTPRIO is 0",
+                "--cap-add=SYS_NICE or --ulimit rtprio=80",
+            ),
+            (DEADLINE, "no CAP_SYS_NICE, and no limit replaces it", "--cap-add=SYS_NICE, or choose"),
+            (
+                Step::LockedMemory,
+                "RLIMIT_MEMLOCK is 8192 kB, of 17384 kB",
+                "--cap-add=IPC_LOCK or --ulimit memlock=-1",
+            ),
+            (Step::ShallowSleep, "there is no /dev/cpu_dma_latency", "--device=/dev/cpu_dma_latency"),
+        ] {
+            let shortfall = facts.against(&step).unwrap();
+            assert!(shortfall.reason.contains(reason), "{shortfall}");
+            assert!(shortfall.remedy.contains(remedy), "{shortfall}");
+        }
+    }
+
+    #[test]
+    fn what_is_granted_has_nothing_against_it() {
+        let limits = Permissions { priority_limit: 80, locked_limit_kb: None, ..contained() };
+        let capable = Permissions { sys_nice: true, ipc_lock: true, cpu_dma_latency: Ok(()), ..contained() };
+        for (facts, step) in [
+            (&limits, Step::Fifo(80)),
+            (&limits, Step::LockedMemory),
+            (&capable, Step::Fifo(80)),
+            (&capable, Step::LockedMemory),
+            (&capable, DEADLINE),
+            (&capable, Step::Cpu(1)),
+            (&capable, Step::ShallowSleep),
+        ] {
+            assert_eq!(facts.against(&step), None);
+        }
+        // Isolated processors are none that such a thread has to be free to run on.
+        let isolated = Permissions {
+            cpus: Cpus::parse("0").unwrap(),
+            cpus_isolated: Cpus::parse("1").unwrap(),
+            ..capable
+        };
+        assert_eq!(isolated.against(&DEADLINE), None);
+    }
+
+    #[test]
+    fn what_no_fact_foresees_is_told_by_the_error() {
+        let group = GroupBudget::Unseen { group: "/sys/fs/cgroup/a.slice".into() };
+        let grouped = Permissions { group_budget: group, ..contained() };
+        let filtered = Permissions { filtered: true, ..grouped.clone() };
+        for (facts, step, number, expected) in [
+            (&grouped, Step::Fifo(80), libc::EPERM, "cgroup /sys/fs/cgroup/a.slice has no real-time budget"),
+            (&grouped, DEADLINE, libc::EPERM, "Operation not permitted"),
+            (&filtered, Step::Fifo(80), libc::EPERM, "a filter of system calls"),
+            (&grouped, DEADLINE, libc::EBUSY, "other deadline threads"),
+        ] {
+            let (reason, _) = facts.unforeseen(&step, &Error::from_raw_os_error(number));
+            assert!(reason.contains(expected), "{reason}");
+        }
+    }
 }

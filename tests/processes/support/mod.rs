@@ -2,6 +2,7 @@
 
 pub mod children;
 pub mod machine;
+pub mod nobody;
 pub mod recorder;
 pub mod rules;
 pub mod stalls;

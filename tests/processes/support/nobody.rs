@@ -1,0 +1,60 @@
+//! Processes without root's rights. Taking them away needs root.
+
+use std::fs::{self, Permissions};
+use std::os::unix::fs::PermissionsExt;
+use std::path::PathBuf;
+use std::process::Command;
+
+use super::children::hexad;
+use super::machine::Machine;
+
+/// `nobody` on every Linux.
+const NOBODY: &str = "65534";
+
+/// Empty places for iceoryx2, which keeps files of one owner in `/tmp/iceoryx2` and `/dev/shm`. They are seen
+/// by this process and its children only.
+pub const OWN_PLACES: &[&str] = &[
+    "unshare",
+    "--mount",
+    "sh",
+    "-c",
+    "mkdir -p /tmp/iceoryx2 && mount -t tmpfs -o mode=1777 tmpfs /tmp/iceoryx2 \
+     && mount -t tmpfs -o mode=1777 tmpfs /dev/shm && exec \"$@\"",
+    "sh",
+];
+
+/// No real-time priority, next to no locked memory.
+pub const NO_LIMITS_RAISED: &[&str] = &["prlimit", "--rtprio=0:0", "--memlock=65536:65536"];
+
+/// What follows runs as nobody.
+pub const AS_NOBODY: &[&str] =
+    &["setpriv", "--reuid", NOBODY, "--regid", NOBODY, "--clear-groups", "--inh-caps=-all"];
+
+/// The command `hexad`, behind these wrappers one after the other.
+pub fn wrapped(machine: &Machine, wrappers: &[&[&str]]) -> Command {
+    // The folders on the way to the binary and to the machine file may be closed to others.
+    let program = machine.path("hexad");
+    fs::copy(hexad().get_program(), &program).expect("a copy of the binary");
+    fs::set_permissions(machine.folder(), Permissions::from_mode(0o777)).expect("an open folder");
+    let mut command = behind(wrappers, program);
+    command.env("TMPDIR", machine.folder()).env_remove("HEXAD_LOG");
+    command
+}
+
+/// Says that a test is left out, and why, where these wrappers do not work.
+pub fn cannot(test: &str, wrappers: &[&[&str]]) -> bool {
+    let reason = match behind(wrappers, "true".into()).output() {
+        Ok(output) if output.status.success() => return false,
+        Ok(output) => String::from_utf8_lossy(&output.stderr).trim().to_owned(),
+        Err(error) => error.to_string(),
+    };
+    println!("SKIPPED {test}: {wrappers:?}: {reason}");
+    true
+}
+
+fn behind(wrappers: &[&[&str]], program: PathBuf) -> Command {
+    let mut words = wrappers.iter().copied().flatten();
+    let mut command = Command::new(words.next().expect("some words"));
+    command.args(words).arg(program);
+    command
+}
