@@ -10,7 +10,7 @@ use hexad::ipc::exchange::exchange;
 use hexad::realtime::clock::{Monotonic, monotonic_ns};
 use hexad::realtime::cyclic::{Counters, CycleRecord, RECORDS, Release, Timing, run};
 use hexad::realtime::overrun::OnOverrun;
-use hexad::realtime::setup;
+use hexad::realtime::setup::scheduling;
 
 const PERIOD_NS: u64 = 500_000;
 
@@ -46,7 +46,7 @@ fn perform(release: Release, on_overrun: OnOverrun) -> (Vec<Cycle>, Vec<CycleRec
     let report = thread::scope(|threads| {
         let body = || {
             // Without it the test is slower, not wrong.
-            let _ = setup::fifo_priority(50);
+            let _ = scheduling::fifo_priority(50);
             run(&mut Monotonic, &timing, step, side, records_in, &stop)
         };
         threads.spawn(body).join().expect("the loop")

@@ -11,6 +11,9 @@ use crate::support::machine::Machine;
 use crate::support::nobody::{AS_NOBODY, NO_LIMITS_RAISED, OWN_PLACES, cannot, wrapped};
 use crate::support::turns;
 
+/// Priorities for a user: what a unit has with `AmbientCapabilities=CAP_SYS_NICE`.
+const NICE: &[&str] = &["--inh-caps=-all,+sys_nice", "--ambient-caps=-all,+sys_nice"];
+
 /// Moves itself to a cgroup, then becomes what follows.
 const MOVED: &str = "echo $$ > \"$0\"/cgroup.procs && exec \"$@\"";
 
@@ -30,31 +33,28 @@ fn a_user_without_rights() {
 }
 
 #[test]
-fn a_user_with_limits_that_almost_suffice() {
-    let limits = &["prlimit", "--rtprio=79:79", "--memlock=unlimited"];
+fn a_user_with_one_capability() {
     refuses(
-        "a_user_with_limits_that_almost_suffice",
+        "a_user_with_one_capability",
         "",
-        &[OWN_PLACES, limits, AS_NOBODY],
-        &[
-            "no FIFO priority 80: no CAP_SYS_NICE, and RLIMIT_RTPRIO is 79; give CAP_SYS_NICE or LimitRTPRIO=80",
-            "no bound on idle states: ",
-        ],
+        &[OWN_PLACES, NO_LIMITS_RAISED, AS_NOBODY, NICE],
+        &["no bound on idle states: ", "no locked memory: no CAP_IPC_LOCK, and RLIMIT_MEMLOCK is 64 kB, "],
     );
 }
 
 #[test]
 fn a_user_who_wants_sched_deadline() {
-    let limits = &["prlimit", "--rtprio=99:99", "--memlock=unlimited"];
     let deadline = "scheduler = \"deadline\"";
     refuses(
         "a_user_who_wants_sched_deadline",
         deadline,
-        &[OWN_PLACES, limits, AS_NOBODY],
+        &[OWN_PLACES, NO_LIMITS_RAISED, AS_NOBODY],
         &[
-            "no deadline scheduling with 400 us of every 1000 us: no CAP_SYS_NICE, and no limit replaces it; give \
-         CAP_SYS_NICE (AmbientCapabilities=CAP_SYS_NICE), or choose realtime.scheduler = \"fifo\"",
+            "no deadline scheduling with 400 us of every 1000 us: no CAP_SYS_NICE, and no limit replaces it; give it \
+         (AmbientCapabilities=CAP_SYS_NICE, docker --cap-add=SYS_NICE), or choose realtime.scheduler = \"fifo\"",
+            "no FIFO priority 79: ",
             "no bound on idle states: ",
+            "no locked memory: ",
         ],
     );
 }
@@ -69,7 +69,7 @@ fn root_of_a_user_namespace_only() {
         &[OWN_PLACES, NO_LIMITS_RAISED, namespace],
         &[
             &format!(
-                "no FIFO priority 80: no CAP_SYS_NICE {lacking}RTPRIO is 0; start the container with --ulimit"
+                "no FIFO priority 80: no CAP_SYS_NICE {lacking}RTPRIO is 0; give LimitRTPRIO=80 (ulimit -r 80); the container"
             ),
             "no FIFO priority 79: no CAP_SYS_NICE of the host",
             &format!("no locked memory: no CAP_IPC_LOCK {lacking}MEMLOCK is 64 kB"),

@@ -210,7 +210,10 @@ pub(super) fn nanoseconds(seconds: f64) -> u64 {
 fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Report {
     let counters = &cyclic.counters;
     for (count, what) in [
-        (deadline::times_exhausted(), "times, at least, the budget of SCHED_DEADLINE was used up: the loop was held"),
+        (
+            deadline::times_exhausted(),
+            "times, at least, the budget of SCHED_DEADLINE was used up: the loop was held",
+        ),
         (counters.records_lost, "cycle records lost: the log thread was too slow"),
         (io.send_failures, "messages could not be sent"),
         (io.rejected, "messages passed over: other schema, older source, or seen before"),

@@ -69,13 +69,11 @@ impl Permissions {
         let limit = self.priority_limit;
         if !self.sys_nice && limit < u64::try_from(priority).unwrap_or_default() {
             let reason = format!("{}, and RLIMIT_RTPRIO is {limit}", self.without("CAP_SYS_NICE"));
-            let remedy = match (self.user_namespace, self.container) {
-                (true, _) => format!("start the container with --ulimit rtprio={priority}"),
-                (_, true) => {
-                    format!("start the container with --cap-add=SYS_NICE or --ulimit rtprio={priority}")
-                }
-                _ => format!("give CAP_SYS_NICE or LimitRTPRIO={priority} (ulimit -r {priority})"),
-            };
+            let [unit, container] = [
+                format!("LimitRTPRIO={priority} (ulimit -r {priority})"),
+                format!("--ulimit rtprio={priority}"),
+            ];
+            let remedy = self.capability_or_limit("SYS_NICE", &unit, &container);
             return Some((reason, remedy));
         }
         match &self.group_budget {
@@ -91,10 +89,10 @@ impl Permissions {
     fn why_no_deadline(&self, reservation: &Reservation) -> Option<Why> {
         let fifo = "or choose realtime.scheduler = \"fifo\"";
         if !self.sys_nice {
-            let remedy = match (self.user_namespace, self.container) {
-                (true, _) => "choose realtime.scheduler = \"fifo\"".into(),
-                (_, true) => format!("start the container with --cap-add=SYS_NICE, {fifo}"),
-                _ => format!("give CAP_SYS_NICE (AmbientCapabilities=CAP_SYS_NICE), {fifo}"),
+            let remedy = if self.user_namespace {
+                "choose realtime.scheduler = \"fifo\"".into()
+            } else {
+                format!("give it (AmbientCapabilities=CAP_SYS_NICE, docker --cap-add=SYS_NICE), {fifo}")
             };
             return Some((format!("{}, and no limit replaces it", self.without("CAP_SYS_NICE")), remedy));
         }
@@ -136,16 +134,13 @@ impl Permissions {
         let needed_kb = self.mapped_kb + ROOM_FOR_PEERS_KB;
         (limit_kb < needed_kb).then(|| {
             let capability = self.without("CAP_IPC_LOCK");
-            let remedy = match (self.user_namespace, self.container) {
-                (true, _) => "start the container with --ulimit memlock=-1",
-                (_, true) => "start the container with --cap-add=IPC_LOCK or --ulimit memlock=-1",
-                _ => "give CAP_IPC_LOCK or LimitMEMLOCK=infinity (ulimit -l unlimited)",
-            };
+            let unit = "LimitMEMLOCK=infinity (ulimit -l unlimited)";
+            let remedy = self.capability_or_limit("IPC_LOCK", unit, "--ulimit memlock=-1");
             (
                 format!(
 "{capability}, and RLIMIT_MEMLOCK is {limit_kb} kB, of {needed_kb} kB of address space with room for peers"
 ),
-                remedy.into(),
+                remedy,
             )
         })
     }
@@ -171,6 +166,18 @@ impl Permissions {
             ),
             number => (Error::from_raw_os_error(number).to_string(), format!("look at {CPU_DMA_LATENCY}")),
         })
+    }
+
+    /// The remedy where one of the two suffices. What a container has not been given it cannot give on.
+    fn capability_or_limit(&self, capability: &str, unit: &str, container: &str) -> String {
+        let first = "the container needs it first";
+        match (self.user_namespace, self.container) {
+            (true, _) => format!("give {unit}; {first} ({container})"),
+            (_, true) => format!(
+                "give CAP_{capability} or {unit}; {first} (docker --cap-add={capability} or {container})"
+            ),
+            _ => format!("give CAP_{capability} or {unit}"),
+        }
     }
 
     /// "no CAP", or why the one it seems to have is none.
@@ -259,7 +266,7 @@ mod tests {
                 "no CAP_SYS_NICE, and RLIMIT_RTPRIO is 0",
                 "--cap-add=SYS_NICE or --ulimit rtprio=80",
             ),
-            (DEADLINE, "no CAP_SYS_NICE, and no limit replaces it", "--cap-add=SYS_NICE, or choose"),
+            (DEADLINE, "no CAP_SYS_NICE, and no limit replaces it", "--cap-add=SYS_NICE), or choose"),
             (
                 Step::LockedMemory,
                 "RLIMIT_MEMLOCK is 8192 kB, of 17384 kB",
@@ -288,6 +295,8 @@ mod tests {
         ] {
             assert_eq!(facts.against(&step), None);
         }
+        let almost = limits.against(&Step::Fifo(81)).unwrap();
+        assert!(almost.reason.contains("RLIMIT_RTPRIO is 80"), "{almost}");
         // Isolated processors are none that such a thread has to be free to run on.
         let isolated = Permissions {
             cpus: Cpus::parse("0").unwrap(),
