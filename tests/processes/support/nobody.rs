@@ -27,8 +27,7 @@ pub const OWN_PLACES: &[&str] = &[
 pub const NO_LIMITS_RAISED: &[&str] = &["prlimit", "--rtprio=0:0", "--memlock=65536:65536"];
 
 /// What follows runs as nobody.
-pub const AS_NOBODY: &[&str] =
-    &["setpriv", "--reuid", NOBODY, "--regid", NOBODY, "--clear-groups", "--inh-caps=-all"];
+pub const AS_NOBODY: &[&str] = &["setpriv", "--reuid", NOBODY, "--regid", NOBODY, "--clear-groups"];
 
 /// The command `hexad`, behind these wrappers one after the other.
 pub fn wrapped(machine: &Machine, wrappers: &[&[&str]]) -> Command {
