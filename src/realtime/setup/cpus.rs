@@ -120,4 +120,13 @@ mod tests {
         assert!(now.without(&permitted).is_empty(), "{now} of {permitted}");
         assert!(permitted.without(&online).is_empty(), "{permitted} of {online}");
     }
+
+    #[test]
+    fn a_bound_thread_is_permitted_what_others_are() {
+        let permitted = Cpus::permitted();
+        let first = *permitted.0.first().unwrap();
+        let bound =
+            thread::spawn(move || (bind(core::iter::once(first)), Cpus::of_this_thread(), Cpus::permitted()));
+        assert_eq!(bound.join().unwrap(), (true, Cpus([first].into()), permitted));
+    }
 }

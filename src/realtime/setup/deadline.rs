@@ -1,12 +1,13 @@
 //! SCHED_DEADLINE: a budget of processor time in every period, before every other class.
 //!
 //! The kernel's rule (CBS; sched(7), `Documentation/scheduler/sched-deadline.rst`) for a thread that sleeps
-//! to the points of a grid: a wake-up begins a new period with the full budget when the last deadline has
-//! passed, and also before that, as then more of the budget is left than of the time. It holds where
-//! deadline and period are the same; with a shorter deadline, a wake-up that comes a little earlier than the
-//! last one would be held until a whole period has passed. So the deadline is the period, and only a thread that has used up its budget is held,
-//! until its deadline. The cycles it then misses are counted like any others, and the kernel's word for
-//! it by [`times_exhausted`].
+//! to the points of a grid: a wake-up after its deadline begins a new period with the full budget. One
+//! before it, as it comes a little earlier than the last did, does so too unless the thread has used up its share of the
+//! time since then. That holds where deadline and period are the same. With a shorter deadline such a wake-up
+//! would be held until a whole period after the last one, so that one late cycle would make all later ones
+//! late. So the deadline is the period, and only a thread that has used up its budget is held, until its
+//! deadline. Cycles that it misses then are counted like any others, and what the kernel says of it by
+//! [`times_exhausted`].
 
 extern crate std;
 
@@ -156,9 +157,10 @@ mod tests {
         let cycles = || {
             let grid = Grid::new(PERIOD_NS, 0);
             let mut late = std::vec![];
-            for _ in 0..500 {
+            for cycle in 0..500 {
                 let release_ns = grid.next_after(monotonic_ns());
-                sleep_until(release_ns);
+                // The first is late, and must not make the others so.
+                sleep_until(if cycle == 0 { release_ns + PERIOD_NS / 2 } else { release_ns });
                 late.push(monotonic_ns() - release_ns);
                 // A quarter of the period, of 0.4 reserved.
                 while monotonic_ns() < release_ns + PERIOD_NS / 4 {}
