@@ -10,7 +10,7 @@ use std::sync::mpsc;
 
 use tracing::warn;
 
-use super::DaemonError;
+use super::{DaemonError, nanoseconds};
 use crate::control::controller::{Controller, Input, Measurement, Setpoint};
 use crate::host::config::deployment::{Realtime, ReleaseKey, Scheduler};
 use crate::model::inverse_geometry::leg_lengths;
@@ -20,15 +20,13 @@ use crate::realtime::setup::deadline::{self, Reservation};
 use crate::realtime::setup::idle::{self, ShallowSleep};
 use crate::realtime::setup::{Shortfall, denormals, memory, scheduling};
 
-use super::nanoseconds;
-
 /// Cycles computed before the first release, so that code and data are in memory and in the cache.
 const WARM_UP_CYCLES: u32 = 1000;
 
 /// What a thread has to say before the loop may begin: what it lacks, or why it cannot run.
 pub(super) type Ready = Result<Vec<Shortfall>, DaemonError>;
 
-/// Collects what the threads lack and adds the process, says it, and lets the loop begin if that is
+/// Collects what the threads and the process lack, says it, and lets the loop begin if that is
 /// acceptable. Processors sleep lightly for as long as the result lives.
 pub(super) fn start(
     realtime: &Realtime,
@@ -84,8 +82,8 @@ fn prepare(cpu: Option<usize>, scheduled: Result<(), Shortfall>) -> Vec<Shortfal
 /// What `realtime.scheduler = "deadline"` reserves.
 ///
 /// With `release = "external"` the period is the one that the drives are expected to have. Messages that
-/// come sooner begin a new one with the full budget, as long as some of the last is left; drives that are faster for good use
-/// more than the kernel admitted, and are then held at their share, which is counted.
+/// come sooner begin a new one with the full budget, unless the share of the last is used up; cycles of
+/// drives so fast that they need more than their share are held, and that is counted.
 pub fn reservation(realtime: &Realtime) -> Reservation {
     let spin_s = if realtime.release == ReleaseKey::Hybrid { realtime.max_lead_s } else { 0.0 };
     Reservation::new(nanoseconds(realtime.period_s()), nanoseconds(spin_s))

@@ -2,7 +2,6 @@
 
 extern crate std;
 
-use core::fmt::Debug;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::prelude::rust_2024::*;

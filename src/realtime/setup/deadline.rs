@@ -2,12 +2,12 @@
 //!
 //! The kernel's rule (CBS; sched(7), `Documentation/scheduler/sched-deadline.rst`) for a thread that sleeps
 //! to the points of a grid: a wake-up after its deadline begins a new period with the full budget. One
-//! before it, as it comes a little earlier than the last did, does so too unless the thread has used up its share of the
-//! time since then. That holds where deadline and period are the same. With a shorter deadline such a wake-up
-//! would be held until a whole period after the last one, so that one late cycle would make all later ones
-//! late. So the deadline is the period, and only a thread that has used up its budget is held, until its
-//! deadline. Cycles that it misses then are counted like any others, and what the kernel says of it by
-//! [`times_exhausted`].
+//! before it, as it comes a little earlier than the last did, does so too, unless the thread has used up
+//! its share of the time since then. That holds where deadline and period are the same. With a shorter
+//! deadline such a wake-up would be held until a whole period after the last one, so that one late cycle
+//! would make all later ones late. So the deadline is the period, and only a thread that has used up its
+//! budget is held, until its deadline. Cycles that it misses then are counted like any others, and what the
+//! kernel says of it by [`times_exhausted`].
 
 extern crate std;
 

@@ -2,9 +2,9 @@
 //!
 //! Rust does not define what a program means whose floating-point environment is not the default: the
 //! compiler may compute with denormals where it folds constants, and the processor then without. Here that
-//! is the only consequence: every operation is still one of the processor's, on numbers, and differs by less than
-//! 2.3e-308 of a unit that nothing here resolves below 1e-12. No index, length or pointer is computed from a
-//! floating-point number, so none can be wrong by it.
+//! is the only consequence: every operation is still one of the processor's, and a term differs by less than
+//! 2.3e-308 of a unit that nothing here resolves below 1e-12. No index, length or pointer is computed from
+//! a floating-point number, so none can be wrong by it.
 //!
 //! It holds for the calling thread and those it starts; the daemon does it in the real-time thread alone.
 //! Who repeats its cycles to the last bit has to do it too.

@@ -133,15 +133,10 @@ impl Permissions {
         let limit_kb = self.locked_limit_kb.filter(|_| !self.ipc_lock)?;
         let needed_kb = self.mapped_kb + ROOM_FOR_PEERS_KB;
         (limit_kb < needed_kb).then(|| {
-            let capability = self.without("CAP_IPC_LOCK");
+            let lacking = format!("{}, and RLIMIT_MEMLOCK is {limit_kb} kB", self.without("CAP_IPC_LOCK"));
             let unit = "LimitMEMLOCK=infinity (ulimit -l unlimited)";
             let remedy = self.capability_or_limit("IPC_LOCK", unit, "--ulimit memlock=-1");
-            (
-                format!(
-"{capability}, and RLIMIT_MEMLOCK is {limit_kb} kB, of {needed_kb} kB of address space with room for peers"
-),
-                remedy,
-            )
+            (format!("{lacking}, of {needed_kb} kB of address space with room for peers"), remedy)
         })
     }
 
@@ -180,10 +175,10 @@ impl Permissions {
         }
     }
 
-    /// "no CAP", or why the one it seems to have is none.
+    /// "no CAP_...", and where the one that it seems to have does not count.
     fn without(&self, capability: &str) -> String {
-        let where_ = if self.user_namespace { " of the host (this is a user namespace)" } else { "" };
-        format!("no {capability}{where_}")
+        let whose = if self.user_namespace { " of the host (this is a user namespace)" } else { "" };
+        format!("no {capability}{whose}")
     }
 
     /// For a refusal that `against` does not foresee.
