@@ -9,7 +9,7 @@
 //! control   control law, limits, one cycle       uses model
 //! plant     simulated platform                   uses model
 //! scene     motions, and the model they need     uses model
-//! ipc       messages, ports, exchange            uses control, model, realtime::clock
+//! ipc       messages, ports, exchange            uses control, model, parts of realtime
 //! realtime  threads, clock, cyclic loop          uses control, ipc::exchange
 //! host      configuration, commands, charts      uses everything
 //! ```

@@ -14,7 +14,18 @@ const ARROWS: &[(&str, &[&str], bool)] = &[
     ("control", &["model"], false),
     ("plant", &["model"], false),
     ("scene", &["model"], false),
-    ("ipc", &["model", "control", "realtime::clock", "realtime::cyclic::Counters"], true),
+    (
+        "ipc",
+        &[
+            "model",
+            "control",
+            "realtime::clock",
+            "realtime::cyclic::Counters",
+            "realtime::doorbell",
+            "realtime::newest",
+        ],
+        true,
+    ),
     ("realtime", &["model", "control", "ipc::exchange"], true),
     ("host", &["model", "control", "plant", "scene", "ipc", "realtime"], true),
 ];

@@ -129,7 +129,7 @@ impl Controller {
             return Err(Cause::ForceNotFinite);
         }
         let limit = self.model.machine().actuator.max_force;
-        output.force = force.map(|value| value.clamp(-limit, limit));
+        output.force = force.map(|value| value.max(-limit).min(limit));
         output.limited = output.force != force;
         Ok(())
     }

@@ -1,10 +1,13 @@
-//! Exchange between the io thread and the real-time thread: one wait-free triple buffer each way.
-//! The real-time thread never waits; a buffer always holds the newest value.
+//! Exchange between the io thread and the real-time thread: the newest value each way.
 
-use triple_buffer::{Input as Writer, Output as Reader};
+extern crate std;
+
+use std::sync::Arc;
 
 use crate::control::controller::{Input, Output};
 use crate::realtime::cyclic::Counters;
+use crate::realtime::doorbell::Doorbell;
+use crate::realtime::newest::{Reader, Writer, newest};
 
 /// What the io thread hands in.
 #[derive(Clone, Copy, Debug, Default)]
@@ -32,20 +35,24 @@ pub struct CycleOutput {
 pub struct RealtimeSide {
     pub inputs: Reader<CycleInput>,
     pub outputs: Writer<CycleOutput>,
+    pub bell: Arc<Doorbell>,
 }
 
 /// The io thread's ends.
 pub struct IoSide {
     pub inputs: Writer<CycleInput>,
     pub outputs: Reader<CycleOutput>,
+    /// To ring for new inputs, with external release.
+    pub bell: Arc<Doorbell>,
 }
 
 /// Makes both. Allocates; start-up only.
 pub fn exchange() -> (RealtimeSide, IoSide) {
-    let (inputs_writer, inputs_reader) = triple_buffer::triple_buffer(&CycleInput::default());
-    let (outputs_writer, outputs_reader) = triple_buffer::triple_buffer(&CycleOutput::default());
+    let (inputs_writer, inputs_reader) = newest(CycleInput::default());
+    let (outputs_writer, outputs_reader) = newest(CycleOutput::default());
+    let bell = Arc::new(Doorbell::default());
     (
-        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer },
-        IoSide { inputs: inputs_writer, outputs: outputs_reader },
+        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer, bell: bell.clone() },
+        IoSide { inputs: inputs_writer, outputs: outputs_reader, bell },
     )
 }

@@ -24,6 +24,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use super::inverse_geometry::LegGeometry;
 use super::lanes::{Eight, Four};
 use super::lanes3::Lanes3;
+use super::lu;
 use super::machine::{Joints, LEGS};
 use super::rigid::{Twist, Wrench};
 use super::triples::{Lane, Triples};
@@ -157,14 +158,16 @@ impl<F> LaneWrench<F> {
 #[cold]
 #[inline(never)]
 fn forces_by_lu(n: &Matrix6<f64>, wrench: &Wrench, along: &[f64; LEGS]) -> Option<[f64; LEGS]> {
-    Some((n.lu().solve(&wrench.vector())? + Vector6::from(*along)).into())
+    let balancing = lu::solve(&n.transpose().into(), &wrench.vector().into())?;
+    Some((Vector6::from(balancing) + Vector6::from(*along)).into())
 }
 
 /// By LU with partial pivoting.
 #[cold]
 #[inline(never)]
 fn twist_by_lu(n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
-    n.transpose().lu().solve(&Vector6::from(*rates)).map(|v| Twist::from_vector(&v))
+    // The columns of N are the rows of its transpose.
+    lu::solve(&(*n).into(), rates).map(|twist| Twist::from_vector(&twist.into()))
 }
 
 /// N, columns in the order of people.

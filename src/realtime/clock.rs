@@ -15,16 +15,21 @@ pub fn monotonic_ns() -> u64 {
 
 /// Sleeps until CLOCK_MONOTONIC shows `instant_ns`; returns at once if it has passed.
 pub fn sleep_until(instant_ns: u64) {
-    let instant = libc::timespec {
-        tv_sec: (instant_ns / 1_000_000_000) as libc::time_t,
-        tv_nsec: (instant_ns % 1_000_000_000) as libc::c_long,
-    };
+    let instant = timespec(instant_ns);
     // SAFETY: `instant` is a valid timespec for the duration of the call; a null remainder is allowed.
     // A signal ends the sleep early (EINTR): sleep on, a cycle must not begin before its release.
     while unsafe {
         libc::clock_nanosleep(libc::CLOCK_MONOTONIC, libc::TIMER_ABSTIME, &instant, core::ptr::null_mut())
     } == libc::EINTR
     {}
+}
+
+/// As the system calls take it.
+pub(super) fn timespec(instant_ns: u64) -> libc::timespec {
+    libc::timespec {
+        tv_sec: (instant_ns / 1_000_000_000) as libc::time_t,
+        tv_nsec: (instant_ns % 1_000_000_000) as libc::c_long,
+    }
 }
 
 /// What the loop needs of time; a test's own clock makes every delay exact.

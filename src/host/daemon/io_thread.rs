@@ -8,10 +8,8 @@
 extern crate std;
 
 use core::sync::atomic::{AtomicBool, Ordering};
-use std::thread::Thread;
 
 use heapless::spsc::Producer;
-use triple_buffer::Output as Reader;
 
 use crate::control::controller::{Measurement, Output, Setpoint};
 use crate::control::state::{Cause, State};
@@ -22,6 +20,7 @@ use crate::ipc::statistics::Statistics;
 use crate::model::task::{TaskState, task_coordinates};
 use crate::realtime::clock::{Clock, Grid, Monotonic, monotonic_ns, sleep_until};
 use crate::realtime::cyclic::{Release, Timing};
+use crate::realtime::newest::Reader;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
 
@@ -53,8 +52,6 @@ pub struct Sides<'a> {
     pub sent: Producer<'a, u64>,
     /// From the log thread.
     pub statistics: Reader<Statistics>,
-    /// To ring for, with external release.
-    pub realtime: Thread,
 }
 
 /// What it needs to know.
@@ -160,7 +157,7 @@ impl Io<'_> {
             let measured = self.read();
             if measured {
                 self.hand_in();
-                self.sides.realtime.unpark();
+                self.sides.exchange.bell.ring();
             }
             self.publish_new();
             if measured || self.published > published {
@@ -211,7 +208,7 @@ impl Io<'_> {
     }
 
     fn publish_newest(&mut self) {
-        let mut cycle = *self.sides.exchange.outputs.output_buffer();
+        let mut cycle = *self.sides.exchange.outputs.value();
         let now_ns = monotonic_ns();
         let held_ns = now_ns.saturating_sub(cycle.due_ns);
         if held_ns > self.settings.longest_hold_ns && cycle.output.state == State::Active {

@@ -11,7 +11,6 @@ use std::time::Instant;
 
 use heapless::spsc::Consumer;
 use tracing::{info, warn};
-use triple_buffer::Input as Writer;
 
 use super::hints::{Hints, ThreadFiles};
 use super::statistics::Collector;
@@ -19,6 +18,7 @@ use crate::control::state::{Cause, State};
 use crate::host::report::{Fault, TrackingSum};
 use crate::ipc::statistics::Statistics;
 use crate::realtime::cyclic::CycleRecord;
+use crate::realtime::newest::Writer;
 use crate::realtime::usage::ThreadUsage;
 
 /// How often the queues are emptied: well before they are full at the highest rate.

@@ -17,7 +17,6 @@ use std::thread::{Builder, Scope, ScopedJoinHandle, scope};
 use heapless::spsc::Queue;
 use sd_notify::NotifyState;
 use tracing::{info, warn};
-use triple_buffer::triple_buffer;
 
 use self::hints::ThreadFiles;
 use self::io_thread::{DELAYS, IoReport, Ports, Settings};
@@ -38,6 +37,7 @@ use crate::ipc::statistics::Statistics;
 use crate::model::ladder::Rung;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Release, Timing};
+use crate::realtime::newest::newest;
 use crate::realtime::setup::{Shortfall, deadline, memory};
 
 mod hints;
@@ -79,11 +79,12 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
     let mut controller = Controller::new(machine, parameters(deployment, fidelity::rung(config)));
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
+    let bell = io_side.bell.clone();
     let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
     let (records_in, records) = queue.split();
     let mut delays = Box::new(Queue::<u64, DELAYS>::new());
     let (sent_in, sent) = delays.split();
-    let (statistics_in, statistics) = triple_buffer(&Statistics::default());
+    let (statistics_in, statistics) = newest(Statistics::default());
     let files = &OnceLock::new();
     let [stop_loop, stop_io, stop_log] = &[const { AtomicBool::new(false) }; 3];
     let (io_ready, ready) = mpsc::channel();
@@ -114,7 +115,6 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
             let step = |input: &Input| controller.step(input);
             Some(cyclic::run(&mut Monotonic, timing, step, realtime_side, records_in, stop_loop))
         })?;
-        let realtime_thread = cyclic.thread().clone();
         let io = spawn(threads, "hexad-io", move || {
             // Ports belong to the thread that opens them.
             let ports = Bus::join(&config.name).and_then(|bus| Ports::open(&bus));
@@ -123,8 +123,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
             let shortfalls = opened.map(|()| prepare_io(realtime));
             // Nobody listens only if the other thread failed first.
             let _ = io_ready.send(shortfalls.map_err(DaemonError::from));
-            let sides =
-                io_thread::Sides { exchange: io_side, sent: sent_in, statistics, realtime: realtime_thread };
+            let sides = io_thread::Sides { exchange: io_side, sent: sent_in, statistics };
             Some(io_thread::run(&settings, ports?, sides, stop_io))
         })?;
 
@@ -138,7 +137,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
         }
         drop(go);
         stop_loop.store(true, Ordering::Relaxed);
-        cyclic.thread().unpark();
+        bell.ring();
         let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
         stop_io.store(true, Ordering::Relaxed);
         let io = io.join().map_err(|_| DaemonError::Died("io"));
