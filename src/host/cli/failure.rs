@@ -3,6 +3,7 @@
 use hexad::host::advise::AdviseError;
 use hexad::host::config::ConfigError;
 use hexad::host::demo::DemoError;
+use hexad::host::doctor::DoctorError;
 use hexad::host::offline::OfflineError;
 use hexad::host::setpoints::SetpointError;
 
@@ -42,6 +43,13 @@ impl From<OfflineError> for Failure {
     fn from(error: OfflineError) -> Self {
         let code = if matches!(error, OfflineError::Unsolved { .. }) { 1 } else { 2 };
         Self { code, what: error.to_string() }
+    }
+}
+
+impl From<DoctorError> for Failure {
+    fn from(error: DoctorError) -> Self {
+        let ran = matches!(error, DoctorError::Impossible(_) | DoctorError::Interrupted);
+        Self { code: if ran { 1 } else { 2 }, what: error.to_string() }
     }
 }
 

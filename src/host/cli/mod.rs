@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand, ValueEnum};
 use hexad::host::advise::Advice;
 use hexad::host::check::Check;
 use hexad::host::demo::{self, Demo};
+use hexad::host::doctor::{self, Doctor};
 use hexad::host::stop::Stop;
 use hexad::host::{daemon, offline, plant, setpoints};
 use hexad::model::ladder::Rung;
@@ -79,6 +80,24 @@ enum Command {
         #[command(flatten)]
         machine: MachineFile,
     },
+    /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
+    Doctor {
+        /// Machine file whose CPU, priority and rate are meant [default: the built-in fried2008]
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+        /// CPU of the real-time thread, instead of the configured one
+        #[arg(long)]
+        cpu: Option<usize>,
+        /// Length of the measurement, all rates together [s]
+        #[arg(long, default_value_t = 10.0, value_parser = duration, allow_negative_numbers = true)]
+        seconds: f64,
+        /// Write a JSON report
+        #[arg(long, value_name = "FILE")]
+        report: Option<PathBuf>,
+        /// Measure although a controller runs on the same CPUs, and delay it
+        #[arg(long)]
+        disturb: bool,
+    },
     /// Show what each model of the ladder costs over a scene, and recommend one
     Advise {
         #[command(flatten)]
@@ -134,6 +153,10 @@ impl Cli {
             Command::Check { machine } => {
                 print!("{}", Check::new(&machine.load()?));
                 Ok(())
+            }
+            Command::Doctor { config, cpu, seconds, report, disturb } => {
+                let doctor = Doctor { config, cpu, seconds, report, disturb };
+                doctor::run(&doctor, &stop()?).map_err(Failure::from)
             }
             Command::Advise { machine, trajectory } => {
                 print!("{}", Advice::new(&machine.load()?, trajectory.as_deref())?);
