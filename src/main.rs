@@ -10,7 +10,7 @@ use hexad::realtime::allocation::CountingAllocator;
 use hexad::realtime::process::stop_with_parent;
 use tracing::level_filters::LevelFilter;
 
-#[path = "host/cli.rs"]
+#[path = "host/cli/mod.rs"]
 mod cli;
 
 #[global_allocator]

@@ -49,8 +49,9 @@ fn failed<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
 }
 
 /// Where the shared memory lives: iceoryx2's usual places, or, where these belong to another user, places
-/// of this user's own. Another user's could not be opened, and root and others may well use one host.
-fn domain() -> Result<Config, SemanticStringError> {
+/// of this user's own, and a word about it. Another user's could not be opened, and root and others may well
+/// use one host.
+fn places() -> Result<(Config, Option<String>), SemanticStringError> {
     let mut config = Config::default();
     config.global.creation_timeout = CREATION_TIMEOUT;
     let usual = config.global.root_path().to_string();
@@ -59,9 +60,18 @@ fn domain() -> Result<Config, SemanticStringError> {
         && owner != user
     {
         let own = format!("{}-{user}", usual.trim_end_matches('/'));
-        info!("{usual} belongs to user {owner}: using {own} and the prefix iox2_{user}_");
         config.global.set_root_path(&Path::new(own.as_bytes())?);
         config.global.prefix = FileName::new(format!("iox2_{user}_").as_bytes())?;
+        let moved = format!("{usual} belongs to user {owner}: using {own} and the prefix iox2_{user}_");
+        return Ok((config, Some(moved)));
+    }
+    Ok((config, None))
+}
+
+fn domain() -> Result<Config, SemanticStringError> {
+    let (config, moved) = places()?;
+    if let Some(moved) = moved {
+        info!("{moved}");
     }
     Ok(config)
 }
@@ -90,6 +100,11 @@ impl Bus {
                 config.global.root_path()
             )))?;
         Ok(Self { node, machine: machine.into(), epoch: monotonic_ns() })
+    }
+
+    /// Why and where this user's shared memory is not in the usual places, if so.
+    pub fn places_of_its_own() -> Option<String> {
+        places().ok()?.1
     }
 
     /// Makes this process the only one that controls a machine, until the result is dropped or the process

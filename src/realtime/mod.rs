@@ -11,6 +11,7 @@
 
 pub mod allocation;
 pub mod clock;
+pub mod clock_cost;
 pub mod cyclic;
 pub mod doorbell;
 pub mod newest;

@@ -19,6 +19,7 @@ mod support;
 
 mod command_line;
 mod demo;
+mod doctor;
 mod fidelity;
 mod in_force;
 mod killed;

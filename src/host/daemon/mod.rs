@@ -46,6 +46,9 @@ mod log_thread;
 pub mod start;
 mod statistics;
 
+/// Name of the real-time thread, by which a running daemon is found.
+pub const REALTIME_THREAD: &str = "hexad-rt";
+
 /// Stack of each thread: several times what they use, and small because locked memory holds all of it.
 const STACK: usize = 512 * 1024;
 
@@ -105,7 +108,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
         let log = spawn(threads, "hexad-log", || {
             log_thread::run(log_thread::Sides { records, sent, statistics: statistics_in, files }, stop_log)
         })?;
-        let cyclic = spawn(threads, "hexad-rt", move || {
+        let cyclic = spawn(threads, REALTIME_THREAD, move || {
             let shortfalls = prepare_loop(realtime, || warm_up(controller.clone(), machine));
             let _ = realtime_ready.send(Ok(shortfalls));
             // Without them the worst cycles carry no hints.
@@ -185,7 +188,8 @@ pub fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
     }
 }
 
-fn timing(deployment: &Deployment) -> Timing {
+/// When the loop is released and what is late.
+pub(super) fn timing(deployment: &Deployment) -> Timing {
     let Deployment { realtime, timeouts, .. } = deployment;
     let period_ns = nanoseconds(realtime.period_s());
     Timing {

@@ -62,7 +62,7 @@ pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
 
 /// Prepares the calling thread for the loop. The warm-up comes before SCHED_DEADLINE, whose budget it would
 /// use up.
-pub(super) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {
+pub(in crate::host) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {
     denormals::flush();
     warm_up();
     let scheduled = match realtime.scheduler {

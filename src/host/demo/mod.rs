@@ -27,7 +27,7 @@ mod recording;
 mod summary;
 
 /// The machine of a demonstration without `--config`.
-const DEFAULT_MACHINE: &str = include_str!("../../../config/fried2008.toml");
+pub const DEFAULT_MACHINE: &str = include_str!("../../../config/fried2008.toml");
 
 /// How often the topics are emptied: a fraction of what they can hold at 20 kHz.
 const POLL: Duration = Duration::from_millis(3);

@@ -53,6 +53,11 @@ impl Cpus {
         Self(self.0.difference(&others.0).copied().collect())
     }
 
+    /// Their numbers, ascending.
+    pub fn iter(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().copied()
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
@@ -62,7 +67,8 @@ impl Cpus {
         fs::read_to_string(path).ok().and_then(|list| Self::parse(&list)).unwrap_or_default()
     }
 
-    pub(super) fn parse(list: &str) -> Option<Self> {
+    /// Reads `0-3,8`; `None` if it is no such list.
+    pub fn parse(list: &str) -> Option<Self> {
         let mut cpus = BTreeSet::new();
         for range in list.trim().split(',').filter(|range| !range.is_empty()) {
             let (first, last) = range.split_once('-').unwrap_or((range, range));

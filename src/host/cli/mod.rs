@@ -3,18 +3,20 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use hexad::host::advise::{Advice, AdviseError};
+use clap::{Parser, Subcommand, ValueEnum};
+use hexad::host::advise::Advice;
 use hexad::host::check::Check;
-use hexad::host::config::{Config, ConfigError};
-use hexad::host::demo::{self, Demo, DemoError};
-use hexad::host::offline::{self, OfflineError};
-use hexad::host::setpoints::{self, Score, SetpointError};
+use hexad::host::demo::{self, Demo};
+use hexad::host::doctor::{self, Doctor};
 use hexad::host::stop::Stop;
-use hexad::host::{daemon, plant};
+use hexad::host::{daemon, offline, plant, setpoints};
 use hexad::model::ladder::Rung;
-use hexad::scene::motions::Motion;
+
+use self::arguments::{Files, MachineFile, MotionName, Start, What, duration, rungs};
+use self::failure::Failure;
+
+mod arguments;
+mod failure;
 
 /// Hard real-time computed-torque controller for Gough-Stewart platforms.
 #[derive(Debug, Parser)]
@@ -78,6 +80,24 @@ enum Command {
         #[command(flatten)]
         machine: MachineFile,
     },
+    /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
+    Doctor {
+        /// Machine file whose CPU, priority and rate are meant [default: the built-in fried2008]
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+        /// CPU of the real-time thread, instead of the configured one
+        #[arg(long)]
+        cpu: Option<usize>,
+        /// Length of the measurement, all rates together [s]
+        #[arg(long, default_value_t = 10.0, value_parser = duration, allow_negative_numbers = true)]
+        seconds: f64,
+        /// Write a JSON report
+        #[arg(long, value_name = "FILE")]
+        report: Option<PathBuf>,
+        /// Measure although a controller runs on the same CPUs, and delay it
+        #[arg(long)]
+        disturb: bool,
+    },
     /// Show what each model of the ladder costs over a scene, and recommend one
     Advise {
         #[command(flatten)]
@@ -108,56 +128,6 @@ enum Command {
     },
 }
 
-#[derive(Debug, Args)]
-struct MachineFile {
-    /// Machine file (TOML)
-    #[arg(long = "config", value_name = "FILE")]
-    path: PathBuf,
-}
-
-#[derive(Debug, Args)]
-struct Files {
-    /// CSV to read
-    #[arg(long, value_name = "FILE")]
-    input: PathBuf,
-    /// CSV to write
-    #[arg(long, value_name = "FILE")]
-    output: PathBuf,
-}
-
-#[derive(Debug, Args)]
-#[group(required = true, multiple = false)]
-struct What {
-    /// A built-in motion
-    #[arg(long, value_enum)]
-    motion: Option<MotionName>,
-    /// A CSV file with t, X, X', X''
-    #[arg(long, value_name = "FILE")]
-    trajectory: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum MotionName {
-    /// Stand at home
-    Settle,
-    /// Moves along every axis in turn, there and back
-    MinimumJerk,
-    /// A sine on every axis
-    Sines,
-    /// A circle at constant orientation
-    Circle,
-    /// A spatial curve at the constant orientation 15, 10, 5 degrees
-    Paper,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Start {
-    /// At the row before, the first at home
-    Previous,
-    /// At home
-    Home,
-}
-
 impl Cli {
     /// Does what the command line asks for.
     pub fn run(self) -> Result<(), Failure> {
@@ -184,6 +154,10 @@ impl Cli {
                 print!("{}", Check::new(&machine.load()?));
                 Ok(())
             }
+            Command::Doctor { config, cpu, seconds, report, disturb } => {
+                let doctor = Doctor { config, cpu, seconds, report, disturb };
+                doctor::run(&doctor, &stop()?).map_err(Failure::from)
+            }
             Command::Advise { machine, trajectory } => {
                 print!("{}", Advice::new(&machine.load()?, trajectory.as_deref())?);
                 Ok(())
@@ -193,105 +167,14 @@ impl Cli {
                 Ok(offline::inverse_dynamics_file(&machine, model, &files.input, &files.output)?)
             }
             Command::ForwardKinematics { machine, files, start } => {
-                let start = match start {
-                    Start::Previous => offline::Start::Previous,
-                    Start::Home => offline::Start::Home,
-                };
                 let machine = machine.load()?.machine;
-                Ok(offline::forward_kinematics_file(&machine, start, &files.input, &files.output)?)
+                Ok(offline::forward_kinematics_file(&machine, start.into(), &files.input, &files.output)?)
             }
         }
     }
-}
-
-impl MachineFile {
-    fn load(&self) -> Result<Config, ConfigError> {
-        Config::load(&self.path)
-    }
-}
-
-impl What {
-    fn score(&self, config: &Config, seconds: f64) -> Result<Score, SetpointError> {
-        match (&self.trajectory, self.motion) {
-            (Some(path), _) => Score::trajectory(path),
-            (None, name) => {
-                let motion = match name.unwrap_or(MotionName::Settle) {
-                    MotionName::Settle => Motion::Settle,
-                    MotionName::MinimumJerk => Motion::MinimumJerk,
-                    MotionName::Sines => Motion::Sines,
-                    MotionName::Circle => Motion::Circle,
-                    MotionName::Paper => Motion::Paper,
-                };
-                Ok(Score::motion(&config.machine, motion, seconds))
-            }
-        }
-    }
-}
-
-/// The ladder of models by name.
-fn rungs() -> impl TypedValueParser<Value = Rung> {
-    PossibleValuesParser::new(Rung::ALL.map(Rung::name))
-        .map(|name| Rung::ALL.into_iter().find(|rung| rung.name() == name).unwrap_or(Rung::Exact))
 }
 
 /// Signals end the command in order instead of killing it.
 fn stop() -> Result<Stop, Failure> {
     Stop::on_signals().map_err(Failure::could_not_begin)
-}
-
-fn duration(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(seconds) if (0.1..=86400.0).contains(&seconds) => Ok(seconds),
-        Ok(_) => Err("must be in [0.1, 86400] s".into()),
-        Err(_) => Err("must be a number".into()),
-    }
-}
-
-/// Why a command failed, and its exit code: 1 it ran and went wrong, 2 it could not begin.
-#[derive(Debug)]
-pub struct Failure {
-    pub code: u8,
-    pub what: String,
-}
-
-impl Failure {
-    fn could_not_begin(error: impl core::error::Error) -> Self {
-        Self { code: 2, what: error.to_string() }
-    }
-}
-
-impl From<ConfigError> for Failure {
-    fn from(error: ConfigError) -> Self {
-        Self::could_not_begin(error)
-    }
-}
-
-impl From<SetpointError> for Failure {
-    fn from(error: SetpointError) -> Self {
-        Self::could_not_begin(error)
-    }
-}
-
-impl From<AdviseError> for Failure {
-    fn from(error: AdviseError) -> Self {
-        Self::could_not_begin(error)
-    }
-}
-
-impl From<OfflineError> for Failure {
-    fn from(error: OfflineError) -> Self {
-        let code = if matches!(error, OfflineError::Unsolved { .. }) { 1 } else { 2 };
-        Self { code, what: error.to_string() }
-    }
-}
-
-impl From<DemoError> for Failure {
-    fn from(error: DemoError) -> Self {
-        let code = if matches!(error, DemoError::Config(_) | DemoError::File(_) | DemoError::Port(_)) {
-            2
-        } else {
-            1
-        };
-        Self { code, what: error.to_string() }
-    }
 }

@@ -1,0 +1,53 @@
+//! What reading the clock costs, and what it would cost as a system call.
+
+use super::clock::monotonic_ns;
+
+/// Readings in a row, so that the two that time them do not count.
+const READINGS: u32 = 1_000;
+/// The cheapest of so many rows: the others were interrupted.
+const ROWS: u32 = 20;
+
+/// Nanoseconds.
+#[derive(Clone, Copy, Debug)]
+pub struct ClockCost {
+    /// As the loop reads it.
+    pub reading_ns: f64,
+    /// By a system call.
+    pub system_call_ns: f64,
+}
+
+impl ClockCost {
+    /// Takes some milliseconds.
+    pub fn measure() -> Self {
+        Self {
+            reading_ns: cost_ns(|| _ = core::hint::black_box(monotonic_ns())),
+            system_call_ns: cost_ns(call),
+        }
+    }
+}
+
+fn call() {
+    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `now` is a valid timespec for the duration of the call, which is clock_gettime(2).
+    unsafe { libc::syscall(libc::SYS_clock_gettime, libc::CLOCK_MONOTONIC, &raw mut now) };
+}
+
+fn cost_ns(read: impl Fn()) -> f64 {
+    let row = |_| {
+        let start_ns = monotonic_ns();
+        (0..READINGS).for_each(|_| read());
+        monotonic_ns() - start_ns
+    };
+    (0..ROWS).map(row).min().unwrap_or_default() as f64 / f64::from(READINGS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_cost_something() {
+        let ClockCost { reading_ns, system_call_ns } = ClockCost::measure();
+        assert!(reading_ns > 0.0 && system_call_ns > 0.0, "{reading_ns} {system_call_ns}");
+    }
+}
