@@ -30,7 +30,9 @@ pub fn lock_all() -> Result<(), Shortfall> {
 }
 
 /// Has the allocator keep what it once had from the kernel: freed memory is not given back, and large blocks
-/// come from the heap instead of mappings of their own. For the whole process, before its threads start.
+/// come from the heap instead of mappings of their own. And there is one heap: each further one would
+/// reserve 64 MiB, all of which count as locked; the one thread that must not wait for it never allocates.
+/// For the whole process, before its threads start.
 #[cfg(target_env = "gnu")]
 pub fn keep_heap() {
     // SAFETY: plain numbers, set under the lock of the allocator. They only decide where blocks come from.
@@ -38,6 +40,7 @@ pub fn keep_heap() {
         // -1: never.
         libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
         libc::mallopt(libc::M_MMAP_MAX, 0);
+        libc::mallopt(libc::M_ARENA_MAX, 1);
     }
 }
 
