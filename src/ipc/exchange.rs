@@ -14,7 +14,7 @@ use crate::realtime::newest::{Reader, Writer, newest};
 pub struct CycleInput {
     /// The release in here is not used: the loop knows its own.
     pub input: Input,
-    /// Measured messages received since start.
+    /// Measured messages that came since start.
     pub measurements: u64,
     /// When it was handed in \[ns\].
     pub handed_ns: u64,

@@ -161,7 +161,7 @@ impl Bus {
             .buffer_size(depth.min(BUFFER))
             .create()
             .map_err(failed(format!("cannot subscribe to {}", T::TOPIC)))?;
-        Ok(Sink { subscriber, epoch: 0, sequence: 0, received: 0, rejected: 0, topic: PhantomData })
+        Ok(Sink { subscriber, epoch: 0, sequence: 0, came: 0, rejected: 0, topic: PhantomData })
     }
 }
 
@@ -195,7 +195,7 @@ pub struct Sink<T: Message> {
     subscriber: Subscriber<ipc::Service, T, ()>,
     epoch: u64,
     sequence: u64,
-    received: u64,
+    came: u64,
     rejected: u64,
     topic: PhantomData<T>,
 }
@@ -217,8 +217,9 @@ impl<T: Message> Sink<T> {
             let header = message.header();
             let order = (header.epoch, header.sequence);
             if header.schema == SCHEMA && order > (self.epoch, self.sequence) {
+                let same_life = header.epoch == self.epoch;
+                self.came += if same_life { header.sequence - self.sequence } else { 1 };
                 (self.epoch, self.sequence) = order;
-                self.received += 1;
                 return Some(message);
             }
             self.rejected += 1;
@@ -238,9 +239,10 @@ impl<T: Message> Sink<T> {
         newest
     }
 
-    /// How many messages were accepted.
-    pub fn received(&self) -> u64 {
-        self.received
+    /// How many messages came: those accepted, and those that the source numbered in between and that found
+    /// the buffer full.
+    pub fn came(&self) -> u64 {
+        self.came
     }
 
     /// How many messages were passed over.

@@ -4,7 +4,7 @@
 //! generous limits against hanging; timeouts are long where they are not what is tested; what is counted is
 //! compared with what the messages themselves say.
 //!
-//! `HEXAD_LONG=1` runs the locked-memory test for a minute instead of 20 seconds.
+//! `HEXAD_LONG=1` runs the tests of locked memory and of peers that die for a minute each.
 
 #![allow(
     clippy::unwrap_used,
@@ -17,15 +17,20 @@
 
 mod support;
 
+mod churn;
 mod command_line;
 mod demo;
 mod doctor;
+mod external;
 mod fidelity;
+mod hybrid;
 mod in_force;
 mod killed;
 mod locked_memory;
 mod orderly_stop;
+mod overruns;
 mod paused;
 mod refusals;
+mod system_calls;
 mod trajectory;
 mod unprivileged;

@@ -17,7 +17,7 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
     let _turn = turns::beside_others();
     let trio = Trio::in_motion("paused-daemon");
     let before = trio.recorder.so_far().statuses.last().copied().expect("a status");
-    trio.daemon.signal("STOP");
+    trio.daemon.hold();
     let (from_ns, _) = let_pass(PAUSE);
     trio.daemon.signal("CONT");
     trio.plant.says("forces stopped arriving: brakes closing");

@@ -192,7 +192,7 @@ impl Io<'_> {
     }
 
     fn hand_in(&mut self) {
-        self.input.measurements = self.ports.measured.received();
+        self.input.measurements = self.ports.measured.came();
         self.input.handed_ns = monotonic_ns();
         self.sides.exchange.inputs.write(self.input);
     }

@@ -38,6 +38,7 @@ use crate::model::ladder::Rung;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Release, Timing};
 use crate::realtime::newest::newest;
+use crate::realtime::process::leave_signals_to_others;
 use crate::realtime::setup::{Shortfall, deadline, memory};
 
 mod hints;
@@ -166,6 +167,11 @@ fn spawn<'scope, T: Send + 'scope>(
     name: &str,
     body: impl FnOnce() -> T + Send + 'scope,
 ) -> io::Result<ScopedJoinHandle<'scope, T>> {
+    let body = || {
+        // The main thread waits for them.
+        leave_signals_to_others();
+        body()
+    };
     Builder::new().name(name.into()).stack_size(STACK).spawn_scoped(threads, body)
 }
 

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 use hexad::host::demo::children::PARENT;
 
 use super::machine::Machine;
+use super::threads::all_stopped;
 
 /// Longer than this nothing may take that has no length of its own.
 pub const HANG: Duration = Duration::from_secs(20);
@@ -65,6 +66,17 @@ impl Hexad {
         let line = format!("kill -s {name} {}", self.child.id());
         let status = Command::new("sh").args(["-c", &line]).status().expect("a shell");
         assert!(status.success(), "{line}: {status}");
+    }
+
+    /// SIGSTOP, and all its threads stand. One of them has to run to begin with that: on a busy machine this
+    /// takes a while.
+    pub fn hold(&self) {
+        self.signal("STOP");
+        let start = Instant::now();
+        while !all_stopped(self.id()) {
+            assert!(start.elapsed() < HANG, "{} does not stop", self.command);
+            sleep(LOOK);
+        }
     }
 
     /// SIGKILL, and it is gone.

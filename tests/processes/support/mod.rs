@@ -3,9 +3,12 @@
 pub mod children;
 pub mod machine;
 pub mod nobody;
+pub mod peer;
 pub mod recorder;
 pub mod rules;
 pub mod stalls;
+pub mod steps;
+pub mod threads;
 pub mod trio;
 pub mod turns;
 pub mod xml;

@@ -1,0 +1,166 @@
+//! Peers that come and are killed ten times a second, and the real-time thread does not notice.
+//!
+//! Two daemons at 4 kHz under the same load in the same seconds: one among constant peers, one among peers
+//! that die. What is zero is zero in both; the time of a cycle is compared between them, second by second.
+//!
+//! Ten seconds, or a minute with `HEXAD_LONG=1`. Needs root (CAP_IPC_LOCK).
+
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use hexad::host::report::Report;
+use hexad::ipc::messages::StatusMessage;
+use hexad::ipc::ports::{Bus, Sink};
+use hexad::ipc::statistics::LoopTimes;
+
+use crate::support::children::HANG;
+use crate::support::machine::{Machine, PATIENT};
+use crate::support::peer::Controlled;
+use crate::support::threads::Thread;
+use crate::support::turns;
+
+const RATE: &str = "[realtime]\nrate_hz = 4000.0\n";
+const KILLS_PER_S: u32 = 10;
+
+/// Largest p99.9 of the time of a cycle among dying peers, over that among constant ones.
+const LARGEST_RATIO: f64 = 1.5;
+
+/// The host can slow one daemon down and not the other, for seconds. What peers do to a cycle they do in
+/// every round, so one good round of these is enough.
+const ROUNDS: usize = 4;
+
+/// More than the log thread allocates for one line, far less than once for each of its rounds in between.
+const PER_LINE: u64 = 20;
+
+#[test]
+fn the_real_time_thread_does_not_notice_peers_that_die() {
+    let _turn = turns::alone();
+    let seconds = if std::env::var_os("HEXAD_LONG").is_some_and(|value| value == "1") { 60 } else { 10 };
+    let [calm, disturbed] =
+        ["calm", "disturbed"].map(|name| Machine::with(name, &format!("{RATE}{PATIENT}")));
+    let (mut calm, mut disturbed) = (Observed::start(calm), Observed::start(disturbed));
+    if calm.controlled.daemon.words().contains("no locked memory") {
+        println!("SKIPPED the_real_time_thread_does_not_notice_peers_that_die: no locked memory");
+        return;
+    }
+    let mut kills = 0;
+    let began = Instant::now();
+    for round in 1..=ROUNDS {
+        let before = [&calm, &disturbed].map(|it| it.p999_ns.len());
+        for _ in 0..KILLS_PER_S * seconds {
+            disturbed.controlled.replace_peer();
+            kills += 1;
+            while began.elapsed() < Duration::from_secs(1) * kills / KILLS_PER_S {
+                calm.look();
+                disturbed.look();
+                sleep(Duration::from_millis(5));
+            }
+        }
+        let [among_constant, among_dying] = [&calm, &disturbed].map(|it| it);
+        let [reference, found] =
+            [median(&among_constant.p999_ns[before[0]..]), median(&among_dying.p999_ns[before[1]..])];
+        let ratio = found as f64 / reference as f64;
+        let rate = f64::from(kills) / began.elapsed().as_secs_f64();
+        println!(
+            "{rate:.1} kills/s; p99.9 of a cycle {found} ns, undisturbed {reference} ns: {ratio:.2} times"
+        );
+        if ratio <= LARGEST_RATIO {
+            break;
+        }
+        assert!(round < ROUNDS, "in each of {ROUNDS} rounds");
+    }
+    among_constant_peers_nothing_is_used(&calm);
+    let seen = disturbed.last.io_allocations - disturbed.first.io_allocations;
+    assert!(seen >= kills.into(), "{kills} peers were killed, and the io thread allocated {seen} times");
+    for observed in [calm, disturbed] {
+        observed.ends();
+    }
+}
+
+fn median(values: &[u64]) -> u64 {
+    let mut values = values.to_vec();
+    values.sort_unstable();
+    values[values.len() / 2]
+}
+
+/// One daemon and what its status said.
+struct Observed {
+    controlled: Controlled,
+    statuses: Sink<StatusMessage>,
+    first: StatusMessage,
+    last: StatusMessage,
+    window: LoopTimes,
+    /// p99.9 of the time of a cycle, of each second.
+    p999_ns: Vec<u64>,
+    /// When everybody was there: minor and major faults of the io and of the log thread.
+    faults: [[u64; 2]; 2],
+}
+
+impl Observed {
+    /// Returns when everybody is there and the first seconds are over, with all that is only done once.
+    fn start(machine: Machine) -> Self {
+        let controlled = Controlled::start(machine);
+        let bus = Bus::join(&controlled.machine.name).expect("to join");
+        let statuses = bus.sink(1).expect("to subscribe");
+        let nothing = StatusMessage::default();
+        let mut observed = Self {
+            controlled,
+            statuses,
+            first: nothing,
+            last: nothing,
+            window: LoopTimes::default(),
+            p999_ns: vec![],
+            faults: [[0; 2]; 2],
+        };
+        let start = Instant::now();
+        while observed.p999_ns.len() < 2 {
+            assert!(start.elapsed() < HANG, "no statistics");
+            observed.look();
+            sleep(Duration::from_millis(5));
+        }
+        observed.p999_ns.clear();
+        (observed.first, observed.faults) = (observed.last, observed.faults_now());
+        observed
+    }
+
+    fn look(&mut self) {
+        let Some(status) = self.statuses.newest() else { return };
+        self.last = status;
+        if status.statistics.window != self.window {
+            self.window = status.statistics.window;
+            self.p999_ns.push(self.window.compute_ns.p999);
+        }
+    }
+
+    fn faults_now(&self) -> [[u64; 2]; 2] {
+        ["hexad-io", "hexad-log"].map(|name| Thread::of(self.controlled.daemon.id(), name).faults())
+    }
+
+    fn ends(self) {
+        let Controlled { peer: _peer, daemon, plant, machine } = self.controlled;
+        let words = daemon.stops_on("TERM", HANG).stderr;
+        plant.stops_on("TERM", HANG);
+        let report = Report::read(&machine.path("report.json")).expect("the report");
+        println!(
+            "{}: {} cycles, {:?}, {:?}",
+            machine.name, report.cycles, report.rt_thread, report.deadline_misses
+        );
+        let used = report.rt_thread;
+        assert_eq!((used.allocations, used.major_faults, used.minor_faults), (0, 0, 0), "{used:#?}");
+        assert!(used.voluntary_switches <= report.cycles, "more than a sleep per cycle: {used:#?}");
+        assert!(report.faults.is_empty(), "control was lost: {:#?}", report.faults);
+        let lines = words.lines().filter(|line| line.contains("cycle=")).count() as u64;
+        let log = report.log_thread;
+        println!("log thread: {} allocations for {lines} lines, {log:?}", log.allocations);
+        assert!(lines > 0 && log.allocations <= PER_LINE * lines, "{lines} lines: {log:#?}");
+    }
+}
+
+/// From when everybody was there: neither the real-time thread nor the io thread allocates; no page is met
+/// for the first time, by the log thread neither.
+fn among_constant_peers_nothing_is_used(calm: &Observed) {
+    let (first, last) = (&calm.first, &calm.last);
+    assert!(last.cycles > first.cycles && last.state == 1, "{last:#?}");
+    assert_eq!((last.allocations, last.io_allocations), (0, first.io_allocations), "real-time and io thread");
+    assert_eq!(calm.faults_now(), calm.faults, "page faults of the io and of the log thread");
+}

@@ -1,0 +1,191 @@
+//! The daemon is held (SIGSTOP) for known times at 1 kHz, under each answer to an overrun.
+//!
+//! The host holds it too, whenever it likes. So what must hold, holds of every step from one published cycle
+//! to the next, whoever held the daemon; and what a hold alone does is asked of one of several holds.
+
+use std::collections::HashSet;
+use std::time::Duration;
+
+use hexad::control::state::Cause;
+use hexad::host::report::Report;
+
+use crate::support::children::HANG;
+use crate::support::machine::{Machine, PATIENT, PERIOD_NS, TIMEOUT_NS};
+use crate::support::peer::Controlled;
+use crate::support::recorder::{Recorder, Recording};
+use crate::support::rules;
+use crate::support::steps::{Step, steps};
+use crate::support::trio::let_pass;
+use crate::support::turns;
+
+/// Shorter than every timeout, longer than what is caught up.
+const HOLD: Duration = Duration::from_millis(30);
+const HOLDS: usize = 8;
+const BETWEEN: Duration = Duration::from_millis(100);
+
+/// From a signal sent to all threads stopped, and on the other side from the last point to the wake-up.
+const SLACK_POINTS: u64 = 3;
+
+/// `realtime.max_catch_up`.
+const MOST: u64 = 4;
+
+/// The daemon is held from the first instant to the second, at the least.
+type Hold = (u64, u64);
+
+/// A busy machine can keep the test itself from ending a hold before the timeouts; not each time.
+const ATTEMPTS: usize = 3;
+
+fn held(keys: &str) -> (Vec<Hold>, Recording, Report) {
+    for _ in 0..ATTEMPTS {
+        let (holds, recording, report) = attempt(keys);
+        let silence_ns = |step: &Step| step.after.header.time_ns - step.before.release_ns;
+        let longest_ns = steps(&recording).iter().map(silence_ns).max().expect("steps");
+        if longest_ns < TIMEOUT_NS / 4 * 3 {
+            return (holds, recording, report);
+        }
+        println!("{keys}: held for {} us, again", longest_ns / 1000);
+    }
+    panic!("held for too long in each of {ATTEMPTS} attempts");
+}
+
+fn attempt(keys: &str) -> (Vec<Hold>, Recording, Report) {
+    let machine =
+        Machine::with("overruns", &format!("[realtime]\nlate_wakeup_us = 500.0\n{keys}\n{PATIENT}"));
+    let recorder = Recorder::start(&machine.name);
+    let Controlled { peer: _peer, mut daemon, plant, machine } = Controlled::start(machine);
+    let mut holds = vec![];
+    for _ in 0..HOLDS {
+        let_pass(BETWEEN);
+        daemon.hold();
+        holds.push(let_pass(HOLD));
+        daemon.signal("CONT");
+    }
+    let (_, end_ns) = let_pass(BETWEEN);
+    recorder.until("the daemon goes on", |recording| {
+        recording.forces.last().filter(|force| force.header.time_ns > end_ns).map(drop)
+    });
+    daemon.must_run();
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+    let recording = recorder.finish();
+    rules::hold(&recording);
+    (holds, recording, Report::read(&machine.path("report.json")).expect("the report"))
+}
+
+/// The steps that have to do with a hold: from the last cycle before it to the end of the burst that may
+/// follow.
+fn of_a_hold<'s>(steps: &'s [Step], hold: &Hold) -> &'s [Step] {
+    let (from_ns, to_ns) = *hold;
+    let until = |instant_ns: u64| steps.partition_point(|step| step.after.header.time_ns < instant_ns);
+    let woken_ns = steps[until(to_ns)].after.header.time_ns;
+    &steps[until(from_ns)..=until(woken_ns + 3 * PERIOD_NS)]
+}
+
+fn sum(steps: &[Step], count: impl Fn(&Step) -> u64) -> u64 {
+    steps.iter().map(count).sum()
+}
+
+/// Points that passed in a hold for sure.
+fn points_in(hold: &Hold) -> u64 {
+    ((hold.1 - hold.0) / PERIOD_NS).saturating_sub(SLACK_POINTS)
+}
+
+/// Every cycle that was not in time has one reason, counted once: it was late to wake or the one before it
+/// computed too long.
+fn every_miss_has_its_reason(steps: &[Step]) {
+    for step in steps {
+        assert!(step.late <= step.cycles, "a wake-up is late once: {step:#?}");
+        assert!(step.skipped == 0 || step.late + step.overruns >= 1, "skipped for no reason: {step:#?}");
+    }
+}
+
+#[test]
+fn skip_counts_every_point_and_never_bursts() {
+    let _turn = turns::beside_others();
+    let (holds, recording, report) = held("on_overrun = \"skip\"");
+    let steps = steps(&recording);
+    every_miss_has_its_reason(&steps);
+    for step in steps.iter().filter(|step| step.cycles == 1) {
+        assert_eq!(
+            step.skipped + 1,
+            (step.after.release_ns - step.before.release_ns) / PERIOD_NS,
+            "{step:#?}"
+        );
+    }
+    for hold in &holds {
+        let of = of_a_hold(&steps, hold);
+        let [skipped, late] = [sum(of, |step| step.skipped), sum(of, |step| step.late + step.overruns)];
+        println!("skip: held for {} us, {skipped} skipped, {late} late", (hold.1 - hold.0) / 1000);
+        assert!(skipped >= points_in(hold) && late >= 1, "{hold:?}: {of:#?}");
+    }
+    let once = |hold| {
+        matches!(
+            of_a_hold(&steps, hold).iter().find(|step| step.skipped >= points_in(hold)),
+            Some(Step { cycles: 1, late: 1, overruns: 0, .. })
+        )
+    };
+    assert!(holds.iter().any(once), "a hold is one late wake-up: {steps:#?}");
+    assert_eq!((report.deadline_misses.caught_up, report.faults.len()), (0, 0), "{report:#?}");
+}
+
+#[test]
+fn catch_up_runs_at_most_so_many_at_once() {
+    let _turn = turns::beside_others();
+    let (holds, recording, report) = held(&format!("on_overrun = \"catch_up\"\nmax_catch_up = {MOST}"));
+    let steps = steps(&recording);
+    every_miss_has_its_reason(&steps);
+    let counted: Vec<_> = holds
+        .iter()
+        .map(|hold| {
+            let of = of_a_hold(&steps, hold);
+            let [skipped, late, caught_up] = [
+                sum(of, |step| step.skipped),
+                sum(of, |step| step.late + step.overruns),
+                sum(of, |step| step.caught_up),
+            ];
+            println!(
+                "catch_up: held for {} us, {skipped} skipped, {caught_up} caught up",
+                (hold.1 - hold.0) / 1000
+            );
+            assert!(caught_up >= MOST, "as many as it may: {of:#?}");
+            assert!(skipped + MOST >= points_in(hold), "the others are skipped: {of:#?}");
+            (late, caught_up)
+        })
+        .collect();
+    assert!(counted.contains(&(1, MOST)), "late or overrun, and caught up, of each hold: {counted:?}");
+    assert!(report.faults.is_empty(), "{:#?}", report.faults);
+}
+
+#[test]
+fn fault_takes_the_force_away_in_the_cycle_after_a_miss_and_in_no_other() {
+    let _turn = turns::beside_others();
+    let (holds, recording, report) = held("on_overrun = \"fault\"");
+    let missed = Cause::DeadlineMissed;
+    let steps = steps(&recording);
+    every_miss_has_its_reason(&steps);
+    let mut faults = HashSet::new();
+    for step in steps.iter().filter(|step| step.cycles == 1) {
+        let told = step.after.fault == missed as u32;
+        assert!(!told || step.skipped > 0, "a fault, and no point was missed: {step:#?}");
+        assert!(!told || step.after.valid == 0 && step.after.force_n == [0.0; 6], "{step:#?}");
+        if step.before.valid == 0 {
+            continue;
+        }
+        assert_eq!(told, step.skipped > 0, "a fault exactly where points were missed: {step:#?}");
+        faults.extend(told.then_some(step.number));
+    }
+    println!("fault: {} holds, faults in cycles {faults:?}", holds.len());
+    assert!(!faults.is_empty(), "no step was seen whole");
+    let reported: HashSet<_> = report.faults.iter().map(|fault| fault.cycle).collect();
+    assert!(faults.is_subset(&reported), "{faults:?} in the messages, {reported:?} in the report");
+    assert!(report.faults.len() >= HOLDS, "one for each hold: {:#?}", report.faults);
+    for fault in &report.faults {
+        assert_eq!((fault.number, fault.name.as_str()), (109, missed.name()), "{fault:#?}");
+    }
+    for hold in &holds {
+        assert!(
+            recording.forces.iter().any(|force| force.valid == 1 && force.release_ns > hold.1),
+            "control is taken again after {hold:?}"
+        );
+    }
+}

@@ -1,0 +1,102 @@
+//! A participant that may be killed at any time and replaced by another: the test program itself, started
+//! once more. What it asks for depends on nothing but the time, so a successor takes over without a jump.
+
+use std::env;
+use std::process::{self, Command, Stdio};
+
+use hexad::ipc::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use hexad::ipc::ports::Bus;
+use hexad::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use hexad::realtime::process as child;
+use hexad::realtime::setup::scheduling;
+
+use super::children::Hexad;
+use super::machine::{Machine, PERIOD_NS};
+use super::trio::{start_daemon, start_plant};
+
+/// Name of the machine and of the process that started it: "NAME PARENT".
+const PART: &str = "HEXAD_TEST_PEER";
+
+/// The setpoint's amplitude \[m\], about the home of the paper's machine. Always within the engage tolerance
+/// of the platform at home.
+const AMPLITUDE: f64 = 0.0015;
+const HOME: [f64; 6] = [0.0, 0.0, 0.0, 1.1, 0.0, 0.0];
+/// \[rad/s\]
+const FREQUENCY: f64 = 4.0;
+
+/// A platform under control: all that it takes, and nobody who listens.
+pub struct Controlled {
+    pub peer: Hexad,
+    pub daemon: Hexad,
+    pub plant: Hexad,
+    pub machine: Machine,
+}
+
+impl Controlled {
+    /// Returns when forces are valid.
+    pub fn start(machine: Machine) -> Self {
+        let daemon = start_daemon(&machine);
+        Self::with(machine, daemon)
+    }
+
+    /// With a daemon that was started in a special way.
+    pub fn with(machine: Machine, daemon: Hexad) -> Self {
+        let plant = start_plant(&machine);
+        let peer = start(&machine);
+        daemon.says("active: forces are valid");
+        Self { peer, daemon, plant, machine }
+    }
+
+    /// Another peer comes; when it is there, the present one is killed.
+    pub fn replace_peer(&mut self) {
+        let next = start(&self.machine);
+        core::mem::replace(&mut self.peer, next).kill();
+    }
+}
+
+/// Starts one; returns when it has sent its first setpoint.
+fn start(machine: &Machine) -> Hexad {
+    let mut command = Command::new(env::current_exe().expect("this program"));
+    command.args(["support::peer::takes_part", "--exact", "--ignored", "--nocapture"]);
+    command.env(PART, format!("{} {}", machine.name, process::id())).stdin(Stdio::null());
+    let peer = Hexad::spawn(machine, "peer", command);
+    peer.says("here");
+    peer
+}
+
+/// The setpoint at an instant.
+pub fn setpoint(time_ns: u64) -> SetpointMessage {
+    let phase = FREQUENCY * (time_ns as f64 * 1e-9);
+    let mut message = SetpointMessage { x: HOME, ..SetpointMessage::default() };
+    message.x[3] += AMPLITUDE * phase.sin();
+    message.x_rate[3] = AMPLITUDE * FREQUENCY * phase.cos();
+    message.x_accel[3] = -AMPLITUDE * FREQUENCY * FREQUENCY * phase.sin();
+    message
+}
+
+#[test]
+#[ignore = "not a test, but the peer process that tests start and kill"]
+fn takes_part() {
+    let Ok(part) = env::var(PART) else { return };
+    let (machine, parent) = part.split_once(' ').expect("name and parent");
+    assert!(child::stop_with_parent(parent.parse().expect("a process")), "its test is gone");
+    // So that a busy machine does not make it late.
+    let _ = scheduling::fifo_priority(1);
+    let bus = Bus::join(machine).expect("to join");
+    let mut setpoints = bus.source::<SetpointMessage>().expect("to publish");
+    // Present without a word: the plant measures.
+    let _measured = bus.source::<MeasuredMessage>().expect("to publish");
+    let mut forces = bus.sink::<ForceMessage>(8).expect("to subscribe");
+    let mut statuses = bus.sink::<StatusMessage>(8).expect("to subscribe");
+    let grid = Grid::new(PERIOD_NS, 0);
+    let mut tick_ns = grid.next_after(monotonic_ns());
+    for tick in 0_u64.. {
+        sleep_until(tick_ns);
+        setpoints.publish(tick_ns, setpoint(tick_ns)).expect("to send");
+        let _ = (forces.newest(), statuses.newest());
+        if tick == 0 {
+            eprintln!("here");
+        }
+        tick_ns = grid.next_after(monotonic_ns());
+    }
+}
