@@ -28,6 +28,12 @@ impl TimeHistogram {
         }
     }
 
+    /// Every time recorded \[ns\], to three digits, and how often.
+    pub fn counts(&self) -> impl Iterator<Item = (u64, u64)> {
+        let steps = self.0.iter().flat_map(Histogram::iter_recorded);
+        steps.map(|step| (step.value_iterated_to(), step.count_at_value()))
+    }
+
     /// The distribution of everything recorded.
     pub fn times(&self) -> Times {
         let Some(histogram) = self.0.as_ref().filter(|histogram| !histogram.is_empty()) else {
@@ -77,6 +83,11 @@ mod tests {
         ] {
             assert!(found.abs_diff(exact) * 1000 <= exact, "{found} for {exact}");
         }
+        assert_eq!(histogram.counts().map(|(_, count)| count).sum::<u64>(), count);
+        histogram.clear();
+        histogram.record(7);
+        histogram.record(7);
+        assert!(histogram.counts().eq([(7, 2)]));
         histogram.clear();
         histogram.record(u64::MAX);
         assert!(histogram.times().p50.abs_diff(LONGEST_NS) * 1000 <= LONGEST_NS);

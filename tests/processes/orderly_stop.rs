@@ -1,6 +1,7 @@
 //! SIGTERM and SIGINT: every process ends by itself, and the daemon takes its force away first.
 
 use std::fs;
+use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -50,7 +51,22 @@ fn stops_in_motion(signal: &str) {
     assert!(before.is_some_and(|force| force.valid == 1), "valid until it stopped: {before:#?}");
     let report = Report::read(&machine.path("report.json")).expect("the report");
     assert!(report.faults.is_empty() && report.cycles > 0, "{report:#?}");
+    let counted = counts(&machine.path("histogram.csv"));
+    let Report { wakeup_ns, compute_ns, measured_age_ns, end_to_end_ns, .. } = &report;
+    let reported = [wakeup_ns, compute_ns, measured_age_ns, end_to_end_ns].map(|times| times.count);
+    assert_eq!(counted, reported, "the same times in the report and in the histogram");
     assert_eq!(last.header.sequence, recording.statuses.last().map_or(0, |status| status.header.sequence));
+}
+
+/// How many times of each kind a histogram holds.
+fn counts(path: &Path) -> [u64; 4] {
+    let text = fs::read_to_string(path).expect("the histogram");
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some("time,ns,count"));
+    let rows: Vec<Vec<_>> = lines.map(|line| line.split(',').collect()).collect();
+    let number = |text: &str| text.parse::<u64>().unwrap_or_else(|_| panic!("a number: {text:?}"));
+    ["wakeup", "compute", "measured_age", "end_to_end"]
+        .map(|kind| rows.iter().filter(|row| row[0] == kind).map(|row| number(row[2])).sum())
 }
 
 /// Two of them would fight for the forces.

@@ -35,6 +35,9 @@ enum Command {
         /// Write a JSON report at the end
         #[arg(long, value_name = "FILE")]
         report: Option<PathBuf>,
+        /// Write how often each time occurred, as CSV, at the end
+        #[arg(long, value_name = "FILE")]
+        histogram: Option<PathBuf>,
     },
     /// Simulate the hardware as a process of its own
     Plant {
@@ -132,9 +135,11 @@ impl Cli {
     /// Does what the command line asks for.
     pub fn run(self) -> Result<(), Failure> {
         match self.command {
-            Command::Run { machine, report } => {
+            Command::Run { machine, report, histogram } => {
                 let (config, stop) = (machine.load()?, stop()?);
-                daemon::run(&config, report.as_deref(), &stop).map(drop).map_err(Failure::could_not_begin)
+                daemon::run(&config, report.as_deref(), histogram.as_deref(), &stop)
+                    .map(drop)
+                    .map_err(Failure::could_not_begin)
             }
             Command::Plant { machine } => {
                 let (config, stop) = (machine.load()?, stop()?);

@@ -45,6 +45,7 @@ pub struct Sides<'a> {
 #[derive(Debug, Default)]
 pub struct LogReport {
     pub statistics: Statistics,
+    pub counts_csv: String,
     pub tracking: TrackingSum,
     pub faults: Vec<Fault>,
     pub usage: ThreadUsage,
@@ -86,6 +87,7 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
         if stopping {
             report.statistics = collector.statistics();
             report.usage = ThreadUsage::of_this_thread().since(&at_start);
+            report.counts_csv = collector.counts_csv();
             return report;
         }
         thread::sleep(PERIOD);

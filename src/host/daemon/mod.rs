@@ -6,6 +6,7 @@
 
 extern crate std;
 
+use core::mem;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::boxed::Box;
 use std::io;
@@ -25,7 +26,7 @@ use self::start::{prepare_io, prepare_loop, start, warm_up};
 use super::config::Config;
 use super::config::deployment::{Deployment, ReleaseKey};
 use super::fidelity;
-use super::files::FileError;
+use super::files::{FileError, write_whole};
 use super::report::{DeadlineMisses, Report};
 use super::stop::Stop;
 use crate::control::controller::{Controller, Input, Parameters};
@@ -68,17 +69,25 @@ pub enum DaemonError {
     Report(#[from] FileError),
 }
 
-/// Runs until `stop`; writes the report if asked to.
-pub fn run(config: &Config, report_path: Option<&Path>, stop: &Stop) -> Result<Report, DaemonError> {
+/// Runs until `stop`; writes the report and the histogram if asked to.
+pub fn run(
+    config: &Config,
+    report_path: Option<&Path>,
+    histogram_path: Option<&Path>,
+    stop: &Stop,
+) -> Result<Report, DaemonError> {
     let _only = Bus::claim(&config.name)?;
-    let report = run_threads(config, stop)?;
+    let (report, counts_csv) = run_threads(config, stop)?;
     if let Some(path) = report_path {
         report.write(path)?;
+    }
+    if let Some(path) = histogram_path {
+        write_whole(path, counts_csv.as_bytes())?;
     }
     Ok(report)
 }
 
-fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
+fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonError> {
     let Config { machine, deployment, .. } = config;
     let mut controller = Controller::new(machine, parameters(deployment, fidelity::rung(config)));
     let timing = &timing(deployment);
@@ -148,8 +157,9 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<Report, DaemonError> {
         stop_log.store(true, Ordering::Relaxed);
         let log = log.join().map_err(|_| DaemonError::Died("log"));
         let _shallow_sleep = started?;
-        let (cyclic, io, log) = (cyclic?.unwrap_or_default(), io?.unwrap_or_default(), log?);
-        Ok(summary(config, &cyclic, &io, log))
+        let (cyclic, io, mut log) = (cyclic?.unwrap_or_default(), io?.unwrap_or_default(), log?);
+        let counts_csv = mem::take(&mut log.counts_csv);
+        Ok((summary(config, &cyclic, &io, log), counts_csv))
     })
 }
 

@@ -3,6 +3,9 @@
 
 extern crate std;
 
+use std::format;
+use std::prelude::rust_2024::*;
+
 use crate::host::histogram::TimeHistogram;
 use crate::ipc::statistics::{LoopTimes, Statistics, WORST, WorstCycle};
 use crate::realtime::cyclic::CycleRecord;
@@ -94,6 +97,21 @@ impl Collector {
     /// Everything.
     pub fn statistics(&self) -> Statistics {
         Statistics { window: self.window.times(), total: self.total.times(), worst: self.worst }
+    }
+
+    /// `time,ns,count`: how often each time occurred since start. Allocates.
+    pub fn counts_csv(&self) -> String {
+        let Span { wakeup, compute, measured_age, end_to_end } = &self.total;
+        let mut csv = String::from("time,ns,count\n");
+        for (time, histogram) in [
+            ("wakeup", wakeup),
+            ("compute", compute),
+            ("measured_age", measured_age),
+            ("end_to_end", end_to_end),
+        ] {
+            csv.extend(histogram.counts().map(|(ns, count)| format!("{time},{ns},{count}\n")));
+        }
+        csv
     }
 
     fn rank(&mut self, cycle: WorstCycle) {

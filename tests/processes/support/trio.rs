@@ -86,7 +86,8 @@ pub fn start_plant(machine: &Machine) -> Hexad {
 }
 
 pub fn start_daemon(machine: &Machine) -> Hexad {
-    Hexad::start(machine, "run", &["--report".into(), machine.path("report.json")])
+    let [report, histogram] = ["report.json", "histogram.csv"].map(|name| machine.path(name));
+    Hexad::start(machine, "run", &["--report".into(), report, "--histogram".into(), histogram])
 }
 
 pub fn start_setpoints(machine: &Machine) -> Hexad {
