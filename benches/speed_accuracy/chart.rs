@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use hexad::host::charts::Stroke;
-use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, pareto_front};
+use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width, pareto_front};
 use hexad::model::ladder::Rung;
 
 use super::Failure;
@@ -46,8 +46,8 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
     let (mut points, mut lines) = (vec![], vec![]);
     let fast = pareto_front(items.iter().map(|item| (item.ns, item.fast)), BETTER);
     let slow = pareto_front(items.iter().filter_map(|item| Some((item.ns, item.slow?))), BETTER);
-    lines.push(Line { points: fast, style: Stroke::Solid, color: DOUBLE, wide: true });
-    lines.push(Line { points: slow, style: Stroke::Dashed, color: DOUBLE, wide: true });
+    lines.push(Line { points: fast, style: Stroke::Solid, color: DOUBLE, width: Width::Band });
+    lines.push(Line { points: slow, style: Stroke::Dashed, color: DOUBLE, width: Width::Band });
     for item in &items {
         let label = match item.side {
             Side::Left => Label::Left(&item.name),
@@ -60,7 +60,7 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
         if let Some(slow) = item.slow.filter(|slow| *slow < 0.5 * item.fast) {
             points.push(Point { at: (item.ns, slow), mark: Mark::Ring, color, label: Label::None });
             let points = vec![(item.ns, item.fast), (item.ns, slow)];
-            lines.push(Line { points, style: Stroke::Solid, color, wide: false });
+            lines.push(Line { points, style: Stroke::Solid, color, width: Width::Hair });
         }
     }
     let best = |precision| written(best_isa(rows, precision));
@@ -80,8 +80,8 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
             (Sample::Mark(Mark::Disc, SINGLE), &single_fast),
             (Sample::Mark(Mark::Disc, PEER), "others, exact, f64"),
             (Sample::Mark(Mark::Disc, DENSE), "the paper's dense matrices"),
-            (Sample::Line(Stroke::Solid, DOUBLE), "Pareto front, fast"),
-            (Sample::Line(Stroke::Dashed, DOUBLE), "Pareto front, slow"),
+            (Sample::Line(Stroke::Solid, Width::Band, DOUBLE), "Pareto front, fast"),
+            (Sample::Line(Stroke::Dashed, Width::Band, DOUBLE), "Pareto front, slow"),
         ],
     };
     chart.write_svg(path)?;

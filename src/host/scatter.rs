@@ -1,4 +1,4 @@
-//! One cloud of named points on logarithmic axes, in the style of [`super::charts`].
+//! Points and lines on logarithmic axes, one chart or a grid of them, in the style of [`super::charts`].
 
 extern crate std;
 
@@ -16,6 +16,10 @@ use super::charts::{
 use super::files::write_whole;
 
 const HEIGHT: i32 = 560 * UNIT;
+/// Height of one chart of a grid.
+const CELL_HEIGHT: i32 = 260 * UNIT;
+/// A decade of an axis at least this long has three ticks, a shorter one has one.
+const ROOMY_DECADE: f64 = (120 * UNIT) as f64;
 const RADIUS: i32 = 45;
 /// Width of a letter, on average, and height of a line of labels.
 const LETTER: i32 = 62;
@@ -59,8 +63,18 @@ pub struct Line {
     pub style: Stroke,
     /// Index into the palette; dashed lines are grey.
     pub color: usize,
-    /// Wide and pale, or thin.
-    pub wide: bool,
+    pub width: Width,
+}
+
+/// How wide a solid line is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Width {
+    /// Pale: lies behind the points and means them all.
+    Band,
+    /// Carries the data.
+    Curve,
+    /// Joins what belongs together.
+    Hair,
 }
 
 /// The chart.
@@ -82,7 +96,7 @@ pub struct Scatter<'a> {
 #[derive(Debug, Clone)]
 pub enum Sample {
     Mark(Mark, usize),
-    Line(Stroke, usize),
+    Line(Stroke, Width, usize),
 }
 
 /// The steps along the points that no other one beats in both coordinates; each step multiplies y by `better`
@@ -101,75 +115,119 @@ pub fn pareto_front(points: impl Iterator<Item = (f64, f64)>, better: f64) -> Ve
     steps
 }
 
+/// Charts side by side under one title and one legend.
+#[derive(Debug, Clone)]
+pub struct Grid<'a> {
+    pub title: &'a str,
+    pub legend: Vec<(Sample, &'a str)>,
+    pub columns: usize,
+    /// Row by row.
+    pub charts: Vec<Scatter<'a>>,
+}
+
+impl Grid<'_> {
+    /// Writes the charts as one SVG file, complete or not at all.
+    pub fn write_svg(&self, path: &Path) -> Result<(), ChartError> {
+        let rows = self.charts.len().div_ceil(self.columns.max(1));
+        let head = TITLE_HEIGHT + LEGEND_LINE;
+        let svg = drawn(head + rows as i32 * CELL_HEIGHT, |root| {
+            root.draw_text(self.title, &text(15, HPos::Center), (WIDTH / 2, TITLE_HEIGHT * 3 / 5))?;
+            let mut left = Y_LABELS + MARGIN;
+            for (sample, label) in &self.legend {
+                sample.draw(root, (left, TITLE_HEIGHT + LEGEND_LINE / 2), label)?;
+                left += SAMPLE + width(label) + 5 * MARGIN;
+            }
+            let (_, cells) = root.split_vertically(head);
+            let cells = cells.split_evenly((rows, self.columns));
+            self.charts.iter().zip(&cells).try_for_each(|(chart, cell)| chart.draw_in(cell, 13))
+        })?;
+        Ok(write_whole(path, svg.as_bytes())?)
+    }
+}
+
+fn drawn(height: i32, draw: impl FnOnce(&Area) -> Result<(), DrawError>) -> Result<String, DrawError> {
+    let mut svg = String::new();
+    {
+        let size = (WIDTH.unsigned_abs(), height.unsigned_abs());
+        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        draw(&root)?;
+        root.present()?;
+    }
+    Ok(finish(&svg, height))
+}
+
 impl Scatter<'_> {
     /// Writes the chart as an SVG file, complete or not at all.
     pub fn write_svg(&self, path: &Path) -> Result<(), ChartError> {
-        Ok(write_whole(path, self.draw()?.as_bytes())?)
+        Ok(write_whole(path, drawn(HEIGHT, |root| self.draw_in(root, 15))?.as_bytes())?)
     }
 
-    fn draw(&self) -> Result<String, DrawError> {
-        let mut svg = String::new();
-        {
-            let size = (WIDTH.unsigned_abs(), HEIGHT.unsigned_abs());
-            let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-            let middle = (MARGIN + Y_LABELS + WIDTH) / 2;
-            root.draw_text(self.title, &text(15, HPos::Center), (middle, TITLE_HEIGHT * 3 / 5))?;
-            let (x, y) = (LogAxis::new(&self.x, &[1.0, 2.0, 5.0]), LogAxis::new(&self.y, &[1.0]));
-            let mut chart = ChartBuilder::on(&root)
-                .margin_top(TITLE_HEIGHT)
-                .margin_left(MARGIN)
-                .margin_right(3 * MARGIN)
-                .margin_bottom(MARGIN)
-                .x_label_area_size(X_LABELS)
-                .y_label_area_size(Y_LABELS)
-                .build_cartesian_2d(x.clone(), y.clone())?;
-            let mut mesh = chart.configure_mesh();
-            house_style(&mut mesh);
-            mesh.x_label_formatter(&|value| x.format_ext(value))
-                .y_label_formatter(&|value| y.format_ext(value))
-                .x_desc(self.x_label)
-                .y_desc(self.y_label)
-                .draw()?;
-            for line in &self.lines {
-                chart.draw_series(LineSeries::new(line.points.iter().copied(), line.stroke()))?;
-            }
-            let placed: Vec<_> =
-                self.points.iter().map(|point| (point, chart.backend_coord(&point.at))).collect();
-            draw_labels(&root, &placed)?;
-            for (point, at) in &placed {
-                point.mark.draw(&root, *at, point.color)?;
-            }
-            self.draw_legend(&root)?;
-            root.present()?;
+    fn draw_in(&self, area: &Area, title_size: i32) -> Result<(), DrawError> {
+        let (width, height) = area.dim_in_pixel();
+        let middle = (MARGIN + Y_LABELS + width as i32) / 2;
+        area.draw_text(self.title, &text(title_size, HPos::Center), (middle, TITLE_HEIGHT * 3 / 5))?;
+        let (x, y) = (LogAxis::new(&self.x, width), LogAxis::new(&self.y, height));
+        let mut chart = ChartBuilder::on(area)
+            .margin_top(TITLE_HEIGHT)
+            .margin_left(MARGIN)
+            .margin_right(3 * MARGIN)
+            .margin_bottom(MARGIN)
+            .x_label_area_size(X_LABELS)
+            .y_label_area_size(Y_LABELS)
+            .build_cartesian_2d(x.clone(), y.clone())?;
+        let mut mesh = chart.configure_mesh();
+        house_style(&mut mesh);
+        mesh.x_label_formatter(&|value| x.format_ext(value))
+            .y_label_formatter(&|value| y.format_ext(value))
+            .x_desc(self.x_label)
+            .y_desc(self.y_label)
+            .draw()?;
+        for line in &self.lines {
+            chart.draw_series(LineSeries::new(line.points.iter().copied(), line.stroke()))?;
         }
-        Ok(finish(&svg, HEIGHT))
+        let (left, top) = area.get_base_pixel();
+        let in_area = |(x, y): (i32, i32)| (x - left, y - top);
+        let placed: Vec<_> =
+            self.points.iter().map(|point| (point, in_area(chart.backend_coord(&point.at)))).collect();
+        draw_labels(area, &placed)?;
+        for (point, at) in &placed {
+            point.mark.draw(area, *at, point.color)?;
+        }
+        self.draw_legend(area, width as i32)
     }
 
-    fn draw_legend(&self, root: &Area) -> Result<(), DrawError> {
+    fn draw_legend(&self, area: &Area, area_width: i32) -> Result<(), DrawError> {
         let longest = self.legend.iter().map(|(_, label)| width(label)).max().unwrap_or(0);
-        let left = WIDTH - 5 * MARGIN - longest - SAMPLE;
+        let left = area_width - 5 * MARGIN - longest - SAMPLE;
         for (row, (sample, label)) in self.legend.iter().enumerate() {
-            let y = TITLE_HEIGHT + LEGEND_LINE + row as i32 * LEGEND_LINE;
-            match sample {
-                Sample::Mark(mark, color) => mark.draw(root, (left + SAMPLE / 2, y), *color)?,
-                Sample::Line(style, color) => {
-                    let line = Line { points: vec![], style: *style, color: *color, wide: true };
-                    root.draw(&PathElement::new(vec![(left, y), (left + SAMPLE, y)], line.stroke()))?;
-                }
-            }
-            root.draw_text(label, &text(12, HPos::Left), (left + SAMPLE + MARGIN, y))?;
+            sample.draw(area, (left, TITLE_HEIGHT + LEGEND_LINE + row as i32 * LEGEND_LINE), label)?;
         }
         Ok(())
+    }
+}
+
+impl Sample {
+    /// With its label to the right.
+    fn draw(&self, area: &Area, (left, y): (i32, i32), label: &str) -> Result<(), DrawError> {
+        match self {
+            Self::Mark(mark, color) => mark.draw(area, (left + SAMPLE / 2, y), *color)?,
+            Self::Line(style, width, color) => {
+                let line = Line { points: vec![], style: *style, color: *color, width: *width };
+                area.draw(&PathElement::new(vec![(left, y), (left + SAMPLE, y)], line.stroke()))?;
+            }
+        }
+        area.draw_text(label, &text(12, HPos::Left), (left + SAMPLE + MARGIN, y))
     }
 }
 
 impl Line {
     fn stroke(&self) -> ShapeStyle {
         let color = palette(self.color);
-        match (self.style, self.wide) {
+        match (self.style, self.width) {
             (Stroke::Dashed, _) => rgb(DASHED_INK).stroke_width(15),
-            (Stroke::Solid, true) => rgb(color).mix(0.35).stroke_width(60),
-            (Stroke::Solid, false) => rgb(color).mix(0.6).stroke_width(10),
+            (Stroke::Solid, Width::Band) => rgb(color).mix(0.35).stroke_width(60),
+            (Stroke::Solid, Width::Curve) => rgb(color).stroke_width(20),
+            (Stroke::Solid, Width::Hair) => rgb(color).mix(0.6).stroke_width(10),
         }
     }
 }
@@ -238,8 +296,10 @@ struct LogAxis {
 }
 
 impl LogAxis {
-    /// Ticks at these multiples of powers of ten, of every second power where there are many.
-    fn new(range: &Range<f64>, leads: &[f64]) -> Self {
+    /// Ticks at 1, 2 and 5 times the powers of ten where there is room, else at these, or every second one.
+    fn new(range: &Range<f64>, length: u32) -> Self {
+        let decade = f64::from(length) / (range.end / range.start).log10();
+        let leads = if decade > ROOMY_DECADE { &[1.0, 2.0, 5.0][..] } else { &[1.0] };
         let (low, high) = (range.start.log10().floor() as i32, range.end.log10().ceil() as i32);
         let step = if high - low > 8 { 2 } else { 1 };
         let powers = (low..=high).filter(|power| power % step == 0);
@@ -270,10 +330,13 @@ impl Ranged for LogAxis {
 
 impl ValueFormatter<f64> for LogAxis {
     fn format_ext(&self, value: &f64) -> String {
+        let exponent = value.log10().round() as i32;
         if (1.0..1e5).contains(value) {
             format!("{value:.0}")
+        } else if (value / 10f64.powi(exponent) - 1.0).abs() < 1e-9 {
+            power_of_ten(exponent)
         } else {
-            power_of_ten(value.log10().round() as i32)
+            format!("{value}")
         }
     }
 }
@@ -281,6 +344,14 @@ impl ValueFormatter<f64> for LogAxis {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_tick_says_its_value() {
+        let axis = LogAxis::new(&(0.05..2e5), 100_000);
+        let written: Vec<_> = axis.ticks.iter().map(|tick| axis.format_ext(tick)).collect();
+        assert_eq!(written.get(..5), Some(&["0.05", "10⁻¹", "0.2", "0.5", "1"].map(String::from)[..]));
+        assert_eq!(written.get(18..), Some(&["50000", "10⁵", "200000"].map(String::from)[..]));
+    }
 
     #[test]
     fn the_front_keeps_what_nothing_beats() {
