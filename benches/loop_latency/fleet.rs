@@ -1,0 +1,165 @@
+//! Many platforms in one loop: the loop itself, with a step that steps the controller of each platform.
+//!
+//! Each has its own place on a moving path, exact rung, and is in control. What counts is the time from
+//! wake-up to output; the inputs are there already.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{scope, sleep};
+use std::time::{Duration, Instant};
+
+use heapless::spsc::Queue;
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::state::State;
+use hexad::host::config::Config;
+use hexad::host::daemon::parameters;
+use hexad::ipc::exchange::exchange;
+use hexad::model::inverse_geometry::leg_motion;
+use hexad::model::ladder::Rung;
+use hexad::model::task::TaskState;
+use hexad::realtime::clock::{Monotonic, monotonic_ns};
+use hexad::realtime::cyclic::{self, CycleRecord, RECORDS, Release, Timing};
+use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::setup::{memory, scheduling};
+use hexad::scene::motions::{Motion, fit};
+
+use super::Failure;
+use super::distribution::Distribution;
+use super::rig::{PRIORITY, Rig};
+use super::size::{Trial, is_rare};
+
+/// Where on the path the first platform begins, when the motion has faded in, and its length \[s\].
+const BEGIN_S: f64 = 2.0;
+const PATH_S: f64 = 60.0;
+
+/// Platforms are this many rows of the path apart, up to so many rows.
+const APART: usize = 7;
+const SPREAD: usize = 512;
+
+/// Steps before the first release: each platform is found and in control, its code and data are in memory.
+const WARM_UP_STEPS: usize = 50;
+
+/// How often the records are taken in: 20 ms of the fastest rate here fill a tenth of the queue.
+const POLL: Duration = Duration::from_millis(5);
+
+/// Steps that are timed one by one.
+const STEPS: usize = 20_000;
+
+/// Controllers and their inputs.
+struct Fleet {
+    controllers: Vec<Controller>,
+    path: Vec<(TaskState, [f64; 6], [f64; 6])>,
+    cycle: usize,
+    inactive: u64,
+}
+
+impl Fleet {
+    /// In control, with inputs for so many cycles at a rate.
+    fn new(config: &Config, platforms: usize, period_s: f64, cycles: usize) -> Self {
+        let machine = &config.machine;
+        let scene = fit(machine, Motion::Sines, PATH_S);
+        let row = |index: usize| {
+            let state = scene.at(BEGIN_S + index as f64 * period_s);
+            let legs = leg_motion(machine, &state.motion());
+            (state, legs.length, legs.rate)
+        };
+        let controller = Controller::new(machine, parameters(&config.deployment, Rung::Exact));
+        let mut fleet = Self {
+            controllers: vec![controller; platforms],
+            path: (0..cycles + SPREAD).map(row).collect(),
+            cycle: 0,
+            inactive: 0,
+        };
+        for _ in 0..WARM_UP_STEPS {
+            fleet.step_all(monotonic_ns());
+        }
+        fleet.inactive = 0;
+        fleet
+    }
+
+    fn step_all(&mut self, release_ns: u64) -> Output {
+        let mut last = Output::default();
+        for (number, controller) in self.controllers.iter_mut().enumerate() {
+            let row = (self.cycle + number * APART % SPREAD).min(self.path.len() - 1);
+            let Some((task, length, rate)) = self.path.get(row) else { continue };
+            last = controller.step(&Input {
+                release_ns,
+                setpoint: Some(Setpoint { time_ns: release_ns, task: *task }),
+                measurement: Some(Measurement { time_ns: release_ns, length: *length, rate: *rate }),
+                ..Input::default()
+            });
+            self.inactive += u64::from(last.state != State::Active);
+        }
+        last
+    }
+
+    fn next_cycle(&mut self, release_ns: u64) -> Output {
+        self.cycle += 1;
+        self.step_all(release_ns)
+    }
+
+    fn all_were_active(&self) -> Result<(), String> {
+        if self.inactive == 0 { Ok(()) } else { Err(format!("{} steps were not in control", self.inactive)) }
+    }
+}
+
+/// Runs the loop with so many platforms for so long.
+pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<Trial, Failure> {
+    let period_ns = 1_000_000_000 / u64::from(rate_hz);
+    let timing = Timing {
+        period_ns,
+        phase_ns: period_ns / 2,
+        release: Release::Grid { max_lead_ns: 0 },
+        on_overrun: OnOverrun::Skip,
+        late_wakeup_ns: period_ns / 2,
+    };
+    let cycles = (seconds * f64::from(rate_hz)) as usize;
+    let mut fleet = Fleet::new(&rig.config, platforms, 1.0 / f64::from(rate_hz), cycles);
+    let (side, _io_side) = exchange();
+    let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
+    let (records_in, mut records) = queue.split();
+    let stop = AtomicBool::new(false);
+    let mut busy = Distribution::default();
+    let report = scope(|threads| -> Result<_, Failure> {
+        let thread = threads.spawn(|| {
+            prepare(rig)?;
+            let step = |input: &Input| fleet.next_cycle(input.release_ns);
+            let report = cyclic::run(&mut Monotonic, &timing, step, side, records_in, &stop);
+            fleet.all_were_active().map(|()| report)
+        });
+        let begin = Instant::now();
+        while begin.elapsed().as_secs_f64() < seconds {
+            sleep(POLL);
+            std::iter::from_fn(|| records.dequeue()).for_each(|record| busy.add(record.compute_ns, 1));
+        }
+        stop.store(true, Ordering::Relaxed);
+        Ok(thread.join().map_err(|_| "the loop died")??)
+    })?;
+    let carries = is_rare(report.counters.overruns, report.counters.cycles);
+    Ok(Trial { busy, carries })
+}
+
+/// Single steps of one controller on a moving path, two looks at the clock included.
+pub fn steps(rig: &Rig) -> Result<Distribution, Failure> {
+    let mut fleet = Fleet::new(&rig.config, 1, 1e-3, STEPS);
+    let timed = scope(|threads| {
+        let thread = threads.spawn(|| {
+            prepare(rig)?;
+            let mut times = Vec::with_capacity(STEPS);
+            for _ in 0..STEPS {
+                let begin_ns = monotonic_ns();
+                std::hint::black_box(fleet.next_cycle(begin_ns));
+                times.push((monotonic_ns() - begin_ns, 1));
+            }
+            fleet.all_were_active().map(|()| Distribution::from_iter(times))
+        });
+        thread.join()
+    });
+    Ok(timed.map_err(|_| "the steps died")??)
+}
+
+fn prepare(rig: &Rig) -> Result<(), String> {
+    scheduling::sharp_timers();
+    memory::touch_stack();
+    scheduling::bind_to_cpu(rig.processors.contestant).map_err(|shortfall| shortfall.to_string())?;
+    scheduling::fifo_priority(PRIORITY).map_err(|shortfall| shortfall.to_string())
+}
