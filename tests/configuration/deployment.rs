@@ -39,8 +39,8 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
     );
     refused("[realtime]\nmax_catch_up = 0", &["realtime.max_catch_up = 0: must be an integer in [1, 100]"]);
     refused(
-        "[realtime]\nmax_lead_us = 751",
-        &["realtime.max_lead_us = 751: must be at most 750 (0.75 periods of realtime.rate_hz = 1000)"],
+        "[realtime]\nmax_lead_us = 501",
+        &["realtime.max_lead_us = 501: must be at most 500 (half a period of realtime.rate_hz = 1000)"],
     );
     refused("[realtime]\nio_lead_us = 0", &["realtime.io_lead_us = 0: must be greater than 0"]);
     refused(
@@ -56,7 +56,7 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
     refused("[realtime]\nlate_wakeup_us = 0", &["realtime.late_wakeup_us = 0: must be greater than 0"]);
     refused(
         "[realtime]\nlate_wakeup_us = 501",
-        &["realtime.late_wakeup_us = 501: must be at most 500 (0.5 periods of realtime.rate_hz = 1000)"],
+        &["realtime.late_wakeup_us = 501: must be at most 500 (half a period of realtime.rate_hz = 1000)"],
     );
     refused(
         "[control]\nposition_bandwidth_hz = 0",

@@ -40,7 +40,7 @@ use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Release, Timing};
 use crate::realtime::newest::newest;
 use crate::realtime::process::leave_signals_to_others;
-use crate::realtime::setup::{Shortfall, deadline, memory, scheduling};
+use crate::realtime::setup::{Shortfall, deadline, memory};
 
 mod hints;
 mod io_thread;
@@ -116,7 +116,6 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonE
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop([stop_loop, stop_io, stop_log]);
         let log = spawn(threads, "hexad-log", || {
-            realtime.cpu.into_iter().for_each(scheduling::keep_off_cpu);
             log_thread::run(log_thread::Sides { records, sent, statistics: statistics_in, files }, stop_log)
         })?;
         let cyclic = spawn(threads, REALTIME_THREAD, move || {

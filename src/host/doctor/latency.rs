@@ -16,7 +16,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
 use super::files::HostFiles;
-use crate::host::config::deployment::{Deployment, LONGEST_LEAD, Realtime, ReleaseKey};
+use crate::host::config::deployment::{Deployment, Realtime, ReleaseKey};
 use crate::host::daemon::start::prepare_loop;
 use crate::host::daemon::{nanoseconds, timing};
 use crate::host::histogram::TimeHistogram;
@@ -153,12 +153,13 @@ fn plans(deployment: &Deployment, seconds: f64) -> Vec<Plan> {
     rates.into_iter().flat_map(plan).collect()
 }
 
-/// The same at another rate: what is bounded by a share of the period stays so.
+/// The same at another rate: what is bounded by half a period stays so.
 fn at(configured: &Realtime, rate_hz: f64) -> Realtime {
+    let half_s = 0.5 / rate_hz;
     Realtime {
         rate_hz,
-        max_lead_s: configured.max_lead_s.min(LONGEST_LEAD / rate_hz),
-        late_wakeup_s: configured.late_wakeup_s.min(0.5 / rate_hz),
+        max_lead_s: configured.max_lead_s.min(half_s),
+        late_wakeup_s: configured.late_wakeup_s.min(half_s),
         ..configured.clone()
     }
 }

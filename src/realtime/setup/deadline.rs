@@ -18,11 +18,9 @@ use std::prelude::rust_2024::*;
 use super::Shortfall;
 use super::refusals::{self, Step};
 
-/// Share of a period for the computing of a cycle. Many times what it takes.
+/// Share of a period for the computing of a cycle. Many times what it takes; and with half a period of
+/// spinning before it still below the 95 % that the kernel admits.
 const COMPUTING: f64 = 0.4;
-
-/// Largest share with the spinning before it, below the 95 % that the kernel admits.
-const MOST_OF_A_PERIOD: f64 = 0.9;
 
 /// What is asked for. The period is the cycle's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,8 +32,7 @@ pub struct Reservation {
 impl Reservation {
     /// For cycles of this period, each after a spin of at most `spin_ns`.
     pub fn new(period_ns: u64, spin_ns: u64) -> Self {
-        let share = |of: f64| (of * period_ns as f64) as u64;
-        Self { budget_ns: (spin_ns + share(COMPUTING)).min(share(MOST_OF_A_PERIOD)), period_ns }
+        Self { budget_ns: spin_ns + (COMPUTING * period_ns as f64) as u64, period_ns }
     }
 }
 

@@ -1,11 +1,11 @@
-//! Scheduling class, processors and timers of the calling thread. No other thread is touched.
+//! FIFO priority, processor and timers of the calling thread. No other thread is touched.
 
 extern crate std;
 
 use std::prelude::rust_2024::*;
 
 use super::Shortfall;
-use super::cpus::{Cpus, bind};
+use super::cpus::bind;
 use super::refusals::{self, Step};
 
 /// Puts the calling thread under SCHED_FIFO at this priority.
@@ -23,15 +23,6 @@ pub fn fifo_priority(priority: i32) -> Result<(), Shortfall> {
 /// Binds the calling thread to one processor.
 pub fn bind_to_cpu(cpu: usize) -> Result<(), Shortfall> {
     if bind(core::iter::once(cpu)) { Ok(()) } else { Err(refusals::of(&Step::Cpu(cpu))) }
-}
-
-/// Keeps the calling thread off a processor that another thread is bound to, where it has another: what it
-/// does in the kernel there, or leaves in the caches, would delay that one. Nothing depends on it.
-pub fn keep_off_cpu(cpu: usize) {
-    let others = Cpus::of_this_thread();
-    if others.iter().any(|other| other != cpu) {
-        bind(others.iter().filter(|other| *other != cpu));
-    }
 }
 
 /// Asks for timers of the calling thread to fire within a nanosecond instead of the default 50 us. Only

@@ -8,7 +8,7 @@ extern crate std;
 
 use std::{format, prelude::rust_2024::*};
 
-pub use self::realtime::{LONGEST_LEAD, Realtime, ReleaseKey, Scheduler};
+pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;

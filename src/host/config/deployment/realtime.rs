@@ -13,12 +13,9 @@ const RATE_HZ: Bound = Bound::Within(10.0, 20_000.0);
 /// Default of `late_wakeup_us` where half a period is longer; the wake-up latency of an ordinary kernel
 /// stays below at the 99th percentile.
 const LATE_WAKEUP_US: f64 = 200.0;
-/// Default of `max_lead_us` where [`LONGEST_LEAD`] is longer: covers the wake-up latency of an ordinary
+/// Default of `max_lead_us` where half a period is longer: covers the wake-up latency of an ordinary
 /// kernel at the 99.9th percentile.
 const MAX_LEAD_US: f64 = 200.0;
-/// Longest spin, in periods. What is left is enough for the cycle and, with 95 % of a processor for real-time
-/// threads, for Linux's throttle; at 20 kHz it is what hides the wake-up latency of an ordinary kernel.
-pub const LONGEST_LEAD: f64 = 0.75;
 /// Defaults of `io_lead_us` where a quarter of the period is longer. Asleep until then, the io thread
 /// wakes about 50 us later and must still read in time; awake before then, it needs only the reading.
 const IO_LEAD_US: f64 = 100.0;
@@ -104,10 +101,15 @@ pub(super) fn read(mut section: Reader) -> Realtime {
     let realtime = Realtime {
         rate_hz,
         release,
-        max_lead_s: within_s(LONGEST_LEAD, &mut section, "max_lead_us", MAX_LEAD_US, rate_hz),
+        max_lead_s: within_half_period_s(&mut section, "max_lead_us", MAX_LEAD_US, rate_hz),
         on_overrun: on_overrun(&mut section),
-        late_wakeup_s: within_s(0.5, &mut section, "late_wakeup_us", LATE_WAKEUP_US, rate_hz),
-        io_lead_s: within_s(0.5, &mut section, "io_lead_us", io_lead_us.min(0.25e6 / rate_hz), rate_hz),
+        late_wakeup_s: within_half_period_s(&mut section, "late_wakeup_us", LATE_WAKEUP_US, rate_hz),
+        io_lead_s: within_half_period_s(
+            &mut section,
+            "io_lead_us",
+            io_lead_us.min(0.25e6 / rate_hz),
+            rate_hz,
+        ),
         cpu: cpu(&mut section, "cpu"),
         io_cpu: cpu(&mut section, "io_cpu"),
         scheduler,
@@ -133,14 +135,14 @@ pub(super) fn read(mut section: Reader) -> Realtime {
     realtime
 }
 
-/// A duration of at most so many periods.
-fn within_s(periods: f64, section: &mut Reader, key: &'static str, default_us: f64, rate_hz: f64) -> f64 {
-    let most_us = periods * 1e6 / rate_hz;
-    let duration_us = section.number_or(key, default_us.min(most_us), Bound::Positive);
-    if duration_us > most_us {
+/// A duration of at most half a period.
+fn within_half_period_s(section: &mut Reader, key: &'static str, default_us: f64, rate_hz: f64) -> f64 {
+    let half_us = 0.5e6 / rate_hz;
+    let duration_us = section.number_or(key, default_us.min(half_us), Bound::Positive);
+    if duration_us > half_us {
         section.refuse(
             key,
-            format!("must be at most {most_us} ({periods} periods of realtime.rate_hz = {rate_hz})"),
+            format!("must be at most {half_us} (half a period of realtime.rate_hz = {rate_hz})"),
         );
     }
     duration_us / 1e6

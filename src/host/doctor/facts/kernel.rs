@@ -9,8 +9,8 @@ use super::Fact;
 use crate::host::doctor::files::HostFiles;
 use crate::realtime::clock_cost::ClockCost;
 
-/// Of its period, real-time threads may use at least this: a loop that spins for three quarters of
-/// its period and computes stays below.
+/// Of its period, real-time threads may use at least this: a loop that sleeps or spins for half of its
+/// period, and the io thread beside it, stay below.
 const ENOUGH_SHARE: f64 = 0.9;
 
 /// Reading the clock costs less than this part of a system call, or it is one.
