@@ -6,5 +6,8 @@
 
 pub mod controller;
 pub mod gains;
+pub mod doubt;
 pub mod law;
+pub mod reference;
 pub mod state;
+pub mod supervisor;

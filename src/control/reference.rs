@@ -1,0 +1,242 @@
+//! The motions that the daemon makes by itself: onto the setpoint, to rest, home.
+//!
+//! Each is a base motion displaced by a vector that follows a quintic in time. The quintic joins given
+//! displacement, rate and acceleration at both ends, so acceleration is continuous and jerk bounded.
+//!
+//! | motion | base | displacement |
+//! | --- | --- | --- |
+//! | engaging | the setpoint | from where the platform is, to none |
+//! | stopping | where it began, at rest | from none, along the motion, until at rest |
+//! | parking | home, at rest | from where the platform is, to none |
+
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
+
+/// Largest magnitudes of the motions made here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    pub position: AxisLimits,
+    pub orientation: AxisLimits,
+}
+
+/// \[m\] or \[rad\], per second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisLimits {
+    pub velocity: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
+}
+
+/// Shortest motion \[s\], and the ratio from one duration tried to the next: 80 of them reach an hour.
+const SHORTEST_S: f64 = 0.02;
+const LONGER: f64 = 1.17;
+const TRIES: u32 = 80;
+
+/// A displacement `[rotation vector; vector]` of a base motion over time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Segment {
+    /// Coefficients of 1, t, ... t^5.
+    coefficients: [Vector6<f64>; 6],
+    duration_s: f64,
+    start_ns: u64,
+}
+
+impl Segment {
+    /// From a displacement and its rate to none, as fast as the limits allow.
+    pub fn vanishing(start_ns: u64, displacement: &Twist, rate: &Twist, limits: &Limits) -> Self {
+        let (d, v) = (displacement.vector(), rate.vector());
+        // Peaks of the quintic from rest to rest, and bounds of those of a rate that dies away.
+        let duration_s = limits.shortest(&d, &v, |limit, d, v, t| {
+            1.875 * d / t + v <= limit.velocity.max(v)
+                && 5.774 * d / (t * t) + 6.0 * v / t <= limit.acceleration
+                && 60.0 * d / t.powi(3) + 36.0 * v / (t * t) <= limit.jerk
+        });
+        Self::joining(start_ns, duration_s, [d, v, Vector6::zeros()], Vector6::zeros())
+    }
+
+    /// From none, with a rate and an acceleration, until at rest: the rate follows a cubic.
+    pub fn to_rest(start_ns: u64, rate: &Twist, acceleration: &Acceleration, limits: &Limits) -> Self {
+        let (v, a) = (rate.vector(), acceleration.vector());
+        let duration_s = limits.shortest(&v, &a, |limit, v, a, t| {
+            1.5 * v / t <= limit.acceleration && 6.0 * v / (t * t) + 4.0 * a / t <= limit.jerk
+        });
+        let end = (v * 0.5 + a * (duration_s / 12.0)) * duration_s;
+        Self::joining(start_ns, duration_s, [Vector6::zeros(), v, a], end)
+    }
+
+    /// The quintic from `[d, d', d'']` to `end` at rest.
+    fn joining(start_ns: u64, t: f64, [d, v, a]: [Vector6<f64>; 3], end: Vector6<f64>) -> Self {
+        let h = end - d;
+        let coefficients = [
+            d,
+            v,
+            a * 0.5,
+            (h * 20.0 - v * (12.0 * t) - a * (3.0 * t * t)) / (2.0 * t.powi(3)),
+            (h * -30.0 + v * (16.0 * t) + a * (3.0 * t * t)) / (2.0 * t.powi(4)),
+            (h * 12.0 - v * (6.0 * t) - a * (t * t)) / (2.0 * t.powi(5)),
+        ];
+        Self { coefficients, duration_s: t, start_ns }
+    }
+
+    /// Whether the end has been reached.
+    pub fn ended(&self, instant_ns: u64) -> bool {
+        self.seconds(instant_ns) >= self.duration_s
+    }
+
+    /// The base motion, displaced. Before the start the quintic is continued: a measurement is a little
+    /// older than the cycle that began the segment.
+    pub fn displace(&self, base: &Motion, instant_ns: u64) -> Motion {
+        let t = self.seconds(instant_ns).min(self.duration_s);
+        let [c0, c1, c2, c3, c4, c5] = &self.coefficients;
+        let d = c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t;
+        let v = c1 + (c2 * 2.0 + (c3 * 3.0 + (c4 * 4.0 + c5 * (5.0 * t)) * t) * t) * t;
+        let a = c2 * 2.0 + (c3 * 6.0 + (c4 * 12.0 + c5 * (20.0 * t)) * t) * t;
+        displaced(base, &Twist::from_vector(&d), &Twist::from_vector(&v), &Acceleration::from_vector(&a))
+    }
+
+    fn seconds(&self, instant_ns: u64) -> f64 {
+        instant_ns.wrapping_sub(self.start_ns) as i64 as f64 * 1e-9
+    }
+}
+
+impl Limits {
+    /// The shortest of the durations tried that keeps what `kept` asks, for both parts. The longest where
+    /// none does: a limit of zero.
+    fn shortest(
+        &self,
+        first: &Vector6<f64>,
+        second: &Vector6<f64>,
+        kept: impl Fn(&AxisLimits, f64, f64, f64) -> bool,
+    ) -> f64 {
+        let parts = |of: &Vector6<f64>| [of.fixed_rows::<3>(0).norm(), of.fixed_rows::<3>(3).norm()];
+        let ([rotation_1, translation_1], [rotation_2, translation_2]) = (parts(first), parts(second));
+        let mut t = SHORTEST_S;
+        for _ in 0..TRIES {
+            if kept(&self.orientation, rotation_1, rotation_2, t)
+                && kept(&self.position, translation_1, translation_2, t)
+            {
+                break;
+            }
+            t *= LONGER;
+        }
+        t
+    }
+}
+
+/// A moving pose displaced by `[dw; dv](t)`: `R = exp(dw) R_b`, `C = C_b + dv`.
+///
+/// `omega = J dw' + exp(dw) omega_b` with the left Jacobian J of SO(3) to the second order in dw. A
+/// displacement along one axis is exact; one of 0.2 rad that turns its axis is exact to a thousandth.
+fn displaced(base: &Motion, d: &Twist, rate: &Twist, acceleration: &Acceleration) -> Motion {
+    let turn = exp(&d.angular);
+    let tilde = d.angular.cross_matrix();
+    let jacobian = Matrix3::identity() + tilde * 0.5 + tilde * tilde / 6.0;
+    let added: Vector3<f64> = jacobian * rate.angular;
+    let carried = turn * base.twist.angular;
+    let bend = rate.angular.cross(&d.angular.cross(&rate.angular)) / 6.0;
+    Motion {
+        pose: Pose { rotation: turn * base.pose.rotation, position: base.pose.position + d.linear },
+        twist: Twist { angular: added + carried, linear: base.twist.linear + rate.linear },
+        acceleration: Acceleration {
+            angular: jacobian * acceleration.angular
+                + bend
+                + added.cross(&carried)
+                + turn * base.acceleration.angular,
+            linear: base.acceleration.linear + acceleration.linear,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::task::TaskState;
+
+    const LIMITS: Limits = Limits {
+        position: AxisLimits { velocity: 0.5, acceleration: 5.0, jerk: 100.0 },
+        orientation: AxisLimits { velocity: 1.0, acceleration: 10.0, jerk: 200.0 },
+    };
+
+    fn twist(numbers: [f64; 6]) -> Twist {
+        Twist::from_vector(&numbers.into())
+    }
+
+    fn moving() -> Motion {
+        TaskState {
+            x: Vector6::new(0.1, -0.2, 0.3, 0.01, 0.02, 0.7),
+            xd: Vector6::new(0.3, -0.1, 0.2, 0.1, -0.2, 0.05),
+            xdd: Vector6::new(1.0, -0.5, 0.2, 0.3, 1.0, -0.7),
+        }
+        .motion()
+    }
+
+    /// Derivatives belong to the pose, and limits are kept, at every instant.
+    fn is_smooth(segment: &Segment, base: &Motion, limits: Option<&Limits>) {
+        let h_ns = 100_000;
+        let h = 1e-4;
+        let mut before: Option<Motion> = None;
+        for instant_ns in (segment.start_ns..segment.start_ns + 3_000_000_000).step_by(1_000_000) {
+            let now = segment.displace(base, instant_ns);
+            let later = segment.displace(base, instant_ns + h_ns);
+            let earlier = segment.displace(base, instant_ns - h_ns);
+            if !segment.ended(instant_ns) {
+                let twist = earlier.pose.displacement_to(&later.pose).vector() / (2.0 * h);
+                assert!((twist - now.twist.vector()).norm() < 2e-4, "{twist} {}", now.twist.vector());
+                let acceleration = (later.twist.vector() - earlier.twist.vector()) / (2.0 * h);
+                assert!((acceleration - now.acceleration.vector()).norm() < 0.05, "{acceleration}");
+            }
+            if let Some(limits) = limits {
+                assert!(now.acceleration.linear.norm() <= limits.position.acceleration * 1.001);
+                assert!(now.acceleration.angular.norm() <= limits.orientation.acceleration * 1.001);
+                if let Some(before) = before.replace(now) {
+                    let jerk = (now.acceleration.linear - before.acceleration.linear).norm() / 1e-3;
+                    assert!(jerk <= limits.position.jerk * 1.001, "{jerk}");
+                }
+            }
+        }
+        let end = segment.start_ns + 4_000_000_000;
+        assert!(segment.ended(end));
+    }
+
+    #[test]
+    fn a_displacement_of_a_resting_pose_vanishes_within_the_limits() {
+        let base = TaskState::at_rest([0.1, 0.2, 0.3, 0.0, 0.0, 1.0]).motion();
+        let d = twist([0.1, -0.05, 0.1, 0.02, -0.03, 0.01]);
+        let segment = Segment::vanishing(5_000_000_000, &d, &twist([0.0; 6]), &LIMITS);
+        let first = segment.displace(&base, 5_000_000_000);
+        assert!((base.pose.displacement_to(&first.pose).vector() - d.vector()).norm() < 1e-14);
+        is_smooth(&segment, &base, Some(&LIMITS));
+        let last = segment.displace(&base, 9_000_000_000);
+        assert!((last.pose.rotation - base.pose.rotation).norm() < 1e-12);
+        assert!((last.pose.position - base.pose.position).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_displacement_of_a_moving_pose_begins_with_the_rate_it_has() {
+        let base = moving();
+        let (d, v) = (twist([0.004, 0.001, -0.002, 0.001, 0.002, 0.0]), twist([0.02, 0.0, 0.01, 0.0, 0.01, 0.0]));
+        let segment = Segment::vanishing(7, &d, &v, &LIMITS);
+        let added = segment.displace(&base, 7).twist.vector() - base.twist.vector();
+        assert!((added - v.vector()).norm() < 1e-2, "{added}");
+    }
+
+    #[test]
+    fn a_motion_comes_to_rest_without_a_step_of_acceleration() {
+        let motion = moving();
+        let base = Motion { pose: motion.pose, ..TaskState::at_rest([0.0; 6]).motion() };
+        let segment = Segment::to_rest(5_000_000_000, &motion.twist, &motion.acceleration, &LIMITS);
+        let first = segment.displace(&base, 5_000_000_000);
+        assert!((first.twist.vector() - motion.twist.vector()).norm() < 1e-12);
+        assert!((first.acceleration.vector() - motion.acceleration.vector()).norm() < 1e-12);
+        is_smooth(&segment, &base, Some(&LIMITS));
+        let last = segment.displace(&base, 9_000_000_000);
+        assert!(last.twist.vector().norm() < 1e-12 && last.acceleration.vector().norm() < 1e-9);
+    }
+
+    #[test]
+    fn nothing_to_do_takes_next_to_no_time() {
+        let segment = Segment::to_rest(9, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
+        assert!(!segment.ended(9) && segment.ended(9 + 20_000_001));
+    }
+}
