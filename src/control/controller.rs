@@ -56,6 +56,14 @@ pub struct Measurement {
     pub rate: [f64; LEGS],
 }
 
+/// A request of an operator, and which message it came with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Asked {
+    pub request: Request,
+    /// Epoch and sequence number of the message.
+    pub message: (u64, u64),
+}
+
 /// Everything a cycle depends on besides the controller's own state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Input {
@@ -65,8 +73,8 @@ pub struct Input {
     pub setpoint: Option<Setpoint>,
     /// The newest measurement, if one ever arrived.
     pub measurement: Option<Measurement>,
-    /// The newest request and its number, if one ever arrived. Each number is carried out once.
-    pub request: Option<(u64, Request)>,
+    /// The newest request, if one ever arrived. Each is carried out once.
+    pub request: Option<Asked>,
     /// Cycles were missed since the last one, and the deployment calls that a fault.
     pub deadline_missed: bool,
 }
@@ -77,7 +85,9 @@ pub struct Output {
     pub state: State,
     /// Why the state is not active, or will not be for long; `None` while engaging and active.
     pub cause: Cause,
-    /// Why the last request was refused; `None` if it was not.
+    /// The message of the last request carried out or refused.
+    pub answered: (u64, u64),
+    /// Why that one was refused; `None` if it was not.
     pub refused: Cause,
     /// Forces \[N\]; zero unless the state controls.
     pub force: [f64; LEGS],
@@ -109,8 +119,7 @@ pub struct Controller {
     setpoint: Believed<Setpoint>,
     mode: Mode,
     reference: Reference,
-    /// Number of the last request carried out.
-    requests: u64,
+    answered: (u64, u64),
     refused: Cause,
 }
 
@@ -134,7 +143,7 @@ impl Controller {
             setpoint: Believed::default(),
             mode: Mode::default(),
             reference: Reference::Setpoint,
-            requests: 0,
+            answered: (0, 0),
             refused: Cause::None,
         }
     }
@@ -154,7 +163,7 @@ impl Controller {
         let present = self.reference_at(input.release_ns);
         let before = self.mode.state;
         self.decide(input, &findings);
-        let mut output = Output { refused: self.refused, error, ..Output::default() };
+        let mut output = Output { answered: self.answered, refused: self.refused, error, ..Output::default() };
         if let Ok(at) = located {
             output.measured = Some((at.pose, at.twist));
             if self.mode.state != before {
@@ -173,11 +182,11 @@ impl Controller {
 
     /// The next state; a request is carried out once.
     fn decide(&mut self, input: &Input, findings: &Findings) {
-        let new = input.request.filter(|(number, _)| *number != self.requests);
-        let (mode, refused) = next(self.mode, new.map(|(_, request)| request), findings);
+        let new = input.request.filter(|asked| asked.message != self.answered);
+        let (mode, refused) = next(self.mode, new.map(|asked| asked.request), findings);
         self.mode = mode;
-        if let Some((number, _)) = new {
-            (self.requests, self.refused) = (number, refused.unwrap_or_default());
+        if let Some(asked) = new {
+            (self.answered, self.refused) = (asked.message, refused.unwrap_or_default());
         }
     }
 
@@ -360,7 +369,7 @@ impl Controller {
         if force.iter().all(|value| value.abs() <= limit) {
             return Ok(*force);
         }
-        let weight = self.model.forces::<Gravity>(command).ok_or(Cause::SingularPose)?.map(|f| f.clamp(-limit, limit));
+        let weight = self.model.forces::<Gravity>(command).ok_or(Cause::SingularPose)?.map(|value| value.max(-limit).min(limit));
         let share = |(force, weight): (&f64, &f64)| {
             let rest = force - weight;
             if rest > 0.0 { (limit - weight) / rest } else if rest < 0.0 { (-limit - weight) / rest } else { 1.0 }
@@ -368,7 +377,7 @@ impl Controller {
         let share = force.iter().zip(&weight).map(share).fold(1.0, f64::min).max(0.0);
         let mut limited = weight;
         for (limited, force) in limited.iter_mut().zip(force) {
-            *limited = (*limited + share * (force - *limited)).clamp(-limit, limit);
+            *limited = (*limited + share * (force - *limited)).max(-limit).min(limit);
         }
         Ok(limited)
     }

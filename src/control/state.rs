@@ -94,6 +94,11 @@ impl Request {
     /// Every request, the weakest first.
     pub const ALL: [Self; 6] = [Self::Engage, Self::Clear, Self::Park, Self::Stop, Self::Off, Self::Estop];
 
+    /// Whether carrying it out may begin to move the platform.
+    pub fn takes_force(self) -> bool {
+        matches!(self, Self::Engage | Self::Park)
+    }
+
     /// Name for people; the command of the command line.
     pub fn name(self) -> &'static str {
         match self {

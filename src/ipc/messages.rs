@@ -9,7 +9,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use super::statistics::Statistics;
 
 /// Version of every struct in this file. Any change of layout or meaning raises it.
-pub const SCHEMA: u32 = 2;
+pub const SCHEMA: u32 = 3;
 
 /// First field of every message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -90,6 +90,18 @@ pub struct ForceMessage {
     pub release_ns: u64,
 }
 
+/// What an operator asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[type_name("hexad_command")]
+#[repr(C)]
+pub struct CommandMessage {
+    pub header: Header,
+    /// Number of [`crate::control::state::Request`].
+    pub request: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
 /// How the daemon is doing; published every cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("hexad_status")]
@@ -100,6 +112,14 @@ pub struct StatusMessage {
     pub state: u32,
     /// Number of [`crate::control::state::Cause`].
     pub fault: u32,
+    /// Number of the [`crate::control::state::Cause`] why the request `answered_*` was refused; 0 if it was
+    /// not.
+    pub refused: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Epoch and sequence number of the last command message that was carried out or refused.
+    pub answered_epoch: u64,
+    pub answered_sequence: u64,
     /// 1 if `x` and `twist` are known.
     pub pose_valid: u32,
     /// 1 if `position_error_m` and `orientation_error_rad` are known.
@@ -149,3 +169,4 @@ message!(SetpointMessage, "setpoint");
 message!(MeasuredMessage, "measured");
 message!(ForceMessage, "force");
 message!(StatusMessage, "status");
+message!(CommandMessage, "command");

@@ -11,10 +11,10 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
 
-use crate::control::controller::{Measurement, Output, Setpoint};
-use crate::control::state::{Cause, State};
+use crate::control::controller::{Asked, Measurement, Output, Setpoint};
+use crate::control::state::{Cause, Request};
 use crate::ipc::exchange::{CycleInput, CycleOutput, IoSide};
-use crate::ipc::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use crate::ipc::messages::{CommandMessage, ForceMessage, Header, MeasuredMessage, SetpointMessage, StatusMessage};
 use crate::ipc::ports::{Bus, PortError, Sink, Source};
 use crate::ipc::statistics::Statistics;
 use crate::model::task::{TaskState, task_coordinates};
@@ -31,6 +31,9 @@ const POLL_NS: u64 = 10_000;
 /// output comes one wake-up latency after the release, and a pause costs as much again.
 const AWAKE_NS: u64 = 50_000;
 
+/// A request for force that is older than this is not carried out.
+const OLDEST_REQUEST_NS: u64 = 1_000_000_000;
+
 /// Messages kept per input between two reads. Only the newest counts.
 const INPUT_DEPTH: usize = 8;
 
@@ -41,6 +44,7 @@ pub const DELAYS: usize = 1024;
 pub struct Ports {
     setpoint: Sink<SetpointMessage>,
     measured: Sink<MeasuredMessage>,
+    command: Sink<CommandMessage>,
     force: Source<ForceMessage>,
     status: Source<StatusMessage>,
 }
@@ -83,6 +87,7 @@ impl Ports {
         Ok(Self {
             setpoint: bus.sink(INPUT_DEPTH)?,
             measured: bus.sink(INPUT_DEPTH)?,
+            command: bus.sink(usize::MAX)?,
             force: bus.source()?,
             status: bus.source()?,
         })
@@ -98,6 +103,7 @@ pub fn run(settings: &Settings, ports: Ports, sides: Sides<'_>, stop: &AtomicBoo
         sides,
         input: CycleInput::default(),
         published: 0,
+        answered: (0, 0),
         send_failures: 0,
         allocations: at_start.allocations,
     };
@@ -120,6 +126,8 @@ struct Io<'a> {
     input: CycleInput,
     /// The cycle that was published last.
     published: u64,
+    /// The last request that the controller has seen.
+    answered: (u64, u64),
     send_failures: u64,
     /// Of this thread, before the first cycle.
     allocations: u64,
@@ -169,6 +177,7 @@ impl Io<'_> {
 
     /// Takes in the newest messages; true if a measurement is among them.
     fn read(&mut self) -> bool {
+        self.read_requests();
         let input = &mut self.input.input;
         if let Some(message) = self.ports.setpoint.newest() {
             input.setpoint = Some(Setpoint {
@@ -191,6 +200,23 @@ impl Io<'_> {
         measured.is_some()
     }
 
+    /// Of the requests not yet answered the strongest counts. An old one that asks for force does not: who
+    /// sent it has long stopped waiting.
+    fn read_requests(&mut self) {
+        let now_ns = monotonic_ns();
+        while let Some(message) = self.ports.command.receive_from_any() {
+            let Header { epoch, sequence, time_ns, .. } = message.header;
+            let Some(request) = Request::from_number(message.request) else { continue };
+            if request.takes_force() && now_ns.abs_diff(time_ns) > OLDEST_REQUEST_NS {
+                continue;
+            }
+            let pending = self.input.input.request.filter(|asked| asked.message != self.answered);
+            if pending.is_none_or(|pending| pending.request <= request) {
+                self.input.input.request = Some(Asked { request, message: (epoch, sequence) });
+            }
+        }
+    }
+
     fn hand_in(&mut self) {
         self.input.measurements = self.ports.measured.came();
         self.input.handed_ns = monotonic_ns();
@@ -199,7 +225,8 @@ impl Io<'_> {
 
     /// Publishes the newest output unless it has been; returns when it was due.
     fn publish_new(&mut self) -> u64 {
-        let CycleOutput { due_ns, counters, .. } = *self.sides.exchange.outputs.read();
+        let CycleOutput { due_ns, counters, output, .. } = *self.sides.exchange.outputs.read();
+        self.answered = output.answered;
         if counters.cycles > self.published {
             self.published = counters.cycles;
             self.publish_newest();
@@ -211,11 +238,11 @@ impl Io<'_> {
         let mut cycle = *self.sides.exchange.outputs.value();
         let now_ns = monotonic_ns();
         let held_ns = now_ns.saturating_sub(cycle.due_ns);
-        if held_ns > self.settings.longest_hold_ns && cycle.output.state == State::Active {
+        if held_ns > self.settings.longest_hold_ns && cycle.output.state.controls() {
             cycle.output = Output { cause: Cause::MeasurementLost, ..Output::default() };
         }
         let sent = self.ports.force.publish(now_ns, force_message(&cycle));
-        if cycle.output.state == State::Active {
+        if cycle.output.state.controls() {
             // Full only if the log thread is held; it loses statistics, not forces.
             let _ = self.sides.sent.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
         }
@@ -256,7 +283,7 @@ fn force_message(cycle: &CycleOutput) -> ForceMessage {
     let Output { state, cause, force, limited, .. } = cycle.output;
     ForceMessage {
         force_n: force,
-        valid: u32::from(state == State::Active),
+        valid: u32::from(state.controls()),
         state: state as u32,
         fault: cause as u32,
         limited: u32::from(limited),
@@ -270,6 +297,9 @@ fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMessage {
     let mut message = StatusMessage {
         state: output.state as u32,
         fault: output.cause as u32,
+        refused: output.refused as u32,
+        answered_epoch: output.answered.0,
+        answered_sequence: output.answered.1,
         cycles: counters.cycles,
         late_wakeups: counters.late_wakeups,
         overruns: counters.overruns,

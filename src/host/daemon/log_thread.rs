@@ -55,7 +55,7 @@ pub struct LogReport {
 pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
     let mut collector = Collector::default();
     let mut report = LogReport { faults: Vec::with_capacity(MAX_FAULTS), ..LogReport::default() };
-    let mut last = (State::Waiting, Cause::None);
+    let mut last = (State::Off, Cause::None);
     let mut hints = Hints::default();
     let mut window_began = Instant::now();
     let at_start = ThreadUsage::of_this_thread();
@@ -68,7 +68,7 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
             }
             let now = (record.state, record.cause);
             if now != last {
-                tell(&record, last.0, &mut report.faults);
+                tell(&record, &mut report.faults);
                 last = now;
             }
         }
@@ -94,16 +94,22 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
     }
 }
 
-fn tell(record: &CycleRecord, before: State, faults: &mut Vec<Fault>) {
+fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
     let CycleRecord { cycle, state, cause, .. } = *record;
-    if state == State::Active {
-        info!(cycle, "active: forces are valid");
-    } else if before == State::Active && cause.is_fault() {
-        warn!(cycle, number = cause as u32, "fault: {}; forces are no longer valid", cause.name());
-        if faults.len() < MAX_FAULTS {
-            faults.push(Fault { cycle, number: cause as u32, name: cause.name().into() });
+    match state {
+        State::Fault => {
+            warn!(
+                cycle,
+                number = cause as u32,
+                "fault: {}; no force until cleared; {}",
+                cause.name(),
+                cause.remedy()
+            );
+            if faults.len() < MAX_FAULTS {
+                faults.push(Fault { cycle, number: cause as u32, name: cause.name().into() });
+            }
         }
-    } else {
-        info!(cycle, "waiting: {}", cause.name());
+        State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
+        _ => info!(cycle, "{}: {}", state.name(), cause.name()),
     }
 }

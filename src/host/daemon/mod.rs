@@ -201,6 +201,7 @@ pub fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
         following_orientation: control.following_orientation_rad,
         setpoint_timeout_ns: nanoseconds(timeouts.setpoint_s),
         measured_timeout_ns: nanoseconds(timeouts.measured_s),
+        limits: deployment.limits,
     }
 }
 

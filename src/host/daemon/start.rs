@@ -97,6 +97,7 @@ pub(super) fn warm_up(mut controller: Controller, machine: &Machine) {
         release_ns: 1,
         setpoint: Some(Setpoint { time_ns: 1, task }),
         measurement: Some(Measurement { time_ns: 1, length, rate: [0.0; 6] }),
+        request: None,
         deadline_missed: false,
     };
     for _ in 0..WARM_UP_CYCLES {

@@ -12,6 +12,7 @@ pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
+use crate::control::reference::{self, AxisLimits};
 use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
 use crate::model::ladder::Rung;
 use crate::scene::envelope::Limits;
@@ -47,6 +48,8 @@ pub struct Deployment {
     pub realtime: Realtime,
     /// The control law.
     pub control: Control,
+    /// Of the motions that the daemon makes by itself.
+    pub limits: reference::Limits,
     /// Ages of messages.
     pub timeouts: Timeouts,
     /// The simulated hardware.
@@ -116,6 +119,7 @@ pub(super) fn read(root: &mut Reader) -> Deployment {
     Deployment {
         realtime,
         control: control(root.section("control"), rate_hz),
+        limits: limits(root.section("limits")),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant(root.section("plant"), rate_hz),
         envelope: envelope(root.section("envelope")),
@@ -177,6 +181,20 @@ fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], 
         section.refuse(bandwidth_key, bound);
     }
     [bandwidth_hz, damping_ratio]
+}
+
+/// Defaults are gentle: a fifth of gravity, half a second to rest.
+fn limits(mut section: Reader) -> reference::Limits {
+    let mut axis = |keys: [&'static str; 3], defaults: [f64; 3]| {
+        let [velocity, acceleration, jerk] =
+            core::array::from_fn(|i| section.number_or(keys[i], defaults[i], Bound::Positive));
+        AxisLimits { velocity, acceleration, jerk }
+    };
+    let position = axis(["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"], [0.2, 2.0, 40.0]);
+    let orientation =
+        axis(["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"], [0.5, 5.0, 100.0]);
+    section.finish();
+    reference::Limits { position, orientation }
 }
 
 fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
