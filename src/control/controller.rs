@@ -4,13 +4,15 @@
 //! from the state's reference, apply the law, evaluate the inverse dynamics, check what comes out. Every
 //! cycle does a bounded amount of work.
 
-use super::doubt::{self, Believed};
-use super::law::{Law, TrackingError};
-use super::reference::{Limits, Segment};
-use super::state::{Cause, Request, State};
-use super::supervisor::{Findings, Mode, next};
+use super::doubt::{self, Believed, Parting};
+use super::law::{Integral, Law, TrackingError};
+use super::limits::{Limit, Limiting, Limits};
+use super::reference::Segment;
+use super::state::{Cause, Evidence, Request, State, Trouble};
+use super::supervisor::{AfterStop, Findings, Mode, next};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::{Tracked, Tracker};
+use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::twist_from_rates;
 use crate::model::ladder::{Gravity, Rung};
 use crate::model::machine::{LEGS, Machine};
@@ -25,8 +27,14 @@ pub struct Parameters {
     /// Which terms of the dynamics are evaluated. It must have inertia: what the law commands is an
     /// acceleration, and without inertia there would be no feedback.
     pub rung: Rung,
-    /// Of the motions that the daemon makes by itself.
+    /// Of every reference.
     pub limits: Limits,
+    /// Where setpoints may be, if anybody has said.
+    pub envelope: Option<Envelope>,
+    /// Largest change of a force \[N/s\].
+    pub force_rate: f64,
+    /// What follows the stop of a platform that lost its setpoint.
+    pub after_loss: AfterStop,
     /// Largest position error at which control may begin \[m\].
     pub engage_position: f64,
     /// Largest orientation error at which control may begin \[rad\].
@@ -39,6 +47,13 @@ pub struct Parameters {
     pub setpoint_timeout_ns: u64,
     /// A measurement older than this is lost.
     pub measured_timeout_ns: u64,
+}
+
+/// Lowest and highest X of a setpoint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Envelope {
+    pub lowest: [f64; 6],
+    pub highest: [f64; 6],
 }
 
 /// A setpoint and the instant it holds at.
@@ -85,14 +100,19 @@ pub struct Output {
     pub state: State,
     /// Why the state is not active, or will not be for long; `None` while engaging and active.
     pub cause: Cause,
+    /// The number behind the cause, if it has one.
+    pub evidence: Evidence,
     /// The message of the last request carried out or refused.
     pub answered: (u64, u64),
     /// Why that one was refused; `None` if it was not.
     pub refused: Cause,
     /// Forces \[N\]; zero unless the state controls.
     pub force: [f64; LEGS],
-    /// The forces were reduced to the actuators' limit.
-    pub limited: bool,
+    /// The limits that this cycle is at.
+    pub limiting: Limiting,
+    /// Cycles under control without a new measurement or setpoint to believe, since start.
+    pub without_measurement: u64,
+    pub without_setpoint: u64,
     /// The measured pose and twist, when the pose is known.
     pub measured: Option<(Pose, Twist)>,
     /// Reference minus measured under control; else setpoint minus measured, when both are known.
@@ -116,11 +136,20 @@ pub struct Controller {
     home: Pose,
     tracker: Tracker,
     measurement: Believed<Measurement>,
+    parting: Parting,
     setpoint: Believed<Setpoint>,
+    /// Of the newest setpoint.
+    setpoint_limiting: Limiting,
     mode: Mode,
+    evidence: Evidence,
     reference: Reference,
+    integral: Integral,
+    /// Of the last cycle, if it was under control.
+    force: Option<[f64; LEGS]>,
     answered: (u64, u64),
     refused: Cause,
+    without_measurement: u64,
+    without_setpoint: u64,
 }
 
 /// A measurement and the pose and twist it stands for.
@@ -140,102 +169,144 @@ impl Controller {
             home: home_pose(machine),
             tracker: Tracker::new(machine, home_pose(machine)),
             measurement: Believed::default(),
+            parting: Parting::default(),
             setpoint: Believed::default(),
+            setpoint_limiting: Limiting::default(),
             mode: Mode::default(),
+            evidence: Evidence::default(),
             reference: Reference::Setpoint,
+            integral: Integral::default(),
+            force: None,
             answered: (0, 0),
             refused: Cause::None,
+            without_measurement: 0,
+            without_setpoint: 0,
         }
     }
 
     /// One cycle. Pure: depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         self.doubt(input);
-        let located = self.locate(input.release_ns);
-        let setpoint = self.fresh_setpoint(input.release_ns);
-        let error = self.error(located.ok());
-        let findings = Findings {
-            located: located.map(drop),
-            engageable: setpoint.and_then(|()| self.near(error.as_ref())),
-            following: self.followed(input, setpoint, error.as_ref()),
-            arrived: self.arrived(input.release_ns),
-        };
-        let present = self.reference_at(input.release_ns);
+        let now_ns = input.release_ns;
+        let located = self.locate(now_ns);
+        let setpoint = self.fresh_setpoint(now_ns);
+        let mut output = Output { limiting: self.setpoint_limiting, ..Output::default() };
+        if self.mode.state.controls() || setpoint.is_ok() {
+            output.error = self.error(located.ok());
+        }
+        let engageable = setpoint.and_then(|()| self.near(output.error.as_ref()));
+        let following = self.followed(input, setpoint, &mut output);
+        let present = self.reference_at(now_ns);
         let before = self.mode.state;
-        self.decide(input, &findings);
-        let mut output = Output { answered: self.answered, refused: self.refused, error, ..Output::default() };
+        self.decide(input, [located.map(drop), engageable, following]);
         if let Ok(at) = located {
             output.measured = Some((at.pose, at.twist));
             if self.mode.state != before {
-                self.enter(&at, input.release_ns, present);
+                self.enter(&at, now_ns, present);
             }
             if self.mode.state.controls()
-                && let Err(cause) = self.control(&at, input.release_ns, &mut output)
+                && let Err(trouble) = self.control(&at, now_ns, &mut output)
             {
-                self.mode = Mode { state: State::Fault, cause, ..Mode::default() };
-                output.force = [0.0; LEGS];
+                self.mode = Mode { state: State::Fault, cause: trouble.cause, ..Mode::default() };
+                self.evidence = trouble.evidence;
             }
         }
-        (output.state, output.cause) = (self.mode.state, self.mode.cause);
-        output
+        self.force = Some(output.force).filter(|_| self.mode.state.controls());
+        if self.force.is_none() {
+            output.force = [0.0; LEGS];
+        }
+        Output {
+            state: self.mode.state,
+            cause: self.mode.cause,
+            evidence: self.evidence,
+            answered: self.answered,
+            refused: self.refused,
+            without_measurement: self.without_measurement,
+            without_setpoint: self.without_setpoint,
+            ..output
+        }
     }
 
     /// The next state; a request is carried out once.
-    fn decide(&mut self, input: &Input, findings: &Findings) {
+    fn decide(&mut self, input: &Input, found: [Result<(), Trouble>; 3]) {
         let new = input.request.filter(|asked| asked.message != self.answered);
-        let (mode, refused) = next(self.mode, new.map(|asked| asked.request), findings);
-        self.mode = mode;
+        let [located, engageable, following] = found.map(|found| found.map_err(|trouble| trouble.cause));
+        let findings = Findings { located, engageable, following, arrived: self.arrived(input.release_ns) };
+        let (mode, refused) =
+            next(self.mode, new.map(|asked| asked.request), &findings, self.parameters.after_loss);
         if let Some(asked) = new {
             (self.answered, self.refused) = (asked.message, refused.unwrap_or_default());
         }
+        if mode.cause != self.mode.cause || !mode.state.controls() && mode.state != State::Fault {
+            let fits = |trouble: &Trouble| trouble.cause == mode.cause;
+            let trouble = found.into_iter().filter_map(Result::err).find(fits);
+            self.evidence = trouble.unwrap_or_default().evidence;
+        }
+        self.mode = mode;
     }
 
     /// Takes in what can be believed. Continuity is asked for only where it can be had: of measurements
     /// that are young, of setpoints that are followed.
     fn doubt(&mut self, input: &Input) {
-        let Self { parameters, measurement, setpoint, .. } = self;
+        let Self { parameters, measurement, parting, setpoint, .. } = self;
         let machine = self.model.machine();
-        let is_new = |now: u64, good: Option<u64>| good != Some(now);
+        let now_ns = input.release_ns;
+        let counted = u64::from(self.mode.state.controls());
+        let mut waited = [true; 2];
         if let Some(now) = input.measurement
-            && is_new(now.time_ns, measurement.good.map(|good| good.time_ns))
+            && measurement.is_new(&now)
         {
-            let young = measurement.good.filter(|good| {
-                input.release_ns.abs_diff(good.time_ns) <= parameters.measured_timeout_ns
-            });
-            let verdict = if input.release_ns.abs_diff(now.time_ns) > parameters.measured_timeout_ns {
-                Err(Cause::MeasurementLost)
-            } else {
-                doubt::measurement(machine, &now, young.as_ref())
-            };
+            let timeout_ns = parameters.measured_timeout_ns;
+            let is_young = |good: &Measurement| now_ns.abs_diff(good.time_ns) <= timeout_ns;
+            let verdict = doubt::time(Cause::MeasurementFromElsewhen, now.time_ns, now_ns, timeout_ns)
+                .and_then(|()| {
+                    let before = measurement.good.filter(is_young);
+                    doubt::measurement(&machine.actuator, &now, before.as_ref(), parting)
+                });
             measurement.take(now, verdict);
+            waited[0] = verdict.is_err();
         }
         if let Some(now) = input.setpoint
-            && is_new(now.time_ns, setpoint.good.map(|good| good.time_ns))
+            && setpoint.is_new(&now)
         {
+            let timeout_ns = parameters.setpoint_timeout_ns;
             let follows = matches!(self.mode.state, State::Engaging | State::Active);
-            let verdict = doubt::setpoint(machine, &now, setpoint.good.filter(|_| follows).as_ref());
+            let mut limiting = Limiting::default();
+            let verdict =
+                doubt::time(Cause::SetpointFromElsewhen, now.time_ns, now_ns, timeout_ns).and_then(|()| {
+                    let before = setpoint.good.filter(|_| follows);
+                    doubt::setpoint(machine, parameters, &now, before.as_ref(), &mut limiting)
+                });
             setpoint.take(now, verdict);
+            self.setpoint_limiting = limiting;
+            waited[1] = verdict.is_err();
         }
+        let [no_measurement, no_setpoint] = waited.map(u64::from);
+        self.without_measurement += counted * no_measurement;
+        self.without_setpoint += counted * no_setpoint;
     }
 
     /// The pose and twist of the platform, by one bounded step of forward kinematics.
-    fn locate(&mut self, release_ns: u64) -> Result<Located, Cause> {
+    fn locate(&mut self, release_ns: u64) -> Result<Located, Trouble> {
         let Some(measurement) = self.measurement.good else {
             return Err(self.measurement.absence(Cause::NoMeasurement));
         };
-        // Far in the future is as wrong as long ago.
-        if release_ns.abs_diff(measurement.time_ns) > self.parameters.measured_timeout_ns {
-            return Err(self.measurement.absence(Cause::MeasurementLost));
-        }
+        doubt::time(
+            Cause::MeasurementLost,
+            measurement.time_ns,
+            release_ns,
+            self.parameters.measured_timeout_ns,
+        )
+        .map_err(|lost| self.measurement.absence(lost))?;
         let machine = self.model.machine();
         match self.tracker.advance(machine, &measurement.length).0 {
             Tracked::Found => {}
-            Tracked::Approaching if self.mode.state.controls() => return Err(Cause::MeasurementJumped),
-            Tracked::Approaching => return Err(Cause::FindingPose),
+            Tracked::Approaching if self.mode.state.controls() => return Err(Cause::MeasurementJumped.into()),
+            Tracked::Approaching => return Err(Cause::FindingPose.into()),
             Tracked::NotConverged => {
                 // Home is the one pose known to be on the right assembly mode: walk again from there.
                 self.tracker = Tracker::new(machine, self.home);
-                return Err(Cause::PoseNotFound);
+                return Err(Cause::PoseNotFound.into());
             }
         }
         let pose = self.tracker.pose;
@@ -243,21 +314,22 @@ impl Controller {
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
     }
 
-    fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Cause> {
+    fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {
         let Some(setpoint) = self.setpoint.good else {
             return Err(self.setpoint.absence(Cause::NoSetpoint));
         };
-        if release_ns.abs_diff(setpoint.time_ns) > self.parameters.setpoint_timeout_ns {
-            let at_rest = setpoint.task.xd.amax() == 0.0 && setpoint.task.xdd.amax() == 0.0;
-            let lost = if at_rest { Cause::SetpointEnded } else { Cause::SetpointLost };
-            return Err(self.setpoint.absence(lost));
-        }
-        Ok(())
+        let at_rest = setpoint.task.xd.amax() == 0.0 && setpoint.task.xdd.amax() == 0.0;
+        let lost = if at_rest { Cause::SetpointEnded } else { Cause::SetpointLost };
+        doubt::time(lost, setpoint.time_ns, release_ns, self.parameters.setpoint_timeout_ns)
+            .map_err(|lost| self.setpoint.absence(lost))
     }
 
+    /// The setpoint, carried on or back for the timeout at most.
     fn setpoint_at(&self, instant_ns: u64) -> Option<Motion> {
         let setpoint = self.setpoint.good?;
-        Some(setpoint.task.after(seconds_between(setpoint.time_ns, instant_ns)).motion())
+        let longest = self.parameters.setpoint_timeout_ns as f64 * 1e-9;
+        let dt = seconds_between(setpoint.time_ns, instant_ns).max(-longest).min(longest);
+        Some(setpoint.task.after(dt).motion())
     }
 
     /// What the platform is to do at an instant; without control, what the setpoint says.
@@ -279,38 +351,60 @@ impl Controller {
 
     /// Control begins only where it is no motion of its own: near, and not passing by (an error of velocity
     /// weighs as much as the error of pose that it is worth to the law, `wn` times as large).
-    fn near(&self, error: Option<&TrackingError>) -> Result<(), Cause> {
-        let limits = &self.parameters;
-        let Law { position, orientation } = &limits.law;
-        let near = error.is_some_and(|error| {
-            error.pose.linear.norm() <= limits.engage_position
-                && error.pose.angular.norm() <= limits.engage_orientation
-                && error.twist.linear.norm() <= limits.engage_position * position.stiffness.sqrt()
-                && error.twist.angular.norm() <= limits.engage_orientation * orientation.stiffness.sqrt()
-        });
-        if near { Ok(()) } else { Err(Cause::SetpointTooFar) }
+    fn near(&self, error: Option<&TrackingError>) -> Result<(), Trouble> {
+        let Some(error) = error else { return Err(Cause::NoSetpoint.into()) };
+        let Parameters { law, engage_position, engage_orientation, .. } = &self.parameters;
+        let share = |pose: f64, rate: f64, tolerance: f64, stiffness: f64| {
+            pose.max(rate / stiffness.sqrt()) / tolerance
+        };
+        let TrackingError { pose, twist } = error;
+        let away = share(pose.linear.norm(), twist.linear.norm(), *engage_position, law.position.stiffness)
+            .max(share(
+                pose.angular.norm(),
+                twist.angular.norm(),
+                *engage_orientation,
+                law.orientation.stiffness,
+            ));
+        if away <= 1.0 { Ok(()) } else { Err(Trouble::new(Cause::SetpointTooFar, away, 1.0)) }
     }
 
     /// Whether control can go on as it is.
     fn followed(
         &self,
         input: &Input,
-        setpoint: Result<(), Cause>,
-        error: Option<&TrackingError>,
-    ) -> Result<(), Cause> {
-        let limits = &self.parameters;
-        let on_path = error.is_none_or(|error| {
-            error.pose.linear.norm() <= limits.following_position
-                && error.pose.angular.norm() <= limits.following_orientation
-        });
-        if !on_path {
-            return Err(Cause::OffPath);
+        setpoint: Result<(), Trouble>,
+        output: &mut Output,
+    ) -> Result<(), Trouble> {
+        if !self.mode.state.controls() {
+            return Ok(());
+        }
+        if let Some(error) = &output.error {
+            let Parameters { following_position, following_orientation, .. } = self.parameters;
+            let pose = &error.pose;
+            let away =
+                (pose.linear.norm() / following_position).max(pose.angular.norm() / following_orientation);
+            if !output.limiting.keeps(Limit::Following, away) {
+                return Err(Trouble::new(Cause::OffPath, away, 1.0));
+            }
         }
         if input.deadline_missed {
-            return Err(Cause::DeadlineMissed);
+            return Err(Cause::DeadlineMissed.into());
         }
-        let follows = matches!(self.mode.state, State::Engaging | State::Active);
-        if follows { setpoint } else { Ok(()) }
+        match self.mode.state {
+            State::Engaging | State::Active => setpoint,
+            _ => self.has_room(input.release_ns),
+        }
+    }
+
+    /// A motion of the daemon's own stays within the stroke.
+    fn has_room(&self, release_ns: u64) -> Result<(), Trouble> {
+        let Some(reference) = self.reference_at(release_ns) else { return Ok(()) };
+        let machine = self.model.machine();
+        doubt::within_believed_stroke(
+            &machine.actuator,
+            Cause::SetpointOutOfReach,
+            &leg_lengths(machine, &reference.pose),
+        )
     }
 
     fn arrived(&self, instant_ns: u64) -> bool {
@@ -326,11 +420,18 @@ impl Controller {
         let present = present.unwrap_or_else(|| resting(&at.pose));
         self.reference = match self.mode.state {
             State::Engaging => {
+                self.integral = Integral::default();
                 let setpoint = self.setpoint_at(at.time_ns).unwrap_or(present);
-                let from = TrackingError::new(&setpoint, &at.pose, &at.twist);
-                let minus = |twist: &Twist| Twist { angular: -twist.angular, linear: -twist.linear };
-                let (away, rate) = (minus(&from.pose), minus(&from.twist));
-                Reference::OntoSetpoint(Segment::vanishing(at.time_ns, &away, &rate, limits))
+                let away = setpoint.pose.displacement_to(&at.pose);
+                let Motion { twist, acceleration, .. } = setpoint;
+                // The platform stands, or coasts; what it accelerates with is not measured.
+                let rate = Twist {
+                    angular: at.twist.angular - twist.angular,
+                    linear: at.twist.linear - twist.linear,
+                };
+                let acceleration =
+                    Acceleration { angular: -acceleration.angular, linear: -acceleration.linear };
+                Reference::OntoSetpoint(Segment::vanishing(at.time_ns, &away, &rate, &acceleration, limits))
             }
             State::Stopping => {
                 let segment = Segment::to_rest(release_ns, &present.twist, &present.acceleration, limits);
@@ -338,49 +439,76 @@ impl Controller {
             }
             State::Parking => {
                 let away = self.home.displacement_to(&present.pose);
-                let segment = Segment::vanishing(release_ns, &away, &Twist::default(), limits);
-                Reference::From(self.home, segment)
+                let (rate, acceleration) = (Twist::default(), Acceleration::default());
+                Reference::From(
+                    self.home,
+                    Segment::vanishing(release_ns, &away, &rate, &acceleration, limits),
+                )
             }
             State::Off | State::Standby | State::Active | State::Fault => Reference::Setpoint,
         };
     }
 
     /// The forces of this cycle, or why there are none.
-    fn control(&self, at: &Located, release_ns: u64, output: &mut Output) -> Result<(), Cause> {
+    fn control(&mut self, at: &Located, release_ns: u64, output: &mut Output) -> Result<(), Trouble> {
         let error = self.error(Some(*at)).ok_or(Cause::SetpointLost)?;
+        let Parameters { period_ns, law, rung, limits, .. } = &self.parameters;
         // The force is held for one period from about the release on.
-        let middle_of_hold_ns = release_ns.saturating_add(self.parameters.period_ns / 2);
+        let middle_of_hold_ns = release_ns.saturating_add(period_ns / 2);
         let desired = self.reference_at(middle_of_hold_ns).ok_or(Cause::SetpointLost)?;
-        let command = self.parameters.law.command(&desired, &error);
-        let force = self.model.forces_of(self.parameters.rung, &command).ok_or(Cause::SingularPose)?;
+        let command = law.command(&desired, &error, &self.integral);
+        let force = self.model.forces_of(*rung, &command).ok_or(Cause::SingularPose)?;
         if force.iter().any(|value| !value.is_finite()) {
-            return Err(Cause::ForceNotFinite);
+            return Err(Cause::ForceNotFinite.into());
         }
         output.error = Some(error);
-        output.force = self.within_limit(&force, &command)?;
-        output.limited = output.force != force;
+        let limited = self.within_limit(&force, &command)?;
+        output.force = self.within_rate(limited);
+        output.limiting = output
+            .limiting
+            .with(Limit::Force, limited != force)
+            .with(Limit::ForceRate, output.force != limited);
+        if output.force == force {
+            self.integral.add(law, &error.pose, *period_ns as f64 * 1e-9, limits);
+        }
         Ok(())
     }
 
     /// Forces beyond the limit keep what holds the platform up and lose the same share of all else, so that
     /// what is left pushes in the direction that was meant.
-    fn within_limit(&self, force: &[f64; LEGS], command: &Motion) -> Result<[f64; LEGS], Cause> {
+    fn within_limit(&self, force: &[f64; LEGS], command: &Motion) -> Result<[f64; LEGS], Trouble> {
         let limit = self.model.machine().actuator.max_force;
         if force.iter().all(|value| value.abs() <= limit) {
             return Ok(*force);
         }
-        let weight = self.model.forces::<Gravity>(command).ok_or(Cause::SingularPose)?.map(|value| value.max(-limit).min(limit));
-        let share = |(force, weight): (&f64, &f64)| {
-            let rest = force - weight;
-            if rest > 0.0 { (limit - weight) / rest } else if rest < 0.0 { (-limit - weight) / rest } else { 1.0 }
-        };
-        let share = force.iter().zip(&weight).map(share).fold(1.0, f64::min).max(0.0);
-        let mut limited = weight;
-        for (limited, force) in limited.iter_mut().zip(force) {
-            *limited = (*limited + share * (force - *limited)).max(-limit).min(limit);
-        }
-        Ok(limited)
+        let weight = self.model.forces::<Gravity>(command).ok_or(Cause::SingularPose)?;
+        Ok(toward(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
     }
+
+    /// Forces that change no faster than they may, all by the same share of the change that was meant.
+    fn within_rate(&self, force: [f64; LEGS]) -> [f64; LEGS] {
+        let Some(before) = &self.force else { return force };
+        let most = self.parameters.force_rate * self.parameters.period_ns as f64 * 1e-9;
+        toward(before, &force, |before| (before - most, before + most))
+    }
+}
+
+/// From `start`, which is within its bounds, so far toward `end` as all bounds allow.
+fn toward(start: &[f64; LEGS], end: &[f64; LEGS], bounds: impl Fn(f64) -> (f64, f64)) -> [f64; LEGS] {
+    let share = |(start, end): (&f64, &f64)| {
+        let ((low, high), way) = (bounds(*start), end - start);
+        let room = if way > 0.0 { high - start } else { low - start };
+        if way == 0.0 { 1.0 } else { room / way }
+    };
+    let share = start.iter().zip(end).map(share).fold(1.0, f64::min).max(0.0);
+    let mut reached = *end;
+    if share < 1.0 {
+        for (reached, start) in reached.iter_mut().zip(start) {
+            let (low, high) = bounds(*start);
+            *reached = (start + share * (*reached - start)).max(low).min(high);
+        }
+    }
+    reached
 }
 
 fn resting(pose: &Pose) -> Motion {

@@ -3,10 +3,13 @@
 //! What is refused changes nothing: the last good input stays, and its age goes on counting. So bad data
 //! never refreshes a watchdog, and the reason of the last refusal is told when the watchdog barks.
 
-use super::controller::{Measurement, Setpoint, seconds_between};
-use super::state::Cause;
-use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::{Actuator, Machine};
+use super::controller::{Measurement, Parameters, Setpoint, seconds_between};
+use super::limits::{AxisLimits, Limit, Limiting};
+use super::reference::Segment;
+use super::state::{Cause, Trouble};
+use crate::model::inverse_geometry::{leg_lengths, leg_motion};
+use crate::model::machine::{Actuator, LEGS, Machine};
+use crate::model::rigid::Motion;
 
 /// How far beyond the ends of its stroke a leg is believed, as a share of the stroke: encoders have
 /// offsets, end stops have springs.
@@ -18,97 +21,279 @@ const BEYOND_RATE: f64 = 1.5;
 /// Change of length that is believed at once, whatever the time between, as a share of the stroke: noise.
 const NOISE: f64 = 1e-3;
 
+/// Lengths and the integral of the rates may part by this share of the way: rates are filtered, late, and
+/// not quite to scale. A wrong sign parts by twice the way, a wrong unit by a thousand times.
+const RATE_SHARE: f64 = 0.3;
+
+/// What parted so long ago is forgotten \[s\].
+const RATE_MEMORY_S: f64 = 0.1;
+
+/// Difference between a setpoint and what the one before it leads to that is believed, as a share of the way
+/// between: messages are stamped a little late or early.
+const SETPOINT_SHARE: f64 = 0.25;
+
+/// And at least so much, as a share of the stroke: too small to do harm, and numbers are rounded.
+const SETPOINT_GRAIN: f64 = 1e-4;
+
 /// The last input that was believed, and why the one after it was not.
 #[derive(Clone, Copy, Debug)]
 pub struct Believed<T> {
     pub good: Option<T>,
-    refused: Option<Cause>,
+    /// The newest, good or not: each is looked at once.
+    newest: Option<T>,
+    refused: Option<Trouble>,
 }
 
 impl<T> Default for Believed<T> {
     fn default() -> Self {
-        Self { good: None, refused: None }
+        Self { good: None, newest: None, refused: None }
     }
 }
 
-impl<T: Copy> Believed<T> {
+impl<T: Copy + PartialEq> Believed<T> {
+    /// Whether an input differs from the last one. NaN differs from itself: it is refused each time.
+    pub fn is_new(&self, input: &T) -> bool {
+        self.newest.as_ref() != Some(input)
+    }
+
     /// Takes an input in, if it is believed.
-    pub fn take(&mut self, input: T, verdict: Result<(), Cause>) {
+    pub fn take(&mut self, input: T, verdict: Result<(), Trouble>) {
+        self.newest = Some(input);
         match verdict {
-            Ok(()) => *self = Self { good: Some(input), refused: None },
-            Err(cause) => self.refused = Some(cause),
+            Ok(()) => (self.good, self.refused) = (Some(input), None),
+            Err(trouble) => self.refused = Some(trouble),
         }
     }
 
     /// Why there is no input that is good and young, where `lost` is the reason if nothing was refused.
-    pub fn absence(&self, lost: Cause) -> Cause {
-        self.refused.unwrap_or(lost)
+    pub fn absence(&self, lost: impl Into<Trouble>) -> Trouble {
+        self.refused.unwrap_or_else(|| lost.into())
     }
 }
 
-/// Whether the legs can be where a measurement says, after `before`.
+/// Whether an input is of now: neither too old nor from the future.
+pub fn time(cause: Cause, time_ns: u64, now_ns: u64, timeout_ns: u64) -> Result<(), Trouble> {
+    if now_ns.abs_diff(time_ns) <= timeout_ns {
+        return Ok(());
+    }
+    Err(Trouble::new(cause, seconds_between(now_ns, time_ns), timeout_ns as f64 * 1e-9))
+}
+
+/// How far each leg's length and the integral of its rate have parted, and on what way. Both fade.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Parting {
+    apart: [f64; LEGS],
+    way: [f64; LEGS],
+}
+
+impl Parting {
+    /// A step from one measurement to the next.
+    fn after(&self, now: &Measurement, before: &Measurement) -> Self {
+        let dt = seconds_between(before.time_ns, now.time_ns);
+        let kept = (1.0 - dt / RATE_MEMORY_S).max(0.0);
+        let mut next = *self;
+        let rates = now.rate.iter().zip(&before.rate);
+        let lengths = now.length.iter().zip(&before.length);
+        for ((apart, way), ((now, before), (rate, rate_before))) in
+            next.apart.iter_mut().zip(&mut next.way).zip(lengths.zip(rates))
+        {
+            let change = now - before;
+            *apart = *apart * kept + change - 0.5 * (rate + rate_before) * dt;
+            *way = *way * kept + change.abs();
+        }
+        next
+    }
+}
+
+/// Whether the legs can be where a measurement says, after `before`. `parting` goes on with what is believed.
 pub fn measurement(
-    machine: &Machine,
+    actuator: &Actuator,
     now: &Measurement,
     before: Option<&Measurement>,
-) -> Result<(), Cause> {
+    parting: &mut Parting,
+) -> Result<(), Trouble> {
     if now.length.iter().chain(&now.rate).any(|value| !value.is_finite()) {
-        return Err(Cause::MeasurementNotFinite);
+        return Err(Cause::MeasurementNotFinite.into());
     }
-    let slack = BEYOND_STROKE * stroke(&machine.actuator);
-    if !within_stroke(&machine.actuator, slack, now) {
-        return Err(Cause::LengthOutOfStroke);
+    within_believed_stroke(actuator, Cause::LengthOutOfStroke, &now.length)?;
+    let Some(before) = before else {
+        *parting = Parting::default();
+        return Ok(());
+    };
+    let dt = seconds_between(before.time_ns, now.time_ns);
+    let noise = NOISE * stroke(actuator);
+    let furthest = BEYOND_RATE * actuator.max_rate * dt + noise;
+    for (leg, (now, before)) in now.length.iter().zip(&before.length).enumerate() {
+        let moved = (now - before).abs();
+        // Backward in time the bound is negative, or the noise alone.
+        if dt < 0.0 || moved > furthest {
+            return Err(Trouble::new(Cause::MeasurementJumped, moved, furthest).at(leg));
+        }
     }
-    let Some(before) = before else { return Ok(()) };
-    if !near(&machine.actuator, now, before) {
-        return Err(Cause::MeasurementJumped);
+    let next = parting.after(now, before);
+    for (leg, (apart, way)) in next.apart.iter().zip(&next.way).enumerate() {
+        let furthest = RATE_SHARE * way + noise;
+        if apart.abs() > furthest {
+            return Err(Trouble::new(Cause::RateInconsistent, apart.abs(), furthest).at(leg));
+        }
     }
-    if continues(&machine.actuator, now, before) { Ok(()) } else { Err(Cause::RateInconsistent) }
+    *parting = next;
+    Ok(())
 }
 
-/// Whether the legs can do what a setpoint says, after `before`.
-pub fn setpoint(machine: &Machine, now: &Setpoint, before: Option<&Setpoint>) -> Result<(), Cause> {
+/// Whether a setpoint keeps the limits and, if it is `followed` since `before`, continues it.
+pub fn setpoint(
+    machine: &Machine,
+    parameters: &Parameters,
+    now: &Setpoint,
+    before: Option<&Setpoint>,
+    limiting: &mut Limiting,
+) -> Result<(), Trouble> {
     if !now.task.is_finite() {
-        return Err(Cause::SetpointNotFinite);
+        return Err(Cause::SetpointNotFinite.into());
     }
-    let legs = legs(machine, now);
-    let slow = legs.rate.iter().all(|rate| rate.abs() <= machine.actuator.max_rate);
-    if !slow || !within_stroke(&machine.actuator, 0.0, &legs) {
-        return Err(Cause::SetpointOutOfReach);
-    }
+    let motion = now.task.motion();
+    within_limits(parameters, &motion, limiting)?;
+    within_envelope(parameters, now, limiting)?;
+    within_legs(machine, parameters, now, &motion, limiting)?;
     let Some(before) = before else { return Ok(()) };
-    let before = self::legs(machine, before);
-    let smooth = near(&machine.actuator, &legs, &before) && continues(&machine.actuator, &legs, &before);
-    if smooth { Ok(()) } else { Err(Cause::SetpointJumped) }
+    continues(
+        machine,
+        parameters,
+        &motion,
+        &before.task.motion(),
+        seconds_between(before.time_ns, now.time_ns),
+        limiting,
+    )
 }
 
-/// What a setpoint asks of the legs.
-fn legs(machine: &Machine, setpoint: &Setpoint) -> Measurement {
-    let legs = leg_motion(machine, &setpoint.task.motion());
-    Measurement { time_ns: setpoint.time_ns, length: legs.length, rate: legs.rate }
+fn within_limits(parameters: &Parameters, motion: &Motion, limiting: &mut Limiting) -> Result<(), Trouble> {
+    let Motion { twist, acceleration, .. } = motion;
+    let limits = &parameters.limits;
+    let share = |of: [f64; 2], bounds: [f64; 2]| (of[0] / bounds[0]).max(of[1] / bounds[1]);
+    let bounds = |of: fn(&AxisLimits) -> f64| [of(&limits.orientation), of(&limits.position)];
+    for (limit, share) in [
+        (Limit::Velocity, share([twist.angular.norm(), twist.linear.norm()], bounds(|axis| axis.velocity))),
+        (
+            Limit::Acceleration,
+            share(
+                [acceleration.angular.norm(), acceleration.linear.norm()],
+                bounds(|axis| axis.acceleration),
+            ),
+        ),
+    ] {
+        if !limiting.keeps(limit, share) {
+            return Err(Trouble::new(Cause::SetpointTooFast, share, 1.0));
+        }
+    }
+    Ok(())
+}
+
+fn within_envelope(parameters: &Parameters, now: &Setpoint, limiting: &mut Limiting) -> Result<(), Trouble> {
+    let Some(envelope) = &parameters.envelope else { return Ok(()) };
+    for (axis, ((x, low), high)) in now.task.x.iter().zip(&envelope.lowest).zip(&envelope.highest).enumerate()
+    {
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let away = (x - middle).abs();
+        // A range of nothing is kept by what does not leave it by more than rounding.
+        if !limiting.keeps(Limit::Envelope, away / (half + 1e-9)) {
+            let bound = if *x > middle { *high } else { *low };
+            return Err(Trouble::new(Cause::SetpointOutOfEnvelope, *x, bound).at(axis));
+        }
+    }
+    Ok(())
+}
+
+/// The legs can follow, and if the next message did not come, there would be room to stop.
+fn within_legs(
+    machine: &Machine,
+    parameters: &Parameters,
+    now: &Setpoint,
+    motion: &Motion,
+    limiting: &mut Limiting,
+) -> Result<(), Trouble> {
+    let actuator = &machine.actuator;
+    let legs = leg_motion(machine, motion);
+    for (leg, rate) in legs.rate.iter().enumerate() {
+        if !limiting.keeps(Limit::LegRate, rate.abs() / actuator.max_rate) {
+            return Err(Trouble::new(Cause::SetpointTooFast, rate.abs() / actuator.max_rate, 1.0).at(leg));
+        }
+    }
+    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &legs.length)?;
+    let last = now.task.after(parameters.setpoint_timeout_ns as f64 * 1e-9).motion();
+    let stop = Segment::to_rest(0, &last.twist, &last.acceleration, &parameters.limits);
+    let length = leg_lengths(machine, &stop.end_from(&last.pose));
+    let middle = 0.5 * (actuator.min_length + actuator.max_length);
+    let furthest = length.iter().fold(0.0_f64, |furthest, length| furthest.max((length - middle).abs()));
+    limiting.keeps(Limit::Stroke, furthest / (0.5 * stroke(actuator)));
+    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &length)
+}
+
+/// X' and X'' are the derivatives of X, as far as two messages can show.
+fn continues(
+    machine: &Machine,
+    parameters: &Parameters,
+    now: &Motion,
+    before: &Motion,
+    dt: f64,
+    limiting: &mut Limiting,
+) -> Result<(), Trouble> {
+    let grain = SETPOINT_GRAIN * stroke(&machine.actuator);
+    let moved = before.pose.displacement_to(&now.pose);
+    let parts = |of: fn(&Motion) -> [nalgebra::Vector3<f64>; 2]| (of(now), of(before));
+    let (v, v_before) = parts(|motion| [motion.twist.angular, motion.twist.linear]);
+    let (a, a_before) = parts(|motion| [motion.acceleration.angular, motion.acceleration.linear]);
+    let limits = [&parameters.limits.orientation, &parameters.limits.position];
+    let grains = [grain / machine.joints.radius, grain];
+    let each =
+        [moved.angular, moved.linear].into_iter().zip(v.iter().zip(&v_before)).zip(a.iter().zip(&a_before));
+    for (((moved, (v, v_before)), (a, a_before)), (limit, grain)) in each.zip(limits.into_iter().zip(grains))
+    {
+        let jerk = limit.jerk * dt;
+        let share = |apart: f64, way: f64, drift: f64| apart / (SETPOINT_SHARE * way + drift + grain);
+        let fastest = v.norm().max(v_before.norm());
+        let strongest = a.norm().max(a_before.norm());
+        let x = share((moved - (v + v_before) * (0.5 * dt)).norm(), fastest * dt, jerk * dt * dt / 12.0);
+        // A grain of rate is what moves a grain of length within the memory of the check of the legs' rates.
+        let v = (v - v_before - (a + a_before) * (0.5 * dt)).norm()
+            / (SETPOINT_SHARE * strongest * dt + 0.25 * jerk * dt + grain / RATE_MEMORY_S);
+        if dt <= 0.0 || x > 1.0 || v > 1.0 {
+            return Err(Trouble::new(Cause::SetpointJumped, x.max(v), 1.0));
+        }
+        // Rates of X'' are asked for over a period at least: messages that come in pairs are no jerk.
+        let longest = dt.max(parameters.period_ns as f64 * 1e-9);
+        let jerk = (a - a_before).norm() / (limit.jerk * longest);
+        if !limiting.keeps(Limit::Jerk, jerk) {
+            return Err(Trouble::new(Cause::SetpointTooFast, jerk, 1.0));
+        }
+    }
+    Ok(())
 }
 
 fn stroke(actuator: &Actuator) -> f64 {
     actuator.max_length - actuator.min_length
 }
 
-fn within_stroke(actuator: &Actuator, slack: f64, legs: &Measurement) -> bool {
-    let believed = actuator.min_length - slack..=actuator.max_length + slack;
-    legs.length.iter().all(|length| believed.contains(length))
+/// Whether all legs are where a leg can be believed to be.
+pub fn within_believed_stroke(
+    actuator: &Actuator,
+    cause: Cause,
+    length: &[f64; LEGS],
+) -> Result<(), Trouble> {
+    within_stroke(actuator, BEYOND_STROKE * stroke(actuator), cause, length)
 }
 
-/// No leg moved further than a leg can; and time did not run backward.
-fn near(actuator: &Actuator, now: &Measurement, before: &Measurement) -> bool {
-    let dt = seconds_between(before.time_ns, now.time_ns);
-    let most = BEYOND_RATE * actuator.max_rate * dt + NOISE * stroke(actuator);
-    dt >= 0.0 && now.length.iter().zip(&before.length).all(|(now, before)| (now - before).abs() <= most)
-}
-
-/// The lengths changed by about what the rates say: a wrong sign or unit does not pass at speed.
-fn continues(actuator: &Actuator, now: &Measurement, before: &Measurement) -> bool {
-    let dt = seconds_between(before.time_ns, now.time_ns);
-    let most = 0.5 * BEYOND_RATE * actuator.max_rate * dt + NOISE * stroke(actuator);
-    let change = now.length.iter().zip(&before.length).map(|(now, before)| now - before);
-    let by_rates = now.rate.iter().zip(&before.rate).map(|(now, before)| 0.5 * (now + before) * dt);
-    change.zip(by_rates).all(|(change, by_rates)| (change - by_rates).abs() <= most)
+/// Whether all legs are within their stroke and `slack`.
+fn within_stroke(actuator: &Actuator, slack: f64, cause: Cause, length: &[f64; LEGS]) -> Result<(), Trouble> {
+    for (leg, length) in length.iter().enumerate() {
+        for (bound, beyond) in [
+            (actuator.min_length - slack, actuator.min_length - slack - length),
+            (actuator.max_length + slack, length - actuator.max_length - slack),
+        ] {
+            if beyond > 0.0 || beyond.is_nan() {
+                return Err(Trouble::new(cause, *length, bound).at(leg));
+            }
+        }
+    }
+    Ok(())
 }

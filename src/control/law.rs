@@ -12,8 +12,12 @@
 //! later. Mixing them would make every delay look like a tracking error of speed times delay. So the
 //! error is carried over unchanged, and "the present" is where the platform will be if the error stays as
 //! it is: the desired motion at that later instant, displaced by minus the error.
+//!
+//! An integral term `Ki` times the integral of e may be added to both lines; it is off by default. It goes
+//! on only while no force is limited, and never beyond a share of the acceleration limits: no wind-up.
 
 use super::gains::Gains;
+use super::limits::Limits;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 /// Gains for position and orientation.
@@ -21,6 +25,35 @@ use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 pub struct Law {
     pub position: Gains,
     pub orientation: Gains,
+    /// Ki / Kp \[1/s\].
+    pub integral: f64,
+}
+
+/// Largest part of the acceleration limit that the integral may ask for: what it removes is a payload or a
+/// friction unknown to the model, and what is more than that is a collision.
+const INTEGRAL_SHARE: f64 = 0.5;
+
+/// The integral of the pose error, times Ki: an acceleration.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Integral {
+    acceleration: Acceleration,
+}
+
+impl Integral {
+    /// Goes on with an error for `dt` seconds.
+    pub fn add(&mut self, law: &Law, error: &Twist, dt: f64, limits: &Limits) {
+        let Acceleration { angular, linear } = &mut self.acceleration;
+        for (sum, error, gains, limit) in [
+            (angular, &error.angular, &law.orientation, &limits.orientation),
+            (linear, &error.linear, &law.position, &limits.position),
+        ] {
+            *sum += error * (law.integral * gains.stiffness * dt);
+            let beyond = sum.norm() / (INTEGRAL_SHARE * limit.acceleration);
+            if beyond > 1.0 {
+                *sum /= beyond;
+            }
+        }
+    }
 }
 
 /// Desired minus measured, base axes.
@@ -48,7 +81,8 @@ impl TrackingError {
 impl Law {
     /// The motion whose inverse dynamics are the forces: where the platform will be at the instant of
     /// `desired` if `error` stays as it is, with the commanded acceleration.
-    pub fn command(&self, desired: &Motion, error: &TrackingError) -> Motion {
+    pub fn command(&self, desired: &Motion, error: &TrackingError, integral: &Integral) -> Motion {
+        let Integral { acceleration: sum } = integral;
         let (e, e_rate) = (&error.pose, &error.twist);
         Motion {
             pose: desired.pose.displaced(&Twist { angular: -e.angular, linear: -e.linear }),
@@ -59,10 +93,12 @@ impl Law {
             acceleration: Acceleration {
                 angular: desired.acceleration.angular
                     + e_rate.angular * self.orientation.damping
-                    + e.angular * self.orientation.stiffness,
+                    + e.angular * self.orientation.stiffness
+                    + sum.angular,
                 linear: desired.acceleration.linear
                     + e_rate.linear * self.position.damping
-                    + e.linear * self.position.stiffness,
+                    + e.linear * self.position.stiffness
+                    + sum.linear,
             },
         }
     }

@@ -11,27 +11,11 @@
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 
+use super::limits::{AxisLimits, Limits};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
 
-/// Largest magnitudes of the motions made here.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    pub position: AxisLimits,
-    pub orientation: AxisLimits,
-}
-
-/// \[m\] or \[rad\], per second.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisLimits {
-    pub velocity: f64,
-    pub acceleration: f64,
-    pub jerk: f64,
-}
-
-/// Shortest motion \[s\], and the ratio from one duration tried to the next: 80 of them reach an hour.
+/// Shortest motion \[s\]: also where there is nothing to do, a motion takes some cycles.
 const SHORTEST_S: f64 = 0.02;
-const LONGER: f64 = 1.17;
-const TRIES: u32 = 80;
 
 /// A displacement `[rotation vector; vector]` of a base motion over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,26 +27,27 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// From a displacement and its rate to none, as fast as the limits allow.
-    pub fn vanishing(start_ns: u64, displacement: &Twist, rate: &Twist, limits: &Limits) -> Self {
-        let (d, v) = (displacement.vector(), rate.vector());
-        // Peaks of the quintic from rest to rest, and bounds of those of a rate that dies away.
-        let duration_s = limits.shortest(&d, &v, |limit, d, v, t| {
-            1.875 * d / t + v <= limit.velocity.max(v)
-                && 5.774 * d / (t * t) + 6.0 * v / t <= limit.acceleration
-                && 60.0 * d / t.powi(3) + 36.0 * v / (t * t) <= limit.jerk
-        });
-        Self::joining(start_ns, duration_s, [d, v, Vector6::zeros()], Vector6::zeros())
+    /// From a displacement with its derivatives to none, as fast as a share of the limits allows.
+    pub fn vanishing(
+        start_ns: u64,
+        displacement: &Twist,
+        rate: &Twist,
+        acceleration: &Acceleration,
+        limits: &Limits,
+    ) -> Self {
+        let from = [displacement.vector(), rate.vector(), acceleration.vector()];
+        let gentle = |axis: &AxisLimits| axis.share(limits.own_share);
+        let limits = [gentle(&limits.orientation), gentle(&limits.position)];
+        Self::joining(start_ns, longest(&limits, &from, vanishing_s), from, Vector6::zeros())
     }
 
     /// From none, with a rate and an acceleration, until at rest: the rate follows a cubic.
     pub fn to_rest(start_ns: u64, rate: &Twist, acceleration: &Acceleration, limits: &Limits) -> Self {
         let (v, a) = (rate.vector(), acceleration.vector());
-        let duration_s = limits.shortest(&v, &a, |limit, v, a, t| {
-            1.5 * v / t <= limit.acceleration && 6.0 * v / (t * t) + 4.0 * a / t <= limit.jerk
-        });
+        let from = [Vector6::zeros(), v, a];
+        let duration_s = longest(&[limits.orientation, limits.position], &from, to_rest_s);
         let end = (v * 0.5 + a * (duration_s / 12.0)) * duration_s;
-        Self::joining(start_ns, duration_s, [Vector6::zeros(), v, a], end)
+        Self::joining(start_ns, duration_s, from, end)
     }
 
     /// The quintic from `[d, d', d'']` to `end` at rest.
@@ -84,6 +69,14 @@ impl Segment {
         self.seconds(instant_ns) >= self.duration_s
     }
 
+    /// Where the displacement of a standing pose ends.
+    pub fn end_from(&self, pose: &Pose) -> Pose {
+        let t = self.duration_s;
+        let [c0, c1, c2, c3, c4, c5] = &self.coefficients;
+        let end = c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t;
+        pose.displaced(&Twist::from_vector(&end))
+    }
+
     /// The base motion, displaced. Before the start the quintic is continued: a measurement is a little
     /// older than the cycle that began the segment.
     pub fn displace(&self, base: &Motion, instant_ns: u64) -> Motion {
@@ -100,28 +93,35 @@ impl Segment {
     }
 }
 
-impl Limits {
-    /// The shortest of the durations tried that keeps what `kept` asks, for both parts. The longest where
-    /// none does: a limit of zero.
-    fn shortest(
-        &self,
-        first: &Vector6<f64>,
-        second: &Vector6<f64>,
-        kept: impl Fn(&AxisLimits, f64, f64, f64) -> bool,
-    ) -> f64 {
-        let parts = |of: &Vector6<f64>| [of.fixed_rows::<3>(0).norm(), of.fixed_rows::<3>(3).norm()];
-        let ([rotation_1, translation_1], [rotation_2, translation_2]) = (parts(first), parts(second));
-        let mut t = SHORTEST_S;
-        for _ in 0..TRIES {
-            if kept(&self.orientation, rotation_1, rotation_2, t)
-                && kept(&self.position, translation_1, translation_2, t)
-            {
-                break;
-            }
-            t *= LONGER;
-        }
-        t
-    }
+/// The longer of the durations \[s\] that rotation and translation need.
+fn longest(
+    limits: &[AxisLimits; 2],
+    [d, v, a]: &[Vector6<f64>; 3],
+    duration_s: impl Fn(&AxisLimits, f64, f64, f64) -> f64,
+) -> f64 {
+    let norms = |of: &Vector6<f64>| [of.fixed_rows::<3>(0).norm(), of.fixed_rows::<3>(3).norm()];
+    let ([d_r, d_p], [v_r, v_p], [a_r, a_p]) = (norms(d), norms(v), norms(a));
+    let [orientation, position] = limits;
+    SHORTEST_S.max(duration_s(orientation, d_r, v_r, a_r)).max(duration_s(position, d_p, v_p, a_p))
+}
+
+/// Duration of the quintic from d, v, a to none. Its peaks are at most `1.875 d / T` (velocity),
+/// `5.774 d / T^2 + 6 v / T + a` and `60 d / T^3 + 36 v / T^2 + 9 a / T`. With the second within the
+/// limit A, the third is at most `10.39 A / T`: no cubic equation is left.
+fn vanishing_s(limit: &AxisLimits, d: f64, v: f64, a: f64) -> f64 {
+    // An acceleration near the limit leaves a little for the rest.
+    let free = (limit.acceleration - a).max(0.2 * limit.acceleration);
+    let by_velocity = 1.875 * d / limit.velocity;
+    let by_acceleration = (3.0 * v + (9.0 * v * v + 5.774 * d * free).sqrt()) / free;
+    by_velocity.max(by_acceleration).max(10.39 * limit.acceleration.max(a) / limit.jerk)
+}
+
+/// Duration of the cubic from v with v' = a to rest. Its peaks are at most `1.5 v / T + a / 3`, or a, and
+/// `6 v / T^2 + 4 a / T`.
+fn to_rest_s(limit: &AxisLimits, _: f64, v: f64, a: f64) -> f64 {
+    let free = (limit.acceleration - a / 3.0).max(0.2 * limit.acceleration);
+    let by_jerk = (2.0 * a + (4.0 * a * a + 6.0 * v * limit.jerk).sqrt()) / limit.jerk;
+    (1.5 * v / free).max(by_jerk)
 }
 
 /// A moving pose displaced by `[dw; dv](t)`: `R = exp(dw) R_b`, `C = C_b + dv`.
@@ -156,6 +156,7 @@ mod tests {
     const LIMITS: Limits = Limits {
         position: AxisLimits { velocity: 0.5, acceleration: 5.0, jerk: 100.0 },
         orientation: AxisLimits { velocity: 1.0, acceleration: 10.0, jerk: 200.0 },
+        own_share: 1.0,
     };
 
     fn twist(numbers: [f64; 6]) -> Twist {
@@ -203,7 +204,8 @@ mod tests {
     fn a_displacement_of_a_resting_pose_vanishes_within_the_limits() {
         let base = TaskState::at_rest([0.1, 0.2, 0.3, 0.0, 0.0, 1.0]).motion();
         let d = twist([0.1, -0.05, 0.1, 0.02, -0.03, 0.01]);
-        let segment = Segment::vanishing(5_000_000_000, &d, &twist([0.0; 6]), &LIMITS);
+        let segment =
+            Segment::vanishing(5_000_000_000, &d, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
         let first = segment.displace(&base, 5_000_000_000);
         assert!((base.pose.displacement_to(&first.pose).vector() - d.vector()).norm() < 1e-14);
         is_smooth(&segment, &base, Some(&LIMITS));
@@ -215,8 +217,9 @@ mod tests {
     #[test]
     fn a_displacement_of_a_moving_pose_begins_with_the_rate_it_has() {
         let base = moving();
-        let (d, v) = (twist([0.004, 0.001, -0.002, 0.001, 0.002, 0.0]), twist([0.02, 0.0, 0.01, 0.0, 0.01, 0.0]));
-        let segment = Segment::vanishing(7, &d, &v, &LIMITS);
+        let (d, v) =
+            (twist([0.004, 0.001, -0.002, 0.001, 0.002, 0.0]), twist([0.02, 0.0, 0.01, 0.0, 0.01, 0.0]));
+        let segment = Segment::vanishing(7, &d, &v, &Acceleration::default(), &LIMITS);
         let added = segment.displace(&base, 7).twist.vector() - base.twist.vector();
         assert!((added - v.vector()).norm() < 1e-2, "{added}");
     }

@@ -4,22 +4,22 @@
 //!
 //! | state | force | leaves it |
 //! | --- | --- | --- |
-//! | off | not valid: brake | the pose is known: standby |
+//! | off | not valid: brake | the pose is known: standby; if off was asked for, `clear` or `engage` |
 //! | standby | not valid: brake | `engage`; the pose is lost: off |
 //! | engaging | controlled, from where the platform stands onto the setpoint | on the setpoint: active |
 //! | active | controlled, on the setpoint | `stop`, `park`, a setpoint that ended or was lost: stopping |
 //! | stopping | controlled, to rest along the present motion | at rest: standby, parking or fault |
-//! | parking | controlled, to the home pose | at home: standby |
-//! | fault | not valid: brake | `clear`: off |
+//! | parking | controlled, to the home pose | at home: off |
+//! | fault | not valid: brake | `clear`: off, and on to standby |
 //!
-//! `off` leads to off and `estop` to fault from everywhere, within the cycle. There is no gravity support
-//! without control: whoever does not get a valid force brakes.
+//! `off` leads to off and `estop` to fault from everywhere, within the cycle; out of fault leads only
+//! `clear`. There is no gravity support without control: whoever does not get a valid force brakes.
 
 /// What the daemon does with the platform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum State {
-    /// No force; where the platform is is not known.
+    /// No force: where the platform is is not known, or an operator wants it off.
     #[default]
     Off = 0,
     /// No force; ready to engage.
@@ -38,15 +38,8 @@ pub enum State {
 
 impl State {
     /// Every state, in the order of their numbers.
-    pub const ALL: [Self; 7] = [
-        Self::Off,
-        Self::Standby,
-        Self::Engaging,
-        Self::Active,
-        Self::Stopping,
-        Self::Parking,
-        Self::Fault,
-    ];
+    pub const ALL: [Self; 7] =
+        [Self::Off, Self::Standby, Self::Engaging, Self::Active, Self::Stopping, Self::Parking, Self::Fault];
 
     /// Whether the platform is under control: forces are valid in these states and in no other.
     pub fn controls(self) -> bool {
@@ -128,9 +121,25 @@ pub enum Reaction {
     Brake,
 }
 
+macro_rules! reaction {
+    (None) => {
+        "goes on"
+    };
+    (Stop) => {
+        "stops under control, then fault"
+    };
+    (Brake) => {
+        "lets go: fault"
+    };
+}
+
 macro_rules! causes {
-    ($($(#[$doc:meta])* $variant:ident = $number:literal, $reaction:ident, $name:literal, $remedy:literal;)*) => {
+    ($($(#[$doc:meta])* $variant:ident = $number:literal, $reaction:ident, $unit:literal, $name:literal, $remedy:literal;)*) => {
         /// Why the platform is not under control, or will not be for long. Below 100: no fault.
+        ///
+        /// | number | what | the daemon | what to do |
+        /// | --- | --- | --- | --- |
+        $(#[doc = concat!("| ", $number, " | ", $name, " | ", reaction!($reaction), " | ", $remedy, " |")])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         #[repr(u32)]
         pub enum Cause { $($(#[$doc])* $variant = $number,)* }
@@ -149,6 +158,11 @@ macro_rules! causes {
                 match self { $(Self::$variant => $remedy,)* }
             }
 
+            /// Unit of the [`Evidence`]; empty if there is none.
+            pub fn unit(self) -> &'static str {
+                match self { $(Self::$variant => $unit,)* }
+            }
+
             /// What the daemon does about it.
             pub fn reaction(self) -> Reaction {
                 match self { $(Self::$variant => Reaction::$reaction,)* }
@@ -160,55 +174,65 @@ macro_rules! causes {
 causes! {
     /// Nothing stands in the way.
     #[default]
-    None = 0, None, "none", "nothing";
+    None = 0, None, "", "none", "nothing";
     /// No measurement has arrived yet.
-    NoMeasurement = 1, None, "no measurement", "start the driver or the plant";
+    NoMeasurement = 1, None, "", "no measurement", "start the driver or the plant";
     /// No setpoint has arrived yet.
-    NoSetpoint = 2, None, "no setpoint", "start a setpoint source, then engage";
+    NoSetpoint = 2, None, "", "no setpoint", "start a setpoint source, then engage";
     /// The pose is being found from the measured lengths, a bounded step per cycle.
-    FindingPose = 3, None, "finding the pose", "wait";
-    /// The setpoint is further from the platform than the engage tolerance, or passing by.
-    SetpointTooFar = 4, None, "setpoint too far from the platform", "start the setpoints where the platform stands";
+    FindingPose = 3, None, "", "finding the pose", "wait";
+    /// The setpoint is further from the platform than `control.engage_*`, or passing by.
+    SetpointTooFar = 4, None, "times the engage tolerance", "setpoint too far from the platform", "start the setpoints where the platform stands";
     /// The setpoint source stopped while its setpoint was at rest.
-    SetpointEnded = 5, None, "setpoint source ended at rest", "start a setpoint source, then engage";
-    /// The daemon is stopping.
-    Stopping = 6, None, "daemon stopping", "nothing";
+    SetpointEnded = 5, None, "s old", "setpoint source ended at rest", "start a setpoint source, then engage";
+    /// The daemon is ending.
+    Stopping = 6, None, "", "daemon stopping", "nothing";
     /// Everything is ready and nobody has asked to engage.
-    NotAsked = 7, None, "ready to engage", "engage";
+    NotAsked = 7, None, "", "ready to engage", "engage";
     /// An operator asked for it.
-    Asked = 8, None, "asked for", "nothing";
+    Asked = 8, None, "", "asked for", "nothing";
     /// What was asked for is not possible in this state.
-    NotNow = 9, None, "not possible in this state", "see the table of states";
+    NotNow = 9, None, "", "not possible in this state", "see the table of states";
     /// The setpoint stopped arriving while it was in motion.
-    SetpointLost = 100, Stop, "setpoint lost in motion", "see why its source ended";
+    SetpointLost = 100, Stop, "s old", "setpoint lost in motion", "see why its source ended";
     /// Measurements stopped arriving.
-    MeasurementLost = 101, Brake, "measurement lost", "see why the driver ended";
+    MeasurementLost = 101, Brake, "s old", "measurement lost", "see why the driver ended";
     /// A setpoint held a number that is not finite.
-    SetpointNotFinite = 102, Stop, "setpoint not finite", "correct the setpoint source";
+    SetpointNotFinite = 102, Stop, "", "setpoint not finite", "correct the setpoint source";
     /// A measurement held a number that is not finite.
-    MeasurementNotFinite = 103, Brake, "measurement not finite", "see the encoders and the driver";
+    MeasurementNotFinite = 103, Brake, "", "measurement not finite", "see the encoders and the driver";
     /// Forward kinematics did not converge on the measured lengths.
-    PoseNotFound = 104, Brake, "pose not found from lengths", "compare the lengths with the machine file";
+    PoseNotFound = 104, Brake, "", "pose not found from lengths", "compare the lengths with the machine file";
     /// The measured lengths moved further than the actuators can.
-    MeasurementJumped = 105, Brake, "measured lengths jumped", "see the encoders and the driver";
+    MeasurementJumped = 105, Brake, "m", "measured lengths jumped", "see the encoders and the driver";
     /// The pose is singular: no forces balance the load.
-    SingularPose = 106, Brake, "singular pose", "move the platform away by hand";
+    SingularPose = 106, Brake, "", "singular pose", "move the platform away by hand";
     /// The force was not finite.
-    ForceNotFinite = 107, Brake, "force not finite", "report it: it is a fault of hexad";
-    /// The platform was further from its reference than the following-error limit.
-    OffPath = 108, Brake, "platform off the path", "look for a collision, a payload, a drive without force";
+    ForceNotFinite = 107, Brake, "", "force not finite", "report it: it is a fault of hexad";
+    /// The platform was further from its reference than `control.following_*`.
+    OffPath = 108, Brake, "times the following-error limit", "platform off the path", "look for a collision, a payload, a drive without force";
     /// Cycles were missed, and `realtime.on_overrun` is `fault`.
-    DeadlineMissed = 109, Stop, "deadline missed", "see the worst cycles in the status; hexad doctor";
+    DeadlineMissed = 109, Stop, "", "deadline missed", "see the worst cycles in the status; hexad doctor";
     /// An operator's emergency stop.
-    EmergencyStop = 110, Brake, "emergency stop", "clear when it is safe";
-    /// A setpoint beyond the stroke or the rate of a leg.
-    SetpointOutOfReach = 111, Stop, "setpoint beyond the stroke or rate of a leg", "correct the trajectory";
+    EmergencyStop = 110, Brake, "", "emergency stop", "clear when it is safe";
+    /// A setpoint beyond the stroke of a leg, or too fast to come to rest within it.
+    SetpointOutOfReach = 111, Stop, "m", "setpoint beyond the stroke of a leg, or without room to stop", "correct the trajectory";
     /// A setpoint that does not continue the one before it: X, X' and X'' do not belong together.
-    SetpointJumped = 112, Stop, "setpoint jumped", "send X, X' and X'' of one smooth motion";
+    SetpointJumped = 112, Stop, "times what can be", "setpoint jumped", "send X, X' and X'' of one smooth motion";
     /// A measured length beyond what the leg has.
-    LengthOutOfStroke = 113, Brake, "measured length beyond the stroke", "see the encoders, compare with the machine file";
+    LengthOutOfStroke = 113, Brake, "m", "measured length beyond the stroke", "see the encoders, compare with the machine file";
     /// A measured rate that is not that of the lengths.
-    RateInconsistent = 114, Brake, "measured rate does not belong to the lengths", "see the units and signs of the driver";
+    RateInconsistent = 114, Brake, "m apart", "measured rate does not belong to the lengths", "see the units and signs of the driver";
+    /// A setpoint faster than `[limits]` or the legs allow.
+    SetpointTooFast = 115, Stop, "times the limit", "setpoint beyond a limit of velocity, acceleration or jerk", "correct the trajectory, or [limits]";
+    /// A setpoint outside of `[envelope]`.
+    SetpointOutOfEnvelope = 116, Stop, "rad or m", "setpoint outside of the envelope", "correct the trajectory, or [envelope]";
+    /// A setpoint with a time stamp from another time than now.
+    SetpointFromElsewhen = 117, Stop, "s from now", "setpoint with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
+    /// A measurement with a time stamp from another time than now.
+    MeasurementFromElsewhen = 118, Brake, "s from now", "measurement with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
+    /// The pose is so near a singular one that `limits.condition` is exceeded.
+    NearSingular = 119, Stop, "", "near a singular pose", "keep away from this pose; hexad check";
 }
 
 impl Cause {
@@ -220,5 +244,39 @@ impl Cause {
     /// Reads the number of a message.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::ALL.iter().copied().find(|cause| *cause as u32 == number)
+    }
+}
+
+/// The number that caused it, and what it should have been.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Evidence {
+    pub value: f64,
+    pub bound: f64,
+    /// Leg or axis, from 1; 0 where it is neither.
+    pub index: u32,
+}
+
+/// A cause with its evidence.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trouble {
+    pub cause: Cause,
+    pub evidence: Evidence,
+}
+
+impl Trouble {
+    /// With the number and its bound.
+    pub fn new(cause: Cause, value: f64, bound: f64) -> Self {
+        Self { cause, evidence: Evidence { value, bound, index: 0 } }
+    }
+
+    /// Of a leg or an axis, counted from 0.
+    pub fn at(self, index: usize) -> Self {
+        Self { evidence: Evidence { index: index as u32 + 1, ..self.evidence }, ..self }
+    }
+}
+
+impl From<Cause> for Trouble {
+    fn from(cause: Cause) -> Self {
+        Self { cause, ..Self::default() }
     }
 }

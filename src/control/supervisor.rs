@@ -8,9 +8,12 @@ use super::state::{Cause, Reaction, Request, State};
 /// What a platform does once it has come to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AfterStop {
+    /// Stands, with its brakes closed.
     #[default]
     Standby,
+    /// Goes home.
     Park,
+    /// Stands until cleared.
     Fault,
 }
 
@@ -37,28 +40,42 @@ pub struct Findings {
     pub arrived: bool,
 }
 
-/// The next state, and why a request was refused if it was.
-pub fn next(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Cause>) {
+/// The next state, and why a request was refused if it was. `after_loss` is what follows the stop of a
+/// platform that lost its setpoint.
+pub fn next(
+    mode: Mode,
+    request: Option<Request>,
+    findings: &Findings,
+    after_loss: AfterStop,
+) -> (Mode, Option<Cause>) {
     if request == Some(Request::Estop) {
         return (fault(Cause::EmergencyStop), None);
     }
-    if mode.state.controls()
-        && let Err(cause) = findings.located.and(findings.following)
-        && cause.reaction() == Reaction::Brake
-    {
-        return (fault(cause), None);
+    if mode.state.controls() {
+        // Without the pose nothing can be controlled, whatever the reason.
+        if let Err(cause) = findings.located {
+            return (fault(cause), None);
+        }
+        if let Err(cause) = findings.following
+            && cause.reaction() == Reaction::Brake
+        {
+            return (fault(cause), None);
+        }
     }
     if request == Some(Request::Off) && mode.state != State::Fault {
-        return (Mode { state: State::Off, cause: Cause::Asked, ..Mode::default() }, None);
+        return (OFF_AS_ASKED, None);
     }
     match mode.state {
-        State::Off | State::Standby => without_force(request, findings),
+        State::Off | State::Standby => without_force(mode, request, findings),
         State::Fault => in_fault(mode, request),
-        State::Engaging | State::Active => following(mode, request, findings),
+        State::Engaging | State::Active => following(mode, request, findings, after_loss),
         State::Stopping => stopping(mode, request, findings),
         State::Parking => parking(mode, request, findings),
     }
 }
+
+/// Off because somebody wants it so: it does not become standby by itself.
+const OFF_AS_ASKED: Mode = Mode { state: State::Off, cause: Cause::Asked, after: AfterStop::Standby };
 
 fn fault(cause: Cause) -> Mode {
     Mode { state: State::Fault, cause, ..Mode::default() }
@@ -72,20 +89,20 @@ fn standby(cause: Cause) -> Mode {
     Mode { state: State::Standby, cause, ..Mode::default() }
 }
 
-fn without_force(request: Option<Request>, findings: &Findings) -> (Mode, Option<Cause>) {
-    let rest = match findings.located {
+fn without_force(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Cause>) {
+    let ready = match findings.located {
         Ok(()) => standby(findings.engageable.err().unwrap_or(Cause::NotAsked)),
         Err(cause) => Mode { state: State::Off, cause, ..Mode::default() },
     };
+    let rest = if mode == OFF_AS_ASKED { mode } else { ready };
     match request {
-        None | Some(Request::Off | Request::Estop) => (rest, None),
         Some(Request::Engage) => match findings.located.and(findings.engageable) {
             Ok(()) => (Mode { state: State::Engaging, ..Mode::default() }, None),
             Err(cause) => (rest, Some(cause)),
         },
-        // What there is to stop or to clear has been.
-        Some(Request::Stop | Request::Clear) => (rest, None),
+        Some(Request::Clear) => (ready, None),
         Some(Request::Park) => (rest, Some(Cause::NotNow)),
+        None | Some(Request::Stop | Request::Off | Request::Estop) => (rest, None),
     }
 }
 
@@ -97,9 +114,18 @@ fn in_fault(mode: Mode, request: Option<Request>) -> (Mode, Option<Cause>) {
     }
 }
 
-fn following(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Cause>) {
+fn following(
+    mode: Mode,
+    request: Option<Request>,
+    findings: &Findings,
+    after_loss: AfterStop,
+) -> (Mode, Option<Cause>) {
     if let Err(cause) = findings.following {
-        let after = if cause.is_fault() { AfterStop::Fault } else { AfterStop::Standby };
+        let after = match cause {
+            Cause::SetpointLost => after_loss,
+            cause if cause.is_fault() => AfterStop::Fault,
+            _ => AfterStop::Standby,
+        };
         return (stop(cause, after), None);
     }
     match request {
@@ -143,5 +169,5 @@ fn parking(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, 
         Some(Request::Engage | Request::Clear) => return (mode, Some(Cause::NotNow)),
         Some(Request::Park | Request::Off | Request::Estop) | None => {}
     }
-    (if findings.arrived { standby(mode.cause) } else { mode }, None)
+    (if findings.arrived { OFF_AS_ASKED } else { mode }, None)
 }

@@ -16,6 +16,7 @@ pub mod files;
 pub mod histogram;
 mod numbers;
 pub mod offline;
+pub mod operator;
 pub mod plant;
 pub mod report;
 pub mod scatter;

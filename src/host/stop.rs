@@ -1,15 +1,15 @@
-//! The wish of the operator to stop (SIGINT, SIGTERM, SIGHUP), as a flag.
+//! The wish of the operator to stop (SIGINT, SIGTERM, SIGHUP), and how often it was said.
 
 extern crate std;
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 use core::time::Duration;
 use std::sync::Arc;
 use std::thread;
 
-/// Set once by a signal, never cleared.
+/// Counts signals.
 #[derive(Clone, Debug, Default)]
-pub struct Stop(Arc<AtomicBool>);
+pub struct Stop(Arc<AtomicU32>);
 
 impl Stop {
     /// Catches the signals for this process. Once per process.
@@ -18,7 +18,7 @@ impl Stop {
         let flag = stop.clone();
         let main = thread::current();
         ctrlc::set_handler(move || {
-            flag.0.store(true, Ordering::Relaxed);
+            flag.0.fetch_add(1, Ordering::Relaxed);
             main.unpark();
         })?;
         Ok(stop)
@@ -26,7 +26,12 @@ impl Stop {
 
     /// Whether it is time to stop.
     pub fn requested(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
+        self.0.load(Ordering::Relaxed) > 0
+    }
+
+    /// Whether it was said more than once: at once, then, and not in order.
+    pub fn insisted(&self) -> bool {
+        self.0.load(Ordering::Relaxed) > 1
     }
 
     /// Sleeps until a signal; for the thread that called [`Stop::on_signals`].

@@ -34,6 +34,8 @@ pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
     const TOPIC: &'static str;
     fn header(&self) -> &Header;
     fn header_mut(&mut self) -> &mut Header;
+    /// Fills in what depends on everything else, last of all.
+    fn seal(&mut self) {}
 }
 
 /// Where the platform shall be: X = alpha, beta, gamma \[rad\], x, y, z \[m\], and derivatives.
@@ -68,8 +70,9 @@ pub struct MeasuredMessage {
     pub twist: [f64; 6],
 }
 
-/// What the actuators shall push with. A driver applies `force_n` only if `valid` is 1 **and** the message
-/// is younger than its own watchdog allows; otherwise it brakes.
+/// What the actuators shall push with. A driver applies `force_n` only if the schema and the checksum are
+/// right, `valid` is 1, the sequence goes forward, **and** the message is younger than its own watchdog
+/// allows; otherwise it brakes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("hexad_force")]
 #[repr(C)]
@@ -83,11 +86,30 @@ pub struct ForceMessage {
     pub state: u32,
     /// Number of [`crate::control::state::Cause`].
     pub fault: u32,
-    /// 1 if a force was cut to the actuators' limit.
-    pub limited: u32,
+    /// Bits of the [`crate::control::limits::Limit`]s that this cycle is at.
+    pub limiting: u32,
     /// Instant for which the forces were computed \[ns\]: the cycle's release, or with external release the
     /// time of the measurement that released it.
     pub release_ns: u64,
+    /// CRC-32 (of zlib, PNG, Ethernet) of the bytes before it.
+    pub checksum: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+impl ForceMessage {
+    /// What `checksum` must be.
+    pub fn computed_checksum(&self) -> u32 {
+        let Self { header, force_n, valid, state, fault, limiting, release_ns, .. } = self;
+        let Header { schema, reserved, epoch, sequence, time_ns } = header;
+        let mut crc = crc32fast::Hasher::new();
+        [schema, reserved].iter().for_each(|field| crc.update(&field.to_ne_bytes()));
+        [epoch, sequence, time_ns].iter().for_each(|field| crc.update(&field.to_ne_bytes()));
+        force_n.iter().for_each(|force| crc.update(&force.to_ne_bytes()));
+        [valid, state, fault, limiting].iter().for_each(|field| crc.update(&field.to_ne_bytes()));
+        crc.update(&release_ns.to_ne_bytes());
+        crc.finalize()
+    }
 }
 
 /// What an operator asks for.
@@ -115,6 +137,13 @@ pub struct StatusMessage {
     /// Number of the [`crate::control::state::Cause`] why the request `answered_*` was refused; 0 if it was
     /// not.
     pub refused: u32,
+    /// Bits of the [`crate::control::limits::Limit`]s that this cycle is at.
+    pub limiting: u32,
+    /// The number behind `fault` and its bound, in the [`crate::control::state::Cause::unit`] of the fault.
+    pub fault_value: f64,
+    pub fault_bound: f64,
+    /// Leg or axis of the fault, from 1; 0 if it is of neither.
+    pub fault_index: u32,
     /// Zero.
     pub reserved: u32,
     /// Epoch and sequence number of the last command message that was carried out or refused.
@@ -146,13 +175,20 @@ pub struct StatusMessage {
     pub allocations: u64,
     /// The same of the io thread: they come with peers that come and go.
     pub io_allocations: u64,
-    /// Messages passed over: other schema, older life of the source, seen before.
-    pub rejected: u64,
+    /// Cycles under control that had no new measurement, or setpoint, to believe.
+    pub without_measurement: u64,
+    pub without_setpoint: u64,
+    /// Messages passed over: of another schema.
+    pub rejected_schema: u64,
+    /// Messages passed over: of an older source, that goes on beside a newer one or left them behind.
+    pub rejected_older_source: u64,
+    /// Messages passed over: seen before, or unreadable.
+    pub rejected_repeated: u64,
     pub statistics: Statistics,
 }
 
 macro_rules! message {
-    ($type:ty, $topic:literal) => {
+    ($type:ty, $topic:literal $(, $checksum:ident = $compute:ident)?) => {
         impl Message for $type {
             const TOPIC: &'static str = $topic;
             fn header(&self) -> &Header {
@@ -161,12 +197,15 @@ macro_rules! message {
             fn header_mut(&mut self) -> &mut Header {
                 &mut self.header
             }
+            $(fn seal(&mut self) {
+                self.$checksum = self.$compute();
+            })?
         }
     };
 }
 
 message!(SetpointMessage, "setpoint");
 message!(MeasuredMessage, "measured");
-message!(ForceMessage, "force");
+message!(ForceMessage, "force", checksum = computed_checksum);
 message!(StatusMessage, "status");
 message!(CommandMessage, "command");

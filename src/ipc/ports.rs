@@ -161,7 +161,14 @@ impl Bus {
             .buffer_size(depth.min(BUFFER))
             .create()
             .map_err(failed(format!("cannot subscribe to {}", T::TOPIC)))?;
-        Ok(Sink { subscriber, epoch: 0, sequence: 0, came: 0, rejected: 0, topic: PhantomData })
+        Ok(Sink {
+            subscriber,
+            epoch: 0,
+            sequence: 0,
+            came: 0,
+            rejected: Rejected::default(),
+            topic: PhantomData,
+        })
     }
 }
 
@@ -173,11 +180,17 @@ pub struct Source<T: Message> {
 }
 
 impl<T: Message> Source<T> {
+    /// Epoch and sequence number that the next message will have.
+    pub fn next_message(&self) -> (u64, u64) {
+        (self.epoch, self.sequence + 1)
+    }
+
     /// Fills in the header and sends. `time_ns` is the instant at which the content holds.
     pub fn publish(&mut self, time_ns: u64, mut message: T) -> Result<(), PortError> {
         self.sequence += 1;
         *message.header_mut() =
             Header { schema: SCHEMA, reserved: 0, epoch: self.epoch, sequence: self.sequence, time_ns };
+        message.seal();
         let sample = self
             .publisher
             .loan_uninit()
@@ -190,13 +203,36 @@ impl<T: Message> Source<T> {
     }
 }
 
+/// Messages passed over, by the reason.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rejected {
+    /// Of another schema.
+    pub schema: u64,
+    /// Of an older life of the source: its last ones, or two sources at once.
+    pub older_source: u64,
+    /// Seen before, or unreadable.
+    pub repeated: u64,
+}
+
+impl core::ops::Add for Rejected {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            schema: self.schema + other.schema,
+            older_source: self.older_source + other.older_source,
+            repeated: self.repeated + other.repeated,
+        }
+    }
+}
+
 /// Receives one topic, newest life of the source first.
 pub struct Sink<T: Message> {
     subscriber: Subscriber<ipc::Service, T, ()>,
     epoch: u64,
     sequence: u64,
     came: u64,
-    rejected: u64,
+    rejected: Rejected,
     topic: PhantomData<T>,
 }
 
@@ -210,7 +246,7 @@ impl<T: Message> Sink<T> {
                 Ok(Some(sample)) => *sample.payload(),
                 Ok(None) => return None,
                 Err(_) => {
-                    self.rejected += 1;
+                    self.rejected.repeated += 1;
                     return None;
                 }
             };
@@ -222,7 +258,14 @@ impl<T: Message> Sink<T> {
                 (self.epoch, self.sequence) = order;
                 return Some(message);
             }
-            self.rejected += 1;
+            let Rejected { schema, older_source, repeated } = &mut self.rejected;
+            *(if header.schema != SCHEMA {
+                schema
+            } else if header.epoch < self.epoch {
+                older_source
+            } else {
+                repeated
+            }) += 1;
         }
         None
     }
@@ -233,13 +276,12 @@ impl<T: Message> Sink<T> {
         for _ in 0..MAX_PUBLISHERS * BUFFER {
             match self.subscriber.receive() {
                 Ok(Some(sample)) if sample.payload().header().schema == SCHEMA => {
-                    self.received += 1;
                     return Some(*sample.payload());
                 }
                 Ok(None) => return None,
-                Ok(Some(_)) => self.rejected += 1,
+                Ok(Some(_)) => self.rejected.schema += 1,
                 Err(_) => {
-                    self.rejected += 1;
+                    self.rejected.repeated += 1;
                     return None;
                 }
             }
@@ -266,7 +308,7 @@ impl<T: Message> Sink<T> {
     }
 
     /// How many messages were passed over.
-    pub fn rejected(&self) -> u64 {
+    pub fn rejected(&self) -> Rejected {
         self.rejected
     }
 }

@@ -19,7 +19,7 @@ use super::overrun::OnOverrun;
 use super::usage::ThreadUsage;
 use super::waiter::Waiter;
 use crate::control::controller::{Input, Output};
-use crate::control::state::{Cause, State};
+use crate::control::state::{Cause, Evidence, State};
 use crate::ipc::exchange::{CycleOutput, RealtimeSide};
 
 /// Length of the queue of records to the log thread: 50 ms at 20 kHz, twice the log's own period.
@@ -77,6 +77,7 @@ pub struct CycleRecord {
     pub io_late: bool,
     pub state: State,
     pub cause: Cause,
+    pub evidence: Evidence,
     /// Norms of the tracking error while active \[m\], \[rad\].
     pub error: Option<(f64, f64)>,
 }
@@ -243,6 +244,7 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
             io_late,
             state: output.state,
             cause: output.cause,
+            evidence: output.evidence,
             error: tracking_error(&output),
         };
         counters.records_lost += u64::from(hand_over(&mut self.records, record).is_err());

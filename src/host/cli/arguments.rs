@@ -1,6 +1,7 @@
 //! What the commands take, and what it means.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -25,6 +26,13 @@ pub struct Files {
     /// CSV to write
     #[arg(long, value_name = "FILE")]
     pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Patience {
+    /// Longest to wait for the outcome [s]
+    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true)]
+    pub within: f64,
 }
 
 #[derive(Debug, Args)]
@@ -63,6 +71,12 @@ pub enum Start {
 impl MachineFile {
     pub fn load(&self) -> Result<Config, ConfigError> {
         Config::load(&self.path)
+    }
+}
+
+impl Patience {
+    pub fn longest(&self) -> Duration {
+        Duration::from_secs_f64(self.within)
     }
 }
 

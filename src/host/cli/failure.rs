@@ -5,6 +5,7 @@ use hexad::host::config::ConfigError;
 use hexad::host::demo::DemoError;
 use hexad::host::doctor::DoctorError;
 use hexad::host::offline::OfflineError;
+use hexad::host::operator::OperatorError;
 use hexad::host::setpoints::SetpointError;
 
 /// Why a command failed, and its exit code: 1 it ran and went wrong, 2 it could not begin.
@@ -24,6 +25,13 @@ impl Failure {
 impl From<ConfigError> for Failure {
     fn from(error: ConfigError) -> Self {
         Self::could_not_begin(error)
+    }
+}
+
+impl From<OperatorError> for Failure {
+    fn from(error: OperatorError) -> Self {
+        let code = if matches!(error, OperatorError::Port(_) | OperatorError::Silent(_)) { 2 } else { 1 };
+        Self { code, what: error.to_string() }
     }
 }
 

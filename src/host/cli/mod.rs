@@ -4,15 +4,16 @@
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum};
+use hexad::control::state::Request;
 use hexad::host::advise::Advice;
 use hexad::host::check::Check;
 use hexad::host::demo::{self, Demo};
 use hexad::host::doctor::{self, Doctor};
 use hexad::host::stop::Stop;
-use hexad::host::{daemon, offline, plant, setpoints};
+use hexad::host::{daemon, offline, operator, plant, setpoints};
 use hexad::model::ladder::Rung;
 
-use self::arguments::{Files, MachineFile, MotionName, Start, What, duration, rungs};
+use self::arguments::{Files, MachineFile, MotionName, Patience, Start, What, duration, rungs};
 use self::failure::Failure;
 
 mod arguments;
@@ -77,6 +78,51 @@ enum Command {
         /// Folder for the pictures
         #[arg(long, value_name = "FOLDER", default_value = "hexad-demo")]
         charts: PathBuf,
+    },
+    /// Take control: the platform follows the setpoint from now on
+    Engage {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        patience: Patience,
+        /// Wait for measurements and for a setpoint where the platform stands, instead of being refused
+        #[arg(long)]
+        wait: bool,
+    },
+    /// Come to rest under control, then let go
+    Stop {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        patience: Patience,
+    },
+    /// Come to rest, go to the home pose, then let go
+    Park {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        patience: Patience,
+    },
+    /// Leave a fault; the platform stays without force until engaged
+    Clear {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        patience: Patience,
+    },
+    /// Let go at once
+    Off {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        patience: Patience,
+    },
+    /// Let go at once, and stay so until cleared
+    Estop {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        patience: Patience,
     },
     /// Validate a machine file and show the machine at home
     Check {
@@ -155,6 +201,12 @@ impl Cli {
                 let demo = Demo { config, plant_config, motion, seconds, rate_hz, report, charts };
                 demo::run(&demo, &stop()?).map_err(Failure::from)
             }
+            Command::Engage { machine, patience, wait } => ask(&machine, Request::Engage, wait, &patience),
+            Command::Stop { machine, patience } => ask(&machine, Request::Stop, false, &patience),
+            Command::Park { machine, patience } => ask(&machine, Request::Park, false, &patience),
+            Command::Clear { machine, patience } => ask(&machine, Request::Clear, false, &patience),
+            Command::Off { machine, patience } => ask(&machine, Request::Off, false, &patience),
+            Command::Estop { machine, patience } => ask(&machine, Request::Estop, false, &patience),
             Command::Check { machine } => {
                 print!("{}", Check::new(&machine.load()?));
                 Ok(())
@@ -177,6 +229,11 @@ impl Cli {
             }
         }
     }
+}
+
+fn ask(machine: &MachineFile, request: Request, wait: bool, patience: &Patience) -> Result<(), Failure> {
+    let config = machine.load()?;
+    Ok(operator::run(&config, request, wait, patience.longest(), &stop()?)?)
 }
 
 /// Signals end the command in order instead of killing it.

@@ -14,8 +14,10 @@ use heapless::spsc::Producer;
 use crate::control::controller::{Asked, Measurement, Output, Setpoint};
 use crate::control::state::{Cause, Request};
 use crate::ipc::exchange::{CycleInput, CycleOutput, IoSide};
-use crate::ipc::messages::{CommandMessage, ForceMessage, Header, MeasuredMessage, SetpointMessage, StatusMessage};
-use crate::ipc::ports::{Bus, PortError, Sink, Source};
+use crate::ipc::messages::{
+    CommandMessage, ForceMessage, Header, MeasuredMessage, SetpointMessage, StatusMessage,
+};
+use crate::ipc::ports::{Bus, PortError, Rejected, Sink, Source};
 use crate::ipc::statistics::Statistics;
 use crate::model::task::{TaskState, task_coordinates};
 use crate::realtime::clock::{Clock, Grid, Monotonic, monotonic_ns, sleep_until};
@@ -33,6 +35,9 @@ const AWAKE_NS: u64 = 50_000;
 
 /// A request for force that is older than this is not carried out.
 const OLDEST_REQUEST_NS: u64 = 1_000_000_000;
+
+/// What the daemon asks itself for before it ends; no message of a source has this epoch.
+const END: Asked = Asked { request: Request::Stop, message: (0, 1) };
 
 /// Messages kept per input between two reads. Only the newest counts.
 const INPUT_DEPTH: usize = 8;
@@ -56,6 +61,10 @@ pub struct Sides<'a> {
     pub sent: Producer<'a, u64>,
     /// From the log thread.
     pub statistics: Reader<Statistics>,
+    /// The daemon wants to end: the platform is to come to rest.
+    pub ending: &'a AtomicBool,
+    /// The daemon wants to end and the platform is not under control.
+    pub may_end: &'a AtomicBool,
 }
 
 /// What it needs to know.
@@ -75,8 +84,8 @@ pub struct Settings {
 pub struct IoReport {
     /// Messages that could not be sent.
     pub send_failures: u64,
-    /// Messages passed over: other schema, older life of the source, seen before.
-    pub rejected: u64,
+    /// Messages passed over.
+    pub rejected: Rejected,
     /// From the first cycle on. It allocates only while a peer comes or goes.
     pub usage: ThreadUsage,
 }
@@ -204,16 +213,21 @@ impl Io<'_> {
     /// sent it has long stopped waiting.
     fn read_requests(&mut self) {
         let now_ns = monotonic_ns();
+        let ending = self.sides.ending.load(Ordering::Relaxed);
         while let Some(message) = self.ports.command.receive_from_any() {
             let Header { epoch, sequence, time_ns, .. } = message.header;
             let Some(request) = Request::from_number(message.request) else { continue };
-            if request.takes_force() && now_ns.abs_diff(time_ns) > OLDEST_REQUEST_NS {
+            if request.takes_force() && (ending || now_ns.abs_diff(time_ns) > OLDEST_REQUEST_NS) {
                 continue;
             }
             let pending = self.input.input.request.filter(|asked| asked.message != self.answered);
             if pending.is_none_or(|pending| pending.request <= request) {
                 self.input.input.request = Some(Asked { request, message: (epoch, sequence) });
             }
+        }
+        let pending = self.input.input.request.is_some_and(|asked| asked.message != self.answered);
+        if ending && !pending {
+            self.input.input.request = Some(END);
         }
     }
 
@@ -227,6 +241,9 @@ impl Io<'_> {
     fn publish_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.sides.exchange.outputs.read();
         self.answered = output.answered;
+        if self.sides.ending.load(Ordering::Relaxed) && !output.state.controls() {
+            self.sides.may_end.store(true, Ordering::Relaxed);
+        }
         if counters.cycles > self.published {
             self.published = counters.cycles;
             self.publish_newest();
@@ -248,14 +265,17 @@ impl Io<'_> {
         }
         let mut status = status_message(&self.settings.home, &cycle);
         status.io_allocations = ThreadUsage::allocations_of_this_thread() - self.allocations;
-        status.rejected = self.rejected();
+        (status.rejected_schema, status.rejected_older_source, status.rejected_repeated) = {
+            let Rejected { schema, older_source, repeated } = self.rejected();
+            (schema, older_source, repeated)
+        };
         status.statistics = *self.sides.statistics.read();
         let told = self.ports.status.publish(now_ns, status);
         self.send_failures += u64::from(sent.is_err()) + u64::from(told.is_err());
     }
 
-    fn rejected(&self) -> u64 {
-        self.ports.setpoint.rejected() + self.ports.measured.rejected()
+    fn rejected(&self) -> Rejected {
+        self.ports.setpoint.rejected() + self.ports.measured.rejected() + self.ports.command.rejected()
     }
 }
 
@@ -280,13 +300,13 @@ impl Pause {
 }
 
 fn force_message(cycle: &CycleOutput) -> ForceMessage {
-    let Output { state, cause, force, limited, .. } = cycle.output;
+    let Output { state, cause, force, limiting, .. } = cycle.output;
     ForceMessage {
         force_n: force,
         valid: u32::from(state.controls()),
         state: state as u32,
         fault: cause as u32,
-        limited: u32::from(limited),
+        limiting: limiting.0,
         release_ns: cycle.release_ns,
         ..ForceMessage::default()
     }
@@ -298,6 +318,12 @@ fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMessage {
         state: output.state as u32,
         fault: output.cause as u32,
         refused: output.refused as u32,
+        limiting: output.limiting.0,
+        fault_value: output.evidence.value,
+        fault_bound: output.evidence.bound,
+        fault_index: output.evidence.index,
+        without_measurement: output.without_measurement,
+        without_setpoint: output.without_setpoint,
         answered_epoch: output.answered.0,
         answered_sequence: output.answered.1,
         cycles: counters.cycles,

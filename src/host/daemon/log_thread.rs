@@ -2,6 +2,7 @@
 
 extern crate std;
 
+use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::prelude::rust_2024::*;
@@ -14,7 +15,7 @@ use tracing::{info, warn};
 
 use super::hints::{Hints, ThreadFiles};
 use super::statistics::Collector;
-use crate::control::state::{Cause, State};
+use crate::control::state::{Cause, Evidence, State};
 use crate::host::report::{Fault, TrackingSum};
 use crate::ipc::statistics::Statistics;
 use crate::realtime::cyclic::CycleRecord;
@@ -95,14 +96,15 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
 }
 
 fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
-    let CycleRecord { cycle, state, cause, .. } = *record;
+    let CycleRecord { cycle, state, cause, evidence, .. } = *record;
     match state {
         State::Fault => {
             warn!(
                 cycle,
                 number = cause as u32,
-                "fault: {}; no force until cleared; {}",
+                "fault: {}{}; no force until cleared; {}",
                 cause.name(),
+                Told(cause, evidence),
                 cause.remedy()
             );
             if faults.len() < MAX_FAULTS {
@@ -110,6 +112,25 @@ fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
             }
         }
         State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
-        _ => info!(cycle, "{}: {}", state.name(), cause.name()),
+        State::Stopping if cause.is_fault() => {
+            warn!(cycle, number = cause as u32, "stopping: {}{}", cause.name(), Told(cause, evidence))
+        }
+        _ => info!(cycle, "{}: {}{}", state.name(), cause.name(), Told(cause, evidence)),
+    }
+}
+
+/// The numbers behind a cause, if it has any.
+struct Told(Cause, Evidence);
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(cause, Evidence { value, bound, index }) = self;
+        if cause.unit().is_empty() {
+            return Ok(());
+        }
+        if *index > 0 {
+            write!(f, ", leg or axis {index}")?;
+        }
+        write!(f, ": {value:.6} {} (bound {bound:.6})", cause.unit())
     }
 }

@@ -1,7 +1,7 @@
 //! `hexad run`: the daemon.
 //!
 //! Start: configuration, ports, threads, real-time set-up; only then the first release. Stop, in this
-//! order: the real-time thread ends its cycle and says that no force is valid, the io thread publishes
+//! order: the platform comes to rest, the real-time thread ends its cycle and says that no force is valid, the io thread publishes
 //! that, the log thread empties its queue, the report is written.
 
 extern crate std;
@@ -13,7 +13,8 @@ use std::io;
 use std::path::Path;
 use std::prelude::rust_2024::*;
 use std::sync::{OnceLock, mpsc};
-use std::thread::{Builder, Scope, ScopedJoinHandle, scope};
+use std::thread::{self, Builder, Scope, ScopedJoinHandle, scope};
+use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
 use sd_notify::NotifyState;
@@ -29,13 +30,14 @@ use super::fidelity;
 use super::files::{FileError, write_whole};
 use super::report::{DeadlineMisses, Report};
 use super::stop::Stop;
-use crate::control::controller::{Controller, Input, Parameters};
+use crate::control::controller::{Controller, Envelope, Input, Parameters};
 use crate::control::gains::Gains;
 use crate::control::law::Law;
 use crate::ipc::exchange::exchange;
 use crate::ipc::ports::{Bus, PortError};
 use crate::ipc::statistics::Statistics;
 use crate::model::ladder::Rung;
+use crate::model::machine::Machine;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, CycleRecord, LoopReport, RECORDS, Release, Timing};
 use crate::realtime::newest::newest;
@@ -53,6 +55,11 @@ pub const REALTIME_THREAD: &str = "hexad-rt";
 
 /// Stack of each thread: several times what they use, and small because locked memory holds all of it.
 const STACK: usize = 512 * 1024;
+
+/// Longest the daemon waits for the platform to come to rest before it ends: a service manager's patience
+/// is longer.
+const LONGEST_STOP: Duration = Duration::from_secs(10);
+const REST_POLL: Duration = Duration::from_millis(2);
 
 /// Why the daemon did not run.
 #[derive(Debug, thiserror::Error)]
@@ -89,7 +96,7 @@ pub fn run(
 
 fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonError> {
     let Config { machine, deployment, .. } = config;
-    let mut controller = Controller::new(machine, parameters(deployment, fidelity::rung(config)));
+    let mut controller = Controller::new(machine, parameters(machine, deployment, fidelity::rung(config)));
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
     let bell = io_side.bell.clone();
@@ -100,6 +107,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonE
     let (statistics_in, statistics) = newest(Statistics::default());
     let files = &OnceLock::new();
     let [stop_loop, stop_io, stop_log] = &[const { AtomicBool::new(false) }; 3];
+    let [ending, may_end] = &[const { AtomicBool::new(false) }; 2];
     let (io_ready, ready) = mpsc::channel();
     let realtime_ready = io_ready.clone();
     let (go, go_ahead) = mpsc::channel::<()>();
@@ -136,7 +144,7 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonE
             let shortfalls = opened.map(|()| prepare_io(realtime));
             // Nobody listens only if the other thread failed first.
             let _ = io_ready.send(shortfalls.map_err(DaemonError::from));
-            let sides = io_thread::Sides { exchange: io_side, sent: sent_in, statistics };
+            let sides = io_thread::Sides { exchange: io_side, sent: sent_in, statistics, ending, may_end };
             Some(io_thread::run(&settings, ports?, sides, stop_io))
         })?;
 
@@ -147,6 +155,8 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonE
             stop.wait();
             let _ = sd_notify::notify(&[NotifyState::Stopping]);
             info!("stopping");
+            ending.store(true, Ordering::Relaxed);
+            wait_for_rest(may_end, stop);
         }
         drop(go);
         stop_loop.store(true, Ordering::Relaxed);
@@ -161,6 +171,18 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonE
         let counts_csv = mem::take(&mut log.counts_csv);
         Ok((summary(config, &cyclic, &io, log), counts_csv))
     })
+}
+
+/// A platform under control is brought to rest before nobody controls it any more.
+fn wait_for_rest(may_end: &AtomicBool, stop: &Stop) {
+    let began = Instant::now();
+    while !may_end.load(Ordering::Relaxed) {
+        if stop.insisted() || began.elapsed() > LONGEST_STOP {
+            warn!("the platform did not come to rest: ending without");
+            return;
+        }
+        thread::sleep(REST_POLL);
+    }
 }
 
 /// Sets every flag when dropped.
@@ -186,13 +208,18 @@ fn spawn<'scope, T: Send + 'scope>(
 }
 
 /// What a deployment means to the controller; `rung` is what its fidelity came to.
-pub fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
-    let Deployment { control, timeouts, .. } = deployment;
+pub fn parameters(machine: &Machine, deployment: &Deployment, rung: Rung) -> Parameters {
+    let Deployment { control, timeouts, limits, .. } = deployment;
+    let envelope = deployment.envelope.map(|limits| {
+        let from_home = |offsets: [f64; 6]| core::array::from_fn(|i| machine.home[i] + offsets[i]);
+        Envelope { lowest: from_home(limits.pose_min), highest: from_home(limits.pose_max) }
+    });
     Parameters {
         period_ns: nanoseconds(deployment.realtime.period_s()),
         law: Law {
             position: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
             orientation: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+            integral: core::f64::consts::TAU * control.integral_bandwidth_hz,
         },
         rung,
         engage_position: control.engage_position_m,
@@ -201,7 +228,10 @@ pub fn parameters(deployment: &Deployment, rung: Rung) -> Parameters {
         following_orientation: control.following_orientation_rad,
         setpoint_timeout_ns: nanoseconds(timeouts.setpoint_s),
         measured_timeout_ns: nanoseconds(timeouts.measured_s),
-        limits: deployment.limits,
+        limits: limits.reference,
+        force_rate: limits.force_rate_n_s,
+        envelope,
+        after_loss: control.on_setpoint_lost,
     }
 }
 
@@ -236,7 +266,9 @@ fn summary(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) 
         ),
         (counters.records_lost, "cycle records lost: the log thread was too slow"),
         (io.send_failures, "messages could not be sent"),
-        (io.rejected, "messages passed over: other schema, older source, or seen before"),
+        (io.rejected.schema, "messages passed over: another schema; build all participants alike"),
+        (io.rejected.older_source, "messages passed over: an older source; were there two at once?"),
+        (io.rejected.repeated, "messages passed over: seen before, or unreadable"),
     ] {
         if count > 0 {
             warn!(count, "{what}");

@@ -17,8 +17,10 @@ use self::summary::Summary;
 use super::charts::ChartError;
 use super::config::{Config, ConfigError};
 use super::files::{FileError, write_whole};
+use super::operator::Operator;
 use super::report::Report;
 use super::stop::Stop;
+use crate::control::state::{Cause, Request};
 use crate::ipc::ports::{Bus, PortError};
 
 pub mod children;
@@ -171,7 +173,8 @@ impl Stage {
                 .chain(["--motion", demo.motion.as_str(), "--seconds", &seconds].map(AsRef::as_ref)),
         )?;
         let mut processes = vec![plant, daemon, setpoints];
-        watch(&mut processes, &mut recorder, demo.seconds, stop)?;
+        let operator = Operator::new(&bus)?;
+        watch(&mut processes, &mut recorder, operator, demo.seconds, stop)?;
         // In the order they were started in reverse: the setpoint source has ended, the daemon says that
         // no force is valid, the plant brakes.
         for process in processes.drain(..).rev() {
@@ -192,10 +195,11 @@ impl Drop for Stage {
     }
 }
 
-/// Records until the setpoint source, the last of the processes, has ended well.
+/// Engages, and records until the setpoint source, the last of the processes, has ended well.
 fn watch(
     processes: &mut [Process],
     recorder: &mut Recorder,
+    mut operator: Operator,
     seconds: f64,
     stop: &Stop,
 ) -> Result<(), DemoError> {
@@ -206,6 +210,9 @@ fn watch(
             return Err(DemoError::Interrupted);
         }
         recorder.poll();
+        if operator.status().is_some_and(|status| status.fault == Cause::NotAsked as u32) {
+            operator.ask(Request::Engage)?;
+        }
         for process in processes.iter_mut() {
             match process.ended()? {
                 Some(status) if status.success() && process.name == "move" => {

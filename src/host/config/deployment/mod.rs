@@ -1,5 +1,5 @@
-//! The sections that say how a machine is run: `[realtime]`, `[control]`, `[timeouts]`, `[plant]`,
-//! `[envelope]`.
+//! The sections that say how a machine is run: `[realtime]`, `[control]`, `[limits]`, `[timeouts]`,
+//! `[plant]`, `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
 //! timeouts. What is given is checked against the limits that follow from the rate.
@@ -12,10 +12,11 @@ pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
-use crate::control::reference::{self, AxisLimits};
 use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
+use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
+use crate::control::supervisor::AfterStop;
 use crate::model::ladder::Rung;
-use crate::scene::envelope::Limits;
+use crate::scene::envelope;
 
 mod realtime;
 
@@ -28,6 +29,11 @@ const LEAST_DEFAULT_PERIODS: f64 = 4.0;
 const LONGEST_TIMEOUT_MS: f64 = 1000.0;
 /// Damping ratios that a control engineer would write down; beyond, it is a slip.
 const DAMPING_RATIO: Bound = Bound::Within(0.1, 10.0);
+/// Largest bandwidth of the integral, as a share of the loop's: it must not take part in the loop's own motion.
+const INTEGRAL_SHARE: f64 = 0.05;
+/// The default of the force rate takes this long from no force to the largest \[s\]: slower than any noise
+/// worth following, faster than any motion.
+const FORCE_RISE_S: f64 = 0.01;
 /// Engaging further away than this is a motion, and needs a trajectory \[m\], \[rad\].
 const FURTHEST_ENGAGE_M: f64 = 0.1;
 const FURTHEST_ENGAGE_RAD: f64 = 0.2;
@@ -48,14 +54,14 @@ pub struct Deployment {
     pub realtime: Realtime,
     /// The control law.
     pub control: Control,
-    /// Of the motions that the daemon makes by itself.
-    pub limits: reference::Limits,
+    /// What no reference may exceed.
+    pub limits: Limits,
     /// Ages of messages.
     pub timeouts: Timeouts,
     /// The simulated hardware.
     pub plant: Plant,
     /// What the platform will be asked to do; `None` if nobody has said.
-    pub envelope: Option<Limits>,
+    pub envelope: Option<envelope::Limits>,
 }
 
 /// `[control]`: the law's error dynamics, and how near the set point must be to engage.
@@ -79,8 +85,21 @@ pub struct Control {
     pub following_orientation_rad: f64,
     /// Which terms of the dynamics are evaluated.
     pub fidelity: Fidelity,
+    /// Ki / Kp of both loops, as a frequency; 0 is without.
+    pub integral_bandwidth_hz: f64,
+    /// What follows the stop of a platform that lost its setpoint.
+    pub on_setpoint_lost: AfterStop,
     /// Largest error [`Fidelity::Auto`] may make, as a share of the peak force of the envelope.
     pub fidelity_tolerance: f64,
+}
+
+/// `[limits]`: what no reference and no force may exceed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Of setpoints and of the motions that the daemon makes by itself.
+    pub reference: ReferenceLimits,
+    /// Largest change of a force.
+    pub force_rate_n_s: f64,
 }
 
 /// `control.fidelity`: which terms of the dynamics are evaluated.
@@ -112,14 +131,14 @@ pub struct Plant {
     pub step_s: f64,
 }
 
-/// Reads and checks the five sections. Where a number was refused it is NaN.
-pub(super) fn read(root: &mut Reader) -> Deployment {
+/// Reads and checks the six sections; a default follows from the actuators' largest force. Where a number was refused it is NaN.
+pub(super) fn read(root: &mut Reader, max_force_n: f64) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     Deployment {
         realtime,
         control: control(root.section("control"), rate_hz),
-        limits: limits(root.section("limits")),
+        limits: limits(root.section("limits"), max_force_n),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant(root.section("plant"), rate_hz),
         envelope: envelope(root.section("envelope")),
@@ -154,6 +173,12 @@ fn control(mut section: Reader, rate_hz: f64) -> Control {
         ),
         fidelity: fidelity(&mut section),
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
+        integral_bandwidth_hz: integral(&mut section, position_bandwidth_hz.min(orientation_bandwidth_hz)),
+        on_setpoint_lost: section.choice_or(
+            "on_setpoint_lost",
+            AfterStop::Fault,
+            &[("fault", AfterStop::Fault), ("park", AfterStop::Park)],
+        ),
     };
     section.finish();
     control
@@ -163,6 +188,13 @@ fn fidelity(section: &mut Reader) -> Fidelity {
     let rungs = Rung::ALL.into_iter().rev().filter(|rung| rung.has_inertia());
     let options = rungs.map(|rung| (rung.name(), Fidelity::Fixed(rung))).chain([("auto", Fidelity::Auto)]);
     section.choice_or("fidelity", Fidelity::Fixed(Rung::Exact), &options.collect::<Vec<_>>())
+}
+
+/// So much slower than the slower loop, the integral takes a twentieth of a radian of its phase at most.
+fn integral(section: &mut Reader, bandwidth_hz: f64) -> f64 {
+    let largest = bandwidth_hz * INTEGRAL_SHARE;
+    let bound = if largest.is_finite() { Bound::Within(0.0, largest) } else { Bound::NotNegative };
+    section.number_or("integral_bandwidth_hz", 0.0, bound)
 }
 
 /// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry.
@@ -183,18 +215,20 @@ fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], 
     [bandwidth_hz, damping_ratio]
 }
 
-/// Defaults are gentle: a fifth of gravity, half a second to rest.
-fn limits(mut section: Reader) -> reference::Limits {
+/// Defaults are what a standing person stands: half of gravity, a tenth of a second to build it up. By itself
+/// the daemon moves at a fifth of that.
+fn limits(mut section: Reader, max_force_n: f64) -> Limits {
     let mut axis = |keys: [&'static str; 3], defaults: [f64; 3]| {
         let [velocity, acceleration, jerk] =
             core::array::from_fn(|i| section.number_or(keys[i], defaults[i], Bound::Positive));
         AxisLimits { velocity, acceleration, jerk }
     };
-    let position = axis(["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"], [0.2, 2.0, 40.0]);
-    let orientation =
-        axis(["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"], [0.5, 5.0, 100.0]);
+    let position = axis(["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"], [1.0, 5.0, 500.0]);
+    let orientation = axis(["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"], [2.0, 20.0, 2000.0]);
+    let own_share = section.number_or("own_share", 0.2, Bound::UpTo(1.0));
+    let force_rate_n_s = section.number_or("force_rate_n_s", max_force_n / FORCE_RISE_S, Bound::Positive);
     section.finish();
-    reference::Limits { position, orientation }
+    Limits { reference: ReferenceLimits { position, orientation, own_share }, force_rate_n_s }
 }
 
 fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
@@ -218,7 +252,7 @@ fn plant(mut section: Reader, rate_hz: f64) -> Plant {
 }
 
 /// All four keys, or none.
-fn envelope(mut section: Reader) -> Option<Limits> {
+fn envelope(mut section: Reader) -> Option<envelope::Limits> {
     let pose = |angle: Bound, position: Bound| [angle, angle, angle, position, position, position];
     let keys = [
         ("pose_min", pose(Bound::Within(-HALF_TURN, 0.0), Bound::NotPositive)),
@@ -234,7 +268,7 @@ fn envelope(mut section: Reader) -> Option<Limits> {
     }
     section.finish();
     let [Some(pose_min), Some(pose_max), Some(velocity), Some(acceleration)] = found else { return None };
-    Some(Limits { pose_min, pose_max, velocity, acceleration })
+    Some(envelope::Limits { pose_min, pose_max, velocity, acceleration })
 }
 
 /// A peer that sends once a cycle is silent for one period: a timeout must be longer.

@@ -1,0 +1,178 @@
+//! `hexad engage | stop | park | clear | off | estop`: an operator's request, and what became of it.
+//!
+//! A request is sent until the daemon answers it, and then its outcome is waited for: a command that ends
+//! with 0 has done what it says.
+
+extern crate std;
+
+use core::fmt;
+use core::time::Duration;
+use std::prelude::rust_2024::*;
+use std::thread;
+use std::time::Instant;
+
+use super::config::Config;
+use super::stop::Stop;
+use crate::control::state::{Cause, Request, State};
+use crate::ipc::messages::{CommandMessage, StatusMessage};
+use crate::ipc::ports::{Bus, PortError, Sink, Source};
+use crate::realtime::clock::monotonic_ns;
+
+/// How often to look for an answer.
+const POLL: Duration = Duration::from_millis(2);
+
+/// How often to ask again: a message is lost if nobody is connected yet.
+const REPEAT: Duration = Duration::from_millis(100);
+
+/// A daemon that has not said a word for this long is not there.
+const SILENCE: Duration = Duration::from_secs(2);
+
+/// Why a request was not carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum OperatorError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error("no daemon runs for {0}: no status for {SILENCE:?}")]
+    Silent(String),
+    #[error("{request} was refused: {reason}", request = .0.name(), reason = .1)]
+    Refused(Request, Reason),
+    #[error("{request} was not completed: the daemon is in {state}: {reason}", request = .0.name(), state = .1.name(), reason = .2)]
+    Otherwise(Request, State, Reason),
+    #[error("{request} was not completed within {1:.0} s: the daemon is in {state}", request = .0.name(), state = .2.name())]
+    TooLong(Request, f64, State),
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// A cause, with what the status says about it.
+#[derive(Clone, Copy, Debug)]
+pub struct Reason {
+    cause: Cause,
+    /// \[m\], \[rad\], where they say something.
+    distance: Option<(f64, f64)>,
+}
+
+impl Reason {
+    fn new(cause: Cause, status: &StatusMessage) -> Self {
+        let norm = |v: [f64; 3]| nalgebra::Vector3::from(v).norm();
+        let distance = (norm(status.position_error_m), norm(status.orientation_error_rad));
+        let told = cause == Cause::SetpointTooFar && status.error_valid == 1;
+        Self { cause, distance: told.then_some(distance) }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.cause.name())?;
+        if let Some((position, orientation)) = self.distance {
+            write!(f, ": {:.3} mm and {:.3} mrad away", position * 1e3, orientation * 1e3)?;
+        }
+        write!(f, "; {}", self.cause.remedy())
+    }
+}
+
+/// Sends requests and reads what comes of them.
+pub struct Operator {
+    commands: Source<CommandMessage>,
+    statuses: Sink<StatusMessage>,
+    /// The first message of the present request.
+    first: (u64, u64),
+}
+
+impl Operator {
+    /// Joins the topics of a machine.
+    pub fn new(bus: &Bus) -> Result<Self, PortError> {
+        Ok(Self { commands: bus.source()?, statuses: bus.sink(8)?, first: (u64::MAX, 0) })
+    }
+
+    /// Sends a request, without waiting.
+    pub fn ask(&mut self, request: Request) -> Result<(), PortError> {
+        let message = CommandMessage { request: request as u32, ..CommandMessage::default() };
+        self.commands.publish(monotonic_ns(), message)?;
+        Ok(())
+    }
+
+    /// The newest status, if one came since the last call.
+    pub fn status(&mut self) -> Option<StatusMessage> {
+        self.statuses.newest()
+    }
+
+    /// Sends a request and waits until it is carried out. `is_patient` waits for what engaging needs, too.
+    pub fn carry_out(
+        &mut self,
+        machine: &str,
+        request: Request,
+        is_patient: bool,
+        longest: Duration,
+        stop: &Stop,
+    ) -> Result<State, OperatorError> {
+        let began = Instant::now();
+        let mut asked: Option<Instant> = None;
+        let mut heard = Instant::now();
+        let mut accepted = false;
+        let mut state = State::default();
+        self.first = self.commands.next_message();
+        loop {
+            if !accepted && asked.is_none_or(|asked| asked.elapsed() > REPEAT) {
+                self.ask(request)?;
+                asked = Some(Instant::now());
+            }
+            if let Some(status) = self.status() {
+                heard = Instant::now();
+                state = State::from_number(status.state).unwrap_or_default();
+                let cause = Cause::from_number(status.fault).unwrap_or_default();
+                if (status.answered_epoch, status.answered_sequence) >= self.first
+                    && status.answered_epoch == self.first.0
+                {
+                    match Cause::from_number(status.refused).unwrap_or_default() {
+                        Cause::None => accepted = true,
+                        cause if is_patient && !accepted && !cause.is_fault() => {}
+                        _ if accepted => {}
+                        cause => return Err(OperatorError::Refused(request, Reason::new(cause, &status))),
+                    }
+                }
+                if accepted && let Some(reached) = outcome(request, state) {
+                    let otherwise = || OperatorError::Otherwise(request, state, Reason::new(cause, &status));
+                    return if reached { Ok(state) } else { Err(otherwise()) };
+                }
+            }
+            if stop.requested() {
+                return Err(OperatorError::Interrupted);
+            }
+            if heard.elapsed() > SILENCE {
+                return Err(OperatorError::Silent(machine.into()));
+            }
+            if began.elapsed() > longest {
+                return Err(OperatorError::TooLong(request, longest.as_secs_f64(), state));
+            }
+            thread::sleep(POLL);
+        }
+    }
+}
+
+/// Whether a state is what an accepted request was to lead to; `None` while it is on the way.
+fn outcome(request: Request, state: State) -> Option<bool> {
+    match (request, state) {
+        (Request::Engage, State::Engaging) => None,
+        (Request::Engage, state) => Some(state == State::Active),
+        (Request::Stop | Request::Park, State::Stopping) | (Request::Park, State::Parking) => None,
+        (Request::Stop, state) => Some(!state.controls() && state != State::Fault),
+        (Request::Park | Request::Off, state) => Some(state == State::Off),
+        (Request::Clear, state) => Some(state != State::Fault),
+        (Request::Estop, state) => Some(state == State::Fault),
+    }
+}
+
+/// The command: asks, waits, says what came of it.
+pub fn run(
+    config: &Config,
+    request: Request,
+    is_patient: bool,
+    longest: Duration,
+    stop: &Stop,
+) -> Result<(), OperatorError> {
+    let bus = Bus::join(&config.name)?;
+    let state = Operator::new(&bus)?.carry_out(&config.name, request, is_patient, longest, stop)?;
+    std::println!("{}", state.name());
+    Ok(())
+}
