@@ -53,6 +53,27 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
         "[realtime]\ncpu_dma_latency_us = -1",
         &["realtime.cpu_dma_latency_us = -1: must be an integer in [0, 1000000]"],
     );
+    refused(
+        "[control]\nintegral_bandwidth_hz = 0.51",
+        &["control.integral_bandwidth_hz = 0.51: must be at most 0.5 (0.05 of the lesser bandwidth)"],
+    );
+    refused("[control]\nposition_bandwidth_hz = 5\nintegral_bandwidth_hz = 0.25", &[]);
+    refused(
+        "[control]\non_setpoint_lost = \"coast\"",
+        &["control.on_setpoint_lost = \"coast\": must be one of \"fault\", \"park\""],
+    );
+    refused("[limits]\nown_share = 1.1", &["limits.own_share = 1.1: must be greater than 0 and at most 1"]);
+    for key in [
+        "velocity_m_s",
+        "acceleration_m_s2",
+        "jerk_m_s3",
+        "velocity_rad_s",
+        "acceleration_rad_s2",
+        "jerk_rad_s3",
+        "force_rate_n_s",
+    ] {
+        refused(&format!("[limits]\n{key} = 0"), &[&format!("limits.{key} = 0: must be greater than 0")]);
+    }
     refused("[realtime]\nlate_wakeup_us = 0", &["realtime.late_wakeup_us = 0: must be greater than 0"]);
     refused(
         "[realtime]\nlate_wakeup_us = 501",

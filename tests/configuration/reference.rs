@@ -79,6 +79,6 @@ fn the_reference_gives_the_defaults() {
             }
         }
     }
-    // 5 sections with 13 + 10 + 2 + 3 + 0 keys, 3 of the actuator, 3 of the inertia, one for each leg.
-    assert_eq!(optional.len(), 5 + 28 + 3 + 3 + 6, "{optional:?}");
+    // 6 sections with 13 + 12 + 8 + 2 + 3 + 0 keys, 3 of the actuator, 3 of the inertia, one for each leg.
+    assert_eq!(optional.len(), 6 + 38 + 3 + 3 + 6, "{optional:?}");
 }

@@ -192,9 +192,13 @@ fn fidelity(section: &mut Reader) -> Fidelity {
 
 /// So much slower than the slower loop, the integral takes a twentieth of a radian of its phase at most.
 fn integral(section: &mut Reader, bandwidth_hz: f64) -> f64 {
-    let largest = bandwidth_hz * INTEGRAL_SHARE;
-    let bound = if largest.is_finite() { Bound::Within(0.0, largest) } else { Bound::NotNegative };
-    section.number_or("integral_bandwidth_hz", 0.0, bound)
+    let largest = (bandwidth_hz * INTEGRAL_SHARE * 1e3).floor() / 1e3;
+    let integral_hz = section.number_or("integral_bandwidth_hz", 0.0, Bound::NotNegative);
+    if integral_hz > largest {
+        let bound = format!("must be at most {largest} ({INTEGRAL_SHARE} of the lesser bandwidth)");
+        section.refuse("integral_bandwidth_hz", bound);
+    }
+    integral_hz
 }
 
 /// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry.
