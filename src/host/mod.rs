@@ -11,6 +11,7 @@ pub mod config;
 pub mod daemon;
 pub mod demo;
 pub mod doctor;
+pub mod faults;
 pub mod fidelity;
 pub mod files;
 pub mod histogram;

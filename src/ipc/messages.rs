@@ -98,6 +98,14 @@ pub struct ForceMessage {
 }
 
 impl ForceMessage {
+    /// Whether a driver may apply it, if it is young and newer than the one before.
+    pub fn may_be_applied(&self) -> bool {
+        self.header.schema == SCHEMA
+            && self.checksum == self.computed_checksum()
+            && self.valid == 1
+            && self.force_n.iter().all(|force| force.is_finite())
+    }
+
     /// What `checksum` must be.
     pub fn computed_checksum(&self) -> u32 {
         let Self { header, force_n, valid, state, fault, limiting, release_ns, .. } = self;

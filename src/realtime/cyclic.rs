@@ -19,7 +19,7 @@ use super::overrun::OnOverrun;
 use super::usage::ThreadUsage;
 use super::waiter::Waiter;
 use crate::control::controller::{Input, Output};
-use crate::control::state::{Cause, Evidence, State};
+use crate::control::state::{Cause, State};
 use crate::ipc::exchange::{CycleOutput, RealtimeSide};
 
 /// Length of the queue of records to the log thread: 50 ms at 20 kHz, twice the log's own period.
@@ -71,15 +71,23 @@ pub struct CycleRecord {
     pub due_ns: u64,
     pub wakeup_ns: u64,
     pub compute_ns: u64,
-    /// Age of the measurement at the release, if there is one.
-    pub measured_age_ns: Option<u64>,
     /// The io thread had handed in nothing new since the last cycle.
     pub io_late: bool,
-    pub state: State,
-    pub cause: Cause,
-    pub evidence: Evidence,
+    pub input: Input,
+    pub output: Output,
+}
+
+impl CycleRecord {
+    /// Age of the measurement at the release, if there is one.
+    pub fn measured_age_ns(&self) -> Option<u64> {
+        self.input.measurement.map(|it| self.input.release_ns.saturating_sub(it.time_ns))
+    }
+
     /// Norms of the tracking error while active \[m\], \[rad\].
-    pub error: Option<(f64, f64)>,
+    pub fn tracking_error(&self) -> Option<(f64, f64)> {
+        let error = self.output.error.filter(|_| self.output.state == State::Active)?;
+        Some((error.pose.linear.norm(), error.pose.angular.norm()))
+    }
 }
 
 /// What the loop used and counted.
@@ -240,12 +248,9 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
             due_ns,
             wakeup_ns,
             compute_ns: done_ns.saturating_sub(woke_ns),
-            measured_age_ns: input.measurement.map(|it| release_ns.saturating_sub(it.time_ns)),
             io_late,
-            state: output.state,
-            cause: output.cause,
-            evidence: output.evidence,
-            error: tracking_error(&output),
+            input,
+            output,
         };
         counters.records_lost += u64::from(hand_over(&mut self.records, record).is_err());
         done_ns
@@ -259,9 +264,4 @@ fn hand_over(records: &mut Producer<'_, CycleRecord>, record: CycleRecord) -> Re
         return Err(record);
     }
     records.enqueue(record)
-}
-
-fn tracking_error(output: &Output) -> Option<(f64, f64)> {
-    let error = output.error.filter(|_| output.state == State::Active)?;
-    Some((error.pose.linear.norm(), error.pose.angular.norm()))
 }

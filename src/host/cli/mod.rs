@@ -9,6 +9,7 @@ use hexad::host::advise::Advice;
 use hexad::host::check::Check;
 use hexad::host::demo::{self, Demo};
 use hexad::host::doctor::{self, Doctor};
+use hexad::host::faults::Faults;
 use hexad::host::stop::Stop;
 use hexad::host::{daemon, offline, operator, plant, setpoints};
 use hexad::model::ladder::Rung;
@@ -39,6 +40,9 @@ enum Command {
         /// Write how often each time occurred, as CSV, at the end
         #[arg(long, value_name = "FILE")]
         histogram: Option<PathBuf>,
+        /// Write the cycles around each fault as CSV into this folder
+        #[arg(long, value_name = "FOLDER", env = "LOGS_DIRECTORY")]
+        faults: Option<PathBuf>,
     },
     /// Simulate the hardware as a process of its own
     Plant {
@@ -124,6 +128,8 @@ enum Command {
         #[command(flatten)]
         patience: Patience,
     },
+    /// Show what the numbers of states, faults and limits mean, and what to do
+    Faults,
     /// Validate a machine file and show the machine at home
     Check {
         #[command(flatten)]
@@ -181,9 +187,9 @@ impl Cli {
     /// Does what the command line asks for.
     pub fn run(self) -> Result<(), Failure> {
         match self.command {
-            Command::Run { machine, report, histogram } => {
+            Command::Run { machine, report, histogram, faults } => {
                 let (config, stop) = (machine.load()?, stop()?);
-                daemon::run(&config, report.as_deref(), histogram.as_deref(), &stop)
+                daemon::run(&config, &daemon::Files { report, histogram, faults }, &stop)
                     .map(drop)
                     .map_err(Failure::could_not_begin)
             }
@@ -207,6 +213,10 @@ impl Cli {
             Command::Clear { machine, patience } => ask(&machine, Request::Clear, false, &patience),
             Command::Off { machine, patience } => ask(&machine, Request::Off, false, &patience),
             Command::Estop { machine, patience } => ask(&machine, Request::Estop, false, &patience),
+            Command::Faults => {
+                print!("{Faults}");
+                Ok(())
+            }
             Command::Check { machine } => {
                 print!("{}", Check::new(&machine.load()?));
                 Ok(())

@@ -13,8 +13,10 @@ use std::time::Instant;
 use heapless::spsc::Consumer;
 use tracing::{info, warn};
 
+use super::fault_dump::FaultDump;
 use super::hints::{Hints, ThreadFiles};
 use super::statistics::Collector;
+use crate::control::controller::Output;
 use crate::control::state::{Cause, Evidence, State};
 use crate::host::report::{Fault, TrackingSum};
 use crate::ipc::statistics::Statistics;
@@ -40,6 +42,7 @@ pub struct Sides<'a> {
     pub statistics: Writer<Statistics>,
     /// Of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
+    pub dump: FaultDump,
 }
 
 /// Statistics of a run.
@@ -64,10 +67,11 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
         let stopping = stop.load(Ordering::Relaxed);
         while let Some(record) = sides.records.dequeue() {
             collector.add(&record);
-            if let Some((position, orientation)) = record.error {
+            sides.dump.add(&record);
+            if let Some((position, orientation)) = record.tracking_error() {
                 report.tracking.add(position, orientation);
             }
-            let now = (record.state, record.cause);
+            let now = (record.output.state, record.output.cause);
             if now != last {
                 tell(&record, &mut report.faults);
                 last = now;
@@ -85,7 +89,9 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
             window_began = Instant::now();
             sides.statistics.write(collector.end_window());
         }
+        sides.dump.step();
         if stopping {
+            sides.dump.finish();
             report.statistics = collector.statistics();
             report.usage = ThreadUsage::of_this_thread().since(&at_start);
             report.counts_csv = collector.counts_csv();
@@ -96,7 +102,7 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
 }
 
 fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
-    let CycleRecord { cycle, state, cause, evidence, .. } = *record;
+    let CycleRecord { cycle, output: Output { state, cause, evidence, .. }, .. } = *record;
     match state {
         State::Fault => {
             warn!(

@@ -10,7 +10,7 @@ use core::mem;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::boxed::Box;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::prelude::rust_2024::*;
 use std::sync::{OnceLock, mpsc};
 use std::thread::{self, Builder, Scope, ScopedJoinHandle, scope};
@@ -20,6 +20,7 @@ use heapless::spsc::Queue;
 use sd_notify::NotifyState;
 use tracing::{info, warn};
 
+use self::fault_dump::FaultDump;
 use self::hints::ThreadFiles;
 use self::io_thread::{DELAYS, IoReport, Ports, Settings};
 use self::log_thread::LogReport;
@@ -44,6 +45,7 @@ use crate::realtime::newest::newest;
 use crate::realtime::process::leave_signals_to_others;
 use crate::realtime::setup::{Shortfall, deadline, memory};
 
+mod fault_dump;
 mod hints;
 mod io_thread;
 mod log_thread;
@@ -76,25 +78,31 @@ pub enum DaemonError {
     Report(#[from] FileError),
 }
 
-/// Runs until `stop`; writes the report and the histogram if asked to.
-pub fn run(
-    config: &Config,
-    report_path: Option<&Path>,
-    histogram_path: Option<&Path>,
-    stop: &Stop,
-) -> Result<Report, DaemonError> {
+/// What the daemon writes, if it shall.
+#[derive(Clone, Debug, Default)]
+pub struct Files {
+    /// JSON, at the end.
+    pub report: Option<PathBuf>,
+    /// How often each time occurred, as CSV, at the end.
+    pub histogram: Option<PathBuf>,
+    /// Folder for the cycles around each fault.
+    pub faults: Option<PathBuf>,
+}
+
+/// Runs until `stop`.
+pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, DaemonError> {
     let _only = Bus::claim(&config.name)?;
-    let (report, counts_csv) = run_threads(config, stop)?;
-    if let Some(path) = report_path {
+    let (report, counts_csv) = run_threads(config, files.faults.as_deref(), stop)?;
+    if let Some(path) = &files.report {
         report.write(path)?;
     }
-    if let Some(path) = histogram_path {
+    if let Some(path) = &files.histogram {
         write_whole(path, counts_csv.as_bytes())?;
     }
     Ok(report)
 }
 
-fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonError> {
+fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(Report, String), DaemonError> {
     let Config { machine, deployment, .. } = config;
     let mut controller = Controller::new(machine, parameters(machine, deployment, fidelity::rung(config)));
     let timing = &timing(deployment);
@@ -124,7 +132,9 @@ fn run_threads(config: &Config, stop: &Stop) -> Result<(Report, String), DaemonE
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop([stop_loop, stop_io, stop_log]);
         let log = spawn(threads, "hexad-log", || {
-            log_thread::run(log_thread::Sides { records, sent, statistics: statistics_in, files }, stop_log)
+            let dump = FaultDump::new(faults, machine.home);
+            let sides = log_thread::Sides { records, sent, statistics: statistics_in, files, dump };
+            log_thread::run(sides, stop_log)
         })?;
         let cyclic = spawn(threads, REALTIME_THREAD, move || {
             let shortfalls = prepare_loop(realtime, || warm_up(controller.clone(), machine));

@@ -54,7 +54,7 @@ impl Collector {
         for span in [&mut self.window, &mut self.total] {
             span.wakeup.record(record.wakeup_ns);
             span.compute.record(record.compute_ns);
-            if let Some(age_ns) = record.measured_age_ns {
+            if let Some(age_ns) = record.measured_age_ns() {
                 span.measured_age.record(age_ns);
             }
         }
@@ -127,9 +127,12 @@ impl Collector {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::controller::{Input, Measurement};
 
     fn record(cycle: u64, wakeup_ns: u64) -> CycleRecord {
-        CycleRecord { cycle, wakeup_ns, compute_ns: 7, measured_age_ns: Some(9), ..CycleRecord::default() }
+        let measurement = Some(Measurement { time_ns: 11, ..Measurement::default() });
+        let input = Input { release_ns: 20, measurement, ..Input::default() };
+        CycleRecord { cycle, wakeup_ns, compute_ns: 7, input, ..CycleRecord::default() }
     }
 
     #[test]
