@@ -196,7 +196,7 @@ impl Controller {
         }
         let engageable = setpoint.and_then(|()| self.near(output.error.as_ref()));
         let following = self.followed(input, setpoint, &mut output);
-        let present = self.reference_at(now_ns);
+        let present = self.reference_at(now_ns).filter(|_| self.mode.state.controls());
         let before = self.mode.state;
         self.decide(input, [located.map(drop), engageable, following]);
         if let Ok(at) = located {
@@ -417,14 +417,14 @@ impl Controller {
     /// Begins the motion of the state just entered, where the one before it is at `present`.
     fn enter(&mut self, at: &Located, release_ns: u64, present: Option<Motion>) {
         let limits = &self.parameters.limits;
-        let present = present.unwrap_or_else(|| resting(&at.pose));
+        // Without control the platform stands, or coasts; what it accelerates with is not measured.
+        let present = present.unwrap_or_else(|| Motion { twist: at.twist, ..resting(&at.pose) });
         self.reference = match self.mode.state {
             State::Engaging => {
                 self.integral = Integral::default();
                 let setpoint = self.setpoint_at(at.time_ns).unwrap_or(present);
                 let away = setpoint.pose.displacement_to(&at.pose);
                 let Motion { twist, acceleration, .. } = setpoint;
-                // The platform stands, or coasts; what it accelerates with is not measured.
                 let rate = Twist {
                     angular: at.twist.angular - twist.angular,
                     linear: at.twist.linear - twist.linear,
@@ -439,7 +439,7 @@ impl Controller {
             }
             State::Parking => {
                 let away = self.home.displacement_to(&present.pose);
-                let (rate, acceleration) = (Twist::default(), Acceleration::default());
+                let Motion { twist: rate, acceleration, .. } = present;
                 Reference::From(
                     self.home,
                     Segment::vanishing(release_ns, &away, &rate, &acceleration, limits),

@@ -5,7 +5,7 @@
 //! | state | force | leaves it |
 //! | --- | --- | --- |
 //! | off | not valid: brake | the pose is known: standby; if off was asked for, `clear` or `engage` |
-//! | standby | not valid: brake | `engage`; the pose is lost: off |
+//! | standby | not valid: brake | `engage`; `park`: parking; the pose is lost: off |
 //! | engaging | controlled, from where the platform stands onto the setpoint | on the setpoint: active |
 //! | active | controlled, on the setpoint | `stop`, `park`, a setpoint that ended or was lost: stopping |
 //! | stopping | controlled, to rest along the present motion | at rest: standby, parking or fault |

@@ -101,7 +101,11 @@ fn without_force(mode: Mode, request: Option<Request>, findings: &Findings) -> (
             Err(cause) => (rest, Some(cause)),
         },
         Some(Request::Clear) => (ready, None),
-        Some(Request::Park) => (rest, Some(Cause::NotNow)),
+        // Home is a way to go without a setpoint.
+        Some(Request::Park) => match findings.located {
+            Ok(()) => (Mode { state: State::Parking, cause: Cause::Asked, ..Mode::default() }, None),
+            Err(cause) => (rest, Some(cause)),
+        },
         None | Some(Request::Stop | Request::Off | Request::Estop) => (rest, None),
     }
 }

@@ -12,7 +12,7 @@ use std::{format, vec};
 use tracing::{info, warn};
 
 use crate::control::controller::Output;
-use crate::control::state::Cause;
+use crate::control::state::{Cause, State};
 use crate::host::table::{Writer, coordinates, legs};
 use crate::model::task::task_coordinates;
 use crate::realtime::cyclic::CycleRecord;
@@ -72,7 +72,9 @@ impl FaultDump {
         }
         self.cycles.push_back(*record);
         let cause = record.output.cause;
-        if cause != self.last && cause.is_fault() && self.due.is_none() {
+        // Without force there is no fault, only something missing.
+        let takes_force_away = matches!(record.output.state, State::Stopping | State::Fault);
+        if cause != self.last && cause.is_fault() && takes_force_away && self.due.is_none() {
             self.due = Some((*record, AFTER));
         }
         self.last = cause;
@@ -191,7 +193,7 @@ mod tests {
         CycleRecord {
             cycle,
             input: Input { release_ns: cycle * 1_000_000, ..Input::default() },
-            output: Output { cause, force: [7.5; 6], ..Output::default() },
+            output: Output { state: State::Stopping, cause, force: [7.5; 6], ..Output::default() },
             ..CycleRecord::default()
         }
     }
