@@ -252,16 +252,13 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
             input,
             output,
         };
-        counters.records_lost += u64::from(hand_over(&mut self.records, record).is_err());
+        counters.records_lost += u64::from(!hand_over(&mut self.records, record));
         done_ns
     }
 }
 
-/// A queue of another length than [`RECORDS`] takes nothing. There is none; but a queue divides by its
-/// length, and this way the compiler sees that it is not zero.
-fn hand_over(records: &mut Producer<'_, CycleRecord>, record: CycleRecord) -> Result<(), CycleRecord> {
-    if records.capacity() != RECORDS - 1 {
-        return Err(record);
-    }
-    records.enqueue(record)
+/// False if the record is lost. A queue of another length than [`RECORDS`] takes nothing. There is none; but a
+/// queue divides by its length, and this way the compiler sees that it is not zero.
+fn hand_over(records: &mut Producer<'_, CycleRecord>, record: CycleRecord) -> bool {
+    records.capacity() == RECORDS - 1 && records.enqueue(record).is_ok()
 }

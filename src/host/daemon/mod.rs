@@ -221,7 +221,8 @@ fn spawn<'scope, T: Send + 'scope>(
 pub fn parameters(machine: &Machine, deployment: &Deployment, rung: Rung) -> Parameters {
     let Deployment { control, timeouts, limits, .. } = deployment;
     let envelope = deployment.envelope.map(|limits| {
-        let from_home = |offsets: [f64; 6]| core::array::from_fn(|i| machine.home[i] + offsets[i]);
+        let home = nalgebra::Vector6::from(machine.home);
+        let from_home = |offsets: [f64; 6]| (home + nalgebra::Vector6::from(offsets)).into();
         Envelope { lowest: from_home(limits.pose_min), highest: from_home(limits.pose_max) }
     });
     Parameters {

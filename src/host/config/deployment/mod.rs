@@ -222,13 +222,17 @@ fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], 
 /// Defaults are what a standing person stands: half of gravity, a tenth of a second to build it up. By itself
 /// the daemon moves at a fifth of that.
 fn limits(mut section: Reader, max_force_n: f64) -> Limits {
-    let mut axis = |keys: [&'static str; 3], defaults: [f64; 3]| {
-        let [velocity, acceleration, jerk] =
-            core::array::from_fn(|i| section.number_or(keys[i], defaults[i], Bound::Positive));
-        AxisLimits { velocity, acceleration, jerk }
+    let mut positive = |key, default| section.number_or(key, default, Bound::Positive);
+    let position = AxisLimits {
+        velocity: positive("velocity_m_s", 1.0),
+        acceleration: positive("acceleration_m_s2", 5.0),
+        jerk: positive("jerk_m_s3", 500.0),
     };
-    let position = axis(["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"], [1.0, 5.0, 500.0]);
-    let orientation = axis(["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"], [2.0, 20.0, 2000.0]);
+    let orientation = AxisLimits {
+        velocity: positive("velocity_rad_s", 2.0),
+        acceleration: positive("acceleration_rad_s2", 20.0),
+        jerk: positive("jerk_rad_s3", 2000.0),
+    };
     let own_share = section.number_or("own_share", 0.2, Bound::UpTo(1.0));
     let force_rate_n_s = section.number_or("force_rate_n_s", max_force_n / FORCE_RISE_S, Bound::Positive);
     section.finish();
