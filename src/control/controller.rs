@@ -4,7 +4,7 @@
 //! from the state's reference, apply the law, evaluate the inverse dynamics, check what comes out. Every
 //! cycle does a bounded amount of work.
 
-use super::doubt::{self, Believed, Parting};
+use super::doubt::{self, Aim, Believed, Parting};
 use super::law::{Integral, Law, TrackingError};
 use super::limits::{Limit, Limiting, Limits};
 use super::reference::Segment;
@@ -137,7 +137,7 @@ pub struct Controller {
     tracker: Tracker,
     measurement: Believed<Measurement>,
     parting: Parting,
-    setpoint: Believed<Setpoint>,
+    setpoint: Believed<Aim>,
     /// Of the newest setpoint.
     setpoint_limiting: Limiting,
     mode: Mode,
@@ -196,13 +196,12 @@ impl Controller {
         }
         let engageable = setpoint.and_then(|()| self.near(output.error.as_ref()));
         let following = self.followed(input, setpoint, &mut output);
-        let present = self.reference_at(now_ns).filter(|_| self.mode.state.controls());
         let before = self.mode.state;
         self.decide(input, [located.map(drop), engageable, following]);
         if let Ok(at) = located {
             output.measured = Some((at.pose, at.twist));
             if self.mode.state != before {
-                self.enter(&at, now_ns, present);
+                self.enter(before, &at, now_ns);
             }
             if self.mode.state.controls()
                 && let Err(trouble) = self.control(&at, now_ns, &mut output)
@@ -254,7 +253,7 @@ impl Controller {
         let counted = u64::from(self.mode.state.controls());
         let mut waited = [true; 2];
         if let Some(now) = input.measurement
-            && measurement.is_new(&now)
+            && measurement.newest != Some(now)
         {
             let timeout_ns = parameters.measured_timeout_ns;
             let is_young = |good: &Measurement| now_ns.abs_diff(good.time_ns) <= timeout_ns;
@@ -267,13 +266,14 @@ impl Controller {
             waited[0] = verdict.is_err();
         }
         if let Some(now) = input.setpoint
-            && setpoint.is_new(&now)
+            && setpoint.newest.map(|aim| aim.setpoint) != Some(now)
         {
             let timeout_ns = parameters.setpoint_timeout_ns;
             let follows = matches!(self.mode.state, State::Engaging | State::Active);
             let mut limiting = Limiting::default();
-            let verdict =
-                doubt::time(Cause::SetpointFromElsewhen, now.time_ns, now_ns, timeout_ns).and_then(|()| {
+            let now = Aim { setpoint: now, motion: now.task.motion() };
+            let verdict = doubt::time(Cause::SetpointFromElsewhen, now.setpoint.time_ns, now_ns, timeout_ns)
+                .and_then(|()| {
                     let before = setpoint.good.filter(|_| follows);
                     doubt::setpoint(machine, parameters, &now, before.as_ref(), &mut limiting)
                 });
@@ -315,7 +315,7 @@ impl Controller {
     }
 
     fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {
-        let Some(setpoint) = self.setpoint.good else {
+        let Some(Aim { setpoint, .. }) = self.setpoint.good else {
             return Err(self.setpoint.absence(Cause::NoSetpoint));
         };
         let at_rest = setpoint.task.xd.amax() == 0.0 && setpoint.task.xdd.amax() == 0.0;
@@ -326,7 +326,10 @@ impl Controller {
 
     /// The setpoint, carried on or back for the timeout at most.
     fn setpoint_at(&self, instant_ns: u64) -> Option<Motion> {
-        let setpoint = self.setpoint.good?;
+        let Aim { setpoint, motion } = self.setpoint.good?;
+        if instant_ns == setpoint.time_ns {
+            return Some(motion);
+        }
         let longest = self.parameters.setpoint_timeout_ns as f64 * 1e-9;
         let dt = seconds_between(setpoint.time_ns, instant_ns).max(-longest).min(longest);
         Some(setpoint.task.after(dt).motion())
@@ -414,10 +417,11 @@ impl Controller {
         }
     }
 
-    /// Begins the motion of the state just entered, where the one before it is at `present`.
-    fn enter(&mut self, at: &Located, release_ns: u64, present: Option<Motion>) {
+    /// Begins the motion of the state just entered.
+    fn enter(&mut self, before: State, at: &Located, release_ns: u64) {
         let limits = &self.parameters.limits;
         // Without control the platform stands, or coasts; what it accelerates with is not measured.
+        let present = self.reference_at(release_ns).filter(|_| before.controls());
         let present = present.unwrap_or_else(|| Motion { twist: at.twist, ..resting(&at.pose) });
         self.reference = match self.mode.state {
             State::Engaging => {

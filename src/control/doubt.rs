@@ -9,7 +9,7 @@ use super::reference::Segment;
 use super::state::{Cause, Trouble};
 use crate::model::inverse_geometry::{leg_lengths, leg_motion};
 use crate::model::machine::{Actuator, LEGS, Machine};
-use crate::model::rigid::Motion;
+use crate::model::rigid::{Motion, Pose, Twist};
 
 /// How far beyond the ends of its stroke a leg is believed, as a share of the stroke: encoders have
 /// offsets, end stops have springs.
@@ -39,8 +39,8 @@ const SETPOINT_GRAIN: f64 = 1e-4;
 #[derive(Clone, Copy, Debug)]
 pub struct Believed<T> {
     pub good: Option<T>,
-    /// The newest, good or not: each is looked at once.
-    newest: Option<T>,
+    /// The last one, good or not: each is looked at once.
+    pub newest: Option<T>,
     refused: Option<Trouble>,
 }
 
@@ -50,12 +50,7 @@ impl<T> Default for Believed<T> {
     }
 }
 
-impl<T: Copy + PartialEq> Believed<T> {
-    /// Whether an input differs from the last one. NaN differs from itself: it is refused each time.
-    pub fn is_new(&self, input: &T) -> bool {
-        self.newest.as_ref() != Some(input)
-    }
-
+impl<T: Copy> Believed<T> {
     /// Takes an input in, if it is believed.
     pub fn take(&mut self, input: T, verdict: Result<(), Trouble>) {
         self.newest = Some(input);
@@ -141,30 +136,31 @@ pub fn measurement(
     Ok(())
 }
 
-/// Whether a setpoint keeps the limits and, if it is `followed` since `before`, continues it.
+/// A setpoint and the motion that it says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    pub setpoint: Setpoint,
+    pub motion: Motion,
+}
+
+/// Whether a setpoint keeps the limits and, if it is followed since `before`, continues it.
 pub fn setpoint(
     machine: &Machine,
     parameters: &Parameters,
-    now: &Setpoint,
-    before: Option<&Setpoint>,
+    now: &Aim,
+    before: Option<&Aim>,
     limiting: &mut Limiting,
 ) -> Result<(), Trouble> {
-    if !now.task.is_finite() {
+    let Aim { setpoint, motion } = now;
+    if !setpoint.task.is_finite() {
         return Err(Cause::SetpointNotFinite.into());
     }
-    let motion = now.task.motion();
-    within_limits(parameters, &motion, limiting)?;
-    within_envelope(parameters, now, limiting)?;
-    within_legs(machine, parameters, now, &motion, limiting)?;
+    within_limits(parameters, motion, limiting)?;
+    within_envelope(parameters, setpoint, limiting)?;
+    within_legs(machine, parameters, motion, limiting)?;
     let Some(before) = before else { return Ok(()) };
-    continues(
-        machine,
-        parameters,
-        &motion,
-        &before.task.motion(),
-        seconds_between(before.time_ns, now.time_ns),
-        limiting,
-    )
+    let dt = seconds_between(before.setpoint.time_ns, setpoint.time_ns);
+    continues(machine, parameters, motion, &before.motion, dt, limiting)
 }
 
 fn within_limits(parameters: &Parameters, motion: &Motion, limiting: &mut Limiting) -> Result<(), Trouble> {
@@ -208,7 +204,6 @@ fn within_envelope(parameters: &Parameters, now: &Setpoint, limiting: &mut Limit
 fn within_legs(
     machine: &Machine,
     parameters: &Parameters,
-    now: &Setpoint,
     motion: &Motion,
     limiting: &mut Limiting,
 ) -> Result<(), Trouble> {
@@ -220,13 +215,20 @@ fn within_legs(
         }
     }
     within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &legs.length)?;
-    let last = now.task.after(parameters.setpoint_timeout_ns as f64 * 1e-9).motion();
-    let stop = Segment::to_rest(0, &last.twist, &last.acceleration, &parameters.limits);
-    let length = leg_lengths(machine, &stop.end_from(&last.pose));
+    let length = leg_lengths(machine, &where_stopped(parameters, motion));
     let middle = 0.5 * (actuator.min_length + actuator.max_length);
     let furthest = length.iter().fold(0.0_f64, |furthest, length| furthest.max((length - middle).abs()));
     limiting.keeps(Limit::Stroke, furthest / (0.5 * stroke(actuator)));
     within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &length)
+}
+
+/// Where the platform stands if this is the last setpoint: carried on for the timeout, then brought to rest.
+fn where_stopped(parameters: &Parameters, motion: &Motion) -> Pose {
+    let t = parameters.setpoint_timeout_ns as f64 * 1e-9;
+    let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
+    let last = Twist::from_vector(&(v + a * t));
+    let stop = Segment::to_rest(0, &last, &motion.acceleration, &parameters.limits);
+    motion.pose.displaced(&Twist::from_vector(&((v + a * (0.5 * t)) * t + stop.end())))
 }
 
 /// X' and X'' are the derivatives of X, as far as two messages can show.

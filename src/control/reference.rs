@@ -69,12 +69,11 @@ impl Segment {
         self.seconds(instant_ns) >= self.duration_s
     }
 
-    /// Where the displacement of a standing pose ends.
-    pub fn end_from(&self, pose: &Pose) -> Pose {
+    /// The displacement at the end.
+    pub fn end(&self) -> Vector6<f64> {
         let t = self.duration_s;
         let [c0, c1, c2, c3, c4, c5] = &self.coefficients;
-        let end = c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t;
-        pose.displaced(&Twist::from_vector(&end))
+        c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t
     }
 
     /// The base motion, displaced. Before the start the quintic is continued: a measurement is a little
