@@ -71,7 +71,7 @@ pub fn time(cause: Cause, time_ns: u64, now_ns: u64, timeout_ns: u64) -> Result<
     if now_ns.abs_diff(time_ns) <= timeout_ns {
         return Ok(());
     }
-    Err(Trouble::new(cause, seconds_between(now_ns, time_ns), timeout_ns as f64 * 1e-9))
+    Err(Trouble::new(cause, seconds_between(time_ns, now_ns), timeout_ns as f64 * 1e-9))
 }
 
 /// How far each leg's length and the integral of its rate have parted, and on what way. Both fade.

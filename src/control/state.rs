@@ -228,9 +228,9 @@ causes! {
     /// A setpoint outside of `[envelope]`.
     SetpointOutOfEnvelope = 116, Stop, "rad or m", "setpoint outside of the envelope", "correct the trajectory, or [envelope]";
     /// A setpoint with a time stamp from another time than now.
-    SetpointFromElsewhen = 117, Stop, "s from now", "setpoint with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
+    SetpointFromElsewhen = 117, Stop, "s old", "setpoint with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
     /// A measurement with a time stamp from another time than now.
-    MeasurementFromElsewhen = 118, Brake, "s from now", "measurement with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
+    MeasurementFromElsewhen = 118, Brake, "s old", "measurement with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
     /// The pose is so near a singular one that `limits.condition` is exceeded.
     NearSingular = 119, Stop, "", "near a singular pose", "keep away from this pose; hexad check";
 }

@@ -48,6 +48,9 @@ pub enum OperatorError {
 #[derive(Clone, Copy, Debug)]
 pub struct Reason {
     cause: Cause,
+    /// What the daemon is in, and why.
+    state: State,
+    state_cause: Cause,
     /// \[m\], \[rad\], where they say something.
     distance: Option<(f64, f64)>,
 }
@@ -57,12 +60,24 @@ impl Reason {
         let norm = |v: [f64; 3]| nalgebra::Vector3::from(v).norm();
         let distance = (norm(status.position_error_m), norm(status.orientation_error_rad));
         let told = cause == Cause::SetpointTooFar && status.error_valid == 1;
-        Self { cause, distance: told.then_some(distance) }
+        Self {
+            cause,
+            state: State::from_number(status.state).unwrap_or_default(),
+            state_cause: Cause::from_number(status.fault).unwrap_or_default(),
+            distance: told.then_some(distance),
+        }
     }
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.cause == Cause::NotNow {
+            write!(f, "not possible in state {}", self.state.name())?;
+            return match self.state {
+                State::Fault => write!(f, " ({}); hexad clear first", self.state_cause.name()),
+                _ => Ok(()),
+            };
+        }
         write!(f, "{}", self.cause.name())?;
         if let Some((position, orientation)) = self.distance {
             write!(f, ": {:.3} mm and {:.3} mrad away", position * 1e3, orientation * 1e3)?;
@@ -157,7 +172,9 @@ fn outcome(request: Request, state: State) -> Option<bool> {
         (Request::Engage, state) => Some(state == State::Active),
         (Request::Stop | Request::Park, State::Stopping) | (Request::Park, State::Parking) => None,
         (Request::Stop, state) => Some(!state.controls() && state != State::Fault),
-        (Request::Park | Request::Off, state) => Some(state == State::Off),
+        (Request::Park, state) => Some(state == State::Off),
+        // A fault stays one, and has no force either.
+        (Request::Off, state) => Some(!state.controls()),
         (Request::Clear, state) => Some(state != State::Fault),
         (Request::Estop, state) => Some(state == State::Fault),
     }

@@ -1,0 +1,228 @@
+//! Any bytes as what happens to a controller: good cycles, requests, and inputs with numbers replaced by any
+//! bits. Never a panic, and never a force that is not finite, beyond its limits, or without the state for it.
+
+use std::sync::LazyLock;
+
+use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::limits::Limit;
+use hexad::control::state::{Request, State};
+use hexad::host::config::Config;
+use hexad::host::daemon;
+use hexad::model::inverse_geometry::leg_motion;
+use hexad::model::ladder::Rung;
+use hexad::model::task::TaskState;
+
+static CONFIG: LazyLock<Config> = LazyLock::new(|| {
+    Config::parse(include_str!("../../../config/fried2008.toml"), "fried2008.toml").expect("sound")
+});
+
+const START_NS: u64 = 86_400_000_000_000;
+
+/// Rounding of a force at its bound.
+const ROUNDING: f64 = 1e-9;
+
+/// Whether control was reached; panics where an output is wrong.
+pub fn hold(input: &[u8]) -> bool {
+    let mut play = Play::new(input);
+    while play.cycle() {}
+    play.controlled
+}
+
+/// How many cycles these bytes stand for.
+pub fn cycles(input: &[u8]) -> u64 {
+    let mut play = Play::new(input);
+    while play.cycle() {}
+    play.cycles
+}
+
+struct Play<'a> {
+    bytes: &'a [u8],
+    parameters: Parameters,
+    controller: Controller,
+    now_ns: u64,
+    /// Size of the source's motion.
+    size: f64,
+    asked: Option<Asked>,
+    last: Output,
+    controlled: bool,
+    cycles: u64,
+}
+
+impl<'a> Play<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        let parameters = daemon::parameters(&CONFIG.machine, &CONFIG.deployment, Rung::Exact);
+        Self {
+            bytes,
+            parameters,
+            controller: Controller::new(&CONFIG.machine, parameters),
+            now_ns: START_NS,
+            size: 0.0,
+            asked: None,
+            last: Output::default(),
+            controlled: false,
+            cycles: 0,
+        }
+    }
+
+    fn byte(&mut self) -> Option<u8> {
+        let (first, rest) = self.bytes.split_first()?;
+        self.bytes = rest;
+        Some(*first)
+    }
+
+    fn bits(&mut self) -> Option<u64> {
+        let (first, rest) = self.bytes.split_first_chunk::<8>()?;
+        self.bytes = rest;
+        Some(u64::from_le_bytes(*first))
+    }
+
+    /// What a good source and a good driver send: the platform is where it shall be.
+    fn good(&self) -> Input {
+        let t = (self.now_ns - START_NS) as f64 * 1e-9;
+        let mut task = TaskState::at_rest(CONFIG.machine.home);
+        for axis in 0..6 {
+            let omega = 2.0 + axis as f64;
+            let (sin, cos) = (omega * t).sin_cos();
+            task.x[axis] += self.size * (1.0 - cos);
+            task.xd[axis] = self.size * omega * sin;
+            task.xdd[axis] = self.size * omega * omega * cos;
+        }
+        let legs = leg_motion(&CONFIG.machine, &task.motion());
+        Input {
+            release_ns: self.now_ns + self.parameters.period_ns / 2,
+            setpoint: Some(Setpoint { time_ns: self.now_ns, task }),
+            measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: legs.rate }),
+            request: self.asked,
+            deadline_missed: false,
+        }
+    }
+
+    fn ask(&mut self, number: u8) {
+        let request = Request::from_number(u32::from(number % 8));
+        let sequence = self.asked.map_or(1, |asked| asked.message.1 + 1);
+        self.asked = request.map(|request| Asked { request, message: (7, sequence) }).or(self.asked);
+    }
+
+    /// One instruction; false at the end.
+    fn cycle(&mut self) -> bool {
+        let Some(op) = self.byte() else { return false };
+        let high = op >> 4;
+        match op & 15 {
+            0..=5 => {
+                for _ in 0..=u32::from(high) * u32::from(high) {
+                    self.step(self.good());
+                }
+                return true;
+            }
+            6 => {
+                self.ask(high);
+                self.step(self.good());
+                return true;
+            }
+            7 => {
+                self.size = f64::from(high) * 1e-3;
+                return true;
+            }
+            _ => {}
+        }
+        let mut input = self.good();
+        let (Some(bits), Some(setpoint), Some(measurement)) =
+            (self.bits(), &mut input.setpoint, &mut input.measurement)
+        else {
+            return false;
+        };
+        let value = f64::from_bits(bits);
+        let place = usize::from(high);
+        match op & 15 {
+            8 => setpoint.task.x[place % 6] = value,
+            9 => setpoint.task.xd[place % 6] = value,
+            10 => setpoint.task.xdd[place % 6] = value,
+            11 => measurement.length[place % 6] = value,
+            12 => measurement.rate[place % 6] = value,
+            13 => match place % 4 {
+                0 => setpoint.time_ns = bits,
+                1 => measurement.time_ns = bits,
+                2 => input.release_ns = bits,
+                _ => self.now_ns = START_NS + bits % (1 << 40),
+            },
+            14 => match place % 4 {
+                0 => input.setpoint = None,
+                1 => input.measurement = None,
+                2 => input.deadline_missed = true,
+                _ => input.request = Some(Asked { request: Request::ALL[place % 6], message: (bits, bits) }),
+            },
+            _ => {
+                // Small changes: what passes the checks by a little.
+                let small = (bits % 2048) as f64 * 1e-6 - 1e-3;
+                match place % 5 {
+                    0 => setpoint.task.x.iter_mut().for_each(|x| *x += small),
+                    1 => setpoint.task.xd.iter_mut().for_each(|x| *x += 100.0 * small),
+                    2 => setpoint.task.xdd.iter_mut().for_each(|x| *x += 10_000.0 * small),
+                    3 => measurement.length[place % 6] += small,
+                    _ => measurement.rate[place % 6] += 100.0 * small,
+                }
+            }
+        }
+        self.step(input);
+        true
+    }
+
+    fn step(&mut self, input: Input) {
+        let request = input.request.filter(|asked| asked.message != self.last.answered);
+        let output = self.controller.step(&input);
+        self.check(&output, request.map(|asked| asked.request));
+        self.controlled |= output.state == State::Active;
+        self.last = output;
+        self.cycles += 1;
+        self.now_ns += self.parameters.period_ns;
+    }
+
+    fn check(&self, output: &Output, request: Option<Request>) {
+        let limit = CONFIG.machine.actuator.max_force;
+        let Output { state, cause, force, limiting, .. } = output;
+        if state.controls() {
+            assert!(force.iter().all(|force| force.abs() <= limit), "{output:?}");
+            let most =
+                self.parameters.force_rate * self.parameters.period_ns as f64 * 1e-9 + ROUNDING * limit;
+            if self.last.state.controls() {
+                let steady =
+                    force.iter().zip(&self.last.force).all(|(now, before)| (now - before).abs() <= most);
+                assert!(steady, "{output:?} after {:?}", self.last);
+            }
+            if force.iter().any(|force| force.abs() == limit) {
+                assert!(limiting.contains(Limit::Force) || limiting.contains(Limit::ForceRate), "{output:?}");
+            }
+            assert!(output.measured.is_some() && output.error.is_some(), "{output:?}");
+        } else {
+            assert_eq!(force.map(f64::to_bits), [0; 6], "{output:?}");
+        }
+        if let Some((pose, twist)) = &output.measured {
+            let numbers =
+                pose.position.iter().chain(&pose.rotation).chain(&twist.angular).chain(&twist.linear);
+            assert!(numbers.into_iter().all(|number| number.is_finite()), "{output:?}");
+        }
+        assert!(*state != State::Fault || cause.is_fault(), "{output:?}");
+        match request {
+            Some(Request::Estop) => assert_eq!(*state, State::Fault),
+            Some(Request::Off) => assert!(!state.controls()),
+            _ => {}
+        }
+        let before = self.last.state;
+        let allowed = match state {
+            State::Off | State::Fault => true,
+            State::Standby => matches!(before, State::Off | State::Standby | State::Stopping),
+            State::Engaging => {
+                before == State::Engaging
+                    || matches!(before, State::Off | State::Standby) && request == Some(Request::Engage)
+            }
+            State::Active => matches!(before, State::Engaging | State::Active),
+            State::Stopping => before.controls(),
+            State::Parking => {
+                matches!(before, State::Parking | State::Stopping)
+                    || matches!(before, State::Off | State::Standby) && request == Some(Request::Park)
+            }
+        };
+        let cleared = before != State::Fault || *state == State::Fault || request == Some(Request::Clear);
+        assert!(allowed && cleared, "{before:?} to {state:?} by {request:?}");
+    }
+}
