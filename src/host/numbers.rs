@@ -1,9 +1,16 @@
-//! Numbers as people read them.
+//! Numbers as people read and write them.
 
 extern crate std;
 
 use std::format;
 use std::prelude::rust_2024::*;
+
+/// No quantity is larger in SI units, and the products of four such still do not overflow.
+pub const LARGEST: f64 = 1e12;
+
+/// No quantity that must be positive is smaller in SI units: the inertia of a milligram within a millimetre
+/// is 1e-12 kg m^2. The products of four such, and their inverses, are still numbers.
+pub const SMALLEST: f64 = 1e-12;
 
 /// Three significant digits; plain where that is short.
 pub fn significant(x: f64) -> String {

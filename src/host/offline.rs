@@ -11,7 +11,7 @@ use nalgebra::Vector6;
 
 use super::batch;
 use super::files::FileError;
-use super::table::{Table, TableError, Writer, coordinates, legs, six, trajectory_columns};
+use super::table::{Table, TableError, Writer, coordinates, legs, length_columns, six, trajectory_columns};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::Tracker;
 use crate::model::inverse_geometry::leg_motion;
@@ -49,7 +49,13 @@ pub fn inverse_dynamics_file(
     input: &Path,
     output: &Path,
 ) -> Result<(), OfflineError> {
-    let table = Table::read(input, &trajectory_columns(), &[])?;
+    let (result, verdict) = inverse_dynamics(machine, rung, &Table::read(input, &trajectory_columns(), &[])?);
+    result.save(output)?;
+    verdict
+}
+
+/// The output for a table with the columns of a trajectory, and whether all rows have forces.
+pub fn inverse_dynamics(machine: &Machine, rung: Rung, table: &Table) -> (Writer, Result<(), OfflineError>) {
     let mut columns = vec!["t".into()];
     for stem in ["force", "length", "length_rate", "length_accel"] {
         columns.extend(legs(stem));
@@ -68,8 +74,7 @@ pub fn inverse_dynamics_file(
         let legs = leg_motion(machine, motion);
         writer.row([t].into_iter().chain(forces).chain(legs.length).chain(legs.rate).chain(legs.accel));
     }
-    writer.save(output)?;
-    unsolved.verdict(table.rows().len(), "are at singular poses and have no forces")
+    (writer, unsolved.verdict(table.rows().len(), "are at singular poses and have no forces"))
 }
 
 /// Lengths, and rates if the file has them, to poses and twists. `--start` says where a row begins.
@@ -79,12 +84,19 @@ pub fn forward_kinematics_file(
     input: &Path,
     output: &Path,
 ) -> Result<(), OfflineError> {
-    let mut required = vec!["t".into()];
-    required.extend(legs("length"));
-    let rates = legs("length_rate");
-    let table = Table::read(input, &required, &rates)?;
-    let with_rates = table.rows().first().is_some_and(|row| row.len() > required.len());
+    let table = Table::read(input, &length_columns(), &legs("length_rate"))?;
+    let (result, verdict) = forward_kinematics(machine, start, &table);
+    result.save(output)?;
+    verdict
+}
 
+/// The output for a table with the columns of lengths, perhaps of rates, and whether all rows have a pose.
+pub fn forward_kinematics(
+    machine: &Machine,
+    start: Start,
+    table: &Table,
+) -> (Writer, Result<(), OfflineError>) {
+    let with_rates = table.rows().first().is_some_and(|row| row.len() > 1 + LEGS);
     let mut columns = vec!["t".into()];
     columns.extend(coordinates(""));
     columns.extend(["iterations", "converged"].map(String::from));
@@ -114,8 +126,7 @@ pub fn forward_kinematics_file(
         let found = [f64::from(solution.iterations), f64::from(u8::from(solution.converged))];
         writer.row([t].into_iter().chain(x).chain(found).chain(twist.iter().flatten().copied()));
     }
-    writer.save(output)?;
-    unsolved.verdict(table.rows().len(), "did not converge (column converged)")
+    (writer, unsolved.verdict(table.rows().len(), "did not converge (column converged)"))
 }
 
 /// X, X', X'' of a row with the columns of [`trajectory_columns`].

@@ -6,9 +6,9 @@
 
 extern crate std;
 
-use std::path::{Path, PathBuf};
+use std::format;
+use std::path::Path;
 use std::prelude::rust_2024::*;
-use std::{format, vec};
 
 use nalgebra::Vector6;
 use tracing::{info, warn};
@@ -18,7 +18,7 @@ use super::daemon::nanoseconds;
 use super::offline::task_state;
 use super::plant::prepare_thread;
 use super::stop::Stop;
-use super::table::{Table, TableError, trajectory_columns};
+use super::table::{Complaints, Table, TableError, trajectory_columns};
 use crate::control::state::State;
 use crate::ipc::messages::{SetpointMessage, StatusMessage};
 use crate::ipc::ports::{Bus, PortError};
@@ -32,6 +32,10 @@ use crate::scene::trajectory::{Knot, interpolate};
 /// Largest X' and X'' at the ends of a trajectory: what counts as at rest, per second.
 const REST_RATE: f64 = 1e-3;
 
+/// Least time from one row of a trajectory to the next \[s\], far below the period of any loop. Between
+/// rows that are nearer, X'' has no digits.
+const LEAST_STEP_S: f64 = 1e-6;
+
 /// A daemon that has not said for this long that it is in control is not: the approach starts over \[ns\].
 const GIVEN_UP_NS: u64 = 200_000_000;
 
@@ -42,8 +46,6 @@ pub enum SetpointError {
     Port(#[from] PortError),
     #[error(transparent)]
     Table(#[from] TableError),
-    #[error("{}: {what}", path.display())]
-    Trajectory { path: PathBuf, what: String },
 }
 
 /// What to play.
@@ -61,44 +63,48 @@ impl Score {
 
     /// A trajectory from a CSV file. It must begin and end at rest, with times that increase.
     pub fn trajectory(path: &Path) -> Result<Self, SetpointError> {
-        let table = Table::read(path, &trajectory_columns(), &[])?;
-        let knots: Vec<_> = table
-            .rows()
-            .iter()
-            .map(|row| Knot { t: row.first().copied().unwrap_or_default(), state: task_state(row) })
-            .collect();
-        let mut wrong = vec![];
-        for (before, after) in knots.iter().zip(knots.iter().skip(1)) {
-            if after.t <= before.t {
-                wrong.push(format!("t = {:?} after t = {:?}: must increase", after.t, before.t));
+        Self::from_rows(&Table::read(path, &trajectory_columns(), &[])?, path)
+    }
+
+    /// A trajectory from a table with its columns; messages call it `path`.
+    pub fn from_rows(table: &Table, path: &Path) -> Result<Self, SetpointError> {
+        let mut complaints = Complaints::about(path);
+        let knot =
+            |row: &Vec<f64>| Knot { t: row.first().copied().unwrap_or_default(), state: task_state(row) };
+        let knots: Vec<_> = table.rows().iter().map(knot).collect();
+        let places = || knots.iter().zip(table.lines());
+        for ((before, _), (after, line)) in places().zip(places().skip(1)) {
+            if !(after.t - before.t >= LEAST_STEP_S) {
+                complaints.add(format!(
+                    "line {line}: t = {:?} after t = {:?}: must increase, by at least {LEAST_STEP_S:?}",
+                    after.t, before.t
+                ));
             }
         }
-        for (end, knot) in [("first", knots.first()), ("last", knots.last())] {
-            let state = knot.map_or_else(TaskState::default, |knot| knot.state);
+        for (end, place) in [("first", places().next()), ("last", places().next_back())] {
+            let Some((Knot { state, .. }, line)) = place else { continue };
             for (what, largest) in [("rate", state.xd.amax()), ("acceleration", state.xdd.amax())] {
                 if largest > REST_RATE {
-                    wrong.push(format!(
-                        "{end} row: {what} {largest:?}: must be at rest, at most {REST_RATE:?}"
+                    complaints.add(format!(
+                        "line {line}: {end} row: {what} {largest:?}: must be at rest, at most {REST_RATE:?}"
                     ));
                 }
             }
         }
-        wrong.truncate(20);
-        if wrong.is_empty() {
-            return Ok(Self::Trajectory(knots));
-        }
-        Err(SetpointError::Trajectory { path: path.into(), what: wrong.join("; ") })
+        complaints.verdict()?;
+        Ok(Self::Trajectory(knots))
     }
 
     /// Seconds it takes.
-    fn duration(&self) -> f64 {
+    pub fn duration(&self) -> f64 {
         match self {
             Self::Scene(scene) => scene.duration,
             Self::Trajectory(knots) => knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t),
         }
     }
 
-    fn at(&self, t: f64) -> TaskState {
+    /// X, X', X'' at `t`, within the duration.
+    pub fn at(&self, t: f64) -> TaskState {
         match self {
             Self::Scene(scene) => scene.at(t),
             Self::Trajectory(knots) => {
@@ -189,5 +195,47 @@ fn message(state: &TaskState) -> SetpointMessage {
         x_rate: state.xd.into(),
         x_accel: state.xdd.into(),
         ..SetpointMessage::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A row at rest with these t and x.
+    fn row(t: &str, x: &str) -> String {
+        format!("{t},0,0,0,{x},0,0{}\n", ",0".repeat(12))
+    }
+
+    fn read(rows: &[String]) -> Result<Score, SetpointError> {
+        let text = trajectory_columns().join(",") + "\n" + &rows.concat();
+        let path = Path::new("x.csv");
+        let table = Table::from_reader(text.as_bytes(), path, &trajectory_columns(), &[]).unwrap();
+        Score::from_rows(&table, path)
+    }
+
+    #[test]
+    fn rows_that_are_too_near_are_refused_each_with_its_line() {
+        let rows = [row("0", "1"), row("1e-300", "2"), row("0.5", "2"), row("0.5", "1")];
+        assert_eq!(
+            read(&rows).unwrap_err().to_string(),
+            "x.csv: line 3: t = 1e-300 after t = 0.0: must increase, by at least 1e-6\n\
+             x.csv: line 5: t = 0.5 after t = 0.5: must increase, by at least 1e-6"
+        );
+    }
+
+    #[test]
+    fn a_refusal_of_many_rows_is_short() {
+        let message = read(&vec![row("0", "1"); 1000]).unwrap_err().to_string();
+        assert_eq!(message.lines().count(), 21);
+        assert!(message.ends_with("\nx.csv: and 979 more"), "{message}");
+    }
+
+    #[test]
+    fn the_largest_numbers_still_make_setpoints() {
+        let score = read(&[row("-1e12", "1e12"), row("0", "-1e12"), row("1e-6", "1e12")]).unwrap();
+        for t in [0.0, 0.5e12, 1e12, score.duration()] {
+            assert!(score.at(t).is_finite(), "{t}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Machines that cannot exist: inertia, stroke, joints, home.
 
-use hexad::host::config::Violation;
+use hexad::host::config::{Config, Violation};
+use nalgebra::Vector3;
 
 use super::{FRIED, fried_with, refused, violations};
 
@@ -97,6 +98,12 @@ fn the_geometry_must_hold_the_platform() {
         "leg[1].universal_axis = 0.000173796 rad from the leg at home: must be at least 0.001 rad from it",
     );
     assert_eq!(violations(&fried_with(leg, &axis("[11.0, -4.2, 2.53]"))), []);
+    // However long it is, it is a direction: squares of these are no numbers.
+    for (short, unit) in [("[0, 3e-170, -4e-170]", [0.0, 0.6, -0.8]), ("[0, 5e-324, 0]", [0.0, 1.0, 0.0])] {
+        let machine = Config::parse(&fried_with(leg, &axis(short)), "test.toml").unwrap().machine;
+        let read = machine.joints.triples.unpack_vectors(&machine.joints.universal_axis)[0];
+        assert!((read - Vector3::from(unit)).norm() < 1e-9, "{short}: {read}");
+    }
 }
 
 /// A machine from twelve points, with a stroke for every length.
@@ -126,6 +133,12 @@ fn singular_machines_are_refused() {
     only(machine_with(ring(0.7, 0.0), line), "leg[1].platform_m = on one line with all others", bound);
     only(machine_with(line, ring(0.5, 0.2)), "leg[1].base_m = on one line with all others", bound);
     only(machine_with(ring(0.7, 0.0), point), "leg[1].platform_m = on one line with all others", bound);
+    let bound = "must be within at least 1e-6 m (RMS)";
+    only(
+        machine_with(ring(0.7, 0.0), ring(1e-7, 0.2)),
+        "leg[1].platform_m = one of six within 1e-7 m",
+        bound,
+    );
     // Two regular hexagons, one above the other: every leg meets the axis at the same angle.
     let end = "must be at most 10000: the legs cannot hold the platform in every direction";
     only(machine_with(ring(0.7, 0.0), ring(0.5, 0.0)), "home.pose = condition number ", end);

@@ -150,6 +150,32 @@ fn what_is_no_configuration_at_all_is_refused_in_few_words() {
     assert!(!violations("").is_empty());
 }
 
+#[test]
+fn many_mistakes_are_counted() {
+    let keys = |count: usize| (0..count).map(|i| format!("key{i:03} = 0\n")).collect::<String>();
+    let found = violations(&format!("{}{REFERENCE}", keys(1000)));
+    assert_eq!((found.len(), found[99].key.as_str(), found[100].line), (101, "key099", 100));
+    assert_eq!(found[100].to_string(), "and 900 more: not shown, as 100 are");
+    assert_eq!(violations(&format!("{}{REFERENCE}", keys(100))).len(), 100);
+    // A file full of legs: those beyond what can be shown are not even read.
+    let legs = violations(&"[[leg]]\n".repeat(8000));
+    assert_eq!(legs.len(), 101);
+    assert!(
+        legs.iter().any(|violation| violation.to_string().starts_with("leg = 8000 sections: must be 6 "))
+    );
+}
+
+#[test]
+fn what_a_file_says_is_shown_on_one_line_and_cut() {
+    let key = format!("\"a\\nb\\u001b[2J{}\"", "c".repeat(1000));
+    let found = violations(&format!("{key} = \"\"\"1\n2\"\"\"\n{REFERENCE}"));
+    let shown = format!("a b\\u{{1b}}[2J{}... = \"\"\"1 2\"\"\": unknown key, ", "c".repeat(53));
+    assert!(found.len() == 1 && found[0].to_string().starts_with(&shown), "{found:?}");
+    let found = violations(&format!("\u{1b}[2J{}\n{REFERENCE}", "c".repeat(1000)));
+    let shown = format!("TOML syntax = \\u{{1b}}[2J{}...: ", "c".repeat(56));
+    assert!(found.len() == 1 && found[0].to_string().starts_with(&shown), "{found:?}");
+}
+
 proptest! {
     /// No text makes the reader panic or hang, and what is damaged does not make violations without a line.
     #[test]

@@ -51,6 +51,7 @@ fn single_values_are_refused_with_key_value_and_bound() {
     let number = "mass_kg = 3.0";
     refused(number, "mass_kg = -3", "platform.mass_kg = -3: must be greater than 0");
     refused(number, "mass_kg = 0.0", "platform.mass_kg = 0.0: must be greater than 0");
+    refused(number, "mass_kg = 1e-300", "platform.mass_kg = 1e-300: must be at least 1e-12");
     refused(number, "mass_kg = \"3\"", "platform.mass_kg = \"3\": must be a number, greater than 0");
     refused(number, "mass_kg = [3.0]", "platform.mass_kg = [3.0]: must be a number, greater than 0");
     for literal in ["nan", "-inf", "1e999", "2e12"] {

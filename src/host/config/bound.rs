@@ -7,17 +7,17 @@ use std::{format, prelude::rust_2024::*};
 
 use toml::de::DeValue;
 
-/// No quantity of a machine is larger in SI units, and the products of four such still do not overflow.
-const LARGEST: f64 = 1e12;
+use crate::host::numbers::{LARGEST, SMALLEST};
 
 /// What a number must be, besides finite.
 #[derive(Clone, Copy)]
 pub(super) enum Bound {
     Finite,
+    /// At least [`SMALLEST`].
     Positive,
     NotNegative,
     NotPositive,
-    /// Above 0 and up to the limit.
+    /// At least [`SMALLEST`] and up to the limit.
     UpTo(f64),
     /// Both ends included.
     Within(f64, f64),
@@ -34,14 +34,15 @@ impl Bound {
         };
         let admits = match self {
             Self::Finite => true,
-            Self::Positive => x > 0.0,
+            Self::Positive => x >= SMALLEST,
             Self::NotNegative => x >= 0.0,
             Self::NotPositive => x <= 0.0,
-            Self::UpTo(high) => x > 0.0 && x <= high,
+            Self::UpTo(high) => x >= SMALLEST && x <= high,
             Self::Within(low, high) => (low..=high).contains(&x),
         };
         match (x.abs() <= LARGEST, admits) {
             (true, true) => None,
+            (true, false) if x > 0.0 && x < SMALLEST => Some(format!("must be at least {SMALLEST:e}")),
             (true, false) => Some(format!("must be {self}")),
             (false, _) => Some(format!("must be a finite number, at most {LARGEST:e} in magnitude")),
         }

@@ -22,6 +22,9 @@ use crate::model::task::TaskState;
 /// the drawings of 6-3 platforms; a universal or spherical joint of two legs cannot be built.
 const COINCIDENT: f64 = 1e-6;
 
+/// Least radius of a body's joints \[m\]: there is no machine of a micrometre, and its cube must have digits.
+const LEAST_RADIUS: f64 = 1e-6;
+
 /// Least sine of the angle between a leg at home and the first axis of its universal joint. Where they
 /// are parallel the joint locks; at a milliradian the leg spins a thousand times faster than it swings.
 const LEAST_UNIVERSAL_SINE: f64 = 1e-3;
@@ -67,16 +70,25 @@ impl Spread {
     }
 }
 
-/// Refuses joints of one body that are all on one line, else any two in one place. False if on a line.
+/// Refuses joints of one body that are all on one line or about one point, else any two in one place. False
+/// if on a line or about a point.
 fn check_joints(legs: &[Leg], key: &str, joint: fn(&Leg) -> Vector3<f64>) -> bool {
     let spread = Spread::of(legs.iter().map(joint));
     let least = COINCIDENT * spread.radius;
     let all_read = legs.len() >= LEGS && legs.iter().map(joint).all(|point| is_finite(&point));
-    if let (true, true, Some(first)) = (all_read, spread.off_line <= least, legs.first()) {
-        let shown = format!("on one line with all others, to {:?} m", rounded(spread.off_line));
-        let bound = format!("must be off it by {COINCIDENT:?} of the radius: no leg resists a turn about it");
-        first.reader.refuse_as(key, shown, bound);
-        return false;
+    if let (true, Some(first)) = (all_read, legs.first()) {
+        if spread.off_line <= least {
+            let shown = format!("on one line with all others, to {:?} m", rounded(spread.off_line));
+            let bound =
+                format!("must be off it by {COINCIDENT:?} of the radius: no leg resists a turn about it");
+            first.reader.refuse_as(key, shown, bound);
+            return false;
+        }
+        if spread.radius < LEAST_RADIUS {
+            let shown = format!("one of six within {:?} m", rounded(spread.radius));
+            first.reader.refuse_as(key, shown, format!("must be within at least {LEAST_RADIUS:?} m (RMS)"));
+            return false;
+        }
     }
     for (i, leg) in legs.iter().enumerate() {
         for (earlier, other) in legs.iter().enumerate().take(i) {
@@ -122,7 +134,8 @@ fn check_legs(machine: &Machine, legs: &[Leg], pose: &Pose) -> bool {
 
 fn check_condition(machine: &Machine, pose: &Pose, home: &Reader) {
     let condition = condition(machine, pose);
-    if condition > LARGEST_CONDITION {
+    // Also where it is no number.
+    if !(condition <= LARGEST_CONDITION) {
         home.refuse_as(
             "pose",
             format!("condition number {} of the legs' wrenches", rounded(condition)),

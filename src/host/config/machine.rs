@@ -170,8 +170,9 @@ fn leg(mut reader: Reader) -> Leg {
     let base = Vector3::from(reader.vector("base_m"));
     let platform = Vector3::from(reader.vector("platform_m"));
     let axis = Vector3::from(reader.vector_or("universal_axis", [0.0, 1.0, 0.0]));
-    let universal_axis = axis.try_normalize(f64::MIN_POSITIVE).unwrap_or(Vector3::repeat(f64::NAN));
-    if axis.norm() <= f64::MIN_POSITIVE {
+    // Scaled before it is squared, which would leave no digits of a short one.
+    let universal_axis = axis.unscale(axis.amax()).normalize();
+    if axis.amax() == 0.0 {
         reader.refuse("universal_axis", "must not be zero: it is a direction");
     }
     Leg { reader, base, platform, universal_axis }

@@ -8,7 +8,7 @@
 
 extern crate std;
 
-use std::{fmt, fs, io, path::Path, path::PathBuf, prelude::rust_2024::*};
+use std::{fmt, io, path::Path, prelude::rust_2024::*};
 
 use thiserror::Error;
 use toml::de::DeTable;
@@ -24,6 +24,10 @@ mod geometry;
 mod machine;
 mod reader;
 mod syntax;
+pub mod text;
+
+/// Violations shown of one file; a file with more is something else.
+const MAX_VIOLATIONS: usize = 100;
 
 /// Longest `name`; iceoryx2 allows 255 characters in the name of a service, which adds some of its own.
 const LONGEST_NAME: usize = 64;
@@ -43,10 +47,10 @@ pub struct Config {
 #[derive(Debug, Error)]
 pub enum ConfigError {
     /// The file could not be read.
-    #[error("{}: could not be read: {cause}", path.display())]
+    #[error("{place}: could not be read: {cause}")]
     Unreadable {
-        /// The file.
-        path: PathBuf,
+        /// The file, as it appears in the message.
+        place: String,
         /// What the operating system said.
         cause: io::Error,
     },
@@ -76,10 +80,8 @@ pub struct Violation {
 impl Config {
     /// Reads and validates a file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        match fs::read_to_string(path) {
-            Ok(text) => Self::parse(&text, &path.display().to_string()),
-            Err(cause) => Err(ConfigError::Unreadable { path: path.into(), cause }),
-        }
+        let (text, place) = text::text_of(path)?;
+        Self::parse(&text, &place)
     }
 
     /// Validates a text; `place` is what messages call it.

@@ -14,16 +14,15 @@ use std::{format, prelude::rust_2024::*, vec::Vec};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Violation;
 use super::bound::{Bound, integer, number};
-use super::syntax::line_at;
-
-/// Values longer than this are cut in messages.
-const LONGEST_SHOWN: usize = 60;
+use super::{MAX_VIOLATIONS, Violation};
+use crate::host::excerpt::excerpt;
 
 /// The text and the violations found in it so far, shared by the readers of all its tables.
 pub(super) struct Report<'t> {
     text: &'t str,
+    /// Where its lines end.
+    ends: Vec<usize>,
     /// Lines were blanked, so a key that is missing may be on one of them: nothing is called missing.
     incomplete: bool,
     violations: RefCell<Vec<Violation>>,
@@ -45,18 +44,27 @@ pub(super) struct Reader<'t> {
 
 impl<'t> Report<'t> {
     pub fn new(text: &'t str, syntax_errors: Vec<Violation>) -> Self {
-        Self { text, incomplete: !syntax_errors.is_empty(), violations: RefCell::new(syntax_errors) }
+        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(i, _)| i).collect();
+        let incomplete = !syntax_errors.is_empty();
+        Self { text, ends, incomplete, violations: RefCell::new(syntax_errors) }
     }
 
-    /// In the order of the lines.
+    /// In the order of the lines; at the end, how many there are more than are shown.
     pub fn into_violations(self) -> Vec<Violation> {
         let mut violations = self.violations.into_inner();
         violations.sort_by_key(|violation| violation.line);
+        let more = violations.len().saturating_sub(MAX_VIOLATIONS);
+        violations.truncate(MAX_VIOLATIONS);
+        if let (1.., Some(last)) = (more, violations.last()) {
+            let bound = format!("not shown, as {MAX_VIOLATIONS} are");
+            let key = format!("and {more} more");
+            violations.push(Violation { line: last.line, key, value: None, bound });
+        }
         violations
     }
 
     fn line(&self, offset: usize) -> usize {
-        line_at(self.text, offset)
+        1 + self.ends.partition_point(|end| *end < offset)
     }
 
     /// A value as written, on one line; `None` for what a header opens.
@@ -67,13 +75,7 @@ impl<'t> Report<'t> {
             DeValue::Array(items) => items.first().is_some_and(|item| item.span().start == span.start),
             _ => false,
         };
-        let words: Vec<&str> = self.text.get(span)?.split_whitespace().collect();
-        let line = words.join(" ");
-        match line.char_indices().nth(LONGEST_SHOWN) {
-            _ if by_header => None,
-            Some((end, _)) => Some(format!("{}...", line.get(..end)?)),
-            None => Some(line),
-        }
+        if by_header { None } else { self.text.get(span).map(excerpt) }
     }
 }
 
@@ -170,7 +172,8 @@ impl<'t> Reader<'t> {
         self.child(self.key(key), found)
     }
 
-    /// `count` tables, each under a header of its own. Returns as many as there are.
+    /// `count` tables, each under a header of its own. Returns as many as there are, but
+    /// no more than can be complained about.
     pub fn rows(&mut self, key: &'static str, count: usize) -> Vec<Self> {
         let bound = format!("{count} sections headed [[{key}]]");
         let Some(value) = self.required(key, &bound) else { return Vec::new() };
@@ -182,7 +185,7 @@ impl<'t> Reader<'t> {
             self.refuse_as(key, format!("{} sections", rows.len()), format!("must be {bound}"));
         }
         let row = |(i, row)| self.child(format!("{}[{}]", self.key(key), i + 1), Some(row));
-        rows.iter().enumerate().map(row).collect()
+        rows.iter().take(MAX_VIOLATIONS).enumerate().map(row).collect()
     }
 
     /// Reports the value of `key`, as written or by default.
@@ -211,7 +214,7 @@ impl<'t> Reader<'t> {
             if !known.contains(&key.get_ref().as_ref()) {
                 let bound = format!("unknown key, must be one of: {}", known.join(", "));
                 let line = self.report.line(key.span().start);
-                self.add(line, self.key(key.get_ref()), self.report.shown(value), bound);
+                self.add(line, self.key(&excerpt(key.get_ref())), self.report.shown(value), bound);
             }
         }
     }

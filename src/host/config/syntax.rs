@@ -11,6 +11,7 @@ use std::{prelude::rust_2024::*, vec::Vec};
 use toml::de::DeTable;
 
 use super::Violation;
+use crate::host::excerpt::excerpt;
 
 /// More syntax errors than this: not a configuration file. Bounds the work, one parse per error.
 const MOST_ERRORS: usize = 20;
@@ -31,7 +32,7 @@ pub(super) fn readable(text: &str) -> (String, Vec<Violation>) {
         violations.push(Violation {
             line: broken + 1,
             key: "TOML syntax".into(),
-            value: lines.get(broken).map(|line| line.trim().into()),
+            value: lines.get(broken).map(|line| excerpt(line)),
             bound: error.message().into(),
         });
         if violations.len() == MOST_ERRORS {
@@ -42,7 +43,7 @@ pub(super) fn readable(text: &str) -> (String, Vec<Violation>) {
 }
 
 /// Number of the line that contains byte `offset`, counting from 1.
-pub(super) fn line_at(text: &str, offset: usize) -> usize {
+fn line_at(text: &str, offset: usize) -> usize {
     1 + text.bytes().take(offset).filter(|byte| *byte == b'\n').count()
 }
 

@@ -15,6 +15,7 @@ use self::children::Process;
 use self::recording::{Recorder, Recording};
 use self::summary::Summary;
 use super::charts::ChartError;
+use super::config::text::text_of;
 use super::config::{Config, ConfigError};
 use super::files::{FileError, write_whole};
 use super::operator::Operator;
@@ -238,13 +239,8 @@ fn progress(seconds: f64) -> ProgressBar {
         .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-fn read(path: Option<&Path>) -> Result<(String, String), FileError> {
-    match path {
-        None => Ok((DEFAULT_MACHINE.into(), "fried2008.toml".into())),
-        Some(path) => {
-            Ok((fs::read_to_string(path).map_err(FileError::on(path))?, path.display().to_string()))
-        }
-    }
+fn read(path: Option<&Path>) -> Result<(String, String), ConfigError> {
+    path.map_or_else(|| Ok((DEFAULT_MACHINE.into(), "fried2008.toml".into())), text_of)
 }
 
 /// The configuration under another name and rate. The text has been parsed before.

@@ -1,0 +1,127 @@
+//! Any bytes as a table: for inverse dynamics, for forward kinematics, and as a trajectory.
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use hexad::host::config::Config;
+use hexad::host::offline::{Start, forward_kinematics, inverse_dynamics};
+use hexad::host::setpoints::{Score, SetpointError};
+use hexad::host::table::{Table, TableError, Writer, legs, length_columns, trajectory_columns};
+use hexad::model::ladder::Rung;
+use hexad::model::machine::Machine;
+
+use super::{line_number, lines};
+
+/// What messages call the input.
+const PLACE: &str = "fuzz.csv";
+
+/// Complaints shown at most, and how many there are beyond.
+const MAX_COMPLAINTS: usize = 20 + 1;
+
+/// No number of a table is larger.
+const LARGEST: f64 = 1e12;
+
+static MACHINE: LazyLock<Machine> = LazyLock::new(|| {
+    Config::parse(include_str!("../../../config/fried2008.toml"), "fried2008.toml").expect("sound").machine
+});
+
+/// Whether the input is accepted by one of the readers; panics where an answer is wrong.
+pub fn hold(input: &[u8]) -> bool {
+    let read = |required: &[String], optional: &[String]| {
+        let table = Table::from_reader(input, Path::new(PLACE), required, optional);
+        match &table {
+            Ok(table) => check_table(table, required.len(), optional.len(), input),
+            Err(error) => check_refusal(error, input),
+        }
+        table.ok()
+    };
+    let motions = read(&trajectory_columns(), &[]);
+    if let Some(table) = &motions {
+        check_output(table, &inverse_dynamics(&MACHINE, Rung::Exact, table).0, 1 + 4 * 6);
+        check_trajectory(table, input);
+    }
+    let lengths = read(&length_columns(), &legs("length_rate"));
+    if let Some(table) = &lengths {
+        let with_rates = table.rows().first().is_some_and(|row| row.len() > length_columns().len());
+        let width = if with_rates { 9 + 6 } else { 9 };
+        for start in [Start::Previous, Start::Home] {
+            check_output(table, &forward_kinematics(&MACHINE, start, table).0, width);
+        }
+    }
+    motions.is_some() || lengths.is_some()
+}
+
+/// Rows of one width, of finite numbers, each with its line.
+fn check_table(table: &Table, required: usize, optional: usize, input: &[u8]) {
+    let width = table.rows().first().expect("at least one row").len();
+    assert!(width == required || width == required + optional, "{width} columns");
+    assert_eq!(table.rows().len(), table.lines().len());
+    assert!(table.lines().is_sorted_by(|a, b| a < b), "a line each: {:?}", table.lines());
+    for (row, line) in table.rows().iter().zip(table.lines()) {
+        assert_eq!(row.len(), width);
+        assert!(row.iter().all(|x| x.abs() <= LARGEST), "{row:?}");
+        let number = line_number(&line.to_string(), input);
+        check_line(row[0], number, input);
+    }
+}
+
+/// The time of a row is in the line that it is said to begin in, where no quote hides what a line is.
+fn check_line(t: f64, number: usize, input: &[u8]) {
+    let line = input.split(|byte| *byte == b'\n').nth(number - 1).expect("a line of the input");
+    if !input.contains(&b'"') {
+        let times = String::from_utf8_lossy(line);
+        assert!(times.split(',').any(|x| x.trim().parse() == Ok(t)), "{t} is not in line {number}: {times}");
+    }
+}
+
+/// A line per complaint, each with its place and what must be.
+fn check_refusal(error: &TableError, input: &[u8]) {
+    let TableError::Content { complaints } = error else { panic!("bytes can be read: {error}") };
+    assert!((1..=MAX_COMPLAINTS).contains(&complaints.len()), "{} complaints", complaints.len());
+    let message = error.to_string();
+    let lines = lines(&message);
+    assert_eq!(lines.len(), complaints.len(), "a line each: {message}");
+    for line in lines {
+        let what = line.strip_prefix(PLACE).and_then(|rest| rest.strip_prefix(": ")).expect(line);
+        if let Some(rest) = what.strip_prefix("line ") {
+            let (number, what) = rest.split_once(": ").expect(what);
+            line_number(number, input);
+            assert!(what.contains("must ") || what.starts_with("missing columns "), "no bound: {line}");
+        } else {
+            let of_file = what == "no rows: must have at least one";
+            assert!(of_file || what.starts_with("and ") && what.ends_with(" more"), "no place: {line}");
+        }
+    }
+}
+
+/// What a command writes has a row for each of the input's, with its time to the last bit; numbers that a
+/// row has not are NaN, none is infinite.
+fn check_output(input: &Table, output: &Writer, width: usize) {
+    let rows: Vec<&str> = output.text().lines().skip(1).collect();
+    assert_eq!(rows.len(), input.rows().len());
+    for (row, input) in rows.into_iter().zip(input.rows()) {
+        let numbers: Vec<f64> = row.split(',').map(|x| x.parse().expect("a number")).collect();
+        assert_eq!(numbers.len(), width);
+        assert_eq!(numbers[0].to_bits(), input[0].to_bits());
+        assert!(!numbers.iter().any(|x| x.is_infinite()), "{row}");
+    }
+}
+
+/// A trajectory that is accepted has finite setpoints wherever it is asked; else the refusal is one of a
+/// table.
+fn check_trajectory(table: &Table, input: &[u8]) {
+    match Score::from_rows(table, Path::new(PLACE)) {
+        Err(SetpointError::Table(error)) => check_refusal(&error, input),
+        Err(error) => panic!("bytes can be read: {error}"),
+        Ok(score) => {
+            let duration = score.duration();
+            assert!(duration.is_finite() && duration >= 0.0, "{duration} s");
+            let starts = table.rows().iter().map(|row| row[0] - table.rows()[0][0]);
+            let shares = (0..=64).map(|k| duration * f64::from(k) / 64.0);
+            for t in starts.flat_map(|t| [t, t + 1e-7, t + 1e-3]).chain(shares) {
+                let state = score.at(t.min(duration));
+                assert!(state.is_finite(), "at {t}: {state:?}");
+            }
+        }
+    }
+}
