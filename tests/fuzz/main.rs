@@ -1,11 +1,11 @@
-//! What reads files from people, against any bytes: no panic, bounded memory and time, and an answer that
-//! either works or says place, value and bound.
+//! What reads files from people, and the controller, against any bytes: no panic, bounded memory and time, and
+//! an answer that either works or says place, value and bound.
 //!
 //! Here the kept seeds run through the properties, with every `cargo test`. The search for new ones:
 //!
 //! ```sh
 //! cargo install cargo-fuzz
-//! tests/fuzz/run.sh config 600     # or machine, or csv; seconds
+//! tests/fuzz/run.sh config 600     # or machine, csv, or step; seconds
 //! ```
 //!
 //! | target | input | reader |
@@ -13,6 +13,7 @@
 //! | `config` | a configuration file | `Config` |
 //! | `machine` | numbers for `config/reference.toml` | the same, past the syntax |
 //! | `csv` | a table | inverse dynamics, forward kinematics, trajectory |
+//! | `step` | cycles, requests, inputs of any bits | `Controller::step` |
 //!
 //! `tests/fuzz/run.sh TARGET merge` adds to the seeds what was found to cover more.
 //!
@@ -26,8 +27,8 @@
 
 mod properties;
 
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{env, fs};
 
 /// Memory of this process at its largest: the readers' bounds and the test itself \[kB\].
 const MAX_MEMORY_KB: u64 = 256 << 10;
@@ -61,6 +62,45 @@ fn configuration_files() {
 #[test]
 fn machines() {
     replay(properties::machine::hold, &["tests/fuzz/seeds/machine"], "");
+}
+
+#[test]
+fn cycles() {
+    replay(properties::step::hold, &["tests/fuzz/seeds/step"], "");
+}
+
+/// A million cycles with any bits in their inputs; a hundred million with `HEXAD_LONG=1`.
+#[test]
+fn random_cycles() {
+    let wanted = if env::var_os("HEXAD_LONG").is_some() { 100_000_000 } else { 1_000_000 };
+    let mut state = 2008_u64;
+    let mut random = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state.wrapping_mul(0x2545_F491_4F6C_DD1D)
+    };
+    let (mut done, mut programs, mut controlled) = (0, 0, 0);
+    while done < wanted {
+        let length = 16 + random() % 512;
+        let mut program = vec![];
+        while program.len() < length as usize {
+            let [kind, op, ..] = random().to_le_bytes();
+            match kind % 10 {
+                // Good cycles, and now and then a request to engage: control is where it matters.
+                0..4 => program.push(op & 0xF0),
+                4 => program.push(0x16),
+                _ => {
+                    program.push(op);
+                    program.extend(random().to_le_bytes());
+                }
+            }
+        }
+        let (cycles, reached) = properties::step::run(&program);
+        (done, programs, controlled) = (done + cycles, programs + 1, controlled + u64::from(reached));
+    }
+    println!("{done} cycles in {programs} programs, {controlled} of them reached control");
+    assert!(10 * controlled > programs, "{controlled} of {programs} reached control");
 }
 
 #[test]

@@ -5,6 +5,7 @@
 pub mod config;
 pub mod csv;
 pub mod machine;
+pub mod step;
 
 /// Longest line of a message: what is unknown is answered with all that is known.
 const MAX_LINE: usize = 800;

@@ -23,16 +23,14 @@ const ROUNDING: f64 = 1e-9;
 
 /// Whether control was reached; panics where an output is wrong.
 pub fn hold(input: &[u8]) -> bool {
-    let mut play = Play::new(input);
-    while play.cycle() {}
-    play.controlled
+    run(input).1
 }
 
-/// How many cycles these bytes stand for.
-pub fn cycles(input: &[u8]) -> u64 {
+/// How many cycles it was, and whether control was reached.
+pub fn run(input: &[u8]) -> (u64, bool) {
     let mut play = Play::new(input);
     while play.cycle() {}
-    play.cycles
+    (play.cycles, play.controlled)
 }
 
 struct Play<'a> {
