@@ -163,9 +163,13 @@ macro_rules! causes {
                 match self { $(Self::$variant => $unit,)* }
             }
 
-            /// What the daemon does about it.
+            /// What the daemon does about it. No `match`: the loop calls this, and the numbers that no cause
+            /// has would be traps in its machine code.
             pub fn reaction(self) -> Reaction {
-                match self { $(Self::$variant => Reaction::$reaction,)* }
+                $(if self == Self::$variant {
+                    return Reaction::$reaction;
+                })*
+                Reaction::Brake
             }
         }
     };
