@@ -186,9 +186,10 @@ impl Controller {
 
     /// One cycle. Pure: depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
-        self.doubt(input);
         let now_ns = input.release_ns;
-        let located = self.locate(now_ns);
+        let unbroken = self.unbroken(now_ns);
+        self.doubt(input);
+        let located = unbroken.and_then(|()| self.locate(now_ns));
         let setpoint = self.fresh_setpoint(now_ns);
         let mut output = Output { limiting: self.setpoint_limiting, ..Output::default() };
         if self.mode.state.controls() || setpoint.is_ok() {
@@ -284,6 +285,13 @@ impl Controller {
         let [no_measurement, no_setpoint] = waited.map(u64::from);
         self.without_measurement += counted * no_measurement;
         self.without_setpoint += counted * no_setpoint;
+    }
+
+    /// After a pause of the loop the inputs may be fresh again, but meanwhile the drives had no force and
+    /// have let go: control does not go on as if nothing had been.
+    fn unbroken(&self, release_ns: u64) -> Result<(), Trouble> {
+        let Some(last) = self.measurement.good.filter(|_| self.mode.state.controls()) else { return Ok(()) };
+        doubt::time(Cause::MeasurementLost, last.time_ns, release_ns, self.parameters.measured_timeout_ns)
     }
 
     /// The pose and twist of the platform, by one bounded step of forward kinematics.

@@ -38,14 +38,14 @@ pub enum OperatorError {
     Refused(Request, Reason),
     #[error("{request} was not completed: the daemon is in {state}: {reason}", request = .0.name(), state = .1.name(), reason = .2)]
     Otherwise(Request, State, Reason),
-    #[error("{request} was not completed within {1:.0} s: the daemon is in {state}", request = .0.name(), state = .2.name())]
-    TooLong(Request, f64, State),
+    #[error("{request} was not completed within {1} s: the daemon is in {state}: {reason}", request = .0.name(), state = .2.name(), reason = .3)]
+    TooLong(Request, f64, State, Reason),
     #[error("interrupted")]
     Interrupted,
 }
 
 /// A cause, with what the status says about it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Reason {
     cause: Cause,
     /// What the daemon is in, and why.
@@ -125,7 +125,7 @@ impl Operator {
         let mut asked: Option<Instant> = None;
         let mut heard = Instant::now();
         let mut accepted = false;
-        let mut state = State::default();
+        let (mut state, mut reason) = (State::default(), Reason::default());
         self.first = self.commands.next_message();
         loop {
             if !accepted && asked.is_none_or(|asked| asked.elapsed() > REPEAT) {
@@ -135,20 +135,24 @@ impl Operator {
             if let Some(status) = self.status() {
                 heard = Instant::now();
                 state = State::from_number(status.state).unwrap_or_default();
-                let cause = Cause::from_number(status.fault).unwrap_or_default();
+                reason = Reason::new(Cause::from_number(status.fault).unwrap_or_default(), &status);
                 if (status.answered_epoch, status.answered_sequence) >= self.first
                     && status.answered_epoch == self.first.0
                 {
                     match Cause::from_number(status.refused).unwrap_or_default() {
                         Cause::None => accepted = true,
-                        cause if is_patient && !accepted && !cause.is_fault() => {}
                         _ if accepted => {}
+                        // Nobody else leaves a fault.
+                        cause if is_patient && !cause.is_fault() && state != State::Fault => {}
                         cause => return Err(OperatorError::Refused(request, Reason::new(cause, &status))),
                     }
                 }
                 if accepted && let Some(reached) = outcome(request, state) {
-                    let otherwise = || OperatorError::Otherwise(request, state, Reason::new(cause, &status));
-                    return if reached { Ok(state) } else { Err(otherwise()) };
+                    return if reached {
+                        Ok(state)
+                    } else {
+                        Err(OperatorError::Otherwise(request, state, reason))
+                    };
                 }
             }
             if stop.requested() {
@@ -158,7 +162,7 @@ impl Operator {
                 return Err(OperatorError::Silent(machine.into()));
             }
             if began.elapsed() > longest {
-                return Err(OperatorError::TooLong(request, longest.as_secs_f64(), state));
+                return Err(OperatorError::TooLong(request, longest.as_secs_f64(), state, reason));
             }
             thread::sleep(POLL);
         }

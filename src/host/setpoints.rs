@@ -182,7 +182,11 @@ impl<'a> Player<'a> {
                 info!("the daemon is in control: moving");
                 self.engaged_ns = Some(now_ns);
             }
-        } else if self.engaged_ns.is_none() && status.pose_valid == 1 {
+        } else if self.engaged_ns.is_none()
+            && status.pose_valid == 1
+            && (status.state != State::Engaging as u32 || self.timeline.is_none())
+        {
+            // While engaging the platform comes to what was offered: that must stand.
             let (from, to) = (Vector6::from(status.x), self.score.at(0.0).x);
             self.timeline = Some(Timeline::new(self.machine, &from, &to, self.score.duration()));
         }

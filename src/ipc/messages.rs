@@ -36,6 +36,10 @@ pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
     fn header_mut(&mut self) -> &mut Header;
     /// Fills in what depends on everything else, last of all.
     fn seal(&mut self) {}
+    /// Whether it is what was sealed.
+    fn is_whole(&self) -> bool {
+        true
+    }
 }
 
 /// Where the platform shall be: X = alpha, beta, gamma \[rad\], x, y, z \[m\], and derivatives.
@@ -70,9 +74,9 @@ pub struct MeasuredMessage {
     pub twist: [f64; 6],
 }
 
-/// What the actuators shall push with. A driver applies `force_n` only if the schema and the checksum are
-/// right, `valid` is 1, the sequence goes forward, **and** the message is younger than its own watchdog
-/// allows; otherwise it brakes.
+/// What the actuators shall push with. A driver brakes at a message that is not `valid`, and when its own
+/// watchdog has seen none that counts for too long. A message counts only if schema and checksum are right,
+/// the sequence goes forward and `time_ns` is past, and not long: `src/host/plant` is an example.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[type_name("hexad_force")]
 #[repr(C)]
@@ -207,6 +211,9 @@ macro_rules! message {
             }
             $(fn seal(&mut self) {
                 self.$checksum = self.$compute();
+            }
+            fn is_whole(&self) -> bool {
+                self.$checksum == self.$compute()
             })?
         }
     };

@@ -212,6 +212,8 @@ pub struct Rejected {
     pub older_source: u64,
     /// Seen before, or unreadable.
     pub repeated: u64,
+    /// With a wrong checksum.
+    pub damaged: u64,
 }
 
 impl core::ops::Add for Rejected {
@@ -222,6 +224,7 @@ impl core::ops::Add for Rejected {
             schema: self.schema + other.schema,
             older_source: self.older_source + other.older_source,
             repeated: self.repeated + other.repeated,
+            damaged: self.damaged + other.damaged,
         }
     }
 }
@@ -237,8 +240,8 @@ pub struct Sink<T: Message> {
 }
 
 impl<T: Message> Sink<T> {
-    /// The next message in order, if any. Passes over other schemas, older lives of the source and what
-    /// was seen already: after a publisher dies, its last sample may still arrive.
+    /// The next message in order, if any. Passes over other schemas, wrong checksums, older lives of the
+    /// source and what was seen already: after a publisher dies, its last sample may still arrive.
     pub fn receive(&mut self) -> Option<T> {
         // At most what the buffers of all publishers can hold: a flood cannot keep the caller here.
         for _ in 0..MAX_PUBLISHERS * BUFFER {
@@ -252,15 +255,18 @@ impl<T: Message> Sink<T> {
             };
             let header = message.header();
             let order = (header.epoch, header.sequence);
-            if header.schema == SCHEMA && order > (self.epoch, self.sequence) {
+            let is_readable = header.schema == SCHEMA && message.is_whole();
+            if is_readable && order > (self.epoch, self.sequence) {
                 let same_life = header.epoch == self.epoch;
                 self.came += if same_life { header.sequence - self.sequence } else { 1 };
                 (self.epoch, self.sequence) = order;
                 return Some(message);
             }
-            let Rejected { schema, older_source, repeated } = &mut self.rejected;
+            let Rejected { schema, older_source, repeated, damaged } = &mut self.rejected;
             *(if header.schema != SCHEMA {
                 schema
+            } else if !is_readable {
+                damaged
             } else if header.epoch < self.epoch {
                 older_source
             } else {

@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use heapless::spsc::Producer;
 
 use crate::control::controller::{Asked, Measurement, Output, Setpoint};
-use crate::control::state::{Cause, Request};
+use crate::control::state::{Cause, Request, State};
 use crate::ipc::exchange::{CycleInput, CycleOutput, IoSide};
 use crate::ipc::messages::{
     CommandMessage, ForceMessage, Header, MeasuredMessage, SetpointMessage, StatusMessage,
@@ -256,7 +256,10 @@ impl Io<'_> {
         let now_ns = monotonic_ns();
         let held_ns = now_ns.saturating_sub(cycle.due_ns);
         if held_ns > self.settings.longest_hold_ns && cycle.output.state.controls() {
-            cycle.output = Output { cause: Cause::MeasurementLost, ..Output::default() };
+            // The loop finds the same at its next cycle, by the age of what it measured last.
+            let output = &mut cycle.output;
+            (output.state, output.cause, output.force) =
+                (State::Fault, Cause::MeasurementLost, Output::default().force);
         }
         let sent = self.ports.force.publish(now_ns, force_message(&cycle));
         if cycle.output.state.controls() {
@@ -266,7 +269,7 @@ impl Io<'_> {
         let mut status = status_message(&self.settings.home, &cycle);
         status.io_allocations = ThreadUsage::allocations_of_this_thread() - self.allocations;
         (status.rejected_schema, status.rejected_older_source, status.rejected_repeated) = {
-            let Rejected { schema, older_source, repeated } = self.rejected();
+            let Rejected { schema, older_source, repeated, .. } = self.rejected();
             (schema, older_source, repeated)
         };
         status.statistics = *self.sides.statistics.read();

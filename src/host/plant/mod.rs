@@ -2,7 +2,8 @@
 //!
 //! It ticks on the multiples of the period. At each tick it lets the time since the last one pass, with
 //! every force applied from the instant its message was sent, as a drive would; then it publishes lengths
-//! and rates. A force is applied no longer than `plant.force_timeout_ms` after it was sent.
+//! and rates. A force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if it
+//! can be believed ([`doubt`]).
 
 extern crate std;
 
@@ -10,10 +11,11 @@ use std::prelude::rust_2024::*;
 
 use tracing::{debug, info, warn};
 
+use self::doubt::Doubt;
 use super::config::Config;
 use super::daemon::nanoseconds;
 use super::stop::Stop;
-use crate::control::state::Cause;
+use crate::control::state::{Cause, State};
 use crate::ipc::messages::{ForceMessage, MeasuredMessage};
 use crate::ipc::ports::{Bus, PortError};
 use crate::model::machine::LEGS;
@@ -21,6 +23,8 @@ use crate::model::task::task_coordinates;
 use crate::plant::simulator::{Brakes, Simulator};
 use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
 use crate::realtime::setup::scheduling;
+
+mod doubt;
 
 /// Forces kept between two ticks: 12.8 ms at 20 kHz, so that a late plant still applies each in its turn.
 const FORCE_DEPTH: usize = 256;
@@ -46,6 +50,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
         cause: Cause::None,
         timeout_ns: nanoseconds(plant.force_timeout_s),
     };
+    let mut doubt = Doubt::default();
     let mut pending = None;
     info!(name = %config.name, "plant at rest at home, brakes closed");
     while !stop.requested() {
@@ -57,12 +62,15 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
         let before = driven.simulator.brakes();
         // A force sent after this tick waits for the next one.
         while let Some(message) = pending.take().or_else(|| forces.receive()) {
-            if message.header.time_ns > tick_ns {
+            if (tick_ns + 1..=monotonic_ns()).contains(&message.header.time_ns) {
                 pending = Some(message);
                 break;
             }
-            driven.receive(&message);
+            if doubt.believes(&message, tick_ns, driven.timeout_ns) {
+                driven.receive(&message);
+            }
         }
+        doubt.hear(forces.rejected());
         driven.advance_to(tick_ns);
         tell(before, driven.simulator.brakes(), driven.cause);
         measured.publish(tick_ns, measured_message(&driven.simulator))?;
@@ -70,6 +78,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
         let now_ns = monotonic_ns();
         tick_ns = grid.next_after(tick_ns.max(now_ns.saturating_sub(grid.period_ns())));
     }
+    doubt.tell_all();
     Ok(())
 }
 
@@ -89,7 +98,9 @@ impl Driven {
     fn receive(&mut self, message: &ForceMessage) {
         self.advance_to(message.header.time_ns);
         self.cause = Cause::from_number(message.fault).unwrap_or_default();
-        let usable = message.valid == 1 && message.force_n.iter().all(|force| force.is_finite());
+        let is_under_control = State::from_number(message.state).is_some_and(State::controls);
+        let is_finite = message.force_n.iter().all(|force| force.is_finite());
+        let usable = message.valid == 1 && is_under_control && is_finite;
         self.force =
             usable.then_some((message.force_n, message.header.time_ns.saturating_add(self.timeout_ns)));
     }
