@@ -8,6 +8,7 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use hexad::control::state::State;
 use hexad::host::report::Report;
 use hexad::ipc::messages::StatusMessage;
 use hexad::ipc::ports::{Bus, Sink};
@@ -160,7 +161,7 @@ impl Observed {
 /// for the first time, by the log thread neither.
 fn among_constant_peers_nothing_is_used(calm: &Observed) {
     let (first, last) = (&calm.first, &calm.last);
-    assert!(last.cycles > first.cycles && last.state == 1, "{last:#?}");
+    assert!(last.cycles > first.cycles && last.state == State::Active as u32, "{last:#?}");
     assert_eq!((last.allocations, last.io_allocations), (0, first.io_allocations), "real-time and io thread");
     assert_eq!(calm.faults_now(), calm.faults, "page faults of the io and of the log thread");
 }

@@ -2,6 +2,7 @@
 
 use crate::support::children::{HANG, Hexad, run};
 use crate::support::machine::{Machine, PATIENT};
+use crate::support::operator;
 use crate::support::recorder::Recorder;
 use crate::support::trio::{start_daemon, start_plant};
 use crate::support::turns;
@@ -45,6 +46,7 @@ fn the_daemon_runs_on_the_rung_it_was_told() {
     let _plant = start_plant(&machine);
     let _daemon = start_daemon(&machine);
     let _setpoints = Hexad::start(&machine, "move", &["--motion", "settle", "--seconds", "100"]);
+    operator::engage(&machine);
     recorder.until("the platform hangs lower", |recording| {
         let (force, measured) = (recording.forces.last()?, recording.measured.last()?);
         (force.valid == 1 && (1.090..1.097).contains(&measured.x[3])).then_some(())

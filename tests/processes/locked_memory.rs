@@ -11,6 +11,7 @@ use hexad::host::report::Report;
 
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
+use crate::support::operator;
 use crate::support::recorder::Recorder;
 use crate::support::rules;
 use crate::support::trio::{start_daemon, start_plant};
@@ -37,6 +38,7 @@ fn the_real_time_thread_uses_nothing_it_did_not_have() {
     }
     let start = Instant::now();
     let setpoints = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", &seconds.to_string()]);
+    operator::engage(&machine);
     let moved = setpoints.ends_within(Duration::from_secs_f64(seconds) + HANG);
     assert_eq!(moved.status.code(), Some(0), "{}", moved.stderr);
     let simulated_s = start.elapsed().as_secs_f64();

@@ -1,15 +1,15 @@
-//! SIGTERM and SIGINT: every process ends by itself, and the daemon takes its force away first.
+//! SIGTERM and SIGINT: every process ends by itself, and the daemon brings the platform to rest first.
 
 use std::fs;
 use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::control::state::Cause;
 use hexad::host::report::Report;
 
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
+use crate::support::operator;
 use crate::support::recorder::Recorder;
 use crate::support::rules;
 use crate::support::trio::{Trio, fastest, start_daemon, start_setpoints};
@@ -35,7 +35,7 @@ fn stops_in_motion(signal: &str) {
     let Trio { setpoints, daemon, plant, recorder, machine } = Trio::in_motion("orderly-stop");
     let ended = daemon.stops_on(signal, SOON);
     assert!(ended.stderr.contains("stopping"), "{}", ended.stderr);
-    plant.says("no valid force (daemon stopping): brakes closing");
+    plant.says("no valid force (asked for): brakes closing");
     setpoints.stops_on(signal, SOON);
     recorder.until("the platform stands", |recording| {
         recording.measured.last().filter(|m| rules::stands(m)).map(drop)
@@ -45,17 +45,16 @@ fn stops_in_motion(signal: &str) {
     let recording = recorder.finish();
     rules::hold(&recording);
     assert!(recording.measured.iter().any(|measured| fastest(measured) > 0.1), "it was in motion");
-    let last = recording.forces.last().expect("forces");
-    assert_eq!((last.valid, last.fault), (0, Cause::Stopping as u32), "{last:#?}");
-    let before = recording.forces.iter().rfind(|force| force.fault != Cause::Stopping as u32);
-    assert!(before.is_some_and(|force| force.valid == 1), "valid until it stopped: {before:#?}");
+    rules::ends_at_rest(&recording);
     let report = Report::read(&machine.path("report.json")).expect("the report");
     assert!(report.faults.is_empty() && report.cycles > 0, "{report:#?}");
     let counted = counts(&machine.path("histogram.csv"));
     let Report { wakeup_ns, compute_ns, measured_age_ns, end_to_end_ns, .. } = &report;
     let reported = [wakeup_ns, compute_ns, measured_age_ns, end_to_end_ns].map(|times| times.count);
     assert_eq!(counted, reported, "the same times in the report and in the histogram");
-    assert_eq!(last.header.sequence, recording.statuses.last().map_or(0, |status| status.header.sequence));
+    let [force, status] =
+        [recording.forces.last().map(|it| it.header), recording.statuses.last().map(|it| it.header)];
+    assert_eq!(force.map(|header| header.sequence), status.map(|header| header.sequence));
 }
 
 /// How many times of each kind a histogram holds.
@@ -80,7 +79,7 @@ fn a_second_daemon_of_the_same_machine_is_refused() {
     daemon.kill();
     // The lock dies with its holder.
     let third = start_daemon(&machine);
-    third.says("active: forces are valid");
+    operator::engage(&machine);
     third.stops_on("TERM", SOON);
     setpoints.stops_on("TERM", SOON);
     plant.stops_on("TERM", SOON);
@@ -92,7 +91,7 @@ fn processes_that_wait_for_others_stop_as_well() {
     let _turn = turns::beside_others();
     let machine = Machine::patient("waiting-stop");
     let daemon = start_daemon(&machine);
-    daemon.says("waiting: no measurement");
+    daemon.says("off: no measurement");
     let setpoints = start_setpoints(&machine);
     setpoints.says("waiting for the daemon");
     setpoints.stops_on("INT", SOON);

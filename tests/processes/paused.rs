@@ -2,6 +2,9 @@
 
 use std::time::Duration;
 
+use hexad::control::state::{Cause, State};
+
+use crate::support::operator;
 use crate::support::recorder::Recording;
 use crate::support::trio::{Trio, let_pass, valid_after};
 use crate::support::turns;
@@ -25,6 +28,7 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
         let status = recording.statuses.last()?;
         (status.skipped >= before.skipped + LEAST_SKIPPED).then_some(())
     });
+    operator::clear_and_engage(&trio.machine);
     let (_, recovered_ns) = let_pass(Duration::from_millis(500));
     trio.moves_after(recovered_ns);
     let recording = trio.finish();
@@ -41,7 +45,8 @@ fn a_paused_plant_recovers() {
     trio.plant.signal("STOP");
     let (from_ns, _) = let_pass(PAUSE);
     trio.plant.signal("CONT");
-    trio.daemon.says("fault: measurement lost; forces are no longer valid");
+    trio.daemon.says("fault: measurement lost");
+    operator::clear_and_engage(&trio.machine);
     let (_, recovered_ns) = let_pass(Duration::from_millis(500));
     trio.moves_after(recovered_ns);
     let recording = trio.finish();
@@ -50,11 +55,17 @@ fn a_paused_plant_recovers() {
     brakes_held_until_control_was_taken_anew(from_ns, &recording);
 }
 
-/// Whoever was away, the plant's brakes closed: the loop may not go on as if nothing had happened, but lets
-/// go first and engages again from where the platform stands.
+/// Whoever was away, the plant's brakes closed: the loop may not go on as if nothing had happened, but is in a
+/// fault until it is cleared and engaged from where the platform stands.
 fn brakes_held_until_control_was_taken_anew(from_ns: u64, recording: &Recording) {
     let after: Vec<_> = recording.forces.iter().filter(|force| force.release_ns > from_ns).collect();
     let let_go = after.iter().position(|force| force.valid == 0).expect("the daemon let go of the platform");
+    let first = after[let_go];
+    assert_eq!(
+        (first.state, first.fault),
+        (State::Fault as u32, Cause::MeasurementLost as u32),
+        "{first:#?}"
+    );
     let again = after[let_go..].iter().any(|force| valid_after(force, from_ns));
     assert!(again, "the loop became active again");
 }

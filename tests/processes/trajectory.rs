@@ -8,6 +8,7 @@ use hexad::scene::minimum_jerk::rise;
 
 use crate::support::children::{HANG, Hexad, run};
 use crate::support::machine::Machine;
+use crate::support::operator;
 use crate::support::recorder::Recorder;
 use crate::support::rules;
 use crate::support::trio::{start_daemon, start_plant};
@@ -29,15 +30,18 @@ fn a_trajectory_moves_the_platform() {
     let plant = start_plant(&machine);
     let daemon = start_daemon(&machine);
     let setpoints = Hexad::start(&machine, "move", &["--trajectory".as_ref(), file.as_os_str()]);
+    operator::engage(&machine);
     let ended = setpoints.ends_within(HANG);
     assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
     // The last setpoint was at rest: losing it is no fault.
-    daemon.says("waiting: setpoint source ended at rest");
+    daemon.says("stopping: setpoint source ended at rest");
+    daemon.says("standby: setpoint source ended at rest");
     daemon.stops_on("TERM", HANG);
     plant.stops_on("TERM", HANG);
 
     let recording = recorder.finish();
     rules::hold(&recording);
+    rules::ends_at_rest(&recording);
     let (first, last) = (&recording.measured[0], recording.measured.last().expect("measurements"));
     assert!((first.x[3] - HOME).abs() < 1e-12 && rules::stands(first), "{first:#?}");
     assert!((last.x[3] - (HOME + WAY)).abs() < 1e-3 && rules::stands(last), "{last:#?}");

@@ -3,6 +3,7 @@
 pub mod children;
 pub mod machine;
 pub mod nobody;
+pub mod operator;
 pub mod peer;
 pub mod recorder;
 pub mod rules;

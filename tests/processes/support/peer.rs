@@ -12,6 +12,7 @@ use hexad::realtime::setup::scheduling;
 
 use super::children::Hexad;
 use super::machine::{Machine, PERIOD_NS};
+use super::operator;
 use super::trio::{start_daemon, start_plant};
 
 /// Name of the machine and of the process that started it: "NAME PARENT".
@@ -33,7 +34,7 @@ pub struct Controlled {
 }
 
 impl Controlled {
-    /// Returns when forces are valid.
+    /// Returns when the daemon is active.
     pub fn start(machine: Machine) -> Self {
         let daemon = start_daemon(&machine);
         Self::with(machine, daemon)
@@ -41,9 +42,15 @@ impl Controlled {
 
     /// With a daemon that was started in a special way.
     pub fn with(machine: Machine, daemon: Hexad) -> Self {
+        let ready = Self::ready(machine, daemon);
+        operator::engage(&ready.machine);
+        ready
+    }
+
+    /// All that engaging takes.
+    pub fn ready(machine: Machine, daemon: Hexad) -> Self {
         let plant = start_plant(&machine);
         let peer = start(&machine);
-        daemon.says("active: forces are valid");
         Self { peer, daemon, plant, machine }
     }
 
@@ -54,8 +61,8 @@ impl Controlled {
     }
 }
 
-/// Starts one; returns when it has sent its first setpoint.
-fn start(machine: &Machine) -> Hexad {
+/// Starts one more; returns when it has sent its first setpoint.
+pub fn start(machine: &Machine) -> Hexad {
     let mut command = Command::new(env::current_exe().expect("this program"));
     command.args(["support::peer::takes_part", "--exact", "--ignored", "--nocapture"]);
     command.env(PART, format!("{} {}", machine.name, process::id())).stdin(Stdio::null());

@@ -5,14 +5,20 @@ use std::sync::{Arc, Mutex, MutexGuard, mpsc};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
-use hexad::ipc::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage};
-use hexad::ipc::ports::{Bus, Sink};
+use hexad::ipc::messages::{
+    CommandMessage, ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage,
+};
+use hexad::ipc::ports::{Bus, Rejected, Sink};
+use hexad::realtime::clock::monotonic_ns;
 use hexad::realtime::setup::scheduling;
 
 use super::children::HANG;
 
 /// The topics hold 256 ms at 1 kHz.
 const POLL: Duration = Duration::from_millis(1);
+
+/// What [`Recorder::cut`] keeps: longer than anything that a rule looks back for \[ns\].
+const OVERLAP_NS: u64 = 1_000_000_000;
 
 /// Everything that was said, in order.
 #[derive(Clone, Default)]
@@ -21,6 +27,10 @@ pub struct Recording {
     pub measured: Vec<MeasuredMessage>,
     pub forces: Vec<ForceMessage>,
     pub statuses: Vec<StatusMessage>,
+    /// Of every operator.
+    pub commands: Vec<CommandMessage>,
+    /// Forces that were said and are not here.
+    pub passed_over: Rejected,
 }
 
 /// Listens in a thread of its own, which owns the ports.
@@ -60,6 +70,18 @@ impl Recorder {
         self.recording.lock().expect("no panic while it was held")
     }
 
+    /// Everything so far. What is older than a second is forgotten then, but for the commands.
+    pub fn cut(&self) -> Recording {
+        let mut recording = self.so_far();
+        let all = recording.clone();
+        let from_ns = monotonic_ns() - OVERLAP_NS;
+        forget(&mut recording.setpoints, from_ns);
+        forget(&mut recording.measured, from_ns);
+        forget(&mut recording.forces, from_ns);
+        forget(&mut recording.statuses, from_ns);
+        all
+    }
+
     /// Waits until the recording shows something.
     pub fn until<T>(&self, what: &str, shown: impl Fn(&Recording) -> Option<T>) -> T {
         let start = Instant::now();
@@ -95,11 +117,18 @@ struct Listener {
     measured: Sink<MeasuredMessage>,
     forces: Sink<ForceMessage>,
     statuses: Sink<StatusMessage>,
+    commands: Sink<CommandMessage>,
 }
 
 impl Listener {
     fn new(bus: &Bus) -> Self {
-        Self { setpoints: sink(bus), measured: sink(bus), forces: sink(bus), statuses: sink(bus) }
+        Self {
+            setpoints: sink(bus),
+            measured: sink(bus),
+            forces: sink(bus),
+            statuses: sink(bus),
+            commands: sink(bus),
+        }
     }
 
     fn take(&mut self, recording: &mut Recording) {
@@ -108,7 +137,13 @@ impl Listener {
         recording.forces.extend(std::iter::from_fn(|| self.forces.receive()));
         recording.measured.extend(std::iter::from_fn(|| self.measured.receive()));
         recording.setpoints.extend(std::iter::from_fn(|| self.setpoints.receive()));
+        recording.commands.extend(std::iter::from_fn(|| self.commands.receive_from_any()));
+        recording.passed_over = self.forces.rejected();
     }
+}
+
+fn forget<T: Message>(messages: &mut Vec<T>, until_ns: u64) {
+    messages.retain(|message| message.header().time_ns >= until_ns);
 }
 
 fn sink<T: Message>(bus: &Bus) -> Sink<T> {

@@ -2,15 +2,27 @@
 
 use std::collections::HashMap;
 
-use hexad::control::state::Cause;
-use hexad::ipc::messages::{ForceMessage, MeasuredMessage, Message};
+use hexad::control::state::{Cause, Request, State};
+use hexad::ipc::messages::{ForceMessage, MeasuredMessage, Message, SCHEMA};
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
 use super::recorder::Recording;
+use super::trio::fastest;
+
+/// `actuator.max_force_n` of the paper's machine, and the default of `limits.force_rate_n_s` \[N, N/s\].
+const MAX_FORCE: f64 = 500.0;
+const FORCE_RATE: f64 = 100.0 * MAX_FORCE;
+
+/// A leg slower than this is at rest, also where it is held by control \[m/s\]. A tenth of what counts as
+/// in motion.
+const AT_REST: f64 = 0.01;
 
 /// Every rule, for a machine of [`super::machine::Machine::patient`].
 pub fn hold(recording: &Recording) {
+    forces_are_whole_and_in_order(recording);
     forces_are_zero_unless_valid(&recording.forces);
+    forces_keep_their_limits(&recording.forces);
+    nothing_moves_unasked(recording);
     valid_forces_are_fresh(recording);
     releases_are_in_phase(&recording.forces);
     every_grid_point_is_counted(recording);
@@ -21,23 +33,113 @@ pub fn stands(measured: &MeasuredMessage) -> bool {
     measured.length_rate_m_s == [0.0; 6]
 }
 
-fn forces_are_zero_unless_valid(forces: &[ForceMessage]) {
-    for force in forces {
-        let valid = force.valid == 1;
-        assert_eq!(valid, force.state == 1 && force.fault == Cause::None as u32, "{force:#?}");
-        assert!(valid || (force.force_n == [0.0; 6] && force.fault != Cause::None as u32), "{force:#?}");
-        assert!(force.force_n.iter().all(|newton| newton.is_finite()), "{force:#?}");
+/// For a daemon that was stopped in order: the platform was at rest before nobody controlled it any more.
+pub fn ends_at_rest(recording: &Recording) {
+    let last = recording.forces.last().expect("forces");
+    assert_eq!((last.valid, last.fault), (0, Cause::Stopping as u32), "{last:#?}");
+    let valid = recording.forces.iter().rfind(|force| force.valid == 1).expect("a valid force");
+    assert_eq!(State::from_number(valid.state), Some(State::Stopping), "the last valid one: {valid:#?}");
+    let until_then = |measured: &&MeasuredMessage| measured.header.time_ns <= valid.header.time_ns;
+    let measured = recording.measured.iter().rfind(until_then).expect("a measurement");
+    assert!(fastest(measured) < AT_REST, "under the last valid force: {measured:#?}");
+}
+
+/// A driver can check each by itself, and within a life everything goes forward.
+fn forces_are_whole_and_in_order(recording: &Recording) {
+    let hexad::ipc::ports::Rejected { schema, repeated, damaged, .. } = recording.passed_over;
+    assert_eq!((schema, repeated, damaged), (0, 0, 0), "forces passed over: {:?}", recording.passed_over);
+    for force in &recording.forces {
+        assert_eq!(force.checksum, force.computed_checksum(), "{force:#?}");
+        assert_eq!(
+            (force.header.schema, force.header.reserved, force.reserved),
+            (SCHEMA, 0, 0),
+            "{force:#?}"
+        );
+    }
+    for [a, b] in pairs(&recording.forces) {
+        let order = |force: &ForceMessage| (force.header.sequence, force.header.time_ns, force.release_ns);
+        let (of_a, of_b) = (order(a), order(b));
+        let forward = of_a.0 < of_b.0 && of_a.1 <= of_b.1 && of_a.2 <= of_b.2;
+        assert!(forward, "{a:#?} and then {b:#?}");
     }
 }
 
-/// A force marked valid was computed from a measurement and a setpoint younger than the timeouts, and was
-/// not itself older than that when it was sent.
+/// Messages one after the other of the same life of the daemon.
+fn pairs(forces: &[ForceMessage]) -> impl Iterator<Item = [&ForceMessage; 2]> {
+    let pairs = forces.iter().zip(forces.iter().skip(1));
+    pairs.filter(|(a, b)| a.header.epoch == b.header.epoch).map(|(a, b)| [a, b])
+}
+
+fn forces_are_zero_unless_valid(forces: &[ForceMessage]) {
+    for force in forces {
+        let state = State::from_number(force.state).expect("a state");
+        assert_eq!(force.valid, u32::from(state.controls()), "{force:#?}");
+        let cause = Cause::from_number(force.fault).expect("a cause");
+        match state {
+            State::Engaging | State::Active => assert_eq!(cause, Cause::None, "{force:#?}"),
+            State::Fault => assert!(cause.is_fault(), "{force:#?}"),
+            // The one cycle after a fault was cleared, too.
+            State::Off => {}
+            _ => assert_ne!(cause, Cause::None, "{force:#?}"),
+        }
+        assert!(force.valid == 1 || force.force_n == [0.0; 6], "{force:#?}");
+        assert!(force.force_n.iter().all(|newton| newton.abs() <= MAX_FORCE), "{force:#?}");
+    }
+}
+
+/// From one valid force to the next each changes no faster than it may.
+fn forces_keep_their_limits(forces: &[ForceMessage]) {
+    for [a, b] in pairs(forces).filter(|[a, b]| a.valid == 1 && b.valid == 1) {
+        let most = FORCE_RATE * (b.release_ns - a.release_ns) as f64 * 1e-9 * (1.0 + 1e-9);
+        let change = a.force_n.iter().zip(&b.force_n).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+        assert!(change <= most, "{change} N of {most} N: {a:#?} and then {b:#?}");
+    }
+}
+
+/// Force comes only after somebody has asked for it (to engage, or to park), since there was none; a fault goes only after somebody
+/// has asked to clear it, and then engaging is to be asked for anew.
+fn nothing_moves_unasked(recording: &Recording) {
+    let asked = |is_it: fn(Request) -> bool, from_ns: u64, until_ns: u64| {
+        let commands = recording.commands.iter();
+        let commands = commands.filter(|command| Request::from_number(command.request).is_some_and(is_it));
+        commands.map(|command| command.header.time_ns).find(|time_ns| (from_ns..=until_ns).contains(time_ns))
+    };
+    let engaged = |from_ns, until_ns| asked(Request::takes_force, from_ns, until_ns).is_some();
+    for life in recording.forces.chunk_by(|a, b| a.header.epoch == b.header.epoch) {
+        let first = &life[0];
+        let begins_unasked = first.header.sequence == 1
+            && first.valid == 1
+            && !engaged(first.header.epoch, first.header.time_ns);
+        assert!(!begins_unasked, "a daemon begins with force: {first:#?}");
+        // Requests count from here on.
+        let mut since_ns = first.header.epoch;
+        for [a, b] in pairs(life) {
+            let is_fault = [a, b].map(|force| force.state == State::Fault as u32);
+            if (a.valid == 1 && b.valid == 0) || is_fault == [false, true] {
+                since_ns = a.header.time_ns;
+            }
+            if is_fault == [true, false] && b.fault != Cause::Stopping as u32 {
+                let cleared_ns = asked(|request| request == Request::Clear, since_ns, b.header.time_ns);
+                since_ns = cleared_ns.unwrap_or_else(|| panic!("not cleared: {a:#?} and then {b:#?}"));
+            }
+            let unasked = a.valid == 0 && b.valid == 1 && !engaged(since_ns, b.header.time_ns);
+            assert!(!unasked, "nobody engaged: {a:#?} and then {b:#?}");
+        }
+    }
+}
+
+/// A force marked valid was computed from a measurement younger than the timeout, and from a setpoint as young
+/// where it follows one; and it was not itself older than that when it was sent.
 fn valid_forces_are_fresh(recording: &Recording) {
     let measured = Instants::of(&recording.measured);
     let setpoints = Instants::of(&recording.setpoints);
     for force in recording.forces.iter().filter(|force| force.valid == 1) {
         let (release_ns, sent_ns) = (force.release_ns, force.header.time_ns);
-        for (instants, what) in [(&measured, "measurement"), (&setpoints, "setpoint")] {
+        let follows =
+            [State::Engaging, State::Active].contains(&State::from_number(force.state).expect("one"));
+        for (instants, what) in
+            [(&measured, "measurement"), (&setpoints, "setpoint")].into_iter().take(1 + usize::from(follows))
+        {
             let newest_ns = instants.newest_until(sent_ns);
             let age_ns = newest_ns.map(|newest_ns| release_ns.saturating_sub(newest_ns));
             assert!(

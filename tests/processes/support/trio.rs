@@ -8,6 +8,7 @@ use hexad::realtime::clock::monotonic_ns;
 
 use super::children::{HANG, Hexad};
 use super::machine::Machine;
+use super::operator;
 use super::recorder::{Recorder, Recording};
 use super::rules;
 
@@ -27,13 +28,14 @@ pub struct Trio {
 }
 
 impl Trio {
-    /// Starts all three and waits until the platform is in full motion.
+    /// Starts all three, engages and waits until the platform is in full motion.
     pub fn in_motion(test: &str) -> Self {
         let machine = Machine::patient(test);
         let recorder = Recorder::start(&machine.name);
         let plant = start_plant(&machine);
         let daemon = start_daemon(&machine);
         let setpoints = start_setpoints(&machine);
+        operator::engage(&machine);
         let trio = Self { setpoints, daemon, plant, recorder, machine };
         trio.moves_after(0);
         trio
@@ -45,7 +47,7 @@ impl Trio {
             let force = recording.forces.last().filter(|force| valid_after(force, instant_ns))?;
             let measured =
                 recording.measured.last().filter(|measured| measured.header.time_ns > instant_ns)?;
-            (force.valid == 1 && fastest(measured) > IN_MOTION).then_some(())
+            (fastest(measured) > IN_MOTION).then_some(force).map(drop)
         });
     }
 
@@ -72,11 +74,12 @@ impl Trio {
         for process in [&mut self.setpoints, &mut self.daemon, &mut self.plant] {
             process.must_run();
         }
-        self.setpoints.stops_on("TERM", HANG);
         self.daemon.stops_on("TERM", HANG);
+        self.setpoints.stops_on("TERM", HANG);
         self.plant.stops_on("TERM", HANG);
         let recording = self.recorder.finish();
         rules::hold(&recording);
+        rules::ends_at_rest(&recording);
         recording
     }
 }
