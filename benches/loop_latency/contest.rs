@@ -5,10 +5,10 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::control::state::{Cause, State};
+use hexad::control::state::{Cause, Request, State};
+use hexad::host::operator::Operator;
 use hexad::host::report::Report;
-use hexad::ipc::messages::StatusMessage;
-use hexad::ipc::ports::{Bus, Sink};
+use hexad::ipc::ports::Bus;
 
 use super::Failure;
 use super::distribution::Distribution;
@@ -57,26 +57,30 @@ pub const HISTOGRAM_NS: u64 = 1_000_000;
 const START: Duration = Duration::from_secs(10);
 const LOOK: Duration = Duration::from_millis(5);
 
-/// The daemons' words about their state.
-pub struct Watch(Vec<Sink<StatusMessage>>);
+/// Who hears the daemons' words about their state, and engages them.
+pub struct Watch(Vec<Operator>);
 
 impl Watch {
     pub fn new(machines: usize) -> Result<Self, Failure> {
-        let sink = |number| Ok(Bus::join(&Rig::machine_name(number))?.sink(1)?);
-        (0..machines).map(sink).collect::<Result<_, Failure>>().map(Self)
+        let operator = |number| Ok(Operator::new(&Bus::join(&Rig::machine_name(number))?)?);
+        (0..machines).map(operator).collect::<Result<_, Failure>>().map(Self)
     }
 
-    /// Waits until every daemon is in control.
+    /// Engages every daemon and waits until it is in control.
     pub fn until_active(&mut self, daemons: &mut [Process]) -> Result<(), Failure> {
         let begin = Instant::now();
-        for (number, sink) in self.0.iter_mut().enumerate() {
+        for (number, operator) in self.0.iter_mut().enumerate() {
             let mut why = "says nothing";
             loop {
-                if let Some(status) = sink.newest() {
+                if let Some(status) = operator.status() {
                     if status.state == State::Active as u32 {
                         break;
                     }
-                    why = Cause::from_number(status.fault).unwrap_or_default().name();
+                    let cause = Cause::from_number(status.fault).unwrap_or_default();
+                    why = cause.name();
+                    if cause == Cause::NotAsked {
+                        operator.ask(Request::Engage)?;
+                    }
                 }
                 for daemon in daemons.iter_mut() {
                     daemon.must_run()?;

@@ -8,8 +8,8 @@ use std::thread::{scope, sleep};
 use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
-use hexad::control::state::State;
+use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::state::{Request, State};
 use hexad::host::config::Config;
 use hexad::host::daemon::parameters;
 use hexad::ipc::exchange::exchange;
@@ -35,8 +35,10 @@ const PATH_S: f64 = 60.0;
 const APART: usize = 7;
 const SPREAD: usize = 512;
 
-/// Steps before the first release: each platform is found and in control, its code and data are in memory.
-const WARM_UP_STEPS: usize = 50;
+/// Steps before the first release, and the time between them: each platform is found and engaged, its code and
+/// data are in memory.
+const WARM_UP_STEPS: usize = 100;
+const WARM_UP_STEP_S: f64 = 0.005;
 
 /// How often the records are taken in: 20 ms of the fastest rate here fill a tenth of the queue.
 const POLL: Duration = Duration::from_millis(5);
@@ -48,7 +50,9 @@ const STEPS: usize = 20_000;
 struct Fleet {
     controllers: Vec<Controller>,
     path: Vec<(TaskState, [f64; 6], [f64; 6])>,
+    /// Of the path and of the clock. The inputs have a time of their own: a cycle that is skipped is no jump.
     cycle: usize,
+    period_ns: u64,
     inactive: u64,
 }
 
@@ -62,21 +66,25 @@ impl Fleet {
             let legs = leg_motion(machine, &state.motion());
             (state, legs.length, legs.rate)
         };
-        let controller = Controller::new(machine, parameters(&config.deployment, Rung::Exact));
+        let controller = Controller::new(machine, parameters(machine, &config.deployment, Rung::Exact));
+        let stride = (WARM_UP_STEP_S / period_s) as usize;
         let mut fleet = Self {
             controllers: vec![controller; platforms],
-            path: (0..cycles + SPREAD).map(row).collect(),
+            path: (0..cycles + WARM_UP_STEPS * stride + SPREAD).map(row).collect(),
             cycle: 0,
+            period_ns: (period_s * 1e9) as u64,
             inactive: 0,
         };
-        for _ in 0..WARM_UP_STEPS {
-            fleet.step_all(monotonic_ns());
+        for number in 1..=WARM_UP_STEPS as u64 {
+            fleet.cycle += stride;
+            fleet.step_all(Some(Asked { request: Request::Engage, message: (1, number) }));
         }
         fleet.inactive = 0;
         fleet
     }
 
-    fn step_all(&mut self, release_ns: u64) -> Output {
+    fn step_all(&mut self, request: Option<Asked>) -> Output {
+        let release_ns = self.cycle as u64 * self.period_ns;
         let mut last = Output::default();
         for (number, controller) in self.controllers.iter_mut().enumerate() {
             let row = (self.cycle + number * APART % SPREAD).min(self.path.len() - 1);
@@ -85,6 +93,7 @@ impl Fleet {
                 release_ns,
                 setpoint: Some(Setpoint { time_ns: release_ns, task: *task }),
                 measurement: Some(Measurement { time_ns: release_ns, length: *length, rate: *rate }),
+                request,
                 ..Input::default()
             });
             self.inactive += u64::from(last.state != State::Active);
@@ -92,9 +101,9 @@ impl Fleet {
         last
     }
 
-    fn next_cycle(&mut self, release_ns: u64) -> Output {
+    fn next_cycle(&mut self) -> Output {
         self.cycle += 1;
-        self.step_all(release_ns)
+        self.step_all(None)
     }
 
     fn all_were_active(&self) -> Result<(), String> {
@@ -122,7 +131,7 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
     let report = scope(|threads| -> Result<_, Failure> {
         let thread = threads.spawn(|| {
             prepare(rig)?;
-            let step = |input: &Input| fleet.next_cycle(input.release_ns);
+            let step = |_: &Input| fleet.next_cycle();
             let report = cyclic::run(&mut Monotonic, &timing, step, side, records_in, &stop);
             fleet.all_were_active().map(|()| report)
         });
@@ -147,7 +156,7 @@ pub fn steps(rig: &Rig) -> Result<Distribution, Failure> {
             let mut times = Vec::with_capacity(STEPS);
             for _ in 0..STEPS {
                 let begin_ns = monotonic_ns();
-                std::hint::black_box(fleet.next_cycle(begin_ns));
+                std::hint::black_box(fleet.next_cycle());
                 times.push((monotonic_ns() - begin_ns, 1));
             }
             fleet.all_were_active().map(|()| Distribution::from_iter(times))

@@ -4,7 +4,8 @@
 //! generous limits against hanging; timeouts are long where they are not what is tested; what is counted is
 //! compared with what the messages themselves say.
 //!
-//! `HEXAD_LONG=1` runs the tests of locked memory and of peers that die for a minute each.
+//! `HEXAD_LONG=1` runs the tests of locked memory and of peers that die for a minute each, and 500 rounds of
+//! kills; `HEXAD_SEED` repeats the rounds of a run.
 
 #![allow(
     clippy::unwrap_used,
@@ -21,6 +22,7 @@ mod churn;
 mod command_line;
 mod demo;
 mod doctor;
+mod doubted;
 mod external;
 mod fidelity;
 mod hybrid;
@@ -31,6 +33,8 @@ mod orderly_stop;
 mod overruns;
 mod paused;
 mod refusals;
+mod requests;
+mod rounds;
 mod system_calls;
 mod trajectory;
 mod unprivileged;

@@ -101,6 +101,11 @@ impl Hexad {
         }
     }
 
+    /// Whether it has not ended.
+    pub fn runs(&mut self) -> bool {
+        self.child.try_wait().expect("the state of a process").is_none()
+    }
+
     /// Panics if it has ended.
     pub fn must_run(&mut self) {
         let ended = self.child.try_wait().expect("the state of a process");

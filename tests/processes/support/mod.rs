@@ -1,10 +1,12 @@
 //! What the tests share.
 
 pub mod children;
+pub mod forged;
 pub mod machine;
 pub mod nobody;
 pub mod operator;
 pub mod peer;
+pub mod random;
 pub mod recorder;
 pub mod rules;
 pub mod stalls;

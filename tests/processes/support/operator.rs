@@ -9,7 +9,8 @@ const WITHIN_S: &str = "15";
 /// `hexad REQUEST` with more arguments, to its end.
 pub fn ask(machine: &Machine, request: &str, more: &[&str]) -> Ended {
     let file = machine.file.display().to_string();
-    run(machine, &[&[request, "--config", &file, "--within", WITHIN_S], more].concat())
+    let within: &[&str] = if more.contains(&"--within") { &[] } else { &["--within", WITHIN_S] };
+    run(machine, &[&[request, "--config", &file], within, more].concat())
 }
 
 /// A request that must be carried out and lead to one of these states.
@@ -38,7 +39,7 @@ pub fn clear(machine: &Machine) {
 
 /// Out of a fault, into control.
 pub fn clear_and_engage(machine: &Machine) {
-    is_refused(machine, "engage", &["--wait"], "engage was refused: not possible in fault: ");
+    is_refused(machine, "engage", &["--wait"], "engage was refused: not possible in state fault (");
     clear(machine);
     engage(machine);
 }

@@ -17,7 +17,8 @@ use super::children::HANG;
 /// The topics hold 256 ms at 1 kHz.
 const POLL: Duration = Duration::from_millis(1);
 
-/// What [`Recorder::cut`] keeps: longer than anything that a rule looks back for \[ns\].
+/// What [`Recorder::cut`] keeps of the answers: longer than any rule looks back. Of what they answer it keeps
+/// twice as much \[ns\].
 const OVERLAP_NS: u64 = 1_000_000_000;
 
 /// Everything that was said, in order.
@@ -70,13 +71,13 @@ impl Recorder {
         self.recording.lock().expect("no panic while it was held")
     }
 
-    /// Everything so far. What is older than a second is forgotten then, but for the commands.
+    /// Everything so far. What is older than a second or two is forgotten then, but for the commands.
     pub fn cut(&self) -> Recording {
         let mut recording = self.so_far();
         let all = recording.clone();
         let from_ns = monotonic_ns() - OVERLAP_NS;
-        forget(&mut recording.setpoints, from_ns);
-        forget(&mut recording.measured, from_ns);
+        forget(&mut recording.setpoints, from_ns - OVERLAP_NS);
+        forget(&mut recording.measured, from_ns - OVERLAP_NS);
         forget(&mut recording.forces, from_ns);
         forget(&mut recording.statuses, from_ns);
         all

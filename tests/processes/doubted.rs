@@ -1,0 +1,101 @@
+//! What a driver does not believe: forces that are damaged, old, of the future, or out of order never move the
+//! platform and never keep the brakes open, and the plant says what it passed over.
+
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use hexad::host::config::Config;
+use hexad::ipc::messages::Message;
+use hexad::ipc::ports::Bus;
+use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::ladder::Exact;
+use hexad::model::task::TaskState;
+
+use crate::support::children::{HANG, Hexad};
+use crate::support::forged::{Change, Forger};
+use crate::support::machine::Machine;
+use crate::support::trio::start_plant;
+use crate::support::turns;
+
+const PERIOD: Duration = Duration::from_millis(1);
+
+const OPEN: &str = "valid force: brakes open";
+const CLOSING: &str = "forces stopped arriving: brakes closing";
+
+/// More than any clock has to do with now \[ns\].
+const LONG_NS: u64 = 10_000_000_000;
+
+/// What is wrong, and what the plant says about it.
+const WRONG: [(Change, &str); 8] = [
+    (|message| message.checksum ^= 1, "with a wrong checksum: the shared memory is damaged"),
+    (|message| message.force_n[3] += 1e-9, "with a wrong checksum: the shared memory is damaged"),
+    // A damaged number of the source must not outrank those of good messages.
+    (|message| message.header.epoch = u64::MAX, "with a wrong checksum: the shared memory is damaged"),
+    (
+        |message| resealed(message, |message| message.header.schema -= 1),
+        "of another schema: build all participants alike",
+    ),
+    (
+        |message| resealed(message, |message| message.header.time_ns -= LONG_NS),
+        "older than plant.force_timeout_ms",
+    ),
+    (|message| resealed(message, |message| message.header.time_ns += LONG_NS), "from the future"),
+    (|message| resealed(message, |message| message.header.sequence = 1), "seen before, or unreadable"),
+    (|message| resealed(message, |message| message.header.epoch -= 1), "of an older daemon"),
+];
+
+fn resealed(message: &mut hexad::ipc::messages::ForceMessage, change: Change) {
+    change(message);
+    message.seal();
+}
+
+#[test]
+fn a_driver_goes_by_good_messages_only() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("doubted");
+    let plant = start_plant(&machine);
+    plant.says("plant at rest");
+    let bus = Bus::join(&machine.name).expect("to join");
+    let mut forger = Forger::new(&bus, holding(&machine));
+    send_until(&mut forger, |_| {}, &plant, OPEN, 1);
+    for (number, (wrong, words)) in (1..).zip(WRONG) {
+        send_until(&mut forger, wrong, &plant, CLOSING, number);
+        assert!(
+            plant.words().contains(&format!("not believed: a force {words}")),
+            "{words}: {}",
+            plant.words()
+        );
+        send_until(&mut forger, |_| {}, &plant, OPEN, number + 1);
+    }
+    // One among good ones does no harm.
+    for (wrong, _) in WRONG {
+        (0..9).for_each(|_| send(&mut forger, |_| {}));
+        send(&mut forger, wrong);
+    }
+    let words = plant.stops_on("TERM", HANG).stderr;
+    assert_eq!(words.matches(CLOSING).count(), WRONG.len(), "{words}");
+    for (_, reason) in WRONG {
+        assert!(words.contains(&format!("not believed in all: forces {reason}")), "{reason}: {words}");
+        assert_eq!(words.matches(&format!("not believed: a force {reason}")).count(), 1, "{reason}: {words}");
+    }
+}
+
+/// What holds the platform up at home.
+fn holding(machine: &Machine) -> [f64; 6] {
+    let machine = Config::load(&machine.file).expect("the machine file").machine;
+    inverse_dynamics::<Exact>(&machine, &TaskState::at_rest(machine.home).motion()).expect("a regular pose")
+}
+
+fn send(forger: &mut Forger, change: Change) {
+    forger.send(change);
+    sleep(PERIOD);
+}
+
+/// Sends one message after the other until the plant has said this so many times.
+fn send_until(forger: &mut Forger, change: Change, plant: &Hexad, words: &str, times: usize) {
+    let began = Instant::now();
+    while plant.words().matches(words).count() < times {
+        assert!(began.elapsed() < HANG, "{words:?}, {times} times: {}", plant.words());
+        send(forger, change);
+    }
+}
