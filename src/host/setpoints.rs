@@ -176,20 +176,23 @@ impl<'a> Player<'a> {
     }
 
     fn listen(&mut self, now_ns: u64, status: &StatusMessage) {
-        if status.state == State::Active as u32 && self.timeline.is_some() {
+        let state = State::from_number(status.state).unwrap_or_default();
+        if state == State::Active && self.timeline.is_some() {
             self.last_active_ns = now_ns;
             if self.engaged_ns.is_none() {
                 info!("the daemon is in control: moving");
                 self.engaged_ns = Some(now_ns);
             }
-        } else if self.engaged_ns.is_none()
-            && status.pose_valid == 1
-            && (status.state != State::Engaging as u32 || self.timeline.is_none())
-        {
-            // While engaging the platform comes to what was offered: that must stand.
-            let (from, to) = (Vector6::from(status.x), self.score.at(0.0).x);
-            self.timeline = Some(Timeline::new(self.machine, &from, &to, self.score.duration()));
+        } else if !state.controls() {
+            // It says so itself: no need to wait.
+            self.last_active_ns = 0;
+            if self.engaged_ns.is_none() && status.pose_valid == 1 {
+                let (from, to) = (Vector6::from(status.x), self.score.at(0.0).x);
+                self.timeline = Some(Timeline::new(self.machine, &from, &to, self.score.duration()));
+            }
         }
+        // While it engages, what was offered must stand. A platform that moves on somebody else's setpoints
+        // is offered nothing.
     }
 }
 
