@@ -301,7 +301,7 @@ impl Controller {
         let Some(measurement) = self.measurement.good else {
             return Err(self.measurement.absence(Cause::NoMeasurement));
         };
-        doubt::age(
+        doubt::time(
             Cause::MeasurementLost,
             measurement.time_ns,
             release_ns,
@@ -330,7 +330,7 @@ impl Controller {
         };
         let at_rest = setpoint.task.xd.amax() == 0.0 && setpoint.task.xdd.amax() == 0.0;
         let lost = if at_rest { Cause::SetpointEnded } else { Cause::SetpointLost };
-        doubt::age(lost, setpoint.time_ns, release_ns, self.parameters.setpoint_timeout_ns)
+        doubt::time(lost, setpoint.time_ns, release_ns, self.parameters.setpoint_timeout_ns)
             .map_err(|lost| self.setpoint.absence(lost))
     }
 

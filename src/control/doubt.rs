@@ -102,14 +102,6 @@ pub fn time(cause: Cause, time_ns: u64, now_ns: u64, timeout_ns: u64) -> Result<
     Err(Trouble::new(cause, seconds_between(time_ns, now_ns), timeout_ns as f64 * 1e-9))
 }
 
-/// Whether an input that was of its time is young still.
-pub fn age(cause: Cause, time_ns: u64, now_ns: u64, timeout_ns: u64) -> Result<(), Trouble> {
-    if now_ns.abs_diff(time_ns) <= timeout_ns {
-        return Ok(());
-    }
-    Err(Trouble::new(cause, seconds_between(time_ns, now_ns), timeout_ns as f64 * 1e-9))
-}
-
 /// How far each leg's length and the integral of its rate have parted, and on what way. Both fade.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Parting {
@@ -159,7 +151,7 @@ pub fn measurement(
     };
     let dt = seconds_between(before.time_ns, now.time_ns);
     if dt < 0.0 {
-        return Err(Trouble::new(Cause::MeasurementFromElsewhen, dt, 0.0));
+        return Err(Trouble::new(Cause::MeasurementFromElsewhen, -dt, 0.0));
     }
     let noise = NOISE * stroke(actuator);
     let furthest = BEYOND_RATE * actuator.max_rate * dt.min(widest) + noise;
@@ -215,7 +207,7 @@ pub fn setpoint(
     let Some(before) = before else { return Ok(()) };
     let dt = seconds_between(before.setpoint.time_ns, setpoint.time_ns);
     if dt <= 0.0 {
-        return Err(Trouble::new(Cause::SetpointFromElsewhen, dt, 0.0));
+        return Err(Trouble::new(Cause::SetpointFromElsewhen, -dt, 0.0));
     }
     continues(machine, parameters, motion, &before.motion, [dt, widest], limiting)
 }

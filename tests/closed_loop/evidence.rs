@@ -80,9 +80,9 @@ fn ages_and_stamps_are_told_in_seconds() {
     let output = ends(|input| input.setpoint = last.setpoint);
     assert_evidence(&output, Cause::SetpointEnded, 0.0505, 0.05, 0);
     let output = ends(|input| input.measurement.as_mut().unwrap().time_ns += 2_000_500_000);
-    assert_evidence(&output, Cause::MeasurementFromElsewhen, 2.0, 0.02, 0);
+    assert_evidence(&output, Cause::MeasurementFromElsewhen, -2.0, 0.02, 0);
     let output = ends(|input| input.setpoint.as_mut().unwrap().time_ns -= 999_500_000);
-    assert_evidence(&output, Cause::SetpointFromElsewhen, -1.0, 0.05, 0);
+    assert_evidence(&output, Cause::SetpointFromElsewhen, 1.0, 0.05, 0);
 }
 
 #[test]

@@ -111,7 +111,9 @@ fn it_begins_anew_with_each_engagement() {
         rig.cycle(&rig.input(&home));
     }
     rig.ask(Request::Off);
-    (0..50).for_each(|_| drop(rig.cycle(&rig.input(&home))));
+    for _ in 0..50 {
+        rig.cycle(&rig.input(&home));
+    }
     let again = first(&mut rig);
     for (fresh, again) in fresh.iter().zip(again) {
         assert!((fresh - again).abs() < 1.0, "{fresh} {again}");

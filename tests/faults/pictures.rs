@@ -24,12 +24,21 @@ pub fn draw(name: &str, title: &str, world: &World) {
     let (acceleration, jerk) =
         ([(0.0, limits.acceleration), (end, limits.acceleration)], [(0.0, limits.jerk), (end, limits.jerk)]);
     let limit = |points| Series { label: "limit", points, style: Stroke::Dashed, color: 0 };
-    // On the axis, so that every picture has room for all states.
-    let axis = [(0.0, 0.0), (0.0, 6.0)];
+    // Points without a line, so that every picture has room for all states.
+    let ends = [[(0.0, 0.0)], [(0.0, 6.0)]];
     let states = curves.states.iter().zip(STATES).enumerate();
     let states = states.flat_map(|(color, (lines, label))| pieces(label, lines, color));
+    let dashed = |label, points, color| Series { label, points, style: Stroke::Dashed, color };
+    let setpoints = curves.setpoint.iter().enumerate().flat_map(|(color, axis)| {
+        // One word in the legend for all dashed lines.
+        let label = if color == 2 { "setpoint" } else { "" };
+        axis.iter().enumerate().map(move |(k, piece)| dashed(if k == 0 { label } else { "" }, piece, color))
+    });
     let panels = [
-        Panel { y_label: "position [mm]", series: lines(&["x", "y", "z"], &curves.position) },
+        Panel {
+            y_label: "position [mm]",
+            series: lines(&["x", "y", "z"], &curves.position).into_iter().chain(setpoints).collect(),
+        },
         Panel {
             y_label: "acceleration [m/s²]",
             series: pieces("by the drives", &curves.acceleration, 0)
@@ -39,10 +48,12 @@ pub fn draw(name: &str, title: &str, world: &World) {
         },
         Panel {
             y_label: "jerk [m/s³]",
-            series: pieces("by the drives", &curves.jerk, 0).chain([limit(&jerk)]).collect(),
+            series: pieces("by the drives", &curves.jerk, 0)
+                .chain([limit(&jerk), solid("", &ends[0], 0)])
+                .collect(),
         },
         Panel { y_label: "force [kN]", series: lines(&LEGS, &curves.force) },
-        Panel { y_label: "state", series: [solid("", &axis, 0)].into_iter().chain(states).collect() },
+        Panel { y_label: "state", series: ends.iter().map(|end| solid("", end, 0)).chain(states).collect() },
     ];
     write_svg(&path, title, "time [s]", &panels).unwrap();
 }
@@ -67,6 +78,7 @@ fn pieces<'a>(label: &'a str, pieces: &'a [Line], color: usize) -> impl Iterator
 struct Curves {
     end: f64,
     position: [Line; 3],
+    setpoint: [Vec<Line>; 3],
     acceleration: Vec<Line>,
     braking: Vec<Line>,
     jerk: Vec<Line>,
@@ -93,6 +105,10 @@ impl Curves {
         Self {
             end: seconds(samples.last().unwrap()),
             position: [0, 1, 2].map(|axis| thinned(&|at| (at.pose.position - home)[axis] * 1e3)),
+            setpoint: [0, 1, 2].map(|axis| {
+                let of = |at: &Sample| at.setpoint.map(|task| (task.x[3 + axis] - home[axis]) * 1e3);
+                split(samples.iter().step_by(THINNED).map(|at| (seconds(at), of(at))))
+            }),
             acceleration: pairwise(&|_, now| now.acceleration.map(|a| a.linear.norm())),
             braking: pairwise(&|before, now| {
                 now.acceleration.is_none().then(|| speed_up(&before.twist, &now.twist))
@@ -100,7 +116,7 @@ impl Curves {
             jerk: pairwise(&|before, now| {
                 Some((now.acceleration?.linear - before.acceleration?.linear).norm() / period_s)
             }),
-            force: core::array::from_fn(|leg| thinned(&|at| at.output.force[leg] * 1e-3)),
+            force: core::array::from_fn(|leg| thinned(&|at| at.force.map_or(0.0, |force| force[leg] * 1e-3))),
             states: State::ALL.map(|state| {
                 pairwise(&|_, now| (now.output.state == state).then_some(f64::from(state as u32)))
                     .into_iter()

@@ -2,7 +2,9 @@
 
 use hexad::control::controller::{Output, Parameters};
 use hexad::control::state::{Cause, State};
+use hexad::model::machine::LEGS;
 use hexad::model::rigid::{Acceleration, Pose, Twist};
+use hexad::model::task::TaskState;
 
 use super::common::largest;
 
@@ -13,6 +15,10 @@ pub struct Sample {
     pub output: Output,
     pub pose: Pose,
     pub twist: Twist,
+    /// X, if somebody says one.
+    pub setpoint: Option<TaskState>,
+    /// On the platform; `None` while the brakes have it.
+    pub force: Option<[f64; LEGS]>,
     /// `None` while the brakes have the platform.
     pub acceleration: Option<Acceleration>,
 }

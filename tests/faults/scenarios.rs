@@ -150,7 +150,12 @@ fn plant_killed_in_motion_and_restarted() {
     world.run(100);
     begins_again(&mut world);
     let lost = [(State::Fault, Cause::MeasurementLost)];
-    assert_smooth("plant_killed", "driver killed in motion and restarted", &world, &twice(&lost));
+    assert_smooth(
+        "plant_killed",
+        "driver killed in motion and restarted; the daemon lets go after 20 ms",
+        &world,
+        &twice(&lost),
+    );
 }
 
 #[test]
@@ -161,7 +166,12 @@ fn daemon_killed_in_motion_and_restarted() {
     world.run(100);
     begins_again(&mut world);
     let expected = twice(&[(State::Standby, Cause::SetpointTooFar)]);
-    assert_smooth("daemon_killed", "daemon killed in motion and restarted", &world, &expected);
+    assert_smooth(
+        "daemon_killed",
+        "daemon killed in motion and restarted; the drives brake after 50 ms",
+        &world,
+        &expected,
+    );
 }
 
 /// None of this is worth anything if the worlds it begins with are not what they say.

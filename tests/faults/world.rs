@@ -206,6 +206,8 @@ impl World {
             output: *output,
             pose: state.pose,
             twist: state.twist,
+            setpoint: self.task(now_ns),
+            force: self.rig.force,
             acceleration,
         });
     }
