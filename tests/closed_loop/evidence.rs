@@ -113,6 +113,29 @@ fn setpoints_are_refused_with_axis_or_leg_and_share_of_the_limit() {
     assert!(output.evidence.value > 10.0 && output.evidence.bound == 1.0, "{output:?}");
 }
 
+#[test]
+fn a_setpoint_out_of_the_envelope_is_refused_with_axis_value_and_end() {
+    let mut config = deployed("motion_base");
+    let range = [0.1, 0.2, 0.3, 0.01, 0.02, 0.03];
+    config.deployment.envelope = Some(hexad::scene::envelope::Limits {
+        pose_min: range.map(|x| -x),
+        pose_max: range,
+        velocity: [1.0; 6],
+        acceleration: [1.0; 6],
+    });
+    for axis in 0..6 {
+        for sign in [1.0, -1.0] {
+            let mut rig = Rig::new(&config, &config.machine);
+            let mut task = TaskState::at_rest(config.machine.home);
+            task.x[axis] += 1.1 * sign * range[axis];
+            let output = rig.cycle(&rig.input(&task));
+            let bound = config.machine.home[axis] + sign * range[axis];
+            assert_eq!(output.state, State::Standby);
+            assert_evidence(&output, Cause::SetpointOutOfEnvelope, task.x[axis], bound, axis as u32 + 1);
+        }
+    }
+}
+
 /// A share of each limit, and whether a cycle says that it is limited.
 #[test]
 fn what_is_near_a_limit_says_so() {

@@ -95,7 +95,7 @@ fn no_transition_takes_force_without_being_asked() {
         );
         // What brakes, brakes now; off and estop let go now.
         let brakes = found.following.is_err_and(|cause| cause.reaction() == Reaction::Brake);
-        assert!(!(had && brakes) || !has, "{}", what());
+        assert!(!(had && brakes && has), "{}", what());
         assert!(!(is(Request::Off) || is(Request::Estop)) || !has, "{}", what());
         assert!(!is(Request::Estop) || then.state == State::Fault, "{}", what());
         // Whoever is refused has asked, and nothing was begun for them.

@@ -85,8 +85,8 @@ pub fn next(now: Mode, request: Option<Request>, found: &Findings, after_loss: A
         return then();
     }
     // Stopping: a fault on the way, or another wish, changes what comes after; then it goes on, or is over.
-    let (goal, refused) = if trouble.is_some() && now.after != AfterStop::Fault {
-        (mode(S::Stopping, trouble.unwrap(), AfterStop::Fault), None)
+    let (goal, refused) = if let Some(cause) = trouble.filter(|_| now.after != AfterStop::Fault) {
+        (mode(S::Stopping, cause, AfterStop::Fault), None)
     } else if is(Park) && now.after == AfterStop::Standby {
         (mode(S::Stopping, Cause::Asked, AfterStop::Park), None)
     } else if is(Stop) && now.after == AfterStop::Park {

@@ -7,7 +7,7 @@ use hexad::control::controller::{Input, Output};
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, Request, State};
 use hexad::host::config::Config;
-use hexad::model::task::TaskState;
+use hexad::model::task::{TaskState, task_coordinates};
 use hexad::scene::motions::{Motion, Scene, fit};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -118,11 +118,10 @@ impl Watched {
             _ => {}
         }
         // Whoever stands, stands where the platform does.
-        if !self.before.state.controls() {
-            if let Some((pose, _)) = self.before.measured {
-                let x = hexad::model::task::task_coordinates(&pose, &CONFIG.machine.home);
-                self.stands_at = TaskState::at_rest(x);
-            }
+        if !self.before.state.controls()
+            && let Some((pose, _)) = self.before.measured
+        {
+            self.stands_at = TaskState::at_rest(task_coordinates(&pose, &CONFIG.machine.home));
         }
         if let Some(request) = stretch.request {
             self.rig.ask(request);
