@@ -62,7 +62,7 @@ impl Fleet {
             let legs = leg_motion(machine, &state.motion());
             (state, legs.length, legs.rate)
         };
-        let controller = Controller::new(machine, parameters(&config.deployment, Rung::Exact));
+        let controller = Controller::new(machine, parameters(machine, &config.deployment, Rung::Exact));
         let mut fleet = Self {
             controllers: vec![controller; platforms],
             path: (0..cycles + SPREAD).map(row).collect(),

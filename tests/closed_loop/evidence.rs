@@ -123,13 +123,13 @@ fn a_setpoint_out_of_the_envelope_is_refused_with_axis_value_and_end() {
         velocity: [1.0; 6],
         acceleration: [1.0; 6],
     });
-    for axis in 0..6 {
+    for (axis, range) in range.into_iter().enumerate() {
         for sign in [1.0, -1.0] {
             let mut rig = Rig::new(&config, &config.machine);
             let mut task = TaskState::at_rest(config.machine.home);
-            task.x[axis] += 1.1 * sign * range[axis];
+            task.x[axis] += 1.1 * sign * range;
             let output = rig.cycle(&rig.input(&task));
-            let bound = config.machine.home[axis] + sign * range[axis];
+            let bound = config.machine.home[axis] + sign * range;
             assert_eq!(output.state, State::Standby);
             assert_evidence(&output, Cause::SetpointOutOfEnvelope, task.x[axis], bound, axis as u32 + 1);
         }
