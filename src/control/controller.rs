@@ -49,6 +49,13 @@ pub struct Parameters {
     pub measured_timeout_ns: u64,
 }
 
+impl Parameters {
+    /// A setpoint is carried on until the first cycle that finds it too old \[s\].
+    pub(super) fn longest_carried_s(&self) -> f64 {
+        self.setpoint_timeout_ns.saturating_add(self.period_ns) as f64 * 1e-9
+    }
+}
+
 /// Lowest and highest X of a setpoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Envelope {
@@ -245,46 +252,49 @@ impl Controller {
         self.mode = mode;
     }
 
-    /// Takes in what can be believed. Continuity is asked for only where it can be had: of measurements
-    /// that are young, of setpoints that are followed.
+    /// Takes in what can be believed. Continuity is asked for only where it can be had: of measurements that
+    /// are young or control the platform, of setpoints that are followed.
     fn doubt(&mut self, input: &Input) {
         let Self { parameters, measurement, parting, setpoint, .. } = self;
         let machine = self.model.machine();
         let now_ns = input.release_ns;
-        let counted = u64::from(self.mode.state.controls());
+        let controls = self.mode.state.controls();
         let mut waited = [true; 2];
         if let Some(now) = input.measurement
             && measurement.newest != Some(now)
         {
             let timeout_ns = parameters.measured_timeout_ns;
-            let is_young = |good: &Measurement| now_ns.abs_diff(good.time_ns) <= timeout_ns;
+            let widest = measurement.widest(now_ns, parameters.period_ns);
+            let binds = |good: &Measurement| controls || now_ns.abs_diff(good.time_ns) <= timeout_ns;
             let verdict = doubt::time(Cause::MeasurementFromElsewhen, now.time_ns, now_ns, timeout_ns)
                 .and_then(|()| {
-                    let before = measurement.good.filter(is_young);
-                    doubt::measurement(&machine.actuator, &now, before.as_ref(), parting)
+                    let before = measurement.good.filter(binds);
+                    let limit = &parameters.limits.position;
+                    doubt::measurement(&machine.actuator, limit, &now, before.as_ref(), widest, parting)
                 });
-            measurement.take(now, verdict);
+            measurement.take(now, verdict, now_ns, controls);
             waited[0] = verdict.is_err();
         }
         if let Some(now) = input.setpoint
             && setpoint.newest.map(|aim| aim.setpoint) != Some(now)
         {
             let timeout_ns = parameters.setpoint_timeout_ns;
+            let widest = setpoint.widest(now_ns, parameters.period_ns);
             let follows = matches!(self.mode.state, State::Engaging | State::Active);
             let mut limiting = Limiting::default();
             let now = Aim { setpoint: now, motion: now.task.motion() };
             let verdict = doubt::time(Cause::SetpointFromElsewhen, now.setpoint.time_ns, now_ns, timeout_ns)
                 .and_then(|()| {
                     let before = setpoint.good.filter(|_| follows);
-                    doubt::setpoint(machine, parameters, &now, before.as_ref(), &mut limiting)
+                    doubt::setpoint(machine, parameters, &now, before.as_ref(), widest, &mut limiting)
                 });
-            setpoint.take(now, verdict);
+            setpoint.take(now, verdict, now_ns, follows);
             self.setpoint_limiting = limiting;
             waited[1] = verdict.is_err();
         }
         let [no_measurement, no_setpoint] = waited.map(u64::from);
-        self.without_measurement += counted * no_measurement;
-        self.without_setpoint += counted * no_setpoint;
+        self.without_measurement += u64::from(controls) * no_measurement;
+        self.without_setpoint += u64::from(controls) * no_setpoint;
     }
 
     /// After a pause of the loop the inputs may be fresh again, but meanwhile the drives had no force and
@@ -332,13 +342,13 @@ impl Controller {
             .map_err(|lost| self.setpoint.absence(lost))
     }
 
-    /// The setpoint, carried on or back for the timeout at most.
+    /// The setpoint, carried on or back no longer than it may be.
     fn setpoint_at(&self, instant_ns: u64) -> Option<Motion> {
         let Aim { setpoint, motion } = self.setpoint.good?;
         if instant_ns == setpoint.time_ns {
             return Some(motion);
         }
-        let longest = self.parameters.setpoint_timeout_ns as f64 * 1e-9;
+        let longest = self.parameters.longest_carried_s();
         let dt = seconds_between(setpoint.time_ns, instant_ns).max(-longest).min(longest);
         Some(setpoint.task.after(dt).motion())
     }

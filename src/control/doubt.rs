@@ -1,7 +1,7 @@
 //! Whether an input can be what it says it is.
 //!
 //! What is refused changes nothing: the last good input stays, and its age goes on counting. So bad data
-//! never refreshes a watchdog, and the reason of the last refusal is told when the watchdog barks.
+//! never refreshes a watchdog, and the reason of a refusal is told when the watchdog barks.
 
 use super::controller::{Measurement, Parameters, Setpoint, seconds_between};
 use super::limits::{AxisLimits, Limit, Limiting};
@@ -25,8 +25,20 @@ const NOISE: f64 = 1e-3;
 /// not quite to scale. A wrong sign parts by twice the way, a wrong unit by a thousand times.
 const RATE_SHARE: f64 = 0.3;
 
-/// What parted so long ago is forgotten \[s\].
-const RATE_MEMORY_S: f64 = 0.1;
+/// And by so much, as a share of the stroke: noise and delay of the rates. What a wrong sign makes of a loop
+/// doubles within milliseconds, so this is not the place to be generous.
+const RATE_NOISE: f64 = 3e-4;
+
+/// What no drive does to a leg \[m/s^2\]: five times gravity is an impact. Or ten times the limit of
+/// acceleration, where somebody has asked for more.
+const LEG_ACCELERATION: f64 = 50.0;
+const LIMIT_SHARE: f64 = 10.0;
+
+/// Change of a rate that is believed at once, as a share of the greatest rate: noise.
+const RATE_GRAIN: f64 = 0.02;
+
+/// What parted so long ago is forgotten \[s\]: long against the delay of a filter, short against a motion.
+const RATE_MEMORY_S: f64 = 0.03;
 
 /// Difference between a setpoint and what the one before it leads to that is believed, as a share of the way
 /// between: messages are stamped a little late or early.
@@ -35,28 +47,44 @@ const SETPOINT_SHARE: f64 = 0.25;
 /// And at least so much, as a share of the stroke: too small to do harm, and numbers are rounded.
 const SETPOINT_GRAIN: f64 = 1e-4;
 
+/// A grain of rate is what moves a grain of length in this time \[s\].
+const SETPOINT_GRAIN_S: f64 = 0.1;
+
+/// What may have changed since the last good input grows with the time since, but no further than in so many
+/// intervals of the messages: refused ones must not widen what is believed. Two: one may get lost.
+const BELIEVED_INTERVALS: f64 = 2.0;
+
 /// The last input that was believed, and why the one after it was not.
 #[derive(Clone, Copy, Debug)]
 pub struct Believed<T> {
     pub good: Option<T>,
     /// The last one, good or not: each is looked at once.
     pub newest: Option<T>,
+    /// When that one was looked at.
+    newest_ns: u64,
     refused: Option<Trouble>,
 }
 
 impl<T> Default for Believed<T> {
     fn default() -> Self {
-        Self { good: None, newest: None, refused: None }
+        Self { good: None, newest: None, newest_ns: 0, refused: None }
     }
 }
 
 impl<T: Copy> Believed<T> {
-    /// Takes an input in, if it is believed.
-    pub fn take(&mut self, input: T, verdict: Result<(), Trouble>) {
-        self.newest = Some(input);
+    /// Longest time \[s\] since the good input that widens what is believed now.
+    pub fn widest(&self, now_ns: u64, period_ns: u64) -> f64 {
+        let interval_ns = now_ns.saturating_sub(self.newest_ns).max(period_ns);
+        BELIEVED_INTERVALS * (interval_ns as f64 * 1e-9)
+    }
+
+    /// Takes an input in, if it is believed. Of several that `bind` and are refused the first is the one to
+    /// tell of: the others may only be far from what was good so long ago.
+    pub fn take(&mut self, input: T, verdict: Result<(), Trouble>, now_ns: u64, bind: bool) {
+        (self.newest, self.newest_ns) = (Some(input), now_ns);
         match verdict {
             Ok(()) => (self.good, self.refused) = (Some(input), None),
-            Err(trouble) => self.refused = Some(trouble),
+            Err(trouble) => self.refused = self.refused.filter(|_| bind).or(Some(trouble)),
         }
     }
 
@@ -85,7 +113,10 @@ impl Parting {
     /// A step from one measurement to the next.
     fn after(&self, now: &Measurement, before: &Measurement) -> Self {
         let dt = seconds_between(before.time_ns, now.time_ns);
-        let kept = (1.0 - dt / RATE_MEMORY_S).max(0.0);
+        let kept = 1.0 - dt / RATE_MEMORY_S;
+        if !(kept > 0.0) {
+            return Self::default();
+        }
         let mut next = *self;
         let rates = now.rate.iter().zip(&before.rate);
         let lengths = now.length.iter().zip(&before.length);
@@ -100,11 +131,14 @@ impl Parting {
     }
 }
 
-/// Whether the legs can be where a measurement says, after `before`. `parting` goes on with what is believed.
+/// Whether the legs can be where a measurement says, after `before`. `widest`: see [`Believed::widest`].
+/// `parting` goes on with what is believed.
 pub fn measurement(
     actuator: &Actuator,
+    limit: &AxisLimits,
     now: &Measurement,
     before: Option<&Measurement>,
+    widest: f64,
     parting: &mut Parting,
 ) -> Result<(), Trouble> {
     if now.length.iter().chain(&now.rate).any(|value| !value.is_finite()) {
@@ -116,18 +150,28 @@ pub fn measurement(
         return Ok(());
     };
     let dt = seconds_between(before.time_ns, now.time_ns);
+    if dt < 0.0 {
+        return Err(Trouble::new(Cause::MeasurementFromElsewhen, -dt, 0.0));
+    }
     let noise = NOISE * stroke(actuator);
-    let furthest = BEYOND_RATE * actuator.max_rate * dt + noise;
+    let furthest = BEYOND_RATE * actuator.max_rate * dt.min(widest) + noise;
     for (leg, (now, before)) in now.length.iter().zip(&before.length).enumerate() {
         let moved = (now - before).abs();
-        // Backward in time the bound is negative, or the noise alone.
-        if dt < 0.0 || moved > furthest {
+        if moved > furthest {
             return Err(Trouble::new(Cause::MeasurementJumped, moved, furthest).at(leg));
+        }
+    }
+    let strongest = LEG_ACCELERATION.max(LIMIT_SHARE * limit.acceleration);
+    let furthest = strongest * dt.min(widest) + RATE_GRAIN * actuator.max_rate;
+    for (leg, (now, before)) in now.rate.iter().zip(&before.rate).enumerate() {
+        let changed = (now - before).abs();
+        if changed > furthest {
+            return Err(Trouble::new(Cause::RateJumped, changed, furthest).at(leg));
         }
     }
     let next = parting.after(now, before);
     for (leg, (apart, way)) in next.apart.iter().zip(&next.way).enumerate() {
-        let furthest = RATE_SHARE * way + noise;
+        let furthest = RATE_SHARE * way + RATE_NOISE * stroke(actuator);
         if apart.abs() > furthest {
             return Err(Trouble::new(Cause::RateInconsistent, apart.abs(), furthest).at(leg));
         }
@@ -143,12 +187,14 @@ pub struct Aim {
     pub motion: Motion,
 }
 
-/// Whether a setpoint keeps the limits and, if it is followed since `before`, continues it.
+/// Whether a setpoint keeps the limits and, if it is followed since `before`, continues it. `widest`: see
+/// [`Believed::widest`].
 pub fn setpoint(
     machine: &Machine,
     parameters: &Parameters,
     now: &Aim,
     before: Option<&Aim>,
+    widest: f64,
     limiting: &mut Limiting,
 ) -> Result<(), Trouble> {
     let Aim { setpoint, motion } = now;
@@ -160,7 +206,10 @@ pub fn setpoint(
     within_legs(machine, parameters, motion, limiting)?;
     let Some(before) = before else { return Ok(()) };
     let dt = seconds_between(before.setpoint.time_ns, setpoint.time_ns);
-    continues(machine, parameters, motion, &before.motion, dt, limiting)
+    if dt <= 0.0 {
+        return Err(Trouble::new(Cause::SetpointFromElsewhen, -dt, 0.0));
+    }
+    continues(machine, parameters, motion, &before.motion, [dt, widest], limiting)
 }
 
 fn within_limits(parameters: &Parameters, motion: &Motion, limiting: &mut Limiting) -> Result<(), Trouble> {
@@ -224,23 +273,24 @@ fn within_legs(
 
 /// Where the platform stands if this is the last setpoint: carried on for the timeout, then brought to rest.
 fn where_stopped(parameters: &Parameters, motion: &Motion) -> Pose {
-    let t = parameters.setpoint_timeout_ns as f64 * 1e-9;
+    let t = parameters.longest_carried_s();
     let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
     let last = Twist::from_vector(&(v + a * t));
     let stop = Segment::to_rest(0, &last, &motion.acceleration, &parameters.limits);
     motion.pose.displaced(&Twist::from_vector(&((v + a * (0.5 * t)) * t + stop.end())))
 }
 
-/// X' and X'' are the derivatives of X, as far as two messages can show.
+/// X' and X'' are the derivatives of X, as far as two messages `dt` apart can show.
 fn continues(
     machine: &Machine,
     parameters: &Parameters,
     now: &Motion,
     before: &Motion,
-    dt: f64,
+    [dt, widest]: [f64; 2],
     limiting: &mut Limiting,
 ) -> Result<(), Trouble> {
     let grain = SETPOINT_GRAIN * stroke(&machine.actuator);
+    let time = dt.min(widest);
     let moved = before.pose.displacement_to(&now.pose);
     let parts = |of: fn(&Motion) -> [nalgebra::Vector3<f64>; 2]| (of(now), of(before));
     let (v, v_before) = parts(|motion| [motion.twist.angular, motion.twist.linear]);
@@ -251,19 +301,19 @@ fn continues(
         [moved.angular, moved.linear].into_iter().zip(v.iter().zip(&v_before)).zip(a.iter().zip(&a_before));
     for (((moved, (v, v_before)), (a, a_before)), (limit, grain)) in each.zip(limits.into_iter().zip(grains))
     {
-        let jerk = limit.jerk * dt;
+        let jerk = limit.jerk * time;
         let share = |apart: f64, way: f64, drift: f64| apart / (SETPOINT_SHARE * way + drift + grain);
         let fastest = v.norm().max(v_before.norm());
         let strongest = a.norm().max(a_before.norm());
-        let x = share((moved - (v + v_before) * (0.5 * dt)).norm(), fastest * dt, jerk * dt * dt / 12.0);
-        // A grain of rate is what moves a grain of length within the memory of the check of the legs' rates.
+        let x =
+            share((moved - (v + v_before) * (0.5 * dt)).norm(), fastest * time, jerk * time * time / 12.0);
         let v = (v - v_before - (a + a_before) * (0.5 * dt)).norm()
-            / (SETPOINT_SHARE * strongest * dt + 0.25 * jerk * dt + grain / RATE_MEMORY_S);
-        if dt <= 0.0 || x > 1.0 || v > 1.0 {
+            / (SETPOINT_SHARE * strongest * time + 0.25 * jerk * time + grain / SETPOINT_GRAIN_S);
+        if x > 1.0 || v > 1.0 {
             return Err(Trouble::new(Cause::SetpointJumped, x.max(v), 1.0));
         }
         // Rates of X'' are asked for over a period at least: messages that come in pairs are no jerk.
-        let longest = dt.max(parameters.period_ns as f64 * 1e-9);
+        let longest = time.max(parameters.period_ns as f64 * 1e-9);
         let jerk = (a - a_before).norm() / (limit.jerk * longest);
         if !limiting.keeps(Limit::Jerk, jerk) {
             return Err(Trouble::new(Cause::SetpointTooFast, jerk, 1.0));

@@ -4,10 +4,13 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-mod faults;
+mod evidence;
+mod inputs;
+mod integral;
 mod limits;
 mod poses;
 mod replay;
+#[path = "../common/rig.rs"]
 mod rig;
 mod rungs;
 mod tracking;

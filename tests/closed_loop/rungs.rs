@@ -35,11 +35,12 @@ fn without_inertia_there_is_no_feedback() {
     rig.controller =
         Controller::new(&config.machine, Parameters { rung: Rung::Gravity, ..parameters(&config) });
     let scene = fit(&config.machine, Motion::Sines, 8.0);
+    rig.engage(&scene.at(0.0));
     for k in 0..3000 {
         let input = rig.input(&scene.at(1e-3 * f64::from(k)));
         let output = rig.cycle(&input);
         if output.state != State::Active {
-            assert_eq!(output.cause, Cause::OffPath, "cycle {k}");
+            assert_eq!((output.state, output.cause), (State::Fault, Cause::OffPath), "cycle {k}");
             return;
         }
     }

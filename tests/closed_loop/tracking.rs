@@ -4,6 +4,7 @@
 use core::f64::consts::TAU;
 
 use hexad::control::state::State;
+use hexad::model::task::TaskState;
 use hexad::scene::motions::Motion;
 
 use super::common::{Errors, angle_between, deployed};
@@ -123,10 +124,14 @@ fn an_offset_decays_as_designed() {
             let hertz = if axis < 3 { 6.0 } else { config.deployment.control.position_bandwidth_hz };
             let wn = TAU * hertz;
             let mut rig = Rig::new(&config, &config.machine);
-            let offset = 1e-3 * config.machine.joints.radius.min(1.0);
-            let mut task = hexad::model::task::TaskState::at_rest(config.machine.home);
-            task.x[axis] += offset;
+            let offset = 2e-4 * config.machine.joints.radius.min(1.0);
+            let task = TaskState::at_rest(config.machine.home);
             let wanted = task.motion().pose;
+            rig.engage(&task);
+            // A shove that is over before anybody sees it: too small to be called a jump.
+            let mut aside = config.machine.clone();
+            aside.home[axis] -= offset;
+            rig.simulator = Rig::new(&config, &aside).simulator;
             for k in 0..300 {
                 // The force acts from 0.6 ms after the first measurement on.
                 let t = (f64::from(k) - 0.6).max(0.0) * 1e-3;

@@ -1,8 +1,11 @@
 //! The loop without threads: measurement and setpoint at k T, release at k T + T / 2, force on the platform
 //! from 100 us after the release on.
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Parameters, Setpoint};
-use hexad::control::state::State;
+#![allow(dead_code, reason = "every test uses a part of it")]
+
+use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::limits::Limit;
+use hexad::control::state::{Cause, Request, State};
 use hexad::host::config::Config;
 use hexad::host::config::deployment::Fidelity;
 use hexad::host::daemon;
@@ -18,6 +21,9 @@ use super::common::{Errors, angle_between};
 /// What reading, computing and sending take, about as on a common computer.
 const FORCE_DELAY_NS: u64 = 100_000;
 
+/// In cycles; a second is more than the gentlest of motions onto a setpoint as near as it must be.
+const LONGEST_ENGAGING: u32 = 1000;
+
 /// The first cycle; the clock of a computer that has been up for a while.
 const START_NS: u64 = 86_400_000_000_000;
 
@@ -27,16 +33,20 @@ pub fn parameters(config: &Config) -> Parameters {
         Fidelity::Fixed(rung) => rung,
         Fidelity::Auto => Rung::Exact,
     };
-    daemon::parameters(&config.deployment, rung)
+    daemon::parameters(&config.machine, &config.deployment, rung)
 }
 
 /// A controller, a platform, and what is between them.
+#[derive(Clone)]
 pub struct Rig {
     pub controller: Controller,
     pub simulator: Simulator,
     pub now_ns: u64,
-    period_ns: u64,
-    force: Option<[f64; LEGS]>,
+    pub period_ns: u64,
+    /// The newest request.
+    pub asked: Option<Asked>,
+    /// On the platform now.
+    pub force: Option<[f64; LEGS]>,
 }
 
 /// How far the platform was from where it should have been.
@@ -56,8 +66,26 @@ impl Rig {
             simulator: Simulator::new(platform, plant.brake_deceleration_m_s2, plant.step_s),
             now_ns: START_NS,
             period_ns: parameters.period_ns,
+            asked: None,
             force: None,
         }
+    }
+
+    /// A request, from the next input on.
+    pub fn ask(&mut self, request: Request) {
+        let number = self.asked.map_or(1, |asked| asked.message.1 + 1);
+        self.asked = Some(Asked { request, message: (START_NS, number) });
+    }
+
+    /// Asks to engage and goes on until active, on a setpoint at rest.
+    pub fn engage(&mut self, task: &TaskState) {
+        self.ask(Request::Engage);
+        for _ in 0..LONGEST_ENGAGING {
+            if self.cycle(&self.input(task)).state == State::Active {
+                return;
+            }
+        }
+        panic!("not active after {LONGEST_ENGAGING} cycles: {:?}", self.cycle(&self.input(task)));
     }
 
     /// What the controller sees in this cycle, everything in order.
@@ -67,6 +95,7 @@ impl Rig {
             release_ns: self.now_ns + self.period_ns / 2,
             setpoint: Some(Setpoint { time_ns: self.now_ns, task: *task }),
             measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: legs.rate }),
+            request: self.asked,
             deadline_missed: false,
         }
     }
@@ -74,15 +103,20 @@ impl Rig {
     /// One cycle of the controller and one period of the platform.
     pub fn cycle(&mut self, input: &Input) -> Output {
         let output = self.controller.step(input);
-        let before = self.period_ns / 2 + FORCE_DELAY_NS;
-        self.simulator.advance(before as f64 * 1e-9, self.force.as_ref());
-        self.force = (output.state == State::Active).then_some(output.force);
-        self.simulator.advance((self.period_ns - before) as f64 * 1e-9, self.force.as_ref());
-        self.now_ns += self.period_ns;
+        self.pass(output.state.controls().then_some(output.force));
         output
     }
 
-    /// Plays a motion from home with approach and settling; each cycle goes to `watch`.
+    /// One period of the platform, in which another force arrives.
+    pub fn pass(&mut self, next: Option<[f64; LEGS]>) {
+        let before = self.period_ns / 2 + FORCE_DELAY_NS;
+        self.simulator.advance(before as f64 * 1e-9, self.force.as_ref());
+        self.force = next;
+        self.simulator.advance((self.period_ns - before) as f64 * 1e-9, self.force.as_ref());
+        self.now_ns += self.period_ns;
+    }
+
+    /// Engages and plays a motion from home with approach and settling; each cycle goes to `watch`.
     pub fn play(
         &mut self,
         machine: &Machine,
@@ -91,6 +125,7 @@ impl Rig {
     ) -> Tracking {
         let timeline = Timeline::new(machine, &machine.home.into(), &scene.at(0.0).x, scene.duration);
         let start_ns = self.now_ns;
+        self.ask(Request::Engage);
         let mut tracking = Tracking::default();
         loop {
             let t = (self.now_ns - start_ns) as f64 * 1e-9;
@@ -111,10 +146,16 @@ impl Rig {
 /// Plays a motion of `seconds` on a platform of its own; every cycle must be in control.
 pub fn track(config: &Config, platform: &Machine, motion: Motion, seconds: f64) -> Tracking {
     let scene = fit(&config.machine, motion, seconds);
-    Rig::new(config, platform).play(&config.machine, &scene, |_, output| {
-        assert_eq!(output.state, State::Active, "{:?}", output.cause);
-        assert!(!output.limited);
-    })
+    let mut cycles = 0;
+    let tracking = Rig::new(config, platform).play(&config.machine, &scene, |_, output| {
+        assert!(output.state.controls() && output.cause == Cause::None, "{:?}", output.cause);
+        assert!(output.state == State::Active || cycles < LONGEST_ENGAGING);
+        cycles += 1;
+        let cut = [Limit::Force, Limit::ForceRate].map(|limit| output.limiting.contains(limit));
+        assert_eq!(cut, [false; 2], "cycle {cycles}");
+    });
+    assert!(cycles > LONGEST_ENGAGING);
+    tracking
 }
 
 /// A rig in the middle of a motion, and the task at its next cycle.
@@ -122,6 +163,7 @@ pub fn in_motion(config: &Config) -> (Rig, TaskState) {
     let mut rig = Rig::new(config, &config.machine);
     let scene = fit(&config.machine, Motion::Sines, 8.0);
     let period_s = rig.period_ns as f64 * 1e-9;
+    rig.engage(&scene.at(0.0));
     for k in 0..1500 {
         let input = rig.input(&scene.at(period_s * f64::from(k)));
         assert_eq!(rig.cycle(&input).state, State::Active);

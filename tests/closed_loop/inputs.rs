@@ -1,0 +1,188 @@
+//! Which inputs count: what it takes to begin, and that one wrong message changes nothing.
+
+use hexad::control::controller::{Controller, Input, Output};
+use hexad::control::limits::Limit;
+use hexad::control::state::{Cause, Request, State};
+use hexad::model::task::TaskState;
+
+use super::common::{deployed, largest};
+use super::rig::{Rig, in_motion, parameters};
+
+/// Asserts a state without force, and why.
+pub fn assert_without_force(output: &Output, state: State, cause: Cause) {
+    assert_eq!((output.state, output.cause), (state, cause));
+    assert!(!state.controls());
+    assert_eq!(output.force.map(f64::to_bits), [0; 6]);
+    assert!(!output.limiting.contains(Limit::Force) && !output.limiting.contains(Limit::ForceRate));
+}
+
+#[test]
+fn without_messages_the_controller_is_off() {
+    let config = deployed("fried2008");
+    let mut rig = Rig::new(&config, &config.machine);
+    rig.ask(Request::Engage);
+    let full = rig.input(&TaskState::at_rest(config.machine.home));
+    let lacks = |cause| move |output: &Output| assert_eq!(output.refused, cause);
+    let output = rig.controller.step(&Input { measurement: None, setpoint: None, ..full });
+    assert_without_force(&output, State::Off, Cause::NoMeasurement);
+    lacks(Cause::NoMeasurement)(&output);
+    let output = rig.controller.step(&Input { measurement: None, ..full });
+    assert_without_force(&output, State::Off, Cause::NoMeasurement);
+    rig.ask(Request::Engage);
+    let output = Rig::new(&config, &config.machine).controller.step(&Input {
+        setpoint: None,
+        request: rig.asked,
+        ..full
+    });
+    assert_without_force(&output, State::Standby, Cause::NoSetpoint);
+    lacks(Cause::NoSetpoint)(&output);
+    assert!(output.measured.is_some() && output.error.is_none(), "it knows the pose all the same");
+    assert!(![Cause::NoMeasurement, Cause::NoSetpoint].iter().any(|cause| cause.is_fault()));
+    // The request was answered once, and is not carried out later.
+    assert_without_force(&rig.controller.step(&full), State::Standby, Cause::NotAsked);
+    let output = rig.controller.step(&Input { request: rig.asked, ..full });
+    assert_eq!(
+        (output.state, output.refused, output.answered),
+        (State::Engaging, Cause::None, rig.asked.unwrap().message)
+    );
+}
+
+#[test]
+fn control_begins_only_near_the_setpoint() {
+    let config = deployed("fried2008");
+    let parameters = parameters(&config);
+    let (turn, way) = (parameters.engage_orientation, parameters.engage_position);
+    for (axis, tolerance) in [turn, turn, turn, way, way, way].into_iter().enumerate() {
+        // An error of velocity counts as the error of pose that it is worth to the law.
+        let law = &parameters.law;
+        let wn = if axis < 3 { law.orientation.stiffness } else { law.position.stiffness }.sqrt();
+        for (is_rate, sign) in [(false, 1.0), (false, -1.0), (true, 1.0), (true, -1.0)] {
+            let setpoint = |share: f64| {
+                let mut task = TaskState::at_rest(config.machine.home);
+                if is_rate {
+                    task.xd[axis] = sign * share * tolerance * wn;
+                } else {
+                    task.x[axis] += sign * share * tolerance;
+                }
+                task
+            };
+            let mut rig = Rig::new(&config, &config.machine);
+            for _ in 0..3 {
+                rig.ask(Request::Engage);
+                let mut far = rig.input(&setpoint(1.001));
+                if is_rate {
+                    // Passing by, just now.
+                    let age_ns = 500_000;
+                    far.release_ns -= age_ns;
+                }
+                let output = rig.controller.step(&far);
+                assert_without_force(&output, State::Standby, Cause::SetpointTooFar);
+                assert_eq!(output.refused, Cause::SetpointTooFar);
+                assert!((output.evidence.value - 1.001).abs() < 1e-6 && output.evidence.bound == 1.0);
+                rig.now_ns += 1_000_000;
+            }
+            rig.ask(Request::Engage);
+            assert_eq!(rig.controller.step(&rig.input(&setpoint(0.999))).state, State::Engaging);
+        }
+    }
+    assert!(!Cause::SetpointTooFar.is_fault());
+}
+
+/// Changes of one message, in motion.
+fn wrong(change: impl Fn(&mut Input)) {
+    let (mut rig, task) = in_motion(&deployed("fried2008"));
+    let good = rig.input(&task);
+    let mut twin = rig.controller.clone();
+    let mut input = good;
+    change(&mut input);
+    let (output, undisturbed) = (rig.controller.step(&input), twin.step(&good));
+    assert_eq!((output.state, output.cause), (State::Active, Cause::None));
+    let waited = [output.without_measurement, output.without_setpoint];
+    assert_eq!(waited[0] + waited[1], 1 + undisturbed.without_measurement + undisturbed.without_setpoint);
+    for (force, should) in output.force.iter().zip(undisturbed.force) {
+        // It goes on with what was good a millisecond ago.
+        assert!((force - should).abs() < 0.1, "{force} instead of {should}");
+    }
+    rig.now_ns += 1_000_000;
+    assert_eq!(rig.controller.step(&rig.input(&task.after(1e-3))).without_setpoint, output.without_setpoint);
+}
+
+#[test]
+fn one_number_that_is_not_finite_is_ridden_through_wherever_it_stands() {
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for k in 0..6 {
+            wrong(|input| input.measurement.as_mut().unwrap().length[k] = value);
+            wrong(|input| input.measurement.as_mut().unwrap().rate[k] = value);
+            wrong(|input| input.setpoint.as_mut().unwrap().task.x[k] = value);
+            wrong(|input| input.setpoint.as_mut().unwrap().task.xd[k] = value);
+            wrong(|input| input.setpoint.as_mut().unwrap().task.xdd[k] = value);
+        }
+    }
+}
+
+/// Finite numbers too large to compute with, and those that are merely wrong.
+#[test]
+fn one_message_far_away_is_ridden_through() {
+    for away in [0.05, 1.0, 1e3, 1e100, 1e300, f64::MAX, -1.0, -1e300] {
+        for k in 0..6 {
+            wrong(|input| input.measurement.as_mut().unwrap().length[k] += away);
+            wrong(|input| input.measurement.as_mut().unwrap().rate[k] += 20.0 * away);
+            wrong(|input| input.setpoint.as_mut().unwrap().task.x[k] += away);
+            wrong(|input| input.setpoint.as_mut().unwrap().task.xd[k] += away);
+            wrong(|input| input.setpoint.as_mut().unwrap().task.xdd[k] += 100.0 * away);
+        }
+    }
+}
+
+#[test]
+fn one_time_stamp_from_another_world_is_ridden_through() {
+    for time_ns in [0, 1, u64::MAX / 2, u64::MAX / 2 + 1, u64::MAX - 1, u64::MAX] {
+        wrong(|input| input.measurement.as_mut().unwrap().time_ns = time_ns);
+        wrong(|input| input.setpoint.as_mut().unwrap().time_ns = time_ns);
+    }
+}
+
+/// To the last nanosecond.
+#[test]
+fn a_message_counts_until_it_is_as_old_as_its_timeout() {
+    let parameters = parameters(&deployed("fried2008"));
+    let after = |age_ns: u64, of_setpoint: bool| {
+        let (mut rig, task) = in_motion(&deployed("fried2008"));
+        let mut input = rig.input(&task);
+        rig.controller.step(&input);
+        let begin_ns = rig.now_ns;
+        input.release_ns = begin_ns + age_ns;
+        let young = Rig { now_ns: input.release_ns, ..rig.clone() }.input(&task.after(age_ns as f64 * 1e-9));
+        if of_setpoint {
+            input.measurement = young.measurement;
+        } else {
+            input.setpoint = young.setpoint;
+        }
+        let output = rig.controller.step(&input);
+        (output.state, output.cause)
+    };
+    let lost = [(State::Fault, Cause::MeasurementLost), (State::Stopping, Cause::SetpointLost)];
+    for (of_setpoint, timeout_ns) in
+        [(false, parameters.measured_timeout_ns), (true, parameters.setpoint_timeout_ns)]
+    {
+        let at = after(timeout_ns, of_setpoint);
+        assert_eq!(at, (State::Active, Cause::None), "{of_setpoint}");
+        assert_eq!(after(timeout_ns + 1, of_setpoint), lost[usize::from(of_setpoint)]);
+    }
+}
+
+/// At the end of time nothing overflows.
+#[test]
+fn the_last_cycle_of_all_is_a_cycle() {
+    let config = deployed("fried2008");
+    let mut rig = Rig::new(&config, &config.machine);
+    rig.ask(Request::Engage);
+    let mut input = rig.input(&TaskState::at_rest(config.machine.home));
+    input.release_ns = u64::MAX;
+    input.measurement.as_mut().unwrap().time_ns = u64::MAX;
+    input.setpoint.as_mut().unwrap().time_ns = u64::MAX;
+    let mut controller = Controller::new(&config.machine, parameters(&config));
+    let output = controller.step(&input);
+    assert_eq!(output.state, State::Engaging);
+    assert!(largest(&output.force) > 1.0);
+}

@@ -1,0 +1,121 @@
+//! The integral term: it removes what a wrong payload leaves, and does not wind up.
+
+use hexad::control::limits::Limit;
+use hexad::control::state::{Request, State};
+use hexad::host::config::Config;
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::ladder::Gravity;
+use hexad::model::task::TaskState;
+
+use super::common::deployed;
+use super::rig::{Rig, parameters};
+
+fn with_integral(hertz: f64) -> Config {
+    let mut config = deployed("motion_base");
+    config.deployment.plant.step_s = 1e-3;
+    config.deployment.control.integral_bandwidth_hz = hertz;
+    config
+}
+
+/// The slowest that makes a difference within the seconds of a test.
+const HERTZ: f64 = 0.5;
+
+/// Position error after some seconds at home, with a platform a fifth heavier than the controller thinks.
+fn sag(config: &Config, seconds: u32) -> f64 {
+    let mut heavy = config.machine.clone();
+    heavy.platform.mass *= 1.2;
+    let mut rig = Rig::new(config, &heavy);
+    let home = TaskState::at_rest(config.machine.home);
+    rig.engage(&home);
+    (0..1000 * seconds).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
+    (rig.simulator.state().pose.position - home.motion().pose.position).norm()
+}
+
+#[test]
+fn a_payload_of_a_fifth_leaves_nothing() {
+    let without = sag(&with_integral(0.0), 4);
+    let with = sag(&with_integral(HERTZ), 4);
+    println!("without {without:e} m, with {with:e} m");
+    assert!(without > 1e-4);
+    assert!(with < 1e-3 * without, "{with} of {without}");
+}
+
+/// How far the platform shoots over when a load, a little too heavy for the drives, falls off.
+fn overshoot(config: &Config) -> f64 {
+    let mut rig = Rig::new(config, &config.machine);
+    let home = TaskState::at_rest(config.machine.home);
+    rig.engage(&home);
+    let mut heavy = config.machine.clone();
+    heavy.platform.mass *= 1.3;
+    let still = home.motion();
+    let weight = [&heavy, &config.machine]
+        .map(|machine| InverseDynamics::new(machine).forces::<Gravity>(&still).unwrap());
+    let mut limited = 0;
+    let mut highest: f64 = 0.0;
+    for cycle in 0..2000 {
+        let input = rig.input(&home);
+        let output = rig.controller.step(&input);
+        assert_eq!(output.state, State::Active, "{cycle}: {output:?}");
+        limited += u32::from(output.limiting.contains(Limit::Force));
+        let loaded = cycle < 300;
+        rig.pass(Some(core::array::from_fn(|leg| {
+            output.force[leg] - if loaded { weight[0][leg] - weight[1][leg] } else { 0.0 }
+        })));
+        if !loaded {
+            highest = highest.max(rig.simulator.state().pose.position.z - config.machine.home[5]);
+        }
+    }
+    assert!(limited > 150, "{limited} cycles at the limit");
+    highest
+}
+
+#[test]
+fn it_does_not_wind_up_while_forces_are_limited() {
+    let weak = |hertz| {
+        let mut config = with_integral(hertz);
+        // Enough for the platform, not for the load.
+        config.machine.actuator.max_force = 4300.0;
+        config.deployment.control.following_position_m = 10.0;
+        config.deployment.control.following_orientation_rad = 10.0;
+        config
+    };
+    let config = weak(HERTZ);
+    let (without, with) = (overshoot(&weak(0.0)), overshoot(&config));
+    // What it would lift the platform by if it had all that it may have: half of the limit of acceleration.
+    let parameters = parameters(&config);
+    let wound_up = 0.5 * parameters.limits.position.acceleration / parameters.law.position.stiffness;
+    println!("overshoot without {without:e} m, with {with:e} m, wound up {wound_up:e} m");
+    assert!(without < 1e-5 && with < 0.7 * wound_up, "{with} after {without}");
+}
+
+/// Whoever engages again begins without what was learnt before: the payload may be another.
+#[test]
+fn it_begins_anew_with_each_engagement() {
+    let config = with_integral(HERTZ);
+    let mut heavy = config.machine.clone();
+    heavy.platform.mass *= 1.2;
+    let mut rig = Rig::new(&config, &heavy);
+    let home = TaskState::at_rest(config.machine.home);
+    let first = |rig: &mut Rig| {
+        rig.ask(Request::Engage);
+        let setpoint = TaskState::at_rest(hexad::model::task::task_coordinates(
+            &rig.simulator.state().pose,
+            &config.machine.home,
+        ));
+        rig.controller.clone().step(&rig.input(&setpoint)).force
+    };
+    rig.cycle(&rig.input(&home));
+    let fresh = first(&mut rig);
+    rig.engage(&home);
+    for _ in 0..2000 {
+        rig.cycle(&rig.input(&home));
+    }
+    rig.ask(Request::Off);
+    for _ in 0..50 {
+        rig.cycle(&rig.input(&home));
+    }
+    let again = first(&mut rig);
+    for (fresh, again) in fresh.iter().zip(again) {
+        assert!((fresh - again).abs() < 1.0, "{fresh} {again}");
+    }
+}

@@ -1,0 +1,16 @@
+//! Faults in every state, in closed loop with the simulated platform: what the daemon does about each, and
+//! what the platform feels.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+#[path = "../common/mod.rs"]
+mod common;
+mod disturbances;
+mod pictures;
+mod recording;
+#[path = "../common/rig.rs"]
+mod rig;
+mod scenarios;
+mod situations;
+mod table;
+mod world;

@@ -1,0 +1,95 @@
+//! What happened, and how near to its bounds.
+
+use hexad::control::controller::{Output, Parameters};
+use hexad::control::state::{Cause, State};
+use hexad::model::machine::LEGS;
+use hexad::model::rigid::{Acceleration, Pose, Twist};
+use hexad::model::task::TaskState;
+
+use super::common::largest;
+
+/// One cycle. Pose, twist and acceleration are the platform's own, at the end of it.
+#[derive(Clone, Copy)]
+pub struct Sample {
+    pub time_ns: u64,
+    pub output: Output,
+    pub pose: Pose,
+    pub twist: Twist,
+    /// X, if somebody says one.
+    pub setpoint: Option<TaskState>,
+    /// On the platform; `None` while the brakes have it.
+    pub force: Option<[f64; LEGS]>,
+    /// `None` while the brakes have the platform.
+    pub acceleration: Option<Acceleration>,
+}
+
+#[derive(Clone, Default)]
+pub struct Recording {
+    pub samples: Vec<Sample>,
+}
+
+/// Largest shares of their bounds while under control.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Peaks {
+    pub force: f64,
+    pub force_rate: f64,
+    pub acceleration: f64,
+    pub jerk: f64,
+}
+
+impl Recording {
+    pub fn push(&mut self, sample: Sample) {
+        self.samples.push(sample);
+    }
+
+    /// State and cause, wherever one of them changes.
+    pub fn path(&self) -> Vec<(State, Cause)> {
+        let mut path: Vec<_> =
+            self.samples.iter().map(|sample| (sample.output.state, sample.output.cause)).collect();
+        path.dedup();
+        path
+    }
+
+    /// Forces and the platform's true motion, against their bounds.
+    pub fn peaks(&self, parameters: &Parameters, max_force: f64) -> Peaks {
+        let period_s = parameters.period_ns as f64 * 1e-9;
+        let limits = [&parameters.limits.position, &parameters.limits.orientation];
+        let mut peaks = Peaks::default();
+        let mut before: Option<&Sample> = None;
+        for sample in &self.samples {
+            let Some(now) = sample.acceleration.filter(|_| sample.output.state.controls()) else {
+                before = None;
+                continue;
+            };
+            let over = |peak: &mut f64, share: f64| *peak = peak.max(share);
+            over(&mut peaks.force, largest(&sample.output.force) / max_force);
+            for (part, limit) in [now.linear, now.angular].iter().zip(limits) {
+                over(&mut peaks.acceleration, part.norm() / limit.acceleration);
+            }
+            if let Some(before) = before {
+                let change = |(now, before): (&f64, &f64)| (now - before).abs();
+                let step =
+                    sample.output.force.iter().zip(&before.output.force).map(change).fold(0.0, f64::max);
+                over(&mut peaks.force_rate, step / period_s / parameters.force_rate);
+                let then = before.acceleration.unwrap_or_default();
+                for (part, limit) in [now.linear - then.linear, now.angular - then.angular].iter().zip(limits)
+                {
+                    over(&mut peaks.jerk, part.norm() / period_s / limit.jerk);
+                }
+            }
+            before = Some(sample);
+        }
+        peaks
+    }
+
+    /// Seconds until the platform stands for good; `None` if it does not.
+    pub fn time_to_rest(&self) -> Option<f64> {
+        let moves = |sample: &Sample| sample.twist.vector().norm() > 1e-4;
+        let begin = self.samples.first()?.time_ns;
+        let seconds = |sample: &Sample| (sample.time_ns - begin) as f64 * 1e-9;
+        match self.samples.iter().rposition(moves) {
+            None => Some(0.0),
+            Some(last) => Some(seconds(self.samples.get(last + 1)?)),
+        }
+    }
+}

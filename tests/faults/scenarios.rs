@@ -1,0 +1,186 @@
+//! What happens on ordinary bad days, from beginning to end: acceleration and jerk of the platform stay below
+//! their limits in every cycle under control, and forces have no steps.
+//!
+//! With `HEXAD_CHARTS=FOLDER` each is drawn into a picture.
+
+use hexad::control::state::{Cause, Request, State};
+
+use super::pictures::draw;
+use super::rig::Rig;
+use super::situations::{Situation, machine};
+use super::world::{Grip, Source, World};
+
+/// Without a force from the daemon for this long, the drives brake \[cycles\].
+const DRIVES_WAIT: u32 = 50;
+
+fn standby() -> World {
+    let (config, parameters) = machine();
+    let mut world = World::new(Rig::new(&config, &config.machine), &config.machine, parameters);
+    world.run(200);
+    world
+}
+
+/// Engages where the platform stands, and is on the way for a second and a half.
+fn moving() -> World {
+    let mut world = standby();
+    world.ask(Request::Engage);
+    world.until(|output| output.state == State::Active);
+    up(&mut world);
+    world.run(900);
+    world
+}
+
+/// 150 mm up in 1.5 s.
+fn up(world: &mut World) {
+    let from = world.x();
+    let to = from + nalgebra::Vector6::new(0.0, 0.0, 0.1, 0.05, 0.0, 0.15);
+    world.source = Source::Moves([from, to], world.rig.now_ns, 1.5);
+}
+
+/// From a fault: clear, engage where it stands, and move again.
+fn begins_again(world: &mut World) {
+    world.source_at_platform();
+    world.run(200);
+    world.ask(Request::Clear);
+    world.run(200);
+    world.ask(Request::Engage);
+    world.until(|output| output.state == State::Active);
+    world.run(200);
+    let from = world.x();
+    world.source = Source::Moves([from, world.machine.home.into()], world.rig.now_ns, 1.5);
+    world.run(1700);
+}
+
+/// The limits are kept, the states are these, and in the end the platform is where it should be.
+fn assert_smooth(name: &str, title: &str, world: &World, expected: &[(State, Cause)]) {
+    let peaks = world.recording.peaks(&world.parameters, world.machine.actuator.max_force);
+    println!("{title}: {peaks:?}");
+    draw(name, title, world);
+    assert!(peaks.acceleration <= 1.0 && peaks.jerk <= 1.0 && peaks.force < 1.0, "{peaks:?}");
+    assert!(peaks.force_rate < 1.0, "never cut: {peaks:?}");
+    let path = world.recording.path();
+    let states = path
+        .iter()
+        .filter(|(state, cause)| state.controls() || cause.is_fault() || *cause == Cause::SetpointTooFar);
+    let mut states: Vec<_> = states.copied().collect();
+    states.dedup();
+    assert_eq!(states, expected);
+}
+
+const ENGAGES: [(State, Cause); 2] = [(State::Engaging, Cause::None), (State::Active, Cause::None)];
+
+/// Engages, loses control in these states, and engages again.
+fn twice(between: &[(State, Cause)]) -> Vec<(State, Cause)> {
+    [&ENGAGES[..], between, &ENGAGES[..]].concat()
+}
+
+#[test]
+fn engage_at_rest() {
+    let mut world = standby();
+    let mut aside = world.x();
+    aside[5] += 0.0019;
+    world.source = Source::Still(hexad::model::task::TaskState::at_rest(aside.into()));
+    world.run(100);
+    world.ask(Request::Engage);
+    world.until(|output| output.state == State::Active);
+    world.run(300);
+    assert_smooth("engage_at_rest", "engage at rest, the setpoint 1.9 mm away", &world, &ENGAGES);
+    assert!((world.x() - aside).norm() < 1e-5);
+}
+
+#[test]
+fn engage_in_motion() {
+    let mut world = standby();
+    let home = world.x();
+    let way = nalgebra::Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.1);
+    world.source = Source::Moves([home - way, home + way], world.rig.now_ns, 4.0);
+    // The setpoint passes by at 94 mm/s; the platform stands.
+    let passing = world.until(|output| output.cause == Cause::NotAsked);
+    assert!(passing.error.unwrap().twist.linear.norm() > 0.09, "{passing:?}");
+    world.ask(Request::Engage);
+    world.until(|output| output.state == State::Active);
+    world.run(2300);
+    let expected = [&[(State::Standby, Cause::SetpointTooFar)], &ENGAGES[..]].concat();
+    let title = "engage in motion, the setpoint passes by at 94 mm/s";
+    assert_smooth("engage_in_motion", title, &world, &expected);
+    assert!((world.x() - home - way).norm() < 1e-5);
+}
+
+#[test]
+fn engage_with_a_wrong_setpoint_is_refused() {
+    let mut world = standby();
+    let mut aside = world.x();
+    aside[5] += 0.01;
+    world.source = Source::Still(hexad::model::task::TaskState::at_rest(aside.into()));
+    world.run(100);
+    world.ask(Request::Engage);
+    let output = world.run(500);
+    assert_eq!((output.state, output.refused), (State::Standby, Cause::SetpointTooFar));
+    // Told with the distance: five times the tolerance of 2 mm.
+    assert!((output.evidence.value - 5.0).abs() < 1e-3 && output.evidence.bound == 1.0, "{output:?}");
+    let expected = [(State::Standby, Cause::SetpointTooFar)];
+    assert_smooth("engage_refused", "engage with the setpoint 10 mm away: refused", &world, &expected);
+    assert_eq!(world.recording.time_to_rest(), Some(0.0));
+}
+
+#[test]
+fn setpoint_source_killed_in_motion_and_restarted() {
+    let mut world = moving();
+    world.source = Source::Silent;
+    world.until(|output| output.state == State::Fault);
+    world.run(300);
+    begins_again(&mut world);
+    let lost = [(State::Stopping, Cause::SetpointLost), (State::Fault, Cause::SetpointLost)];
+    let title = "setpoint source killed in motion and restarted";
+    assert_smooth("setpoint_source_killed", title, &world, &twice(&lost));
+}
+
+#[test]
+fn plant_killed_in_motion_and_restarted() {
+    let mut world = moving();
+    let silence = world.last.measurement;
+    // A driver that is gone sends nothing on: its drives brake.
+    for cycle in 0..500 {
+        if cycle == DRIVES_WAIT {
+            world.grip = Grip::Held;
+        }
+        world.cycle(|_, input| input.measurement = silence);
+    }
+    world.grip = Grip::Free;
+    world.run(100);
+    begins_again(&mut world);
+    let lost = [(State::Fault, Cause::MeasurementLost)];
+    assert_smooth(
+        "plant_killed",
+        "driver killed in motion and restarted; the daemon lets go after 20 ms",
+        &world,
+        &twice(&lost),
+    );
+}
+
+#[test]
+fn daemon_killed_in_motion_and_restarted() {
+    let mut world = moving();
+    world.without_daemon(500, DRIVES_WAIT);
+    world.restart_daemon();
+    world.run(100);
+    begins_again(&mut world);
+    let expected = twice(&[(State::Standby, Cause::SetpointTooFar)]);
+    assert_smooth(
+        "daemon_killed",
+        "daemon killed in motion and restarted; the drives brake after 50 ms",
+        &world,
+        &expected,
+    );
+}
+
+/// None of this is worth anything if the worlds it begins with are not what they say.
+#[test]
+fn situations_are_what_they_say() {
+    for situation in Situation::ALL {
+        let mut world = situation.world();
+        let output = world.cycle(|_, _| {});
+        assert_eq!(output.state, situation.state());
+        assert_eq!(output.force != [0.0; 6], situation.state().controls());
+    }
+}

@@ -1,0 +1,132 @@
+//! One world in each state, a moment before something goes wrong.
+
+use hexad::control::controller::Parameters;
+use hexad::control::state::{Cause, Request, State};
+use hexad::host::config::Config;
+use hexad::model::task::TaskState;
+use hexad::scene::envelope;
+use hexad::scene::motions::{Motion, fit};
+
+use super::common::deployed;
+use super::rig::{Rig, parameters};
+use super::world::{Source, World};
+
+/// In the order of the columns of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Situation {
+    Standby,
+    Engaging,
+    AtRest,
+    InMotion,
+    Stopping,
+    Parking,
+    Fault,
+}
+
+impl Situation {
+    pub const ALL: [Self; 7] = [
+        Self::Standby,
+        Self::Engaging,
+        Self::AtRest,
+        Self::InMotion,
+        Self::Stopping,
+        Self::Parking,
+        Self::Fault,
+    ];
+
+    pub fn state(self) -> State {
+        match self {
+            Self::Standby => State::Standby,
+            Self::Engaging => State::Engaging,
+            Self::AtRest | Self::InMotion => State::Active,
+            Self::Stopping => State::Stopping,
+            Self::Parking => State::Parking,
+            Self::Fault => State::Fault,
+        }
+    }
+
+    /// Before anything goes wrong.
+    pub fn begins(self) -> (State, Cause) {
+        let cause = match self {
+            Self::Standby => Cause::NotAsked,
+            Self::Engaging | Self::AtRest | Self::InMotion => Cause::None,
+            Self::Stopping | Self::Parking => Cause::Asked,
+            Self::Fault => Cause::EmergencyStop,
+        };
+        (self.state(), cause)
+    }
+
+    /// A machine for a person, in this situation.
+    pub fn world(self) -> World {
+        let (config, parameters) = machine();
+        let mut world = World::new(Rig::new(&config, &config.machine), &config.machine, parameters);
+        let mut home = TaskState::at_rest(config.machine.home);
+        match self {
+            Self::Standby => {
+                world.run(50);
+            }
+            Self::Engaging => {
+                home.x[5] += 0.75 * parameters.engage_position;
+                world.source = Source::Still(home);
+                world.ask(Request::Engage);
+                world.run(30);
+            }
+            Self::AtRest => {
+                world.ask(Request::Engage);
+                world.until(|output| output.state == State::Active);
+                world.run(50);
+            }
+            Self::InMotion => moving(&mut world),
+            Self::Stopping => {
+                moving(&mut world);
+                world.ask(Request::Stop);
+                world.run(20);
+            }
+            Self::Parking => {
+                moving(&mut world);
+                world.ask(Request::Park);
+                world.until(|output| output.state == State::Parking);
+                world.run(100);
+            }
+            Self::Fault => {
+                moving(&mut world);
+                world.ask(Request::Estop);
+                world.run(200);
+            }
+        }
+        let output = world.cycle(|_, _| {});
+        assert_eq!((output.state, output.cause), self.begins());
+        world.recording.samples.clear();
+        world
+    }
+}
+
+/// The motion base, with an envelope that ends before the stroke does in one axis only, and a plant that is
+/// fast to compute.
+pub fn machine() -> (Config, Parameters) {
+    let mut config = deployed("motion_base");
+    config.deployment.plant.step_s = 1e-3;
+    let wide = [0.5, 0.5, GAMMA_RANGE, 1.0, 1.0, 1.0];
+    config.deployment.envelope = Some(envelope::Limits {
+        pose_min: wide.map(|x| -x),
+        pose_max: wide,
+        velocity: [1.0; 6],
+        acceleration: [1.0; 6],
+    });
+    let parameters = parameters(&config);
+    (config, parameters)
+}
+
+/// Of the envelope about home \[rad\].
+pub const GAMMA_RANGE: f64 = 0.3;
+
+/// Active, in the middle of sines on all axes.
+fn moving(world: &mut World) {
+    world.ask(Request::Engage);
+    world.until(|output| output.state == State::Active);
+    let scene = fit(&world.machine, Motion::Sines, 8.0);
+    world.source = Source::Plays(scene, world.rig.now_ns);
+    world.run(1900);
+    let speed = world.rig.simulator.state().twist.linear.norm();
+    assert!(speed > 0.2, "{speed}");
+}

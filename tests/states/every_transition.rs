@@ -1,0 +1,105 @@
+//! Every state with every cause and goal, every request, every combination of findings.
+
+use hexad::control::state::{Cause, Reaction, Request, State};
+use hexad::control::supervisor::{AfterStop, Findings, Mode, next};
+use rayon::prelude::*;
+
+use super::oracle;
+
+const GOALS: [AfterStop; 3] = [AfterStop::Standby, AfterStop::Park, AfterStop::Fault];
+
+/// Every cause there is, and none.
+fn verdicts() -> Vec<Result<(), Cause>> {
+    [Ok(())].into_iter().chain(Cause::ALL.iter().map(|cause| Err(*cause))).collect()
+}
+
+fn requests() -> Vec<Option<Request>> {
+    [None].into_iter().chain(Request::ALL.map(Some)).collect()
+}
+
+/// Calls `check` with all of them; returns how many there were. Whether control may begin is of no interest
+/// where it has begun, or after a fault: two verdicts show that.
+fn every(check: impl Fn(Mode, Option<Request>, &Findings, AfterStop, (Mode, Option<Cause>)) + Sync) -> u64 {
+    let modes: Vec<_> = State::ALL
+        .into_iter()
+        .flat_map(|state| GOALS.map(|after| (state, after)))
+        .flat_map(|(state, after)| Cause::ALL.iter().map(move |cause| Mode { state, cause: *cause, after }))
+        .collect();
+    let (verdicts, requests) = (verdicts(), requests());
+    let of_mode = |mode: &Mode| {
+        let idle = matches!(mode.state, State::Off | State::Standby);
+        let engageables = if idle { &verdicts[..] } else { &verdicts[..2] };
+        let mut count = 0;
+        for located in &verdicts {
+            for following in &verdicts {
+                for engageable in engageables {
+                    for arrived in [false, true] {
+                        let found = Findings {
+                            located: *located,
+                            engageable: *engageable,
+                            following: *following,
+                            arrived,
+                        };
+                        for request in &requests {
+                            for after_loss in GOALS {
+                                let then = next(*mode, *request, &found, after_loss);
+                                check(*mode, *request, &found, after_loss, then);
+                                count += 1;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        count
+    };
+    modes.par_iter().map(of_mode).sum()
+}
+
+#[test]
+fn every_transition_is_the_documented_one() {
+    let count = every(|mode, request, found, after_loss, then| {
+        let wanted = oracle::next(mode, request, found, after_loss);
+        assert!(then == wanted, "{mode:?} {request:?} {found:?} {after_loss:?}: {then:?}, not {wanted:?}");
+    });
+    let causes = Cause::ALL.len() as u64;
+    let (modes, rest) = (3 * causes, 7 * (causes + 1).pow(2) * 2 * 3);
+    assert_eq!(count, modes * rest * (2 * (causes + 1) + 5 * 2));
+}
+
+/// What must hold whatever the table says.
+#[test]
+fn no_transition_takes_force_without_being_asked() {
+    every(|mode, request, found, _, (then, refused)| {
+        let what = || format!("{mode:?} {request:?} {found:?}: {then:?} {refused:?}");
+        let is = |what| request == Some(what);
+        let (had, has) = (mode.state.controls(), then.state.controls());
+        // Control begins only by engage or park, with a known pose, and not out of a fault.
+        assert!(had || !has || is(Request::Engage) || is(Request::Park), "{}", what());
+        assert!(!has || found.located.is_ok(), "{}", what());
+        assert!(mode.state != State::Fault || !has, "{}", what());
+        assert!(then.state != State::Engaging || had || found.engageable.is_ok(), "{}", what());
+        // A fault is left only by clear, and clear leads to no force.
+        assert!(mode.state != State::Fault || then.state == State::Fault || is(Request::Clear), "{}", what());
+        assert!(!is(Request::Clear) || had || !has, "{}", what());
+        // Active is reached only on the setpoint, and followed only while it can be.
+        assert!(
+            then.state != State::Active || matches!(mode.state, State::Engaging | State::Active),
+            "{}",
+            what()
+        );
+        assert!(
+            !matches!(then.state, State::Engaging | State::Active) || !had || found.following.is_ok(),
+            "{}",
+            what()
+        );
+        // What brakes, brakes now; off and estop let go now.
+        let brakes = found.following.is_err_and(|cause| cause.reaction() == Reaction::Brake);
+        assert!(!(had && brakes && has), "{}", what());
+        assert!(!(is(Request::Off) || is(Request::Estop)) || !has, "{}", what());
+        assert!(!is(Request::Estop) || then.state == State::Fault, "{}", what());
+        // Whoever is refused has asked, and nothing was begun for them.
+        assert!(refused.is_none() || request.is_some(), "{}", what());
+        assert!(refused.is_none() || had || !has, "{}", what());
+    });
+}

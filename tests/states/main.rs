@@ -1,0 +1,11 @@
+//! The state machine: every transition there is, and every way through the whole controller.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+#[path = "../common/mod.rs"]
+mod common;
+mod every_transition;
+mod oracle;
+#[path = "../common/rig.rs"]
+mod rig;
+mod sequences;
