@@ -158,6 +158,14 @@ pub mod measurements {
         m.measured().time_ns = before_ns - 100_000 * (m.cycle + 1);
     }
 
+    /// Rates behind a filter of the first order, with a time constant of 5 ms.
+    pub fn filtered_rates(m: &mut Moment) {
+        let before = m.world.last.measurement.unwrap().rate;
+        for (rate, before) in m.measured().rate.iter_mut().zip(before) {
+            *rate = before + 0.2 * (*rate - before);
+        }
+    }
+
     /// What good encoders do: counts of a micrometre, rates with noise of a millimetre per second.
     pub fn noise_of_encoders(m: &mut Moment) {
         let cycle = m.cycle;

@@ -146,6 +146,7 @@ const ROWS: &[Row] = &[
     ("measurements stamped 0", measurements::stamps_of_nothing, GENTLE, unusable_measurement(MeasurementFromElsewhen)),
     ("measurements' stamps run backward", measurements::stamps_run_backward, GENTLE, unusable_measurement(MeasurementFromElsewhen)),
     ("counts of 1 um, noise of 1 mm/s", measurements::noise_of_encoders, Bounds { rest_s: f64::INFINITY, ..GENTLE }, EVERYWHERE),
+    ("rates filtered with 5 ms", measurements::filtered_rates, LONG, EVERYWHERE),
     // Setpoints.
     ("setpoints end", setpoints::end, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Stop(SetpointLost), On, On, On]),
     ("setpoints pause for 30 ms", setpoints::pause_30_ms, Bounds { rest_s: 1.6, ..GAP }, EVERYWHERE),
