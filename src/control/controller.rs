@@ -4,6 +4,8 @@
 //! from the state's reference, apply the law, evaluate the inverse dynamics, check what comes out. Every
 //! cycle does a bounded amount of work.
 
+use nalgebra::Vector3;
+
 use super::doubt::{self, Aim, Believed, Parting};
 use super::law::{Integral, Law, TrackingError};
 use super::limits::{Limit, Limiting, Limits};
@@ -288,9 +290,15 @@ impl Controller {
                     let before = setpoint.good.filter(|_| follows);
                     doubt::setpoint(machine, parameters, &now, before.as_ref(), widest, &mut limiting)
                 });
-            setpoint.take(now, verdict, now_ns, follows);
             self.setpoint_limiting = limiting;
             waited[1] = verdict.is_err();
+            let gap = setpoint.good.map(|good| now.setpoint.time_ns.abs_diff(good.setpoint.time_ns));
+            let after_gap = gap.is_some_and(|gap| gap > parameters.period_ns + parameters.period_ns / 2);
+            let present = self.reference_at(now_ns).filter(|_| follows && after_gap);
+            self.setpoint.take(now, verdict, now_ns, follows);
+            if let Some(present) = present {
+                self.bridge(&present, now_ns);
+            }
         }
         let [no_measurement, no_setpoint] = waited.map(u64::from);
         self.without_measurement += u64::from(controls) * no_measurement;
@@ -299,9 +307,15 @@ impl Controller {
 
     /// After a pause of the loop the inputs may be fresh again, but meanwhile the drives had no force and
     /// have let go: control does not go on as if nothing had been.
-    fn unbroken(&self, release_ns: u64) -> Result<(), Trouble> {
-        let Some(last) = self.measurement.good.filter(|_| self.mode.state.controls()) else { return Ok(()) };
-        doubt::time(Cause::MeasurementLost, last.time_ns, release_ns, self.parameters.measured_timeout_ns)
+    fn unbroken(&self, now_ns: u64) -> Result<(), Trouble> {
+        let last = self.measurement.good.filter(|_| self.mode.state.controls());
+        last.map_or(Ok(()), |last| self.is_young(&last, now_ns))
+    }
+
+    fn is_young(&self, measurement: &Measurement, now_ns: u64) -> Result<(), Trouble> {
+        let timeout_ns = self.parameters.measured_timeout_ns;
+        doubt::time(Cause::MeasurementLost, measurement.time_ns, now_ns, timeout_ns)
+            .map_err(|lost| self.measurement.absence(lost))
     }
 
     /// The pose and twist of the platform, by one bounded step of forward kinematics.
@@ -309,13 +323,7 @@ impl Controller {
         let Some(measurement) = self.measurement.good else {
             return Err(self.measurement.absence(Cause::NoMeasurement));
         };
-        doubt::time(
-            Cause::MeasurementLost,
-            measurement.time_ns,
-            release_ns,
-            self.parameters.measured_timeout_ns,
-        )
-        .map_err(|lost| self.measurement.absence(lost))?;
+        self.is_young(&measurement, release_ns)?;
         let machine = self.model.machine();
         match self.tracker.advance(machine, &measurement.length).0 {
             Tracked::Found => {}
@@ -435,6 +443,38 @@ impl Controller {
         }
     }
 
+    /// After a gap a setpoint may be, within what is believed, elsewhere than the one before it led to: where
+    /// following it at once would be a jerk beyond the limit, the platform is led there.
+    fn bridge(&mut self, present: &Motion, now_ns: u64) {
+        let Some(next) = self.reference_at(now_ns) else { return };
+        let Parameters { period_ns, law, limits, .. } = &self.parameters;
+        let error = TrackingError::new(present, &next.pose, &next.twist);
+        let command = law.command(present, &error, &Integral::default()).acceleration;
+        let longest = *period_ns as f64 * 1e-9;
+        let step = |command: Vector3<f64>, next: Vector3<f64>| (command - next).norm();
+        if step(command.linear, next.acceleration.linear) > limits.position.jerk * longest
+            || step(command.angular, next.acceleration.angular) > limits.orientation.jerk * longest
+        {
+            self.reference = self.onto_setpoint(present, now_ns);
+        }
+    }
+
+    /// From a motion onto the setpoint.
+    fn onto_setpoint(&self, from: &Motion, instant_ns: u64) -> Reference {
+        let Some(base) = self.setpoint_at(instant_ns) else { return Reference::Setpoint };
+        let away = base.pose.displacement_to(&from.pose);
+        let rate = Twist::from_vector(&(from.twist.vector() - base.twist.vector()));
+        let acceleration =
+            Acceleration::from_vector(&(from.acceleration.vector() - base.acceleration.vector()));
+        Reference::OntoSetpoint(Segment::vanishing(
+            instant_ns,
+            &away,
+            &rate,
+            &acceleration,
+            &self.parameters.limits,
+        ))
+    }
+
     /// Begins the motion of the state just entered.
     fn enter(&mut self, before: State, at: &Located, release_ns: u64) {
         let limits = &self.parameters.limits;
@@ -444,16 +484,7 @@ impl Controller {
         self.reference = match self.mode.state {
             State::Engaging => {
                 self.integral = Integral::default();
-                let setpoint = self.setpoint_at(at.time_ns).unwrap_or(present);
-                let away = setpoint.pose.displacement_to(&at.pose);
-                let Motion { twist, acceleration, .. } = setpoint;
-                let rate = Twist {
-                    angular: at.twist.angular - twist.angular,
-                    linear: at.twist.linear - twist.linear,
-                };
-                let acceleration =
-                    Acceleration { angular: -acceleration.angular, linear: -acceleration.linear };
-                Reference::OntoSetpoint(Segment::vanishing(at.time_ns, &away, &rate, &acceleration, limits))
+                self.onto_setpoint(&Motion { twist: at.twist, ..resting(&at.pose) }, at.time_ns)
             }
             State::Stopping => {
                 let segment = Segment::to_rest(release_ns, &present.twist, &present.acceleration, limits);

@@ -190,7 +190,7 @@ const ROWS: &[Row] = &[
     ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(OffPath), Brake(OffPath), Brake(OffPath), Brake(OffPath), Brake(OffPath), On]),
     // The host.
     ("deadline missed", host::deadline_missed, GENTLE, [On, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
-    ("daemon held for 1 s", host::held_1_s, GENTLE, [On, On, On, Brake(OffPath), On, Brake(OffPath), On]),
+    ("daemon held for 1 s", host::held_1_s, GENTLE, [On, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
     ("daemon held for 5 ms", host::held_5_ms, LONG, EVERYWHERE),
     ("daemon restarted", host::restarted, GENTLE, [On, Idle(State::Standby, NotAsked), Idle(State::Standby, NotAsked), TOO_FAR, TOO_FAR, TOO_FAR, TOO_FAR]),
     // Two at once.

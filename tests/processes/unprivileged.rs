@@ -13,7 +13,7 @@ fn nobody_is_told_what_is_lacking_and_served() {
     if cannot("nobody_is_told_what_is_lacking_and_served", &nobody) {
         return;
     }
-    let _turn = turns::beside_others();
+    let _turn = turns::alone();
     let Ended { status, stdout, stderr } = demo(&Machine::patient("nobody"), &nobody);
     assert_eq!(status.code(), Some(0), "{stdout}\n{stderr}");
     for words in ["no FIFO priority 80: ", "no locked memory: ", "no bound on idle states: "] {
@@ -29,7 +29,7 @@ fn nobody_is_served_beside_root() {
     if cannot("nobody_is_served_beside_root", &nobody) {
         return;
     }
-    let _turn = turns::beside_others();
+    let _turn = turns::alone();
     let machine = Machine::patient("beside");
     let recorder = Recorder::start(&machine.name);
     let plant = start_plant(&machine);

@@ -21,7 +21,7 @@ use super::files::{FileError, write_whole};
 use super::operator::Operator;
 use super::report::Report;
 use super::stop::Stop;
-use crate::control::state::{Cause, Request};
+use crate::control::state::{Cause, Request, State};
 use crate::ipc::ports::{Bus, PortError};
 
 pub mod children;
@@ -211,8 +211,14 @@ fn watch(
             return Err(DemoError::Interrupted);
         }
         recorder.poll();
-        if operator.status().is_some_and(|status| status.fault == Cause::NotAsked as u32) {
-            operator.ask(Request::Engage)?;
+        if let Some(status) = operator.status() {
+            if status.state == State::Fault as u32 {
+                let cause = Cause::from_number(status.fault).unwrap_or_default();
+                return Err(DemoError::NotWell(format!("fault: {}; {}", cause.name(), cause.remedy())));
+            }
+            if status.fault == Cause::NotAsked as u32 {
+                operator.ask(Request::Engage)?;
+            }
         }
         for process in processes.iter_mut() {
             match process.ended()? {
