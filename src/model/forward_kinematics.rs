@@ -223,7 +223,9 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
                 }
                 if size <= last && report.iterations == 1 {
                     // Already there. To move on by less than the legs follow would add up over the cycles.
-                    return Report { outcome: Outcome::Solved, ..report };
+                    let sound = stance.sensitivity.condition <= LARGEST_CONDITION;
+                    report.outcome = if sound { Outcome::Solved } else { Outcome::NearSingular };
+                    return report;
                 }
                 at = at.moved(simd, &step);
                 if first == 0.0 {
