@@ -6,3 +6,7 @@ mod check;
 #[path = "../common/mod.rs"]
 mod common;
 mod dietmaier;
+mod random;
+mod rivals;
+mod sizes;
+mod trials;
