@@ -22,7 +22,7 @@ use fearless_simd::Simd;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four, Reals};
+use super::lanes::{Eight, Four};
 use super::lanes3::Lanes3;
 use super::lu;
 use super::machine::{Joints, LEGS};
@@ -44,22 +44,22 @@ const LEAST_DS: f64 = 1e-3;
 
 /// `N^-1` and `N^-T` at one pose.
 pub(super) struct Balance<'a, S: Simd, V: Eight<S>> {
-    simd: S,
-    joints: &'a Joints,
+    pub simd: S,
+    pub joints: &'a Joints,
     /// m of A.
-    moment_a: Lanes3<V::Half>,
+    pub moment_a: Lanes3<V::Half>,
     /// a / dA
-    inverse_a: Lanes3<V::Half>,
+    pub inverse_a: Lanes3<V::Half>,
     /// X: a vector for each i over the lanes j.
-    x: [V::Half; 3],
+    pub x: [V::Half; 3],
     /// c
-    adjugate_s: Lanes3<V::Half>,
+    pub adjugate_s: Lanes3<V::Half>,
     /// 1 / dS, in each lane as that leg computes it.
-    inverse_d_s: V::Half,
+    pub inverse_d_s: V::Half,
     /// dA, dS, as the first leg of each computes it.
-    determinants: [f64; 2],
+    pub determinants: [f64; 2],
     /// Both determinants are large enough.
-    sound: bool,
+    pub sound: bool,
 }
 
 /// A [`Balance`] in memory, both triples' halves in one lane.
@@ -154,35 +154,6 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
         -d_a * d_s
     }
 
-    /// Square of the Frobenius norm of `N^-1`, torques divided by the radius: what a unit of wrench, in newtons
-    /// at the radius, asks of the legs at most. Not finite at a singular pose.
-    ///
-    /// ```text
-    /// rows of B: torque t_j = c_j / dS               force p_j = -sum_i (t_j . m_i) a_i / dA
-    /// rows of A: torque     - sum_j X_ij t_j         force a_i / dA - sum_j X_ij p_j
-    /// ```
-    #[inline(always)]
-    pub fn inverse_norm_squared(&self, legs: &LegGeometry<V>) -> f64 {
-        let simd = self.simd;
-        if !self.sound {
-            let n = wrench_columns(&self.joints.triples, legs);
-            return inverse_norm_squared_by_lu(&n, self.joints.radius);
-        }
-        let r = V::Half::splat(simd, self.joints.radius);
-        let [i0, i1, i2] = broadcast_vectors(simd, self.inverse_a);
-        let [m0, m1, m2] = broadcast_vectors(simd, self.moment_a);
-        let t = self.adjugate_s * self.inverse_d_s;
-        let p = (i0 * t.dot(m0)).plus_scaled(t.dot(m1), i1).plus_scaled(t.dot(m2), i2)
-            * V::Half::splat(simd, -1.0);
-        let [x0, x1, x2] = V::Half::transposed(simd, self.x);
-        let ([t0, t1, t2], [p0, p1, p2]) = (broadcast_vectors(simd, t), broadcast_vectors(simd, p));
-        let torque_a = (t0 * x0).plus_scaled(x1, t1).plus_scaled(x2, t2);
-        let force_a = self.inverse_a.minus_scaled(x0, p0).minus_scaled(x1, p1).minus_scaled(x2, p2);
-        let torques = t.dot(t) + torque_a.dot(torque_a);
-        let forces = p.dot(p) + force_a.dot(force_a);
-        (torques * r).mul_add(r, forces).legs().into_iter().sum()
-    }
-
     /// `Gamma + along` with `N Gamma = W`, still in lanes; `None` at a singular pose.
     #[inline(always)]
     pub fn forces(&self, legs: &LegGeometry<V>, wrench: &LaneWrench<V::Half>, along: V) -> Option<Lane> {
@@ -268,20 +239,6 @@ impl<F> LaneWrench<F> {
     }
 }
 
-/// The same by LU with partial pivoting, a column of the inverse after the other.
-#[cold]
-#[inline(never)]
-fn inverse_norm_squared_by_lu(n: &Matrix6<f64>, radius: f64) -> f64 {
-    let rows: [[f64; LEGS]; LEGS] = n.transpose().into();
-    let scales = [radius, radius, radius, 1.0, 1.0, 1.0];
-    let mut sum = 0.0;
-    for (unit, scale) in Matrix6::<f64>::identity().column_iter().zip(scales) {
-        let column = lu::solve(&rows, &(unit * scale).into_owned().into()).unwrap_or([f64::INFINITY; LEGS]);
-        sum += Vector6::from(column).norm_squared();
-    }
-    sum
-}
-
 /// By LU with partial pivoting.
 #[cold]
 #[inline(never)]
@@ -323,7 +280,7 @@ fn broadcasts<S: Simd, F: Four<S>>(simd: S, v: F) -> [F; 3] {
 
 /// Each leg's vector in all lanes.
 #[inline(always)]
-fn broadcast_vectors<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> [Lanes3<F>; 3] {
+pub(super) fn broadcast_vectors<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> [Lanes3<F>; 3] {
     let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
         (broadcasts(simd, v.x), broadcasts(simd, v.y), broadcasts(simd, v.z));
     [Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 }, Lanes3 { x: x2, y: y2, z: z2 }]

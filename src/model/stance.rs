@@ -5,10 +5,11 @@ use fearless_simd::{Simd, dispatch, f64x8};
 
 use super::balance::{Balance, Factors};
 use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four};
+use super::lanes::Eight;
 use super::lanes3::Lanes3;
 use super::machine::{Joints, LEGS, Machine};
 use super::rigid::{Pose, Twist};
+use super::sensitivity::Sensitivity;
 use super::triples::Lane;
 
 /// One pose, its legs, its factorization.
@@ -27,59 +28,6 @@ pub(super) struct StoredLegs {
     direction: [Lane; 3],
     length: Lane,
     inverse_length: Lane,
-}
-
-/// How a pose answers to errors, torques and angles measured at the radius. All without units.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sensitivity {
-    /// Frobenius condition of N: never below the 2-norm condition and at most six times it, at a singular pose
-    /// not finite.
-    pub condition: f64,
-    /// `det N / radius^3`: changes its sign where the platform passes a singular pose.
-    pub determinant: f64,
-    /// Largest step (radian, or radius) for which Newton's method is known to find the only pose nearby.
-    pub trusted_step: f64,
-}
-
-/// The share of Kantorovich's bound that is used. His theorem: from a start with `h = B K s <= 1/2` (B norm of the
-/// inverse Jacobian, K Lipschitz constant of the Jacobian, s size of the first step) Newton's method converges
-/// quadratically to a solution, and within the radius `(1 - sqrt(1 - 2 h)) / (B K)` there is no other. K is
-/// taken at the start; that it grows along the step costs less than the fifth that is left.
-const TRUSTED_SHARE: f64 = 0.4;
-
-impl Sensitivity {
-    /// Of legs with arms from the mean of the joints, and their factorization.
-    ///
-    /// Along a step `(dw, dv)` a length L has the second derivative at most `(|dv| + |dw| a)^2 / L + |dw|^2 a`,
-    /// a the length of the arm. With `rho = a / radius` that is a Lipschitz constant
-    /// `K_i radius = (1 + rho^2) radius / L + rho`, and the root of the sum of squares for all six.
-    #[inline(always)]
-    pub(super) fn new<S: Simd, V: Eight<S>>(
-        simd: S,
-        joints: &Joints,
-        legs: &LegGeometry<V>,
-        balance: &Balance<S, V>,
-    ) -> Self {
-        let inverse_radius = V::splat(simd, 1.0 / joints.radius);
-        let (share, arm_curvature) =
-            (V::constant(simd, &joints.arm_share), V::constant(simd, &joints.arm_curvature));
-        let curvature = arm_curvature.mul_add(legs.inverse_length, share);
-        let moment = legs.arm.cross(legs.direction) * inverse_radius;
-        let (curvature, wrench) =
-            (sum_legs(curvature * curvature), sum_legs(moment.dot(moment) + V::splat(simd, 1.0)));
-        let inverse = balance.inverse_norm_squared(legs);
-        Self {
-            condition: (wrench * inverse).sqrt(),
-            determinant: balance.determinant() * joints.inverse_radius_cubed,
-            trusted_step: TRUSTED_SHARE / (curvature * inverse).sqrt(),
-        }
-    }
-}
-
-#[inline(always)]
-fn sum_legs<S: Simd, V: Eight<S>>(v: V) -> f64 {
-    let (first, second) = v.halves();
-    (first + second).legs().into_iter().sum()
 }
 
 impl StoredLegs {

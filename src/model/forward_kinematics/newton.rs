@@ -1,41 +1,17 @@
-//! Forward kinematics: the pose from six leg lengths, by Newton's method on SE(3).
-//!
-//! ```text
-//! residual r_i = L_i - L_i(pose)      J^-1 [dw; dv] = r      R <- turn(dw) R,   M <- M + dv
-//! ```
-//!
-//! M is the mean of the joints on the platform, so that the way to the solution does not depend on where C
-//! is; `turn` is Cayley's rotation, which differs from `exp` by a third power. Steps are added to the rotation,
-//! not to Bryan angles (which converges only linearly).
-//!
-//! A factorization costs more than an evaluation of the lengths, so it is used again (the chord method) where a
-//! second step of it comes as near as a new one would. With the error e and the first step q the next error is
-//! `e^2` with a new factorization, `e q` with the old one. On the way r is `(L_i^2 - |s_i|^2) / 2 L_i`, which
-//! has the same zero and needs no root and no division. The last factorization is at the solution and stays
-//! for all who need it ([`Stance`]).
-//!
-//! Lengths do not determine the pose: up to 40 real poses share them (assembly modes), and a small
-//! residual says nothing about being on the wrong one. Uniqueness comes from continuity: a step is only
-//! taken within Kantorovich's bound ([`Sensitivity::trusted_step`]), where there is a solution nearby and only
-//! one. [`refine`] needs a start that near; [`Tracker`] walks toward far lengths in such steps, and cannot leave
-//! the assembly mode it started on.
-//!
-//! Conditioning: errors of the lengths are amplified by the condition of N. Toward a singular pose the
-//! trusted steps become shorter and end before it.
+//! Newton's method and the chord method on lanes.
 
-use fearless_simd::{Simd, dispatch, f64x8};
-use nalgebra::{Matrix3, Vector6};
+use fearless_simd::Simd;
+use nalgebra::Matrix3;
 
-use super::balance::{Balance, LaneTwist};
-use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four, Reals};
-use super::lanes3::Lanes3;
-use super::machine::{Joints, LEGS, Machine};
-use super::rigid::Pose;
-use super::stance::{Sensitivity, Stance, StoredLegs};
-
-/// Bound on factorizations. From the edge of the trusted region six suffice to rounding, by Kantorovich.
-pub const MAX_ITERATIONS: u32 = 8;
+use super::{LARGEST_CONDITION, MAX_ITERATIONS, Outcome, Report};
+use crate::model::balance::{Balance, LaneTwist};
+use crate::model::inverse_geometry::LegGeometry;
+use crate::model::lanes::{Eight, Four, Reals};
+use crate::model::lanes3::Lanes3;
+use crate::model::machine::Joints;
+use crate::model::rigid::Pose;
+use crate::model::sensitivity::Sensitivity;
+use crate::model::stance::{Stance, StoredLegs};
 
 /// A step this small (radian, or radius) is the last: the legs are where the pose is, to all practical digits, and
 /// the pose, which still takes it, is so to rounding.
@@ -44,54 +20,8 @@ const LAST_STEP: f64 = 1e-12;
 /// Errors of rounding that add up in a residual, about.
 const ROUNDINGS: f64 = 8.0;
 
-/// How much of a trusted step is taken toward lengths that are further away: rounding must not undo it.
-const PART_OF_TRUSTED: f64 = 0.99;
-
-/// Bound on the steps of [`Tracker::find`]: one is some hundredths of the radius, and the steps toward a singular
-/// pose end after about fifty.
-const MOST_STEPS: u32 = 2000;
-
-/// Beyond this condition a pose counts as singular: an encoder's error of 1 um is up to 1 cm at the platform, and
-/// a leg may push 10,000 times the load. Machines that are meant to work have 2 to 100.
-pub const LARGEST_CONDITION: f64 = 1e4;
-
-/// How it went.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// The pose belongs to the lengths, and no other pose in the trusted region does.
-    Solved,
-    /// The iterations were used up.
-    NotConverged,
-    /// The lengths are further away than one trusted step.
-    LeftTrustedRegion,
-    /// The pose would be singular, or worse than [`LARGEST_CONDITION`].
-    NearSingular,
-}
-
-/// What a call of [`refine`] did.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Report {
-    pub outcome: Outcome,
-    /// Steps of Newton's method.
-    pub iterations: u32,
-    /// Size of the first step over that of the largest trusted one.
-    pub reach: f64,
-}
-
-/// Moves a stance to the pose with these leg lengths \[m\], if that is one trusted step away. Otherwise the
-/// stance stays where it is.
-pub fn refine(machine: &Machine, stance: &mut Stance, lengths: &[f64; LEGS]) -> Report {
-    let joints = &machine.joints;
-    let target = joints.triples.pack(lengths);
-    dispatch!(machine.level, simd => {
-        let legs = stance.legs.load::<_, f64x8<_>>(simd);
-        let balance = Balance::load(simd, joints, &stance.factors);
-        Newton::new(simd, joints, Eight::load(simd, &target)).refine(stance, legs, balance)
-    })
-}
-
 /// Newton's method toward some lengths.
-struct Newton<'a, S: Simd, V: Eight<S>> {
+pub(super) struct Newton<'a, S: Simd, V: Eight<S>> {
     simd: S,
     joints: &'a Joints,
     target: V,
@@ -181,12 +111,12 @@ fn turned<V: Reals>(v: Lanes3<V>, u: Lanes3<V>, k: V) -> Lanes3<V> {
 
 impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
     #[inline(always)]
-    fn new(simd: S, joints: &'a Joints, target: V) -> Self {
+    pub fn new(simd: S, joints: &'a Joints, target: V) -> Self {
         Self { simd, joints, target, inverse_target: V::splat(simd, 1.0) / target }
     }
 
     #[inline(always)]
-    fn refine(
+    pub fn refine(
         &self,
         stance: &mut Stance,
         mut legs: LegGeometry<V>,
@@ -194,13 +124,13 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
     ) -> Report {
         let Self { simd, joints, target, inverse_target } = *self;
         // Sizes are squares.
-        let (last, trusted) = (square(last_step(joints, stance)), square(stance.sensitivity.trusted_step));
+        let last = square(last_step(joints, stance));
         let linear_weight = V::Half::splat(simd, 1.0 / square(joints.radius));
         let mut at = Iterate::start(simd, joints, &stance.pose);
         let mut residual = target - legs.length;
         let mut report = Report { outcome: Outcome::NotConverged, iterations: 0, reach: f64::NAN };
         // Steps become shorter: Kantorovich halves them at least.
-        let mut longest = trusted;
+        let mut longest = square(stance.sensitivity.trusted_step);
         loop {
             // Of the steps with one factorization.
             let mut first = 0.0;
@@ -215,11 +145,13 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
                 let linear = step.linear.dot(step.linear);
                 let size = linear.mul_add(linear_weight, step.angular.dot(step.angular)).first();
                 if report.iterations == 1 {
-                    report.reach = size / trusted;
-                }
-                if !(size <= longest) {
-                    let reach = report.reach.sqrt();
-                    return Report { outcome: Outcome::LeftTrustedRegion, reach, ..report };
+                    report.reach = (size / longest).sqrt();
+                    // Also where it is not a number.
+                    if !(report.reach <= 1.0) {
+                        return Report { outcome: Outcome::LeftTrustedRegion, ..report };
+                    }
+                } else if !(size <= longest) {
+                    return report;
                 }
                 if size <= last && report.iterations == 1 {
                     // Already there. To move on by less than the legs follow would add up over the cycles.
@@ -289,77 +221,4 @@ fn last_step(joints: &Joints, start: &Stance) -> f64 {
 
 fn square(x: f64) -> f64 {
     x * x
-}
-
-/// Follows measured lengths without leaving the assembly mode it started on.
-#[derive(Clone, Copy, Debug)]
-pub struct Tracker {
-    /// Pose of the last converged step.
-    pub pose: Pose,
-    /// The same with its legs and factorization.
-    stance: Stance,
-    outcome: Outcome,
-}
-
-/// What one step of a [`Tracker`] achieved.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tracked {
-    /// The pose belongs to the given lengths.
-    Found,
-    /// The lengths are further away than one step: the pose is on its way.
-    Approaching,
-    /// There is no trusted step toward the lengths; the pose is the last good one. [`Tracker::outcome`] says why.
-    NotConverged,
-}
-
-impl Tracker {
-    /// Starts at a known pose.
-    pub fn new(machine: &Machine, pose: Pose) -> Self {
-        Self { pose, stance: Stance::new(machine, pose), outcome: Outcome::Solved }
-    }
-
-    /// The pose with its legs and factorization.
-    pub fn stance(&self) -> &Stance {
-        &self.stance
-    }
-
-    /// Of the last step.
-    pub fn outcome(&self) -> Outcome {
-        self.outcome
-    }
-
-    /// One trusted step toward the pose with these lengths; also the iterations it took.
-    pub fn advance(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (Tracked, u32) {
-        let mut iterations = 0;
-        let mut tracked = Tracked::Found;
-        let mut report = self.step(machine, lengths, &mut iterations);
-        if report.outcome == Outcome::LeftTrustedRegion {
-            tracked = Tracked::Approaching;
-            let here = Vector6::from(self.stance.lengths(machine));
-            let part = here + (Vector6::from(*lengths) - here) * (PART_OF_TRUSTED / report.reach);
-            report = self.step(machine, &part.into(), &mut iterations);
-        }
-        (if report.outcome == Outcome::Solved { tracked } else { Tracked::NotConverged }, iterations)
-    }
-
-    fn step(&mut self, machine: &Machine, lengths: &[f64; LEGS], iterations: &mut u32) -> Report {
-        let report = refine(machine, &mut self.stance, lengths);
-        *iterations += report.iterations;
-        (self.pose, self.outcome) = (*self.stance.pose(), report.outcome);
-        report
-    }
-
-    /// Steps until the pose is found: for use off line, where nobody waits. Also the iterations it took.
-    pub fn find(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (Tracked, u32) {
-        let mut iterations = 0;
-        for _ in 0..MOST_STEPS {
-            let (tracked, spent) = self.advance(machine, lengths);
-            iterations += spent;
-            if tracked != Tracked::Approaching {
-                return (tracked, iterations);
-            }
-        }
-        self.outcome = Outcome::NotConverged;
-        (Tracked::NotConverged, iterations)
-    }
 }
