@@ -11,10 +11,10 @@ use super::{Failure, MACHINES, cells, chart, common, write_csv};
 const ANGLES_DEG: [u32; 12] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60];
 const POSES: u64 = 5000;
 const MILLION: u64 = 1_000_000;
-const METHODS: [(&str, Method, Stroke); 3] = [
-    ("hexad", Method::Hexad, Stroke::Solid),
-    ("rotation added to angles (genhexkins)", Method::Rival(Update::RotationAdded), Stroke::Solid),
-    ("Newton on Bryan angles", Method::Rival(Update::Angles), Stroke::Solid),
+const METHODS: [(&str, Method); 3] = [
+    ("hexad", Method::Hexad),
+    ("rotation added to angles (genhexkins)", Method::Rival(Update::RotationAdded)),
+    ("Newton on Bryan angles", Method::Rival(Update::Angles)),
 ];
 
 pub fn run(fewer: u64) -> Result<(), Failure> {
@@ -22,7 +22,7 @@ pub fn run(fewer: u64) -> Result<(), Failure> {
     let mut lines = vec![];
     for name in MACHINES {
         let machine = common::machine(name);
-        for (method_name, method, _) in METHODS {
+        for (method_name, method) in METHODS {
             let (mut failed, mut wrong) = (vec![], vec![]);
             for angle_deg in ANGLES_DEG {
                 let angle = f64::from(angle_deg).to_radians();
@@ -45,7 +45,7 @@ pub fn run(fewer: u64) -> Result<(), Failure> {
                     &shares[2],
                 ]));
             }
-            lines.push((failed, wrong));
+            lines.push([failed, wrong]);
         }
     }
     let header = ["machine", "method", "angle_deg", "reachable_poses", "right", "failed", "wrong"];
@@ -54,8 +54,11 @@ pub fn run(fewer: u64) -> Result<(), Failure> {
     million(fewer)
 }
 
+/// Share of failed and of wrong poses against the angle, of one method on one machine.
+type Lines = [Vec<(f64, f64)>; 2];
+
 /// Two panels per machine.
-fn draw(lines: &[(Vec<(f64, f64)>, Vec<(f64, f64)>)]) -> Result<(), Failure> {
+fn draw(lines: &[Lines]) -> Result<(), Failure> {
     let labels: Vec<_> = MACHINES
         .iter()
         .flat_map(|name| ["failed", "wrong"].map(|what| format!("{what}, {name} [%]")))
@@ -63,13 +66,9 @@ fn draw(lines: &[(Vec<(f64, f64)>, Vec<(f64, f64)>)]) -> Result<(), Failure> {
     let mut panels = vec![];
     for (index, of_machine) in lines.chunks(METHODS.len()).enumerate() {
         for what in 0..2 {
-            let series =
-                of_machine.iter().zip(METHODS).enumerate().map(|(color, (line, (label, _, style)))| Series {
-                    label,
-                    points: if what == 0 { &line.0 } else { &line.1 },
-                    style,
-                    color,
-                });
+            let series = of_machine.iter().zip(METHODS).enumerate().map(|(color, (line, (label, _)))| {
+                Series { label, points: &line[what], style: Stroke::Solid, color }
+            });
             panels.push(Panel { y_label: &labels[2 * index + what], series: series.collect() });
         }
     }
