@@ -2,18 +2,30 @@
 
 extern crate std;
 
-use core::f64::consts::TAU;
+use core::f64::consts::{FRAC_PI_2, TAU};
 use core::fmt;
 use std::prelude::rust_2024::*;
 
+use super::assembly::{self, Region};
 use super::config::Config;
 use crate::control::gains::{gain_margin, max_bandwidth_hz};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
 use crate::model::ladder::Exact;
-use crate::model::machine::LEGS;
+use crate::model::machine::{LEGS, Machine};
+use crate::model::stance::Stance;
 use crate::model::task::TaskState;
+
+/// Where other poses are looked for around home: further away nobody takes them for home.
+const TURN: f64 = FRAC_PI_2;
+/// In radii.
+const SHIFT: f64 = 2.0;
+/// A tenth of a second on two processors.
+const STARTS: u64 = 2000;
+
+/// Another pose this near (radian, or radius) may be where the platform is found at start-up.
+const NEARBY: f64 = 0.5;
 
 /// The machine at its home pose.
 pub struct Check<'a> {
@@ -24,6 +36,19 @@ pub struct Check<'a> {
     /// Angle between each leg and the first axis of its universal joint \[deg\].
     joint_angles: [f64; LEGS],
     condition: f64,
+    /// How far one measurement may be from the next for its pose to be certain \[rad\], \[radius\].
+    trusted_step: f64,
+    /// Other poses with the same lengths, the nearest first.
+    others: Vec<Other>,
+}
+
+/// A pose with the lengths of home that is not home.
+struct Other {
+    distance: f64,
+    turn_deg: f64,
+    shift_m: f64,
+    /// The way there crosses a singular pose, whatever it is.
+    across: bool,
 }
 
 impl<'a> Check<'a> {
@@ -38,14 +63,39 @@ impl<'a> Check<'a> {
         for (angle, (u, n)) in joint_angles.iter_mut().zip(axes.iter().zip(&directions)) {
             *angle = u.cross(n).norm().atan2(u.dot(n)).to_degrees();
         }
+        let stance = Stance::new(machine, motion.pose);
         Self {
             config,
+            trusted_step: stance.sensitivity().trusted_step,
+            others: others(machine, &stance),
             lengths: leg_lengths(machine, &motion.pose),
             forces: inverse_dynamics::<Exact>(machine, &motion),
             joint_angles,
             condition: condition(machine, &motion.pose),
         }
     }
+}
+
+/// Other poses with the lengths of home that are found around it.
+fn others(machine: &Machine, home: &Stance) -> Vec<Other> {
+    let center = *home.pose();
+    let region = Region { center, turn: TURN, shift: SHIFT * machine.joints.radius };
+    let found = assembly::modes(machine, &home.lengths(machine), &region, STARTS);
+    let mut others: Vec<_> = found
+        .iter()
+        .map(|other| {
+            let way = center.displacement_to(other.pose());
+            Other {
+                distance: assembly::distance(machine, &center, other.pose()),
+                turn_deg: way.angular.norm().to_degrees(),
+                shift_m: way.linear.norm(),
+                across: other.sensitivity().determinant * home.sensitivity().determinant < 0.0,
+            }
+        })
+        .filter(|other| other.distance > home.sensitivity().trusted_step)
+        .collect();
+    others.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    others
 }
 
 impl fmt::Display for Check<'_> {
@@ -68,6 +118,7 @@ impl fmt::Display for Check<'_> {
             )?;
         }
         writeln!(f, "\ncondition of the Jacobian  {:.2}   (1 is best; errors grow with it)", self.condition)?;
+        self.fmt_modes(f)?;
         let period = deployment.realtime.period_s();
         let control = &deployment.control;
         for (what, bandwidth, damping) in [
@@ -81,6 +132,43 @@ impl fmt::Display for Check<'_> {
                 TAU * bandwidth * period,
                 gain_margin(bandwidth, damping, period),
                 max_bandwidth_hz(damping, period),
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl Check<'_> {
+    /// What start-up and the loop can be certain of.
+    fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Config { machine, deployment, .. } = self.config;
+        let step_m = self.trusted_step * machine.joints.radius;
+        writeln!(
+            f,
+            "pose certain from cycle to cycle  up to {:.1} mm or {:.2} deg, {:.1} m/s at {:.0} Hz",
+            1e3 * step_m,
+            self.trusted_step.to_degrees(),
+            step_m * deployment.realtime.rate_hz,
+            deployment.realtime.rate_hz,
+        )?;
+        let Some(nearest) = self.others.first() else {
+            return writeln!(
+                f,
+                "other poses with these lengths    none found within 90 deg and 2 radii of home"
+            );
+        };
+        let across = if nearest.across { "across a singular pose" } else { "NOT across a singular pose" };
+        writeln!(
+            f,
+            "other poses with these lengths    {} found, the nearest {:.1} deg and {:.3} m away, {across}",
+            self.others.len(),
+            nearest.turn_deg,
+            nearest.shift_m,
+        )?;
+        if nearest.distance < NEARBY {
+            writeln!(
+                f,
+                "WARNING: at start-up lengths alone may not tell it from home; move home away from it"
             )?;
         }
         Ok(())

@@ -4,6 +4,7 @@
 //! could not begin: bad command line, configuration, input or environment.
 
 pub mod advise;
+pub mod assembly;
 pub mod batch;
 pub mod charts;
 pub mod check;

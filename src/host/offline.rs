@@ -13,9 +13,8 @@ use super::batch;
 use super::files::FileError;
 use super::table::{Table, TableError, Writer, coordinates, legs, length_columns, six, trajectory_columns};
 use crate::model::active_forces::InverseDynamics;
-use crate::model::forward_kinematics::Tracker;
+use crate::model::forward_kinematics::{Tracked, Tracker};
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::inverse_jacobian::twist_from_rates;
 use crate::model::ladder::Rung;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Twist;
@@ -114,16 +113,17 @@ pub fn forward_kinematics(
         let t = row.first().copied().unwrap_or_default();
         // A row without solution leaves the start of the next one where it was.
         let mut walker = tracker;
-        let solution = walker.find(machine, &six(row, 1));
-        let x = task_coordinates(&solution.pose, &near);
-        if solution.converged {
+        let (tracked, iterations) = walker.find(machine, &six(row, 1));
+        let converged = tracked == Tracked::Found;
+        let x = task_coordinates(&walker.pose, &near);
+        if converged {
             (tracker, near) = (walker, x);
         }
         let twist = with_rates
-            .then(|| twist_from_rates(machine, &solution.pose, &six(row, 1 + LEGS)))
+            .then(|| walker.stance().twist(machine, &six(row, 1 + LEGS)))
             .map(|twist| twist.as_ref().map_or(Vector6::repeat(f64::NAN), Twist::vector));
-        unsolved.count(t, solution.converged);
-        let found = [f64::from(solution.iterations), f64::from(u8::from(solution.converged))];
+        unsolved.count(t, converged);
+        let found = [f64::from(iterations), f64::from(u8::from(converged))];
         writer.row([t].into_iter().chain(x).chain(found).chain(twist.iter().flatten().copied()));
     }
     (writer, unsolved.verdict(table.rows().len(), "did not converge (column converged)"))

@@ -22,6 +22,7 @@ use super::leg::{LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, LEGS, Machine, at_most_256_bits};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
+use super::stance::Stance;
 use super::triples::{Constant, Lane, Triples};
 
 /// The inverse dynamic model of one machine: its constants, ready for the lanes.
@@ -75,6 +76,23 @@ impl InverseDynamics {
         Some(self.joints.triples.unpack(&lane))
     }
 
+    /// [`InverseDynamics::forces`] at a pose whose legs and factorization are at hand.
+    pub fn forces_at<M: Model>(
+        &self,
+        stance: &Stance,
+        twist: &Twist,
+        acceleration: &Acceleration,
+    ) -> Option<[f64; LEGS]> {
+        let motion = Motion { pose: stance.pose, twist: *twist, acceleration: *acceleration };
+        let lane = dispatch!(self.machine.level, simd => {
+            let legs = stance.legs_with::<_, f64x8<_>>(simd, &self.joints);
+            let balance = Balance::load(simd, &self.joints, &stance.factors).with_arms(&legs);
+            let (wrench, along) = self.load::<_, _, M>(simd, &motion, &legs);
+            balance.forces(&legs, &wrench, along)
+        })?;
+        Some(self.joints.triples.unpack(&lane))
+    }
+
     /// [`InverseDynamics::forces`] with lanes of single precision, a fifth faster: errors below 1e-6 of the
     /// largest force instead of 1e-15, times `1 + d / L` for a base at the distance d from the origin of the
     /// base frame, where differences of coordinates lose digits.
@@ -106,7 +124,7 @@ impl InverseDynamics {
         let legs = LegGeometry::<V>::new(simd, &self.joints, &motion.pose);
         let balance = Balance::new(simd, &self.joints, &legs);
         let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
-        balance.forces(&wrench, along)
+        balance.forces(&legs, &wrench, along)
     }
 
     /// The load of a motion, before it is shared among the legs.
@@ -116,7 +134,7 @@ impl InverseDynamics {
             let legs = LegGeometry::<f64x8<_>>::new(simd, &self.joints, &motion.pose);
             let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
             TaskLoad {
-                leg_wrenches: wrench_columns(triples, legs.arm.cross(legs.direction), legs.direction),
+                leg_wrenches: wrench_columns(triples, &legs),
                 wrench: wrench.sum().vector(),
                 along: triples.unpack(&along.store()).into(),
             }

@@ -44,22 +44,34 @@ const LEAST_DS: f64 = 1e-3;
 
 /// `N^-1` and `N^-T` at one pose.
 pub(super) struct Balance<'a, S: Simd, V: Eight<S>> {
-    simd: S,
-    joints: &'a Joints,
-    /// n and m of all legs.
-    direction: Lanes3<V>,
-    moment: Lanes3<V>,
+    pub simd: S,
+    pub joints: &'a Joints,
     /// m of A.
-    moment_a: Lanes3<V::Half>,
+    pub moment_a: Lanes3<V::Half>,
     /// a / dA
-    inverse_a: Lanes3<V::Half>,
+    pub inverse_a: Lanes3<V::Half>,
     /// X: a vector for each i over the lanes j.
-    x: [V::Half; 3],
+    pub x: [V::Half; 3],
     /// c
-    adjugate_s: Lanes3<V::Half>,
+    pub adjugate_s: Lanes3<V::Half>,
     /// 1 / dS, in each lane as that leg computes it.
-    inverse_d_s: V::Half,
+    pub inverse_d_s: V::Half,
+    /// dA, dS, as the first leg of each computes it.
+    pub determinants: [f64; 2],
     /// Both determinants are large enough.
+    pub sound: bool,
+}
+
+/// A [`Balance`] in memory, both triples' halves in one lane.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Factors {
+    /// m of A, c.
+    moment_adjugate: [Lane; 3],
+    /// a / dA, X.
+    inverse_x: [Lane; 3],
+    /// 1 / dS, twice.
+    inverse_d_s: Lane,
+    determinants: [f64; 2],
     sound: bool,
 }
 
@@ -73,9 +85,8 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
     /// Factorizes. At a singular pose the factors are not finite.
     #[inline(always)]
     pub fn new(simd: S, joints: &'a Joints, legs: &LegGeometry<V>) -> Self {
-        let direction = legs.direction;
-        let moment = legs.arm.cross(direction);
-        let ((n_a, n_b), (moment_a, m_b)) = (direction.halves(), moment.halves());
+        let moment = legs.arm.cross(legs.direction);
+        let ((n_a, n_b), (moment_a, m_b)) = (legs.direction.halves(), moment.halves());
         let one = V::Half::splat(simd, 1.0);
 
         let a = adjugate(simd, n_a);
@@ -92,32 +103,73 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
 
         let ([d_a, ..], [d_s, ..]) = (d_a.legs(), d_s.legs());
         let sound = d_a.abs() >= LEAST_DA && d_s.abs() >= LEAST_DS * joints.radius_cubed;
-        Self { simd, joints, direction, moment, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, sound }
+        let determinants = [d_a, d_s];
+        Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, sound }
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub fn load(simd: S, joints: &'a Joints, factors: &Factors) -> Self {
+        let load = |lane: &Lane| V::load(simd, lane).halves();
+        let [(m_x, c_x), (m_y, c_y), (m_z, c_z)] = factors.moment_adjugate.each_ref().map(load);
+        let [(i_x, x_0), (i_y, x_1), (i_z, x_2)] = factors.inverse_x.each_ref().map(load);
+        Self {
+            simd,
+            joints,
+            moment_a: Lanes3 { x: m_x, y: m_y, z: m_z },
+            inverse_a: Lanes3 { x: i_x, y: i_y, z: i_z },
+            x: [x_0, x_1, x_2],
+            adjugate_s: Lanes3 { x: c_x, y: c_y, z: c_z },
+            inverse_d_s: load(&factors.inverse_d_s).0,
+            determinants: factors.determinants,
+            sound: factors.sound,
+        }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub fn store(&self) -> Factors {
+        let (m, i, c, [x_0, x_1, x_2]) = (self.moment_a, self.inverse_a, self.adjugate_s, self.x);
+        let store = |first: V::Half, second: V::Half| V::join(first, second).store();
+        Factors {
+            moment_adjugate: [store(m.x, c.x), store(m.y, c.y), store(m.z, c.z)],
+            inverse_x: [store(i.x, x_0), store(i.y, x_1), store(i.z, x_2)],
+            inverse_d_s: store(self.inverse_d_s, self.inverse_d_s),
+            determinants: self.determinants,
+            sound: self.sound,
+        }
+    }
+
+    /// With the moments of other arms, from another point of the platform: X and S do not depend on it.
+    #[inline(always)]
+    pub fn with_arms(self, legs: &LegGeometry<V>) -> Self {
+        let ((arm, _), (direction, _)) = (legs.arm.halves(), legs.direction.halves());
+        Self { moment_a: arm.cross(direction), ..self }
+    }
+
+    /// `det N`, columns in the order of the lanes.
+    #[inline(always)]
+    pub fn determinant(&self) -> f64 {
+        let [d_a, d_s] = self.determinants;
+        -d_a * d_s
     }
 
     /// `Gamma + along` with `N Gamma = W`, still in lanes; `None` at a singular pose.
     #[inline(always)]
-    pub fn forces(&self, wrench: &LaneWrench<V::Half>, along: V) -> Option<Lane> {
+    pub fn forces(&self, legs: &LegGeometry<V>, wrench: &LaneWrench<V::Half>, along: V) -> Option<Lane> {
         let simd = self.simd;
         let triples = &self.joints.triples;
         if !self.sound {
-            let n = wrench_columns(triples, self.moment, self.direction);
+            let n = wrench_columns(triples, legs);
             let forces = forces_by_lu(&n, &wrench.sum(), &triples.unpack(&along.store()))?;
             return Some(triples.pack(&forces));
         }
-        let force = wrench.force.map(
-            #[inline(always)]
-            |component| component.total(simd),
-        );
+        let force = wrench.force.total(simd);
         let g = self.inverse_a.dot(force);
         // The lane of padding is nobody's force.
         let g_of_legs = g * V::Half::load(simd, [1.0, 1.0, 1.0, 0.0]);
         let torque = wrench.torque.minus_scaled(g_of_legs, self.moment_a);
-        let torque = torque.map(
-            #[inline(always)]
-            |component| component.total(simd),
-        );
-        let gamma_b = self.adjugate_s.dot(torque) * self.inverse_d_s;
+        let gamma_b = self.adjugate_s.dot(torque.total(simd)) * self.inverse_d_s;
         let [g0, g1, g2] = broadcasts(simd, gamma_b);
         let [x0, x1, x2] = V::Half::transposed(simd, self.x);
         let gamma_a = g - g0 * x0 - g1 * x1 - g2 * x2;
@@ -126,21 +178,54 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
 
     /// `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
     #[inline(always)]
-    pub fn twist(&self, rates: V) -> Option<Twist> {
+    pub fn twist(&self, legs: &LegGeometry<V>, rates: V) -> Option<LaneTwist<V::Half>> {
+        let simd = self.simd;
         if !self.sound {
             let triples = &self.joints.triples;
-            let n = wrench_columns(triples, self.moment, self.direction);
-            return twist_by_lu(&n, &triples.unpack(&rates.store()));
+            let n = wrench_columns(triples, legs);
+            return twist_by_lu(&n, &triples.unpack(&rates.store())).map(
+                #[inline(always)]
+                |twist| LaneTwist::spread(simd, &twist),
+            );
         }
+        // The lane of padding is nobody's rate.
+        let of_legs = V::Half::load(simd, [1.0, 1.0, 1.0, 0.0]);
         let (r_a, r_b) = rates.halves();
-        let [r0, r1, r2] = broadcasts(self.simd, r_a);
+        let [r0, r1, r2] = broadcasts(simd, r_a);
         let [x0, x1, x2] = self.x;
         // One dS for all three: near a singular pose the lanes' own differ by rounding times the condition,
         // and the sum, where large terms cancel, would lose the condition a second time.
-        let [inverse_d_s, ..] = self.inverse_d_s.legs();
-        let angular = (self.adjugate_s * (r_b - r0 * x0 - r1 * x1 - r2 * x2)).sum_legs() * inverse_d_s;
-        let turning = self.moment_a.dot(splat(self.simd, &angular));
-        Some(Twist { angular, linear: (self.inverse_a * (r_a - turning)).sum_legs() })
+        let inverse_d_s = self.inverse_d_s.broadcast::<0>(simd);
+        let rest = (r_b - r0 * x0 - r1 * x1 - r2 * x2) * of_legs;
+        let angular = (self.adjugate_s * rest).total(simd) * inverse_d_s;
+        let rest = (r_a - self.moment_a.dot(angular)) * of_legs;
+        Some(LaneTwist { angular, linear: (self.inverse_a * rest).total(simd) })
+    }
+}
+
+/// A twist, each number of it in all lanes.
+#[derive(Clone, Copy)]
+pub(super) struct LaneTwist<F> {
+    pub angular: Lanes3<F>,
+    pub linear: Lanes3<F>,
+}
+
+impl<F> LaneTwist<F> {
+    #[inline(always)]
+    fn spread<S: Simd>(simd: S, twist: &Twist) -> Self
+    where
+        F: Four<S>,
+    {
+        Self { angular: splat(simd, &twist.angular), linear: splat(simd, &twist.linear) }
+    }
+
+    /// As numbers.
+    #[inline(always)]
+    pub fn numbers<S: Simd>(&self) -> Twist
+    where
+        F: Four<S>,
+    {
+        Twist { angular: self.angular.first(), linear: self.linear.first() }
     }
 }
 
@@ -172,12 +257,8 @@ fn twist_by_lu(n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
 
 /// N, columns in the order of people.
 #[inline(always)]
-pub(super) fn wrench_columns<S: Simd, V: Eight<S>>(
-    triples: &Triples,
-    moment: Lanes3<V>,
-    direction: Lanes3<V>,
-) -> Matrix6<f64> {
-    let rows = [moment.store(), direction.store()];
+pub(super) fn wrench_columns<S: Simd, V: Eight<S>>(triples: &Triples, legs: &LegGeometry<V>) -> Matrix6<f64> {
+    let rows = [legs.arm.cross(legs.direction).store(), legs.direction.store()];
     let mut n = Matrix6::zeros();
     for (mut row, lane) in n.row_iter_mut().zip(rows.iter().flatten()) {
         row.copy_from_slice(&triples.unpack(lane));
@@ -188,15 +269,7 @@ pub(super) fn wrench_columns<S: Simd, V: Eight<S>>(
 /// `v_i+1 x v_i+2` in each lane i.
 #[inline(always)]
 fn adjugate<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> Lanes3<F> {
-    let next = v.map(
-        #[inline(always)]
-        |component| component.next(simd),
-    );
-    let previous = v.map(
-        #[inline(always)]
-        |component| component.previous(simd),
-    );
-    next.cross(previous)
+    v.next(simd).cross(v.previous(simd))
 }
 
 /// Each leg's number in all lanes.
@@ -207,7 +280,7 @@ fn broadcasts<S: Simd, F: Four<S>>(simd: S, v: F) -> [F; 3] {
 
 /// Each leg's vector in all lanes.
 #[inline(always)]
-fn broadcast_vectors<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> [Lanes3<F>; 3] {
+pub(super) fn broadcast_vectors<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> [Lanes3<F>; 3] {
     let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
         (broadcasts(simd, v.x), broadcasts(simd, v.y), broadcasts(simd, v.z));
     [Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 }, Lanes3 { x: x2, y: y2, z: z2 }]

@@ -18,7 +18,7 @@ use super::lanes3::Lanes3;
 use super::machine::{Joints, LEGS, Machine};
 use super::platform::acceleration_map;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
-use super::triples::Lane;
+use super::triples::{Constant, Lane};
 
 /// Geometry of the six legs at one pose.
 #[derive(Clone, Copy)]
@@ -48,8 +48,26 @@ impl<V> LegGeometry<V> {
     where
         V: Eight<S>,
     {
-        let arm = Lanes3::<V>::constant(simd, &joints.platform)
-            .transformed(&pose.rotation, |value| V::spread(simd, value));
+        Self::of(simd, &joints.platform, joints, pose)
+    }
+
+    /// With arms from the mean of the joints on the platform, wherever C is.
+    #[inline(always)]
+    pub fn around_center<S: Simd>(simd: S, joints: &Joints, pose: &Pose) -> Self
+    where
+        V: Eight<S, Scalar = f64>,
+    {
+        let position = pose.position + pose.rotation * joints.center;
+        Self::of(simd, &joints.around_center, joints, &Pose { rotation: pose.rotation, position })
+    }
+
+    #[inline(always)]
+    fn of<S: Simd>(simd: S, platform: &[Constant; 3], joints: &Joints, pose: &Pose<V::Scalar>) -> Self
+    where
+        V: Eight<S>,
+    {
+        let arm =
+            Lanes3::<V>::constant(simd, platform).transformed(&pose.rotation, |value| V::spread(simd, value));
         let s = Lanes3::spread(simd, &pose.position) + arm - Lanes3::constant(simd, &joints.base);
         let length = s.dot(s).sqrt();
         let inverse_length = V::splat(simd, 1.0) / length;

@@ -18,17 +18,26 @@ use super::rigid::{Pose, Twist};
 pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
-        wrench_columns(&machine.joints.triples, legs.arm.cross(legs.direction), legs.direction)
+        wrench_columns(&machine.joints.triples, &legs)
     })
 }
 
-/// 2-norm condition number of N with torques divided by the characteristic length, so that metres and
-/// radians compare. Infinite at a singular pose. Not for the loop: it computes singular values.
+/// 2-norm condition number of N, torques about the mean of the joints on the platform and in units of the
+/// characteristic length, so that metres and radians compare and nothing depends on where C is. Infinite at a
+/// singular pose. Not for the loop: it computes singular values.
 pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
-    let mut scaled = leg_wrenches(machine, pose);
-    scaled.fixed_rows_mut::<3>(0).unscale_mut(machine.joints.radius);
-    let singular_values = scaled.singular_values();
+    let singular_values = scaled_wrenches(machine, pose).singular_values();
     singular_values.max() / singular_values.min()
+}
+
+/// N as [`condition`] judges it.
+pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
+    let mut scaled = dispatch!(machine.level, simd => {
+        let legs = LegGeometry::<f64x8<_>>::around_center(simd, &machine.joints, pose);
+        wrench_columns(&machine.joints.triples, &legs)
+    });
+    scaled.fixed_rows_mut::<3>(0).unscale_mut(machine.joints.radius);
+    scaled
 }
 
 /// The twist that gives the measured leg rates: solves `J^-1 [omega; v] = L'`.
@@ -38,6 +47,7 @@ pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> 
     let rates = machine.joints.triples.pack(rates);
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
-        Balance::new(simd, &machine.joints, &legs).twist(Eight::load(simd, &rates))
+        let twist = Balance::new(simd, &machine.joints, &legs).twist(&legs, Eight::load(simd, &rates));
+        twist.map(|twist| twist.numbers())
     })
 }

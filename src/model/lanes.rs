@@ -65,6 +65,8 @@ pub(super) trait Four<S: Simd>: Reals {
     fn transposed(simd: S, rows: [Self; 3]) -> [Self; 3];
     /// The triple's three numbers.
     fn legs(self) -> [f64; 3];
+    /// The number in the first lane.
+    fn first(self) -> f64;
 }
 
 macro_rules! reals {
@@ -188,6 +190,11 @@ macro_rules! precision {
             fn legs(self) -> [f64; 3] {
                 let [a, b, c, _] = self.to_array();
                 [a.into(), b.into(), c.into()]
+            }
+            #[inline(always)]
+            fn first(self) -> f64 {
+                let [a, ..] = self.to_array();
+                a.into()
             }
         }
     };

@@ -51,11 +51,6 @@ impl<V: Reals> Lanes3<V> {
             .plus_scaled(self.y, column(m.m12, m.m22, m.m32))
             .plus_scaled(self.x, column(m.m11, m.m21, m.m31))
     }
-
-    #[inline(always)]
-    pub fn map<W>(self, f: impl Fn(V) -> W) -> Lanes3<W> {
-        Lanes3 { x: f(self.x), y: f(self.y), z: f(self.z) }
-    }
 }
 
 impl<V> Lanes3<V> {
@@ -108,14 +103,49 @@ impl<V> Lanes3<V> {
 }
 
 impl<F> Lanes3<F> {
-    /// Sum over the three legs of a triple, per component; the padding does not count.
+    /// The next leg's vector in each lane.
     #[inline(always)]
-    pub fn sum_legs<S: Simd>(self) -> Vector3<f64>
+    pub fn next<S: Simd>(self, simd: S) -> Self
     where
         F: Four<S>,
     {
-        let sum = |value: F| value.legs().into_iter().sum();
-        Vector3::new(sum(self.x), sum(self.y), sum(self.z))
+        Self { x: self.x.next(simd), y: self.y.next(simd), z: self.z.next(simd) }
+    }
+
+    /// The vector of the leg before in each lane.
+    #[inline(always)]
+    pub fn previous<S: Simd>(self, simd: S) -> Self
+    where
+        F: Four<S>,
+    {
+        Self { x: self.x.previous(simd), y: self.y.previous(simd), z: self.z.previous(simd) }
+    }
+
+    /// The sum of all four lanes, in all lanes.
+    #[inline(always)]
+    pub fn total<S: Simd>(self, simd: S) -> Self
+    where
+        F: Four<S>,
+    {
+        Self { x: self.x.total(simd), y: self.y.total(simd), z: self.z.total(simd) }
+    }
+
+    /// Twice, for both triples.
+    #[inline(always)]
+    pub fn doubled<S: Simd, V: Eight<S, Half = F>>(self) -> Lanes3<V>
+    where
+        F: Four<S>,
+    {
+        Lanes3 { x: V::join(self.x, self.x), y: V::join(self.y, self.y), z: V::join(self.z, self.z) }
+    }
+
+    /// The vector in the first lane.
+    #[inline(always)]
+    pub fn first<S: Simd>(self) -> Vector3<f64>
+    where
+        F: Four<S>,
+    {
+        Vector3::new(self.x.first(), self.y.first(), self.z.first())
     }
 
     /// Sum over all four lanes, per component.

@@ -8,7 +8,7 @@
 use fearless_simd::Level;
 use nalgebra::{Matrix3, Vector3};
 
-use super::rigid::Pose;
+use super::rigid::{Pose, Twist};
 use super::triples::{Constant, Triples};
 
 /// Number of legs.
@@ -73,8 +73,16 @@ pub struct Joints {
     /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. Turns
     /// radians into metres wherever a tolerance must not depend on the size of the machine.
     pub radius: f64,
-    /// Its cube.
+    /// Its cube, and the inverse of it with the sign of the order of the lanes.
     pub(super) radius_cubed: f64,
+    pub(super) inverse_radius_cubed: f64,
+    /// Mean of the `B_i`, from C, in platform axes \[m\]: the point that does not depend on the choice of C.
+    pub(super) center: Vector3<f64>,
+    /// The `B_i` from their mean, in platform axes \[m\].
+    pub(super) around_center: [Constant; 3],
+    /// The length `a` of that arm as a share of the radius, and `(1 + a^2) radius`: see `super::stance`.
+    pub(super) arm_share: Constant,
+    pub(super) arm_curvature: Constant,
 }
 
 impl Joints {
@@ -91,8 +99,9 @@ impl Joints {
             *direction = (home.position + home.rotation * joint - *direction).normalize();
         }
         let triples = Triples::best(&directions);
-        let mean = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
-        let mean_square = platform.iter().map(|b| (b - mean).norm_squared()).sum::<f64>() / LEGS as f64;
+        let center = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
+        let around_center = platform.map(|b| b - center);
+        let mean_square = around_center.iter().map(Vector3::norm_squared).sum::<f64>() / LEGS as f64;
         let radius = mean_square.sqrt();
         Self {
             triples,
@@ -101,7 +110,18 @@ impl Joints {
             universal_axis: triples.pack_vectors(universal_axis).map(Constant::from),
             radius,
             radius_cubed: radius * radius * radius,
+            inverse_radius_cubed: triples.parity() / (radius * radius * radius),
+            center,
+            around_center: triples.pack_vectors(&around_center).map(Constant::from),
+            arm_share: triples.pack(&around_center.map(|b| b.norm() / radius)).into(),
+            arm_curvature: triples.pack(&around_center.map(|b| radius + b.norm_squared() / radius)).into(),
         }
+    }
+
+    /// The twist at C of a twist at the mean of the joints on the platform.
+    pub(super) fn twist_of_origin(&self, twist: &Twist, rotation: &Matrix3<f64>) -> Twist {
+        let arm = rotation * self.center;
+        Twist { angular: twist.angular, linear: twist.linear - twist.angular.cross(&arm) }
     }
 
     /// The same joints with a point of the platform (from C, in platform axes) in the first lane of

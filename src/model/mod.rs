@@ -12,7 +12,7 @@
 //! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
-//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`ladder`], [`rigid`], [`triples`], `lanes`, `lanes3`, `balance`, `lu`, [`machine`] |
+//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`ladder`], [`rigid`], [`sensitivity`], [`stance`], [`triples`], `lanes`, `lanes3`, `balance`, `lu`, [`machine`] |
 //!
 //! # Errata of the print
 //!
@@ -49,5 +49,7 @@ pub mod mass_matrix;
 pub mod platform;
 pub mod regressor;
 pub mod rigid;
+pub mod sensitivity;
+pub mod stance;
 pub mod task;
 pub mod triples;

@@ -82,6 +82,14 @@ impl Triples {
         all.max_by(|a, b| volume(a).total_cmp(&volume(b))).unwrap_or(Self::ALL[0])
     }
 
+    /// 1 or -1: whether the order of the lanes is an even permutation of the legs.
+    pub(super) fn parity(&self) -> f64 {
+        let pairs = self.lanes.iter().enumerate();
+        let behind =
+            pairs.map(|(k, lane)| self.lanes.iter().skip(k + 1).filter(|later| *later < lane).count());
+        if behind.sum::<usize>() % 2 == 0 { 1.0 } else { -1.0 }
+    }
+
     /// One number per leg to lanes.
     #[inline(always)]
     pub fn pack(&self, legs: &[f64; LEGS]) -> Lane {

@@ -1,5 +1,7 @@
 //! Machines that cannot exist: inertia, stroke, joints, home.
 
+use std::f64::consts::{FRAC_PI_3, FRAC_PI_6};
+
 use hexad::host::config::{Config, Violation};
 use nalgebra::Vector3;
 
@@ -118,7 +120,7 @@ fn machine_with(base: [[f64; 3]; 6], platform: [[f64; 3]; 6]) -> String {
 fn singular_machines_are_refused() {
     let ring = |radius: f64, phase: f64| -> [[f64; 3]; 6] {
         std::array::from_fn(|i| {
-            let angle = phase + i as f64 * std::f64::consts::FRAC_PI_3;
+            let angle = phase + i as f64 * FRAC_PI_3;
             [0.0, radius * angle.cos(), radius * angle.sin()]
         })
     };
@@ -139,8 +141,44 @@ fn singular_machines_are_refused() {
         "leg[1].platform_m = one of six within 1e-7 m",
         bound,
     );
-    // Two regular hexagons, one above the other: every leg meets the axis at the same angle.
-    let end = "must be at most 10000: the legs cannot hold the platform in every direction";
-    only(machine_with(ring(0.7, 0.0), ring(0.5, 0.0)), "home.pose = condition number ", end);
-    only(machine_with(ring(0.7, 0.0), ring(0.5, 1e-5)), "home.pose = condition number ", end);
+    // Regular hexagons at any angle to each other, and similar semi-regular ones: all the legs belong to one linear
+    // complex wherever the platform goes.
+    let semi = |radius: f64, phase: f64| -> [[f64; 3]; 6] {
+        std::array::from_fn(|i| {
+            let angle = phase + (i / 2) as f64 * 2.0 * FRAC_PI_3 + (i % 2) as f64 * 0.6;
+            [0.0, radius * angle.cos(), radius * angle.sin()]
+        })
+    };
+    let everywhere = "at best around home: joints laid out like this are singular everywhere";
+    for platform in [ring(0.5, 0.0), ring(0.5, FRAC_PI_6), ring(0.5, 0.3), ring(0.5, 1e-5)] {
+        only(machine_with(ring(0.7, 0.0), platform), "leg[1] = condition number ", everywhere);
+    }
+    for platform in [semi(0.5, 0.0), semi(0.5, 0.3), semi(0.5, 0.3 + 1e-6)] {
+        only(machine_with(semi(0.7, 0.0), platform), "leg[1] = condition number ", everywhere);
+    }
+    // A semi-regular hexagon that is not similar will do.
+    let other = std::array::from_fn(|i| semi(0.5, FRAC_PI_3)[(i + 5) % 6]);
+    assert_eq!(violations(&machine_with(semi(0.7, 0.0), other)), []);
+}
+
+/// The machine is sound, its home is not.
+#[test]
+fn singular_homes_are_refused() {
+    let home = "pose = [0.0, 0.0, 0.0, 1.1, 0.0, 0.0]";
+    let stroke = "min_length_m = 0.85\nmax_length_m = 1.6";
+    let at = |pose: &str| {
+        fried_with(home, pose)
+            .replace(stroke, "min_length_m = 0.01\nmax_length_m = 16.0")
+            .replace("axial_inertia_kg_m2 = 0.0013", "axial_inertia_kg_m2 = 0.001")
+    };
+    let found = |text: &str| violations(text).iter().map(Violation::to_string).collect::<Vec<_>>();
+    // Fichter's: turned by a quarter about the vertical; and all legs in one plane.
+    for pose in ["pose = [1.5707963267948966, 0, 0, 1.1, 0, 0]", "pose = [0, 0, 0, 1e-9, 0, 0]"] {
+        let found = found(&at(pose));
+        let message = found.first().map(String::as_str).unwrap_or_default();
+        assert!(found.len() == 1 && message.starts_with("home.pose = condition number "), "{found:#?}");
+        let (_, best) = message.rsplit_once("poses around it have ").unwrap();
+        assert!(best.trim_end_matches(" at best").parse::<f64>().unwrap() < 100.0, "{message}");
+    }
+    assert_eq!(found(&at("pose = [1.3, 0, 0, 1.1, 0, 0]")), Vec::<String>::new());
 }

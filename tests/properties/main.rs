@@ -12,6 +12,7 @@ mod kinematics;
 mod layouts;
 mod regressor;
 mod rotations;
+mod stances;
 
 use std::sync::LazyLock;
 

@@ -11,10 +11,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::machine::{Leg, rounded};
 use super::reader::Reader;
+use crate::model::forward_kinematics::LARGEST_CONDITION;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
 use crate::model::machine::{LEGS, Machine};
-use crate::model::rigid::Pose;
+use crate::model::rigid::{Pose, Twist};
 use crate::model::task::TaskState;
 
 /// Points nearer than this share of the joints' radius are one point: a micrometre on a machine of a metre,
@@ -29,9 +30,9 @@ const LEAST_RADIUS: f64 = 1e-6;
 /// are parallel the joint locks; at a milliradian the leg spins a thousand times faster than it swings.
 const LEAST_UNIVERSAL_SINE: f64 = 1e-3;
 
-/// Largest condition number at home. There, an encoder's error of 1 um is up to 1 cm at the platform, and a
-/// leg may push 10,000 times the load. Machines that are meant to work have 2 to 100.
-const LARGEST_CONDITION: f64 = 1e4;
+/// How far around home a singular layout is looked at, in radians and as a share of the radius: far enough that a
+/// pose that is singular by itself is left, near enough that every machine gets there.
+const AROUND: f64 = 0.2;
 
 /// Checks the joints, then the home pose.
 pub(super) fn check(machine: &Machine, legs: &[Leg], home: &Reader) {
@@ -41,7 +42,7 @@ pub(super) fn check(machine: &Machine, legs: &[Leg], home: &Reader) {
     let pose = TaskState::at_rest(machine.home).motion().pose;
     let complete = check_legs(machine, legs, &pose);
     if base_spans && platform_spans && complete {
-        check_condition(machine, &pose, home);
+        check_condition(machine, legs, &pose, home);
     }
 }
 
@@ -132,18 +133,42 @@ fn check_legs(machine: &Machine, legs: &[Leg], pose: &Pose) -> bool {
     complete && legs.len() == LEGS
 }
 
-fn check_condition(machine: &Machine, pose: &Pose, home: &Reader) {
-    let condition = condition(machine, pose);
-    // Also where it is no number.
-    if !(condition <= LARGEST_CONDITION) {
-        home.refuse_as(
-            "pose",
-            format!("condition number {} of the legs' wrenches", rounded(condition)),
-            format!(
-                "must be at most {LARGEST_CONDITION}: the legs cannot hold the platform in every direction"
-            ),
-        );
+/// Refuses a singular home, and tells it from a layout that is singular everywhere.
+fn check_condition(machine: &Machine, legs: &[Leg], pose: &Pose, home: &Reader) {
+    let at_home = condition(machine, pose);
+    if at_home <= LARGEST_CONDITION {
+        return;
     }
+    // Also where it is no number.
+    let best = around(machine, pose).map(|pose| condition(machine, &pose)).fold(f64::INFINITY, f64::min);
+    let shown = format!("condition number {} of the legs' wrenches", rounded(at_home));
+    if best <= LARGEST_CONDITION {
+        let bound = format!(
+            "must be at most {LARGEST_CONDITION}: the legs cannot hold the platform in every direction; poses \
+             around it have {} at best",
+            rounded(best)
+        );
+        home.refuse_as("pose", shown, bound);
+    } else if let Some(first) = legs.first() {
+        let bound = format!(
+            "must be at most {LARGEST_CONDITION} at some pose, and is {} at best around home: joints laid out \
+             like this are singular everywhere",
+            rounded(best)
+        );
+        first.reader.refuse_table(shown, bound);
+    }
+}
+
+/// Poses in all directions from `pose`.
+fn around(machine: &Machine, pose: &Pose) -> impl Iterator<Item = Pose> {
+    let shift = AROUND * machine.joints.radius;
+    (0..1_u32 << LEGS).map(move |corner| {
+        let sign = |axis: u32| if corner & (1 << axis) == 0 { 1.0 } else { -1.0 };
+        // Different amounts, for symmetric motions may keep a layout singular.
+        let angular = Vector3::new(sign(0), 0.7 * sign(1), 0.4 * sign(2)) * AROUND;
+        let linear = Vector3::new(0.5 * sign(3), 0.8 * sign(4), sign(5)) * shift;
+        pose.displaced(&Twist { angular, linear })
+    })
 }
 
 fn is_finite(point: &Vector3<f64>) -> bool {

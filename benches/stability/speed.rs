@@ -1,0 +1,206 @@
+//! Error of the pose against time: plain Newton by the step, ours, and the others, from several starts.
+
+use hexad::host::charts::Stroke;
+use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width};
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::forward_kinematics::refine;
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::inverse_jacobian::twist_from_rates;
+use hexad::model::ladder::Exact;
+use hexad::model::machine::Machine;
+use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad::model::stance::Stance;
+use hexad::model::task::task_coordinates;
+use nalgebra::{Vector3, Vector6};
+
+use super::rivals::{self, Update};
+use super::timing::{Samples, sample};
+use super::trials::{pose, rigid};
+use super::{Failure, MACHINES, cells, chart, common, write_csv};
+
+/// Starts by their distance: 2 mm and 0.2 degrees, a tenth and a hundredth of it, five times.
+const STARTS: [(&str, f64); 4] = [("0.02 mm", 0.01), ("0.2 mm", 0.1), ("2 mm", 1.0), ("10 mm", 5.0)];
+const SHIFT_M: f64 = 2e-3;
+const TURN: f64 = 0.2 * core::f64::consts::PI / 180.0;
+
+const MOST_STEPS: u32 = 4;
+const ROUNDS: usize = 31;
+const SAMPLE_S: f64 = 1e-3;
+const POSES: u64 = 100;
+/// Errors below this are rounding: where the chart ends.
+const ROUNDING: f64 = 1e-16;
+
+/// A pose, its lengths, and where its search starts.
+struct Case {
+    there: Pose,
+    lengths: [f64; 6],
+    start: Pose,
+    start_x: [f64; 6],
+    stance: Stance,
+}
+
+/// So many steps of plain Newton, a new factorization each.
+pub fn newton(machine: &Machine, start: &Pose, lengths: &[f64; 6], steps: u32) -> Pose {
+    (0..steps).fold(*start, |pose, _| {
+        let rest = Vector6::from(*lengths) - Vector6::from(leg_lengths(machine, &pose));
+        twist_from_rates(machine, &pose, &rest.into()).map_or(pose, |step| pose.displaced(&step))
+    })
+}
+
+fn cases(machine: &Machine, distance: f64) -> Vec<Case> {
+    let direction = |k: u64| {
+        let [a, b, c, ..] = pose(machine, 1.0, k + 77);
+        let [h0, h1, h2, ..] = machine.home;
+        Vector3::new(a - h0, b - h1, c - h2).normalize()
+    };
+    (0..POSES)
+        .map(|k| {
+            let x = pose(machine, 0.2, k);
+            let there = rigid(x);
+            let angular = direction(2 * k) * (TURN * distance);
+            let linear = direction(2 * k + 1) * (SHIFT_M * distance);
+            let start = there.displaced(&Twist { angular, linear });
+            let start_x = task_coordinates(&start, &x);
+            let lengths = leg_lengths(machine, &there);
+            Case { there, lengths, start, start_x, stance: Stance::new(machine, start) }
+        })
+        .collect()
+}
+
+/// A method, timed and judged.
+struct Row {
+    method: String,
+    machine: &'static str,
+    start: &'static str,
+    ns: f64,
+    error: f64,
+}
+
+pub fn run() -> Result<(), Failure> {
+    let mut rows = vec![];
+    for name in MACHINES {
+        let machine = common::machine(name);
+        for (start, distance) in STARTS {
+            let cases = cases(&machine, distance);
+            let mut add = |method: String, find: &dyn Fn(&Case) -> Pose| {
+                let errors = cases.iter().map(|case| {
+                    let way = find(case).displacement_to(&case.there);
+                    way.linear.norm().max(way.angular.norm() * machine.joints.radius)
+                });
+                let error = errors.fold(0.0, f64::max);
+                let mut samples = Samples::default();
+                for _ in 0..ROUNDS {
+                    samples
+                        .take(cases.len(), SAMPLE_S, |passes, fenced| sample(&cases, passes, fenced, find));
+                }
+                rows.push(Row { method, machine: name, start, ns: samples.latency(), error });
+            };
+            for steps in 1..=MOST_STEPS {
+                add(format!("newton {steps}"), &|case| newton(&machine, &case.start, &case.lengths, steps));
+            }
+            add("hexad".into(), &|case| {
+                let mut stance = case.stance;
+                refine(&machine, &mut stance, &case.lengths);
+                *stance.pose()
+            });
+            add("hexad from a pose".into(), &|case| {
+                let mut stance = Stance::new(&machine, case.start);
+                refine(&machine, &mut stance, &case.lengths);
+                *stance.pose()
+            });
+            for (method, update) in
+                [("rotation added to angles", Update::RotationAdded), ("Newton on angles", Update::Angles)]
+            {
+                add(method.into(), &|case| {
+                    let found = rivals::solve(&machine, update, &case.start_x, &case.lengths);
+                    found.map_or(case.start, |(x, _)| rigid(x))
+                });
+            }
+        }
+        shared(name, &machine);
+    }
+    for row in rows.iter().filter(|row| row.start == "2 mm") {
+        println!("{:<12}{:<26}{:>8.0} ns{:>10.1e} m", row.machine, row.method, row.ns, row.error);
+    }
+    let table: Vec<_> = rows
+        .iter()
+        .map(|row| {
+            let (ns, error) = (format!("{:.1}", row.ns), format!("{:.2e}", row.error));
+            cells([&row.machine, &row.method, &row.start, &ns, &error])
+        })
+        .collect();
+    write_csv("stability_speed.csv", &["machine", "method", "start", "ns_fenced", "error_max_m"], &table)?;
+    draw(&rows)
+}
+
+/// What the factorization that is left saves the inverse dynamics.
+fn shared(name: &str, machine: &Machine) {
+    let dynamics = InverseDynamics::new(machine);
+    let cases = cases(machine, 1.0);
+    let (twist, acceleration) =
+        (Twist::default(), Acceleration { linear: Vector3::x(), ..Default::default() });
+    let (mut alone, mut with) = (Samples::default(), Samples::default());
+    for _ in 0..ROUNDS {
+        alone.take(cases.len(), SAMPLE_S, |passes, fenced| {
+            sample(&cases, passes, fenced, |case| {
+                dynamics.forces::<Exact>(&Motion { pose: case.start, twist, acceleration })
+            })
+        });
+        with.take(cases.len(), SAMPLE_S, |passes, fenced| {
+            sample(&cases, passes, fenced, |case| {
+                dynamics.forces_at::<Exact>(&case.stance, &twist, &acceleration)
+            })
+        });
+    }
+    println!(
+        "{name}: forces {:.0} ns, with the factors of the pose {:.0} ns",
+        alone.latency(),
+        with.latency()
+    );
+}
+
+/// The motion base: a line per start, a point per step.
+fn draw(rows: &[Row]) -> Result<(), Failure> {
+    let at = |row: &Row| (row.ns, row.error.max(ROUNDING));
+    let of = |color: usize, found: &dyn Fn(&Row) -> bool| -> Vec<(f64, f64, usize)> {
+        let start = STARTS[color].0;
+        let rows = rows.iter().filter(|row| row.machine == "motion_base" && row.start == start && found(row));
+        rows.map(|row| (at(row).0, at(row).1, color)).collect()
+    };
+    let (mut points, mut lines) = (vec![], vec![]);
+    for color in 0..STARTS.len() {
+        let plain = of(color, &|row| row.method.starts_with("newton "));
+        let line = plain.iter().map(|(ns, error, _)| (*ns, *error)).collect();
+        lines.push(Line { points: line, style: Stroke::Solid, color, width: Width::Hair });
+        let ours = of(color, &|row| row.method == "hexad");
+        let others = of(color, &|row| row.method.contains("angles"));
+        for (marks, mark) in [(plain, Mark::Disc), (others, Mark::Disc), (ours, Mark::Ring)] {
+            points.extend(marks.iter().map(|(ns, error, color)| Point {
+                at: (*ns, *error),
+                mark,
+                color: *color,
+                label: Label::None,
+            }));
+        }
+    }
+    let labels = STARTS.map(|(start, _)| format!("Newton, 1 to {MOST_STEPS} steps, from {start}"));
+    let mut legend: Vec<_> = labels
+        .iter()
+        .enumerate()
+        .map(|(k, label)| (Sample::Line(Stroke::Solid, Width::Hair, k), &**label))
+        .collect();
+    legend.push((Sample::Mark(Mark::Ring, 2), "hexad, factorization included"));
+    legend.push((Sample::Mark(Mark::Disc, 2), "alone at the right: updates of Bryan angles"));
+    let chart_of = Scatter {
+        title: "Forward kinematics: error of the pose against time, motion base",
+        x_label: "time, one thread [ns]",
+        y_label: "largest error [m]",
+        x: 50.0..30e3,
+        y: 1e-16..1e-2,
+        points,
+        lines,
+        legend,
+    };
+    chart_of.write_svg(&chart("stability_speed.svg"))?;
+    Ok(())
+}

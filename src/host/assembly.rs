@@ -1,0 +1,104 @@
+//! Assembly modes: all poses found that have the same leg lengths. Off line, by many starts.
+//!
+//! From each start Levenberg's and Marquardt's method goes wherever the lengths fit; what is the same pose counts
+//! once. Nothing proves that none is missing: more starts find
+//! more. The starts are the same in every run.
+
+extern crate std;
+
+use core::f64::consts::PI;
+use std::{prelude::rust_2024::*, vec};
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::machine::{LEGS, Machine};
+use crate::model::rigid::{Pose, Twist};
+use crate::model::stance::Stance;
+
+/// Bound on the steps from a start; most need ten to twenty.
+const MAX_STEPS: usize = 400;
+
+/// Lengths that fit to this share of the radius fit: rounding.
+const CLOSE: f64 = 1e-12;
+
+/// Poses this near to each other (radian, or radius) are one.
+const SAME: f64 = 1e-7;
+
+/// First damping, as a share of the largest eigenvalue that `J^T J` usually has; then a factor for each step.
+const DAMPING: f64 = 1e-2;
+const RELAXED: f64 = 0.2;
+const TIGHTENED: f64 = 5.0;
+
+/// Where starts are spread.
+#[derive(Clone, Copy, Debug)]
+pub struct Region {
+    /// In the middle.
+    pub center: Pose,
+    /// Largest rotation away from it \[rad\]; pi for all orientations.
+    pub turn: f64,
+    /// Largest displacement along each axis \[m\].
+    pub shift: f64,
+}
+
+/// The poses with these lengths \[m\] that are found from so many starts, in the order of their finding.
+pub fn modes(machine: &Machine, lengths: &[f64; LEGS], region: &Region, starts: u64) -> Vec<Stance> {
+    let ends = (0..starts).into_par_iter().map(|k| settled(machine, lengths, start(region, k)));
+    let mut found: Vec<Stance> = vec![];
+    for stance in ends.collect::<Vec<_>>().into_iter().flatten() {
+        let size = |other: &Stance| distance(machine, stance.pose(), other.pose());
+        if found.iter().all(|other| size(other) > SAME) {
+            found.push(stance);
+        }
+    }
+    found
+}
+
+/// How far apart two poses are: rotation \[rad\] and shift \[radius\] together.
+pub fn distance(machine: &Machine, a: &Pose, b: &Pose) -> f64 {
+    let way = a.displacement_to(b);
+    way.angular.norm().hypot(way.linear.norm() / machine.joints.radius)
+}
+
+/// The start with this number.
+fn start(region: &Region, number: u64) -> Pose {
+    let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    // splitmix64, evenly in -1..1
+    let mut unit = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-52) - 1.0
+    };
+    let mut vector = || Vector3::new(unit(), unit(), unit());
+    let turn = vector() * region.turn.min(PI);
+    region.center.displaced(&Twist { angular: turn, linear: vector() * region.shift })
+}
+
+/// Where the way from a start ends, if the lengths fit there.
+fn settled(machine: &Machine, lengths: &[f64; LEGS], start: Pose) -> Option<Stance> {
+    let radius = machine.joints.radius;
+    let scale = Vector6::new(1.0, 1.0, 1.0, radius, radius, radius);
+    let residual = |pose: &Pose| Vector6::from(*lengths) - Vector6::from(leg_lengths(machine, pose));
+    let (mut pose, mut rest) = (start, residual(&start));
+    let mut damping = DAMPING * radius * radius;
+    for _ in 0..MAX_STEPS {
+        if rest.norm() < CLOSE * radius {
+            return Some(Stance::new(machine, pose));
+        }
+        let jacobian = leg_wrenches(machine, &pose).transpose() * Matrix6::from_diagonal(&scale);
+        let normal = jacobian.tr_mul(&jacobian) + Matrix6::identity() * damping;
+        let step = normal.cholesky()?.solve(&jacobian.tr_mul(&rest)).component_mul(&scale);
+        let next = pose.displaced(&Twist::from_vector(&step));
+        let left = residual(&next);
+        if left.norm() < rest.norm() {
+            (pose, rest, damping) = (next, left, damping * RELAXED);
+        } else {
+            damping *= TIGHTENED;
+        }
+    }
+    None
+}

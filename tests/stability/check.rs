@@ -1,0 +1,35 @@
+//! `hexad check` tells when the lengths of home belong to another pose nearby.
+
+use std::fs;
+use std::process::Command;
+
+use super::common::data;
+
+/// What `check` prints of the motion base with its home turned about the vertical.
+fn checked(turn: f64) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("turned.toml");
+    let text = fs::read_to_string(data("motion_base", "toml")).unwrap();
+    let turned = text.replace("pose = [0.0, 0.0, 0.0,", &format!("pose = [0.0, 0.0, {turn},"));
+    fs::write(
+        &file,
+        turned.replace("min_length_m = 1.1\nmax_length_m = 2.3", "min_length_m = 0.9\nmax_length_m = 4.0"),
+    )
+    .unwrap();
+    let ran =
+        Command::new(env!("CARGO_BIN_EXE_hexad")).args(["check", "--config"]).arg(&file).output().unwrap();
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    String::from_utf8(ran.stdout).unwrap()
+}
+
+/// Fichter: at a quarter turn about the vertical two of these poses meet, as far before it as behind.
+#[test]
+fn another_pose_nearby_is_told() {
+    let line = |text: &str| text.lines().find(|line| line.starts_with("other poses")).unwrap().to_string();
+    let near = checked(86_f64.to_radians());
+    assert!(line(&near).ends_with("across a singular pose") && !line(&near).contains("NOT"), "{near}");
+    assert!(line(&near).contains(", the nearest 8.0 deg and "), "{near}");
+    assert!(near.contains("WARNING: at start-up lengths alone may not tell it from home"), "{near}");
+    let far = checked(0.0);
+    assert!(!far.contains("WARNING"), "{far}");
+}

@@ -1,0 +1,103 @@
+//! Dietmaier's platform: all forty solutions of its lengths are real (Dietmaier 1998, The Stewart-Gough platform
+//! of general geometry can have 40 real postures).
+
+use std::f64::consts::PI;
+use std::sync::LazyLock;
+
+use hexad::host::assembly::{Region, distance, modes};
+use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, Tracked, Tracker};
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::machine::Machine;
+use hexad::model::rigid::{Pose, Twist};
+use hexad::model::stance::Stance;
+use nalgebra::{Matrix3, Vector3};
+
+use super::common::{Legs, machine};
+
+const LENGTHS: [f64; 6] = [1.0, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071];
+
+/// From this many starts the search finds all.
+const STARTS: u64 = 100_000;
+
+fn dietmaier() -> Machine {
+    let mut dietmaier = machine("tsai2000");
+    let legs = Legs {
+        base: [
+            [0.0, 0.0, 0.0],
+            [1.107915, 0.0, 0.0],
+            [0.549094, 0.756063, 0.0],
+            [0.735077, -0.223935, 0.525991],
+            [0.514188, -0.526063, -0.368418],
+            [0.590473, 0.094733, -0.205018],
+        ]
+        .map(Vector3::from),
+        platform: [
+            [0.0, 0.0, 0.0],
+            [0.542805, 0.0, 0.0],
+            [0.956919, -0.528915, 0.0],
+            [0.665885, -0.353482, 1.402538],
+            [0.478359, 1.158742, 0.107672],
+            [-0.137087, -0.235121, 0.353913],
+        ]
+        .map(Vector3::from),
+        universal_axis: [Vector3::y(); 6],
+    };
+    dietmaier.home = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    dietmaier.joints = legs.joints(&dietmaier.home);
+    dietmaier
+}
+
+static MODES: LazyLock<Vec<Stance>> = LazyLock::new(|| {
+    // The first joints are the origins, so C is at the first length from the origin.
+    let center = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
+    modes(&dietmaier(), &LENGTHS, &Region { center, turn: PI, shift: 1.0 }, STARTS)
+});
+
+#[test]
+fn all_forty_are_found() {
+    let dietmaier = dietmaier();
+    assert_eq!(MODES.len(), 40);
+    let mut nearest = f64::INFINITY;
+    for (k, mode) in MODES.iter().enumerate() {
+        let lengths = leg_lengths(&dietmaier, mode.pose());
+        assert!(lengths.iter().zip(&LENGTHS).all(|(a, b)| (a - b).abs() < 1e-12), "{lengths:?}");
+        for other in &MODES[..k] {
+            nearest = nearest.min(distance(&dietmaier, mode.pose(), other.pose()));
+        }
+    }
+    let conditions = MODES.iter().map(|mode| mode.sensitivity().condition);
+    println!("nearest {nearest:.3}, worst condition {:.0}", conditions.fold(0.0, f64::max));
+    let positive = MODES.iter().filter(|mode| mode.sensitivity().determinant > 0.0).count();
+    // Solutions are born and die in pairs of opposite sign.
+    assert_eq!(positive, 20);
+}
+
+/// Three trusted steps around, on every mode but those that are singular for all practical purposes: there
+/// nothing is trusted.
+#[test]
+fn small_motions_stay_on_their_mode() {
+    let dietmaier = dietmaier();
+    let mut singular = 0;
+    for (k, mode) in MODES.iter().enumerate() {
+        let sensitivity = mode.sensitivity();
+        let size = sensitivity.trusted_step * 3.0;
+        if sensitivity.condition > LARGEST_CONDITION {
+            let mut tracker = Tracker::new(&dietmaier, *mode.pose());
+            assert_eq!(tracker.find(&dietmaier, &LENGTHS).0, Tracked::NotConverged, "mode {k}");
+            assert_eq!(tracker.outcome(), Outcome::NearSingular, "mode {k}");
+            singular += 1;
+            continue;
+        }
+        let mut tracker = Tracker::new(&dietmaier, *mode.pose());
+        for step in 0..=200 {
+            let phase = f64::from(step) * PI / 50.0;
+            let (a, b) = (phase.sin() * size, (1.0 - phase.cos()) * 0.5 * size);
+            let shift = Vector3::new(b, -a, a) * dietmaier.joints.radius;
+            let there = mode.pose().displaced(&Twist { angular: Vector3::new(a, b, -b), linear: shift });
+            let lengths = leg_lengths(&dietmaier, &there);
+            assert_eq!(tracker.find(&dietmaier, &lengths).0, Tracked::Found, "mode {k}");
+            assert!(distance(&dietmaier, &tracker.pose, &there) < 1e-9, "mode {k}, step {step}");
+        }
+    }
+    assert_eq!(singular, 5);
+}

@@ -1,0 +1,12 @@
+//! Where methods fail: assembly modes, far starts, sizes, offsets. Each case has its predicted outcome.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+mod check;
+#[path = "../common/mod.rs"]
+mod common;
+mod dietmaier;
+mod random;
+mod rivals;
+mod sizes;
+mod trials;

@@ -1,0 +1,120 @@
+//! Random poses, found from home by us and by others.
+
+use std::f64::consts::FRAC_PI_2;
+
+use hexad::host::assembly::{Region, distance, modes};
+use hexad::model::forward_kinematics::{Outcome, Tracked, Tracker, refine};
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::machine::Machine;
+use hexad::model::rigid::Pose;
+use hexad::model::stance::Stance;
+use hexad::model::task::TaskState;
+
+use super::rivals::{self, Update};
+
+/// Farther apart than this (radian, or radius) are two poses.
+const APART: f64 = 1e-5;
+
+/// Largest shift of a pose from home, in radii.
+const SHIFT: f64 = 0.3;
+
+/// Starts of a search for other poses.
+const STARTS: u64 = 2000;
+
+/// Poses on the way from home that are looked at for [`within_reach`].
+const WAY: u32 = 40;
+
+/// Who finds the pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    Hexad,
+    Rival(Update),
+}
+
+/// How a trial ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    Right,
+    /// The method says that it has no pose.
+    Failed,
+    /// Another pose with the same lengths.
+    Wrong,
+}
+
+/// X of a pose, up to `angle` \[rad\] from home on every axis, by number.
+pub fn pose(machine: &Machine, angle: f64, number: u64) -> [f64; 6] {
+    let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 2008;
+    // splitmix64
+    let mut unit = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-52) - 1.0
+    };
+    let shift = SHIFT * machine.joints.radius;
+    let sizes = [angle, angle, angle, shift, shift, shift];
+    std::array::from_fn(|i| machine.home[i] + sizes[i] * unit())
+}
+
+/// R and C of X.
+pub fn rigid(x: [f64; 6]) -> Pose {
+    TaskState::at_rest(x).motion().pose
+}
+
+/// Finds the pose of X by its lengths, from home.
+pub fn trial(machine: &Machine, method: Method, x: [f64; 6]) -> End {
+    let lengths = leg_lengths(machine, &rigid(x));
+    let found = match method {
+        Method::Hexad => {
+            let mut tracker = Tracker::new(machine, rigid(machine.home));
+            (tracker.find(machine, &lengths).0 == Tracked::Found).then_some(tracker.pose)
+        }
+        Method::Rival(update) => {
+            rivals::solve(machine, update, &machine.home, &lengths).map(|(x, _)| rigid(x))
+        }
+    };
+    match found {
+        None => End::Failed,
+        Some(found) if distance(machine, &found, &rigid(x)) < APART => End::Right,
+        Some(_) => End::Wrong,
+    }
+}
+
+/// Whether a search around home, as `hexad check` makes it, finds that the lengths of X have several poses on the
+/// side of home: what start-up has to ask before it believes one of them.
+pub fn ambiguous(machine: &Machine, x: [f64; 6]) -> bool {
+    let center = rigid(machine.home);
+    let region = Region { center, turn: FRAC_PI_2, shift: 2.0 * machine.joints.radius };
+    let home = Stance::new(machine, center).sensitivity().determinant;
+    let found = modes(machine, &leg_lengths(machine, &rigid(x)), &region, STARTS);
+    found.iter().filter(|mode| mode.sensitivity().determinant * home > 0.0).count() > 1
+}
+
+/// A step of the true pose from X, of any size up to a radian and a radius, that the loop sees as two
+/// measurements, one after the other: whether it follows, refuses, or is deceived.
+pub fn step(machine: &Machine, x: [f64; 6], number: u64) -> End {
+    let from = rigid(x);
+    let to = pose(machine, 1.0, number.wrapping_add(1 << 40));
+    // As many small ones as large ones.
+    let share = 10_f64.powf(-4.0 * (number % 1000) as f64 / 1000.0);
+    let away: [f64; 6] = std::array::from_fn(|i| x[i] + share * (to[i] - machine.home[i]));
+    let mut stance = Stance::new(machine, from);
+    let report = refine(machine, &mut stance, &leg_lengths(machine, &rigid(away)));
+    match report.outcome {
+        Outcome::Solved if distance(machine, stance.pose(), &rigid(away)) < APART => End::Right,
+        Outcome::Solved => End::Wrong,
+        _ => End::Failed,
+    }
+}
+
+/// Whether the platform gets to X from home, on the straight way of the coordinates, without a singular pose.
+pub fn within_reach(machine: &Machine, x: [f64; 6]) -> bool {
+    let positive = |step: u32| {
+        let share = f64::from(step) / f64::from(WAY);
+        let way = std::array::from_fn(|i| machine.home[i] + share * (x[i] - machine.home[i]));
+        Stance::new(machine, rigid(way)).sensitivity().determinant > 0.0
+    };
+    let at_home = positive(0);
+    (1..=WAY).all(|step| positive(step) == at_home)
+}
