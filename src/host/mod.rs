@@ -12,6 +12,7 @@ pub mod daemon;
 pub mod demo;
 pub mod doctor;
 mod excerpt;
+pub mod export;
 pub mod fidelity;
 pub mod files;
 pub mod histogram;
