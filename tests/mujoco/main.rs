@@ -18,6 +18,7 @@ use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
+use hexad::plant::random::Random;
 use nalgebra::Vector3;
 
 use self::common::{Errors, MACHINES, Table, data, largest, machine, motions};
@@ -139,20 +140,14 @@ fn mujoco_sees_what_is_wrong_in_a_model() {
 
 /// Twenty poses within the stroke, up to a tenth of a radian and of the platform's radius from home.
 fn poses(machine: &Machine) -> Vec<[f64; 6]> {
-    let mut seed = 7_u64;
-    let mut random = || {
-        // Steele, Lea and Flood's SplitMix64.
-        seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = (seed ^ (seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        2.0 * ((bits ^ (bits >> 31)) as f64 / u64::MAX as f64) - 1.0
-    };
+    let mut random = Random::new(7);
     let stroke = machine.actuator.min_length..machine.actuator.max_length;
     let mut poses = Vec::new();
     while poses.len() < 20 {
         let mut x = machine.home;
         for (k, value) in x.iter_mut().enumerate() {
-            *value += 0.1 * random() * if k < 3 { 1.0 } else { machine.joints.radius };
+            let reach = if k < 3 { 0.1 } else { 0.1 * machine.joints.radius };
+            *value += reach * (2.0 * random.uniform() - 1.0);
         }
         let lengths = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
         if lengths.iter().all(|length| stroke.contains(length)) {

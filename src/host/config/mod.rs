@@ -90,14 +90,12 @@ impl Config {
         let (table, _) = DeTable::parse_recoverable(&text);
         let report = Report::new(&text, syntax_errors);
         let mut root = Reader::root(&report, table.get_ref());
-        let config = Self {
-            name: root.name("name", LONGEST_NAME),
-            machine: machine::read(&mut root),
-            deployment: deployment::read(&mut root),
-        };
+        let name = root.name("name", LONGEST_NAME);
+        let machine = machine::read(&mut root);
+        let deployment = deployment::read(&mut root, &machine);
         root.finish();
         match report.into_violations() {
-            violations if violations.is_empty() => Ok(config),
+            violations if violations.is_empty() => Ok(Self { name, machine, deployment }),
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }
     }

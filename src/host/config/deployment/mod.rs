@@ -8,14 +8,17 @@ extern crate std;
 
 use std::{format, prelude::rust_2024::*};
 
+pub use self::plant::Plant;
 pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
 use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
 use crate::model::ladder::Rung;
+use crate::model::machine::Machine;
 use crate::scene::envelope::Limits;
 
+mod plant;
 mod realtime;
 
 /// Default of the bandwidths where the rate carries it \[Hz\]: stiff enough for micrometres, soft enough for
@@ -35,8 +38,6 @@ const FURTHEST_FOLLOWING_M: f64 = 1.0;
 const FURTHEST_FOLLOWING_RAD: f64 = 1.0;
 /// Strongest brake \[m/s^2\]: a hundred times gravity is an impact.
 const STRONGEST_BRAKE_M_S2: f64 = 1000.0;
-/// The plant's step \[us\]: below, it cannot keep up; above, its drives are not stable.
-const STEP_US: Bound = Bound::Within(10.0, 1000.0);
 /// Largest angle of an envelope \[rad\], just over half a turn: beyond, it is a slip of the unit.
 const HALF_TURN: f64 = 3.2;
 
@@ -98,26 +99,15 @@ pub struct Timeouts {
     pub measured_s: f64,
 }
 
-/// `[plant]`: the simulated hardware.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plant {
-    /// Without a force command for this long, the plant brakes by itself.
-    pub force_timeout_s: f64,
-    /// How hard the brakes decelerate each leg.
-    pub brake_deceleration_m_s2: f64,
-    /// Step of the integration.
-    pub step_s: f64,
-}
-
 /// Reads and checks the five sections. Where a number was refused it is NaN.
-pub(super) fn read(root: &mut Reader) -> Deployment {
+pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     Deployment {
         realtime,
         control: control(root.section("control"), rate_hz),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
-        plant: plant(root.section("plant"), rate_hz),
+        plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
     }
 }
@@ -186,17 +176,6 @@ fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
     };
     section.finish();
     timeouts
-}
-
-fn plant(mut section: Reader, rate_hz: f64) -> Plant {
-    let brake = Bound::UpTo(STRONGEST_BRAKE_M_S2);
-    let plant = Plant {
-        force_timeout_s: timeout_s(&mut section, "force_timeout_ms", 50.0, rate_hz),
-        brake_deceleration_m_s2: section.number_or("brake_deceleration_m_s2", 9.81, brake),
-        step_s: section.number_or("step_us", 250.0, STEP_US) / 1e6,
-    };
-    section.finish();
-    plant
 }
 
 /// All four keys, or none.
