@@ -15,7 +15,6 @@ use super::supervisor::{AfterStop, Findings, Mode, next};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::forward_kinematics::{Tracked, Tracker};
 use crate::model::inverse_geometry::leg_lengths;
-use crate::model::inverse_jacobian::twist_from_rates;
 use crate::model::ladder::{Gravity, Rung};
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
@@ -33,6 +32,8 @@ pub struct Parameters {
     pub limits: Limits,
     /// Where setpoints may be, if anybody has said.
     pub envelope: Option<Envelope>,
+    /// Largest condition of the pose, see [`crate::model::sensitivity`].
+    pub condition: f64,
     /// Largest change of a force \[N/s\].
     pub force_rate: f64,
     /// What follows the stop of a platform that lost its setpoint.
@@ -204,8 +205,9 @@ impl Controller {
         if self.mode.state.controls() || setpoint.is_ok() {
             output.error = self.error(located.ok());
         }
-        let engageable = setpoint.and_then(|()| self.near(output.error.as_ref()));
-        let following = self.followed(input, setpoint, &mut output);
+        let conditioned = self.conditioned(&mut output);
+        let engageable = conditioned.and(setpoint).and_then(|()| self.near(output.error.as_ref()));
+        let following = self.followed(input, setpoint, &mut output).and(conditioned);
         let before = self.mode.state;
         self.decide(input, [located.map(drop), engageable, following]);
         if let Ok(at) = located {
@@ -336,7 +338,7 @@ impl Controller {
             }
         }
         let pose = self.tracker.pose;
-        let twist = twist_from_rates(machine, &pose, &measurement.rate).ok_or(Cause::SingularPose)?;
+        let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
     }
 
@@ -395,6 +397,15 @@ impl Controller {
                 law.orientation.stiffness,
             ));
         if away <= 1.0 { Ok(()) } else { Err(Trouble::new(Cause::SetpointTooFar, away, 1.0)) }
+    }
+
+    /// The pose is far enough from singular ones.
+    fn conditioned(&self, output: &mut Output) -> Result<(), Trouble> {
+        let condition = self.tracker.stance().sensitivity().condition;
+        if output.limiting.keeps(Limit::Condition, condition / self.parameters.condition) {
+            return Ok(());
+        }
+        Err(Trouble::new(Cause::NearSingular, condition, self.parameters.condition))
     }
 
     /// Whether control can go on as it is.

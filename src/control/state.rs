@@ -236,7 +236,7 @@ causes! {
     /// A measurement with a time stamp from another time than now.
     MeasurementFromElsewhen = 118, Brake, "s old", "measurement with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
     /// The pose is so near a singular one that `limits.condition` is exceeded.
-    NearSingular = 119, Stop, "", "near a singular pose", "keep away from this pose; hexad check";
+    NearSingular = 119, Stop, "condition", "near a singular pose", "keep away from this pose; hexad check";
     /// The measured rates changed faster than actuators can.
     RateJumped = 120, Brake, "m/s", "measured rates jumped", "look for a collision; see the encoders and the driver";
 }

@@ -13,6 +13,7 @@ pub mod daemon;
 pub mod demo;
 pub mod doctor;
 mod excerpt;
+pub mod export;
 pub mod faults;
 pub mod fidelity;
 pub mod files;

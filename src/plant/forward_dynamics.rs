@@ -1,7 +1,7 @@
 //! Forward dynamics: the acceleration that six actuator forces cause.
 //!
 //! ```text
-//! M(X) [omega'; v'] + h(X, twist) = N Gamma
+//! M(X) [omega'; v'] + h(X, twist) = N Gamma + external wrench
 //! ```
 //!
 //! M is the model's [`MassMatrix`], the bias h the load of inverse dynamics at zero acceleration, so plant
@@ -17,7 +17,10 @@ use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::ladder::Exact;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
-use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
+
+/// Largest element of `N^T M^-1 N` \[1/kg\] that is believed.
+const HIGHEST_MOBILITY: f64 = 1e100;
 
 /// Forward dynamics of one machine.
 #[derive(Clone, Debug)]
@@ -44,9 +47,20 @@ impl ForwardDynamics {
 
     /// Acceleration under these forces; `None` if M is not positive definite (a pose that is not one).
     pub fn acceleration(&self, pose: &Pose, twist: &Twist, force: &[f64; LEGS]) -> Option<Acceleration> {
+        self.acceleration_under(pose, twist, force, &Wrench::default())
+    }
+
+    /// The same with an `external` wrench on the platform.
+    pub fn acceleration_under(
+        &self,
+        pose: &Pose,
+        twist: &Twist,
+        force: &[f64; LEGS],
+        external: &Wrench,
+    ) -> Option<Acceleration> {
         let coasting = Motion { pose: *pose, twist: *twist, acceleration: Acceleration::default() };
         let load = self.model.load_of::<Exact>(&coasting);
-        let unbalanced = load.leg_wrenches * Vector6::from(*force) - load.total();
+        let unbalanced = load.leg_wrenches * Vector6::from(*force) - load.total() + external.vector();
         let mass: Cholesky<f64, U6> = Cholesky::new(self.mass_matrix(pose))?;
         Some(Acceleration::from_vector(&mass.solve(&unbalanced)))
     }
@@ -57,6 +71,8 @@ impl ForwardDynamics {
         let n = leg_wrenches(self.machine(), pose);
         let mass: Cholesky<f64, U6> = Cholesky::new(self.mass_matrix(pose))?;
         let mobility = n.transpose() * mass.solve(&n);
-        Some(1.0 / mobility.symmetric_eigenvalues().max())
+        // The search for eigenvalues squares, and does not end where that overflows.
+        let believed = mobility.iter().all(|element| element.abs() < HIGHEST_MOBILITY);
+        believed.then(|| 1.0 / mobility.symmetric_eigenvalues().max())
     }
 }

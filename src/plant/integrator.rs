@@ -2,13 +2,12 @@
 //!
 //! Within a step the rotation is `R = exp(theta~) R_0`, so that an ordinary method for vectors applies to
 //! `[theta C omega v]` (Munthe-Kaas): `theta' = omega - theta x omega / 2 + theta x (theta x omega) / 12`,
-//! exact to the order of the method. Forces are constant over a step, hence the work they do is exactly
+//! exact to the order of the method. Drives that move on their own, where legs are elastic, are six more
+//! positions and rates of the same step. Where forces are constant over a step, the work they do is exactly
 //! force times change of length.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
-use super::forward_dynamics::ForwardDynamics;
-use crate::model::machine::LEGS;
 use crate::model::rigid::{Acceleration, Pose, Twist};
 
 /// Pose and twist of the platform.
@@ -18,49 +17,88 @@ pub struct PlantState {
     pub twist: Twist,
 }
 
+/// Where the drives of elastic legs are, as lengths of legs without load; not used where legs are rigid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Drives {
+    /// \[m\]
+    pub length: Vector6<f64>,
+    /// \[m/s\]
+    pub rate: Vector6<f64>,
+}
+
+/// Everything that moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WholeState {
+    pub platform: PlantState,
+    pub drives: Drives,
+}
+
+/// What everything accelerates by.
+#[derive(Clone, Copy, Debug)]
+pub struct Accelerations {
+    pub platform: Acceleration,
+    /// \[m/s^2\]; zeros where legs are rigid.
+    pub drives: Vector6<f64>,
+}
+
 /// Time derivative of the state, angular part first.
 #[derive(Clone, Copy)]
 struct Slope {
     pose: Twist,
     twist: Acceleration,
+    drives: Drives,
 }
 
-/// The state `step` seconds later under constant forces; `None` where the dynamics are not defined.
+/// The state `step` seconds later; `None` where the dynamics are not defined. `accelerations` gets a state and
+/// its time since the start of the step.
 pub fn integrate(
-    dynamics: &ForwardDynamics,
-    start: &PlantState,
-    force: &[f64; LEGS],
+    start: &WholeState,
     step: f64,
-) -> Option<PlantState> {
+    accelerations: impl Fn(&WholeState, f64) -> Option<Accelerations>,
+) -> Option<WholeState> {
     // The state at `start` displaced by `theta` and `slope` over `dt`, and the slope there.
     let slope_at = |slope: &Slope, dt: f64| {
         let theta = slope.pose.angular * dt;
         let state = advanced(start, slope, dt);
-        let twist = dynamics.acceleration(&state.pose, &state.twist, force)?;
-        let angular = dexp_inverse(&theta, &state.twist.angular);
-        Some(Slope { pose: Twist { angular, linear: state.twist.linear }, twist })
+        let accelerations = accelerations(&state, dt)?;
+        let twist = state.platform.twist;
+        let angular = dexp_inverse(&theta, &twist.angular);
+        Some(Slope {
+            pose: Twist { angular, linear: twist.linear },
+            twist: accelerations.platform,
+            drives: Drives { length: state.drives.rate, rate: accelerations.drives },
+        })
     };
-    let rest = Slope { pose: Twist::default(), twist: Acceleration::default() };
+    let rest = Slope { pose: Twist::default(), twist: Acceleration::default(), drives: Drives::default() };
     let k1 = slope_at(&rest, 0.0)?;
     let k2 = slope_at(&k1, 0.5 * step)?;
     let k3 = slope_at(&k2, 0.5 * step)?;
     let k4 = slope_at(&k3, step)?;
     let mean = |f: fn(&Slope) -> Vector3<f64>| (f(&k1) + (f(&k2) + f(&k3)) * 2.0 + f(&k4)) / 6.0;
+    let of_drives = |f: fn(&Slope) -> Vector6<f64>| (f(&k1) + (f(&k2) + f(&k3)) * 2.0 + f(&k4)) / 6.0;
     let slope = Slope {
         pose: Twist { angular: mean(|k| k.pose.angular), linear: mean(|k| k.pose.linear) },
         twist: Acceleration { angular: mean(|k| k.twist.angular), linear: mean(|k| k.twist.linear) },
+        drives: Drives { length: of_drives(|k| k.drives.length), rate: of_drives(|k| k.drives.rate) },
     };
     Some(advanced(start, &slope, step))
 }
 
-fn advanced(start: &PlantState, slope: &Slope, dt: f64) -> PlantState {
-    PlantState {
-        pose: start
-            .pose
-            .displaced(&Twist { angular: slope.pose.angular * dt, linear: slope.pose.linear * dt }),
-        twist: Twist {
-            angular: start.twist.angular + slope.twist.angular * dt,
-            linear: start.twist.linear + slope.twist.linear * dt,
+fn advanced(start: &WholeState, slope: &Slope, dt: f64) -> WholeState {
+    let WholeState { platform, drives } = start;
+    WholeState {
+        platform: PlantState {
+            pose: platform
+                .pose
+                .displaced(&Twist { angular: slope.pose.angular * dt, linear: slope.pose.linear * dt }),
+            twist: Twist {
+                angular: platform.twist.angular + slope.twist.angular * dt,
+                linear: platform.twist.linear + slope.twist.linear * dt,
+            },
+        },
+        drives: Drives {
+            length: drives.length + slope.drives.length * dt,
+            rate: drives.rate + slope.drives.rate * dt,
         },
     }
 }

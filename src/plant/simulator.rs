@@ -1,18 +1,25 @@
-//! The simulated machine: dynamics, brakes and end stops.
+//! The simulated machine: dynamics, drives, brakes and end stops.
 //!
 //! Brakes are open exactly while a valid force is applied. Without one they close: every leg rate falls to
 //! zero in a straight line, all at the same instant, the fastest at the configured deceleration; the
 //! platform follows the legs, whatever its weight. Then it stands. A leg that reaches its end of stroke
 //! closes the brakes for good: on hardware somebody has to come and look.
+//!
+//! Where legs are elastic a brake holds rod and drive alike: the deflection stays as it was, and is there
+//! when the brake opens. A drive whose brake closes pushes no more.
 
 use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;
-use super::integrator::{PlantState, integrate};
-use crate::model::inverse_geometry::{LegMotion, leg_lengths, leg_motion};
+use super::imperfections::Imperfections;
+use super::integrator::{Drives, PlantState, WholeState, integrate};
+use super::terms::{Terms, legs};
+use crate::model::active_forces::inverse_dynamics;
+use crate::model::inverse_geometry::{LegMotion, leg_lengths};
 use crate::model::inverse_jacobian::twist_from_rates;
-use crate::model::machine::{Actuator, LEGS, Machine};
-use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::ladder::Exact;
+use crate::model::machine::{LEGS, Machine};
+use crate::model::rigid::Twist;
 use crate::model::task::TaskState;
 
 /// Whether the legs may move.
@@ -32,38 +39,60 @@ pub enum Brakes {
 #[derive(Clone, Debug)]
 pub struct Simulator {
     dynamics: ForwardDynamics,
-    state: PlantState,
+    terms: Terms,
+    state: WholeState,
     brakes: Brakes,
     deceleration: f64,
-    max_step: f64,
+    /// What the drives push with \[N\].
+    push: [f64; LEGS],
+    /// Since the start \[s\].
+    time: f64,
 }
 
 impl Simulator {
-    /// At rest at home, brakes closed. `deceleration` of the brakes in m/s^2, `max_step` of the
-    /// integrator in s.
+    /// The machine as it is configured: at rest at home, brakes closed. `deceleration` of the brakes in m/s^2,
+    /// `max_step` of the integrator in s.
     ///
     /// Coulomb friction acts within `smoothing / (coulomb / mass)`; where that is too fast for the step,
     /// the plant's smoothing speed is widened just enough for a stable integration.
     pub fn new(machine: &Machine, deceleration: f64, max_step: f64) -> Self {
-        let pose = TaskState::at_rest(machine.home).motion().pose;
-        let mut machine = machine.clone();
-        if let Some(mass) = ForwardDynamics::new(&machine).smallest_leg_mass(&pose) {
-            // Runge-Kutta is stable to 2.78 / rate; 1 is also accurate.
-            let widest = machine.actuator.coulomb_friction * max_step / mass;
-            machine.actuator.coulomb_smoothing = Actuator::COULOMB_SMOOTHING_M_S.max(widest);
+        // Nothing is imperfect, so no tolerance decides anything.
+        Self::imperfect(machine, deceleration, max_step, f64::INFINITY, &Imperfections::default())
+    }
+
+    /// The same with drives and legs as hardware has them, positions exact to `tolerance` \[m\]. The rest of the
+    /// imperfections is for [`super::hardware`].
+    pub fn imperfect(
+        machine: &Machine,
+        deceleration: f64,
+        max_step: f64,
+        tolerance: f64,
+        wanted: &Imperfections,
+    ) -> Self {
+        let terms = Terms::choose(machine, wanted, max_step, tolerance);
+        let machine = terms.machine(machine);
+        let home = TaskState::at_rest(machine.home).motion();
+        let mut length = Vector6::from(leg_lengths(&machine, &home.pose));
+        if let (Some((spring, _)), Some(load)) = (terms.elastic, inverse_dynamics::<Exact>(&machine, &home)) {
+            length += Vector6::from(load.map(|force| spring.deflection(force)));
         }
         Self {
             dynamics: ForwardDynamics::new(&machine),
-            state: PlantState { pose, twist: Twist::default() },
+            terms,
+            state: WholeState {
+                platform: PlantState { pose: home.pose, twist: Twist::default() },
+                drives: Drives { length, rate: Vector6::zeros() },
+            },
             brakes: Brakes::Closed,
             deceleration,
-            max_step,
+            push: [0.0; LEGS],
+            time: 0.0,
         }
     }
 
     /// Pose and twist.
     pub fn state(&self) -> &PlantState {
-        &self.state
+        &self.state.platform
     }
 
     /// Brakes.
@@ -71,29 +100,41 @@ impl Simulator {
         self.brakes
     }
 
-    /// The machine simulated, with the friction it was given.
+    /// The machine simulated, with the friction it was given; without drives where they move on their own.
     pub fn machine(&self) -> &Machine {
         self.dynamics.machine()
     }
 
-    /// Lengths and rates of the legs, what sensors would say. The accelerations are not filled in.
+    /// The terms that are evaluated.
+    pub fn terms(&self) -> &Terms {
+        &self.terms
+    }
+
+    /// Lengths and rates of the legs, what perfect sensors on the drives would say. The accelerations are not
+    /// filled in.
     pub fn leg_motion(&self) -> LegMotion {
-        let PlantState { pose, twist } = self.state;
-        let motion = Motion { pose, twist, acceleration: Acceleration::default() };
-        LegMotion { accel: [0.0; LEGS], ..leg_motion(self.machine(), &motion) }
+        match self.terms.elastic {
+            Some(_) => LegMotion {
+                length: self.state.drives.length.into(),
+                rate: self.state.drives.rate.into(),
+                accel: [0.0; LEGS],
+            },
+            None => legs(self.machine(), &self.state),
+        }
     }
 
     /// Lets `duration` seconds pass under constant forces, or without any.
     pub fn advance(&mut self, duration: f64, force: Option<&[f64; LEGS]>) {
-        if !(duration > 0.0) || matches!(self.brakes, Brakes::EndStop { .. }) {
+        if !(duration > 0.0) {
             return;
         }
-        match force {
-            Some(_) => self.brakes = Brakes::Open,
-            None if self.brakes == Brakes::Open => self.close_brakes(),
-            None => {}
+        match (self.brakes, force) {
+            (Brakes::EndStop { .. }, _) => return,
+            (_, Some(_)) => self.brakes = Brakes::Open,
+            (Brakes::Open, None) => self.close_brakes(),
+            _ => {}
         }
-        let steps = (duration / self.max_step).ceil().clamp(1.0, f64::from(u32::MAX)) as u32;
+        let steps = (duration / self.terms.step).ceil().clamp(1.0, f64::from(u32::MAX)) as u32;
         let step = duration / f64::from(steps);
         for _ in 0..steps {
             match (self.brakes, force) {
@@ -101,28 +142,35 @@ impl Simulator {
                 (Brakes::Closing { rates, elapsed, duration }, _) => {
                     self.brake(&rates, elapsed, duration, step)
                 }
-                _ => return,
+                _ => {}
             }
+            self.time += step;
         }
     }
 
     fn drive(&mut self, force: &[f64; LEGS], step: f64) {
-        match integrate(&self.dynamics, &self.state, force, step) {
-            Some(state) => self.state = state,
+        let Self { dynamics, terms, state, push, time, .. } = &*self;
+        let accelerations = |state: &WholeState, dt: f64| {
+            terms.accelerations(dynamics, state, &terms.push(push, force, dt), time + dt)
+        };
+        match integrate(state, step, accelerations) {
+            Some(state) => (self.state, self.push) = (state, terms.push(push, force, step)),
             None => self.close_brakes(),
         }
         let actuator = &self.machine().actuator;
         let stroke = actuator.min_length..=actuator.max_length;
-        let lengths = leg_lengths(self.machine(), &self.state.pose);
+        let lengths = leg_lengths(self.machine(), &self.state().pose);
         if let Some(leg) = lengths.iter().position(|length| !stroke.contains(length)) {
-            self.state.twist = Twist::default();
+            self.state.platform.twist = Twist::default();
+            self.state.drives.rate.fill(0.0);
             self.brakes = Brakes::EndStop { leg };
         }
     }
 
     fn close_brakes(&mut self) {
-        let rates = self.leg_motion().rate;
+        let rates = legs(self.machine(), &self.state).rate;
         let duration = Vector6::from(rates).amax() / self.deceleration;
+        self.push = [0.0; LEGS];
         self.brakes = Brakes::Closing { rates, elapsed: 0.0, duration };
     }
 
@@ -133,15 +181,26 @@ impl Simulator {
             twist_from_rates(self.machine(), pose, &rates.map(|rate| rate * share)).unwrap_or_default()
         };
         let scaled = |twist: Twist, dt: f64| Twist { angular: twist.angular * dt, linear: twist.linear * dt };
-        let start = twist_at(elapsed, &self.state.pose);
-        let middle_pose = self.state.pose.displaced(&scaled(start, 0.5 * step));
+        let before = self.state().pose;
+        let start = twist_at(elapsed, &before);
+        let middle_pose = before.displaced(&scaled(start, 0.5 * step));
         let middle = twist_at(elapsed + 0.5 * step, &middle_pose);
-        let pose = self.state.pose.displaced(&scaled(middle, step));
+        let pose = before.displaced(&scaled(middle, step));
         let elapsed = elapsed + step;
         let standing = !(elapsed < duration);
         let twist = if standing { Twist::default() } else { twist_at(elapsed, &pose) };
-        self.state = PlantState { pose, twist };
+        self.carry_drives(PlantState { pose, twist });
         self.brakes =
             if standing { Brakes::Closed } else { Brakes::Closing { rates: *rates, elapsed, duration } };
+    }
+
+    /// The platform moves on; drives keep their distance from the legs.
+    fn carry_drives(&mut self, platform: PlantState) {
+        let before = legs(self.machine(), &self.state);
+        self.state.platform = platform;
+        let after = legs(self.machine(), &self.state);
+        let drives = &mut self.state.drives;
+        drives.length += Vector6::from(after.length) - Vector6::from(before.length);
+        drives.rate = after.rate.into();
     }
 }

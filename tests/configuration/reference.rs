@@ -79,6 +79,7 @@ fn the_reference_gives_the_defaults() {
             }
         }
     }
-    // 6 sections with 13 + 12 + 8 + 2 + 3 + 0 keys, 3 of the actuator, 3 of the inertia, one for each leg.
-    assert_eq!(optional.len(), 6 + 38 + 3 + 3 + 6, "{optional:?}");
+    // 6 sections with 13 + 12 + 9 + 2 + 5 + 0 keys, 3 of the actuator, 3 of the inertia, one for each leg, 6 sections
+    // of the plant with 2 + 4 + 2 + 4 + 3 + 3 keys.
+    assert_eq!(optional.len(), 6 + 41 + 3 + 3 + 6 + 6 + 18, "{optional:?}");
 }

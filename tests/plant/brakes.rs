@@ -1,9 +1,7 @@
 //! Brakes and end stops.
 
-use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Machine};
-use hexad::model::rigid::{Acceleration, Motion, Twist};
+use hexad::model::rigid::Twist;
 use hexad::plant::simulator::{Brakes, Simulator};
 
 use super::common::{largest, machine};
@@ -22,9 +20,7 @@ fn in_motion(machine: &Machine) -> Simulator {
 
 /// Forces that hold the platform where it is.
 fn holding(simulator: &Simulator) -> [f64; LEGS] {
-    let pose = simulator.state().pose;
-    let motion = Motion { pose, twist: Twist::default(), acceleration: Acceleration::default() };
-    inverse_dynamics::<Exact>(simulator.machine(), &motion).unwrap()
+    super::holding(simulator.machine(), &simulator.state().pose)
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use hexad::model::machine::Machine;
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::integrator::{PlantState, integrate};
+use hexad::plant::integrator::PlantState;
 
 use super::common::{Errors, angle_between, machine};
-use super::{DEFAULT_STEP_S, home, shaking};
+use super::{DEFAULT_STEP_S, home, integrate, shaking};
 
 /// The states after each `hold` of a motion whose forces are constant that long, with steps of `hold / steps`.
 fn motion(machine: &Machine, hold: f64, steps: u32, duration: f64) -> Vec<PlantState> {

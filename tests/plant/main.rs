@@ -7,8 +7,11 @@ mod brakes;
 #[path = "../common/mod.rs"]
 mod common;
 mod dynamics;
+mod elastic;
 mod energy;
 mod friction;
+mod hardware;
+mod imperfect;
 mod integration;
 mod power;
 
@@ -16,16 +19,55 @@ use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Machine};
-use hexad::model::rigid::{Acceleration, Motion, Twist};
+use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 use hexad::model::task::TaskState;
-use hexad::plant::integrator::PlantState;
-use nalgebra::Vector3;
+use hexad::plant::forward_dynamics::ForwardDynamics;
+use hexad::plant::hardware::Hardware;
+use hexad::plant::imperfections::{
+    BuildErrors, DriveErrors, Elastic, External, Friction, Imperfections, SensorErrors,
+};
+use hexad::plant::integrator::{Accelerations, Drives, PlantState, WholeState};
+use hexad::plant::simulator::Simulator;
+use nalgebra::{Vector3, Vector6};
 
 /// Default of `plant.step_us`.
 const DEFAULT_STEP_S: f64 = 250e-6;
 
 /// Default of `plant.brake_deceleration_m_s2`.
 const DECELERATION: f64 = 9.81;
+
+/// Default of `plant.tolerance_um`.
+const TOLERANCE_M: f64 = 1e-7;
+
+fn simulator(machine: &Machine, wanted: &Imperfections) -> Simulator {
+    Simulator::imperfect(machine, DECELERATION, DEFAULT_STEP_S, TOLERANCE_M, wanted)
+}
+
+fn hardware(machine: &Machine, wanted: &Imperfections) -> Hardware {
+    Hardware::new(machine, DECELERATION, DEFAULT_STEP_S, TOLERANCE_M, wanted)
+}
+
+/// Every imperfection that there is, of a size that a motion base could have.
+fn everything() -> Imperfections {
+    Imperfections {
+        seed: 5,
+        drive: DriveErrors { bandwidth_hz: Some(80.0), force_step: 5.0, dead_time_ns: 1_500_000 },
+        friction: Friction { viscous: 200.0, coulomb: 150.0, stiction: 100.0, ..Friction::default() },
+        leg: Some(Elastic { stiffness: 5e7, damping: 1e4, backlash: 2e-5 }),
+        sensor: SensorErrors { length_step: 1e-6, rate_step: 1e-4, length_noise: 2e-6, rate_noise: 1e-4 },
+        build: BuildErrors { payload: 100.0, payload_at: Vector3::new(0.1, 0.0, 0.5), joints: 1e-4 },
+        external: External {
+            wrench: Wrench { torque: Vector3::new(50.0, 0.0, 0.0), force: Vector3::new(0.0, 100.0, 0.0) },
+            frequency_hz: 2.0,
+        },
+    }
+}
+
+/// Forces that hold a machine where it is.
+fn holding(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
+    let motion = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
+    inverse_dynamics::<Exact>(machine, &motion).unwrap()
+}
 
 /// Drives that only push.
 fn without_drives(mut machine: Machine) -> Machine {
@@ -36,6 +78,21 @@ fn without_drives(mut machine: Machine) -> Machine {
 
 fn home(machine: &Machine) -> PlantState {
     PlantState { pose: TaskState::at_rest(machine.home).motion().pose, twist: Twist::default() }
+}
+
+/// The model's state a step later under constant forces.
+fn integrate(
+    dynamics: &ForwardDynamics,
+    start: &PlantState,
+    force: &[f64; LEGS],
+    step: f64,
+) -> Option<PlantState> {
+    let start = WholeState { platform: *start, drives: Drives::default() };
+    let accelerations = |state: &WholeState, _| {
+        let platform = dynamics.acceleration(&state.platform.pose, &state.platform.twist, force)?;
+        Some(Accelerations { platform, drives: Vector6::zeros() })
+    };
+    Some(hexad::plant::integrator::integrate(&start, step, accelerations)?.platform)
 }
 
 /// Lengths and rates of the legs.

@@ -2,11 +2,10 @@
 
 use hexad::model::machine::Machine;
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::integrator::integrate;
 
 use super::common::{Legs, machine};
 use super::energy::{Energy, energy};
-use super::{DEFAULT_STEP_S, home, legs, shaking, without_drives};
+use super::{DEFAULT_STEP_S, home, integrate, legs, shaking, without_drives};
 
 /// What a motion did.
 #[derive(Debug, Default)]

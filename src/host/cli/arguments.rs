@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use hexad::host::config::{Config, ConfigError};
+use hexad::host::export;
 use hexad::host::offline;
 use hexad::host::setpoints::{Score, SetpointError};
 use hexad::model::ladder::Rung;
@@ -68,6 +69,14 @@ pub enum Start {
     Home,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum FormatName {
+    /// A model for MuJoCo, its loops closed
+    Mjcf,
+    /// URDF, its loops open at the platform
+    Urdf,
+}
+
 impl MachineFile {
     pub fn load(&self) -> Result<Config, ConfigError> {
         Config::load(&self.path)
@@ -103,6 +112,15 @@ impl From<Start> for offline::Start {
         match start {
             Start::Previous => Self::Previous,
             Start::Home => Self::Home,
+        }
+    }
+}
+
+impl From<FormatName> for export::Format {
+    fn from(format: FormatName) -> Self {
+        match format {
+            FormatName::Mjcf => Self::Mjcf,
+            FormatName::Urdf => Self::Urdf,
         }
     }
 }

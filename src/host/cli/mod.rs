@@ -11,10 +11,10 @@ use hexad::host::demo::{self, Demo};
 use hexad::host::doctor::{self, Doctor};
 use hexad::host::faults::Faults;
 use hexad::host::stop::Stop;
-use hexad::host::{daemon, offline, operator, plant, setpoints};
+use hexad::host::{daemon, export, offline, operator, plant, setpoints};
 use hexad::model::ladder::Rung;
 
-use self::arguments::{Files, MachineFile, MotionName, Patience, Start, What, duration, rungs};
+use self::arguments::{Files, FormatName, MachineFile, MotionName, Patience, Start, What, duration, rungs};
 use self::failure::Failure;
 
 mod arguments;
@@ -161,6 +161,17 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         trajectory: Option<PathBuf>,
     },
+    /// Write the machine as a model for other tools
+    Export {
+        #[command(flatten)]
+        machine: MachineFile,
+        /// The language of the model
+        #[arg(long, value_enum)]
+        format: FormatName,
+        /// File to write [default: standard output]
+        #[arg(long, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
     /// Forces, lengths and their derivatives for a file of motions
     InverseDynamics {
         #[command(flatten)]
@@ -228,6 +239,10 @@ impl Cli {
             Command::Advise { machine, trajectory } => {
                 print!("{}", Advice::new(&machine.load()?, trajectory.as_deref())?);
                 Ok(())
+            }
+            Command::Export { machine, format, output } => {
+                export::export(&machine.load()?, format.into(), output.as_deref())
+                    .map_err(Failure::could_not_begin)
             }
             Command::InverseDynamics { machine, files, model } => {
                 let machine = machine.load()?.machine;

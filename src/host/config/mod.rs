@@ -92,11 +92,10 @@ impl Config {
         let mut root = Reader::root(&report, table.get_ref());
         let name = root.name("name", LONGEST_NAME);
         let machine = machine::read(&mut root);
-        let deployment = deployment::read(&mut root, machine.actuator.max_force);
-        let config = Self { name, machine, deployment };
+        let deployment = deployment::read(&mut root, &machine);
         root.finish();
         match report.into_violations() {
-            violations if violations.is_empty() => Ok(config),
+            violations if violations.is_empty() => Ok(Self { name, machine, deployment }),
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }
     }

@@ -241,6 +241,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, rung: Rung) -> Par
         measured_timeout_ns: nanoseconds(timeouts.measured_s),
         limits: limits.reference,
         force_rate: limits.force_rate_n_s,
+        condition: limits.condition,
         envelope,
         after_loss: control.on_setpoint_lost,
     }

@@ -20,7 +20,10 @@ use crate::ipc::messages::{ForceMessage, MeasuredMessage};
 use crate::ipc::ports::{Bus, PortError};
 use crate::model::machine::LEGS;
 use crate::model::task::task_coordinates;
-use crate::plant::simulator::{Brakes, Simulator};
+use crate::plant::hardware::Hardware;
+use crate::plant::imperfections::Imperfections;
+use crate::plant::simulator::Brakes;
+use crate::plant::terms::Terms;
 use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
 use crate::realtime::setup::scheduling;
 
@@ -44,7 +47,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
     let mut driven = Driven {
-        simulator: Simulator::new(&config.machine, plant.brake_deceleration_m_s2, plant.step_s),
+        hardware: hardware(config),
         time_ns: tick_ns,
         force: None,
         cause: Cause::None,
@@ -52,6 +55,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
     };
     let mut doubt = Doubt::default();
     let mut pending = None;
+    say_terms(config, driven.hardware.simulator().terms());
     info!(name = %config.name, "plant at rest at home, brakes closed");
     while !stop.requested() {
         sleep_until(tick_ns);
@@ -59,7 +63,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
             warn!(seconds = (tick_ns - driven.time_ns) as f64 * 1e-9, "was paused; time goes on from now");
             driven.time_ns = tick_ns;
         }
-        let before = driven.simulator.brakes();
+        let before = driven.hardware.simulator().brakes();
         // A force sent after this tick waits for the next one.
         while let Some(message) = pending.take().or_else(|| forces.receive()) {
             if (tick_ns + 1..=monotonic_ns()).contains(&message.header.time_ns) {
@@ -72,8 +76,8 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
         }
         doubt.hear(forces.rejected());
         driven.advance_to(tick_ns);
-        tell(before, driven.simulator.brakes(), driven.cause);
-        measured.publish(tick_ns, measured_message(&driven.simulator))?;
+        tell(before, driven.hardware.simulator().brakes(), driven.cause);
+        measured.publish(tick_ns, measured_message(&mut driven.hardware))?;
         // The newest grid point that is not in the future, or else the next.
         let now_ns = monotonic_ns();
         tick_ns = grid.next_after(tick_ns.max(now_ns.saturating_sub(grid.period_ns())));
@@ -84,7 +88,7 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
 
 /// A simulator and the force on it.
 struct Driven {
-    simulator: Simulator,
+    hardware: Hardware,
     time_ns: u64,
     /// Forces and the instant they expire.
     force: Option<([f64; LEGS], u64)>,
@@ -117,22 +121,54 @@ impl Driven {
 
     fn pass(&mut self, time_ns: u64, force: Option<&[f64; LEGS]>) {
         if time_ns > self.time_ns {
-            self.simulator.advance((time_ns - self.time_ns) as f64 * 1e-9, force);
+            self.hardware.advance(time_ns - self.time_ns, force.copied());
             self.time_ns = time_ns;
         }
     }
 }
 
-fn measured_message(simulator: &Simulator) -> MeasuredMessage {
-    let legs = simulator.leg_motion();
+fn measured_message(hardware: &mut Hardware) -> MeasuredMessage {
+    let (length_m, length_rate_m_s) = hardware.measure();
+    let simulator = hardware.simulator();
     let state = simulator.state();
     MeasuredMessage {
-        length_m: legs.length,
-        length_rate_m_s: legs.rate,
+        length_m,
+        length_rate_m_s,
         pose_valid: 1,
         x: task_coordinates(&state.pose, &simulator.machine().home),
         twist: state.twist.vector().into(),
         ..MeasuredMessage::default()
+    }
+}
+
+/// The hardware that a configuration describes.
+pub fn hardware(config: &Config) -> Hardware {
+    let plant = &config.deployment.plant;
+    Hardware::new(
+        &config.machine,
+        plant.brake_deceleration_m_s2,
+        plant.step_s,
+        plant.tolerance_m,
+        &plant.imperfections,
+    )
+}
+
+/// What is simulated beyond the model, and what of it the tolerance leaves out.
+fn say_terms(config: &Config, terms: &Terms) {
+    let plant = &config.deployment.plant;
+    if plant.imperfections == (Imperfections { seed: plant.imperfections.seed, ..Imperfections::default() }) {
+        return;
+    }
+    let tolerance_um = plant.tolerance_m * 1e6;
+    info!(seed = plant.imperfections.seed, step_us = terms.step * 1e6, tolerance_um, "imperfect plant");
+    let wanted = &plant.imperfections;
+    for (what, wanted, acts) in [
+        ("drive.bandwidth_hz", wanted.drive.bandwidth_hz.is_some(), terms.lag.is_some()),
+        ("leg", wanted.leg.is_some(), terms.elastic.is_some()),
+    ] {
+        if wanted && !acts {
+            info!(tolerance_um, "plant.{what} is left out: it moves nothing by more than the tolerance");
+        }
     }
 }
 

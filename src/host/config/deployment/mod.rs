@@ -8,6 +8,7 @@ extern crate std;
 
 use std::{format, prelude::rust_2024::*};
 
+pub use self::plant::Plant;
 pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
@@ -16,8 +17,12 @@ use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
 use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
 use crate::control::supervisor::AfterStop;
 use crate::model::ladder::Rung;
+use crate::model::machine::Machine;
+use crate::model::stance::Stance;
+use crate::model::task::TaskState;
 use crate::scene::envelope;
 
+mod plant;
 mod realtime;
 
 /// Default of the bandwidths where the rate carries it \[Hz\]: stiff enough for micrometres, soft enough for
@@ -34,6 +39,9 @@ const INTEGRAL_SHARE: f64 = 0.05;
 /// The default of the force rate takes this long from no force to the largest \[s\]: slower than any noise
 /// worth following, faster than any motion.
 const FORCE_RISE_S: f64 = 0.01;
+/// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
+/// a load asks for up to a hundred times its size of the legs.
+const CONDITION: f64 = 100.0;
 /// Engaging further away than this is a motion, and needs a trajectory \[m\], \[rad\].
 const FURTHEST_ENGAGE_M: f64 = 0.1;
 const FURTHEST_ENGAGE_RAD: f64 = 0.2;
@@ -42,8 +50,6 @@ const FURTHEST_FOLLOWING_M: f64 = 1.0;
 const FURTHEST_FOLLOWING_RAD: f64 = 1.0;
 /// Strongest brake \[m/s^2\]: a hundred times gravity is an impact.
 const STRONGEST_BRAKE_M_S2: f64 = 1000.0;
-/// The plant's step \[us\]: below, it cannot keep up; above, its drives are not stable.
-const STEP_US: Bound = Bound::Within(10.0, 1000.0);
 /// Largest angle of an envelope \[rad\], just over half a turn: beyond, it is a slip of the unit.
 const HALF_TURN: f64 = 3.2;
 
@@ -100,6 +106,8 @@ pub struct Limits {
     pub reference: ReferenceLimits,
     /// Largest change of a force.
     pub force_rate_n_s: f64,
+    /// Largest Frobenius condition of the legs' wrenches under control.
+    pub condition: f64,
 }
 
 /// `control.fidelity`: which terms of the dynamics are evaluated.
@@ -120,27 +128,16 @@ pub struct Timeouts {
     pub measured_s: f64,
 }
 
-/// `[plant]`: the simulated hardware.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plant {
-    /// Without a force command for this long, the plant brakes by itself.
-    pub force_timeout_s: f64,
-    /// How hard the brakes decelerate each leg.
-    pub brake_deceleration_m_s2: f64,
-    /// Step of the integration.
-    pub step_s: f64,
-}
-
-/// Reads and checks the six sections; a default follows from the actuators' largest force. Where a number was refused it is NaN.
-pub(super) fn read(root: &mut Reader, max_force_n: f64) -> Deployment {
+/// Reads and checks the six sections; some defaults follow from the machine. Where a number was refused it is NaN.
+pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     Deployment {
         realtime,
         control: control(root.section("control"), rate_hz),
-        limits: limits(root.section("limits"), max_force_n),
+        limits: limits(root.section("limits"), machine),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
-        plant: plant(root.section("plant"), rate_hz),
+        plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
     }
 }
@@ -221,7 +218,7 @@ fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], 
 
 /// Defaults are what a standing person stands: half of gravity, a tenth of a second to build it up. By itself
 /// the daemon moves at a fifth of that.
-fn limits(mut section: Reader, max_force_n: f64) -> Limits {
+fn limits(mut section: Reader, machine: &Machine) -> Limits {
     let mut positive = |key, default| section.number_or(key, default, Bound::Positive);
     let position = AxisLimits {
         velocity: positive("velocity_m_s", 1.0),
@@ -234,9 +231,23 @@ fn limits(mut section: Reader, max_force_n: f64) -> Limits {
         jerk: positive("jerk_rad_s3", 2000.0),
     };
     let own_share = section.number_or("own_share", 0.2, Bound::UpTo(1.0));
-    let force_rate_n_s = section.number_or("force_rate_n_s", max_force_n / FORCE_RISE_S, Bound::Positive);
+    let force_rate_n_s =
+        section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
+    let condition = condition(&mut section, machine);
     section.finish();
-    Limits { reference: ReferenceLimits { position, orientation, own_share }, force_rate_n_s }
+    Limits { reference: ReferenceLimits { position, orientation, own_share }, force_rate_n_s, condition }
+}
+
+/// The default leaves room around a home that is badly conditioned itself; at home it must be kept.
+fn condition(section: &mut Reader, machine: &Machine) -> f64 {
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    let at_home = Stance::new(machine, home).sensitivity().condition;
+    let limit = section.number_or("condition", CONDITION.max(2.0 * at_home), Bound::Positive);
+    if limit < at_home {
+        let bound = format!("must be at least {} (that of home)", rounded(at_home));
+        section.refuse("condition", bound);
+    }
+    limit
 }
 
 fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
@@ -246,17 +257,6 @@ fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
     };
     section.finish();
     timeouts
-}
-
-fn plant(mut section: Reader, rate_hz: f64) -> Plant {
-    let brake = Bound::UpTo(STRONGEST_BRAKE_M_S2);
-    let plant = Plant {
-        force_timeout_s: timeout_s(&mut section, "force_timeout_ms", 50.0, rate_hz),
-        brake_deceleration_m_s2: section.number_or("brake_deceleration_m_s2", 9.81, brake),
-        step_s: section.number_or("step_us", 250.0, STEP_US) / 1e6,
-    };
-    section.finish();
-    plant
 }
 
 /// All four keys, or none.

@@ -1,0 +1,58 @@
+//! Dead time: what is commanded now acts later, each command for as long as it stood.
+
+use heapless::Deque;
+
+use crate::model::machine::LEGS;
+
+/// A force, or none.
+pub type Command = Option<[f64; LEGS]>;
+
+/// Most changes of the command within a dead time. A loop of 20 kHz makes 200 in the longest, 10 ms, and a
+/// plant that starts and stops between them cuts each into three.
+const DEPTH: usize = 1024;
+
+/// A line of commands as long as the dead time.
+#[derive(Clone, Debug, Default)]
+pub struct Delay {
+    /// Oldest first, with the time each stood or has yet to act \[ns\].
+    line: Deque<(Command, u64), DEPTH>,
+}
+
+impl Delay {
+    /// Nothing was commanded before the start.
+    pub fn new(dead_time_ns: u64) -> Self {
+        let mut delay = Self::default();
+        if dead_time_ns > 0 {
+            delay.push(None, dead_time_ns);
+        }
+        delay
+    }
+
+    /// Lets `duration_ns` of `command` in; what comes out at the other end goes to `act`, piece by piece.
+    pub fn pass(&mut self, duration_ns: u64, command: Command, mut act: impl FnMut(u64, &Command)) {
+        if self.line.is_empty() {
+            return act(duration_ns, &command);
+        }
+        self.push(command, duration_ns);
+        let mut rest = duration_ns;
+        while rest > 0 {
+            let Some((command, time)) = self.line.pop_front() else { return };
+            let acts = time.min(rest);
+            act(acts, &command);
+            rest -= acts;
+            if time > acts {
+                // There is room: it was taken from here.
+                self.line.push_front((command, time - acts)).ok();
+            }
+        }
+    }
+
+    /// A command that still stands makes its piece longer; so does a change that finds no room.
+    fn push(&mut self, command: Command, duration_ns: u64) {
+        let full = self.line.is_full();
+        match self.line.back_mut() {
+            Some((last, time)) if *last == command || full => *time += duration_ns,
+            _ => self.line.push_back((command, duration_ns)).unwrap_or_default(),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! The simulated hardware as a controller meets it: commands go in, measured lengths and rates come out, and
+//! between them is everything that [`super::imperfections`] lists.
+
+use super::delay::{Command, Delay};
+use super::imperfections::{DriveErrors, Imperfections, SensorErrors};
+use super::random::Random;
+use super::simulator::Simulator;
+use crate::model::machine::{LEGS, Machine};
+
+/// A machine with its drives and sensors, in simulated time.
+#[derive(Clone, Debug)]
+pub struct Hardware {
+    simulator: Simulator,
+    drive: DriveErrors,
+    sensor: SensorErrors,
+    delay: Delay,
+    random: Random,
+}
+
+impl Hardware {
+    /// At rest at home, brakes closed; see [`Simulator::imperfect`].
+    pub fn new(
+        machine: &Machine,
+        deceleration: f64,
+        max_step: f64,
+        tolerance: f64,
+        wanted: &Imperfections,
+    ) -> Self {
+        let mut random = Random::new(wanted.seed);
+        let built = wanted.build.built(machine, &mut random);
+        Self {
+            simulator: Simulator::imperfect(&built, deceleration, max_step, tolerance, wanted),
+            drive: wanted.drive,
+            sensor: wanted.sensor,
+            delay: Delay::new(wanted.drive.dead_time_ns),
+            random,
+        }
+    }
+
+    /// What is behind the sensors.
+    pub fn simulator(&self) -> &Simulator {
+        &self.simulator
+    }
+
+    /// Lets `duration_ns` pass under a constant command.
+    pub fn advance(&mut self, duration_ns: u64, command: Command) {
+        let command = command.map(|force| force.map(|newtons| rounded(newtons, self.drive.force_step)));
+        let Self { simulator, delay, .. } = self;
+        delay.pass(duration_ns, command, |nanoseconds, command| {
+            simulator.advance(nanoseconds as f64 * 1e-9, command.as_ref());
+        });
+    }
+
+    /// Lengths \[m\] and rates \[m/s\] as the sensors say them now. Each reading has noise of its own.
+    pub fn measure(&mut self) -> ([f64; LEGS], [f64; LEGS]) {
+        let legs = self.simulator.leg_motion();
+        let SensorErrors { length_step, rate_step, length_noise, rate_noise } = self.sensor;
+        let mut read = |values: [f64; LEGS], noise: f64, step: f64| {
+            values.map(|value| {
+                let noise = if noise > 0.0 { noise * self.random.gaussian() } else { 0.0 };
+                rounded(value + noise, step)
+            })
+        };
+        (read(legs.length, length_noise, length_step), read(legs.rate, rate_noise, rate_step))
+    }
+}
+
+/// To the nearest multiple of `step`; 0 leaves the value as it is.
+fn rounded(value: f64, step: f64) -> f64 {
+    if step > 0.0 { (value / step).round() * step } else { value }
+}

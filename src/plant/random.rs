@@ -1,0 +1,32 @@
+//! Random numbers with a seed: the same on every machine, bit for bit, as they need no function of a library.
+//!
+//! Steele, Lea and Flood (2014), "Fast splittable pseudorandom number generators": SplitMix64.
+
+/// A sequence of random numbers.
+#[derive(Clone, Debug)]
+pub struct Random {
+    state: u64,
+}
+
+impl Random {
+    /// The sequence of this seed.
+    pub fn new(seed: u64) -> Self {
+        Self { state: seed }
+    }
+
+    /// Uniform in \[0, 1).
+    pub fn uniform(&mut self) -> f64 {
+        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.state;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        // The 53 bits that a double holds.
+        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Mean 0, variance 1: the sum of twelve uniform numbers less six. As good as Gaussian to three
+    /// deviations, and never beyond six.
+    pub fn gaussian(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
