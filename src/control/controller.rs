@@ -20,6 +20,10 @@ use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::task::TaskState;
 
+/// Trusted steps of forward kinematics in one cycle under control. One is far more than a cycle's motion; after a
+/// pause of the measurements it may take some.
+const STEPS: u32 = 8;
+
 /// What a deployment chooses. Times in nanoseconds, like the clock.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
@@ -154,6 +158,8 @@ pub struct Controller {
     evidence: Evidence,
     reference: Reference,
     integral: Integral,
+    /// Under control: the last error, and the instant of the measurement it comes from.
+    known_error: Option<(u64, TrackingError)>,
     /// Of the last cycle, if it was under control.
     force: Option<[f64; LEGS]>,
     answered: (u64, u64),
@@ -186,6 +192,7 @@ impl Controller {
             evidence: Evidence::default(),
             reference: Reference::Setpoint,
             integral: Integral::default(),
+            known_error: None,
             force: None,
             answered: (0, 0),
             refused: Cause::None,
@@ -203,7 +210,7 @@ impl Controller {
         let setpoint = self.fresh_setpoint(now_ns);
         let mut output = Output { limiting: self.setpoint_limiting, ..Output::default() };
         if self.mode.state.controls() || setpoint.is_ok() {
-            output.error = self.error(located.ok());
+            output.error = located.ok().and_then(|at| self.error(&at));
         }
         let conditioned = self.conditioned(&mut output);
         let engageable = conditioned.and(setpoint).and_then(|()| self.near(output.error.as_ref()));
@@ -214,9 +221,11 @@ impl Controller {
             output.measured = Some((at.pose, at.twist));
             if self.mode.state != before {
                 self.enter(before, &at, now_ns);
+                self.known_error = None;
+                output.error = self.error(&at);
             }
             if self.mode.state.controls()
-                && let Err(trouble) = self.control(&at, now_ns, &mut output)
+                && let Err(trouble) = self.control(now_ns, &mut output)
             {
                 self.mode = Mode { state: State::Fault, cause: trouble.cause, ..Mode::default() };
                 self.evidence = trouble.evidence;
@@ -327,9 +336,22 @@ impl Controller {
         };
         self.is_young(&measurement, release_ns)?;
         let machine = self.model.machine();
-        match self.tracker.advance(machine, &measurement.length).0 {
+        let controls = self.mode.state.controls();
+        let trusted = self.tracker.stance().sensitivity().trusted_step * machine.joints.radius;
+        let before = self.tracker.stance().lengths(machine);
+        let mut tracked = self.tracker.advance(machine, &measurement.length).0;
+        for _ in 1..if controls { STEPS } else { 1 } {
+            if tracked == Tracked::Approaching {
+                tracked = self.tracker.advance(machine, &measurement.length).0;
+            }
+        }
+        match tracked {
             Tracked::Found => {}
-            Tracked::Approaching if self.mode.state.controls() => return Err(Cause::MeasurementJumped.into()),
+            Tracked::Approaching if controls => {
+                let way = |(now, before): (&f64, &f64)| (now - before).abs();
+                let furthest = measurement.length.iter().zip(&before).map(way).fold(0.0, f64::max);
+                return Err(Trouble::new(Cause::MeasurementJumped, furthest, f64::from(STEPS) * trusted));
+            }
             Tracked::Approaching => return Err(Cause::FindingPose.into()),
             Tracked::NotConverged => {
                 // Home is the one pose known to be on the right assembly mode: walk again from there.
@@ -374,10 +396,18 @@ impl Controller {
         }
     }
 
-    /// Reference minus measured, at the instant of the measurement.
-    fn error(&self, located: Option<Located>) -> Option<TrackingError> {
-        let at = located?;
-        Some(TrackingError::new(&self.reference_at(at.time_ns)?, &at.pose, &at.twist))
+    /// Reference minus measured, at the instant of the measurement; while there is no new one, what becomes of
+    /// it by the law.
+    fn error(&mut self, at: &Located) -> Option<TrackingError> {
+        let known = self.known_error.filter(|(time_ns, _)| *time_ns == at.time_ns);
+        let error = match known {
+            Some((_, error)) => {
+                self.parameters.law.predicted(&error, self.parameters.period_ns as f64 * 1e-9)
+            }
+            None => TrackingError::new(&self.reference_at(at.time_ns)?, &at.pose, &at.twist),
+        };
+        self.known_error = Some((at.time_ns, error)).filter(|_| self.mode.state.controls());
+        Some(error)
     }
 
     /// Control begins only where it is no motion of its own: near, and not passing by (an error of velocity
@@ -514,8 +544,8 @@ impl Controller {
     }
 
     /// The forces of this cycle, or why there are none.
-    fn control(&mut self, at: &Located, release_ns: u64, output: &mut Output) -> Result<(), Trouble> {
-        let error = self.error(Some(*at)).ok_or(Cause::SetpointLost)?;
+    fn control(&mut self, release_ns: u64, output: &mut Output) -> Result<(), Trouble> {
+        let error = output.error.ok_or(Cause::SetpointLost)?;
         let Parameters { period_ns, law, rung, limits, .. } = &self.parameters;
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = release_ns.saturating_add(period_ns / 2);
@@ -525,7 +555,6 @@ impl Controller {
         if force.iter().any(|value| !value.is_finite()) {
             return Err(Cause::ForceNotFinite.into());
         }
-        output.error = Some(error);
         let limited = self.within_limit(&force, &command)?;
         output.force = self.within_rate(limited);
         output.limiting = output

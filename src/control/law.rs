@@ -79,6 +79,20 @@ impl TrackingError {
 }
 
 impl Law {
+    /// The error after `dt` seconds without a measurement, if the platform does what the model says:
+    /// `e'' = -Kd e' - Kp e`, by one step of the semi-implicit Euler method, stable at these gains.
+    pub fn predicted(&self, error: &TrackingError, dt: f64) -> TrackingError {
+        let mut next = *error;
+        for (e, e_rate, gains) in [
+            (&mut next.pose.angular, &mut next.twist.angular, &self.orientation),
+            (&mut next.pose.linear, &mut next.twist.linear, &self.position),
+        ] {
+            *e_rate -= (*e_rate * gains.damping + *e * gains.stiffness) * dt;
+            *e += *e_rate * dt;
+        }
+        next
+    }
+
     /// The motion whose inverse dynamics are the forces: where the platform will be at the instant of
     /// `desired` if `error` stays as it is, with the commanded acceleration.
     pub fn command(&self, desired: &Motion, error: &TrackingError, integral: &Integral) -> Motion {

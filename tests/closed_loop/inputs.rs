@@ -3,7 +3,9 @@
 use hexad::control::controller::{Controller, Input, Output};
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, Request, State};
+use hexad::model::stance::Stance;
 use hexad::model::task::TaskState;
+use hexad::scene::motions::{Motion, fit};
 
 use super::common::{deployed, largest};
 use super::rig::{Rig, in_motion, parameters};
@@ -190,4 +192,29 @@ fn the_last_cycle_of_all_is_a_cycle() {
     let output = controller.step(&input);
     assert_eq!(output.state, State::Engaging);
     assert!(largest(&output.force) > 1.0);
+}
+
+/// The lengths are then further away than one trusted step of forward kinematics.
+#[test]
+fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
+    let mut config = deployed("fried2008");
+    config.deployment.timeouts.measured_s = 0.2;
+    let (mut rig, _) = in_motion(&config);
+    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let stale = rig.input(&scene.at(1.5)).measurement.unwrap();
+    let mut furthest = 0.0_f64;
+    for k in 0..=150 {
+        let mut input = rig.input(&scene.at(1.5 + f64::from(k) * 1e-3));
+        let fresh = input.measurement.unwrap();
+        if k < 150 {
+            input.measurement = Some(stale);
+        } else {
+            furthest = (0..6).fold(0.0, |most, leg| most.max((fresh.length[leg] - stale.length[leg]).abs()));
+        }
+        let output = rig.cycle(&input);
+        assert_eq!((output.state, output.cause), (State::Active, Cause::None), "{k}: {:?}", output.evidence);
+    }
+    let stance = Stance::new(&config.machine, rig.simulator.state().pose);
+    let trusted = stance.sensitivity().trusted_step * config.machine.joints.radius;
+    assert!(furthest > 1.5 * trusted, "{furthest} m of {trusted} m");
 }
