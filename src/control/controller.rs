@@ -302,12 +302,16 @@ impl Controller {
                     doubt::setpoint(machine, parameters, &now, before.as_ref(), widest, &mut limiting)
                 });
             self.setpoint_limiting = limiting;
-            waited[1] = verdict.is_err();
             let gap = setpoint.good.map(|good| now.setpoint.time_ns.abs_diff(good.setpoint.time_ns));
             let after_gap = gap.is_some_and(|gap| gap > parameters.period_ns + parameters.period_ns / 2);
             let present = self.reference_at(now_ns).filter(|_| follows && after_gap);
+            let verdict = verdict.and_then(|()| match present {
+                Some(_) => self.takes_over(&now, now_ns),
+                None => Ok(()),
+            });
+            waited[1] = verdict.is_err();
             self.setpoint.take(now, verdict, now_ns, follows);
-            if let Some(present) = present {
+            if let Some(present) = present.filter(|_| verdict.is_ok()) {
                 self.bridge(&present, now_ns);
             }
         }
@@ -374,15 +378,19 @@ impl Controller {
             .map_err(|lost| self.setpoint.absence(lost))
     }
 
-    /// The setpoint, carried on or back no longer than it may be.
     fn setpoint_at(&self, instant_ns: u64) -> Option<Motion> {
-        let Aim { setpoint, motion } = self.setpoint.good?;
+        Some(self.carried(self.setpoint.good.as_ref()?, instant_ns))
+    }
+
+    /// A setpoint, carried on or back no longer than it may be.
+    fn carried(&self, aim: &Aim, instant_ns: u64) -> Motion {
+        let Aim { setpoint, motion } = aim;
         if instant_ns == setpoint.time_ns {
-            return Some(motion);
+            return *motion;
         }
         let longest = self.parameters.longest_carried_s();
         let dt = seconds_between(setpoint.time_ns, instant_ns).max(-longest).min(longest);
-        Some(setpoint.task.after(dt).motion())
+        setpoint.task.after(dt).motion()
     }
 
     /// What the platform is to do at an instant; without control, what the setpoint says.
@@ -414,19 +422,23 @@ impl Controller {
     /// weighs as much as the error of pose that it is worth to the law, `wn` times as large).
     fn near(&self, error: Option<&TrackingError>) -> Result<(), Trouble> {
         let Some(error) = error else { return Err(Cause::NoSetpoint.into()) };
+        let away = self.away(error);
+        if away <= 1.0 { Ok(()) } else { Err(Trouble::new(Cause::SetpointTooFar, away, 1.0)) }
+    }
+
+    /// The largest share of an engage tolerance.
+    fn away(&self, error: &TrackingError) -> f64 {
         let Parameters { law, engage_position, engage_orientation, .. } = &self.parameters;
         let share = |pose: f64, rate: f64, tolerance: f64, stiffness: f64| {
             pose.max(rate / stiffness.sqrt()) / tolerance
         };
         let TrackingError { pose, twist } = error;
-        let away = share(pose.linear.norm(), twist.linear.norm(), *engage_position, law.position.stiffness)
-            .max(share(
-                pose.angular.norm(),
-                twist.angular.norm(),
-                *engage_orientation,
-                law.orientation.stiffness,
-            ));
-        if away <= 1.0 { Ok(()) } else { Err(Trouble::new(Cause::SetpointTooFar, away, 1.0)) }
+        share(pose.linear.norm(), twist.linear.norm(), *engage_position, law.position.stiffness).max(share(
+            pose.angular.norm(),
+            twist.angular.norm(),
+            *engage_orientation,
+            law.orientation.stiffness,
+        ))
     }
 
     /// The pose is far enough from singular ones.
@@ -484,8 +496,19 @@ impl Controller {
         }
     }
 
+    /// After a gap the setpoint is near what the one before it leads to, as near as one to engage on.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn takes_over(&self, now: &Aim, now_ns: u64) -> Result<(), Trouble> {
+        let Some(led_to) = self.setpoint_at(now_ns) else { return Ok(()) };
+        let next = self.carried(now, now_ns);
+        let away = self.away(&TrackingError::new(&led_to, &next.pose, &next.twist));
+        if away <= 1.0 { Ok(()) } else { Err(Trouble::new(Cause::SetpointJumped, away, 1.0)) }
+    }
+
     /// After a gap a setpoint may be, within what is believed, elsewhere than the one before it led to: where
     /// following it at once would be a jerk beyond the limit, the platform is led there.
+    #[inline(never)]
     fn bridge(&mut self, present: &Motion, now_ns: u64) {
         let Some(next) = self.reference_at(now_ns) else { return };
         let Parameters { period_ns, law, limits, .. } = &self.parameters;
@@ -496,12 +519,13 @@ impl Controller {
         if step(command.linear, next.acceleration.linear) > limits.position.jerk * longest
             || step(command.angular, next.acceleration.angular) > limits.orientation.jerk * longest
         {
-            self.reference = self.onto_setpoint(present, now_ns);
+            // As hard as a stop: what lags behind is off the path that somebody planned.
+            self.reference = self.onto_setpoint(present, now_ns, 1.0);
         }
     }
 
-    /// From a motion onto the setpoint.
-    fn onto_setpoint(&self, from: &Motion, instant_ns: u64) -> Reference {
+    /// From a motion onto the setpoint, with a share of the limits.
+    fn onto_setpoint(&self, from: &Motion, instant_ns: u64, share: f64) -> Reference {
         let Some(base) = self.setpoint_at(instant_ns) else { return Reference::Setpoint };
         let away = base.pose.displacement_to(&from.pose);
         let rate = Twist::from_vector(&(from.twist.vector() - base.twist.vector()));
@@ -512,7 +536,7 @@ impl Controller {
             &away,
             &rate,
             &acceleration,
-            &self.parameters.limits,
+            &Limits { own_share: share, ..self.parameters.limits },
         ))
     }
 
@@ -525,7 +549,11 @@ impl Controller {
         self.reference = match self.mode.state {
             State::Engaging => {
                 self.integral = Integral::default();
-                self.onto_setpoint(&Motion { twist: at.twist, ..resting(&at.pose) }, at.time_ns)
+                self.onto_setpoint(
+                    &Motion { twist: at.twist, ..resting(&at.pose) },
+                    at.time_ns,
+                    limits.own_share,
+                )
             }
             State::Stopping => {
                 let segment = Segment::to_rest(release_ns, &present.twist, &present.acceleration, limits);

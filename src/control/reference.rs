@@ -108,8 +108,8 @@ fn longest(
 /// `5.774 d / T^2 + 6 v / T + a` and `60 d / T^3 + 36 v / T^2 + 9 a / T`. With the second within the
 /// limit A, the third is at most `10.39 A / T`: no cubic equation is left.
 fn vanishing_s(limit: &AxisLimits, d: f64, v: f64, a: f64) -> f64 {
-    // An acceleration near the limit leaves a little for the rest.
-    let free = (limit.acceleration - a).max(0.2 * limit.acceleration);
+    // An acceleration near the limit leaves half of it for the rest.
+    let free = (limit.acceleration - a).max(0.5 * limit.acceleration);
     let by_velocity = 1.875 * d / limit.velocity;
     let by_acceleration = (3.0 * v + (9.0 * v * v + 5.774 * d * free).sqrt()) / free;
     by_velocity.max(by_acceleration).max(10.39 * limit.acceleration.max(a) / limit.jerk)

@@ -212,7 +212,7 @@ pub struct Rejected {
     pub older_source: u64,
     /// Seen before, or unreadable.
     pub repeated: u64,
-    /// With a wrong checksum.
+    /// With a wrong checksum, or of a source that begins in the future.
     pub damaged: u64,
 }
 
@@ -255,7 +255,9 @@ impl<T: Message> Sink<T> {
             };
             let header = message.header();
             let order = (header.epoch, header.sequence);
-            let is_readable = header.schema == SCHEMA && message.is_whole();
+            // A life that has not begun (another clock) would outrank all that come after it.
+            let has_begun = header.epoch <= monotonic_ns();
+            let is_readable = header.schema == SCHEMA && message.is_whole() && has_begun;
             if is_readable && order > (self.epoch, self.sequence) {
                 let same_life = header.epoch == self.epoch;
                 self.came += if same_life { header.sequence - self.sequence } else { 1 };

@@ -218,3 +218,45 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
     let trusted = stance.sensitivity().trusted_step * config.machine.joints.radius;
     assert!(furthest > 1.5 * trusted, "{furthest} m of {trusted} m");
 }
+
+/// A source that comes after a gap is taken over without a jolt if it is near what was led to, and refused else.
+#[test]
+fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
+    let config = deployed("fried2008");
+    let limits = parameters(&config).limits.position;
+    for (away, expected) in
+        [(0.0005, (State::Active, Cause::None)), (0.0035, (State::Fault, Cause::SetpointJumped))]
+    {
+        let (mut rig, _) = in_motion(&config);
+        let scene = fit(&config.machine, Motion::Sines, 8.0);
+        let last = rig.input(&scene.at(1.5)).setpoint;
+        let (mut twist, mut before) = (rig.simulator.state().twist.linear, None);
+        let (mut strongest, mut jolt) = (0.0_f64, 0.0_f64);
+        let mut end = (State::Off, Cause::None);
+        for k in 0..400 {
+            let mut task = scene.at(1.5 + f64::from(k) * 1e-3);
+            task.x[3] += away;
+            let mut input = rig.input(&task);
+            if k < 40 {
+                input.setpoint = last;
+            }
+            let output = rig.cycle(&input);
+            end = (output.state, output.cause);
+            if !output.state.controls() {
+                break;
+            }
+            let now = rig.simulator.state().twist.linear;
+            let acceleration = (now - twist) / 1e-3;
+            twist = now;
+            strongest = strongest.max(acceleration.norm());
+            if let Some(before) = before.replace(acceleration) {
+                jolt = jolt.max((acceleration - before).norm() / 1e-3);
+            }
+        }
+        assert_eq!(end, expected, "{away}");
+        assert!(
+            strongest < limits.acceleration && jolt < limits.jerk,
+            "{away}: {strongest} m/s^2, {jolt} m/s^3"
+        );
+    }
+}

@@ -26,11 +26,18 @@ const CLOSING: &str = "forces stopped arriving: brakes closing";
 const LONG_NS: u64 = 10_000_000_000;
 
 /// What is wrong, and what the plant says about it.
-const WRONG: [(Change, &str); 8] = [
-    (|message| message.checksum ^= 1, "with a wrong checksum: the shared memory is damaged"),
-    (|message| message.force_n[3] += 1e-9, "with a wrong checksum: the shared memory is damaged"),
+const WRONG: [(Change, &str); 9] = [
+    (|message| message.checksum ^= 1, "with a wrong checksum, or of a source that begins in the future"),
+    (|message| message.force_n[3] += 1e-9, "with a wrong checksum, or of a source that begins in the future"),
     // A damaged number of the source must not outrank those of good messages.
-    (|message| message.header.epoch = u64::MAX, "with a wrong checksum: the shared memory is damaged"),
+    (
+        |message| message.header.epoch = u64::MAX,
+        "with a wrong checksum, or of a source that begins in the future",
+    ),
+    (
+        |message| resealed(message, |message| message.header.epoch = u64::MAX),
+        "with a wrong checksum, or of a source that begins in the future",
+    ),
     (
         |message| resealed(message, |message| message.header.schema -= 1),
         "of another schema: build all participants alike",

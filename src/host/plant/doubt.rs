@@ -14,7 +14,7 @@ use crate::ipc::ports::Rejected;
 /// Why a message is not believed, in the order of the counts.
 const REASONS: [&str; 6] = [
     "of another schema: build all participants alike",
-    "with a wrong checksum: the shared memory is damaged",
+    "with a wrong checksum, or of a source that begins in the future",
     "of an older daemon",
     "seen before, or unreadable",
     "older than plant.force_timeout_ms",
