@@ -1,0 +1,70 @@
+//! The forces of a cycle, within what the actuators and the deployment allow.
+
+use super::{Controller, Output, Parameters};
+use crate::control::limits::Limit;
+use crate::control::state::{Cause, Trouble};
+use crate::model::ladder::Gravity;
+use crate::model::machine::LEGS;
+use crate::model::rigid::Motion;
+
+impl Controller {
+    /// The forces of this cycle, or why there are none.
+    pub(super) fn control(&mut self, release_ns: u64, output: &mut Output) -> Result<(), Trouble> {
+        let error = output.error.ok_or(Cause::SetpointLost)?;
+        let Parameters { period_ns, law, rung, limits, .. } = &self.parameters;
+        // The force is held for one period from about the release on.
+        let middle_of_hold_ns = release_ns.saturating_add(period_ns / 2);
+        let desired = self.reference_at(middle_of_hold_ns).ok_or(Cause::SetpointLost)?;
+        let command = law.command(&desired, &error, &self.integral);
+        let force = self.model.forces_of(*rung, &command).ok_or(Cause::SingularPose)?;
+        if force.iter().any(|value| !value.is_finite()) {
+            return Err(Cause::ForceNotFinite.into());
+        }
+        let limited = self.within_limit(&force, &command)?;
+        output.force = self.within_rate(limited);
+        output.limiting = output
+            .limiting
+            .with(Limit::Force, limited != force)
+            .with(Limit::ForceRate, output.force != limited);
+        if output.force == force {
+            self.integral.add(law, &error.pose, *period_ns as f64 * 1e-9, limits);
+        }
+        Ok(())
+    }
+
+    /// Forces beyond the limit keep what holds the platform up and lose the same share of all else, so that
+    /// what is left pushes in the direction that was meant.
+    fn within_limit(&self, force: &[f64; LEGS], command: &Motion) -> Result<[f64; LEGS], Trouble> {
+        let limit = self.model.machine().actuator.max_force;
+        if force.iter().all(|value| value.abs() <= limit) {
+            return Ok(*force);
+        }
+        let weight = self.model.forces::<Gravity>(command).ok_or(Cause::SingularPose)?;
+        Ok(toward(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
+    }
+
+    /// Forces that change no faster than they may, all by the same share of the change that was meant.
+    fn within_rate(&self, force: [f64; LEGS]) -> [f64; LEGS] {
+        let Some(before) = &self.force else { return force };
+        let most = self.parameters.force_rate * self.parameters.period_ns as f64 * 1e-9;
+        toward(before, &force, |before| (before - most, before + most))
+    }
+}
+
+/// From `start`, which is within its bounds, so far toward `end` as all bounds allow.
+fn toward(start: &[f64; LEGS], end: &[f64; LEGS], bounds: impl Fn(f64) -> (f64, f64)) -> [f64; LEGS] {
+    let share = |(start, end): (&f64, &f64)| {
+        let ((low, high), way) = (bounds(*start), end - start);
+        let room = if way > 0.0 { high - start } else { low - start };
+        if way == 0.0 { 1.0 } else { room / way }
+    };
+    let share = start.iter().zip(end).map(share).fold(1.0, f64::min).max(0.0);
+    let mut reached = *end;
+    if share < 1.0 {
+        for (reached, start) in reached.iter_mut().zip(start) {
+            let (low, high) = bounds(*start);
+            *reached = (start + share * (*reached - start)).max(low).min(high);
+        }
+    }
+    reached
+}

@@ -1,0 +1,137 @@
+//! Which inputs count in this cycle, and the pose that they say.
+
+use super::{Controller, Input, Located, Measurement};
+use crate::control::doubt::{self, Aim};
+use crate::control::law::TrackingError;
+use crate::control::limits::Limiting;
+use crate::control::state::{Cause, State, Trouble};
+use crate::model::forward_kinematics::{Tracked, Tracker};
+
+/// Trusted steps of forward kinematics in one cycle under control. One is far more than a cycle's motion; after a
+/// pause of the measurements it may take some.
+const STEPS: u32 = 8;
+
+impl Controller {
+    /// Takes in what can be believed. Continuity is asked for only where it can be had: of measurements that
+    /// are young or control the platform, of setpoints that are followed.
+    pub(super) fn doubt(&mut self, input: &Input) {
+        let Self { parameters, measurement, parting, setpoint, .. } = self;
+        let machine = self.model.machine();
+        let now_ns = input.release_ns;
+        let controls = self.mode.state.controls();
+        let mut waited = [true; 2];
+        if let Some(now) = input.measurement
+            && measurement.newest != Some(now)
+        {
+            let timeout_ns = parameters.measured_timeout_ns;
+            let widest = measurement.widest(now_ns, parameters.period_ns);
+            let binds = |good: &Measurement| controls || now_ns.abs_diff(good.time_ns) <= timeout_ns;
+            let verdict = doubt::time(Cause::MeasurementFromElsewhen, now.time_ns, now_ns, timeout_ns)
+                .and_then(|()| {
+                    let before = measurement.good.filter(binds);
+                    let limit = &parameters.limits.position;
+                    doubt::measurement(&machine.actuator, limit, &now, before.as_ref(), widest, parting)
+                });
+            measurement.take(now, verdict, now_ns, controls);
+            waited[0] = verdict.is_err();
+        }
+        if let Some(now) = input.setpoint
+            && setpoint.newest.map(|aim| aim.setpoint) != Some(now)
+        {
+            let timeout_ns = parameters.setpoint_timeout_ns;
+            let widest = setpoint.widest(now_ns, parameters.period_ns);
+            let follows = matches!(self.mode.state, State::Engaging | State::Active);
+            let mut limiting = Limiting::default();
+            let now = Aim { setpoint: now, motion: now.task.motion() };
+            let verdict = doubt::time(Cause::SetpointFromElsewhen, now.setpoint.time_ns, now_ns, timeout_ns)
+                .and_then(|()| {
+                    let before = setpoint.good.filter(|_| follows);
+                    doubt::setpoint(machine, parameters, &now, before.as_ref(), widest, &mut limiting)
+                });
+            self.setpoint_limiting = limiting;
+            let gap = setpoint.good.map(|good| now.setpoint.time_ns.abs_diff(good.setpoint.time_ns));
+            let after_gap = gap.is_some_and(|gap| gap > parameters.period_ns + parameters.period_ns / 2);
+            let present = self.reference_at(now_ns).filter(|_| follows && after_gap);
+            let verdict = verdict.and_then(|()| match present {
+                Some(_) => self.takes_over(&now, now_ns),
+                None => Ok(()),
+            });
+            waited[1] = verdict.is_err();
+            self.setpoint.take(now, verdict, now_ns, follows);
+            if let Some(present) = present.filter(|_| verdict.is_ok()) {
+                self.bridge(&present, now_ns);
+            }
+        }
+        let [no_measurement, no_setpoint] = waited.map(u64::from);
+        self.without_measurement += u64::from(controls) * no_measurement;
+        self.without_setpoint += u64::from(controls) * no_setpoint;
+    }
+
+    /// After a pause of the loop the inputs may be fresh again, but meanwhile the drives had no force and
+    /// have let go: control does not go on as if nothing had been.
+    pub(super) fn unbroken(&self, now_ns: u64) -> Result<(), Trouble> {
+        let last = self.measurement.good.filter(|_| self.mode.state.controls());
+        last.map_or(Ok(()), |last| self.is_young(&last, now_ns))
+    }
+
+    fn is_young(&self, measurement: &Measurement, now_ns: u64) -> Result<(), Trouble> {
+        let timeout_ns = self.parameters.measured_timeout_ns;
+        doubt::time(Cause::MeasurementLost, measurement.time_ns, now_ns, timeout_ns)
+            .map_err(|lost| self.measurement.absence(lost))
+    }
+
+    /// The pose and twist of the platform, by one bounded step of forward kinematics.
+    pub(super) fn locate(&mut self, release_ns: u64) -> Result<Located, Trouble> {
+        let Some(measurement) = self.measurement.good else {
+            return Err(self.measurement.absence(Cause::NoMeasurement));
+        };
+        self.is_young(&measurement, release_ns)?;
+        let machine = self.model.machine();
+        let controls = self.mode.state.controls();
+        let trusted = self.tracker.stance().sensitivity().trusted_step * machine.joints.radius;
+        let before = self.tracker.stance().lengths(machine);
+        let mut tracked = self.tracker.advance(machine, &measurement.length).0;
+        for _ in 1..if controls { STEPS } else { 1 } {
+            if tracked == Tracked::Approaching {
+                tracked = self.tracker.advance(machine, &measurement.length).0;
+            }
+        }
+        match tracked {
+            Tracked::Found => {}
+            Tracked::Approaching if controls => {
+                let way = |(now, before): (&f64, &f64)| (now - before).abs();
+                let furthest = measurement.length.iter().zip(&before).map(way).fold(0.0, f64::max);
+                return Err(Trouble::new(Cause::MeasurementJumped, furthest, f64::from(STEPS) * trusted));
+            }
+            Tracked::Approaching => return Err(Cause::FindingPose.into()),
+            Tracked::NotConverged => {
+                // Home is the one pose known to be on the right assembly mode: walk again from there.
+                self.tracker = Tracker::new(machine, self.home);
+                return Err(Cause::PoseNotFound.into());
+            }
+        }
+        let pose = self.tracker.pose;
+        let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
+        Ok(Located { time_ns: measurement.time_ns, pose, twist })
+    }
+
+    pub(super) fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {
+        let Some(Aim { setpoint, .. }) = self.setpoint.good else {
+            return Err(self.setpoint.absence(Cause::NoSetpoint));
+        };
+        let at_rest = setpoint.task.xd.amax() == 0.0 && setpoint.task.xdd.amax() == 0.0;
+        let lost = if at_rest { Cause::SetpointEnded } else { Cause::SetpointLost };
+        doubt::time(lost, setpoint.time_ns, release_ns, self.parameters.setpoint_timeout_ns)
+            .map_err(|lost| self.setpoint.absence(lost))
+    }
+
+    /// After a gap the setpoint is near what the one before it leads to, as near as one to engage on.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn takes_over(&self, now: &Aim, now_ns: u64) -> Result<(), Trouble> {
+        let Some(led_to) = self.setpoint_at(now_ns) else { return Ok(()) };
+        let next = self.carried(now, now_ns);
+        let away = self.away(&TrackingError::new(&led_to, &next.pose, &next.twist));
+        if away <= 1.0 { Ok(()) } else { Err(Trouble::new(Cause::SetpointJumped, away, 1.0)) }
+    }
+}
