@@ -10,6 +10,9 @@ use crate::control::reference::Segment;
 use crate::control::state::State;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
+/// A share of the engage tolerances that is led onto; below, it is a matter of stamps and rounding.
+const SMALLEST_TAKEOVER: f64 = 0.05;
+
 impl Controller {
     pub(super) fn setpoint_at(&self, instant_ns: u64) -> Option<Motion> {
         Some(self.carried(self.setpoint.good.as_ref()?, instant_ns))
@@ -65,6 +68,10 @@ impl Controller {
         let Some(next) = self.reference_at(now_ns) else { return };
         let Parameters { period_ns, law, limits, .. } = &self.parameters;
         let error = TrackingError::new(present, &next.pose, &next.twist);
+        // What messages a little late or early make is no takeover, and must not begin a motion anew.
+        if self.away(&error) < SMALLEST_TAKEOVER {
+            return;
+        }
         let command = law.command(present, &error, &Integral::default()).acceleration;
         let longest = *period_ns as f64 * 1e-9;
         let step = |command: Vector3<f64>, next: Vector3<f64>| (command - next).norm();
