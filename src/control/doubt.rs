@@ -72,8 +72,12 @@ impl<T> Default for Believed<T> {
 }
 
 impl<T: Copy> Believed<T> {
-    /// Longest time \[s\] since the good input that widens what is believed now.
+    /// Longest time \[s\] since the good input that widens what is believed now: any, as long as nothing was
+    /// refused since.
     pub fn widest(&self, now_ns: u64, period_ns: u64) -> f64 {
+        if self.refused.is_none() {
+            return f64::INFINITY;
+        }
         let interval_ns = now_ns.saturating_sub(self.newest_ns).max(period_ns);
         BELIEVED_INTERVALS * (interval_ns as f64 * 1e-9)
     }

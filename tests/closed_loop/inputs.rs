@@ -260,3 +260,25 @@ fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
         );
     }
 }
+
+/// The host takes everybody away at once: the message of before is seen only after it, and the next one in the
+/// next cycle.
+#[test]
+fn a_message_seen_only_after_a_pause_does_not_make_the_next_one_a_jump() {
+    let config = deployed("fried2008");
+    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let (mut rig, _) = in_motion(&config);
+    let [mut seen, mut kept] = [Input::default(); 2];
+    for k in 0..6000 {
+        let fresh = rig.input(&scene.at(1.5 + f64::from(k) * 1e-3));
+        match k % 100 {
+            0 => kept = fresh,
+            1..18 => {}
+            18 => seen = kept,
+            _ => seen = fresh,
+        }
+        let output = rig.cycle(&Input { release_ns: fresh.release_ns, ..seen });
+        let state = (output.state, output.cause);
+        assert_eq!(state, (State::Active, Cause::None), "{k}: {:?}", output.evidence);
+    }
+}
