@@ -204,7 +204,7 @@ impl Panel<'_> {
 
 /// Range and ticks of one axis.
 #[derive(Clone)]
-struct Axis {
+pub(super) struct Axis {
     low: f64,
     high: f64,
     ticks: Vec<f64>,
@@ -215,7 +215,7 @@ struct Axis {
 
 impl Axis {
     /// Covers the values and a `margin` as a share of their span, with about `count` ticks at most.
-    fn new(values: impl Iterator<Item = f64>, margin: f64, count: f64) -> Self {
+    pub fn new(values: impl Iterator<Item = f64>, margin: f64, count: f64) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
         let size = low.abs().max(high.abs());
@@ -241,7 +241,7 @@ impl Axis {
     }
 
     /// Turns `position [mm]` into `position [10⁻⁶ mm]` where the numbers need it.
-    fn label(&self, label: &str) -> String {
+    pub fn label(&self, label: &str) -> String {
         if self.exponent == 0 {
             return label.into();
         }

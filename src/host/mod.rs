@@ -28,3 +28,4 @@ pub mod scatter;
 pub mod setpoints;
 pub mod stop;
 pub mod table;
+pub mod workspace;

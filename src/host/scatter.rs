@@ -145,7 +145,11 @@ impl Grid<'_> {
     }
 }
 
-fn drawn(height: i32, draw: impl FnOnce(&Area) -> Result<(), DrawError>) -> Result<String, DrawError> {
+/// An SVG text of this height.
+pub(super) fn drawn(
+    height: i32,
+    draw: impl FnOnce(&Area) -> Result<(), DrawError>,
+) -> Result<String, DrawError> {
     let mut svg = String::new();
     {
         let size = (WIDTH.unsigned_abs(), height.unsigned_abs());

@@ -31,10 +31,10 @@ const STEPS: i32 = 40;
 /// The envelope of a machine.
 pub fn envelope(model: &InverseDynamics) -> Envelope {
     let machine = model.machine();
-    let p = POSITION_SHARE * machine.joints.radius;
     let boxed = |share: f64| {
-        let half = [ANGLE, ANGLE, ANGLE, p, p, p].map(|a| a * share);
-        Limits { pose_min: half.map(|a| -a), pose_max: half, velocity: [0.0; 6], acceleration: [0.0; 6] }
+        let nominal = nominal_box(machine);
+        let [pose_min, pose_max] = [nominal.pose_min, nominal.pose_max].map(|ends| ends.map(|a| a * share));
+        Limits { pose_min, pose_max, ..nominal }
     };
     let pose = shrunk(machine, boxed, |state| within_stroke(machine, state));
     let moving = |share: f64| {
@@ -43,6 +43,13 @@ pub fn envelope(model: &InverseDynamics) -> Envelope {
         Limits { velocity, acceleration: velocity.map(|v| v * omega), ..pose }
     };
     Envelope::new(&machine.home, shrunk(machine, moving, |state| has_reserve(model, state)))
+}
+
+/// The box before it shrinks, at rest.
+pub fn nominal_box(machine: &Machine) -> Limits {
+    let p = POSITION_SHARE * machine.joints.radius;
+    let half = [ANGLE, ANGLE, ANGLE, p, p, p];
+    Limits { pose_min: half.map(|a| -a), pose_max: half, velocity: [0.0; 6], acceleration: [0.0; 6] }
 }
 
 /// Whether every leg is within its stroke.

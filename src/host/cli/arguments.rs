@@ -1,5 +1,6 @@
 //! What the commands take, and what it means.
 
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,6 +10,8 @@ use hexad::host::config::{Config, ConfigError};
 use hexad::host::export;
 use hexad::host::offline;
 use hexad::host::setpoints::{Score, SetpointError};
+use hexad::host::workspace::Wish;
+use hexad::host::workspace::slice::Plane;
 use hexad::model::ladder::Rung;
 use hexad::scene::motions::Motion;
 
@@ -45,6 +48,31 @@ pub struct What {
     /// A CSV file with t, X, X', X''
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct WishArguments {
+    /// Two of alpha, beta, gamma, x, y, z, as in x-z; may be given more than once [default: horizontal, vertical, tilt]
+    #[arg(long = "plane", value_name = "PLANE")]
+    planes: Vec<Plane>,
+    /// The pose all slices go through, alpha,beta,gamma,x,y,z [rad, m] [default: home]
+    #[arg(long, value_name = "POSE", value_parser = pose, allow_hyphen_values = true)]
+    through: Option<[f64; 6]>,
+    /// Poses along each axis of a slice
+    #[arg(long, value_name = "POSES", default_value_t = 121, value_parser = resolution, allow_negative_numbers = true)]
+    resolution: usize,
+    /// Acceleration for the forces, in any direction [default: that of [limits]]
+    #[arg(long, value_name = "A", value_parser = acceleration, allow_negative_numbers = true)]
+    acceleration_m_s2: Option<f64>,
+    /// Angular acceleration for the forces, about any axis [default: that of [limits]]
+    #[arg(long, value_name = "A", value_parser = acceleration, allow_negative_numbers = true)]
+    angular_acceleration_rad_s2: Option<f64>,
+    /// Turn about any axis that the second ball allows [deg]
+    #[arg(long, value_name = "DEG", default_value_t = 10.0, value_parser = turn, allow_negative_numbers = true)]
+    turn_deg: f64,
+    /// Folder for the maps and their tables
+    #[arg(long, value_name = "FOLDER", default_value = "hexad-workspace")]
+    output: PathBuf,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -107,6 +135,20 @@ impl What {
     }
 }
 
+impl From<WishArguments> for Wish {
+    fn from(wish: WishArguments) -> Self {
+        Self {
+            planes: wish.planes,
+            through: wish.through,
+            resolution: wish.resolution,
+            acceleration_m_s2: wish.acceleration_m_s2,
+            angular_acceleration_rad_s2: wish.angular_acceleration_rad_s2,
+            turn_deg: wish.turn_deg,
+            output: wish.output,
+        }
+    }
+}
+
 impl From<Start> for offline::Start {
     fn from(start: Start) -> Self {
         match start {
@@ -133,9 +175,40 @@ pub fn rungs() -> impl TypedValueParser<Value = Rung> {
 
 /// A length of time \[s\].
 pub fn duration(text: &str) -> Result<f64, String> {
+    within(text, 0.1..=86400.0, " s")
+}
+
+/// \[m/s^2\] or \[rad/s^2\]
+fn acceleration(text: &str) -> Result<f64, String> {
+    within(text, 0.0..=1e6, "")
+}
+
+/// Of a platform that is still the right way up \[deg\].
+fn turn(text: &str) -> Result<f64, String> {
+    within(text, 0.0..=90.0, " deg")
+}
+
+/// Poses along an axis: enough for a picture, few enough for memory.
+fn resolution(text: &str) -> Result<usize, String> {
     match text.parse() {
-        Ok(seconds) if (0.1..=86400.0).contains(&seconds) => Ok(seconds),
-        Ok(_) => Err("must be in [0.1, 86400] s".into()),
+        Ok(count) if (11..=1001).contains(&count) => Ok(count),
+        _ => Err("must be an integer in [11, 1001]".into()),
+    }
+}
+
+fn within(text: &str, bounds: RangeInclusive<f64>, unit: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(number) if bounds.contains(&number) => Ok(number),
+        Ok(_) => Err(format!("must be in [{}, {}]{unit}", bounds.start(), bounds.end())),
         Err(_) => Err("must be a number".into()),
     }
+}
+
+/// X.
+fn pose(text: &str) -> Result<[f64; 6], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|number| number.trim().parse()).collect();
+    let six = numbers.ok().and_then(|numbers| numbers.try_into().ok());
+    let bounded = |x: &[f64; 6]| x.iter().all(|x| x.abs() <= 1e12);
+    six.filter(bounded)
+        .ok_or_else(|| "must be six numbers, as in 0,0,0,0,0,1.25, at most 1e12 in magnitude".into())
 }

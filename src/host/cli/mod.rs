@@ -11,10 +11,13 @@ use hexad::host::demo::{self, Demo};
 use hexad::host::doctor::{self, Doctor};
 use hexad::host::faults::Faults;
 use hexad::host::stop::Stop;
+use hexad::host::workspace::Survey;
 use hexad::host::{daemon, export, offline, operator, plant, setpoints};
 use hexad::model::ladder::Rung;
 
-use self::arguments::{Files, FormatName, MachineFile, MotionName, Patience, Start, What, duration, rungs};
+use self::arguments::{
+    Files, FormatName, MachineFile, MotionName, Patience, Start, What, WishArguments, duration, rungs,
+};
 use self::failure::Failure;
 
 mod arguments;
@@ -161,6 +164,13 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         trajectory: Option<PathBuf>,
     },
+    /// Map what the machine reaches and what it can do there; find the largest regions without obstacle
+    Workspace {
+        #[command(flatten)]
+        machine: MachineFile,
+        #[command(flatten)]
+        wish: WishArguments,
+    },
     /// Write the machine as a model for other tools
     Export {
         #[command(flatten)]
@@ -238,6 +248,10 @@ impl Cli {
             }
             Command::Advise { machine, trajectory } => {
                 print!("{}", Advice::new(&machine.load()?, trajectory.as_deref())?);
+                Ok(())
+            }
+            Command::Workspace { machine, wish } => {
+                print!("{}", Survey::new(&machine.load()?, &wish.into()).map_err(Failure::could_not_begin)?);
                 Ok(())
             }
             Command::Export { machine, format, output } => {
