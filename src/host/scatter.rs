@@ -284,7 +284,8 @@ fn draw_labels(root: &Area, points: &[(&Point, (i32, i32))]) -> Result<(), DrawE
     Ok(())
 }
 
-fn width(label: &str) -> i32 {
+/// Of a label, about.
+pub(super) fn width(label: &str) -> i32 {
     label.chars().count() as i32 * LETTER + 8 * UNIT
 }
 

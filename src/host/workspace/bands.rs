@@ -39,19 +39,17 @@ impl Quantity {
     }
 
     /// Thresholds from the worst to the best, so that something lies beyond each; none where nothing is good enough.
-    pub fn thresholds<'a>(&self, qualities: impl Iterator<Item = &'a Quality>) -> Vec<f64> {
-        let values = qualities.filter(|quality| self.beyond(quality, self.worst) >= 0.0).map(self.value);
-        let finite = values.filter(|value| value.is_finite());
-        let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    pub fn thresholds<'a>(&self, qualities: impl Iterator<Item = &'a Quality> + Clone) -> Vec<f64> {
+        let good = |quality: &&Quality| self.beyond(quality, self.worst) >= 0.0;
+        let values = qualities.clone().filter(good).map(self.value).filter(|value| value.is_finite());
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         match self.better {
             _ if low > high => vec![],
-            Better::Higher => {
-                [self.worst].into_iter().chain(round_numbers(low.max(self.worst), high)).collect()
-            }
+            Better::Higher => [self.worst].into_iter().chain(round_numbers(0.0, high)).collect(),
             Better::Lower => {
-                // All the values are below the first one.
-                let mut numbers = round_numbers(low, high);
-                numbers.push(self.worst);
+                let worst = if qualities.clone().all(|quality| good(&quality)) { high } else { self.worst };
+                let mut numbers = round_numbers(low, worst);
+                numbers.push(worst);
                 numbers.reverse();
                 numbers
             }

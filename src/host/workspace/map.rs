@@ -17,7 +17,7 @@ use crate::host::charts::{
     UNIT, WIDTH, X_LABELS, Y_LABELS, house_style, rgb, text,
 };
 use crate::host::files::write_whole;
-use crate::host::scatter::drawn;
+use crate::host::scatter::{drawn, width};
 use crate::model::machine::Machine;
 use crate::scene::workspace::Quality;
 
@@ -28,6 +28,8 @@ const BAR: i32 = 14 * UNIT;
 const BAR_LABELS: i32 = 56 * UNIT;
 /// About as many ticks on an axis.
 const TICKS: f64 = 6.0;
+/// Forces beyond the actuators' limit everywhere have colours up to this many times the least.
+const FAR: f64 = 5.0;
 const DISC: i32 = 5 * UNIT;
 
 /// From bad to good: viridis (S. van der Walt, N. Smith), which keeps its order in grey and for the colour-blind.
@@ -65,14 +67,23 @@ impl Maps<'_> {
             let cells = cells.split_evenly((2, 2));
             cells
                 .iter()
-                .zip(self.quantities())
+                .zip(self.quantities(slice))
                 .try_for_each(|(cell, of)| self.draw_map(cell, slice, &of, &lines))
         })?;
         Ok(write_whole(path, svg.as_bytes())?)
     }
 
-    fn quantities(&self) -> [Quantity; 4] {
+    fn quantities(&self, slice: &Slice) -> [Quantity; 4] {
         let max_force = self.machine.actuator.max_force;
+        let reached = || slice.qualities.iter().filter(|quality| quality.within_reach());
+        // Where every pose asks for more than the actuators have, the map still says how much.
+        let some = reached().any(|quality| quality.worst_force <= max_force);
+        let (force_label, payload_label, max_force) = if some {
+            ("worst force [N]", "payload [kg]", max_force)
+        } else {
+            let least = reached().map(|quality| quality.worst_force).fold(f64::INFINITY, f64::min);
+            ("worst force [N], nowhere within the limit", "payload [kg]: none anywhere", FAR * least)
+        };
         [
             Quantity {
                 label: "stroke margin [mm]",
@@ -87,13 +98,13 @@ impl Maps<'_> {
                 worst: self.largest_condition,
             },
             Quantity {
-                label: "worst force [N]",
+                label: force_label,
                 value: |quality| quality.worst_force,
                 better: Better::Lower,
                 worst: max_force,
             },
             Quantity {
-                label: "payload [kg]",
+                label: payload_label,
                 value: |quality| quality.payload,
                 better: Better::Higher,
                 // Without a limit in words: none at all is what is beyond it.
@@ -155,7 +166,7 @@ impl Maps<'_> {
         samples.dedup_by_key(|(_, label)| *label);
         samples.push((rgb(BEYOND).mix(0.4).stroke_width(100), "beyond a limit"));
         let y = TITLE_HEIGHT + LEGEND_LINE / 2;
-        let mut left = Y_LABELS;
+        let mut left = Y_LABELS / 2;
         for (style, label) in samples {
             let line = vec![(left, y), (left + SAMPLE, y)];
             draw_line(root, line, style)?;
@@ -168,7 +179,7 @@ impl Maps<'_> {
     /// Right of a sample; returns where the next one begins.
     fn draw_label(&self, root: &Area, left: i32, y: i32, label: &str) -> Result<i32, DrawError> {
         root.draw_text(label, &text(12, HPos::Left), (left + SAMPLE + MARGIN, y))?;
-        Ok(left + SAMPLE + 5 * MARGIN + label.chars().count() as i32 * 6 * UNIT)
+        Ok(left + SAMPLE + 4 * MARGIN + width(label))
     }
 }
 

@@ -26,7 +26,7 @@ use crate::scene::workspace::{Effort, Quality, Workspace};
 mod bands;
 mod contour;
 mod map;
-mod search;
+pub mod search;
 pub mod slice;
 
 /// What is asked for.
@@ -63,6 +63,7 @@ pub struct Survey {
     name: String,
     effort: Effort,
     largest_condition: f64,
+    max_force: f64,
     slices: Vec<Slice>,
     turn_deg: f64,
     /// Positions at home's orientation, positions with any turn, the box.
@@ -101,6 +102,7 @@ impl Survey {
             name: name.clone(),
             effort,
             largest_condition,
+            max_force: machine.actuator.max_force,
             slices,
             turn_deg: wish.turn_deg,
             regions,
@@ -182,30 +184,18 @@ impl fmt::Display for Survey {
             "slice", "poses", "in reach", "margin [mm]", "condition", "worst force [N]", "payload [kg]"
         )?;
         for slice in &self.slices {
-            let all = slice.qualities.len();
-            let reached: Vec<_> = slice.qualities.iter().filter(|quality| quality.within_reach()).collect();
-            let range = |value: fn(&Quality) -> f64| {
-                let (low, high) = reached
-                    .iter()
-                    .map(|quality| value(quality))
-                    .fold((f64::INFINITY, 0.0), |(l, h), v| (f64::min(l, v), f64::max(h, v)));
-                format!("{} to {}", significant(low), significant(high))
-            };
-            writeln!(
-                f,
-                "{:<12}{all:>9}{:>10}{:>16}{:>16}{:>19}{:>19}",
-                slice.plane.to_string(),
-                reached.len(),
-                range(|quality| 1e3 * quality.stroke_margin),
-                range(|quality| quality.condition),
-                range(|quality| quality.worst_force),
-                range(|quality| quality.payload),
-            )?;
+            self.fmt_slice(f, slice)?;
         }
         writeln!(
             f,
-            "\nGuaranteed around home, by bounds for every pose: within the stroke, no singular pose, condition up to {}:",
-            significant(*largest_condition)
+            "in reach: within the stroke, on home's side of singular poses; usable: and condition up to {}, of these the \
+             numbers;\nthe actuators' limit is {} N\n",
+            significant(*largest_condition),
+            significant(self.max_force)
+        )?;
+        writeln!(
+            f,
+            "Guaranteed around home, by bounds on every pose in between: all usable, none singular:"
         )?;
         self.fmt_regions(f)?;
         writeln!(f)?;
@@ -214,6 +204,31 @@ impl fmt::Display for Survey {
 }
 
 impl Survey {
+    fn fmt_slice(&self, f: &mut fmt::Formatter<'_>, slice: &Slice) -> fmt::Result {
+        let in_reach = slice.qualities.iter().filter(|quality| quality.within_reach());
+        let usable = in_reach.clone().filter(|quality| quality.condition <= self.largest_condition);
+        let ends = |value: fn(&Quality) -> f64| {
+            let values = usable.clone().map(value);
+            values.fold((f64::INFINITY, 0.0), |(low, high), v| (f64::min(low, v), f64::max(high, v)))
+        };
+        let range = |value: fn(&Quality) -> f64| {
+            let (low, high) = ends(value);
+            format!("{} to {}", significant(low), significant(high))
+        };
+        writeln!(
+            f,
+            "{:<12}{:>9}{:>10}{:>9}{:>13}{:>16}{:>18}{:>15}",
+            slice.plane.to_string(),
+            slice.qualities.len(),
+            in_reach.clone().count(),
+            usable.clone().count(),
+            format!("up to {}", significant(1e3 * ends(|quality| quality.stroke_margin).1)),
+            range(|quality| quality.condition),
+            range(|quality| quality.worst_force),
+            range(|quality| quality.payload),
+        )
+    }
+
     fn fmt_regions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let turned = format!("ball, turned up to {} deg about any axis", significant(self.turn_deg));
         let origin = if self.configured { "box, times [envelope]" } else { "box, times the one below" };

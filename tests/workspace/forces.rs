@@ -1,0 +1,125 @@
+//! Worst forces and payloads, found again by the ordinary inverse dynamics over many directions.
+
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::ladder::Exact;
+use hexad::model::machine::Machine;
+use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad::model::task::TaskState;
+use hexad::scene::workspace::{Effort, Workspace};
+use nalgebra::Vector3;
+
+use super::common::{MACHINES, largest, machine};
+use super::{beside_home, directions};
+
+const DIRECTIONS: u32 = 10_000;
+const POSES: u32 = 4;
+
+/// Faster than the smoothing of the Coulomb force, too slow for any other force of velocity.
+const CREEPING: f64 = 1e-3;
+
+/// The largest force over many directions of both accelerations and of a creeping motion.
+fn by_force(machine: &Machine, pose: Pose, effort: Effort) -> f64 {
+    let model = InverseDynamics::new(machine);
+    let forces = (0..DIRECTIONS).map(|k| {
+        let [angular, linear] = directions(k);
+        let [turning, moving] = directions(k + DIRECTIONS);
+        let twist = Twist { angular: turning * CREEPING / machine.joints.radius, linear: moving * CREEPING };
+        let acceleration = Acceleration { angular: angular * effort.angular, linear: linear * effort.linear };
+        largest(&model.forces::<Exact>(&Motion { pose, twist, acceleration }).unwrap())
+    });
+    forces.fold(0.0, f64::max)
+}
+
+/// With friction by direction alone.
+fn dry(name: &str) -> Machine {
+    let mut machine = machine(name);
+    machine.actuator.viscous_friction = 0.0;
+    machine.actuator.coulomb_friction = 0.01 * machine.actuator.max_force;
+    machine
+}
+
+/// An acceleration that asks for about a third of the actuators' force.
+fn effort(machine: &Machine) -> Effort {
+    let linear = machine.actuator.max_force / machine.platform.mass;
+    Effort { linear, angular: linear / machine.joints.radius }
+}
+
+#[test]
+fn no_direction_asks_for_more_and_some_for_nearly_as_much() {
+    for name in MACHINES {
+        let machine = dry(name);
+        let effort = effort(&machine);
+        let workspace = Workspace::new(&machine, effort);
+        for k in 0..POSES {
+            let pose = TaskState::at_rest(beside_home(&machine, k, 0.1)).motion().pose;
+            let share = by_force(&machine, pose, effort) / workspace.quality(&pose).worst_force;
+            assert!((0.95..1.0 + 1e-5).contains(&share), "{name}, pose {k}: {share}");
+        }
+    }
+}
+
+#[test]
+fn a_machine_with_its_payload_is_at_the_actuators_limit() {
+    for name in MACHINES {
+        let mut machine = dry(name);
+        let pose = TaskState::at_rest(beside_home(&machine, 1, 0.1)).motion().pose;
+        let gentle = Effort { linear: 0.5, angular: 0.5 };
+        let bare = Workspace::new(&machine, gentle).quality(&pose);
+        // Whatever the machine: it can carry something.
+        machine.actuator.max_force = 2.0 * bare.worst_force;
+        let payload = Workspace::new(&machine, gentle).quality(&pose).payload;
+        assert!(payload > 0.0 && payload.is_finite(), "{name}: {payload}");
+        let limit = machine.actuator.max_force;
+        // At the centre of mass it adds neither a moment of inertia nor an arm.
+        machine.platform.mass += payload;
+        let share = by_force(&machine, pose, gentle) / limit;
+        assert!((0.95..1.0 + 1e-5).contains(&share), "{name}: {share} with {payload} kg");
+        let loaded = Workspace::new(&machine, gentle).quality(&pose);
+        assert!((loaded.worst_force / limit - 1.0).abs() < 1e-9, "{name}: {loaded:?}");
+        assert!(loaded.payload < 1e-6 * payload, "{name}: {loaded:?}");
+        machine.platform.mass += 0.01 * payload;
+        assert!(Workspace::new(&machine, gentle).quality(&pose).payload == 0.0, "{name}");
+    }
+}
+
+#[test]
+fn what_weighs_nothing_has_no_limit_and_what_is_too_much_carries_nothing() {
+    let mut machine = machine("fried2008");
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    let hard = Effort { linear: 1e4, angular: 0.0 };
+    let quality = Workspace::new(&machine, hard).quality(&home);
+    assert!(quality.payload == 0.0 && quality.worst_force > machine.actuator.max_force, "{quality:?}");
+    machine.gravity = Vector3::zeros();
+    let still = Effort { linear: 0.0, angular: 0.0 };
+    let quality = Workspace::new(&machine, still).quality(&home);
+    assert_eq!((quality.worst_force, quality.payload), (0.0, f64::INFINITY));
+}
+
+/// Beside a home that is not singular, on its side; across, on the other.
+#[test]
+fn reach_ends_with_the_stroke_and_at_singular_poses() {
+    let machine = machine("motion_base");
+    let workspace = Workspace::new(&machine, Effort { linear: 1.0, angular: 1.0 });
+    let at = |z: f64| {
+        let [alpha, beta, gamma, x, y, _] = machine.home;
+        workspace.quality(&TaskState::at_rest([alpha, beta, gamma, x, y, z]).motion().pose)
+    };
+    let lengths = |z: f64| {
+        let [_, _, _, _, _, home] = machine.home;
+        let length = hexad::model::inverse_geometry::leg_lengths(
+            &machine,
+            &TaskState::at_rest([0.0, 0.0, 0.0, 0.0, 0.0, z]).motion().pose,
+        );
+        assert!(home > 0.0);
+        length
+    };
+    let home = at(machine.home[5]);
+    let longest = lengths(machine.home[5]).iter().fold(0.0_f64, |a, b| a.max(*b));
+    assert!((home.stroke_margin - (machine.actuator.max_length - longest)).abs() < 1e-12, "{home:?}");
+    assert!(home.within_reach() && home.determinant > 0.0);
+    assert!(!at(2.5).within_reach() && at(2.5).stroke_margin < 0.0);
+    // Flat on the base all legs lie in one plane; below, the mirror image has the same lengths.
+    assert!(at(0.0).condition > 1e12 && !(at(0.0).worst_force < 1e12), "{:?}", at(0.0));
+    let below = at(-machine.home[5]);
+    assert!(below.stroke_margin > 0.0 && below.determinant < 0.0 && !below.within_reach(), "{below:?}");
+}

@@ -1,0 +1,140 @@
+//! Regions that are said to be without obstacle have none, and hardly larger ones have one.
+
+use hexad::host::config::Config;
+use hexad::host::workspace::search::{Found, largest};
+use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::inverse_jacobian::scaled_wrenches;
+use hexad::model::machine::Machine;
+use hexad::model::rigid::{Pose, exp};
+use hexad::model::task::TaskState;
+use hexad::scene::clearance::{Clearance, Obstacle, Shape};
+use hexad::scene::reach::nominal_box;
+use indicatif::ProgressBar;
+
+use super::common::{data, deployed};
+use super::{directions, numbers};
+
+const SAMPLES: u32 = 50_000;
+const TURN: f64 = 0.17;
+
+fn found(config: &Config, shape: &Shape) -> Found {
+    let condition = config.deployment.limits.condition;
+    let clearance = Clearance::new(&config.machine, condition);
+    largest(&config.machine, &clearance, shape, &ProgressBar::hidden())
+}
+
+/// How far from the nearest end of a stroke, and what is said of a pose by singular values and a determinant of LU.
+fn margin(machine: &Machine, pose: &Pose) -> f64 {
+    let actuator = &machine.actuator;
+    let lengths = leg_lengths(machine, pose);
+    lengths
+        .iter()
+        .map(|l| (l - actuator.min_length).min(actuator.max_length - l))
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn is_fine(config: &Config, pose: &Pose) -> bool {
+    let machine = &config.machine;
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    let [here, there] = [pose, &home].map(|pose| scaled_wrenches(machine, pose));
+    let values = here.singular_values();
+    let inverse = values.iter().map(|value| value.powi(-2)).sum::<f64>().sqrt();
+    margin(machine, pose) >= -1e-12
+        && here.determinant() * there.determinant() > 0.0
+        && here.norm() * inverse <= config.deployment.limits.condition * (1.0 + 1e-9)
+}
+
+/// A pose of the ball: the k-th; half of them on its edge.
+fn of_ball(machine: &Machine, k: u32, radius: f64, turn: f64) -> Pose {
+    let [axis, way] = directions(k);
+    let [a, b, ..] = numbers(k + SAMPLES);
+    let share = |x: f64| if k % 2 == 0 { 1.0 } else { x.abs().cbrt() };
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    Pose {
+        rotation: exp(&(axis * turn * share(a))) * home.rotation,
+        position: home.position + way * radius * share(b),
+    }
+}
+
+/// A pose of the box: first all corners, then some inside.
+fn of_box(machine: &Machine, k: u32, size: f64) -> Pose {
+    let high = nominal_box(machine).pose_max;
+    let corner = |axis: usize| if k >> axis & 1 == 0 { -1.0 } else { 1.0 };
+    let share = |axis| if k < 64 { corner(axis) } else { numbers(k)[axis] };
+    let x = core::array::from_fn(|axis| machine.home[axis] + size * high[axis] * share(axis));
+    TaskState::at_rest(x).motion().pose
+}
+
+#[test]
+fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
+    for name in ["fried2008", "motion_base", "tsai2000", "reference"] {
+        let config = deployed(name);
+        let machine = &config.machine;
+        for turn in [0.0, TURN] {
+            let found = found(&config, &Shape::Ball { turn });
+            println!("{name}, turned {turn}: {found:?}");
+            assert!(found.guaranteed > 0.1 * machine.joints.radius, "{name}: {found:?}");
+            let bad = (0..SAMPLES).find(|k| !is_fine(&config, &of_ball(machine, *k, found.guaranteed, turn)));
+            assert_eq!(bad, None, "{name}: {found:?}");
+            // C comes as far along a leg as that leg has stroke left: that is the ball of an orientation.
+            let (size, obstacle) = found.obstacle.unwrap();
+            let least = (0..SAMPLES).map(|k| margin(machine, &of_ball(machine, 2 * k, 0.0, turn)));
+            let least = least.fold(f64::INFINITY, f64::min);
+            match obstacle {
+                Obstacle::Short(_) | Obstacle::Long(_) => {
+                    assert!(
+                        size <= least * (1.0 + 1e-9) && size > 0.98 * least,
+                        "{name}: {found:?}, {least}"
+                    );
+                }
+                _ => assert!(size < least, "{name}: {found:?}, {least}"),
+            }
+        }
+        let high = nominal_box(machine).pose_max;
+        let found = found(&config, &Shape::Box { low: high.map(|x| -x), high });
+        println!("{name}, box: {found:?}");
+        let fine = |size: f64| (0..SAMPLES).find(|k| !is_fine(&config, &of_box(machine, *k, size)));
+        assert_eq!(fine(found.guaranteed), None, "{name}: {found:?}");
+        assert!(fine(1.02 * found.obstacle.unwrap().0).is_some(), "{name}: {found:?}");
+    }
+}
+
+/// Within the stroke the bounds end next to what is in the way. (Where the condition is, they end earlier.)
+#[test]
+fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
+    for name in ["fried2008", "motion_base", "reference"] {
+        let config = deployed(name);
+        let high = nominal_box(&config.machine).pose_max;
+        let shapes = [
+            Shape::Ball { turn: 0.0 },
+            Shape::Ball { turn: TURN },
+            Shape::Box { low: high.map(|x| -x), high },
+        ];
+        for shape in shapes {
+            let found = found(&config, &shape);
+            let (size, _) = found.obstacle.unwrap();
+            assert!(
+                found.guaranteed <= size && found.guaranteed > 0.95 * size,
+                "{name}, {shape:?}: {found:?}"
+            );
+        }
+    }
+}
+
+/// Fichter: a quarter turn about the vertical makes this layout singular, whatever its size. A surface without
+/// thickness: no sample meets it.
+#[test]
+fn a_singular_surface_between_samples_is_found() {
+    let text = std::fs::read_to_string(data("motion_base", "toml")).unwrap();
+    let text = text
+        .replace("pose = [0.0, 0.0, 0.0,", &format!("pose = [0.0, 0.0, {},", 80_f64.to_radians()))
+        .replace("min_length_m = 1.1\nmax_length_m = 2.3", "min_length_m = 0.5\nmax_length_m = 4.0");
+    let config = Config::parse(&(text + "\n[limits]\ncondition = 1e6\n"), "turned.toml").unwrap();
+    let mut high = [0.0; 6];
+    high[2] = 1_f64.to_radians();
+    let found = found(&config, &Shape::Box { low: high.map(|x| -x), high });
+    let (size, obstacle) = found.obstacle.unwrap();
+    assert!(matches!(obstacle, Obstacle::Singular | Obstacle::Condition), "{found:?}");
+    assert!((size - 10.0).abs() < 1e-2, "{found:?}");
+    assert!(found.guaranteed > 9.9 && found.guaranteed < 10.0, "{found:?}");
+}
