@@ -147,7 +147,7 @@ fn judge_trajectory(
     let mut motions = vec![];
     for (k, row) in rows.iter().enumerate() {
         if k % 1024 == 0 && start.elapsed() > PATIENCE {
-            bar.get_or_insert_with(|| progress(rows.len())).set_position(k as u64);
+            bar.get_or_insert_with(|| progress(rows.len(), "rows")).set_position(k as u64);
         }
         let state = task_state(row);
         let sample = Sample::take(model, &state);

@@ -4,7 +4,7 @@ extern crate std;
 
 use std::path::Path;
 use std::prelude::rust_2024::*;
-use std::vec;
+use std::{format, vec};
 
 use indicatif::{ProgressBar, ProgressIterator, ProgressStyle};
 use nalgebra::Vector6;
@@ -61,7 +61,7 @@ pub fn inverse_dynamics(machine: &Machine, rung: Rung, table: &Table) -> (Writer
     }
     let motions: Vec<_> = table.rows().iter().map(|row| task_state(row).motion()).collect();
     let mut forces = vec![None; motions.len()];
-    let bar = progress(motions.len());
+    let bar = progress(motions.len(), "rows");
     batch::forces(&InverseDynamics::new(machine), rung, &motions, &mut forces, &bar);
     bar.finish_and_clear();
     let mut writer = Writer::new(&columns);
@@ -106,7 +106,7 @@ pub fn forward_kinematics(
     let mut unsolved = Unsolved::default();
     let home = Tracker::new(machine, TaskState::at_rest(machine.home).motion().pose);
     let (mut tracker, mut near) = (home, machine.home);
-    for row in table.rows().iter().progress_with(progress(table.rows().len())) {
+    for row in table.rows().iter().progress_with(progress(table.rows().len(), "rows")) {
         if start == Start::Home {
             (tracker, near) = (home, machine.home);
         }
@@ -135,9 +135,10 @@ pub(super) fn task_state(row: &[f64]) -> TaskState {
 }
 
 /// A bar on a terminal, nothing elsewhere.
-pub(super) fn progress(rows: usize) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {human_pos} of {human_len} rows, {eta} left");
-    ProgressBar::new(rows as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+pub(super) fn progress(count: usize, what: &str) -> ProgressBar {
+    let template = format!("{{bar:40}} {{human_pos}} of {{human_len}} {what}, {{eta}} left");
+    let style = ProgressStyle::with_template(&template);
+    ProgressBar::new(count as u64).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
 /// Counts the rows without solution.

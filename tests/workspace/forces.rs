@@ -1,6 +1,7 @@
 //! Worst forces and payloads, found again by the ordinary inverse dynamics over many directions.
 
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::ladder::Exact;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
@@ -104,22 +105,15 @@ fn reach_ends_with_the_stroke_and_at_singular_poses() {
         let [alpha, beta, gamma, x, y, _] = machine.home;
         workspace.quality(&TaskState::at_rest([alpha, beta, gamma, x, y, z]).motion().pose)
     };
-    let lengths = |z: f64| {
-        let [_, _, _, _, _, home] = machine.home;
-        let length = hexad::model::inverse_geometry::leg_lengths(
-            &machine,
-            &TaskState::at_rest([0.0, 0.0, 0.0, 0.0, 0.0, z]).motion().pose,
-        );
-        assert!(home > 0.0);
-        length
-    };
-    let home = at(machine.home[5]);
-    let longest = lengths(machine.home[5]).iter().fold(0.0_f64, |a, b| a.max(*b));
-    assert!((home.stroke_margin - (machine.actuator.max_length - longest)).abs() < 1e-12, "{home:?}");
+    let [.., z] = machine.home;
+    let home = at(z);
+    let lengths = leg_lengths(&machine, &TaskState::at_rest(machine.home).motion().pose);
+    let margin = machine.actuator.max_length - largest(&lengths);
+    assert!((home.stroke_margin - margin).abs() < 1e-12, "{home:?}");
     assert!(home.within_reach() && home.determinant > 0.0);
     assert!(!at(2.5).within_reach() && at(2.5).stroke_margin < 0.0);
     // Flat on the base all legs lie in one plane; below, the mirror image has the same lengths.
     assert!(at(0.0).condition > 1e12 && !(at(0.0).worst_force < 1e12), "{:?}", at(0.0));
-    let below = at(-machine.home[5]);
+    let below = at(-z);
     assert!(below.stroke_margin > 0.0 && below.determinant < 0.0 && !below.within_reach(), "{below:?}");
 }

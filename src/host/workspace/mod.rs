@@ -117,7 +117,7 @@ fn slices(machine: &Machine, effort: Effort, wish: &Wish, through: [f64; 6]) -> 
     let workspace = Workspace::new(machine, effort);
     let usual = Plane::usual(&machine.gravity);
     let planes = if wish.planes.is_empty() { &usual[..] } else { &wish.planes };
-    let bar = progress(planes.len() * wish.resolution * wish.resolution);
+    let bar = progress(planes.len() * wish.resolution * wish.resolution, "poses");
     let slice = |plane: &Plane| Slice::new(&workspace, machine, *plane, through, wish.resolution, &bar);
     let slices = planes.iter().map(slice).collect();
     bar.finish_and_clear();
@@ -130,7 +130,8 @@ fn regions(machine: &Machine, clearance: &Clearance, turn: f64, shape: &Limits) 
         Shape::Ball { turn },
         Shape::Box { low: shape.pose_min, high: shape.pose_max },
     ];
-    let bar = progress(shapes.len() * BUDGET as usize);
+    // Two searches for a ball, one for a box.
+    let bar = progress(5 * BUDGET as usize, "cells");
     let regions = shapes.map(|shape| largest(machine, clearance, &shape, &bar));
     bar.finish_and_clear();
     regions
@@ -176,20 +177,27 @@ impl fmt::Display for Survey {
         let [linear, angular] = [effort.linear, effort.angular].map(significant);
         writeln!(
             f,
-            "{name}: forces at rest under {linear} m/s2 and {angular} rad/s2, each in any direction\n"
+            "{name}: forces from rest under {linear} m/s2 and {angular} rad/s2, each in any direction\n"
         )?;
         writeln!(
             f,
-            "{:<12}{:>9}{:>10}{:>16}{:>16}{:>19}{:>19}",
-            "slice", "poses", "in reach", "margin [mm]", "condition", "worst force [N]", "payload [kg]"
+            "{:<12}{:>9}{:>10}{:>9}{:>13}{:>16}{:>18}{:>15}",
+            "slice",
+            "poses",
+            "in reach",
+            "usable",
+            "margin [mm]",
+            "condition",
+            "worst force [N]",
+            "payload [kg]"
         )?;
         for slice in &self.slices {
             self.fmt_slice(f, slice)?;
         }
         writeln!(
             f,
-            "in reach: within the stroke, on home's side of singular poses; usable: and condition up to {}, of these the \
-             numbers;\nthe actuators' limit is {} N\n",
+            "\nin reach: within the stroke, on home's side of singular poses; usable: and the condition is up to {}.\n\
+             Numbers are of usable poses; the actuators' limit is {} N.\n",
             significant(*largest_condition),
             significant(self.max_force)
         )?;

@@ -112,7 +112,7 @@ fn first_obstacle(clearance: &Clearance, shape: &Shape) -> (f64, Option<(f64, Ob
     };
     let (mut best, mut spread) = ([0.0; 6], 1.0);
     for k in 0..WAYS + NARROWER * TRIES {
-        if k >= WAYS && (k - WAYS) % TRIES == 0 {
+        if k >= WAYS && (k - WAYS).is_multiple_of(TRIES) {
             spread *= NARROWED;
         }
         let numbers = way(k, &best, spread);
