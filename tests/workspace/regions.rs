@@ -48,7 +48,7 @@ fn is_fine(config: &Config, pose: &Pose) -> bool {
 fn of_ball(machine: &Machine, k: u32, radius: f64, turn: f64) -> Pose {
     let [axis, way] = directions(k);
     let [a, b, ..] = numbers(k + SAMPLES);
-    let share = |x: f64| if k % 2 == 0 { 1.0 } else { x.abs().cbrt() };
+    let share = |x: f64| if k.is_multiple_of(2) { 1.0 } else { x.abs().cbrt() };
     let home = TaskState::at_rest(machine.home).motion().pose;
     Pose {
         rotation: exp(&(axis * turn * share(a))) * home.rotation,
@@ -119,6 +119,16 @@ fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
             );
         }
     }
+}
+
+/// A stroke of 25 mm has no room for ten degrees.
+#[test]
+fn a_turn_that_home_has_no_room_for_has_no_ball() {
+    let config = Config::load(&data("telescope", "toml")).unwrap();
+    let none = found(&config, &Shape::Ball { turn: TURN });
+    let (size, obstacle) = none.obstacle.unwrap();
+    assert!(none.guaranteed == 0.0 && size <= 0.0, "{none:?}");
+    assert!(matches!(obstacle, Obstacle::Short(_) | Obstacle::Long(_)), "{none:?}");
 }
 
 /// Fichter: a quarter turn about the vertical makes this layout singular, whatever its size. A surface without

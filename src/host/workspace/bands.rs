@@ -8,6 +8,8 @@ use crate::scene::workspace::Quality;
 
 /// Most bands of colour.
 pub const BANDS: usize = 10;
+/// The worst band is no thinner than this share of the range, so that two numbers do not read the same.
+const THINNEST: f64 = 0.05;
 /// From this ratio of its ends on a range is divided by ratios.
 const WIDE: f64 = 8.0;
 
@@ -20,6 +22,8 @@ pub struct Quantity {
     pub better: Better,
     /// Beyond it there is no colour.
     pub worst: f64,
+    /// Nor where the worst force is beyond this.
+    pub max_force: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +52,7 @@ impl Quantity {
             Better::Lower => {
                 let worst = if qualities.clone().all(|quality| good(&quality)) { high } else { self.worst };
                 let mut numbers = round_numbers(low, worst);
+                numbers.retain(|number| worst - number > THINNEST * (worst - low));
                 numbers.push(worst);
                 numbers.reverse();
                 numbers

@@ -90,25 +90,29 @@ impl Maps<'_> {
                 value: |quality| 1e3 * quality.stroke_margin,
                 better: Better::Higher,
                 worst: 0.0,
+                max_force: f64::INFINITY,
             },
             Quantity {
                 label: "condition",
                 value: |quality| quality.condition,
                 better: Better::Lower,
                 worst: self.largest_condition,
+                max_force: f64::INFINITY,
             },
             Quantity {
                 label: force_label,
                 value: |quality| quality.worst_force,
                 better: Better::Lower,
                 worst: max_force,
+                max_force,
             },
             Quantity {
                 label: payload_label,
                 value: |quality| quality.payload,
                 better: Better::Higher,
-                // Without a limit in words: none at all is what is beyond it.
+                // Nothing is what is beyond. It is the same for all poses there: only the forces say where it begins.
                 worst: f64::MIN_POSITIVE,
+                max_force,
             },
         ]
     }
@@ -166,7 +170,7 @@ impl Maps<'_> {
         samples.dedup_by_key(|(_, label)| *label);
         samples.push((rgb(BEYOND).mix(0.4).stroke_width(100), "beyond a limit"));
         let y = TITLE_HEIGHT + LEGEND_LINE / 2;
-        let mut left = Y_LABELS / 2;
+        let mut left = 2 * MARGIN;
         for (style, label) in samples {
             let line = vec![(left, y), (left + SAMPLE, y)];
             draw_line(root, line, style)?;
@@ -179,7 +183,7 @@ impl Maps<'_> {
     /// Right of a sample; returns where the next one begins.
     fn draw_label(&self, root: &Area, left: i32, y: i32, label: &str) -> Result<i32, DrawError> {
         root.draw_text(label, &text(12, HPos::Left), (left + SAMPLE + MARGIN, y))?;
-        Ok(left + SAMPLE + 4 * MARGIN + width(label))
+        Ok(left + SAMPLE + 2 * MARGIN + width(label))
     }
 }
 
@@ -241,8 +245,11 @@ impl Maps<'_> {
     /// other, each from and back to the first, by bridges without width.
     fn part(&self, slice: &Slice, quantity: &Quantity, threshold: f64) -> Vec<(f64, f64)> {
         let numbers = |quality: &Quality| {
-            let beyond = if threshold.is_nan() { 0.0 } else { quantity.beyond(quality, threshold) };
-            [quality.stroke_margin, quality.determinant, beyond]
+            let [beyond, spare] = match threshold {
+                _ if threshold.is_nan() => [0.0; 2],
+                _ => [quantity.beyond(quality, threshold), quantity.max_force - quality.worst_force],
+            };
+            [quality.stroke_margin, quality.determinant, beyond, spare]
         };
         let outlines = outlines(slice.count, |places| slice.at(places).map(numbers));
         let origin = outlines.first().and_then(|outline| outline.first()).copied();

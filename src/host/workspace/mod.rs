@@ -247,6 +247,9 @@ impl Survey {
             };
             write!(f, "{name:<45}{:>10}", size(found.guaranteed))?;
             match found.obstacle {
+                Some((at, obstacle)) if at <= 0.0 => {
+                    writeln!(f, "; without going anywhere {}", Reason(obstacle, self.largest_condition))?;
+                }
                 Some((at, obstacle)) => {
                     writeln!(f, "; at {} {}", size(at), Reason(obstacle, self.largest_condition))?;
                 }

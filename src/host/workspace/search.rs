@@ -61,7 +61,7 @@ pub fn largest(machine: &Machine, clearance: &Clearance, shape: &Shape, bar: &Pr
         (of_family(cell).then(|| clearance.least_margin(shape, cell)), met)
     };
     let within_stroke = search(shape.cell(0.0), start, arm, stroke, bar);
-    let start = within_stroke.obstacle.map_or(start, |met| (met.0, Some(met)));
+    let start = within_stroke.obstacle.map_or(start, |met| (met.0.max(0.0), Some(met)));
     let judge =
         |cell: &Cell| (shape.size(cell).filter(|_| !clearance.is_regular(shape, cell)), in_the_way(cell));
     let regular = search(shape.cell(start.0), start, arm, judge, bar);
