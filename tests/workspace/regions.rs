@@ -7,11 +7,12 @@ use hexad::model::inverse_jacobian::scaled_wrenches;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Pose, exp};
 use hexad::model::task::TaskState;
-use hexad::scene::clearance::{Clearance, Obstacle, Shape};
+use hexad::scene::clearance::{Cell, Clearance, Obstacle, Shape};
 use hexad::scene::reach::nominal_box;
 use indicatif::ProgressBar;
+use nalgebra::Vector3;
 
-use super::common::{data, deployed};
+use super::common::{data, deployed, rotation};
 use super::{directions, numbers};
 
 const SAMPLES: u32 = 50_000;
@@ -147,4 +148,65 @@ fn a_singular_surface_between_samples_is_found() {
     assert!(matches!(obstacle, Obstacle::Singular | Obstacle::Condition), "{found:?}");
     assert!((size - 10.0).abs() < 1e-2, "{found:?}");
     assert!(found.guaranteed > 9.9 && found.guaranteed < 10.0, "{found:?}");
+}
+
+/// A pose of a cell by numbers in -1..1, multiplied out without the code under test.
+fn of_cell(machine: &Machine, shape: &Shape, cell: &Cell, numbers: &[f64; 6]) -> Pose {
+    let p: [f64; 6] = core::array::from_fn(|axis| cell.middle[axis] + cell.half[axis] * numbers[axis]);
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    let [alpha, beta, gamma, ..] = machine.home;
+    let rotation = match shape {
+        Shape::Ball { .. } => rotation(p[0], p[1], p[2]) * home.rotation,
+        Shape::Box { .. } => rotation(alpha + p[0], beta + p[1], gamma + p[2]),
+    };
+    Pose { rotation, position: home.position + Vector3::new(p[3], p[4], p[5]) }
+}
+
+/// The bounds themselves, at their sharpest: the smallest limit of the condition that a cell is proved to keep, and its
+/// least margin, against poses of the cell, all corners among them.
+#[test]
+fn no_pose_of_a_cell_is_beyond_its_bounds() {
+    let (mut proved, mut sharpness) = (0, 0.0_f64);
+    for name in ["fried2008", "motion_base", "tsai2000", "reference"] {
+        let config = deployed(name);
+        let machine = &config.machine;
+        let radius = machine.joints.radius;
+        let shapes = [Shape::Ball { turn: 1.0 }, Shape::Box { low: [-1.0; 6], high: [1.0; 6] }];
+        for (k, shape) in (0..60).flat_map(|k| shapes.iter().map(move |shape| (k, shape))) {
+            let scales = [0.3, 0.3, 0.3, 0.2 * radius, 0.2 * radius, 0.2 * radius];
+            let (place, size) = (numbers(k), numbers(k + 1000));
+            let share = 0.6_f64.powi(k as i32 % 12);
+            let cell = Cell {
+                middle: core::array::from_fn(|axis| scales[axis] * place[axis]),
+                half: core::array::from_fn(|axis| share * scales[axis] * size[axis].abs()),
+            };
+            let (mut low, mut high) = (6.0_f64, 1e4_f64);
+            for _ in 0..40 {
+                let limit = (low * high).sqrt();
+                let keeps = Clearance::new(machine, limit).is_regular(shape, &cell);
+                (low, high) = if keeps { (low, limit) } else { (limit, high) };
+            }
+            let least = Clearance::new(machine, 100.0).least_margin(shape, &cell);
+            let home = TaskState::at_rest(machine.home).motion().pose;
+            let sign = scaled_wrenches(machine, &home).determinant();
+            let mut worst = 0.0_f64;
+            for j in 0..2000 {
+                let corner: [f64; 6] =
+                    core::array::from_fn(|axis| if j >> axis & 1 == 0 { -1.0 } else { 1.0 });
+                let pose = of_cell(machine, shape, &cell, &if j < 64 { corner } else { numbers(j) });
+                assert!(margin(machine, &pose) >= least - 1e-12, "{name}, cell {k}: {least}");
+                let wrenches = scaled_wrenches(machine, &pose);
+                let inverse = wrenches.try_inverse().map_or(f64::INFINITY, |inverse| inverse.norm());
+                worst = worst.max(wrenches.norm() * inverse);
+                assert!(high > 9e3 || worst <= high * (1.0 + 1e-9), "{name}, cell {k}: {worst} over {high}");
+                assert!(high > 9e3 || sign * wrenches.determinant() > 0.0, "{name}, cell {k}");
+            }
+            if high < 9e3 {
+                proved += 1;
+                sharpness = sharpness.max(worst / high);
+            }
+        }
+    }
+    println!("{proved} of 480 cells proved, the sharpest to {sharpness}");
+    assert!(proved > 200 && sharpness > 0.9, "{proved}, {sharpness}");
 }
