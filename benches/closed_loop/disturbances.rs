@@ -148,7 +148,7 @@ fn draw<'a>(
         x_label: sweep.x_label,
         y_label: "RMS position error [µm]",
         x: 0.8 * first..1.25 * last,
-        y: 0.5..2e4,
+        y: 0.1..2e4,
         points,
         lines,
         legend: vec![],

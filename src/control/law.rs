@@ -36,7 +36,8 @@
 //! So the error becomes that of the law alone times `s / (s + L)`: nothing at rest, about `w / L` of it at a
 //! frequency w below L. An integral alone, `L Kp` times that of e, does the same at rest, but takes damping from
 //! the loop instead of adding a pole: it is of use to a twentieth of the bandwidth, too slow for a load that moves.
-//! The observer may be as fast as the loop. It is off by default: what is stiffer against payloads is so against
+//! On the fast scene of `motion_base` (`tests/closed_loop/modes.rs`), a fifth heavier than modelled, the RMS error is
+//! 261 um with neither, 52 um with such an integral, 4.7 um with an observer as fast as the loop. It is off by default: what is stiffer against payloads is so against
 //! people too. d goes on only while no force is limited, and never beyond a share of the acceleration limits: no
 //! wind-up.
 

@@ -124,7 +124,8 @@ fn legs_that_move_together_have_the_gain_of_the_law_on_average() {
     }
 }
 
-/// What a push leaves fades, in each mode at its limit of bandwidth.
+/// At its limit of bandwidth each mode still has its gain margin: what a push leaves fades also where forces
+/// answer to errors twice as much as they should.
 #[test]
 fn the_largest_bandwidth_is_stable_in_every_mode() {
     for name in ["fried2008", "motion_base", "tsai2000"] {
@@ -144,21 +145,23 @@ fn the_largest_bandwidth_is_stable_in_every_mode() {
             let mut rig = Rig::new(&config, &config.machine);
             let home = TaskState::at_rest(config.machine.home);
             rig.engage(&home);
-            let mut cycles = |count: u32, push: f64| {
-                for _ in 0..count {
+            (0..2000).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
+            let (settled, holds) = (rig.simulator.state().pose.position, rig.force.unwrap());
+            let mut away = |cycles: u32, push: f64| {
+                for _ in 0..cycles {
                     let output = rig.controller.step(&rig.input(&home));
                     assert_eq!(output.state, State::Active, "{name} {}: {:?}", mode.name(), output.cause);
-                    let mut force = output.force;
+                    let answers = |leg: usize| holds[leg] + 2.0 * (output.force[leg] - holds[leg]);
+                    let mut force: [f64; 6] = core::array::from_fn(answers);
                     force[0] += push;
                     rig.pass(Some(force));
                 }
-                rig.simulator.state().pose.position
+                (rig.simulator.state().pose.position - settled).norm()
             };
-            let settled = cycles(2000, 0.0);
-            let pushed = (cycles(20, 0.01 * config.machine.actuator.max_force) - settled).norm();
-            let left = (cycles(2000, 0.0) - settled).norm();
+            let pushed = away(20, 0.01 * config.machine.actuator.max_force);
+            let left = away(2000, 0.0);
             println!("{name}, {}: to {largest} Hz, {pushed:e} m, {left:e} m are left", mode.name());
-            assert!(pushed > 1e-6 && left < 1e-3 * pushed, "{name} {}: {left} of {pushed}", mode.name());
+            assert!(pushed > 1e-7 && left < 1e-3 * pushed, "{name} {}: {left} of {pushed}", mode.name());
         }
     }
 }
@@ -189,7 +192,7 @@ fn every_mode_rides_through_missing_measurements() {
             tracking.position.rms()
         });
         println!("{}: {rms:?}", mode.name());
-        assert!(rms[1] < 3.0 * rms[0], "{}: {rms:?}", mode.name());
+        assert!(rms[1] < 1.1 * rms[0], "{}: {rms:?}", mode.name());
     }
 }
 

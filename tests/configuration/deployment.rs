@@ -67,6 +67,13 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
         ],
     );
     refused("[control]\nmode = \"joint_pd\"", &[]);
+    // What follows from a refused number is not said again.
+    refused(
+        "[control]\nposition_bandwidth_hz = 38\nobserver_bandwidth_hz = 5",
+        &[
+            "control.position_bandwidth_hz = 38: must be at most 37.028 at realtime.rate_hz = 1000 and position_damping_ratio = 1 (gain margin of 2)",
+        ],
+    );
     refused(
         "[control]\non_setpoint_lost = \"coast\"",
         &["control.on_setpoint_lost = \"coast\": must be one of \"fault\", \"park\""],

@@ -15,24 +15,30 @@ impl Controller {
         let Parameters { period_ns, law, rung, .. } = &self.parameters;
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = release_ns.saturating_add(period_ns / 2);
-        let desired = self.reference_at(middle_of_hold_ns).ok_or(Cause::SetpointLost)?;
+        let desired = self.reference_at(middle_of_hold_ns);
+        // Motions are long: borrowed, not copied.
+        let desired = desired.as_ref().ok_or(Cause::SetpointLost)?;
         let deviation = self.known_error.map_or(Deviation::from(&error), |known| known.acted_on);
         let asked = self.observer.asks(law, &deviation, *period_ns as f64 * 1e-9);
-        let (rung, motion, own) = match law.mode {
-            ControlMode::ComputedTorque => (Some(*rung), law.command(&desired, &error, &asked), [0.0; LEGS]),
-            ControlMode::FeedforwardJointPd => (Some(*rung), desired, law.leg_forces(&asked)),
-            ControlMode::GravityJointPd => (Some(Rung::Gravity), desired, law.leg_forces(&asked)),
-            ControlMode::JointPd => (None, desired, law.leg_forces(&asked)),
+        let command;
+        let (motion, rung) = match law.mode {
+            ControlMode::ComputedTorque => {
+                command = law.command(desired, &error, &asked);
+                (&command, Some(*rung))
+            }
+            ControlMode::FeedforwardJointPd => (desired, Some(*rung)),
+            ControlMode::GravityJointPd => (desired, Some(Rung::Gravity)),
+            ControlMode::JointPd => (desired, None),
         };
-        let mut force = own;
+        let mut force = if law.mode.acts_on_legs() { law.leg_forces(&asked) } else { [0.0; LEGS] };
         if let Some(rung) = rung {
-            let modelled = self.model.forces_of(rung, &motion).ok_or(Cause::SingularPose)?;
+            let modelled = self.model.forces_of(rung, motion).ok_or(Cause::SingularPose)?;
             force.iter_mut().zip(modelled).for_each(|(force, modelled)| *force += modelled);
         }
         if force.iter().any(|value| !value.is_finite()) {
             return Err(Cause::ForceNotFinite.into());
         }
-        let limited = self.within_limit(&force, &motion)?;
+        let limited = self.within_limit(&force, motion)?;
         output.force = self.within_rate(limited);
         output.limiting = output
             .limiting

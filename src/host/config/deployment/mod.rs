@@ -242,17 +242,14 @@ fn gains(
         let modes = if stiffest == 1.0 {
             String::new()
         } else {
-            format!(
-                " in the stiffest mode of the legs, \
-            which has {} times the gain",
-                rounded(stiffest)
-            )
+            format!(" in the stiffest mode of the legs, which has {} times the gain", rounded(stiffest))
         };
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
              (gain margin of {MIN_GAIN_MARGIN}{modes})"
         );
         section.refuse(bandwidth_key, bound);
+        return [f64::NAN, damping_ratio];
     }
     [bandwidth_hz, damping_ratio]
 }
