@@ -198,7 +198,7 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
         let mut seen = None;
         let mut missed = false;
         loop {
-            let timeout_at_ns = done_ns + timeout_ns;
+            let timeout_at_ns = done_ns.saturating_add(timeout_ns);
             let rung = self.side.bell.wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
             if stop.load(Ordering::Relaxed) {
                 break;
