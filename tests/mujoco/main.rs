@@ -5,6 +5,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod in_the_loop;
+mod layouts;
 mod python;
 
 use std::ffi::OsStr;

@@ -14,11 +14,11 @@ use heapless::spsc::Producer;
 
 use crate::control::controller::{Asked, Measurement, Output, Setpoint};
 use crate::control::state::{Cause, Request, State};
+use crate::host::lockstep::look_until;
 use crate::ipc::exchange::{CycleInput, CycleOutput, IoSide};
 use crate::ipc::messages::{
     CommandMessage, ForceMessage, Header, MeasuredMessage, SetpointMessage, StatusMessage,
 };
-use crate::host::lockstep::look_until;
 use crate::ipc::ports::{Bus, PortError, Rejected, Sink, Source, Time};
 use crate::ipc::statistics::Statistics;
 use crate::model::task::{TaskState, task_coordinates};
@@ -194,7 +194,12 @@ impl Io<'_> {
     fn run_in_lockstep(&mut self, stop: &AtomicBool) {
         let mut answered_ns = None;
         let stop = || stop.load(Ordering::Relaxed);
-        while let Some(measured) = look_until(stop, || self.ports.measured.receive()) {
+        let next = |io: &mut Self| {
+            // Whether the daemon may end is heard while everybody waits, too.
+            io.publish_new();
+            io.ports.measured.receive()
+        };
+        while let Some(measured) = look_until(stop, || next(self)) {
             let time_ns = measured.header.time_ns;
             // Who is not answered at once says it again.
             if answered_ns == Some(time_ns) {
@@ -357,11 +362,7 @@ impl Pause {
 }
 
 fn measurement(message: &MeasuredMessage) -> Measurement {
-    Measurement {
-        time_ns: message.header.time_ns,
-        length: message.length_m,
-        rate: message.length_rate_m_s,
-    }
+    Measurement { time_ns: message.header.time_ns, length: message.length_m, rate: message.length_rate_m_s }
 }
 
 fn force_message(cycle: &CycleOutput) -> ForceMessage {

@@ -144,7 +144,10 @@ pub(super) fn read(mut section: Reader) -> Realtime {
         );
     }
     if realtime.release == ReleaseKey::Lockstep && realtime.require_realtime {
-        section.refuse("require_realtime", "must be false with realtime.release = \"lockstep\" (simulated time)");
+        section.refuse(
+            "require_realtime",
+            "must be false with realtime.release = \"lockstep\" (simulated time)",
+        );
     }
     if realtime.release == ReleaseKey::Lockstep && realtime.on_overrun != OnOverrun::Skip {
         section.refuse(

@@ -1,0 +1,59 @@
+//! The structs of `tests/clients/hexad.py` are those of `src/ipc/messages.rs`. That they have the names of the
+//! documentation shows when they connect.
+
+use std::mem::{align_of, offset_of, size_of};
+
+use crate::python;
+use hexad::ipc::messages::{
+    CommandMessage, ForceMessage, Header, MeasuredMessage, Message, SCHEMA, SetpointMessage, StatusMessage,
+};
+use hexad::ipc::statistics::{LoopTimes, Statistics, Times, WorstCycle};
+
+/// A line for the struct and one for each of its fields: a field that is not listed here does not compile.
+macro_rules! layout {
+    ($type:ident, $name:expr, $($field:ident)*) => {{
+        let $type { $($field: _,)* } = $type::default();
+        let mut lines = format!("{} {} {}\n", $name, size_of::<$type>(), align_of::<$type>());
+        $(lines += &format!("  {} {}\n", stringify!($field), offset_of!($type, $field));)*
+        lines
+    }};
+}
+
+const PRINT: &str = "
+import ctypes, hexad
+print(hexad.SCHEMA)
+for name in ['Header', 'Setpoint', 'Measured', 'Force', 'Command', 'Status',
+             'Statistics', 'LoopTimes', 'Times', 'WorstCycle']:
+    struct = getattr(hexad, name)
+    print(getattr(struct, 'topic', name), ctypes.sizeof(struct), ctypes.alignment(struct))
+    for field, *_ in struct._fields_:
+        print(' ', field, getattr(struct, field).offset)
+";
+
+#[test]
+fn python_declares_the_documented_structs() {
+    let ours = [
+        format!("{SCHEMA}\n"),
+        layout!(Header, "Header", schema reserved epoch sequence time_ns),
+        layout!(SetpointMessage, SetpointMessage::TOPIC, header x x_rate x_accel),
+        layout!(MeasuredMessage, MeasuredMessage::TOPIC,
+            header length_m length_rate_m_s pose_valid reserved x twist),
+        layout!(ForceMessage, ForceMessage::TOPIC,
+            header force_n valid state fault limiting release_ns checksum reserved),
+        layout!(CommandMessage, CommandMessage::TOPIC, header request reserved),
+        layout!(StatusMessage, StatusMessage::TOPIC,
+            header state fault refused limiting fault_value fault_bound fault_index reserved
+            answered_epoch answered_sequence pose_valid error_valid x twist
+            position_error_m orientation_error_rad
+            cycles late_wakeups overruns skipped caught_up allocations io_allocations
+            without_measurement without_setpoint
+            rejected_schema rejected_older_source rejected_repeated statistics),
+        layout!(Statistics, "Statistics", window total worst),
+        layout!(LoopTimes, "LoopTimes", wakeup_ns compute_ns measured_age_ns end_to_end_ns),
+        layout!(Times, "Times", count min mean p50 p90 p99 p999 p9999 max),
+        layout!(WorstCycle, "WorstCycle",
+            cycle due_ns wakeup_ns compute_ns io_late involuntary_switches page_faults steal_ms),
+    ]
+    .concat();
+    assert_eq!(python::printed(PRINT), ours);
+}
