@@ -149,6 +149,14 @@ def sleep_until(instant_ns):
     time.sleep(max(0.0, (instant_ns - monotonic_ns()) * 1e-9))
 
 
+def be_punctual():
+    """Before everything that is not real-time, where this is allowed, so that a busy machine does not make us late."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError:
+        pass
+
+
 class Bus:
     """Participation in the topics of one machine; `simulated` as of a daemon with release = "lockstep"."""
 

@@ -128,11 +128,15 @@ class Machine:
         self.follow_lengths()
         mujoco.mj_step(self.model, self.data, nstep=steps)
 
-    def twist(self):
+    def velocities(self):
+        """Of all joints at the instant of their positions: MuJoCo's are those of half a step before."""
+        return self.data.qvel + 0.5 * self.model.opt.timestep * self.data.qacc
+
+    def twist(self, velocities):
         """omega [rad/s], then v [m/s] of the platform in the base."""
         r = np.zeros(9)
         mujoco.mju_quat2Mat(r, self.data.qpos[self.free_qpos[3:]])
-        v, w = np.split(self.data.qvel[self.free_dof], 2)
+        v, w = np.split(velocities[self.free_dof], 2)
         return np.array([*(r.reshape(3, 3) @ w), *v])
 
     def gaps(self):

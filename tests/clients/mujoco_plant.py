@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 
-from hexad import Bus, Force, Measured, monotonic_ns, sleep_until
+from hexad import Bus, Force, Measured, be_punctual, monotonic_ns, sleep_until
 from mujoco_machine import COORDINATES, LEGS, Machine, write_rows
 
 # Without an answer a measurement is said again: nobody may have been there [ns].
@@ -20,12 +20,13 @@ REPEAT_NS = 100_000_000
 
 
 def measurement(machine):
+    velocities = machine.velocities()
     return Measured(
         length_m=tuple(machine.lengths),
-        length_rate_m_s=tuple(machine.rates),
+        length_rate_m_s=tuple(velocities[machine.prismatic_dof]),
         pose_valid=1,
         x=tuple(machine.coordinates()),
-        twist=tuple(machine.twist()),
+        twist=tuple(machine.twist(velocities)),
     )
 
 
@@ -41,6 +42,7 @@ def drive(machine, measured, force, steps, rows):
 def run_in_real_time(machine, bus, period_ns, rows):
     forces, source = bus.subscriber(Force), bus.publisher(Measured)
     steps = round(period_ns * 1e-9 / machine.model.opt.timestep)
+    be_punctual()
     tick_ns = (monotonic_ns() // period_ns + 1) * period_ns
     force = None
     while True:

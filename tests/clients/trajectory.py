@@ -14,7 +14,7 @@ import os
 import numpy as np
 
 from hexad import ACTIVE, ENGAGE, READY_TO_ENGAGE
-from hexad import Bus, Command, Measured, Setpoint, Status, monotonic_ns, sleep_until
+from hexad import Bus, Command, Measured, Setpoint, Status, be_punctual, monotonic_ns, sleep_until
 from mujoco_machine import COORDINATES, rows_of, write_rows
 
 # How long to stand at the end [s]: the platform is a little behind.
@@ -71,6 +71,7 @@ class Player:
 
 def run_in_real_time(bus, player, period_ns, rows):
     setpoints = bus.publisher(Setpoint)
+    be_punctual()
     tick_ns = (monotonic_ns() // period_ns + 1) * period_ns
     while (setpoint := player.setpoint(tick_ns)) is not None:
         setpoints.publish(tick_ns, setpoint)

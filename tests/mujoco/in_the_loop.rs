@@ -3,8 +3,10 @@
 
 use std::collections::HashMap;
 use std::fs::{self, File};
+use std::panic::{catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{self, Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::{panicking, sleep};
 use std::time::{Duration, Instant};
 
@@ -22,6 +24,7 @@ use hexad::scene::motions::{Motion as Scene, fit};
 use nalgebra::Vector6;
 
 use crate::common::{Errors, Table, largest};
+use crate::stalls::Watchdog;
 use crate::{DEPLOYED, file, python};
 
 const PERIOD_NS: u64 = 1_000_000;
@@ -33,6 +36,27 @@ const ROW_S: f64 = 0.01;
 
 /// Longer than this nothing takes, on any host.
 const HANG: Duration = Duration::from_secs(120);
+
+const LOCKSTEP: &str = "[realtime]\nrelease = \"lockstep\"";
+
+/// Timeouts that hardly a stall of the host reaches, but for the driver's own.
+const REAL_TIME: &str = "
+[realtime]
+release = \"external\"
+[timeouts]
+setpoint_ms = 200.0
+measured_ms = 200.0
+";
+
+/// What a run in real time does not survive, half of the driver's timeout, and how often it is tried.
+const HELD: Duration = Duration::from_millis(25);
+const ATTEMPTS: u32 = 5;
+
+/// Each of these keeps two processors busy.
+fn turn() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// One run in a folder of its own.
 struct Stage {
@@ -54,6 +78,8 @@ struct Period {
 struct Run {
     position: Errors,
     orientation: Errors,
+    /// Median \[m\].
+    typical_position: f64,
     /// Differences to the inverse dynamics of the motion made, as shares of the largest force at the instant.
     force: Errors,
     /// Periods under control that were compared.
@@ -167,13 +193,14 @@ impl Stage {
         let played: HashMap<_, _> =
             (0..table.rows.len()).map(|row| (number(row), table.coordinates(row, ""))).collect();
         let [mut position, mut orientation, mut force] = [Errors::default(); 3];
-        let mut compared = 0;
+        let mut away = vec![];
         for pair in periods.windows(2) {
             let [now, next] = pair else { unreachable!() };
             let (Some(pushed), Some(desired)) = (now.force, played.get(&now.time_ns)) else { continue };
             let pose = |x: Vector6<f64>| TaskState::at_rest(x.into()).motion().pose;
             let error = pose(now.x).displacement_to(&pose(*desired));
             position.add(error.linear.norm());
+            away.push(error.linear.norm());
             orientation.add(error.angular.norm());
             // The force is constant in the period, and so nearly is the acceleration.
             let motion = Motion {
@@ -185,9 +212,9 @@ impl Stage {
             for (pushed, offline_leg) in pushed.iter().zip(&offline) {
                 force.add((pushed - offline_leg) / largest(&offline));
             }
-            compared += 1;
         }
-        Run { position, orientation, force, periods: compared }
+        away.sort_unstable_by(f64::total_cmp);
+        Run { position, orientation, typical_position: away[away.len() / 2], force, periods: away.len() }
     }
 }
 
@@ -284,7 +311,7 @@ impl Drop for Process {
 
 impl Run {
     fn print(&self, what: &str) {
-        let Self { position, orientation, force, periods } = self;
+        let Self { position, orientation, force, periods, .. } = self;
         println!(
             "{what}: {periods} periods; position RMS {:.2e} max {:.2e} m, orientation RMS {:.2e} max {:.2e} rad; \
              forces off inverse dynamics: RMS {:.1e} max {:.1e}",
@@ -298,13 +325,55 @@ impl Run {
     }
 }
 
+/// Daemon and plant have the same parameters, so what is off is what a period makes of a force, in both engines alike.
 #[test]
 fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
+    let _turn = turn();
     for machine in DEPLOYED {
-        let [mujoco, ours] =
-            ["mujoco", "ours"].map(|who| Stage::new(machine, who, "[realtime]\nrelease = \"lockstep\""));
+        let [mujoco, ours] = ["mujoco", "ours"].map(|who| Stage::new(machine, who, LOCKSTEP));
         let (mujoco, ours) = (mujoco.with_mujoco(), ours.with_ours());
         mujoco.print(&format!("{machine} in MuJoCo"));
         ours.print(&format!("{machine} in our plant"));
+        assert!(ours.periods > (SECONDS / PERIOD_S) as usize && mujoco.periods == ours.periods);
+        for (what, mujoco, ours) in [
+            ("position", mujoco.position, ours.position),
+            ("orientation", mujoco.orientation, ours.orientation),
+        ] {
+            for (mujoco, ours) in [(mujoco.rms(), ours.rms()), (mujoco.max, ours.max)] {
+                let ratio = mujoco / ours;
+                assert!(
+                    (0.5..1.5).contains(&ratio),
+                    "{machine}, {what}: {ratio} times the error in our plant"
+                );
+            }
+        }
+        // Not zero: the other engine is there.
+        assert!((1e-6..0.01).contains(&mujoco.force.max), "{machine}: forces {:?}", mujoco.force);
+        assert!((1e-9..1e-5).contains(&ours.force.max), "{machine}: forces of our plant {:?}", ours.force);
+    }
+}
+
+/// The drives are the clock, and time is everybody's. While the host holds somebody the platform drifts, rightly: the
+/// typical error counts. Where it held somebody for longer than a driver waits, it is tried again.
+#[test]
+fn a_platform_in_mujoco_moves_in_real_time() {
+    let _turn = turn();
+    for attempt in 1.. {
+        let host = Watchdog::start();
+        let stage = Stage::new("fried2008", &format!("real{attempt}"), REAL_TIME);
+        let run = catch_unwind(|| stage.with_mujoco());
+        let held = host.largest();
+        match run {
+            Ok(run) => {
+                run.print("fried2008 in MuJoCo, in real time");
+                println!("typically {:.1e} m off; the host held somebody for {held:?}", run.typical_position);
+                assert!(run.periods > (SECONDS / PERIOD_S) as usize / 2, "{} periods", run.periods);
+                assert!((1e-8..20e-6).contains(&run.typical_position), "{} m", run.typical_position);
+                assert!((1e-6..0.01).contains(&run.force.max), "forces {:?}", run.force);
+                return;
+            }
+            Err(failure) if held < HELD || attempt == ATTEMPTS => resume_unwind(failure),
+            Err(_) => println!("attempt {attempt} failed; the host held somebody for {held:?}"),
+        }
     }
 }

@@ -8,6 +8,8 @@ mod common;
 mod in_the_loop;
 mod layouts;
 mod python;
+#[path = "../processes/support/stalls.rs"]
+mod stalls;
 
 use std::ffi::OsStr;
 use std::fs;
