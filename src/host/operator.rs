@@ -92,6 +92,8 @@ pub struct Operator {
     commands: Source<CommandMessage>,
     statuses: Sink<StatusMessage>,
     time: Time,
+    /// The first message of the present request.
+    first: (u64, u64),
     /// Of the newest status \[ns\]: in simulated time, that is now.
     heard_ns: u64,
 }
@@ -99,7 +101,8 @@ pub struct Operator {
 impl Operator {
     /// Joins the topics of a machine.
     pub fn new(bus: &Bus) -> Result<Self, PortError> {
-        Ok(Self { commands: bus.source()?, statuses: bus.sink(8)?, time: bus.time(), heard_ns: 0 })
+        let (commands, statuses) = (bus.source()?, bus.sink(8)?);
+        Ok(Self { commands, statuses, time: bus.time(), first: (u64::MAX, 0), heard_ns: 0 })
     }
 
     /// Sends a request, without waiting.
@@ -133,20 +136,19 @@ impl Operator {
         let mut heard = Instant::now();
         let mut accepted = false;
         let (mut state, mut reason) = (State::default(), Reason::default());
-        let mut first = None;
+        self.first = self.commands.next_message();
         loop {
             if !accepted && asked.is_none_or(|asked| asked.elapsed() > REPEAT) {
                 self.ask(request)?;
-                first.get_or_insert(self.commands.last_message());
                 asked = Some(Instant::now());
             }
             if let Some(status) = self.status() {
                 heard = Instant::now();
                 state = State::from_number(status.state).unwrap_or_default();
                 reason = Reason::new(Cause::from_number(status.fault).unwrap_or_default(), &status);
-                if first.is_some_and(|(epoch, sequence)| {
-                    status.answered_epoch == epoch && status.answered_sequence >= sequence
-                }) {
+                if (status.answered_epoch, status.answered_sequence) >= self.first
+                    && status.answered_epoch == self.first.0
+                {
                     match Cause::from_number(status.refused).unwrap_or_default() {
                         Cause::None => accepted = true,
                         _ if accepted => {}

@@ -83,7 +83,7 @@ pub enum Time {
     /// CLOCK_MONOTONIC. Topics `hexad/<name>/...`.
     #[default]
     Real,
-    /// That of the measured messages, which wait for everybody: `release = "lockstep"`. It has topics of its own,
+    /// That of the measured messages, while everybody waits for everybody: `release = "lockstep"`. Topics
     /// `hexad-simulated/<name>/...`, so that no hardware ever listens to it.
     Simulated,
 }
@@ -102,7 +102,7 @@ pub struct Bus {
     node: Node<ipc::Service>,
     machine: String,
     time: Time,
-    epoch: Option<u64>,
+    epoch: u64,
 }
 
 impl Bus {
@@ -111,7 +111,7 @@ impl Bus {
         Self::join_in(machine, Time::Real)
     }
 
-    /// The same in a time. In simulated time the epoch is that of the first message.
+    /// The same in a time.
     pub fn join_in(machine: &str, time: Time) -> Result<Self, PortError> {
         // Its log goes to `tracing`; what it warns about (dead nodes cleaned up) is routine here.
         set_log_level(LogLevel::Error);
@@ -126,7 +126,7 @@ impl Bus {
                  participants of a machine run as one user",
                 config.global.root_path()
             )))?;
-        Ok(Self { node, machine: machine.into(), time, epoch: (time == Time::Real).then(monotonic_ns) })
+        Ok(Self { node, machine: machine.into(), time, epoch: monotonic_ns() })
     }
 
     /// Which time its participants live in.
@@ -182,7 +182,7 @@ impl Bus {
             .publisher_builder()
             .create()
             .map_err(failed(format!("cannot publish {}", T::TOPIC)))?;
-        Ok(Source { publisher, epoch: self.epoch, sequence: 0 })
+        Ok(Source { publisher, epoch: Some(self.epoch), sequence: 0 })
     }
 
     /// A subscriber to `T` that keeps up to `depth` messages.
@@ -214,9 +214,15 @@ pub struct Source<T: Message> {
 }
 
 impl<T: Message> Source<T> {
-    /// Epoch and sequence number of the last message that was sent.
-    pub fn last_message(&self) -> (u64, u64) {
-        (self.epoch.unwrap_or_default(), self.sequence)
+    /// The same, with the time of its first message as the epoch: in simulated time all that it says is then the same
+    /// in each run.
+    pub fn reproducible(self) -> Self {
+        Self { epoch: None, ..self }
+    }
+
+    /// Epoch and sequence number that the next message will have.
+    pub fn next_message(&self) -> (u64, u64) {
+        (self.epoch.unwrap_or_default(), self.sequence + 1)
     }
 
     /// Fills in the header and sends. `time_ns` is the instant at which the content holds.
@@ -293,11 +299,8 @@ impl<T: Message> Sink<T> {
             let header = message.header();
             let order = (header.epoch, header.sequence);
             // A life that has not begun (another clock) would outrank all that come after it.
-            let has_begun = header.epoch
-                <= match self.time {
-                    Time::Real => monotonic_ns(),
-                    Time::Simulated => header.time_ns,
-                };
+            // Simulated time has no other clock.
+            let has_begun = self.time == Time::Simulated || header.epoch <= monotonic_ns();
             let is_readable = header.schema == SCHEMA && message.is_whole() && has_begun;
             if is_readable && order > (self.epoch, self.sequence) {
                 let same_life = header.epoch == self.epoch;

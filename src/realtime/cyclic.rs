@@ -44,7 +44,7 @@ pub enum Release {
     /// A point of the grid. The last `max_lead_ns` at most are spun; 0 sleeps.
     Grid { max_lead_ns: u64 },
     /// A measured message, rung for by the io thread. When none comes for `timeout_ns`, a cycle is run all
-    /// the same, so that the loss is noticed.
+    /// the same, so that the loss is noticed. In simulated time there is no such end.
     External { timeout_ns: u64 },
 }
 

@@ -177,8 +177,7 @@ class Bus:
         return builder.open_or_create()
 
     def publisher(self, message):
-        epoch = None if self.simulated else monotonic_ns()
-        return Publisher(self._service(message).publisher_builder().create(), epoch)
+        return Publisher(self._service(message).publisher_builder().create())
 
     def subscriber(self, message, depth=8):
         port = self._service(message).subscriber_builder().buffer_size(depth).create()
@@ -198,12 +197,11 @@ def places():
 class Publisher:
     """Numbers what it publishes."""
 
-    def __init__(self, port, epoch):
-        self.port, self.epoch, self.sequence = port, epoch, 0
+    def __init__(self, port):
+        self.port, self.epoch, self.sequence = port, monotonic_ns(), 0
 
     def publish(self, time_ns, message):
         """`time_ns` is the instant at which the content holds."""
-        self.epoch = time_ns if self.epoch is None else self.epoch
         self.sequence += 1
         message.header = Header(SCHEMA, 0, self.epoch, self.sequence, time_ns)
         self.port.send_copy(message)
@@ -221,7 +219,7 @@ class Subscriber:
             message = self.message.from_buffer_copy(sample.payload().contents)
             header = message.header
             order = (header.epoch, header.sequence)
-            has_begun = header.epoch <= (header.time_ns if self.simulated else monotonic_ns())
+            has_begun = self.simulated or header.epoch <= monotonic_ns()
             if header.schema == SCHEMA and has_begun and order > self.last and message.is_whole():
                 self.last = order
                 return message

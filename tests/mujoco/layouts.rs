@@ -57,3 +57,19 @@ fn python_declares_the_documented_structs() {
     .concat();
     assert_eq!(python::printed(PRINT), ours);
 }
+
+#[test]
+fn the_documented_sizes_are_right() {
+    let size = [
+        format!("{} {}", SetpointMessage::TOPIC, size_of::<SetpointMessage>()),
+        format!("{} {}", MeasuredMessage::TOPIC, size_of::<MeasuredMessage>()),
+        format!("{} {}", CommandMessage::TOPIC, size_of::<CommandMessage>()),
+        format!("{} {}", ForceMessage::TOPIC, size_of::<ForceMessage>()),
+        format!("{} {}", StatusMessage::TOPIC, size_of::<StatusMessage>()),
+    ]
+    .join(", ");
+    assert!(
+        include_str!("../../src/ipc/messages.rs").contains(&format!("| size in bytes | {size} |")),
+        "{size}"
+    );
+}

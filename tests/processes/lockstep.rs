@@ -16,6 +16,7 @@ use hexad::realtime::setup::scheduling;
 
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PERIOD_NS};
+use crate::support::operator;
 use crate::support::recorder::Recorder;
 use crate::support::turns;
 
@@ -71,6 +72,8 @@ impl Build {
             let mut measured = bus.source::<MeasuredMessage>().expect("to publish");
             let mut forces = bus.sink::<ForceMessage>(8).expect("to subscribe");
             let mut hardware = hardware(&Config::load(&machine.file).expect("the machine file"));
+            let driver = Bus::join(&machine.name).expect("to join");
+            let mut driver = driver.sink::<ForceMessage>(1).expect("to subscribe");
             let (daemon, source) = self.start_both(&machine);
             let mut said: Vec<ForceMessage> = vec![];
             let mut began = Instant::now();
@@ -102,6 +105,7 @@ impl Build {
                 began = if said.len() == 1 { Instant::now() } else { began };
             }
             let took = began.elapsed();
+            assert_eq!(driver.newest(), None, "a driver of the same machine");
             assert_eq!(source.ends_within(HANG).status.code(), Some(0));
             let ended = daemon.stops_on("TERM", HANG);
             assert!(ended.stderr.contains("TIME IS SIMULATED"), "{}", ended.stderr);
@@ -178,6 +182,23 @@ fn in_lock_step_the_forces_are_the_same_bytes_on_one_processor_and_on_two() {
     println!("{simulated:?} of simulated time on one processor in {took:?}");
     assert_same(&first, &alone, "on one processor");
     assert_heard(&first, &Build::this(None).forces_overheard(), "with hexad plant");
+}
+
+/// They stamp with what they have heard, as there is no other time.
+#[test]
+fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
+    let _turn = turns::beside_others();
+    let machine = Machine::with("lock-step-operated", LOCKSTEP);
+    let daemon = Hexad::start::<&str>(&machine, "run", &[]);
+    let plant = Hexad::start::<&str>(&machine, "plant", &[]);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "10000"]);
+    operator::engage(&machine);
+    operator::does(&machine, "stop", &[], &["standby"]);
+    operator::engage(&machine);
+    let ended = daemon.stops_on("TERM", HANG);
+    assert!(!ended.stderr.contains("did not come to rest"), "{}", ended.stderr);
+    source.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
 }
 
 /// Debug, if this is release, and the other way round.

@@ -33,6 +33,7 @@ mod lockstep;
 mod orderly_stop;
 mod overruns;
 mod paused;
+mod readme;
 mod refusals;
 mod requests;
 mod rounds;

@@ -97,11 +97,12 @@ pub struct IoReport {
 impl Ports {
     /// Opens all.
     pub fn open(bus: &Bus) -> Result<Self, PortError> {
+        let force = bus.source()?;
         Ok(Self {
             setpoint: bus.sink(INPUT_DEPTH)?,
             measured: bus.sink(INPUT_DEPTH)?,
             command: bus.sink(usize::MAX)?,
-            force: bus.source()?,
+            force: if bus.time() == Time::Simulated { force.reproducible() } else { force },
             status: bus.source()?,
         })
     }
