@@ -57,8 +57,9 @@ mod statistics;
 /// Name of the real-time thread, by which a running daemon is found.
 pub const REALTIME_THREAD: &str = "hexad-rt";
 
-/// Stack of each thread: several times what they use, and small because locked memory holds all of it.
-const STACK: usize = 512 * 1024;
+/// Stack of each thread: several times what they use, and small because locked memory holds all of it. A debug build keeps
+/// every intermediate value there.
+const STACK: usize = if cfg!(debug_assertions) { 8 << 20 } else { 512 * 1024 };
 
 /// Longest the daemon waits for the platform to come to rest before it ends: a service manager's patience
 /// is longer.
