@@ -194,8 +194,7 @@ impl Stage {
             (0..table.rows.len()).map(|row| (number(row), table.coordinates(row, ""))).collect();
         let [mut position, mut orientation, mut force] = [Errors::default(); 3];
         let mut away = vec![];
-        for pair in periods.windows(2) {
-            let [now, next] = pair else { unreachable!() };
+        for (now, next) in periods.iter().zip(&periods[1..]) {
             let (Some(pushed), Some(desired)) = (now.force, played.get(&now.time_ns)) else { continue };
             let pose = |x: Vector6<f64>| TaskState::at_rest(x.into()).motion().pose;
             let error = pose(now.x).displacement_to(&pose(*desired));
