@@ -73,3 +73,22 @@ fn the_documented_sizes_are_right() {
         "{size}"
     );
 }
+
+/// A force of simulated time 1 s, good but for one thing at a time.
+const JUDGE: &str = "
+import hexad, zlib
+def judged(now_ns=1_000_000_000, **fields):
+    force = hexad.Force(hexad.Header(hexad.SCHEMA, 0, 7, 1, 1_000_000_000), valid=1, force_n=(1, 2, 3, 4, 5, 6))
+    damaged = fields.pop('damaged', 0)
+    for name, value in fields.items():
+        setattr(force, name, value)
+    force.checksum = damaged ^ zlib.crc32(bytes(force)[:hexad.Force.checksum.offset])
+    return force.may_be_applied(now_ns)
+print(judged(), judged(now_ns=1_050_000_000), judged(now_ns=1_050_000_001), judged(now_ns=999_999_999))
+print(judged(valid=0), judged(damaged=1), judged(force_n=(1, 2, 3, 4, 5, float('nan'))))
+";
+
+#[test]
+fn python_applies_no_force_that_is_old_or_early_or_not_valid_or_damaged() {
+    assert_eq!(python::printed(JUDGE), "True True False False\nFalse False False\n");
+}
