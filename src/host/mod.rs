@@ -18,6 +18,8 @@ pub mod faults;
 pub mod fidelity;
 pub mod files;
 pub mod histogram;
+mod join;
+mod lockstep;
 mod numbers;
 pub mod offline;
 pub mod operator;

@@ -12,10 +12,11 @@ use std::thread;
 use std::time::Instant;
 
 use super::config::Config;
+use super::join::join;
 use super::stop::Stop;
 use crate::control::state::{Cause, Request, State};
 use crate::ipc::messages::{CommandMessage, StatusMessage};
-use crate::ipc::ports::{Bus, PortError, Sink, Source};
+use crate::ipc::ports::{Bus, PortError, Sink, Source, Time};
 use crate::realtime::clock::monotonic_ns;
 
 /// How often to look for an answer.
@@ -90,26 +91,35 @@ impl fmt::Display for Reason {
 pub struct Operator {
     commands: Source<CommandMessage>,
     statuses: Sink<StatusMessage>,
+    time: Time,
     /// The first message of the present request.
     first: (u64, u64),
+    /// Of the newest status \[ns\]: in simulated time, that is now.
+    heard_ns: u64,
 }
 
 impl Operator {
     /// Joins the topics of a machine.
     pub fn new(bus: &Bus) -> Result<Self, PortError> {
-        Ok(Self { commands: bus.source()?, statuses: bus.sink(8)?, first: (u64::MAX, 0) })
+        let (commands, statuses) = (bus.source()?, bus.sink(8)?);
+        Ok(Self { commands, statuses, time: bus.time(), first: (u64::MAX, 0), heard_ns: 0 })
     }
 
     /// Sends a request, without waiting.
     pub fn ask(&mut self, request: Request) -> Result<(), PortError> {
         let message = CommandMessage { request: request as u32, ..CommandMessage::default() };
-        self.commands.publish(monotonic_ns(), message)?;
-        Ok(())
+        let now_ns = match self.time {
+            Time::Real => monotonic_ns(),
+            Time::Simulated => self.heard_ns,
+        };
+        self.commands.publish(now_ns, message)
     }
 
     /// The newest status, if one came since the last call.
     pub fn status(&mut self) -> Option<StatusMessage> {
-        self.statuses.newest()
+        let newest = self.statuses.newest();
+        self.heard_ns = newest.map_or(self.heard_ns, |status| status.header.time_ns);
+        newest
     }
 
     /// Sends a request and waits until it is carried out. `is_patient` waits for what engaging needs, too.
@@ -197,7 +207,7 @@ pub fn run(
     longest: Duration,
     stop: &Stop,
 ) -> Result<(), OperatorError> {
-    let bus = Bus::join(&config.name)?;
+    let bus = join(config)?;
     let state = Operator::new(&bus)?.carry_out(&config.name, request, is_patient, longest, stop)?;
     std::println!("{}", state.name());
     Ok(())

@@ -1,4 +1,4 @@
-//! `hexad move`: a setpoint source in real time.
+//! `hexad move`: a setpoint source, in real time or in lock-step.
 //!
 //! It starts where the platform stands (the daemon's status says where), moves it gently to the start of
 //! the scene, plays the scene and ends at rest. If the daemon gives up control on the way, it starts over
@@ -15,13 +15,16 @@ use tracing::{info, warn};
 
 use super::config::Config;
 use super::daemon::nanoseconds;
+use super::join::join;
+use super::lockstep::look_until;
 use super::offline::task_state;
+use super::operator::Operator;
 use super::plant::prepare_thread;
 use super::stop::Stop;
 use super::table::{Complaints, Table, TableError, trajectory_columns};
-use crate::control::state::State;
-use crate::ipc::messages::{SetpointMessage, StatusMessage};
-use crate::ipc::ports::{Bus, PortError};
+use crate::control::state::{Cause, Request, State};
+use crate::ipc::messages::{MeasuredMessage, SetpointMessage, StatusMessage};
+use crate::ipc::ports::{PortError, Sink, Source, Time};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
@@ -114,25 +117,60 @@ impl Score {
     }
 }
 
-/// Plays the score once, or until `stop`.
-pub fn run(config: &Config, score: &Score, stop: &Stop) -> Result<(), SetpointError> {
-    let bus = Bus::join(&config.name)?;
-    let mut setpoints = bus.source::<SetpointMessage>()?;
-    let mut status = bus.sink::<StatusMessage>(8)?;
-    prepare_thread(config);
-
-    let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
-    let mut player = Player::new(&config.machine, score);
+/// Plays the score once, or until `stop`. With `engage` it also asks for control, once.
+pub fn run(config: &Config, score: &Score, engage: bool, stop: &Stop) -> Result<(), SetpointError> {
+    let bus = join(config)?;
+    let setpoints = bus.source()?;
+    let player = Player::new(&config.machine, score, Operator::new(&bus)?, engage);
     info!(name = %config.name, seconds = score.duration(), "waiting for the daemon to know where the platform is");
+    match bus.time() {
+        Time::Real => run_in_real_time(config, player, setpoints, stop)?,
+        Time::Simulated => run_in_lockstep(bus.sink(8)?, player, setpoints, stop)?,
+    }
+    Ok(())
+}
+
+fn run_in_real_time(
+    config: &Config,
+    mut player: Player,
+    mut setpoints: Source<SetpointMessage>,
+    stop: &Stop,
+) -> Result<(), PortError> {
+    prepare_thread(config);
+    let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
     while !stop.requested() {
         sleep_until(tick_ns);
-        match player.cue(tick_ns, status.newest().as_ref()) {
+        match player.cue(tick_ns)? {
             Cue::Silent => {}
             Cue::Play(state) => setpoints.publish(tick_ns, message(&state))?,
             Cue::Finished => break,
         }
         tick_ns = grid.next_after(tick_ns.max(monotonic_ns()));
+    }
+    Ok(())
+}
+
+/// Each measurement is answered, as everybody waits for it; what has no answer yet, with home.
+fn run_in_lockstep(
+    mut measured: Sink<MeasuredMessage>,
+    mut player: Player,
+    mut setpoints: Source<SetpointMessage>,
+    stop: &Stop,
+) -> Result<(), PortError> {
+    let mut answered = None;
+    while let Some(asked) = look_until(|| stop.requested(), || measured.receive()) {
+        let time_ns = asked.header.time_ns;
+        let answer = match answered {
+            Some((same_ns, answer)) if same_ns == time_ns => answer,
+            _ => match player.cue(time_ns)? {
+                Cue::Silent => message(&TaskState::at_rest(player.machine.home)),
+                Cue::Play(state) => message(&state),
+                Cue::Finished => break,
+            },
+        };
+        setpoints.publish(time_ns, answer)?;
+        answered = Some((time_ns, answer));
     }
     Ok(())
 }
@@ -148,6 +186,9 @@ enum Cue {
 struct Player<'a> {
     machine: &'a Machine,
     score: &'a Score,
+    operator: Operator,
+    /// Asks for control, until it was given.
+    engage: bool,
     /// The way to the score from where the platform stands, or stood when the daemon took control.
     timeline: Option<Timeline>,
     /// Since when the daemon is in control \[ns\].
@@ -157,26 +198,31 @@ struct Player<'a> {
 }
 
 impl<'a> Player<'a> {
-    fn new(machine: &'a Machine, score: &'a Score) -> Self {
-        Self { machine, score, timeline: None, engaged_ns: None, last_active_ns: 0 }
+    fn new(machine: &'a Machine, score: &'a Score, operator: Operator, engage: bool) -> Self {
+        Self { machine, score, operator, engage, timeline: None, engaged_ns: None, last_active_ns: 0 }
     }
 
-    fn cue(&mut self, now_ns: u64, status: Option<&StatusMessage>) -> Cue {
-        if let Some(status) = status {
-            self.listen(now_ns, status);
+    fn cue(&mut self, now_ns: u64) -> Result<Cue, PortError> {
+        if let Some(status) = self.operator.status() {
+            self.listen(now_ns, &status);
+            if self.engage && status.fault == Cause::NotAsked as u32 {
+                self.operator.ask(Request::Engage)?;
+            }
         }
         if self.engaged_ns.is_some() && now_ns.saturating_sub(self.last_active_ns) > GIVEN_UP_NS {
             warn!("the daemon gave up control or is gone: starting over from where the platform stands");
             (self.engaged_ns, self.timeline) = (None, None);
         }
-        let Some(timeline) = &self.timeline else { return Cue::Silent };
+        let Some(timeline) = &self.timeline else { return Ok(Cue::Silent) };
         // Until the daemon takes it, offer the pose at which the platform stands.
         let t = self.engaged_ns.map_or(0.0, |engaged_ns| now_ns.saturating_sub(engaged_ns) as f64 * 1e-9);
-        if t > timeline.ends() { Cue::Finished } else { Cue::Play(timeline.at(t, |t| self.score.at(t))) }
+        Ok(if t > timeline.ends() { Cue::Finished } else { Cue::Play(timeline.at(t, |t| self.score.at(t))) })
     }
 
     fn listen(&mut self, now_ns: u64, status: &StatusMessage) {
         let state = State::from_number(status.state).unwrap_or_default();
+        // An operator who takes control away keeps it.
+        self.engage &= !state.controls();
         if state == State::Active && self.timeline.is_some() {
             self.last_active_ns = now_ns;
             if self.engaged_ns.is_none() {

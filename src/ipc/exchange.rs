@@ -25,7 +25,7 @@ pub struct CycleInput {
 pub struct CycleOutput {
     /// CLOCK_MONOTONIC instant at which the cycle was due \[ns\].
     pub due_ns: u64,
-    /// Instant for which it was computed \[ns\]: `due_ns`, or with external release the measurement's.
+    /// Instant for which it was computed \[ns\]: `due_ns`, or where measurements release cycles the measurement's.
     pub release_ns: u64,
     pub output: Output,
     pub counters: Counters,

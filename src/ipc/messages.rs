@@ -1,8 +1,35 @@
 //! Messages on the topics `hexad/<name>/...`: `#[repr(C)]`, plain numbers, SI units and radians.
 //!
 //! Each begins with a [`Header`]. iceoryx2 compares only name, size and alignment of a type, so the header
-//! carries a schema version; a reader ignores messages of another one. Python or C participants declare
-//! the same struct under the same type name.
+//! carries a schema version; a reader ignores messages of another one.
+//!
+//! # In other languages
+//!
+//! Declare the same structs: fields in this order with the alignment of C, which leaves no gaps (numbers of 4 bytes
+//! come in pairs). `tests/clients/hexad.py` does, and is tested against this file.
+//!
+//! | | |
+//! | --- | --- |
+//! | iceoryx2 | 0.9.3 exactly, publish-subscribe, IPC service, no user header |
+//! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status` |
+//! | type name | `hexad_<last part>`, as each struct says |
+//! | settings | open or create with `max_publishers` 4, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: whoever comes first sets them for all |
+//! | size in bytes | setpoint 176, measured 232, command 40, force 112, status 1296 |
+//! | places | iceoryx2's defaults. Where its root path is another user's: that path and `-<user ID>`, and the prefix `iox2_<user ID>_` |
+//! | user | all participants of a machine are of one |
+//! | signals | the daemon's node leaves them alone (`SignalHandlingMode::Disabled`), so may yours |
+//!
+//! Who publishes fills in the header and counts from 1. Who subscribes takes what is of this schema, whole and further
+//! in order of (epoch, sequence) than all before: after a source died, its last message may still come.
+//!
+//! # In simulated time
+//!
+//! With `realtime.release = "lockstep"` the topics are `hexad-simulated/<name>/...`. All times are then those of the
+//! plant, which begins where it likes; the epoch of `force` is the time of its first message. Each step goes like this:
+//! the plant publishes `measured` of an instant; the setpoint source answers with `setpoint` of that `time_ns`, before it
+//! with a `command` if it wants; the daemon publishes `status`, then `force`, with that instant as `time_ns` and
+//! `release_ns`; the plant lets a period pass. A plant without answer says the same again, a source then answers the
+//! same again: at first somebody may not be there. When the source has left, the daemon goes on without.
 
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -20,7 +47,8 @@ pub struct Header {
     pub schema: u32,
     /// Zero.
     pub reserved: u32,
-    /// Identifies one life of the source: its CLOCK_MONOTONIC start time \[ns\]. The newest life wins.
+    /// Identifies one life of the source: its CLOCK_MONOTONIC start time \[ns\]. The newest life wins; one that has
+    /// not begun is ignored.
     pub epoch: u64,
     /// Counts the messages of this life, from 1.
     pub sequence: u64,

@@ -19,6 +19,7 @@ use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::port::{publisher::Publisher, subscriber::Subscriber};
 use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use tracing::info;
@@ -76,16 +77,42 @@ fn domain() -> Result<Config, SemanticStringError> {
     Ok(config)
 }
 
+/// Which time the participants of a machine live in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Time {
+    /// CLOCK_MONOTONIC. Topics `hexad/<name>/...`.
+    #[default]
+    Real,
+    /// That of the measured messages, while everybody waits for everybody: `release = "lockstep"`. Topics
+    /// `hexad-simulated/<name>/...`, so that no hardware ever listens to it.
+    Simulated,
+}
+
+impl Time {
+    fn topics(self) -> &'static str {
+        match self {
+            Self::Real => "hexad",
+            Self::Simulated => "hexad-simulated",
+        }
+    }
+}
+
 /// Participation of this process in the topics of one machine.
 pub struct Bus {
     node: Node<ipc::Service>,
     machine: String,
+    time: Time,
     epoch: u64,
 }
 
 impl Bus {
     /// Joins. `machine` is the configured name; the epoch of everything published is now.
     pub fn join(machine: &str) -> Result<Self, PortError> {
+        Self::join_in(machine, Time::Real)
+    }
+
+    /// The same in a time.
+    pub fn join_in(machine: &str, time: Time) -> Result<Self, PortError> {
         // Its log goes to `tracing`; what it warns about (dead nodes cleaned up) is routine here.
         set_log_level(LogLevel::Error);
         let config = domain().map_err(failed("cannot name the shared memory".into()))?;
@@ -99,7 +126,12 @@ impl Bus {
                  participants of a machine run as one user",
                 config.global.root_path()
             )))?;
-        Ok(Self { node, machine: machine.into(), epoch: monotonic_ns() })
+        Ok(Self { node, machine: machine.into(), time, epoch: monotonic_ns() })
+    }
+
+    /// Which time its participants live in.
+    pub fn time(&self) -> Time {
+        self.time
     }
 
     /// Why and where this user's shared memory is not in the usual places, if so.
@@ -128,7 +160,7 @@ impl Bus {
     }
 
     fn service<T: Message>(&self) -> Result<PortFactory<ipc::Service, T, ()>, PortError> {
-        let name = format!("hexad/{}/{}", self.machine, T::TOPIC);
+        let name = format!("{}/{}/{}", self.time.topics(), self.machine, T::TOPIC);
         let service_name = name.as_str().try_into().map_err(failed(format!("bad topic {name}")))?;
         self.node
             .service_builder(&service_name)
@@ -150,19 +182,21 @@ impl Bus {
             .publisher_builder()
             .create()
             .map_err(failed(format!("cannot publish {}", T::TOPIC)))?;
-        Ok(Source { publisher, epoch: self.epoch, sequence: 0 })
+        Ok(Source { publisher, epoch: Some(self.epoch), sequence: 0 })
     }
 
     /// A subscriber to `T` that keeps up to `depth` messages.
     pub fn sink<T: Message>(&self, depth: usize) -> Result<Sink<T>, PortError> {
-        let subscriber = self
-            .service::<T>()?
+        let service = self.service::<T>()?;
+        let subscriber = service
             .subscriber_builder()
             .buffer_size(depth.min(BUFFER))
             .create()
             .map_err(failed(format!("cannot subscribe to {}", T::TOPIC)))?;
         Ok(Sink {
+            service,
             subscriber,
+            time: self.time,
             epoch: 0,
             sequence: 0,
             came: 0,
@@ -175,21 +209,28 @@ impl Bus {
 /// Publishes one topic and numbers what it publishes.
 pub struct Source<T: Message> {
     publisher: Publisher<ipc::Service, T, ()>,
-    epoch: u64,
+    epoch: Option<u64>,
     sequence: u64,
 }
 
 impl<T: Message> Source<T> {
+    /// The same, with the time of its first message as the epoch: in simulated time all that it says is then the same
+    /// in each run.
+    pub fn reproducible(self) -> Self {
+        Self { epoch: None, ..self }
+    }
+
     /// Epoch and sequence number that the next message will have.
     pub fn next_message(&self) -> (u64, u64) {
-        (self.epoch, self.sequence + 1)
+        (self.epoch.unwrap_or_default(), self.sequence + 1)
     }
 
     /// Fills in the header and sends. `time_ns` is the instant at which the content holds.
     pub fn publish(&mut self, time_ns: u64, mut message: T) -> Result<(), PortError> {
         self.sequence += 1;
+        let epoch = *self.epoch.get_or_insert(time_ns);
         *message.header_mut() =
-            Header { schema: SCHEMA, reserved: 0, epoch: self.epoch, sequence: self.sequence, time_ns };
+            Header { schema: SCHEMA, reserved: 0, epoch, sequence: self.sequence, time_ns };
         message.seal();
         let sample = self
             .publisher
@@ -231,6 +272,8 @@ impl core::ops::Add for Rejected {
 
 /// Receives one topic, newest life of the source first.
 pub struct Sink<T: Message> {
+    service: PortFactory<ipc::Service, T, ()>,
+    time: Time,
     subscriber: Subscriber<ipc::Service, T, ()>,
     epoch: u64,
     sequence: u64,
@@ -256,7 +299,8 @@ impl<T: Message> Sink<T> {
             let header = message.header();
             let order = (header.epoch, header.sequence);
             // A life that has not begun (another clock) would outrank all that come after it.
-            let has_begun = header.epoch <= monotonic_ns();
+            // Simulated time has no other clock.
+            let has_begun = self.time == Time::Simulated || header.epoch <= monotonic_ns();
             let is_readable = header.schema == SCHEMA && message.is_whole() && has_begun;
             if is_readable && order > (self.epoch, self.sequence) {
                 let same_life = header.epoch == self.epoch;
@@ -307,6 +351,11 @@ impl<T: Message> Sink<T> {
             }
         }
         newest
+    }
+
+    /// How many sources are there now. One that was killed counts until somebody notices.
+    pub fn sources(&self) -> usize {
+        self.service.dynamic_config().number_of_publishers()
     }
 
     /// How many messages came: those accepted, and those that the source numbered in between and that found

@@ -44,7 +44,7 @@ pub enum Release {
     /// A point of the grid. The last `max_lead_ns` at most are spun; 0 sleeps.
     Grid { max_lead_ns: u64 },
     /// A measured message, rung for by the io thread. When none comes for `timeout_ns`, a cycle is run all
-    /// the same, so that the loss is noticed.
+    /// the same, so that the loss is noticed. In simulated time there is no such end.
     External { timeout_ns: u64 },
 }
 
@@ -198,7 +198,7 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
         let mut seen = None;
         let mut missed = false;
         loop {
-            let timeout_at_ns = done_ns + timeout_ns;
+            let timeout_at_ns = done_ns.saturating_add(timeout_ns);
             let rung = self.side.bell.wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
             if stop.load(Ordering::Relaxed) {
                 break;

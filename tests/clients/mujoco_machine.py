@@ -10,6 +10,8 @@ import mujoco
 import numpy as np
 
 LEGS = range(1, 7)
+# Time in which a brake brings a leg to rest [s].
+BRAKE_S = 0.02
 COORDINATES = ["alpha", "beta", "gamma", "x", "y", "z"]
 
 
@@ -29,6 +31,15 @@ def load(path):
                 name1=f"ball_platform_{i}",
                 name2=f"ball_rod_{i}",
             )
+    for i in LEGS:
+        spec.add_equality(
+            name=f"brake_{i}",
+            type=mujoco.mjtEq.mjEQ_JOINT,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            name1=f"prismatic_{i}",
+            active=False,
+            solref=[BRAKE_S, 1.0],
+        )
     return spec.compile()
 
 
@@ -55,6 +66,8 @@ class Machine:
                 start = self.model.numeric_adr[law]
                 bodies = [self.model.body(f"{link}_{i}").id for i in LEGS]
                 self.laws.append((bodies, self.model.numeric_data[start : start + 3]))
+
+        self.brakes = np.array([self.model.equality(f"brake_{i}").id for i in LEGS])
 
     @property
     def lengths(self):
@@ -99,6 +112,32 @@ class Machine:
         if np.abs(gaps).max() > 1e-12:
             raise RuntimeError(f"no legs found for the pose {x}: gaps of {gaps} m")
         self.follow_lengths()
+
+    def push(self, force):
+        """Actuator forces [N] until the next call; None brakes."""
+        data, brakes = self.data, self.brakes
+        if force is None and not data.eq_active[brakes].any():
+            # The joints' positions count from those at home.
+            home = self.model.qpos0[self.leg_qpos[:, 2]]
+            self.model.eq_data[brakes, 0] = self.lengths - home
+        data.eq_active[brakes] = force is None
+        data.ctrl[:] = 0.0 if force is None else force
+
+    def advance(self, steps):
+        """Lets so many time steps of the model pass."""
+        self.follow_lengths()
+        mujoco.mj_step(self.model, self.data, nstep=steps)
+
+    def velocities(self):
+        """Of all joints at the instant of their positions: MuJoCo's are those of half a step before."""
+        return self.data.qvel + 0.5 * self.model.opt.timestep * self.data.qacc
+
+    def twist(self, velocities):
+        """omega [rad/s], then v [m/s] of the platform in the base."""
+        r = np.zeros(9)
+        mujoco.mju_quat2Mat(r, self.data.qpos[self.free_qpos[3:]])
+        v, w = np.split(velocities[self.free_dof], 2)
+        return np.array([*(r.reshape(3, 3) @ w), *v])
 
     def gaps(self):
         """What is left open of the six loops [m], 6 x 3."""

@@ -29,7 +29,7 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
     );
     refused(
         "[realtime]\nrelease = \"spin\"",
-        &["realtime.release = \"spin\": must be one of \"sleep\", \"hybrid\", \"external\""],
+        &["realtime.release = \"spin\": must be one of \"sleep\", \"hybrid\", \"external\", \"lockstep\""],
     );
     refused(
         "[realtime]\nrelease = \"external\"\non_overrun = \"catch_up\"",
@@ -37,6 +37,20 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
             "realtime.on_overrun = \"catch_up\": must be one of \"skip\", \"fault\" with realtime.release = \"external\" (only the newest message is kept)",
         ],
     );
+    for policy in ["catch_up", "fault"] {
+        refused(
+            &format!(
+                "[realtime]\nrelease = \"lockstep\"\non_overrun = \"{policy}\"\nrequire_realtime = true"
+            ),
+            &[
+                &format!(
+                    "realtime.on_overrun = \"{policy}\": must be \"skip\" with realtime.release = \"lockstep\" \
+                     (simulated time waits for the loop)"
+                ),
+                "realtime.require_realtime = true: must be false with realtime.release = \"lockstep\" (simulated time)",
+            ],
+        );
+    }
     refused("[realtime]\nmax_catch_up = 0", &["realtime.max_catch_up = 0: must be an integer in [1, 100]"]);
     refused(
         "[realtime]\nmax_lead_us = 501",

@@ -5,7 +5,11 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod in_the_loop;
+mod layouts;
 mod python;
+#[path = "../processes/support/stalls.rs"]
+mod stalls;
 
 use std::ffi::OsStr;
 use std::fs;

@@ -1,4 +1,4 @@
-//! A Python of our own with MuJoCo in it.
+//! A Python of our own with MuJoCo and iceoryx2 in it.
 //!
 //! Where it cannot be had, the tests fail and say why. Rust's test harness knows no "not run" that a test could
 //! decide on, and a comparison that did not take place must not count as passed.
@@ -9,30 +9,58 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 /// The engine. Pinned: what it makes of a model may change.
-const PACKAGE: &str = "mujoco==4.0.0";
+const MUJOCO: &str = "mujoco==4.0.0";
+
+/// What speaks with the daemon, of the daemon's own version.
+fn iceoryx2() -> String {
+    let (_, after) = include_str!("../../Cargo.toml").split_once("iceoryx2 = { version = \"=").unwrap();
+    format!("iceoryx2=={}", after.split_once('"').unwrap().0)
+}
 
 /// Runs a script of `tests/clients`; its standard error if it fails.
 pub fn run(script: &str, arguments: &[&Path]) -> Result<(), String> {
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/clients").join(script);
+    output(command(script).args(arguments)).map(drop)
+}
+
+/// What a few lines of Python among `tests/clients` print.
+pub fn printed(lines: &str) -> String {
+    let mut command = python();
+    output(command.args(["-c", lines]).current_dir(clients())).unwrap()
+}
+
+/// A script of `tests/clients`.
+pub fn command(script: &str) -> Command {
+    let mut command = python();
+    command.arg(clients().join(script));
+    command
+}
+
+fn clients() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/clients")
+}
+
+fn python() -> Command {
     let mut command = Command::new(environment().join("bin/python"));
     // No __pycache__ between the sources.
-    command.arg("-B").arg(script).args(arguments);
-    output(&mut command)
+    command.arg("-B");
+    command
 }
 
 /// The virtual environment, set up by whoever comes first.
 fn environment() -> &'static Path {
     static READY: OnceLock<PathBuf> = OnceLock::new();
     READY.get_or_init(|| {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(PACKAGE.replace("==", "-"));
-        // Another process may be at it.
-        let lock = File::create(folder.with_extension("lock")).unwrap();
+        let packages = [MUJOCO.to_owned(), iceoryx2()];
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(packages.join("-").replace("==", "-"));
+        // Another process may be at it. (Versions have dots: no `with_extension` here.)
+        let beside = |end: &str| PathBuf::from(format!("{}.{end}", folder.display()));
+        let lock = File::create(beside("lock")).unwrap();
         lock.lock().unwrap();
         let complete = folder.join("complete");
         if !complete.exists() {
-            if let Err(why) = set_up(&folder) {
+            if let Err(why) = set_up(&folder, &packages) {
                 panic!(
-                    "\n\nNOT RUN: no Python with {PACKAGE}.\n{why}\n\
+                    "\n\nNOT RUN: no Python with {packages:?}.\n{why}\n\
                      Needed: python3 with the module venv (apt-get install python3-venv) and PyPI, once.\n\
                      Without: cargo test --release -- --skip mujoco\n\n"
                 );
@@ -43,15 +71,15 @@ fn environment() -> &'static Path {
     })
 }
 
-fn set_up(folder: &Path) -> Result<(), String> {
+fn set_up(folder: &Path, packages: &[String]) -> Result<(), String> {
     output(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder))?;
-    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", PACKAGE];
-    output(Command::new(folder.join("bin/python")).args(pip))
+    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
+    output(Command::new(folder.join("bin/python")).args(pip).args(packages)).map(drop)
 }
 
-fn output(command: &mut Command) -> Result<(), String> {
+fn output(command: &mut Command) -> Result<String, String> {
     match command.output() {
-        Ok(ended) if ended.status.success() => Ok(()),
+        Ok(ended) if ended.status.success() => Ok(String::from_utf8_lossy(&ended.stdout).into()),
         Ok(ended) => {
             Err(format!("{command:?}: {}\n{}", ended.status, String::from_utf8_lossy(&ended.stderr)))
         }

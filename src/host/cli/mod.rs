@@ -61,6 +61,9 @@ enum Command {
         /// Length of the motion [s]
         #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
         seconds: f64,
+        /// Also ask for control, once, as soon as it can be had
+        #[arg(long)]
+        engage: bool,
     },
     /// Run daemon, plant and setpoint source through a motion; print timing and tracking, draw pictures
     Demo {
@@ -218,10 +221,10 @@ impl Cli {
                 let (config, stop) = (machine.load()?, stop()?);
                 plant::run(&config, &stop).map_err(Failure::could_not_begin)
             }
-            Command::Move { machine, what, seconds } => {
+            Command::Move { machine, what, seconds, engage } => {
                 let config = machine.load()?;
                 let score = what.score(&config, seconds)?;
-                setpoints::run(&config, &score, &stop()?).map_err(Failure::could_not_begin)
+                setpoints::run(&config, &score, engage, &stop()?).map_err(Failure::could_not_begin)
             }
             Command::Demo { config, plant_config, motion, seconds, rate_hz, report, charts } => {
                 let motion = motion.to_possible_value().map_or_else(String::new, |v| v.get_name().into());

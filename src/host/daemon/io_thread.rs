@@ -1,7 +1,8 @@
 //! The io thread: owner of every port of the daemon, in phase with the cycle.
 //!
 //! It reads the newest messages a lead before the release and publishes when the output of the cycle
-//! appears; with external release it waits for measured messages and rings for the real-time thread. When
+//! appears; with external release it waits for measured messages and rings for the real-time thread; in
+//! lock-step it waits for everybody. When
 //! a peer comes or goes, the port calls here allocate and block for a moment; the real-time thread
 //! meanwhile runs on with data it knows the age of.
 
@@ -13,11 +14,12 @@ use heapless::spsc::Producer;
 
 use crate::control::controller::{Asked, Measurement, Output, Setpoint};
 use crate::control::state::{Cause, Request, State};
+use crate::host::lockstep::look_until;
 use crate::ipc::exchange::{CycleInput, CycleOutput, IoSide};
 use crate::ipc::messages::{
     CommandMessage, ForceMessage, Header, MeasuredMessage, SetpointMessage, StatusMessage,
 };
-use crate::ipc::ports::{Bus, PortError, Rejected, Sink, Source};
+use crate::ipc::ports::{Bus, PortError, Rejected, Sink, Source, Time};
 use crate::ipc::statistics::Statistics;
 use crate::model::task::{TaskState, task_coordinates};
 use crate::realtime::clock::{Clock, Grid, Monotonic, monotonic_ns, sleep_until};
@@ -76,6 +78,8 @@ pub struct Settings {
     /// Forces computed longer ago are not valid any more: the process was held (stopped, or the host took
     /// the processor) between computing and sending them.
     pub longest_hold_ns: u64,
+    /// Simulated: in lock-step.
+    pub time: Time,
     pub home: [f64; 6],
 }
 
@@ -93,11 +97,12 @@ pub struct IoReport {
 impl Ports {
     /// Opens all.
     pub fn open(bus: &Bus) -> Result<Self, PortError> {
+        let force = bus.source()?;
         Ok(Self {
             setpoint: bus.sink(INPUT_DEPTH)?,
             measured: bus.sink(INPUT_DEPTH)?,
             command: bus.sink(usize::MAX)?,
-            force: bus.source()?,
+            force: if bus.time() == Time::Simulated { force.reproducible() } else { force },
             status: bus.source()?,
         })
     }
@@ -116,9 +121,10 @@ pub fn run(settings: &Settings, ports: Ports, sides: Sides<'_>, stop: &AtomicBoo
         send_failures: 0,
         allocations: at_start.allocations,
     };
-    match settings.timing.release {
-        Release::Grid { max_lead_ns } => io.run_in_phase(max_lead_ns, stop),
-        Release::External { .. } => io.run_on_messages(stop),
+    match (settings.time, settings.timing.release) {
+        (Time::Simulated, _) => io.run_in_lockstep(stop),
+        (_, Release::Grid { max_lead_ns }) => io.run_in_phase(max_lead_ns, stop),
+        (_, Release::External { .. }) => io.run_on_messages(stop),
     }
     io.publish_newest();
     IoReport {
@@ -184,12 +190,62 @@ impl Io<'_> {
         }
     }
 
+    /// A cycle for each measurement, once the setpoint of its instant is there, and nothing else before it is
+    /// answered. What a setpoint source asked for before it sent that setpoint counts in the same cycle.
+    fn run_in_lockstep(&mut self, stop: &AtomicBool) {
+        let mut answered_ns = None;
+        let stop = || stop.load(Ordering::Relaxed);
+        let next = |io: &mut Self| {
+            // Whether the daemon may end is heard while everybody waits, too.
+            io.publish_new();
+            io.ports.measured.receive()
+        };
+        while let Some(measured) = look_until(stop, || next(self)) {
+            let time_ns = measured.header.time_ns;
+            // Who is not answered at once says it again.
+            if answered_ns == Some(time_ns) {
+                continue;
+            }
+            answered_ns = Some(time_ns);
+            self.input.input.measurement = Some(measurement(&measured));
+            self.input.measurements += 1;
+            if look_until(stop, || self.has_setpoint_of(time_ns).then_some(())).is_none() {
+                return;
+            }
+            self.read_requests(time_ns);
+            self.hand_in();
+            self.sides.exchange.bell.ring();
+            let before = self.published;
+            look_until(stop, || {
+                self.publish_new();
+                (self.published > before).then_some(())
+            });
+        }
+    }
+
+    /// Whether the setpoint of an instant has come. It never will if there was a source and it has left.
+    fn has_setpoint_of(&mut self, time_ns: u64) -> bool {
+        // In this order: its last message comes before its leave.
+        let has_left = self.ports.setpoint.came() > 0 && self.ports.setpoint.sources() == 0;
+        self.read_setpoint();
+        has_left || self.input.input.setpoint.is_some_and(|setpoint| setpoint.time_ns == time_ns)
+    }
+
     /// Takes in the newest messages; true if a measurement is among them.
     fn read(&mut self) -> bool {
-        self.read_requests();
-        let input = &mut self.input.input;
+        self.read_requests(monotonic_ns());
+        self.read_setpoint();
+        let measured = self.ports.measured.newest();
+        if let Some(message) = &measured {
+            self.input.input.measurement = Some(measurement(message));
+            self.input.measurements = self.ports.measured.came();
+        }
+        measured.is_some()
+    }
+
+    fn read_setpoint(&mut self) {
         if let Some(message) = self.ports.setpoint.newest() {
-            input.setpoint = Some(Setpoint {
+            self.input.input.setpoint = Some(Setpoint {
                 time_ns: message.header.time_ns,
                 task: TaskState {
                     x: message.x.into(),
@@ -198,21 +254,11 @@ impl Io<'_> {
                 },
             });
         }
-        let measured = self.ports.measured.newest();
-        if let Some(message) = &measured {
-            input.measurement = Some(Measurement {
-                time_ns: message.header.time_ns,
-                length: message.length_m,
-                rate: message.length_rate_m_s,
-            });
-        }
-        measured.is_some()
     }
 
     /// Of the requests not yet answered the strongest counts. An old one that asks for force does not: who
     /// sent it has long stopped waiting.
-    fn read_requests(&mut self) {
-        let now_ns = monotonic_ns();
+    fn read_requests(&mut self, now_ns: u64) {
         let ending = self.sides.ending.load(Ordering::Relaxed);
         while let Some(message) = self.ports.command.receive_from_any() {
             let Header { epoch, sequence, time_ns, .. } = message.header;
@@ -232,7 +278,6 @@ impl Io<'_> {
     }
 
     fn hand_in(&mut self) {
-        self.input.measurements = self.ports.measured.came();
         self.input.handed_ns = monotonic_ns();
         self.sides.exchange.inputs.write(self.input);
     }
@@ -253,6 +298,12 @@ impl Io<'_> {
 
     fn publish_newest(&mut self) {
         let mut cycle = *self.sides.exchange.outputs.value();
+        if self.settings.time == Time::Simulated {
+            // In this order: who answers the next measurement has the status of this one.
+            self.publish_status(&cycle, cycle.release_ns);
+            self.publish_force(&cycle, cycle.release_ns);
+            return;
+        }
         let now_ns = monotonic_ns();
         let held_ns = now_ns.saturating_sub(cycle.due_ns);
         if held_ns > self.settings.longest_hold_ns && cycle.output.state.controls() {
@@ -261,12 +312,21 @@ impl Io<'_> {
             (output.state, output.cause, output.force) =
                 (State::Fault, Cause::MeasurementLost, Output::default().force);
         }
-        let sent = self.ports.force.publish(now_ns, force_message(&cycle));
+        self.publish_force(&cycle, now_ns);
+        self.publish_status(&cycle, now_ns);
+    }
+
+    fn publish_force(&mut self, cycle: &CycleOutput, now_ns: u64) {
+        let sent = self.ports.force.publish(now_ns, force_message(cycle));
+        self.send_failures += u64::from(sent.is_err());
         if cycle.output.state.controls() {
             // Full only if the log thread is held; it loses statistics, not forces.
             let _ = self.sides.sent.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
         }
-        let mut status = status_message(&self.settings.home, &cycle);
+    }
+
+    fn publish_status(&mut self, cycle: &CycleOutput, now_ns: u64) {
+        let mut status = status_message(&self.settings.home, cycle);
         status.io_allocations = ThreadUsage::allocations_of_this_thread() - self.allocations;
         (status.rejected_schema, status.rejected_older_source, status.rejected_repeated) = {
             let Rejected { schema, older_source, repeated, .. } = self.rejected();
@@ -274,7 +334,7 @@ impl Io<'_> {
         };
         status.statistics = *self.sides.statistics.read();
         let told = self.ports.status.publish(now_ns, status);
-        self.send_failures += u64::from(sent.is_err()) + u64::from(told.is_err());
+        self.send_failures += u64::from(told.is_err());
     }
 
     fn rejected(&self) -> Rejected {
@@ -300,6 +360,10 @@ impl Pause {
             sleep_until(now_ns + POLL_NS);
         }
     }
+}
+
+fn measurement(message: &MeasuredMessage) -> Measurement {
+    Measurement { time_ns: message.header.time_ns, length: message.length_m, rate: message.length_rate_m_s }
 }
 
 fn force_message(cycle: &CycleOutput) -> ForceMessage {

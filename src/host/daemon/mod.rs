@@ -15,6 +15,7 @@ use std::prelude::rust_2024::*;
 use std::sync::{OnceLock, mpsc};
 use std::thread::{self, Builder, Scope, ScopedJoinHandle, scope};
 use std::time::{Duration, Instant};
+use std::vec;
 
 use heapless::spsc::Queue;
 use sd_notify::NotifyState;
@@ -24,18 +25,19 @@ use self::fault_dump::FaultDump;
 use self::hints::ThreadFiles;
 use self::io_thread::{DELAYS, IoReport, Ports, Settings};
 use self::log_thread::LogReport;
-use self::start::{prepare_io, prepare_loop, start, warm_up};
+use self::start::{prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use super::config::Config;
 use super::config::deployment::{Deployment, ReleaseKey};
 use super::fidelity;
 use super::files::{FileError, write_whole};
+use super::join::join;
 use super::report::{DeadlineMisses, Report};
 use super::stop::Stop;
 use crate::control::controller::{Controller, Envelope, Input, Parameters};
 use crate::control::gains::Gains;
 use crate::control::law::Law;
 use crate::ipc::exchange::exchange;
-use crate::ipc::ports::{Bus, PortError};
+use crate::ipc::ports::{Bus, PortError, Time};
 use crate::ipc::statistics::Statistics;
 use crate::model::ladder::Rung;
 use crate::model::machine::Machine;
@@ -55,8 +57,9 @@ mod statistics;
 /// Name of the real-time thread, by which a running daemon is found.
 pub const REALTIME_THREAD: &str = "hexad-rt";
 
-/// Stack of each thread: several times what they use, and small because locked memory holds all of it.
-const STACK: usize = 512 * 1024;
+/// Stack of each thread: several times what they use, and small because locked memory holds all of it. A debug build keeps
+/// every intermediate value there.
+const STACK: usize = if cfg!(debug_assertions) { 8 << 20 } else { 512 * 1024 };
 
 /// Longest the daemon waits for the platform to come to rest before it ends: a service manager's patience
 /// is longer.
@@ -125,6 +128,7 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
         timing: *timing,
         lead_ns: nanoseconds(realtime.io_lead_s),
         longest_hold_ns: nanoseconds(deployment.timeouts.measured_s),
+        time: realtime.time(),
         home: machine.home,
     };
 
@@ -137,7 +141,11 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
             log_thread::run(sides, stop_log)
         })?;
         let cyclic = spawn(threads, REALTIME_THREAD, move || {
-            let shortfalls = prepare_loop(realtime, || warm_up(controller.clone(), machine));
+            let warm_up = || warm_up(controller.clone(), machine);
+            let shortfalls = match realtime.time() {
+                Time::Real => prepare_loop(realtime, warm_up),
+                Time::Simulated => prepare_simulated(warm_up),
+            };
             let _ = realtime_ready.send(Ok(shortfalls));
             // Without them the worst cycles carry no hints.
             let _ = ThreadFiles::of_this_thread().map(|found| files.set(found));
@@ -148,10 +156,13 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
         })?;
         let io = spawn(threads, "hexad-io", move || {
             // Ports belong to the thread that opens them.
-            let ports = Bus::join(&config.name).and_then(|bus| Ports::open(&bus));
+            let ports = join(config).and_then(|bus| Ports::open(&bus));
             let (ports, opened) =
                 ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
-            let shortfalls = opened.map(|()| prepare_io(realtime));
+            let shortfalls = opened.map(|()| match realtime.time() {
+                Time::Real => prepare_io(realtime),
+                Time::Simulated => vec![],
+            });
             // Nobody listens only if the other thread failed first.
             let _ = io_ready.send(shortfalls.map_err(DaemonError::from));
             let sides = io_thread::Sides { exchange: io_side, sent: sent_in, statistics, ending, may_end };
@@ -263,6 +274,8 @@ pub(super) fn timing(deployment: &Deployment) -> Timing {
             ReleaseKey::Sleep => Release::Grid { max_lead_ns: 0 },
             ReleaseKey::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
             ReleaseKey::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
+            // Simulated time stands while nobody measures.
+            ReleaseKey::Lockstep => Release::External { timeout_ns: u64::MAX },
         },
         on_overrun: realtime.on_overrun,
         late_wakeup_ns: nanoseconds(realtime.late_wakeup_s),

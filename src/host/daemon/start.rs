@@ -7,12 +7,14 @@ extern crate std;
 
 use std::prelude::rust_2024::*;
 use std::sync::mpsc;
+use std::vec;
 
 use tracing::warn;
 
 use super::{DaemonError, nanoseconds};
 use crate::control::controller::{Controller, Input, Measurement, Setpoint};
 use crate::host::config::deployment::{Realtime, ReleaseKey, Scheduler};
+use crate::ipc::ports::Time;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
@@ -37,11 +39,15 @@ pub(super) fn start(
     for _ in ["io", "real-time"] {
         shortfalls.extend(ready.recv().map_err(|_| DaemonError::Died("io or real-time"))??);
     }
-    let shallow_sleep =
-        idle::bound_wakeup(realtime.cpu_dma_latency_us).map_err(|shortfall| shortfalls.push(shortfall)).ok();
-    if realtime.lock_memory {
-        // Last, when all memory is there to be locked.
-        shortfalls.extend(memory::lock_all().err());
+    let mut shallow_sleep = None;
+    if realtime.time() == Time::Real {
+        shallow_sleep = idle::bound_wakeup(realtime.cpu_dma_latency_us)
+            .map_err(|shortfall| shortfalls.push(shortfall))
+            .ok();
+        if realtime.lock_memory {
+            // Last, when all memory is there to be locked.
+            shortfalls.extend(memory::lock_all().err());
+        }
     }
     for shortfall in &shortfalls {
         warn!("{shortfall}");
@@ -70,6 +76,14 @@ pub(in crate::host) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce())
         Scheduler::Deadline => deadline::reserve(&reservation(realtime)),
     };
     prepare(realtime.cpu, scheduled)
+}
+
+/// Prepares the calling thread for the loop in simulated time: the same numbers, but nothing is urgent, and who waits
+/// for others must not keep the processor from them.
+pub(super) fn prepare_simulated(warm_up: impl FnOnce()) -> Vec<Shortfall> {
+    denormals::flush();
+    warm_up();
+    vec![]
 }
 
 fn prepare(cpu: Option<usize>, scheduled: Result<(), Shortfall>) -> Vec<Shortfall> {

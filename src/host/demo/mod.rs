@@ -18,11 +18,12 @@ use super::charts::ChartError;
 use super::config::text::text_of;
 use super::config::{Config, ConfigError};
 use super::files::{FileError, write_whole};
+use super::join::join;
 use super::operator::Operator;
 use super::report::Report;
 use super::stop::Stop;
 use crate::control::state::{Cause, Request, State};
-use crate::ipc::ports::{Bus, PortError};
+use crate::ipc::ports::PortError;
 
 pub mod children;
 mod pictures;
@@ -158,7 +159,7 @@ impl Stage {
     }
 
     fn perform(&self, demo: &Demo, stop: &Stop) -> Result<Recording, DemoError> {
-        let bus = Bus::join(&self.config.name)?;
+        let bus = join(&self.config)?;
         let mut recorder = Recorder::new(&bus)?;
         let seconds = format!("{}", demo.seconds);
         let controller = ["--config".as_ref(), self.controller.as_os_str()];

@@ -47,6 +47,7 @@ impl Layout {
     pub fn facts(&self, name: &str, realtime: &Realtime, facts: &[Fact]) -> String {
         let release = match realtime.release {
             ReleaseKey::External => "sleep (instead of external)",
+            ReleaseKey::Lockstep => "sleep (instead of lockstep)",
             release => Waiting::from(release).name(),
         };
         let on = realtime.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));

@@ -1,6 +1,6 @@
-//! `hexad plant`: the simulated platform as a process of its own, in real time.
+//! `hexad plant`: the simulated platform as a process of its own, in real time or in lock-step.
 //!
-//! It ticks on the multiples of the period. At each tick it lets the time since the last one pass, with
+//! In real time it ticks on the multiples of the period. At each tick it lets the time since the last one pass, with
 //! every force applied from the instant its message was sent, as a drive would; then it publishes lengths
 //! and rates. A force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if it
 //! can be believed ([`doubt`]).
@@ -8,16 +8,19 @@
 extern crate std;
 
 use std::prelude::rust_2024::*;
+use std::time::Instant;
 
 use tracing::{debug, info, warn};
 
 use self::doubt::Doubt;
 use super::config::Config;
 use super::daemon::nanoseconds;
+use super::join::join;
+use super::lockstep::{REPEAT, look_until};
 use super::stop::Stop;
 use crate::control::state::{Cause, State};
 use crate::ipc::messages::{ForceMessage, MeasuredMessage};
-use crate::ipc::ports::{Bus, PortError};
+use crate::ipc::ports::{Bus, PortError, Time};
 use crate::model::machine::LEGS;
 use crate::model::task::task_coordinates;
 use crate::plant::hardware::Hardware;
@@ -38,25 +41,23 @@ const LONGEST_PAUSE_NS: u64 = 1_000_000_000;
 
 /// Runs until `stop`.
 pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
-    let plant = &config.deployment.plant;
-    let bus = Bus::join(&config.name)?;
+    let bus = join(config)?;
+    match bus.time() {
+        Time::Real => run_in_real_time(config, &bus, stop),
+        Time::Simulated => run_in_lockstep(config, &bus, stop),
+    }
+}
+
+fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
     let mut forces = bus.sink::<ForceMessage>(FORCE_DEPTH)?;
     let mut measured = bus.source::<MeasuredMessage>()?;
     prepare_thread(config);
 
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
-    let mut driven = Driven {
-        hardware: hardware(config),
-        time_ns: tick_ns,
-        force: None,
-        cause: Cause::None,
-        timeout_ns: nanoseconds(plant.force_timeout_s),
-    };
+    let mut driven = Driven::new(config, tick_ns);
     let mut doubt = Doubt::default();
     let mut pending = None;
-    say_terms(config, driven.hardware.simulator().terms());
-    info!(name = %config.name, "plant at rest at home, brakes closed");
     while !stop.requested() {
         sleep_until(tick_ns);
         if tick_ns - driven.time_ns > LONGEST_PAUSE_NS {
@@ -86,6 +87,40 @@ pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
     Ok(())
 }
 
+/// In simulated time, which begins at zero: a force is there at the instant of the measurement that it answers. What
+/// the answer needs is the port's to judge; it cannot be old.
+fn run_in_lockstep(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
+    let mut forces = bus.sink::<ForceMessage>(FORCE_DEPTH)?;
+    let mut measured = bus.source::<MeasuredMessage>()?;
+    let period_ns = nanoseconds(config.deployment.realtime.period_s());
+    let mut driven = Driven::new(config, 0);
+    info!("waiting for the daemon and a setpoint source in each step");
+    while !stop.requested() {
+        let time_ns = driven.time_ns;
+        let message = measured_message(&mut driven.hardware);
+        measured.publish(time_ns, message)?;
+        let mut said = Instant::now();
+        let answer = look_until(
+            || stop.requested(),
+            || {
+                if said.elapsed() > REPEAT {
+                    said = Instant::now();
+                    if let Err(failed) = measured.publish(time_ns, message) {
+                        return Some(Err(failed));
+                    }
+                }
+                forces.newest().filter(|force| force.release_ns == time_ns).map(Ok)
+            },
+        );
+        let Some(force) = answer else { break };
+        let before = driven.hardware.simulator().brakes();
+        driven.receive(&force?);
+        driven.advance_to(time_ns + period_ns);
+        tell(before, driven.hardware.simulator().brakes(), driven.cause);
+    }
+    Ok(())
+}
+
 /// A simulator and the force on it.
 struct Driven {
     hardware: Hardware,
@@ -98,6 +133,15 @@ struct Driven {
 }
 
 impl Driven {
+    /// At rest at home, brakes closed.
+    fn new(config: &Config, time_ns: u64) -> Self {
+        let hardware = hardware(config);
+        say_terms(config, hardware.simulator().terms());
+        info!(name = %config.name, "plant at rest at home, brakes closed");
+        let timeout_ns = nanoseconds(config.deployment.plant.force_timeout_s);
+        Self { hardware, time_ns, force: None, cause: Cause::None, timeout_ns }
+    }
+
     /// Applies a message from the instant it was sent.
     fn receive(&mut self, message: &ForceMessage) {
         self.advance_to(message.header.time_ns);

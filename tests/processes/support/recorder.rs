@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use hexad::ipc::messages::{
     CommandMessage, ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage,
 };
-use hexad::ipc::ports::{Bus, Rejected, Sink};
+use hexad::ipc::ports::{Bus, Rejected, Sink, Time};
 use hexad::realtime::clock::monotonic_ns;
 use hexad::realtime::setup::scheduling;
 
@@ -44,6 +44,11 @@ pub struct Recorder {
 impl Recorder {
     /// Returns when every port is open.
     pub fn start(machine: &str) -> Self {
+        Self::start_in(machine, Time::Real)
+    }
+
+    /// In a time.
+    pub fn start_in(machine: &str, time: Time) -> Self {
         let recording = Arc::new(Mutex::new(Recording::default()));
         let stop = Arc::new(AtomicBool::new(false));
         let (ready, opened) = mpsc::channel();
@@ -52,7 +57,7 @@ impl Recorder {
             spawn(move || {
                 // So that a busy machine does not keep it from listening for a quarter of a second.
                 let _ = scheduling::fifo_priority(1);
-                let bus = Bus::join(&machine).expect("to join");
+                let bus = Bus::join_in(&machine, time).expect("to join");
                 let mut listen = Listener::new(&bus);
                 ready.send(()).expect("the test waits");
                 while !stop.load(Ordering::Relaxed) {

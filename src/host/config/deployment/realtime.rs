@@ -6,6 +6,7 @@ use std::{format, prelude::rust_2024::*};
 
 use crate::host::config::bound::Bound;
 use crate::host::config::reader::Reader;
+use crate::ipc::ports::Time;
 use crate::realtime::overrun::OnOverrun;
 
 /// Slowest and fastest loop \[Hz\]. Above, one wake-up costs more than the period leaves.
@@ -71,6 +72,8 @@ pub enum ReleaseKey {
     Hybrid,
     /// A measured message.
     External,
+    /// A measured message and the setpoint of its instant, in simulated time.
+    Lockstep,
 }
 
 /// `realtime.scheduler`: the scheduling class of the real-time thread.
@@ -87,12 +90,21 @@ impl Realtime {
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
+
+    /// Which time the participants live in.
+    pub fn time(&self) -> Time {
+        if self.release == ReleaseKey::Lockstep { Time::Simulated } else { Time::Real }
+    }
 }
 
 pub(super) fn read(mut section: Reader) -> Realtime {
     let rate_hz = section.number_or("rate_hz", 1000.0, RATE_HZ);
-    let releases =
-        [("sleep", ReleaseKey::Sleep), ("hybrid", ReleaseKey::Hybrid), ("external", ReleaseKey::External)];
+    let releases = [
+        ("sleep", ReleaseKey::Sleep),
+        ("hybrid", ReleaseKey::Hybrid),
+        ("external", ReleaseKey::External),
+        ("lockstep", ReleaseKey::Lockstep),
+    ];
     let release = section.choice_or("release", ReleaseKey::Sleep, &releases);
     let io_lead_us = if release == ReleaseKey::Hybrid { IO_LEAD_AWAKE_US } else { IO_LEAD_US };
     let schedulers = [("fifo", Scheduler::Fifo), ("deadline", Scheduler::Deadline)];
@@ -129,6 +141,18 @@ pub(super) fn read(mut section: Reader) -> Realtime {
         section.refuse(
             "on_overrun",
             "must be one of \"skip\", \"fault\" with realtime.release = \"external\" (only the newest message is kept)",
+        );
+    }
+    if realtime.release == ReleaseKey::Lockstep && realtime.require_realtime {
+        section.refuse(
+            "require_realtime",
+            "must be false with realtime.release = \"lockstep\" (simulated time)",
+        );
+    }
+    if realtime.release == ReleaseKey::Lockstep && realtime.on_overrun != OnOverrun::Skip {
+        section.refuse(
+            "on_overrun",
+            "must be \"skip\" with realtime.release = \"lockstep\" (simulated time waits for the loop)",
         );
     }
     section.finish();

@@ -1,0 +1,224 @@
+//! `release = "lockstep"`: everybody waits for everybody, and the forces are the same to the last bit, whoever is fast
+//! or slow.
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use hexad::host::config::Config;
+use hexad::host::demo::children::PARENT;
+use hexad::host::plant::hardware;
+use hexad::ipc::messages::{ForceMessage, Header, MeasuredMessage};
+use hexad::ipc::ports::{Bus, Time};
+use hexad::realtime::setup::scheduling;
+
+use crate::support::children::{HANG, Hexad, hexad};
+use crate::support::machine::{Machine, PERIOD_NS};
+use crate::support::operator;
+use crate::support::recorder::Recorder;
+use crate::support::turns;
+
+const LOCKSTEP: &str = "[realtime]\nrelease = \"lockstep\"";
+
+/// Of the motion \[s\], and where a debug build takes part, which is a hundred times slower.
+const SECONDS: &str = "20";
+const DEBUG_SECONDS: &str = "3";
+
+/// Cycles that it takes at least, with the way there and back.
+const LEAST: usize = 20_000;
+
+/// A build of `hexad` and the processor that it may use; any, if none is said.
+struct Build {
+    program: PathBuf,
+    cpu: Option<usize>,
+    seconds: &'static str,
+}
+
+impl Build {
+    /// The one under test.
+    fn this(cpu: Option<usize>) -> Self {
+        Self { program: hexad().get_program().into(), cpu, seconds: SECONDS }
+    }
+
+    fn start(&self, machine: &Machine, arguments: &[&str]) -> Hexad {
+        let [command, more @ ..] = arguments else { panic!("a command") };
+        let mut line = match self.cpu {
+            Some(cpu) => {
+                let mut taskset = Command::new("taskset");
+                taskset.args(["-c", &cpu.to_string()]).arg(&self.program);
+                taskset
+            }
+            None => Command::new(&self.program),
+        };
+        line.arg(command).arg("--config").arg(&machine.file).args(more);
+        line.env(PARENT, std::process::id().to_string()).env_remove("HEXAD_LOG");
+        Hexad::spawn(machine, command, line)
+    }
+
+    /// Daemon and setpoint source.
+    fn start_both(&self, machine: &Machine) -> (Hexad, Hexad) {
+        let daemon = self.start(machine, &["run"]);
+        let motion = ["move", "--motion", "sines", "--seconds", self.seconds, "--engage"];
+        (daemon, self.start(machine, &motion))
+    }
+
+    /// All forces of a run whose plant is this process, until control has ended; and how long it took.
+    fn forces_for_us(self) -> (Vec<ForceMessage>, Duration) {
+        // In a thread of its own, whose processor ends with it.
+        let run = move || {
+            self.cpu.map_or(Ok(()), scheduling::bind_to_cpu).expect("the processor");
+            let machine = Machine::with("lock-step-ours", LOCKSTEP);
+            let bus = Bus::join_in(&machine.name, Time::Simulated).expect("to join");
+            let mut measured = bus.source::<MeasuredMessage>().expect("to publish");
+            let mut forces = bus.sink::<ForceMessage>(8).expect("to subscribe");
+            let mut hardware = hardware(&Config::load(&machine.file).expect("the machine file"));
+            let driver = Bus::join(&machine.name).expect("to join");
+            let mut driver = driver.sink::<ForceMessage>(1).expect("to subscribe");
+            let (daemon, source) = self.start_both(&machine);
+            let mut said: Vec<ForceMessage> = vec![];
+            let mut began = Instant::now();
+            for time_ns in (0..).step_by(PERIOD_NS as usize) {
+                let (length_m, length_rate_m_s) = hardware.measure();
+                let message = MeasuredMessage { length_m, length_rate_m_s, ..MeasuredMessage::default() };
+                let asked = Instant::now();
+                measured.publish(time_ns, message).expect("to send");
+                let mut times = 1;
+                let force = loop {
+                    match forces.receive() {
+                        Some(force) => break force,
+                        None => thread::yield_now(),
+                    }
+                    if asked.elapsed() > times * Duration::from_millis(50) {
+                        assert!(asked.elapsed() < HANG, "no force for {time_ns}");
+                        measured.publish(time_ns, message).expect("to send");
+                        times += 1;
+                    }
+                };
+                assert_eq!((force.release_ns, force.header.time_ns), (time_ns, time_ns), "one answer each");
+                hardware.advance(PERIOD_NS, force.may_be_applied().then_some(force.force_n));
+                let ended = force.valid == 0 && said.last().is_some_and(|last| last.valid == 1);
+                said.push(force);
+                if ended {
+                    break;
+                }
+                // From the first answer on: processes take a while to start.
+                began = if said.len() == 1 { Instant::now() } else { began };
+            }
+            let took = began.elapsed();
+            assert_eq!(driver.newest(), None, "a driver of the same machine");
+            assert_eq!(source.ends_within(HANG).status.code(), Some(0));
+            let ended = daemon.stops_on("TERM", HANG);
+            assert!(ended.stderr.contains("TIME IS SIMULATED"), "{}", ended.stderr);
+            (said, took)
+        };
+        thread::spawn(run).join().expect("the plant")
+    }
+
+    /// Forces of a run of which all parts are processes of this build, as far as somebody who listens hears
+    /// them.
+    fn forces_overheard(self) -> Vec<ForceMessage> {
+        let machine = Machine::with("lock-step-theirs", LOCKSTEP);
+        let recorder = Recorder::start_in(&machine.name, Time::Simulated);
+        let plant = self.start(&machine, &["plant"]);
+        let (daemon, source) = self.start_both(&machine);
+        assert_eq!(source.ends_within(10 * HANG).status.code(), Some(0));
+        daemon.says("standby: setpoint source ended");
+        plant.stops_on("TERM", HANG);
+        daemon.stops_on("TERM", HANG);
+        recorder.finish().forces
+    }
+}
+
+/// As it is in memory. A field that is not here does not compile.
+fn bytes(force: &ForceMessage) -> Vec<u8> {
+    let ForceMessage { header, force_n, valid, state, fault, limiting, release_ns, checksum, reserved } =
+        force;
+    let Header { schema, reserved: zero, epoch, sequence, time_ns } = header;
+    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_ne_bytes()).collect::<Vec<_>>();
+    let longs = |longs: &[u64]| longs.iter().flat_map(|long| long.to_ne_bytes()).collect::<Vec<_>>();
+    [
+        words(&[*schema, *zero]),
+        longs(&[*epoch, *sequence, *time_ns]),
+        longs(&force_n.map(f64::to_bits)),
+        words(&[*valid, *state, *fault, *limiting]),
+        longs(&[*release_ns]),
+        words(&[*checksum, *reserved]),
+    ]
+    .concat()
+}
+
+/// Every byte of every message.
+fn assert_same(a: &[ForceMessage], b: &[ForceMessage], what: &str) {
+    assert_eq!(a.len(), b.len(), "{what}");
+    for (a, b) in a.iter().zip(b) {
+        assert_eq!(bytes(a), bytes(b), "{what}: {a:?} {b:?}");
+    }
+}
+
+/// Every byte of what was heard, which is most of it.
+fn assert_heard(all: &[ForceMessage], heard: &[ForceMessage], what: &str) {
+    let mut count = 0;
+    for heard in heard {
+        // After the end of `all` time goes on.
+        let Some(said) = all.get((heard.release_ns / PERIOD_NS) as usize) else { break };
+        assert_eq!(bytes(said), bytes(heard), "{what}: {said:?} {heard:?}");
+        count += 1;
+    }
+    println!("{what}: {count} of {} heard", all.len());
+    assert!(count > all.len() / 2, "{what}: {count} of {} heard", all.len());
+}
+
+#[test]
+fn in_lock_step_the_forces_are_the_same_bytes_on_one_processor_and_on_two() {
+    let _turn = turns::alone();
+    let (first, took) = Build::this(None).forces_for_us();
+    let simulated = Duration::from_nanos(PERIOD_NS * first.len() as u64);
+    println!("{simulated:?} of simulated time in {took:?}");
+    let valid = first.iter().filter(|force| force.valid == 1).count();
+    assert!(valid > LEAST, "{valid} cycles under control");
+    assert!(took < simulated, "slower than real time: {took:?} for {simulated:?}");
+    assert_same(&first, &Build::this(None).forces_for_us().0, "again");
+    let (alone, took) = Build::this(Some(0)).forces_for_us();
+    println!("{simulated:?} of simulated time on one processor in {took:?}");
+    assert_same(&first, &alone, "on one processor");
+    assert_heard(&first, &Build::this(None).forces_overheard(), "with hexad plant");
+}
+
+/// They stamp with what they have heard, as there is no other time.
+#[test]
+fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
+    let _turn = turns::beside_others();
+    let machine = Machine::with("lock-step-operated", LOCKSTEP);
+    let daemon = Hexad::start::<&str>(&machine, "run", &[]);
+    let plant = Hexad::start::<&str>(&machine, "plant", &[]);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "10000"]);
+    operator::engage(&machine);
+    operator::does(&machine, "stop", &[], &["standby"]);
+    operator::engage(&machine);
+    let ended = daemon.stops_on("TERM", HANG);
+    assert!(!ended.stderr.contains("did not come to rest"), "{}", ended.stderr);
+    source.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+}
+
+/// Debug, if this is release, and the other way round.
+#[test]
+#[ignore = "builds the other profile, which takes minutes"]
+fn in_lock_step_the_forces_are_the_same_bytes_in_debug_and_release() {
+    let _turn = turns::alone();
+    let this: PathBuf = hexad().get_program().into();
+    let target = this.parent().and_then(Path::parent).expect("the target folder");
+    let (profile, arguments): (_, &[&str]) =
+        if cfg!(debug_assertions) { ("release", &["--release"]) } else { ("debug", &[]) };
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo
+        .args(["build", "--bin", "hexad", "--manifest-path"])
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
+    let built = cargo.args(arguments).arg("--target-dir").arg(target).status().expect("cargo");
+    assert!(built.success());
+    let this = Build { seconds: DEBUG_SECONDS, ..Build::this(None) };
+    let other = Build { program: target.join(profile).join("hexad"), seconds: DEBUG_SECONDS, cpu: None };
+    assert_heard(&this.forces_for_us().0, &other.forces_overheard(), profile);
+}
