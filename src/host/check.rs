@@ -8,7 +8,8 @@ use std::prelude::rust_2024::*;
 
 use super::assembly::{self, Region};
 use super::config::Config;
-use crate::control::gains::{gain_margin, max_bandwidth_hz};
+use super::config::deployment::{Deployment, GAIN_MARGIN};
+use crate::control::sampled::LONGEST_DELAY;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
@@ -100,7 +101,7 @@ fn others(machine: &Machine, home: &Stance) -> Vec<Other> {
 
 impl fmt::Display for Check<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Config { name, machine, deployment } = self.config;
+        let Config { name, machine, .. } = self.config;
         let actuator = &machine.actuator;
         writeln!(f, "{name}: valid. At home, at rest:\n")?;
         writeln!(f, "leg   length      to shortest  to longest   force        of the limit  to joint axis")?;
@@ -119,26 +120,41 @@ impl fmt::Display for Check<'_> {
         }
         writeln!(f, "\ncondition of the Jacobian  {:.2}   (1 is best; errors grow with it)", self.condition)?;
         self.fmt_modes(f)?;
-        let period = deployment.realtime.period_s();
-        let control = &deployment.control;
-        for (what, bandwidth, damping) in [
-            ("position", control.position_bandwidth_hz, control.position_damping_ratio),
-            ("orientation", control.orientation_bandwidth_hz, control.orientation_damping_ratio),
-        ] {
-            writeln!(
-                f,
-                "{what:<12} bandwidth {bandwidth:>6.2} Hz at {:.0} Hz: wn T = {:.3}, gain margin {:.2}, at most {:.2} Hz",
-                deployment.realtime.rate_hz,
-                TAU * bandwidth * period,
-                gain_margin(bandwidth, damping, period),
-                max_bandwidth_hz(damping, period),
-            )?;
-        }
-        Ok(())
+        self.fmt_loops(f)
     }
 }
 
 impl Check<'_> {
+    /// How far the sampled loops are from unstable.
+    fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Deployment { realtime, control, .. } = &self.config.deployment;
+        let bandwidths = [control.position_bandwidth_hz, control.orientation_bandwidth_hz];
+        let loops = self.config.deployment.sampled_loops();
+        for ((what, bandwidth), sampled) in ["position", "orientation"].iter().zip(bandwidths).zip(&loops) {
+            let limit = sampled.largest_wn_t();
+            let (margin, longest) = (sampled.gain_margin(), sampled.longest_delay());
+            let beyond = if longest < 0.99 * LONGEST_DELAY as f64 { "" } else { "more than " };
+            writeln!(
+                f,
+                "{what:<12} bandwidth {bandwidth:>6.2} Hz at {:.0} Hz: wn T = {:.3}, with {:.2} periods of delay stable \
+                 to {limit:.3} ({:.2} Hz), gain margin {margin:.2}; stable to {beyond}{longest:.1} periods",
+                realtime.rate_hz,
+                sampled.wn_t,
+                sampled.delay,
+                limit * realtime.rate_hz / TAU,
+            )?;
+            if margin < GAIN_MARGIN {
+                writeln!(
+                    f,
+                    "WARNING: with that delay a platform of less than {:.2} of the modelled mass is unstable; a \
+                     gain margin of {GAIN_MARGIN} is usual",
+                    1.0 / margin,
+                )?;
+            }
+        }
+        Ok(())
+    }
+
     /// What start-up and the loop can be certain of.
     fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Config { machine, deployment, .. } = self.config;

@@ -5,8 +5,11 @@
 mod check;
 #[path = "../common/mod.rs"]
 mod common;
+mod delayed;
 mod dietmaier;
 mod random;
 mod rivals;
+mod sampled;
 mod sizes;
+mod transition;
 mod trials;

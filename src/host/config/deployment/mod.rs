@@ -6,6 +6,7 @@
 
 extern crate std;
 
+use core::f64::consts::TAU;
 use std::{format, prelude::rust_2024::*};
 
 pub use self::plant::Plant;
@@ -13,8 +14,8 @@ pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
-use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
 use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
+use crate::control::sampled::SampledLoop;
 use crate::control::supervisor::AfterStop;
 use crate::model::ladder::Rung;
 use crate::model::machine::Machine;
@@ -34,6 +35,9 @@ const LEAST_DEFAULT_PERIODS: f64 = 4.0;
 const LONGEST_TIMEOUT_MS: f64 = 1000.0;
 /// Damping ratios that a control engineer would write down; beyond, it is a slip.
 const DAMPING_RATIO: Bound = Bound::Within(0.1, 10.0);
+/// Gain margin of the default bandwidths, and the least that is not warned of: the textbook's 6 dB. A platform of
+/// half the modelled mass is still stable.
+pub const GAIN_MARGIN: f64 = 2.0;
 /// Largest bandwidth of the integral, as a share of the loop's: it must not take part in the loop's own motion.
 const INTEGRAL_SHARE: f64 = 0.05;
 /// The default of the force rate takes this long from no force to the largest \[s\]: slower than any noise
@@ -99,6 +103,24 @@ pub struct Control {
     pub fidelity_tolerance: f64,
 }
 
+impl Deployment {
+    /// The sampled loops of position and of orientation, with their longest delay.
+    pub fn sampled_loops(&self) -> [SampledLoop; 2] {
+        let Self { realtime, control, .. } = self;
+        [
+            (control.position_bandwidth_hz, control.position_damping_ratio),
+            (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+        ]
+        .map(|(bandwidth_hz, damping_ratio)| SampledLoop {
+            wn_t: TAU * bandwidth_hz * realtime.period_s(),
+            damping_ratio,
+            integral: control.integral_bandwidth_hz / bandwidth_hz,
+            delay: realtime.longest_delay(),
+            mass_ratio: 1.0,
+        })
+    }
+}
+
 /// `[limits]`: what no reference and no force may exceed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
@@ -133,20 +155,22 @@ pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     Deployment {
-        realtime,
-        control: control(root.section("control"), rate_hz),
+        control: control(root.section("control"), &realtime),
         limits: limits(root.section("limits"), machine),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
+        realtime,
     }
 }
 
-fn control(mut section: Reader, rate_hz: f64) -> Control {
+fn control(mut section: Reader, realtime: &Realtime) -> Control {
+    let integral_hz = section.number_or("integral_bandwidth_hz", 0.0, Bound::NotNegative);
     let [position_bandwidth_hz, position_damping_ratio] =
-        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], rate_hz);
+        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], integral_hz, realtime);
     let [orientation_bandwidth_hz, orientation_damping_ratio] =
-        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], rate_hz);
+        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], integral_hz, realtime);
+    refuse_fast_integral(&mut section, integral_hz, position_bandwidth_hz.min(orientation_bandwidth_hz));
     let control = Control {
         position_bandwidth_hz,
         position_damping_ratio,
@@ -170,7 +194,7 @@ fn control(mut section: Reader, rate_hz: f64) -> Control {
         ),
         fidelity: fidelity(&mut section),
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
-        integral_bandwidth_hz: integral(&mut section, position_bandwidth_hz.min(orientation_bandwidth_hz)),
+        integral_bandwidth_hz: integral_hz,
         on_setpoint_lost: section.choice_or(
             "on_setpoint_lost",
             AfterStop::Fault,
@@ -188,28 +212,42 @@ fn fidelity(section: &mut Reader) -> Fidelity {
 }
 
 /// So much slower than the slower loop, the integral takes a twentieth of a radian of its phase at most.
-fn integral(section: &mut Reader, bandwidth_hz: f64) -> f64 {
+fn refuse_fast_integral(section: &mut Reader, integral_hz: f64, bandwidth_hz: f64) {
     let largest = (bandwidth_hz * INTEGRAL_SHARE * 1e3).floor() / 1e3;
-    let integral_hz = section.number_or("integral_bandwidth_hz", 0.0, Bound::NotNegative);
     if integral_hz > largest {
         let bound = format!("must be at most {largest} ({INTEGRAL_SHARE} of the lesser bandwidth)");
         section.refuse("integral_bandwidth_hz", bound);
     }
-    integral_hz
 }
 
-/// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry.
-fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], rate_hz: f64) -> [f64; 2] {
+/// Bandwidth and damping ratio of one loop; refused where the loop is unstable with its longest delay.
+fn gains(
+    section: &mut Reader,
+    [bandwidth_key, damping_key]: [&'static str; 2],
+    integral_hz: f64,
+    realtime: &Realtime,
+) -> [f64; 2] {
+    let rate_hz = realtime.rate_hz;
     let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO);
-    let period_s = 1.0 / rate_hz;
+    let sampled = SampledLoop {
+        wn_t: f64::NAN,
+        damping_ratio,
+        // Any integral as if it were the largest: the bound does not move with the bandwidth that it bounds.
+        integral: if integral_hz > 0.0 { INTEGRAL_SHARE } else { 0.0 },
+        delay: realtime.longest_delay(),
+        mass_ratio: 1.0,
+    };
     // Rounded down, so that the number in the message is one that is accepted.
-    let largest = (max_bandwidth_hz(damping_ratio, period_s) * 1e3).floor() / 1e3;
-    let bandwidth_hz = section.number_or(bandwidth_key, BANDWIDTH_HZ.min(largest), Bound::Positive);
-    let all_read = [bandwidth_hz, damping_ratio, period_s].iter().all(|x| x.is_finite());
-    if all_read && gain_margin(bandwidth_hz, damping_ratio, period_s) < MIN_GAIN_MARGIN {
+    let largest_hz = |sampled: SampledLoop| (sampled.largest_wn_t() * rate_hz / TAU * 1e3).floor() / 1e3;
+    let comfortable_hz = largest_hz(SampledLoop { mass_ratio: 1.0 / GAIN_MARGIN, ..sampled });
+    let bandwidth_hz = section.number_or(bandwidth_key, BANDWIDTH_HZ.min(comfortable_hz), Bound::Positive);
+    let largest = largest_hz(sampled);
+    let all_read = sampled.delay.is_finite() && damping_ratio.is_finite();
+    if all_read && bandwidth_hz > largest {
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
-             (gain margin of {MIN_GAIN_MARGIN})"
+             (stable with {:.2} periods from measurement to force)",
+            sampled.delay
         );
         section.refuse(bandwidth_key, bound);
     }

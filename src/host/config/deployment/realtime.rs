@@ -87,6 +87,17 @@ impl Realtime {
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
     }
+
+    /// Longest time from a measurement to its force, in periods, of a loop that misses nothing and whose driver
+    /// measures once a period: the newest message may be a period old when it is read, a lead before the
+    /// release, and the force may come at the next release. Dead time of the drives comes on top.
+    pub fn longest_delay(&self) -> f64 {
+        match self.release {
+            ReleaseKey::Sleep | ReleaseKey::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
+            // Released by the measurement itself.
+            ReleaseKey::External => 1.0,
+        }
+    }
 }
 
 pub(super) fn read(mut section: Reader) -> Realtime {
@@ -144,6 +155,7 @@ fn within_half_period_s(section: &mut Reader, key: &'static str, default_us: f64
             key,
             format!("must be at most {half_us} (half a period of realtime.rate_hz = {rate_hz})"),
         );
+        return f64::NAN;
     }
     duration_us / 1e6
 }
