@@ -94,15 +94,16 @@ impl SampledLoop {
 
     /// Largest `wn T` that is stable, all else as it is; all that are less are stable too.
     pub fn largest_wn_t(&self) -> f64 {
-        // Beyond, delay and hold lag by more than the damping term leads, at any gain.
-        let none = 2.0 * self.damping_ratio / (self.delay + 0.5);
+        // Beyond half of it, delay and hold lag by more than the damping term leads, at any gain; an integral may
+        // move that a little.
+        let none = 4.0 * self.damping_ratio / (self.delay + 0.5);
         boundary(none, |wn_t| Self { wn_t, ..*self }.is_stable())
     }
 
     /// The factor by which the loop gain may grow, or the mass shrink; below 1 the loop is unstable already.
     pub fn gain_margin(&self) -> f64 {
-        // At any delay kd < 6, by the bound above and Jury's conditions at z = 0 and z = -1.
-        let none = 3.0 * self.mass_ratio / (self.damping_ratio * self.wn_t);
+        // At any delay kd < 6, by that lag and Jury's conditions at z = 0 and z = -1; an integral may move it.
+        let none = 4.0 * self.mass_ratio / (self.damping_ratio * self.wn_t);
         boundary(none, |gain| Self { mass_ratio: self.mass_ratio / gain, ..*self }.is_stable())
     }
 

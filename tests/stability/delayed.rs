@@ -24,7 +24,7 @@ const START_NS: u64 = 86_400_000_000_000;
 
 /// The push that begins a run gives every axis this velocity \[m/s\], \[rad/s\]: errors stay below a micrometre
 /// as long as the loop is stable, where everything is linear and nothing is limited.
-const PUSH: f64 = 1e-4;
+pub const PUSH: f64 = 1e-4;
 
 /// Nothing but the loop limits the loop: more force and change of force than anything asks for.
 const UNLIMITED: f64 = 1e12;
@@ -176,4 +176,41 @@ fn push(machine: &Machine, still: &Motion, acceleration: f64) -> [f64; LEGS] {
 /// Largest velocity of an axis in these cycles.
 pub fn fastest(cycles: &[Cycle]) -> f64 {
     cycles.iter().map(|cycle| cycle.twist.amax()).fold(0.0, f64::max)
+}
+
+/// Cycles after which growth and decay are told apart, a thousandth from the limit.
+const LONG: usize = 4000;
+
+/// Largest `wn T` at which the loop of this setup settles, by bisection of its logarithm to a thousandth.
+pub fn boundary(config: &Config, sampled: &SampledLoop) -> f64 {
+    let (mut low, mut high) = (0.005_f64, 5.0_f64);
+    for _ in 0..13 {
+        let wn_t = (low * high).sqrt();
+        let setup = Setup::of(SampledLoop { wn_t, ..*sampled });
+        if settles(config, &setup) { low = wn_t } else { high = wn_t }
+    }
+    (low * high).sqrt()
+}
+
+/// Whether the push is forgotten.
+fn settles(config: &Config, setup: &Setup) -> bool {
+    let mut delayed = Delayed::new(config, setup);
+    let mut before = f64::INFINITY;
+    // Long enough for the slowest oscillation of the setups that are looked at.
+    for _ in 0..4 {
+        let (cycles, cause) = delayed.run(LONG / 4);
+        let now = fastest(&cycles);
+        // Beyond, the controller believes no more what it measures, and the loop is another.
+        if cause != Cause::None || now > 100.0 * PUSH {
+            return false;
+        }
+        if now < 1e-3 * PUSH {
+            return true;
+        }
+        before = before.min(now);
+        if now > before {
+            return false;
+        }
+    }
+    true
 }

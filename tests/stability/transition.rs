@@ -6,9 +6,11 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 
 pub struct Transition {
     /// Of `[e, T e', s, u_k-1, u_k-2, ...]`, lengths and T^2 times accelerations.
-    pub matrix: DMatrix<f64>,
+    matrix: DMatrix<f64>,
+    /// What T^2 times an acceleration commanded beside the law adds.
+    command: DVector<f64>,
     /// What noise of e, and of T e', in the measurement adds.
-    pub noise: [DVector<f64>; 2],
+    noise: [DVector<f64>; 2],
 }
 
 impl Transition {
@@ -30,6 +32,9 @@ impl Transition {
         let mut matrix = DMatrix::identity(states, states);
         matrix[(0, 1)] = 1.0;
         matrix[(2, 0)] = integral * wn_t * kp;
+        if integral == 0.0 {
+            matrix[(2, 2)] = 0.0;
+        }
         let mut add = |row: usize, terms: RowDVector<f64>| {
             let sum = matrix.row(row) + terms;
             matrix.set_row(row, &sum);
@@ -39,18 +44,34 @@ impl Transition {
         for ago in 1..=d + 1 {
             matrix.set_row(2 + ago, &command(ago - 1));
         }
-        // A reading enters as the error does, but it is no error: less what the identity carries on.
-        let noise = [0, 1].map(|state| {
-            let mut free = DMatrix::<f64>::zeros(states, states);
-            (free[(0, 0)], free[(0, 1)], free[(1, 1)]) = (1.0, 1.0, 1.0);
-            (&matrix - free).column(state).into_owned()
-        });
-        Self { matrix, noise }
+        let mut command = DVector::zeros(states);
+        command[3] = 1.0;
+        if d == 0 {
+            (command[0], command[1]) = (-0.5 * h * h / mass_ratio, -h / mass_ratio);
+        }
+        let mut noise = [kp, kd].map(|gain| &command * gain);
+        noise[0][2] += integral * wn_t * kp;
+        Self { matrix, command, noise }
     }
 
     /// What the slowest part of an error is multiplied with in a cycle.
     pub fn spectral_radius(&self) -> f64 {
         self.matrix.complex_eigenvalues().iter().map(|z| z.norm()).fold(0.0, f64::max)
+    }
+
+    /// The error e of so many cycles, from rest, where in the first T^2 times an acceleration is commanded beside
+    /// the law.
+    pub fn response(&self, push: f64, cycles: usize) -> Vec<f64> {
+        let mut state = DVector::zeros(self.matrix.nrows());
+        let mut errors = vec![];
+        for cycle in 0..cycles {
+            errors.push(state[0]);
+            state = &self.matrix * state;
+            if cycle == 0 {
+                state += &self.command * push;
+            }
+        }
+        errors
     }
 
     /// Standard deviation of e where these are those of the readings of e and T e': P = A P A' + Q, by doubling.

@@ -229,25 +229,24 @@ fn gains(
 ) -> [f64; 2] {
     let rate_hz = realtime.rate_hz;
     let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO);
-    let sampled = SampledLoop {
-        wn_t: f64::NAN,
-        damping_ratio,
-        // Any integral as if it were the largest: the bound does not move with the bandwidth that it bounds.
-        integral: if integral_hz > 0.0 { INTEGRAL_SHARE } else { 0.0 },
-        delay: realtime.longest_delay(),
-        mass_ratio: 1.0,
+    let delay = realtime.longest_delay();
+    // The lesser of none and the largest: the bound does not move with the bandwidth that it bounds.
+    let integrals = if integral_hz > 0.0 { [0.0, INTEGRAL_SHARE] } else { [0.0; 2] };
+    let largest_hz = |mass_ratio| {
+        let [a, b] = integrals.map(|integral| {
+            SampledLoop { wn_t: f64::NAN, damping_ratio, integral, delay, mass_ratio }.largest_wn_t()
+        });
+        // Rounded down, so that the number in the message is one that is accepted.
+        (a.min(b) * rate_hz / TAU * 1e3).floor() / 1e3
     };
-    // Rounded down, so that the number in the message is one that is accepted.
-    let largest_hz = |sampled: SampledLoop| (sampled.largest_wn_t() * rate_hz / TAU * 1e3).floor() / 1e3;
-    let comfortable_hz = largest_hz(SampledLoop { mass_ratio: 1.0 / GAIN_MARGIN, ..sampled });
-    let bandwidth_hz = section.number_or(bandwidth_key, BANDWIDTH_HZ.min(comfortable_hz), Bound::Positive);
-    let largest = largest_hz(sampled);
-    let all_read = sampled.delay.is_finite() && damping_ratio.is_finite();
+    let default_hz = BANDWIDTH_HZ.min(largest_hz(1.0 / GAIN_MARGIN));
+    let bandwidth_hz = section.number_or(bandwidth_key, default_hz, Bound::Positive);
+    let largest = largest_hz(1.0);
+    let all_read = delay.is_finite() && damping_ratio.is_finite();
     if all_read && bandwidth_hz > largest {
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
-             (stable with {:.2} periods from measurement to force)",
-            sampled.delay
+             (stable with {delay:.2} periods from measurement to force)"
         );
         section.refuse(bandwidth_key, bound);
     }
