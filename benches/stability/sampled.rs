@@ -11,7 +11,7 @@ use super::{Failure, cells, chart, common, write_csv};
 const LONGEST_DELAY: u32 = 2;
 /// Points per period: of the simulation, and of the line.
 const FOUND: u32 = 4;
-const PREDICTED: u32 = 50;
+const PREDICTED: u32 = 100;
 
 const DAMPING_RATIOS: [f64; 4] = [0.3, 0.7, 1.0, 2.0];
 /// Of the platform over that of the model.
@@ -20,8 +20,8 @@ const MASS_RATIOS: [f64; 5] = [0.3, 0.5, 1.0, 2.0, 3.0];
 /// A prediction that is further off is wrong.
 const TOLERANCE: f64 = 0.02;
 
-/// Half a mark, along the delay and along wn T.
-const MARK: (f64, f64) = (0.008, 0.012);
+/// Half a mark: in periods, and as a share of the largest limit of its panel.
+const MARK: (f64, f64) = (0.016, 0.018);
 
 /// A point: delay, `wn T`.
 type At = (f64, f64);
@@ -64,9 +64,14 @@ pub fn run() -> Result<(), Failure> {
             }
             let predicted: Vec<At> =
                 delays(PREDICTED).into_iter().map(|delay| (delay, predict(delay))).collect();
-            lines.push((label, predicted, found.into_iter().map(diamond).collect::<Vec<_>>()));
+            lines.push((label, predicted, found));
         }
-        drawn.push((y_label, lines));
+        let largest = lines.iter().flat_map(|(_, line, _)| line).map(|(_, wn_t)| *wn_t).fold(0.0, f64::max);
+        let mark = |at| diamond(at, MARK.0, MARK.1 * largest);
+        let marked = lines
+            .into_iter()
+            .map(|(label, line, found)| (label, line, found.into_iter().map(mark).collect::<Vec<_>>()));
+        drawn.push((y_label, marked.collect::<Vec<_>>()));
     }
     let header = ["damping_ratio", "mass_ratio", "delay_periods", "wn_t_predicted", "wn_t_simulated"];
     write_csv("stability_sampled.csv", &header, &rows)?;
@@ -93,7 +98,6 @@ fn delays(per_period: u32) -> Vec<f64> {
     (0..=LONGEST_DELAY * per_period).map(|k| f64::from(k) / f64::from(per_period)).collect()
 }
 
-fn diamond((x, y): At) -> Vec<At> {
-    let (dx, dy) = MARK;
+fn diamond((x, y): At, dx: f64, dy: f64) -> Vec<At> {
     vec![(x - dx, y), (x, y + dy), (x + dx, y), (x, y - dy), (x - dx, y)]
 }
