@@ -26,11 +26,12 @@
 //! ```
 //!
 //! without an integral less one factor `z - 1`. The loop is stable exactly while all its zeros are within
-//! the unit circle. Franklin, Powell and Workman, "Digital Control of Dynamic Systems", 4.3 (delay) and
-//! Åström and Wittenmark, "Computer-Controlled Systems", 2.3 and 3.2 (delay, Jury's criterion).
+//! the unit circle. Franklin, Powell and Workman, "Digital Control of Dynamic Systems", chapter 4 (hold and delay);
+//! Åström and Wittenmark, "Computer-Controlled Systems", chapters 2 and 3 (the same; Jury's criterion).
 //!
-//! It does not say what drives that lag and legs that give way do, nor cycles without a new measurement, which
-//! carry the last error on by the law. None of this is part of the cycle.
+//! Short delays are no simpler: a strong damping term is stable with a quarter of a period and not without.
+//! What this does not say is what drives that lag and legs that give way do, nor cycles without a new measurement,
+//! which carry the last error on by the law. None of this is part of the cycle.
 
 /// Longest delay that is looked at, in periods: of the loops that are slow enough for more, nobody needs to
 /// know how much more.

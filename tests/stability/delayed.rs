@@ -174,7 +174,7 @@ fn push(machine: &Machine, still: &Motion, acceleration: f64) -> [f64; LEGS] {
 }
 
 /// Largest velocity of an axis in these cycles.
-pub fn fastest(cycles: &[Cycle]) -> f64 {
+fn fastest(cycles: &[Cycle]) -> f64 {
     cycles.iter().map(|cycle| cycle.twist.amax()).fold(0.0, f64::max)
 }
 
@@ -207,10 +207,10 @@ fn settles(config: &Config, setup: &Setup) -> bool {
         if now < 1e-3 * PUSH {
             return true;
         }
-        before = before.min(now);
         if now > before {
             return false;
         }
+        before = now;
     }
     true
 }

@@ -1,4 +1,4 @@
-//! Where methods fail: assembly modes, far starts, sizes, offsets. Each case has its predicted outcome.
+//! Where methods fail: assembly modes, far starts, sizes, offsets, sampling. Each case has its predicted outcome.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 

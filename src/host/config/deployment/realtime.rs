@@ -90,7 +90,7 @@ impl Realtime {
 
     /// Longest time from a measurement to its force, in periods, of a loop that misses nothing and whose driver
     /// measures once a period: the newest message may be a period old when it is read, a lead before the
-    /// release, and the force may come at the next release. Dead time of the drives comes on top.
+    /// release, and the force may come at the next release. What the drives wait or sleep comes on top.
     pub fn longest_delay(&self) -> f64 {
         match self.release {
             ReleaseKey::Sleep | ReleaseKey::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
