@@ -32,7 +32,7 @@ pub fn run() -> Result<(), Failure> {
     let of = |damping_ratio, mass_ratio| SampledLoop {
         wn_t: f64::NAN,
         damping_ratio,
-        integral: 0.0,
+        observer: 0.0,
         delay: f64::NAN,
         mass_ratio,
     };

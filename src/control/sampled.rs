@@ -5,7 +5,7 @@
 //! knows e and e', commands
 //!
 //! ```text
-//! u_k = Kp e_k + Kd e'_k + s_k        s_k+1 = s_k + Ki Kp T e_k
+//! u_k = Kp e_k + Kd e'_k + s_k        s_k+1 = s_k + Ki T e_k
 //! ```
 //!
 //! and the drives hold it for a period from `k T + delay` on. The delay is all that lies between: age of the
@@ -18,14 +18,15 @@
 //! T        e'_k+1 =       T e'_k - T^2 / m (h       u_k-d +  f            u_k-d-1)
 //! ```
 //!
-//! The characteristic polynomial of that matrix, `kp = Kp T^2 / m`, `kd = Kd T / m`, `ki = Ki T kp`, is
+//! The characteristic polynomial of that matrix, `kp = Kp T^2 / m`, `kd = Kd T / m`, `ki = Ki T^3 / m`, is
 //!
 //! ```text
 //! z^(d+1) (z - 1)^3 + (kp (z - 1) + ki) q(z) + kd (h z + f) (z - 1)^2
 //! q(z) = h^2 / 2 z^2 + (1 / 2 + h f) z + f^2 / 2
 //! ```
 //!
-//! without an integral less one factor `z - 1`. The loop is stable exactly while all its zeros are within
+//! without Ki less one factor `z - 1`. An observer L ([`super::law`]) makes such a loop: in sum it adds `L Kd` to
+//! Kp, L to Kd, and `Ki = L Kp`. The loop is stable exactly while all its zeros are within
 //! the unit circle. Franklin, Powell and Workman, "Digital Control of Dynamic Systems", chapter 4 (hold and delay);
 //! Åström and Wittenmark, "Computer-Controlled Systems", chapters 2 and 3 (the same; Jury's criterion).
 //!
@@ -37,7 +38,7 @@
 /// know how much more.
 pub const LONGEST_DELAY: usize = 64;
 
-/// Coefficients of the polynomial with that delay and an integral.
+/// Coefficients of the polynomial with that delay and an observer.
 const MOST: usize = LONGEST_DELAY + 5;
 
 /// Halvings of an interval, down to rounding.
@@ -50,8 +51,8 @@ pub struct SampledLoop {
     pub wn_t: f64,
     /// zeta
     pub damping_ratio: f64,
-    /// `Ki / wn`, where the integral adds `Ki Kp` times the integral of e; 0 is without.
-    pub integral: f64,
+    /// `L / wn` of the observer; 0 is without.
+    pub observer: f64,
     /// From the measurement to its force, in periods.
     pub delay: f64,
     /// Of the platform over that of the model.
@@ -59,13 +60,20 @@ pub struct SampledLoop {
 }
 
 impl SampledLoop {
+    /// Kp and Kd together with what the observer adds, in units of `wn^2` and `wn`.
+    fn observed(&self) -> [f64; 2] {
+        let damping = 2.0 * self.damping_ratio;
+        [1.0 + self.observer * damping, damping + self.observer]
+    }
+
     /// The characteristic polynomial, lowest coefficient first, and its degree; the commands of `after` periods
     /// are under way, the oldest for a share `f` of a period more.
     fn characteristic(&self, after: usize, f: f64) -> ([f64; MOST], usize) {
         let h = 1.0 - f;
-        let kp = self.wn_t * self.wn_t / self.mass_ratio;
-        let kd = 2.0 * self.damping_ratio * self.wn_t / self.mass_ratio;
-        let ki = self.integral * self.wn_t * kp;
+        let [stiffness, damping] = self.observed();
+        let kp = stiffness * self.wn_t * self.wn_t / self.mass_ratio;
+        let kd = damping * self.wn_t / self.mass_ratio;
+        let ki = self.observer * self.wn_t * self.wn_t * self.wn_t / self.mass_ratio;
         let [q0, q1, q2] = [0.5 * f * f, 0.5 + h * f, 0.5 * h * h];
         let [n0, n1, n2] = [kp * q0 - kd * f, kp * q1 + kd * (f - h), kp * q2 + kd * h];
         let mut coefficients = [0.0; MOST];
@@ -74,7 +82,7 @@ impl SampledLoop {
                 *sum += term;
             }
         };
-        if self.integral > 0.0 {
+        if self.observer > 0.0 {
             add(after, [-1.0, 3.0, -3.0, 1.0]);
             add(0, [ki * q0 - n0, ki * q1 + n0 - n1, ki * q2 + n1 - n2, n2]);
             (coefficients, after + 3)
@@ -95,17 +103,26 @@ impl SampledLoop {
 
     /// Largest `wn T` that is stable, all else as it is; all that are less are stable too.
     pub fn largest_wn_t(&self) -> f64 {
-        // Beyond half of it, delay and hold lag by more than the damping term leads, at any gain; an integral may
-        // move that a little.
-        let none = 4.0 * self.damping_ratio / (self.delay + 0.5);
+        // Beyond half of it, delay and hold lag by more than the damping term leads, at any gain; the integral in an
+        // observer may move that a little.
+        let [stiffness, damping] = self.observed();
+        let none = 2.0 * damping / (stiffness * (self.delay + 0.5));
         boundary(none, |wn_t| Self { wn_t, ..*self }.is_stable())
     }
 
     /// The factor by which the loop gain may grow, or the mass shrink; below 1 the loop is unstable already.
     pub fn gain_margin(&self) -> f64 {
-        // At any delay kd < 6, by that lag and Jury's conditions at z = 0 and z = -1; an integral may move it.
-        let none = 4.0 * self.mass_ratio / (self.damping_ratio * self.wn_t);
+        // At any delay kd < 6, by that lag and Jury's conditions at z = 0 and z = -1; an observer may move it.
+        let [_, damping] = self.observed();
+        let none = 8.0 * self.mass_ratio / (damping * self.wn_t);
         boundary(none, |gain| Self { mass_ratio: self.mass_ratio / gain, ..*self }.is_stable())
+    }
+
+    /// The factor to which the loop gain may fall, where an observer asks for some: Routh's criterion, for a loop
+    /// that is slow against its period.
+    pub fn least_gain(&self) -> f64 {
+        let [stiffness, damping] = self.observed();
+        self.mass_ratio * self.observer / (stiffness * damping)
     }
 
     /// The longest delay that is stable, in periods; no longer than [`LONGEST_DELAY`]. Shorter ones are too, down
@@ -116,7 +133,7 @@ impl SampledLoop {
 }
 
 /// Where what holds from 0 on ceases to, at the latest at `high`. Looks from above.
-fn boundary(mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+pub fn boundary(mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let mut low = 0.0;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
@@ -154,17 +171,17 @@ mod tests {
     use super::*;
 
     const LOOP: SampledLoop =
-        SampledLoop { wn_t: 0.1, damping_ratio: 1.0, integral: 0.0, delay: 1.0, mass_ratio: 1.0 };
+        SampledLoop { wn_t: 0.1, damping_ratio: 1.0, observer: 0.0, delay: 1.0, mass_ratio: 1.0 };
 
     fn loops() -> impl Iterator<Item = SampledLoop> {
         [0.1, 0.5, 1.0, 3.0, 10.0].into_iter().flat_map(|damping_ratio| {
             [0.0, 0.3, 0.999, 1.0, 1.5, 2.0, 2.1, 5.7].into_iter().flat_map(move |delay| {
                 [0.3, 1.0, 3.0].into_iter().flat_map(move |mass_ratio| {
-                    [0.0, 0.05].map(|integral| SampledLoop {
+                    [0.0, 0.5 * damping_ratio].map(|observer| SampledLoop {
                         damping_ratio,
                         delay,
                         mass_ratio,
-                        integral,
+                        observer,
                         ..LOOP
                     })
                 })
@@ -174,17 +191,20 @@ mod tests {
 
     /// Largest error in the last quarter of so many cycles, started at 1, by the recurrence itself.
     fn simulated(of: &SampledLoop, cycles: usize) -> f64 {
-        let SampledLoop { wn_t, damping_ratio, integral, delay, mass_ratio } = *of;
+        let SampledLoop { wn_t, damping_ratio, observer, delay, mass_ratio } = *of;
         let (d, f) = (delay as usize, delay.fract());
         let h = 1.0 - f;
-        let [mut e, mut v, mut s] = [1.0, 0.0, 0.0];
+        let (kp, kd, l) = (wn_t * wn_t, 2.0 * damping_ratio * wn_t, observer * wn_t);
+        let [mut e, mut v, mut learnt] = [1.0, 0.0, 0.0];
+        let mut expected = kd;
         // The newest first.
         let mut commands = [0.0; 16];
         let mut largest = 0.0;
         for cycle in 0..cycles {
             commands.copy_within(0..15, 1);
-            commands[0] = wn_t * wn_t * e + 2.0 * damping_ratio * wn_t * v + s;
-            s += integral * wn_t.powi(3) * e;
+            learnt += l * (v + kd * e - expected);
+            expected = v + kd * e - kp * e;
+            commands[0] = kp * e + kd * v + learnt;
             let [late, early] = [commands[d], commands[d + 1]].map(|u| u / mass_ratio);
             e += v - 0.5 * h * h * late - 0.5 * (1.0 - h * h) * early;
             v -= h * late + f * early;
@@ -209,7 +229,7 @@ mod tests {
         }
     }
 
-    /// One period, no integral: with `a = kp / 2`, `b = kd` Jury's criterion leaves `b - 3 a > (b - a)^2`.
+    /// One period, no observer: with `a = kp / 2`, `b = kd` Jury's criterion leaves `b - 3 a > (b - a)^2`.
     #[test]
     fn with_one_period_the_gain_margin_is_the_closed_form() {
         for (wn_t, damping_ratio) in [(0.06, 1.0), (0.19, 0.7), (0.3, 1.2), (0.05, 0.1)] {
@@ -246,7 +266,7 @@ mod tests {
             }
             let at = SampledLoop { wn_t: 0.5 * each.largest_wn_t(), ..each };
             let there = SampledLoop { delay: at.longest_delay(), ..at };
-            // Slow loops with an integral, to rounding.
+            // Slow loops with an observer, to rounding.
             assert!(
                 (there.largest_wn_t() / at.wn_t - 1.0).abs() < 1e-4,
                 "{there:?}: {}",

@@ -44,7 +44,7 @@ fn nobody_is_served_beside_root() {
 /// With timeouts that also a busy machine does not reach: nobody has priority here.
 fn machine(test: &str) -> Machine {
     let timeouts =
-        "[timeouts]\nsetpoint_ms = 900.0\nmeasured_ms = 900.0\n[plant]\nforce_timeout_ms = 900.0\n";
+        "[timeouts]\nsetpoint_ms = 200.0\nmeasured_ms = 900.0\n[plant]\nforce_timeout_ms = 900.0\n";
     Machine::with(test, timeouts)
 }
 

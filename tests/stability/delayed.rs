@@ -4,7 +4,7 @@
 
 use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
 use hexad::control::gains::Gains;
-use hexad::control::law::Law;
+use hexad::control::law::{ControlMode, Law};
 use hexad::control::sampled::SampledLoop;
 use hexad::control::state::{Cause, Request, State};
 use hexad::host::config::Config;
@@ -136,11 +136,17 @@ impl Delayed {
 fn parameters(config: &Config, setup: &Setup) -> Parameters {
     let Fidelity::Fixed(rung) = config.deployment.control.fidelity else { panic!("not fixed") };
     let parameters = daemon::parameters(&config.machine, &config.deployment, rung);
-    let SampledLoop { wn_t, damping_ratio, integral, .. } = setup.sampled;
+    let SampledLoop { wn_t, damping_ratio, observer, .. } = setup.sampled;
     let wn = wn_t * config.deployment.realtime.rate_hz;
     let gains = Gains::new(wn / core::f64::consts::TAU, damping_ratio);
     Parameters {
-        law: Law { position: gains, orientation: gains, integral: integral * wn },
+        law: Law::new(
+            &config.machine,
+            ControlMode::ComputedTorque,
+            [gains; 2],
+            observer * wn,
+            &parameters.limits,
+        ),
         force_rate: UNLIMITED,
         ..parameters
     }

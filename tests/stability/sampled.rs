@@ -15,7 +15,7 @@ use super::delayed::{Delayed, PUSH, Setup, boundary};
 use super::transition::Transition;
 
 const LOOP: SampledLoop =
-    SampledLoop { wn_t: f64::NAN, damping_ratio: 1.0, integral: 0.0, delay: 1.0, mass_ratio: 1.0 };
+    SampledLoop { wn_t: f64::NAN, damping_ratio: 1.0, observer: 0.0, delay: 1.0, mass_ratio: 1.0 };
 const DELAYS: [f64; 6] = [0.0, 0.5, 1.0, 1.6, 2.0, 3.3];
 
 /// No gravity: nothing but the push moves the platform.
@@ -33,10 +33,10 @@ fn at(share: f64, sampled: SampledLoop) -> SampledLoop {
 fn the_limit_is_that_of_controller_and_plant() {
     let config = in_space();
     for delay in [0.0, 0.5, 1.0, 2.0] {
-        for [damping_ratio, integral, mass_ratio] in
-            [[1.0, 0.0, 1.0], [0.3, 0.0, 1.0], [1.0, 0.05, 1.0], [0.7, 0.0, 0.3], [0.7, 0.0, 3.0]]
+        for [damping_ratio, observer, mass_ratio] in
+            [[1.0, 0.0, 1.0], [0.3, 0.0, 1.0], [1.0, 0.5, 1.0], [0.7, 0.0, 0.3], [0.7, 0.0, 3.0]]
         {
-            let sampled = SampledLoop { damping_ratio, integral, mass_ratio, delay, ..LOOP };
+            let sampled = SampledLoop { damping_ratio, observer, mass_ratio, delay, ..LOOP };
             let (predicted, found) = (sampled.largest_wn_t(), boundary(&config, &sampled));
             println!("{sampled:?}: predicted {predicted:.4}, found {found:.4}");
             assert!((found / predicted - 1.0).abs() < 0.01, "{sampled:?}: {predicted} {found}");
@@ -48,9 +48,9 @@ fn the_limit_is_that_of_controller_and_plant() {
 #[test]
 fn at_the_limit_the_spectral_radius_is_one() {
     for delay in DELAYS {
-        for [damping_ratio, integral, mass_ratio] in [[1.0, 0.0, 1.0], [0.2, 0.05, 0.3], [3.0, 0.05, 3.0]] {
+        for [damping_ratio, observer, mass_ratio] in [[1.0, 0.0, 1.0], [0.2, 0.05, 0.3], [3.0, 1.0, 3.0]] {
             let radius = |share| {
-                let sampled = SampledLoop { damping_ratio, integral, mass_ratio, delay, ..LOOP };
+                let sampled = SampledLoop { damping_ratio, observer, mass_ratio, delay, ..LOOP };
                 Transition::new(&at(share, sampled)).spectral_radius()
             };
             assert!((radius(1.0) - 1.0).abs() < 1e-6, "{delay} {damping_ratio}: {}", radius(1.0));
@@ -125,7 +125,7 @@ fn the_bound_of_the_configuration_is_the_limit_with_the_longest_delay() {
         let (_, bound) = refused.split_once("must be at most ").unwrap();
         let largest = bound.split_once(' ').unwrap().0.parse().unwrap();
         let config = Config::parse(&text(largest), "most").unwrap();
-        let [sampled, _] = config.deployment.sampled_loops();
+        let sampled = config.deployment.realtime.sampled_loop(largest, 1.0);
         assert_eq!(sampled.delay, if release == "sleep" { 2.1 } else { 1.0 });
         let found = boundary(&config, &sampled);
         println!("{release}: {largest} Hz, wn T {:.4}, found {found:.4}", sampled.wn_t);

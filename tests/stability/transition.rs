@@ -15,11 +15,12 @@ pub struct Transition {
 
 impl Transition {
     pub fn new(of: &SampledLoop) -> Self {
-        let SampledLoop { wn_t, damping_ratio, integral, delay, mass_ratio } = *of;
+        let SampledLoop { wn_t, damping_ratio, observer, delay, mass_ratio } = *of;
         let (d, f) = (delay.floor() as usize, delay.fract());
         let h = 1.0 - f;
         let states = 4 + d;
-        let (kp, kd) = (wn_t * wn_t, 2.0 * damping_ratio * wn_t);
+        let (kp, kd, l) = (wn_t * wn_t, 2.0 * damping_ratio * wn_t, observer * wn_t);
+        let (summed, kp, kd) = (l * kp, kp + l * kd, kd + l);
         let mut law = RowDVector::zeros(states);
         (law[0], law[1], law[2]) = (kp, kd, 1.0);
         // The command of so many periods ago, as a row over the state.
@@ -31,8 +32,8 @@ impl Transition {
         let (newer, older) = (command(d) / mass_ratio, command(d + 1) / mass_ratio);
         let mut matrix = DMatrix::identity(states, states);
         matrix[(0, 1)] = 1.0;
-        matrix[(2, 0)] = integral * wn_t * kp;
-        if integral == 0.0 {
+        matrix[(2, 0)] = summed;
+        if observer == 0.0 {
             matrix[(2, 2)] = 0.0;
         }
         let mut add = |row: usize, terms: RowDVector<f64>| {
@@ -50,7 +51,7 @@ impl Transition {
             (command[0], command[1]) = (-0.5 * h * h / mass_ratio, -h / mass_ratio);
         }
         let mut noise = [kp, kd].map(|gain| &command * gain);
-        noise[0][2] += integral * wn_t * kp;
+        noise[0][2] += summed;
         Self { matrix, command, noise }
     }
 

@@ -14,8 +14,10 @@ pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
+use crate::control::law::ControlMode;
+use crate::control::leg_masses::LegMasses;
 use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
-use crate::control::sampled::SampledLoop;
+use crate::control::sampled::{SampledLoop, boundary};
 use crate::control::supervisor::AfterStop;
 use crate::model::ladder::Rung;
 use crate::model::machine::Machine;
@@ -35,11 +37,11 @@ const LEAST_DEFAULT_PERIODS: f64 = 4.0;
 const LONGEST_TIMEOUT_MS: f64 = 1000.0;
 /// Damping ratios that a control engineer would write down; beyond, it is a slip.
 const DAMPING_RATIO: Bound = Bound::Within(0.1, 10.0);
-/// Gain margin of the default bandwidths, and the least that is not warned of: the textbook's 6 dB. A platform of
-/// half the modelled mass is still stable.
+/// Gain margin of the default bandwidths and of observers, and the least that is not warned of: the textbook's
+/// 6 dB. A platform of half the modelled mass is still stable.
 pub const GAIN_MARGIN: f64 = 2.0;
-/// Largest bandwidth of the integral, as a share of the loop's: it must not take part in the loop's own motion.
-const INTEGRAL_SHARE: f64 = 0.05;
+/// Largest bandwidth of the observer, as a multiple of the lesser bandwidth: what is faster only amplifies noise.
+const FASTEST_OBSERVER: f64 = 2.0;
 /// The default of the force rate takes this long from no force to the largest \[s\]: slower than any noise
 /// worth following, faster than any motion.
 const FORCE_RISE_S: f64 = 0.01;
@@ -77,6 +79,8 @@ pub struct Deployment {
 /// `[control]`: the law's error dynamics, and how near the set point must be to engage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Control {
+    /// From errors to forces.
+    pub mode: ControlMode,
     /// Natural frequency of the position error.
     pub position_bandwidth_hz: f64,
     /// Damping ratio of the position error.
@@ -95,30 +99,12 @@ pub struct Control {
     pub following_orientation_rad: f64,
     /// Which terms of the dynamics are evaluated.
     pub fidelity: Fidelity,
-    /// Ki / Kp of both loops, as a frequency; 0 is without.
-    pub integral_bandwidth_hz: f64,
+    /// Below this frequency disturbances are cancelled; 0 is without.
+    pub observer_bandwidth_hz: f64,
     /// What follows the stop of a platform that lost its setpoint.
     pub on_setpoint_lost: AfterStop,
     /// Largest error [`Fidelity::Auto`] may make, as a share of the peak force of the envelope.
     pub fidelity_tolerance: f64,
-}
-
-impl Deployment {
-    /// The sampled loops of position and of orientation, with their longest delay.
-    pub fn sampled_loops(&self) -> [SampledLoop; 2] {
-        let Self { realtime, control, .. } = self;
-        [
-            (control.position_bandwidth_hz, control.position_damping_ratio),
-            (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
-        ]
-        .map(|(bandwidth_hz, damping_ratio)| SampledLoop {
-            wn_t: TAU * bandwidth_hz * realtime.period_s(),
-            damping_ratio,
-            integral: control.integral_bandwidth_hz / bandwidth_hz,
-            delay: realtime.longest_delay(),
-            mass_ratio: 1.0,
-        })
-    }
 }
 
 /// `[limits]`: what no reference and no force may exceed.
@@ -155,7 +141,7 @@ pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     Deployment {
-        control: control(root.section("control"), &realtime),
+        control: control(root.section("control"), &realtime, machine),
         limits: limits(root.section("limits"), machine),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant::read(root.section("plant"), rate_hz, machine),
@@ -164,14 +150,22 @@ pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     }
 }
 
-fn control(mut section: Reader, realtime: &Realtime) -> Control {
-    let integral_hz = section.number_or("integral_bandwidth_hz", 0.0, Bound::NotNegative);
+fn control(mut section: Reader, realtime: &Realtime, machine: &Machine) -> Control {
+    let modes = ControlMode::ALL.map(|mode| (mode.name(), mode));
+    let mode = section.choice_or("mode", ControlMode::default(), &modes);
+    let legs = mode.acts_on_legs().then(|| LegMasses::at_home(machine));
+    let [softest, stiffest] = legs.map_or([1.0; 2], |legs| [legs.softest, legs.stiffest]);
     let [position_bandwidth_hz, position_damping_ratio] =
-        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], integral_hz, realtime);
+        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], realtime, stiffest);
     let [orientation_bandwidth_hz, orientation_damping_ratio] =
-        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], integral_hz, realtime);
-    refuse_fast_integral(&mut section, integral_hz, position_bandwidth_hz.min(orientation_bandwidth_hz));
+        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], realtime, 1.0);
+    let bandwidths = [position_bandwidth_hz, orientation_bandwidth_hz];
+    let loops = [
+        (realtime.sampled_loop(position_bandwidth_hz, position_damping_ratio), [softest, stiffest]),
+        (realtime.sampled_loop(orientation_bandwidth_hz, orientation_damping_ratio), [1.0; 2]),
+    ];
     let control = Control {
+        mode,
         position_bandwidth_hz,
         position_damping_ratio,
         orientation_bandwidth_hz,
@@ -194,7 +188,7 @@ fn control(mut section: Reader, realtime: &Realtime) -> Control {
         ),
         fidelity: fidelity(&mut section),
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
-        integral_bandwidth_hz: integral_hz,
+        observer_bandwidth_hz: observer(&mut section, realtime.rate_hz, &bandwidths, &loops),
         on_setpoint_lost: section.choice_or(
             "on_setpoint_lost",
             AfterStop::Fault,
@@ -211,42 +205,62 @@ fn fidelity(section: &mut Reader) -> Fidelity {
     section.choice_or("fidelity", Fidelity::Fixed(Rung::Exact), &options.collect::<Vec<_>>())
 }
 
-/// So much slower than the slower loop, the integral takes a twentieth of a radian of its phase at most.
-fn refuse_fast_integral(section: &mut Reader, integral_hz: f64, bandwidth_hz: f64) {
-    let largest = (bandwidth_hz * INTEGRAL_SHARE * 1e3).floor() / 1e3;
-    if integral_hz > largest {
-        let bound = format!("must be at most {largest} ({INTEGRAL_SHARE} of the lesser bandwidth)");
-        section.refuse("integral_bandwidth_hz", bound);
+/// As fast as both loops carry it.
+fn observer(
+    section: &mut Reader,
+    rate_hz: f64,
+    bandwidths: &[f64; 2],
+    loops: &[(SampledLoop, [f64; 2]); 2],
+) -> f64 {
+    let observer_hz = section.number_or("observer_bandwidth_hz", 0.0, Bound::NotNegative);
+    let fastest = FASTEST_OBSERVER * bandwidths.iter().copied().fold(f64::INFINITY, f64::min);
+    let largest = boundary(fastest, |hertz| {
+        bandwidths.iter().zip(loops).all(|(bandwidth, (sampled, [softest, stiffest]))| {
+            let observed = SampledLoop { observer: hertz / bandwidth, ..*sampled };
+            observed.gain_margin() >= GAIN_MARGIN * stiffest
+                && observed.least_gain() * GAIN_MARGIN <= *softest
+        })
+    });
+    // What halving never reaches is meant too.
+    let largest = (largest * (1.0 + 1e-9) * 1e3).floor() / 1e3;
+    if observer_hz > largest && bandwidths.iter().all(|hertz| hertz.is_finite()) {
+        let bound = format!(
+            "must be at most {largest} at realtime.rate_hz = {rate_hz} and these bandwidths (gain margin of \
+             {GAIN_MARGIN}, and {FASTEST_OBSERVER} times the lesser bandwidth)"
+        );
+        section.refuse("observer_bandwidth_hz", bound);
     }
+    observer_hz
 }
 
-/// Bandwidth and damping ratio of one loop; refused where the loop is unstable with its longest delay.
+/// Bandwidth and damping ratio of one loop, the stiffest of whose modes has so many times its gain; refused where
+/// that is unstable with the longest delay.
 fn gains(
     section: &mut Reader,
     [bandwidth_key, damping_key]: [&'static str; 2],
-    integral_hz: f64,
     realtime: &Realtime,
+    stiffest: f64,
 ) -> [f64; 2] {
     let rate_hz = realtime.rate_hz;
     let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO);
-    let delay = realtime.longest_delay();
-    // The lesser of none and the largest: the bound does not move with the bandwidth that it bounds.
-    let integrals = if integral_hz > 0.0 { [0.0, INTEGRAL_SHARE] } else { [0.0; 2] };
-    let largest_hz = |mass_ratio| {
-        let [a, b] = integrals.map(|integral| {
-            SampledLoop { wn_t: f64::NAN, damping_ratio, integral, delay, mass_ratio }.largest_wn_t()
-        });
-        // Rounded down, so that the number in the message is one that is accepted.
-        (a.min(b) * rate_hz / TAU * 1e3).floor() / 1e3
+    // Rounded down, so that the number in the message is one that is accepted.
+    let largest_hz = |gain: f64| {
+        let sampled = realtime.sampled_loop(f64::NAN, damping_ratio);
+        let wn_t = SampledLoop { mass_ratio: 1.0 / gain, ..sampled }.largest_wn_t();
+        (wn_t * rate_hz / TAU * 1e3).floor() / 1e3
     };
-    let default_hz = BANDWIDTH_HZ.min(largest_hz(1.0 / GAIN_MARGIN));
+    let default_hz = BANDWIDTH_HZ.min(largest_hz(GAIN_MARGIN * stiffest));
     let bandwidth_hz = section.number_or(bandwidth_key, default_hz, Bound::Positive);
-    let largest = largest_hz(1.0);
-    let all_read = delay.is_finite() && damping_ratio.is_finite();
-    if all_read && bandwidth_hz > largest {
+    let (largest, delay) = (largest_hz(stiffest), realtime.longest_delay());
+    if delay.is_finite() && damping_ratio.is_finite() && bandwidth_hz > largest {
+        let modes = if stiffest == 1.0 {
+            String::new()
+        } else {
+            format!(" in the stiffest mode of the legs, which has {} times the gain", rounded(stiffest))
+        };
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
-             (stable with {delay:.2} periods from measurement to force)"
+             (stable with {delay:.2} periods from measurement to force{modes})"
         );
         section.refuse(bandwidth_key, bound);
     }

@@ -2,8 +2,10 @@
 
 extern crate std;
 
+use core::f64::consts::TAU;
 use std::{format, prelude::rust_2024::*};
 
+use crate::control::sampled::SampledLoop;
 use crate::host::config::bound::Bound;
 use crate::host::config::reader::Reader;
 use crate::realtime::overrun::OnOverrun;
@@ -96,6 +98,17 @@ impl Realtime {
             ReleaseKey::Sleep | ReleaseKey::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
             // Released by the measurement itself.
             ReleaseKey::External => 1.0,
+        }
+    }
+
+    /// A loop with that delay, without observer.
+    pub fn sampled_loop(&self, bandwidth_hz: f64, damping_ratio: f64) -> SampledLoop {
+        SampledLoop {
+            wn_t: TAU * bandwidth_hz * self.period_s(),
+            damping_ratio,
+            observer: 0.0,
+            delay: self.longest_delay(),
+            mass_ratio: 1.0,
         }
     }
 }
