@@ -1,8 +1,9 @@
 //! Where forward kinematics fails, ours and others': `cargo bench --bench stability` (3 min).
 //!
 //! Success from home against the spread of the poses; error against time for 1, 2, 3 ... steps; what one step of
-//! Newton's method per cycle costs at two rates; and a million trials in which ours must not be deceived. Writes
-//! `benches/charts/stability_*.csv` and `.svg`. `-- --quick` makes a twentieth of the trials.
+//! Newton's method per cycle costs at two rates; where the sampled loop turns unstable; and a million trials in
+//! which ours must not be deceived. Writes `benches/charts/stability_*.csv` and `.svg`. `-- --quick` makes a
+//! twentieth of the trials.
 
 #![allow(
     dead_code,
@@ -15,9 +16,12 @@
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod cycles;
+#[path = "../../tests/stability/delayed.rs"]
+mod delayed;
 mod maps;
 #[path = "../../tests/stability/rivals.rs"]
 mod rivals;
+mod sampled;
 mod speed;
 #[path = "../speed_accuracy/timing.rs"]
 mod timing;
@@ -40,6 +44,7 @@ fn main() -> Result<(), Failure> {
     let quick = std::env::args().any(|argument| argument == "--quick");
     speed::run()?;
     cycles::run()?;
+    sampled::run()?;
     maps::run(if quick { 20 } else { 1 })
 }
 

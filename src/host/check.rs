@@ -8,8 +8,9 @@ use std::{format, prelude::rust_2024::*, vec};
 
 use super::assembly::{self, Region};
 use super::config::Config;
-use crate::control::gains::{Gains, MIN_GAIN_MARGIN, max_bandwidth_hz};
+use super::config::deployment::GAIN_MARGIN;
 use crate::control::leg_masses::LegMasses;
+use crate::control::sampled::{LONGEST_DELAY, SampledLoop};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
@@ -128,10 +129,8 @@ impl Check<'_> {
     /// How far the loops are from unstable.
     fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Config { machine, deployment, .. } = self.config;
-        let period = deployment.realtime.period_s();
         let control = &deployment.control;
-        let observer = TAU * control.observer_bandwidth_hz;
-        let observed = if observer > 0.0 {
+        let observed = if control.observer_bandwidth_hz > 0.0 {
             format!(", with an observer of {} Hz", control.observer_bandwidth_hz)
         } else {
             String::new()
@@ -154,14 +153,12 @@ impl Check<'_> {
                 vec![("legs", control.position_bandwidth_hz, control.position_damping_ratio, legs.stiffest)];
         }
         for (what, bandwidth, damping, gain) in loops {
-            writeln!(
-                f,
-                "{what:<12} bandwidth {bandwidth:>6.2} Hz at {:.0} Hz: wn T = {:.3}, gain margin {:.2}, at most {:.2} Hz",
-                deployment.realtime.rate_hz,
-                TAU * bandwidth * period,
-                Gains::new(bandwidth, damping).observed(observer).margin(period) / gain,
-                max_bandwidth_hz(damping, period, MIN_GAIN_MARGIN * gain),
-            )?;
+            let sampled = SampledLoop {
+                observer: control.observer_bandwidth_hz / bandwidth,
+                mass_ratio: 1.0 / gain,
+                ..deployment.realtime.sampled_loop(bandwidth, damping)
+            };
+            fmt_loop(f, what, bandwidth, deployment.realtime.rate_hz, &sampled)?;
         }
         Ok(())
     }
@@ -200,4 +197,33 @@ impl Check<'_> {
         }
         Ok(())
     }
+}
+
+/// A loop, what it carries with its delay, and how much delay it would carry.
+fn fmt_loop(
+    f: &mut fmt::Formatter<'_>,
+    what: &str,
+    bandwidth: f64,
+    rate_hz: f64,
+    sampled: &SampledLoop,
+) -> fmt::Result {
+    let (limit, margin, longest) = (sampled.largest_wn_t(), sampled.gain_margin(), sampled.longest_delay());
+    let beyond = if longest < 0.99 * LONGEST_DELAY as f64 { "" } else { "more than " };
+    writeln!(
+        f,
+        "{what:<12} bandwidth {bandwidth:>6.2} Hz at {rate_hz:.0} Hz: wn T = {:.3}, with {:.2} periods of delay stable \
+         to {limit:.3} ({:.2} Hz), gain margin {margin:.2}; stable to {beyond}{longest:.1} periods",
+        sampled.wn_t,
+        sampled.delay,
+        limit * rate_hz / TAU,
+    )?;
+    if margin < GAIN_MARGIN {
+        writeln!(
+            f,
+            "WARNING: with that delay a platform of less than {:.2} of the modelled mass is unstable; a gain margin \
+             of {GAIN_MARGIN} is usual",
+            1.0 / margin,
+        )?;
+    }
+    Ok(())
 }

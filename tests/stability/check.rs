@@ -1,4 +1,4 @@
-//! `hexad check` tells when the lengths of home belong to another pose nearby.
+//! `hexad check` tells when the lengths of home belong to another pose nearby, and how near to unstable a loop is.
 
 use std::fs;
 use std::process::Command;
@@ -7,15 +7,17 @@ use super::common::data;
 
 /// What `check` prints of the motion base with its home turned about the vertical.
 fn checked(turn: f64) -> String {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("turned.toml");
     let text = fs::read_to_string(data("motion_base", "toml")).unwrap();
     let turned = text.replace("pose = [0.0, 0.0, 0.0,", &format!("pose = [0.0, 0.0, {turn},"));
-    fs::write(
-        &file,
-        turned.replace("min_length_m = 1.1\nmax_length_m = 2.3", "min_length_m = 0.9\nmax_length_m = 4.0"),
+    printed(
+        &turned.replace("min_length_m = 1.1\nmax_length_m = 2.3", "min_length_m = 0.9\nmax_length_m = 4.0"),
     )
-    .unwrap();
+}
+
+fn printed(text: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("checked.toml");
+    fs::write(&file, text).unwrap();
     let ran =
         Command::new(env!("CARGO_BIN_EXE_hexad")).args(["check", "--config"]).arg(&file).output().unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
@@ -32,4 +34,22 @@ fn another_pose_nearby_is_told() {
     assert!(near.contains("WARNING: at start-up lengths alone may not tell it from home"), "{near}");
     let far = checked(0.0);
     assert!(!far.contains("WARNING"), "{far}");
+}
+
+/// Two periods and a lead of delay: the limit of 1 kHz is 39.8 Hz, half of its gain is 22.4 Hz.
+#[test]
+fn a_loop_near_its_limit_is_told() {
+    let of = |bandwidth: &str| {
+        let text = fs::read_to_string(data("motion_base", "toml")).unwrap();
+        printed(&format!("{text}\n[control]\nposition_bandwidth_hz = {bandwidth}\n"))
+    };
+    let (good, bold) = (of("22"), of("23"));
+    assert!(!good.contains("WARNING"), "{good}");
+    let of_position = bold.lines().skip_while(|line| !line.starts_with("position ")).collect::<Vec<_>>();
+    assert!(
+        of_position[0].contains("2.10 periods of delay stable to 0.250 (39.80 Hz), gain margin 1.9"),
+        "{bold}"
+    );
+    assert!(of_position[1].starts_with("WARNING: with that delay a platform of less than 0.5"), "{bold}");
+    assert!(of_position[2].starts_with("orientation ") && of_position.len() == 3, "{bold}");
 }

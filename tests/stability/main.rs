@@ -1,12 +1,15 @@
-//! Where methods fail: assembly modes, far starts, sizes, offsets. Each case has its predicted outcome.
+//! Where methods fail: assembly modes, far starts, sizes, offsets, sampling. Each case has its predicted outcome.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
 mod check;
 #[path = "../common/mod.rs"]
 mod common;
+mod delayed;
 mod dietmaier;
 mod random;
 mod rivals;
+mod sampled;
 mod sizes;
+mod transition;
 mod trials;

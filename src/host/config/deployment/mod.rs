@@ -14,10 +14,10 @@ pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
-use crate::control::gains::{Gains, MIN_GAIN_MARGIN, max_bandwidth_hz, max_observer};
 use crate::control::law::ControlMode;
 use crate::control::leg_masses::LegMasses;
 use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
+use crate::control::sampled::{SampledLoop, boundary};
 use crate::control::supervisor::AfterStop;
 use crate::model::ladder::Rung;
 use crate::model::machine::Machine;
@@ -37,6 +37,9 @@ const LEAST_DEFAULT_PERIODS: f64 = 4.0;
 const LONGEST_TIMEOUT_MS: f64 = 1000.0;
 /// Damping ratios that a control engineer would write down; beyond, it is a slip.
 const DAMPING_RATIO: Bound = Bound::Within(0.1, 10.0);
+/// Gain margin of the default bandwidths and of observers, and the least that is not warned of: the textbook's
+/// 6 dB. A platform of half the modelled mass is still stable.
+pub const GAIN_MARGIN: f64 = 2.0;
 /// Largest bandwidth of the observer, as a multiple of the lesser bandwidth: what is faster only amplifies noise.
 const FASTEST_OBSERVER: f64 = 2.0;
 /// The default of the force rate takes this long from no force to the largest \[s\]: slower than any noise
@@ -138,28 +141,28 @@ pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     Deployment {
-        realtime,
-        control: control(root.section("control"), rate_hz, machine),
+        control: control(root.section("control"), &realtime, machine),
         limits: limits(root.section("limits"), machine),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
+        realtime,
     }
 }
 
-fn control(mut section: Reader, rate_hz: f64, machine: &Machine) -> Control {
+fn control(mut section: Reader, realtime: &Realtime, machine: &Machine) -> Control {
     let modes = ControlMode::ALL.map(|mode| (mode.name(), mode));
     let mode = section.choice_or("mode", ControlMode::default(), &modes);
     let legs = mode.acts_on_legs().then(|| LegMasses::at_home(machine));
     let [softest, stiffest] = legs.map_or([1.0; 2], |legs| [legs.softest, legs.stiffest]);
     let [position_bandwidth_hz, position_damping_ratio] =
-        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], rate_hz, stiffest);
+        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], realtime, stiffest);
     let [orientation_bandwidth_hz, orientation_damping_ratio] =
-        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], rate_hz, 1.0);
+        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], realtime, 1.0);
     let bandwidths = [position_bandwidth_hz, orientation_bandwidth_hz];
     let loops = [
-        (Gains::new(position_bandwidth_hz, position_damping_ratio), [softest, stiffest]),
-        (Gains::new(orientation_bandwidth_hz, orientation_damping_ratio), [1.0; 2]),
+        (realtime.sampled_loop(position_bandwidth_hz, position_damping_ratio), [softest, stiffest]),
+        (realtime.sampled_loop(orientation_bandwidth_hz, orientation_damping_ratio), [1.0; 2]),
     ];
     let control = Control {
         mode,
@@ -185,7 +188,7 @@ fn control(mut section: Reader, rate_hz: f64, machine: &Machine) -> Control {
         ),
         fidelity: fidelity(&mut section),
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
-        observer_bandwidth_hz: observer(&mut section, rate_hz, &bandwidths, &loops),
+        observer_bandwidth_hz: observer(&mut section, realtime.rate_hz, &bandwidths, &loops),
         on_setpoint_lost: section.choice_or(
             "on_setpoint_lost",
             AfterStop::Fault,
@@ -207,38 +210,49 @@ fn observer(
     section: &mut Reader,
     rate_hz: f64,
     bandwidths: &[f64; 2],
-    loops: &[(Gains, [f64; 2]); 2],
+    loops: &[(SampledLoop, [f64; 2]); 2],
 ) -> f64 {
     let observer_hz = section.number_or("observer_bandwidth_hz", 0.0, Bound::NotNegative);
-    let fastest = TAU * FASTEST_OBSERVER * bandwidths.iter().copied().fold(f64::INFINITY, f64::min);
-    let carried = loops.iter().map(|(gains, modes)| max_observer(gains, 1.0 / rate_hz, *modes, fastest));
-    let largest = (carried.fold(fastest, f64::min) / TAU * 1e3).floor() / 1e3;
+    let fastest = FASTEST_OBSERVER * bandwidths.iter().copied().fold(f64::INFINITY, f64::min);
+    let largest = boundary(fastest, |hertz| {
+        bandwidths.iter().zip(loops).all(|(bandwidth, (sampled, [softest, stiffest]))| {
+            let observed = SampledLoop { observer: hertz / bandwidth, ..*sampled };
+            observed.gain_margin() >= GAIN_MARGIN * stiffest
+                && observed.least_gain() * GAIN_MARGIN <= *softest
+        })
+    });
+    // What halving never reaches is meant too.
+    let largest = (largest * (1.0 + 1e-9) * 1e3).floor() / 1e3;
     if observer_hz > largest && bandwidths.iter().all(|hertz| hertz.is_finite()) {
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and these bandwidths (gain margin of \
-             {MIN_GAIN_MARGIN}, and {FASTEST_OBSERVER} times the lesser bandwidth)"
+             {GAIN_MARGIN}, and {FASTEST_OBSERVER} times the lesser bandwidth)"
         );
         section.refuse("observer_bandwidth_hz", bound);
     }
     observer_hz
 }
 
-/// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry, the stiffest of
-/// whose modes has so many times its gain.
+/// Bandwidth and damping ratio of one loop, the stiffest of whose modes has so many times its gain; refused where
+/// that is unstable with the longest delay.
 fn gains(
     section: &mut Reader,
     [bandwidth_key, damping_key]: [&'static str; 2],
-    rate_hz: f64,
+    realtime: &Realtime,
     stiffest: f64,
 ) -> [f64; 2] {
+    let rate_hz = realtime.rate_hz;
     let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO);
-    let period_s = 1.0 / rate_hz;
-    let margin = MIN_GAIN_MARGIN * stiffest;
     // Rounded down, so that the number in the message is one that is accepted.
-    let largest = (max_bandwidth_hz(damping_ratio, period_s, margin) * 1e3).floor() / 1e3;
-    let bandwidth_hz = section.number_or(bandwidth_key, BANDWIDTH_HZ.min(largest), Bound::Positive);
-    let all_read = [bandwidth_hz, damping_ratio, period_s].iter().all(|x| x.is_finite());
-    if all_read && Gains::new(bandwidth_hz, damping_ratio).margin(period_s) < margin {
+    let largest_hz = |gain: f64| {
+        let sampled = realtime.sampled_loop(f64::NAN, damping_ratio);
+        let wn_t = SampledLoop { mass_ratio: 1.0 / gain, ..sampled }.largest_wn_t();
+        (wn_t * rate_hz / TAU * 1e3).floor() / 1e3
+    };
+    let default_hz = BANDWIDTH_HZ.min(largest_hz(GAIN_MARGIN * stiffest));
+    let bandwidth_hz = section.number_or(bandwidth_key, default_hz, Bound::Positive);
+    let (largest, delay) = (largest_hz(stiffest), realtime.longest_delay());
+    if delay.is_finite() && damping_ratio.is_finite() && bandwidth_hz > largest {
         let modes = if stiffest == 1.0 {
             String::new()
         } else {
@@ -246,7 +260,7 @@ fn gains(
         };
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
-             (gain margin of {MIN_GAIN_MARGIN}{modes})"
+             (stable with {delay:.2} periods from measurement to force{modes})"
         );
         section.refuse(bandwidth_key, bound);
         return [f64::NAN, damping_ratio];

@@ -2,8 +2,10 @@
 
 extern crate std;
 
+use core::f64::consts::TAU;
 use std::{format, prelude::rust_2024::*};
 
+use crate::control::sampled::SampledLoop;
 use crate::host::config::bound::Bound;
 use crate::host::config::reader::Reader;
 use crate::ipc::ports::Time;
@@ -95,6 +97,28 @@ impl Realtime {
     pub fn time(&self) -> Time {
         if self.release == ReleaseKey::Lockstep { Time::Simulated } else { Time::Real }
     }
+
+    /// Longest time from a measurement to its force, in periods, of a loop that misses nothing and whose driver
+    /// measures once a period: the newest message may be a period old when it is read, a lead before the
+    /// release, and the force may come at the next release. What the drives wait or sleep comes on top.
+    pub fn longest_delay(&self) -> f64 {
+        match self.release {
+            ReleaseKey::Sleep | ReleaseKey::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
+            // Released by the measurement itself.
+            ReleaseKey::External | ReleaseKey::Lockstep => 1.0,
+        }
+    }
+
+    /// A loop with that delay, without observer.
+    pub fn sampled_loop(&self, bandwidth_hz: f64, damping_ratio: f64) -> SampledLoop {
+        SampledLoop {
+            wn_t: TAU * bandwidth_hz * self.period_s(),
+            damping_ratio,
+            observer: 0.0,
+            delay: self.longest_delay(),
+            mass_ratio: 1.0,
+        }
+    }
 }
 
 pub(super) fn read(mut section: Reader) -> Realtime {
@@ -168,6 +192,7 @@ fn within_half_period_s(section: &mut Reader, key: &'static str, default_us: f64
             key,
             format!("must be at most {half_us} (half a period of realtime.rate_hz = {rate_hz})"),
         );
+        return f64::NAN;
     }
     duration_us / 1e6
 }

@@ -1,0 +1,217 @@
+//! The sampled loop: what the theory says of gains, delays, masses and sensors, and what controller and plant do.
+
+use hexad::control::sampled::SampledLoop;
+use hexad::control::state::Cause;
+use hexad::host::config::Config;
+use hexad::model::inverse_jacobian::leg_wrenches;
+use hexad::model::machine::LEGS;
+use hexad::model::task::TaskState;
+use hexad::plant::forward_dynamics::ForwardDynamics;
+use hexad::plant::imperfections::SensorErrors;
+use nalgebra::Vector6;
+
+use super::common::{deployed, largest};
+use super::delayed::{Delayed, PUSH, Setup, boundary};
+use super::transition::Transition;
+
+const LOOP: SampledLoop =
+    SampledLoop { wn_t: f64::NAN, damping_ratio: 1.0, observer: 0.0, delay: 1.0, mass_ratio: 1.0 };
+const DELAYS: [f64; 6] = [0.0, 0.5, 1.0, 1.6, 2.0, 3.3];
+
+/// No gravity: nothing but the push moves the platform.
+fn in_space() -> Config {
+    let mut config = deployed("fried2008");
+    config.machine.gravity.fill(0.0);
+    config
+}
+
+fn at(share: f64, sampled: SampledLoop) -> SampledLoop {
+    SampledLoop { wn_t: share * sampled.largest_wn_t(), ..sampled }
+}
+
+#[test]
+fn the_limit_is_that_of_controller_and_plant() {
+    let config = in_space();
+    for delay in [0.0, 0.5, 1.0, 2.0] {
+        for [damping_ratio, observer, mass_ratio] in
+            [[1.0, 0.0, 1.0], [0.3, 0.0, 1.0], [1.0, 0.5, 1.0], [0.7, 0.0, 0.3], [0.7, 0.0, 3.0]]
+        {
+            let sampled = SampledLoop { damping_ratio, observer, mass_ratio, delay, ..LOOP };
+            let (predicted, found) = (sampled.largest_wn_t(), boundary(&config, &sampled));
+            println!("{sampled:?}: predicted {predicted:.4}, found {found:.4}");
+            assert!((found / predicted - 1.0).abs() < 0.01, "{sampled:?}: {predicted} {found}");
+        }
+    }
+}
+
+/// The polynomial of the library and the matrix of these tests are the same loop.
+#[test]
+fn at_the_limit_the_spectral_radius_is_one() {
+    for delay in DELAYS {
+        for [damping_ratio, observer, mass_ratio] in [[1.0, 0.0, 1.0], [0.2, 0.05, 0.3], [3.0, 1.0, 3.0]] {
+            let radius = |share| {
+                let sampled = SampledLoop { damping_ratio, observer, mass_ratio, delay, ..LOOP };
+                Transition::new(&at(share, sampled)).spectral_radius()
+            };
+            assert!((radius(1.0) - 1.0).abs() < 1e-6, "{delay} {damping_ratio}: {}", radius(1.0));
+            assert!(radius(0.99) < 1.0 && radius(1.01) > 1.0, "{} {}", radius(0.99), radius(1.01));
+        }
+    }
+}
+
+/// The push, run until it has faded or grown by a factor, against what the matrix makes of it, whatever part of the
+/// delay is before the release. Why it ended.
+fn as_predicted(sampled: SampledLoop, factor: f64) -> [Cause; 2] {
+    let config = in_space();
+    let period_s = config.deployment.realtime.period_s();
+    let transition = Transition::new(&sampled);
+    let cycles = (factor.ln() / transition.spectral_radius().ln().abs()) as usize + 5;
+    let predicted = transition.response(PUSH * period_s, cycles);
+    [0.0, sampled.delay.min(1.0)].map(|age| {
+        let mut delayed = Delayed::new(&config, &Setup { age, ..Setup::of(sampled) });
+        let (found, cause) = delayed.run(cycles);
+        assert_eq!((cause, found.len()), (Cause::None, cycles), "{sampled:?}");
+        let mut worst = 0.0_f64;
+        for (predicted, found) in predicted.chunks(STRETCH).zip(found.chunks(STRETCH)) {
+            let apart = predicted.iter().zip(found).map(|(e, cycle)| cycle.error.add_scalar(-e).amax());
+            worst = worst.max(apart.fold(0.0, f64::max) / largest(predicted));
+        }
+        println!("{sampled:?}, age {age}: within {worst:.1e} of the prediction for {cycles} cycles");
+        assert!(worst < 1e-3, "{sampled:?}, age {age}: {worst}");
+        delayed.run(1000).1
+    })
+}
+
+/// The largest difference is compared with the largest error of so many cycles.
+const STRETCH: usize = 20;
+
+#[test]
+fn below_the_limit_errors_fade_as_predicted() {
+    for delay in DELAYS {
+        for (share, damping_ratio) in [(0.2, 0.7), (0.2, 1.0), (0.9, 0.7), (0.9, 1.0)] {
+            let sampled = at(share, SampledLoop { delay, damping_ratio, ..LOOP });
+            assert_eq!(as_predicted(sampled, 1e3), [Cause::None; 2]);
+        }
+    }
+}
+
+/// Until the path is left, or until rates jump further than a leg can accelerate.
+#[test]
+fn above_the_limit_errors_grow_as_predicted_until_the_controller_lets_go() {
+    for delay in DELAYS {
+        for share in [1.1, 2.0] {
+            let causes = as_predicted(at(share, SampledLoop { delay, ..LOOP }), 30.0);
+            println!("{share} of the limit, delay {delay}: {causes:?}");
+            assert!(
+                causes.iter().all(|cause| [Cause::OffPath, Cause::RateJumped].contains(cause)),
+                "{causes:?}"
+            );
+        }
+    }
+}
+
+/// What a configuration may ask for at most is stable with its longest delay, and not by much.
+#[test]
+fn the_bound_of_the_configuration_is_the_limit_with_the_longest_delay() {
+    for release in ["sleep", "external"] {
+        let text = |bandwidth: f64| {
+            let file = format!("{}/config/fried2008.toml", env!("CARGO_MANIFEST_DIR"));
+            let machine = std::fs::read_to_string(file).unwrap().replace("[-9.81, 0.0, 0.0]", "[0, 0, 0]");
+            format!(
+                "{machine}\n[realtime]\nrelease = \"{release}\"\n[control]\nposition_bandwidth_hz = {bandwidth}\n"
+            )
+        };
+        let refused = Config::parse(&text(100.0), "much").unwrap_err().to_string();
+        let (_, bound) = refused.split_once("must be at most ").unwrap();
+        let largest = bound.split_once(' ').unwrap().0.parse().unwrap();
+        let config = Config::parse(&text(largest), "most").unwrap();
+        let sampled = config.deployment.realtime.sampled_loop(largest, 1.0);
+        assert_eq!(sampled.delay, if release == "sleep" { 2.1 } else { 1.0 });
+        let found = boundary(&config, &sampled);
+        println!("{release}: {largest} Hz, wn T {:.4}, found {found:.4}", sampled.wn_t);
+        assert!((found / sampled.wn_t - 1.0).abs() < 0.01, "{found} {sampled:?}");
+    }
+}
+
+/// The error of a wrong mass: what is missing of the weight, as the law gives it.
+#[test]
+fn a_mass_that_is_wrong_is_stable_and_sags_as_predicted() {
+    let config = deployed("fried2008");
+    let home = TaskState::at_rest(config.machine.home).motion();
+    let falls = ForwardDynamics::new(&config.machine)
+        .acceleration(&home.pose, &home.twist, &[0.0; LEGS])
+        .unwrap()
+        .vector();
+    let model = at(0.5, LOOP);
+    assert!((2.0..2.5).contains(&model.gain_margin()), "{}", model.gain_margin());
+    for mass_ratio in [0.3, 0.4, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0] {
+        let sampled = SampledLoop { mass_ratio, ..model };
+        let (cycles, cause) = Delayed::new(&config, &Setup::of(sampled)).run(2000);
+        let stable = sampled.gain_margin() > 1.0;
+        assert_eq!(stable, mass_ratio > 0.45);
+        assert_eq!(cause == Cause::None, stable, "{mass_ratio}: {cause:?}");
+        if !stable {
+            assert!(cause == Cause::RateJumped || cause == Cause::OffPath, "{cause:?}");
+            continue;
+        }
+        let period_s = config.deployment.realtime.period_s();
+        let predicted = falls * ((1.0 - mass_ratio) / (sampled.wn_t / period_s).powi(2));
+        let found = cycles.last().unwrap().error;
+        println!("{mass_ratio}: predicted {:.3e}, found {:.3e}", predicted.norm(), found.norm());
+        assert!((found - predicted).amax() < 1e-3 * predicted.amax() + 1e-9, "{found} {predicted}");
+    }
+}
+
+/// Root mean square of each axis of the platform's error, from the second second on.
+fn noisy(config: &Config, sampled: SampledLoop, sensor: SensorErrors) -> Vector6<f64> {
+    let setup = Setup { sensor, ..Setup::of(sampled) };
+    let (cycles, cause) = Delayed::new(config, &setup).run(21_000);
+    assert_eq!(cause, Cause::None);
+    let settled = &cycles[1000..];
+    let sum: Vector6<f64> = settled.iter().map(|cycle| cycle.error.component_mul(&cycle.error)).sum();
+    (sum / settled.len() as f64).map(f64::sqrt)
+}
+
+/// What the readings of the legs, of these standard deviations, do to each axis, by Lyapunov's equation.
+fn predicted_noise(config: &Config, sampled: &SampledLoop, [length, rate]: [f64; 2]) -> Vector6<f64> {
+    let home = TaskState::at_rest(config.machine.home).motion().pose;
+    let twists = leg_wrenches(&config.machine, &home).transpose().try_inverse().unwrap();
+    let transition = Transition::new(sampled);
+    let period_s = config.deployment.realtime.period_s();
+    Vector6::from_fn(|axis, _| {
+        let of_legs = twists.row(axis).norm();
+        transition.deviation([length * of_legs, rate * of_legs * period_s])
+    })
+}
+
+const LENGTH_M: f64 = 1e-6;
+const RATE_M_S: f64 = 1e-4;
+
+#[test]
+fn noise_and_steps_of_the_sensors_make_the_error_that_is_predicted() {
+    let config = in_space();
+    for delay in [0.0, 1.0, 2.0] {
+        for share in [0.2, 0.9] {
+            let sampled = at(share, SampledLoop { delay, ..LOOP });
+            let noise = [LENGTH_M, RATE_M_S];
+            // Steps of twice the noise hide it well: their error is as good as noise of its own.
+            for steps in [0.0, 2.0] {
+                let sensor = SensorErrors {
+                    length_noise: noise[0],
+                    rate_noise: noise[1],
+                    length_step: steps * noise[0],
+                    rate_step: steps * noise[1],
+                };
+                let deviations = noise.map(|noise| noise * (1.0 + steps * steps / 12.0).sqrt());
+                let predicted = predicted_noise(&config, &sampled, deviations);
+                let found = noisy(&config, sampled, sensor);
+                let ratios: [f64; 6] = found.component_div(&predicted).into();
+                println!(
+                    "delay {delay}, {share} of the limit, steps {steps}: {:.3e}, {ratios:.3?}",
+                    found[3]
+                );
+                assert!(ratios.iter().all(|ratio| (0.85..1.15).contains(ratio)), "{sampled:?}: {ratios:?}");
+            }
+        }
+    }
+}
