@@ -298,8 +298,8 @@ impl<T: Message> Sink<T> {
             };
             let header = message.header();
             let order = (header.epoch, header.sequence);
-            // A life that has not begun (another clock) would outrank all that come after it.
-            // Simulated time has no other clock.
+            // A life that has not begun (another clock) would outrank all that come after it. Who lives in
+            // simulated time may begin at any.
             let has_begun = self.time == Time::Simulated || header.epoch <= monotonic_ns();
             let is_readable = header.schema == SCHEMA && message.is_whole() && has_begun;
             if is_readable && order > (self.epoch, self.sequence) {
