@@ -7,9 +7,10 @@ use super::controller::{Measurement, Parameters, Setpoint, seconds_between};
 use super::limits::{AxisLimits, Limit, Limiting};
 use super::reference::Segment;
 use super::state::{Cause, Trouble};
-use crate::model::inverse_geometry::{leg_lengths, leg_motion};
+use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::{Actuator, LEGS, Machine};
 use crate::model::rigid::{Motion, Pose, Twist};
+use crate::model::stance::Stance;
 
 /// How far beyond the ends of its stroke a leg is believed, as a share of the stroke: encoders have
 /// offsets, end stops have springs.
@@ -196,6 +197,7 @@ pub struct Aim {
 pub fn setpoint(
     machine: &Machine,
     parameters: &Parameters,
+    home: &Stance,
     now: &Aim,
     before: Option<&Aim>,
     widest: f64,
@@ -207,7 +209,8 @@ pub fn setpoint(
     }
     within_limits(parameters, motion, limiting)?;
     within_envelope(parameters, setpoint, limiting)?;
-    within_legs(machine, parameters, motion, limiting)?;
+    within_legs(machine, motion, limiting)?;
+    with_room_to_stop(machine, parameters, home, motion, limiting)?;
     let Some(before) = before else { return Ok(()) };
     let dt = seconds_between(before.setpoint.time_ns, setpoint.time_ns);
     if dt <= 0.0 {
@@ -253,13 +256,8 @@ fn within_envelope(parameters: &Parameters, now: &Setpoint, limiting: &mut Limit
     Ok(())
 }
 
-/// The legs can follow, and if the next message did not come, there would be room to stop.
-fn within_legs(
-    machine: &Machine,
-    parameters: &Parameters,
-    motion: &Motion,
-    limiting: &mut Limiting,
-) -> Result<(), Trouble> {
+/// The legs can follow.
+fn within_legs(machine: &Machine, motion: &Motion, limiting: &mut Limiting) -> Result<(), Trouble> {
     let actuator = &machine.actuator;
     let legs = leg_motion(machine, motion);
     for (leg, rate) in legs.rate.iter().enumerate() {
@@ -267,12 +265,32 @@ fn within_legs(
             return Err(Trouble::new(Cause::SetpointTooFast, rate.abs() / actuator.max_rate, 1.0).at(leg));
         }
     }
-    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &legs.length)?;
-    let length = leg_lengths(machine, &where_stopped(parameters, motion));
+    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &legs.length)
+}
+
+/// If the next message did not come, the platform would come to rest within the stroke and before a singular pose.
+fn with_room_to_stop(
+    machine: &Machine,
+    parameters: &Parameters,
+    home: &Stance,
+    motion: &Motion,
+    limiting: &mut Limiting,
+) -> Result<(), Trouble> {
+    let actuator = &machine.actuator;
+    let stop = Stance::new(machine, where_stopped(parameters, motion));
+    let length = stop.lengths(machine);
     let middle = 0.5 * (actuator.min_length + actuator.max_length);
     let furthest = length.iter().fold(0.0_f64, |furthest, length| furthest.max((length - middle).abs()));
     limiting.keeps(Limit::Stroke, furthest / (0.5 * stroke(actuator)));
-    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &length)
+    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &length)?;
+    let (there, here) = (stop.sensitivity(), home.sensitivity());
+    // On the way to the other side the condition has no bound.
+    let across = there.determinant * here.determinant < 0.0;
+    let condition = if across { f64::INFINITY } else { there.condition };
+    if !limiting.keeps(Limit::Condition, condition / parameters.condition) {
+        return Err(Trouble::new(Cause::NearSingular, condition, parameters.condition));
+    }
+    Ok(())
 }
 
 /// Where the platform stands if this is the last setpoint: carried on for the timeout, then brought to rest.

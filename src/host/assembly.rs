@@ -48,18 +48,12 @@ pub fn modes(machine: &Machine, lengths: &[f64; LEGS], region: &Region, starts: 
     let ends = (0..starts).into_par_iter().map(|k| settled(machine, lengths, start(region, k)));
     let mut found: Vec<Stance> = vec![];
     for stance in ends.collect::<Vec<_>>().into_iter().flatten() {
-        let size = |other: &Stance| distance(machine, stance.pose(), other.pose());
+        let size = |other: &Stance| machine.joints.distance(stance.pose(), other.pose());
         if found.iter().all(|other| size(other) > SAME) {
             found.push(stance);
         }
     }
     found
-}
-
-/// How far apart two poses are: rotation \[rad\] and shift \[radius\] together.
-pub fn distance(machine: &Machine, a: &Pose, b: &Pose) -> f64 {
-    let way = a.displacement_to(b);
-    way.angular.norm().hypot(way.linear.norm() / machine.joints.radius)
 }
 
 /// The start with this number.

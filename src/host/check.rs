@@ -86,7 +86,7 @@ fn others(machine: &Machine, home: &Stance) -> Vec<Other> {
         .map(|other| {
             let way = center.displacement_to(other.pose());
             Other {
-                distance: assembly::distance(machine, &center, other.pose()),
+                distance: machine.joints.distance(&center, other.pose()),
                 turn_deg: way.angular.norm().to_degrees(),
                 shift_m: way.linear.norm(),
                 across: other.sensitivity().determinant * home.sensitivity().determinant < 0.0,

@@ -118,6 +118,13 @@ impl Joints {
         }
     }
 
+    /// How far apart two poses are: rotation \[rad\] and shift of the mean of the joints \[radius\] together.
+    pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
+        let turn = a.displacement_to(b).angular;
+        let center = |pose: &Pose| pose.position + pose.rotation * self.center;
+        turn.norm().hypot((center(b) - center(a)).norm() / self.radius)
+    }
+
     /// The twist at C of a twist at the mean of the joints on the platform.
     pub(super) fn twist_of_origin(&self, twist: &Twist, rotation: &Matrix3<f64>) -> Twist {
         let arm = rotation * self.center;

@@ -1,11 +1,15 @@
 //! Which inputs count in this cycle, and the pose that they say.
 
+use core::mem;
+
 use super::{Controller, Input, Located, Measurement};
 use crate::control::doubt::{self, Aim};
 use crate::control::law::TrackingError;
 use crate::control::limits::Limiting;
 use crate::control::state::{Cause, State, Trouble};
-use crate::model::forward_kinematics::{Tracked, Tracker};
+use crate::model::forward_kinematics::{Outcome, Tracked, Tracker};
+use crate::model::rigid::Pose;
+use crate::model::sensitivity::Sensitivity;
 
 /// Trusted steps of forward kinematics in one cycle under control. One is far more than a cycle's motion; after a
 /// pause of the measurements it may take some.
@@ -46,7 +50,7 @@ impl Controller {
             let verdict = doubt::time(Cause::SetpointFromElsewhen, now.setpoint.time_ns, now_ns, timeout_ns)
                 .and_then(|()| {
                     let before = setpoint.good.filter(|_| follows);
-                    doubt::setpoint(machine, parameters, &now, before.as_ref(), widest, &mut limiting)
+                    doubt::setpoint(machine, parameters, &self.home, &now, before.as_ref(), widest, &mut limiting)
                 });
             self.setpoint_limiting = limiting;
             let gap = setpoint.good.map(|good| now.setpoint.time_ns.abs_diff(good.setpoint.time_ns));
@@ -86,7 +90,9 @@ impl Controller {
             return Err(self.measurement.absence(Cause::NoMeasurement));
         };
         self.is_young(&measurement, release_ns)?;
+        self.astray.map_or(Ok(()), Err)?;
         let machine = self.model.machine();
+        let from = self.tracker.pose;
         let controls = self.mode.state.controls();
         let trusted = self.tracker.stance().sensitivity().trusted_step * machine.joints.radius;
         let before = self.tracker.stance().lengths(machine);
@@ -105,14 +111,40 @@ impl Controller {
             }
             Tracked::Approaching => return Err(Cause::FindingPose.into()),
             Tracked::NotConverged => {
+                if mem::take(&mut self.known) && self.tracker.outcome() == Outcome::NearSingular {
+                    return Err(self.lost());
+                }
                 // Home is the one pose known to be on the right assembly mode: walk again from there.
-                self.tracker = Tracker::new(machine, self.home);
+                self.tracker = Tracker::at(self.home);
                 return Err(Cause::PoseNotFound.into());
             }
         }
         let pose = self.tracker.pose;
         let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
+        self.stays_on_its_side(&from)?;
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
+    }
+
+    /// Behind a singular pose are poses with the lengths of those before it, and forward kinematics cannot tell
+    /// them apart. So nearer to it than the deployment wants anybody to be, a platform that moves so far in one
+    /// measurement that the next may be from there is not known any more.
+    fn stays_on_its_side(&mut self, from: &Pose) -> Result<(), Trouble> {
+        self.known = true;
+        let stance = self.tracker.stance();
+        let Sensitivity { condition, trusted_step, .. } = *stance.sensitivity();
+        if condition <= self.parameters.condition
+            || self.model.machine().joints.distance(from, stance.pose()) < trusted_step
+        {
+            return Ok(());
+        }
+        self.known = false;
+        Err(self.lost())
+    }
+
+    /// Nothing that is measured tells when the platform is back: somebody has to look, and clear it.
+    fn lost(&mut self) -> Trouble {
+        let condition = self.tracker.stance().sensitivity().condition;
+        *self.astray.insert(Trouble::new(Cause::SingularPose, condition, self.parameters.condition))
     }
 
     pub(super) fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {

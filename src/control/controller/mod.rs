@@ -19,6 +19,7 @@ use crate::model::inverse_geometry::leg_lengths;
 use crate::model::ladder::Rung;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
+use crate::model::stance::Stance;
 use crate::model::task::TaskState;
 
 mod forces;
@@ -148,8 +149,12 @@ enum Reference {
 pub struct Controller {
     model: InverseDynamics,
     parameters: Parameters,
-    home: Pose,
+    home: Stance,
     tracker: Tracker,
+    /// The pose is known, from home on without a gap.
+    known: bool,
+    /// Why the platform may be beyond a singular pose, until somebody has cleared it.
+    astray: Option<Trouble>,
     measurement: Believed<Measurement>,
     parting: Parting,
     setpoint: Believed<Aim>,
@@ -180,11 +185,14 @@ struct Located {
 impl Controller {
     /// Waits at the home pose for a first measurement.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
+        let home = Stance::new(machine, TaskState::at_rest(machine.home).motion().pose);
         Self {
             model: InverseDynamics::new(machine),
             parameters,
-            home: home_pose(machine),
-            tracker: Tracker::new(machine, home_pose(machine)),
+            home,
+            tracker: Tracker::at(home),
+            known: false,
+            astray: None,
             measurement: Believed::default(),
             parting: Parting::default(),
             setpoint: Believed::default(),
@@ -257,6 +265,9 @@ impl Controller {
             next(self.mode, new.map(|asked| asked.request), &findings, self.parameters.after_loss);
         if let Some(asked) = new {
             (self.answered, self.refused) = (asked.message, refused.unwrap_or_default());
+            if asked.request == Request::Clear && self.astray.take().is_some() {
+                self.tracker = Tracker::at(self.home);
+            }
         }
         if mode.cause != self.mode.cause || !mode.state.controls() && mode.state != State::Fault {
             let fits = |trouble: &Trouble| trouble.cause == mode.cause;
@@ -336,10 +347,6 @@ impl Controller {
             &leg_lengths(machine, &reference.pose),
         )
     }
-}
-
-fn home_pose(machine: &Machine) -> Pose {
-    TaskState::at_rest(machine.home).motion().pose
 }
 
 /// `to - from` in seconds, either sign.

@@ -38,7 +38,12 @@ pub enum Tracked {
 impl Tracker {
     /// Starts at a known pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
-        Self { pose, stance: Stance::new(machine, pose), outcome: Outcome::Solved }
+        Self::at(Stance::new(machine, pose))
+    }
+
+    /// The same, with what is known of that pose.
+    pub fn at(stance: Stance) -> Self {
+        Self { pose: *stance.pose(), stance, outcome: Outcome::Solved }
     }
 
     /// The pose with its legs and factorization.
