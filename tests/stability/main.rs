@@ -2,11 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
+mod beyond;
 mod check;
 #[path = "../common/mod.rs"]
 mod common;
 mod dietmaier;
+mod fichter;
 mod random;
+#[path = "../common/rig.rs"]
+mod rig;
 mod rivals;
 mod sizes;
 mod trials;

@@ -1,7 +1,5 @@
 //! Which inputs count in this cycle, and the pose that they say.
 
-use core::mem;
-
 use super::{Controller, Input, Located, Measurement};
 use crate::control::doubt::{self, Aim};
 use crate::control::law::TrackingError;
@@ -14,6 +12,11 @@ use crate::model::sensitivity::Sensitivity;
 /// Trusted steps of forward kinematics in one cycle under control. One is far more than a cycle's motion; after a
 /// pause of the measurements it may take some.
 const STEPS: u32 = 8;
+
+/// From this condition on (or that of the limit, if it is less) it matters how far the platform moves in one
+/// measurement. Such poses are within a hundredth of the radius or of a radian of a singular one: nothing gets
+/// past them between two measurements.
+const DOUBTED: f64 = 300.0;
 
 impl Controller {
     /// Takes in what can be believed. Continuity is asked for only where it can be had: of measurements that
@@ -50,7 +53,15 @@ impl Controller {
             let verdict = doubt::time(Cause::SetpointFromElsewhen, now.setpoint.time_ns, now_ns, timeout_ns)
                 .and_then(|()| {
                     let before = setpoint.good.filter(|_| follows);
-                    doubt::setpoint(machine, parameters, &self.home, &now, before.as_ref(), widest, &mut limiting)
+                    doubt::setpoint(
+                        machine,
+                        parameters,
+                        &self.home,
+                        &now,
+                        before.as_ref(),
+                        widest,
+                        &mut limiting,
+                    )
                 });
             self.setpoint_limiting = limiting;
             let gap = setpoint.good.map(|good| now.setpoint.time_ns.abs_diff(good.setpoint.time_ns));
@@ -102,8 +113,11 @@ impl Controller {
                 tracked = self.tracker.advance(machine, &measurement.length).0;
             }
         }
+        if tracked != Tracked::NotConverged && self.known && self.may_have_passed(&from) {
+            return Err(self.lost());
+        }
         match tracked {
-            Tracked::Found => {}
+            Tracked::Found => self.known = true,
             Tracked::Approaching if controls => {
                 let way = |(now, before): (&f64, &f64)| (now - before).abs();
                 let furthest = measurement.length.iter().zip(&before).map(way).fold(0.0, f64::max);
@@ -111,9 +125,10 @@ impl Controller {
             }
             Tracked::Approaching => return Err(Cause::FindingPose.into()),
             Tracked::NotConverged => {
-                if mem::take(&mut self.known) && self.tracker.outcome() == Outcome::NearSingular {
+                if self.known && self.tracker.outcome() == Outcome::NearSingular {
                     return Err(self.lost());
                 }
+                self.known = false;
                 // Home is the one pose known to be on the right assembly mode: walk again from there.
                 self.tracker = Tracker::at(self.home);
                 return Err(Cause::PoseNotFound.into());
@@ -121,30 +136,27 @@ impl Controller {
         }
         let pose = self.tracker.pose;
         let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
-        self.stays_on_its_side(&from)?;
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
     }
 
     /// Behind a singular pose are poses with the lengths of those before it, and forward kinematics cannot tell
-    /// them apart. So nearer to it than the deployment wants anybody to be, a platform that moves so far in one
-    /// measurement that the next may be from there is not known any more.
-    fn stays_on_its_side(&mut self, from: &Pose) -> Result<(), Trouble> {
-        self.known = true;
+    /// them apart. So near one, a platform that moves so far in one measurement that the next may be from there is
+    /// not known any more.
+    fn may_have_passed(&self, from: &Pose) -> bool {
         let stance = self.tracker.stance();
         let Sensitivity { condition, trusted_step, .. } = *stance.sensitivity();
-        if condition <= self.parameters.condition
-            || self.model.machine().joints.distance(from, stance.pose()) < trusted_step
-        {
-            return Ok(());
-        }
-        self.known = false;
-        Err(self.lost())
+        condition > self.doubted() && self.model.machine().joints.distance(from, stance.pose()) > trusted_step
     }
 
     /// Nothing that is measured tells when the platform is back: somebody has to look, and clear it.
     fn lost(&mut self) -> Trouble {
+        self.known = false;
         let condition = self.tracker.stance().sensitivity().condition;
-        *self.astray.insert(Trouble::new(Cause::SingularPose, condition, self.parameters.condition))
+        *self.astray.insert(Trouble::new(Cause::SingularPose, condition, self.doubted()))
+    }
+
+    fn doubted(&self) -> f64 {
+        self.parameters.condition.min(DOUBTED)
     }
 
     pub(super) fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {

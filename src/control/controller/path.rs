@@ -121,10 +121,7 @@ impl Controller {
                 let home = *self.home.pose();
                 let away = home.displacement_to(&present.pose);
                 let Motion { twist: rate, acceleration, .. } = present;
-                Reference::From(
-                    home,
-                    Segment::vanishing(release_ns, &away, &rate, &acceleration, limits),
-                )
+                Reference::From(home, Segment::vanishing(release_ns, &away, &rate, &acceleration, limits))
             }
             State::Off | State::Standby | State::Active | State::Fault => Reference::Setpoint,
         };
