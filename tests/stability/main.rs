@@ -8,6 +8,8 @@ mod check;
 mod common;
 mod dietmaier;
 mod fichter;
+mod gimbal;
+mod passing;
 mod random;
 #[path = "../common/rig.rs"]
 mod rig;
