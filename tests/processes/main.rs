@@ -29,6 +29,7 @@ mod hybrid;
 mod in_force;
 mod killed;
 mod locked_memory;
+mod modes;
 mod orderly_stop;
 mod overruns;
 mod paused;

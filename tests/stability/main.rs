@@ -9,6 +9,7 @@ mod common;
 mod dietmaier;
 mod fichter;
 mod gimbal;
+mod legs;
 mod passing;
 mod random;
 #[path = "../common/rig.rs"]

@@ -100,7 +100,9 @@ pub fn step(machine: &Machine, x: [f64; 6], number: u64) -> End {
     let share = 10_f64.powf(-4.0 * (number % 1000) as f64 / 1000.0);
     let away: [f64; 6] = std::array::from_fn(|i| x[i] + share * (to[i] - machine.home[i]));
     let mut stance = Stance::new(machine, from);
+    let side = stance.sensitivity().determinant;
     let report = refine(machine, &mut stance, &leg_lengths(machine, &rigid(away)));
+    assert!(stance.sensitivity().determinant * side >= 0.0, "across a singular pose from {x:?}");
     match report.outcome {
         Outcome::Solved if machine.joints.distance(stance.pose(), &rigid(away)) < APART => End::Right,
         Outcome::Solved => End::Wrong,
