@@ -9,6 +9,7 @@ pub mod controller;
 pub mod doubt;
 pub mod gains;
 pub mod law;
+pub mod leg_masses;
 pub mod limits;
 pub mod reference;
 pub mod state;

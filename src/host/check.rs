@@ -4,11 +4,12 @@ extern crate std;
 
 use core::f64::consts::TAU;
 use core::fmt;
-use std::prelude::rust_2024::*;
+use std::{format, prelude::rust_2024::*, vec};
 
 use super::assembly::{Other, others};
 use super::config::Config;
-use crate::control::gains::{gain_margin, max_bandwidth_hz};
+use crate::control::gains::{Gains, MIN_GAIN_MARGIN, max_bandwidth_hz};
+use crate::control::leg_masses::LegMasses;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
@@ -59,7 +60,7 @@ impl<'a> Check<'a> {
 
 impl fmt::Display for Check<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Config { name, machine, deployment } = self.config;
+        let Config { name, machine, .. } = self.config;
         let actuator = &machine.actuator;
         writeln!(f, "{name}: valid. At home, at rest:\n")?;
         writeln!(f, "leg   length      to shortest  to longest   force        of the limit  to joint axis")?;
@@ -78,26 +79,52 @@ impl fmt::Display for Check<'_> {
         }
         writeln!(f, "\ncondition of the Jacobian  {:.2}   (1 is best; errors grow with it)", self.condition)?;
         self.fmt_modes(f)?;
+        self.fmt_loops(f)
+    }
+}
+
+impl Check<'_> {
+    /// How far the loops are from unstable.
+    fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Config { machine, deployment, .. } = self.config;
         let period = deployment.realtime.period_s();
         let control = &deployment.control;
-        for (what, bandwidth, damping) in [
-            ("position", control.position_bandwidth_hz, control.position_damping_ratio),
-            ("orientation", control.orientation_bandwidth_hz, control.orientation_damping_ratio),
-        ] {
+        let observer = TAU * control.observer_bandwidth_hz;
+        let observed = if observer > 0.0 {
+            format!(", with an observer of {} Hz", control.observer_bandwidth_hz)
+        } else {
+            String::new()
+        };
+        writeln!(f, "control mode {}{observed}", control.mode.name())?;
+        let mut loops = vec![
+            ("position", control.position_bandwidth_hz, control.position_damping_ratio, 1.0),
+            ("orientation", control.orientation_bandwidth_hz, control.orientation_damping_ratio, 1.0),
+        ];
+        if control.mode.acts_on_legs() {
+            let legs = LegMasses::at_home(machine);
+            let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
+            writeln!(
+                f,
+                "legs         together they move like one of {:.2} to {:.2} Hz",
+                root(legs.softest),
+                root(legs.stiffest)
+            )?;
+            loops =
+                vec![("legs", control.position_bandwidth_hz, control.position_damping_ratio, legs.stiffest)];
+        }
+        for (what, bandwidth, damping, gain) in loops {
             writeln!(
                 f,
                 "{what:<12} bandwidth {bandwidth:>6.2} Hz at {:.0} Hz: wn T = {:.3}, gain margin {:.2}, at most {:.2} Hz",
                 deployment.realtime.rate_hz,
                 TAU * bandwidth * period,
-                gain_margin(bandwidth, damping, period),
-                max_bandwidth_hz(damping, period),
+                Gains::new(bandwidth, damping).observed(observer).margin(period) / gain,
+                max_bandwidth_hz(damping, period, MIN_GAIN_MARGIN * gain),
             )?;
         }
         Ok(())
     }
-}
 
-impl Check<'_> {
     /// What start-up and the loop can be certain of.
     fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Config { machine, deployment, .. } = self.config;

@@ -143,7 +143,7 @@ impl Operator {
                         Cause::None => accepted = true,
                         _ if accepted => {}
                         // Nobody else leaves a fault.
-                        cause if is_patient && !cause.is_fault() && state != State::Fault => {}
+                        cause if is_patient && may_come(cause) && state != State::Fault => {}
                         cause => return Err(OperatorError::Refused(request, Reason::new(cause, &status))),
                     }
                 }
@@ -167,6 +167,11 @@ impl Operator {
             thread::sleep(POLL);
         }
     }
+}
+
+/// Whether what is lacking may come without anybody's correction: who was lost may be about to come back.
+fn may_come(cause: Cause) -> bool {
+    !cause.is_fault() || matches!(cause, Cause::SetpointLost | Cause::MeasurementLost)
 }
 
 /// Whether a state is what an accepted request was to lead to; `None` while it is on the way.

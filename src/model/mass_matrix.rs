@@ -20,9 +20,10 @@
 //! Cost: six evaluations of the load. Not for a loop that only needs forces; it is what the simulated
 //! platform spends its time on.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Cholesky, Matrix6, U6, Vector3, Vector6};
 
 use super::active_forces::InverseDynamics;
+use super::inverse_jacobian::leg_wrenches;
 use super::ladder::Exact;
 use super::machine::Machine;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
@@ -54,5 +55,13 @@ impl MassMatrix {
             column.copy_from(&self.weightless.load_of::<Exact>(&motion).total());
         }
         mass
+    }
+
+    /// `N^T M^-1 N` \[1/kg\], how each leg accelerates under a unit force in each; `None` if M is not positive
+    /// definite (a pose that is not one).
+    pub fn leg_mobility(&self, pose: &Pose) -> Option<Matrix6<f64>> {
+        let n = leg_wrenches(self.weightless.machine(), pose);
+        let mass: Cholesky<f64, U6> = Cholesky::new(self.at(pose))?;
+        Some(n.transpose() * mass.solve(&n))
     }
 }

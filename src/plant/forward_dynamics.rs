@@ -13,7 +13,6 @@
 use nalgebra::{Cholesky, Matrix6, U6, Vector6};
 
 use crate::model::active_forces::InverseDynamics;
-use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::ladder::Exact;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
@@ -68,9 +67,7 @@ impl ForwardDynamics {
     /// Smallest moving mass an actuator can feel \[kg\]: 1 / largest eigenvalue of `N^T M^-1 N`. It bounds
     /// how fast friction can act, hence the step of the integrator.
     pub fn smallest_leg_mass(&self, pose: &Pose) -> Option<f64> {
-        let n = leg_wrenches(self.machine(), pose);
-        let mass: Cholesky<f64, U6> = Cholesky::new(self.mass_matrix(pose))?;
-        let mobility = n.transpose() * mass.solve(&n);
+        let mobility = self.mass.leg_mobility(pose)?;
         // The search for eigenvalues squares, and does not end where that overflows.
         let believed = mobility.iter().all(|element| element.abs() < HIGHEST_MOBILITY);
         believed.then(|| 1.0 / mobility.symmetric_eigenvalues().max())

@@ -6,8 +6,9 @@
 mod common;
 mod evidence;
 mod inputs;
-mod integral;
 mod limits;
+mod modes;
+mod observer;
 mod poses;
 mod replay;
 #[path = "../common/rig.rs"]

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "every test uses a part of it")]
 
+pub mod fast;
+
 use std::path::{Path, PathBuf};
 
 use hexad::host::config::Config;

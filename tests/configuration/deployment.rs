@@ -54,10 +54,19 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
         &["realtime.cpu_dma_latency_us = -1: must be an integer in [0, 1000000]"],
     );
     refused(
-        "[control]\nintegral_bandwidth_hz = 0.51",
-        &["control.integral_bandwidth_hz = 0.51: must be at most 0.5 (0.05 of the lesser bandwidth)"],
+        "[control]\nobserver_bandwidth_hz = 20.1",
+        &[
+            "control.observer_bandwidth_hz = 20.1: must be at most 20 at realtime.rate_hz = 1000 and these bandwidths (gain margin of 2, and 2 times the lesser bandwidth)",
+        ],
     );
-    refused("[control]\nposition_bandwidth_hz = 5\nintegral_bandwidth_hz = 0.25", &[]);
+    refused("[control]\nposition_bandwidth_hz = 5\nobserver_bandwidth_hz = 10", &[]);
+    refused(
+        "[control]\nmode = \"pid\"",
+        &[
+            "control.mode = \"pid\": must be one of \"computed_torque\", \"feedforward_joint_pd\", \"gravity_joint_pd\", \"joint_pd\"",
+        ],
+    );
+    refused("[control]\nmode = \"joint_pd\"", &[]);
     refused(
         "[control]\non_setpoint_lost = \"coast\"",
         &["control.on_setpoint_lost = \"coast\": must be one of \"fault\", \"park\""],

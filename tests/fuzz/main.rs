@@ -30,6 +30,8 @@ mod properties;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
+use hexad::control::law::ControlMode;
+
 /// Memory of this process at its largest: the readers' bounds and the test itself \[kB\].
 const MAX_MEMORY_KB: u64 = 256 << 10;
 
@@ -69,7 +71,7 @@ fn cycles() {
     replay(properties::step::hold, &["tests/fuzz/seeds/step"], "");
 }
 
-/// A million cycles with any bits in their inputs; a hundred million with `HEXAD_LONG=1`.
+/// A million cycles with any bits in their inputs, in every mode in turn; a hundred million with `HEXAD_LONG=1`.
 #[test]
 fn random_cycles() {
     let wanted = if env::var_os("HEXAD_LONG").is_some() { 100_000_000 } else { 1_000_000 };
@@ -96,7 +98,9 @@ fn random_cycles() {
                 }
             }
         }
-        let (cycles, reached) = properties::step::run(&program);
+        let mode = ControlMode::ALL[programs as usize % ControlMode::ALL.len()];
+        let observer_hz = if programs / 4 % 2 == 0 { 0.0 } else { properties::step::OBSERVER_HZ };
+        let (cycles, reached) = properties::step::run(&program, mode, observer_hz);
         (done, programs, controlled) = (done + cycles, programs + 1, controlled + u64::from(reached));
     }
     println!("{done} cycles in {programs} programs, {controlled} of them reached control");

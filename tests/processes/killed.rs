@@ -1,9 +1,10 @@
 //! SIGKILL in full motion, then a restart and one `engage`, without anybody cleaning up.
 
-use hexad::control::state::Cause;
+use hexad::control::state::{Cause, Request};
 use hexad::ipc::messages::MeasuredMessage;
 use hexad::realtime::clock::monotonic_ns;
 
+use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::PERIOD_NS;
 use crate::support::operator;
 use crate::support::recorder::Recording;
@@ -46,8 +47,16 @@ fn a_killed_setpoint_source_comes_back() {
     trio.plant.says("no valid force (setpoint lost in motion): brakes closing");
     trio.stands();
     let to_ns = monotonic_ns();
+    operator::clear(&trio.machine);
+    // Who waits does so from before the source is back.
+    let engages = Hexad::start(&trio.machine, "engage", &["--wait"]);
+    trio.recorder.until("it is asked to engage", |recording| {
+        let asked = recording.commands.last()?;
+        (asked.request == Request::Engage as u32 && asked.header.time_ns > to_ns).then_some(())
+    });
     trio.setpoints = start_setpoints(&trio.machine);
-    operator::clear_and_engage(&trio.machine);
+    let Ended { status, stderr, .. } = engages.ends_within(HANG);
+    assert_eq!(status.code(), Some(0), "{stderr}");
     trio.moves_after(to_ns);
     let recording = trio.finish();
     let outage = Outage { from_ns, to_ns };

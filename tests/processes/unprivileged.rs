@@ -14,7 +14,7 @@ fn nobody_is_told_what_is_lacking_and_served() {
         return;
     }
     let _turn = turns::alone();
-    let Ended { status, stdout, stderr } = demo(&Machine::patient("nobody"), &nobody);
+    let Ended { status, stdout, stderr } = demo(&machine("nobody"), &nobody);
     assert_eq!(status.code(), Some(0), "{stdout}\n{stderr}");
     for words in ["no FIFO priority 80: ", "no locked memory: ", "no bound on idle states: "] {
         assert!(stderr.contains(words), "{words:?} must be in\n{stderr}");
@@ -30,7 +30,7 @@ fn nobody_is_served_beside_root() {
         return;
     }
     let _turn = turns::alone();
-    let machine = Machine::patient("beside");
+    let machine = machine("beside");
     let recorder = Recorder::start(&machine.name);
     let plant = start_plant(&machine);
     recorder.until("root's plant owns the shared memory", |recording| recording.measured.last().map(drop));
@@ -39,6 +39,13 @@ fn nobody_is_served_beside_root() {
     assert!(stderr.contains("using /tmp/iceoryx2-65534"), "must say where its shared memory is: {stderr}");
     assert!(stdout.contains("faults           0"), "{stdout}");
     plant.stops_on("TERM", HANG);
+}
+
+/// With timeouts that also a busy machine does not reach: nobody has priority here.
+fn machine(test: &str) -> Machine {
+    let timeouts =
+        "[timeouts]\nsetpoint_ms = 200.0\nmeasured_ms = 900.0\n[plant]\nforce_timeout_ms = 900.0\n";
+    Machine::with(test, timeouts)
 }
 
 fn demo(machine: &Machine, wrappers: &[&[&str]]) -> Ended {

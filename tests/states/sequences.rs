@@ -18,7 +18,7 @@ use super::rig::Rig;
 static CONFIG: LazyLock<Config> = LazyLock::new(|| {
     let mut config = deployed("motion_base");
     config.deployment.plant.step_s = 1e-3;
-    config.deployment.control.integral_bandwidth_hz = 0.3;
+    config.deployment.control.observer_bandwidth_hz = 0.3;
     config
 });
 static SCENE: LazyLock<Scene> = LazyLock::new(|| fit(&CONFIG.machine, Motion::Sines, 8.0));

@@ -1,9 +1,10 @@
 //! The forces of a cycle, within what the actuators and the deployment allow.
 
 use super::{Controller, Output, Parameters};
+use crate::control::law::{ControlMode, Deviation};
 use crate::control::limits::Limit;
 use crate::control::state::{Cause, Trouble};
-use crate::model::ladder::Gravity;
+use crate::model::ladder::{Gravity, Rung};
 use crate::model::machine::LEGS;
 use crate::model::rigid::Motion;
 
@@ -11,35 +12,46 @@ impl Controller {
     /// The forces of this cycle, or why there are none.
     pub(super) fn control(&mut self, release_ns: u64, output: &mut Output) -> Result<(), Trouble> {
         let error = output.error.ok_or(Cause::SetpointLost)?;
-        let Parameters { period_ns, law, rung, limits, .. } = &self.parameters;
+        let Parameters { period_ns, law, rung, .. } = &self.parameters;
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = release_ns.saturating_add(period_ns / 2);
         let desired = self.reference_at(middle_of_hold_ns).ok_or(Cause::SetpointLost)?;
-        let command = law.command(&desired, &error, &self.integral);
-        let force = self.model.forces_of(*rung, &command).ok_or(Cause::SingularPose)?;
+        let deviation = self.known_error.map_or(Deviation::from(&error), |known| known.acted_on);
+        let asked = self.observer.asks(law, &deviation, *period_ns as f64 * 1e-9);
+        let (rung, motion, own) = match law.mode {
+            ControlMode::ComputedTorque => (Some(*rung), law.command(&desired, &error, &asked), [0.0; LEGS]),
+            ControlMode::FeedforwardJointPd => (Some(*rung), desired, law.leg_forces(&asked)),
+            ControlMode::GravityJointPd => (Some(Rung::Gravity), desired, law.leg_forces(&asked)),
+            ControlMode::JointPd => (None, desired, law.leg_forces(&asked)),
+        };
+        let mut force = own;
+        if let Some(rung) = rung {
+            let modelled = self.model.forces_of(rung, &motion).ok_or(Cause::SingularPose)?;
+            force.iter_mut().zip(modelled).for_each(|(force, modelled)| *force += modelled);
+        }
         if force.iter().any(|value| !value.is_finite()) {
             return Err(Cause::ForceNotFinite.into());
         }
-        let limited = self.within_limit(&force, &command)?;
+        let limited = self.within_limit(&force, &motion)?;
         output.force = self.within_rate(limited);
         output.limiting = output
             .limiting
             .with(Limit::Force, limited != force)
             .with(Limit::ForceRate, output.force != limited);
-        if output.force == force {
-            self.integral.add(law, &error.pose, *period_ns as f64 * 1e-9, limits);
+        if output.force != force {
+            self.observer.expect_nothing();
         }
         Ok(())
     }
 
     /// Forces beyond the limit keep what holds the platform up and lose the same share of all else, so that
     /// what is left pushes in the direction that was meant.
-    fn within_limit(&self, force: &[f64; LEGS], command: &Motion) -> Result<[f64; LEGS], Trouble> {
+    fn within_limit(&self, force: &[f64; LEGS], motion: &Motion) -> Result<[f64; LEGS], Trouble> {
         let limit = self.model.machine().actuator.max_force;
         if force.iter().all(|value| value.abs() <= limit) {
             return Ok(*force);
         }
-        let weight = self.model.forces::<Gravity>(command).ok_or(Cause::SingularPose)?;
+        let weight = self.model.forces::<Gravity>(motion).ok_or(Cause::SingularPose)?;
         Ok(toward(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
     }
 

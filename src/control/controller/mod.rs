@@ -8,7 +8,7 @@
 //! with which forces.
 
 use super::doubt::{self, Aim, Believed, Parting};
-use super::law::{Integral, Law, TrackingError};
+use super::law::{Deviation, Law, Observer, TrackingError};
 use super::limits::{Limit, Limiting, Limits};
 use super::reference::Segment;
 use super::state::{Cause, Evidence, Request, State, Trouble};
@@ -163,15 +163,24 @@ pub struct Controller {
     mode: Mode,
     evidence: Evidence,
     reference: Reference,
-    integral: Integral,
-    /// Under control: the last error, and the instant of the measurement it comes from.
-    known_error: Option<(u64, TrackingError)>,
+    observer: Observer,
+    /// Under control: the last error.
+    known_error: Option<KnownError>,
     /// Of the last cycle, if it was under control.
     force: Option<[f64; LEGS]>,
     answered: (u64, u64),
     refused: Cause,
     without_measurement: u64,
     without_setpoint: u64,
+}
+
+/// An error, and the instant of the measurement it comes from.
+#[derive(Clone, Copy, Debug)]
+struct KnownError {
+    time_ns: u64,
+    error: TrackingError,
+    /// What the law sees of it: the same, or the legs' part.
+    acted_on: Deviation,
 }
 
 /// A measurement and the pose and twist it stands for.
@@ -200,7 +209,7 @@ impl Controller {
             mode: Mode::default(),
             evidence: Evidence::default(),
             reference: Reference::Setpoint,
-            integral: Integral::default(),
+            observer: Observer::default(),
             known_error: None,
             force: None,
             answered: (0, 0),

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::{Controller, Located, Parameters, Reference, seconds_between};
+use super::{Controller, KnownError, Located, Measurement, Parameters, Reference, seconds_between};
 use crate::control::doubt::Aim;
-use crate::control::law::{Integral, TrackingError};
+use crate::control::law::{Deviation, Observer, TrackingError};
 use crate::control::limits::Limits;
 use crate::control::reference::Segment;
 use crate::control::state::State;
@@ -42,15 +42,26 @@ impl Controller {
     /// Reference minus measured, at the instant of the measurement; while there is no new one, what becomes of
     /// it by the law.
     pub(super) fn error(&mut self, at: &Located) -> Option<TrackingError> {
-        let known = self.known_error.filter(|(time_ns, _)| *time_ns == at.time_ns);
-        let error = match known {
-            Some((_, error)) => {
-                self.parameters.law.predicted(&error, self.parameters.period_ns as f64 * 1e-9)
+        let Parameters { law, period_ns, .. } = &self.parameters;
+        let known = match self.known_error.filter(|known| known.time_ns == at.time_ns) {
+            Some(known) => {
+                let after = |deviation: &Deviation| law.predicted(deviation, *period_ns as f64 * 1e-9);
+                let error = TrackingError::from(&after(&Deviation::from(&known.error)));
+                KnownError { error, acted_on: after(&known.acted_on), ..known }
             }
-            None => TrackingError::new(&self.reference_at(at.time_ns)?, &at.pose, &at.twist),
+            None => {
+                let desired = self.reference_at(at.time_ns)?;
+                let error = TrackingError::new(&desired, &at.pose, &at.twist);
+                let mut acted_on = Deviation::from(&error);
+                if law.mode.acts_on_legs() {
+                    let Measurement { length, rate, .. } = self.measurement.good?;
+                    acted_on = Deviation::of_legs(self.model.machine(), &desired, &length, &rate);
+                }
+                KnownError { time_ns: at.time_ns, error, acted_on }
+            }
         };
-        self.known_error = Some((at.time_ns, error)).filter(|_| self.mode.state.controls());
-        Some(error)
+        self.known_error = Some(known).filter(|_| self.mode.state.controls());
+        Some(known.error)
     }
 
     pub(super) fn arrived(&self, instant_ns: u64) -> bool {
@@ -71,7 +82,8 @@ impl Controller {
         if self.away(&error) < SMALLEST_TAKEOVER {
             return;
         }
-        let command = law.command(present, &error, &Integral::default()).acceleration;
+        let asked = law.feedback(&Deviation::from(&error));
+        let command = law.command(present, &error, &asked).acceleration;
         let longest = *period_ns as f64 * 1e-9;
         let step = |command: Vector3<f64>, next: Vector3<f64>| (command - next).norm();
         if step(command.linear, next.acceleration.linear) > limits.position.jerk * longest
@@ -79,6 +91,7 @@ impl Controller {
         {
             // As hard as a stop: what lags behind is off the path that somebody planned.
             self.reference = self.onto_setpoint(present, now_ns, 1.0);
+            self.observer.expect_nothing();
         }
     }
 
@@ -104,15 +117,18 @@ impl Controller {
         // Without control the platform stands, or coasts; what it accelerates with is not measured.
         let present = self.reference_at(release_ns).filter(|_| before.controls());
         let present = present.unwrap_or_else(|| Motion { twist: at.twist, ..resting(&at.pose) });
+        if before.controls() {
+            self.observer.expect_nothing();
+        } else {
+            // The payload may be another.
+            self.observer = Observer::default();
+        }
         self.reference = match self.mode.state {
-            State::Engaging => {
-                self.integral = Integral::default();
-                self.onto_setpoint(
-                    &Motion { twist: at.twist, ..resting(&at.pose) },
-                    at.time_ns,
-                    limits.own_share,
-                )
-            }
+            State::Engaging => self.onto_setpoint(
+                &Motion { twist: at.twist, ..resting(&at.pose) },
+                at.time_ns,
+                limits.own_share,
+            ),
             State::Stopping => {
                 let segment = Segment::to_rest(release_ns, &present.twist, &present.acceleration, limits);
                 Reference::From(present.pose, segment)

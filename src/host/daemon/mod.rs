@@ -231,11 +231,16 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, rung: Rung) -> Par
     });
     Parameters {
         period_ns: nanoseconds(deployment.realtime.period_s()),
-        law: Law {
-            position: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
-            orientation: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
-            integral: core::f64::consts::TAU * control.integral_bandwidth_hz,
-        },
+        law: Law::new(
+            machine,
+            control.mode,
+            [
+                Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
+                Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+            ],
+            core::f64::consts::TAU * control.observer_bandwidth_hz,
+            &limits.reference,
+        ),
         rung,
         engage_position: control.engage_position_m,
         engage_orientation: control.engage_orientation_rad,

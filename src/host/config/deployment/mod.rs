@@ -6,6 +6,7 @@
 
 extern crate std;
 
+use core::f64::consts::TAU;
 use std::{format, prelude::rust_2024::*};
 
 pub use self::plant::Plant;
@@ -13,7 +14,9 @@ pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;
-use crate::control::gains::{MIN_GAIN_MARGIN, gain_margin, max_bandwidth_hz};
+use crate::control::gains::{Gains, MIN_GAIN_MARGIN, max_bandwidth_hz, max_observer};
+use crate::control::law::ControlMode;
+use crate::control::leg_masses::LegMasses;
 use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
 use crate::control::supervisor::AfterStop;
 use crate::model::ladder::Rung;
@@ -34,8 +37,8 @@ const LEAST_DEFAULT_PERIODS: f64 = 4.0;
 const LONGEST_TIMEOUT_MS: f64 = 1000.0;
 /// Damping ratios that a control engineer would write down; beyond, it is a slip.
 const DAMPING_RATIO: Bound = Bound::Within(0.1, 10.0);
-/// Largest bandwidth of the integral, as a share of the loop's: it must not take part in the loop's own motion.
-const INTEGRAL_SHARE: f64 = 0.05;
+/// Largest bandwidth of the observer, as a multiple of the lesser bandwidth: what is faster only amplifies noise.
+const FASTEST_OBSERVER: f64 = 2.0;
 /// The default of the force rate takes this long from no force to the largest \[s\]: slower than any noise
 /// worth following, faster than any motion.
 const FORCE_RISE_S: f64 = 0.01;
@@ -73,6 +76,8 @@ pub struct Deployment {
 /// `[control]`: the law's error dynamics, and how near the set point must be to engage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Control {
+    /// From errors to forces.
+    pub mode: ControlMode,
     /// Natural frequency of the position error.
     pub position_bandwidth_hz: f64,
     /// Damping ratio of the position error.
@@ -91,8 +96,8 @@ pub struct Control {
     pub following_orientation_rad: f64,
     /// Which terms of the dynamics are evaluated.
     pub fidelity: Fidelity,
-    /// Ki / Kp of both loops, as a frequency; 0 is without.
-    pub integral_bandwidth_hz: f64,
+    /// Below this frequency disturbances are cancelled; 0 is without.
+    pub observer_bandwidth_hz: f64,
     /// What follows the stop of a platform that lost its setpoint.
     pub on_setpoint_lost: AfterStop,
     /// Largest error [`Fidelity::Auto`] may make, as a share of the peak force of the envelope.
@@ -134,7 +139,7 @@ pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     let rate_hz = realtime.rate_hz;
     Deployment {
         realtime,
-        control: control(root.section("control"), rate_hz),
+        control: control(root.section("control"), rate_hz, machine),
         limits: limits(root.section("limits"), machine),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant::read(root.section("plant"), rate_hz, machine),
@@ -142,12 +147,22 @@ pub(super) fn read(root: &mut Reader, machine: &Machine) -> Deployment {
     }
 }
 
-fn control(mut section: Reader, rate_hz: f64) -> Control {
+fn control(mut section: Reader, rate_hz: f64, machine: &Machine) -> Control {
+    let modes = ControlMode::ALL.map(|mode| (mode.name(), mode));
+    let mode = section.choice_or("mode", ControlMode::default(), &modes);
+    let legs = mode.acts_on_legs().then(|| LegMasses::at_home(machine));
+    let [softest, stiffest] = legs.map_or([1.0; 2], |legs| [legs.softest, legs.stiffest]);
     let [position_bandwidth_hz, position_damping_ratio] =
-        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], rate_hz);
+        gains(&mut section, ["position_bandwidth_hz", "position_damping_ratio"], rate_hz, stiffest);
     let [orientation_bandwidth_hz, orientation_damping_ratio] =
-        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], rate_hz);
+        gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], rate_hz, 1.0);
+    let bandwidths = [position_bandwidth_hz, orientation_bandwidth_hz];
+    let loops = [
+        (Gains::new(position_bandwidth_hz, position_damping_ratio), [softest, stiffest]),
+        (Gains::new(orientation_bandwidth_hz, orientation_damping_ratio), [1.0; 2]),
+    ];
     let control = Control {
+        mode,
         position_bandwidth_hz,
         position_damping_ratio,
         orientation_bandwidth_hz,
@@ -170,7 +185,7 @@ fn control(mut section: Reader, rate_hz: f64) -> Control {
         ),
         fidelity: fidelity(&mut section),
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
-        integral_bandwidth_hz: integral(&mut section, position_bandwidth_hz.min(orientation_bandwidth_hz)),
+        observer_bandwidth_hz: observer(&mut section, rate_hz, &bandwidths, &loops),
         on_setpoint_lost: section.choice_or(
             "on_setpoint_lost",
             AfterStop::Fault,
@@ -187,29 +202,55 @@ fn fidelity(section: &mut Reader) -> Fidelity {
     section.choice_or("fidelity", Fidelity::Fixed(Rung::Exact), &options.collect::<Vec<_>>())
 }
 
-/// So much slower than the slower loop, the integral takes a twentieth of a radian of its phase at most.
-fn integral(section: &mut Reader, bandwidth_hz: f64) -> f64 {
-    let largest = (bandwidth_hz * INTEGRAL_SHARE * 1e3).floor() / 1e3;
-    let integral_hz = section.number_or("integral_bandwidth_hz", 0.0, Bound::NotNegative);
-    if integral_hz > largest {
-        let bound = format!("must be at most {largest} ({INTEGRAL_SHARE} of the lesser bandwidth)");
-        section.refuse("integral_bandwidth_hz", bound);
+/// As fast as both loops carry it.
+fn observer(
+    section: &mut Reader,
+    rate_hz: f64,
+    bandwidths: &[f64; 2],
+    loops: &[(Gains, [f64; 2]); 2],
+) -> f64 {
+    let observer_hz = section.number_or("observer_bandwidth_hz", 0.0, Bound::NotNegative);
+    let fastest = TAU * FASTEST_OBSERVER * bandwidths.iter().copied().fold(f64::INFINITY, f64::min);
+    let carried = loops.iter().map(|(gains, modes)| max_observer(gains, 1.0 / rate_hz, *modes, fastest));
+    let largest = (carried.fold(fastest, f64::min) / TAU * 1e3).floor() / 1e3;
+    if observer_hz > largest && bandwidths.iter().all(|hertz| hertz.is_finite()) {
+        let bound = format!(
+            "must be at most {largest} at realtime.rate_hz = {rate_hz} and these bandwidths (gain margin of \
+             {MIN_GAIN_MARGIN}, and {FASTEST_OBSERVER} times the lesser bandwidth)"
+        );
+        section.refuse("observer_bandwidth_hz", bound);
     }
-    integral_hz
+    observer_hz
 }
 
-/// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry.
-fn gains(section: &mut Reader, [bandwidth_key, damping_key]: [&'static str; 2], rate_hz: f64) -> [f64; 2] {
+/// Bandwidth and damping ratio of one loop; refused beyond what a loop of that rate can carry, the stiffest of
+/// whose modes has so many times its gain.
+fn gains(
+    section: &mut Reader,
+    [bandwidth_key, damping_key]: [&'static str; 2],
+    rate_hz: f64,
+    stiffest: f64,
+) -> [f64; 2] {
     let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO);
     let period_s = 1.0 / rate_hz;
+    let margin = MIN_GAIN_MARGIN * stiffest;
     // Rounded down, so that the number in the message is one that is accepted.
-    let largest = (max_bandwidth_hz(damping_ratio, period_s) * 1e3).floor() / 1e3;
+    let largest = (max_bandwidth_hz(damping_ratio, period_s, margin) * 1e3).floor() / 1e3;
     let bandwidth_hz = section.number_or(bandwidth_key, BANDWIDTH_HZ.min(largest), Bound::Positive);
     let all_read = [bandwidth_hz, damping_ratio, period_s].iter().all(|x| x.is_finite());
-    if all_read && gain_margin(bandwidth_hz, damping_ratio, period_s) < MIN_GAIN_MARGIN {
+    if all_read && Gains::new(bandwidth_hz, damping_ratio).margin(period_s) < margin {
+        let modes = if stiffest == 1.0 {
+            String::new()
+        } else {
+            format!(
+                " in the stiffest mode of the legs, \
+            which has {} times the gain",
+                rounded(stiffest)
+            )
+        };
         let bound = format!(
             "must be at most {largest} at realtime.rate_hz = {rate_hz} and {damping_key} = {damping_ratio} \
-             (gain margin of {MIN_GAIN_MARGIN})"
+             (gain margin of {MIN_GAIN_MARGIN}{modes})"
         );
         section.refuse(bandwidth_key, bound);
     }

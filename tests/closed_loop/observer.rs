@@ -1,4 +1,4 @@
-//! The integral term: it removes what a wrong payload leaves, and does not wind up.
+//! The observer: it removes what a wrong payload leaves, and does not wind up.
 
 use hexad::control::limits::Limit;
 use hexad::control::state::{Request, State};
@@ -10,10 +10,10 @@ use hexad::model::task::TaskState;
 use super::common::deployed;
 use super::rig::{Rig, parameters};
 
-fn with_integral(hertz: f64) -> Config {
+fn with_observer(hertz: f64) -> Config {
     let mut config = deployed("motion_base");
     config.deployment.plant.step_s = 1e-3;
-    config.deployment.control.integral_bandwidth_hz = hertz;
+    config.deployment.control.observer_bandwidth_hz = hertz;
     config
 }
 
@@ -33,8 +33,8 @@ fn sag(config: &Config, seconds: u32) -> f64 {
 
 #[test]
 fn a_payload_of_a_fifth_leaves_nothing() {
-    let without = sag(&with_integral(0.0), 4);
-    let with = sag(&with_integral(HERTZ), 4);
+    let without = sag(&with_observer(0.0), 4);
+    let with = sag(&with_observer(HERTZ), 4);
     println!("without {without:e} m, with {with:e} m");
     assert!(without > 1e-4);
     assert!(with < 1e-3 * without, "{with} of {without}");
@@ -72,7 +72,7 @@ fn overshoot(config: &Config) -> f64 {
 #[test]
 fn it_does_not_wind_up_while_forces_are_limited() {
     let weak = |hertz| {
-        let mut config = with_integral(hertz);
+        let mut config = with_observer(hertz);
         // Enough for the platform, not for the load.
         config.machine.actuator.max_force = 4300.0;
         config.deployment.control.following_position_m = 10.0;
@@ -91,7 +91,7 @@ fn it_does_not_wind_up_while_forces_are_limited() {
 /// Whoever engages again begins without what was learnt before: the payload may be another.
 #[test]
 fn it_begins_anew_with_each_engagement() {
-    let config = with_integral(HERTZ);
+    let config = with_observer(HERTZ);
     let mut heavy = config.machine.clone();
     heavy.platform.mass *= 1.2;
     let mut rig = Rig::new(&config, &heavy);

@@ -1,0 +1,156 @@
+//! Tracking error against what the model does not know: payload, friction, noise, dead time.
+
+use hexad::control::law::ControlMode;
+use hexad::host::charts::Stroke;
+use hexad::host::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width};
+use hexad::model::ladder::Rung;
+use hexad::plant::imperfections::Imperfections;
+
+use super::common;
+use super::run::{Outcome, Run};
+use super::{Failure, MODES, cells, chart, play, write_csv};
+
+const MACHINE: &str = "motion_base";
+const RATE_HZ: f64 = 1e3;
+/// As fast as the loop for computed torque and feedforward.
+const OBSERVER_HZ: f64 = 10.0;
+/// Noise of a rate that comes from lengths with the noise of 1 m: of a filter at 100 Hz or so \[1/s\].
+const RATE_NOISE: f64 = 300.0;
+
+/// What grows along an axis.
+struct Sweep {
+    name: &'static str,
+    x_label: &'static str,
+    levels: &'static [f64],
+    imperfect: fn(f64) -> Imperfections,
+}
+
+const SWEEPS: [Sweep; 4] = [
+    Sweep {
+        name: "payload_percent",
+        x_label: "platform heavier than modelled [%]",
+        levels: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 50.0],
+        imperfect: payload,
+    },
+    Sweep {
+        name: "friction_n",
+        x_label: "Coulomb friction of a leg [N]",
+        levels: &[0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0],
+        imperfect: friction,
+    },
+    Sweep {
+        name: "noise_um",
+        x_label: "noise of the measured lengths [µm]",
+        levels: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0],
+        imperfect: noise,
+    },
+    Sweep {
+        name: "dead_time_ms",
+        x_label: "dead time of the drives [ms]",
+        levels: &[0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0],
+        imperfect: dead_time,
+    },
+];
+
+fn payload(percent: f64) -> Imperfections {
+    let body = common::deployed(MACHINE).machine.platform;
+    let mut imperfections = Imperfections::default();
+    imperfections.build.payload = 0.01 * percent * body.mass;
+    imperfections.build.payload_at = body.center_of_mass;
+    imperfections
+}
+
+fn friction(newtons: f64) -> Imperfections {
+    let mut imperfections = Imperfections::default();
+    imperfections.friction.coulomb = newtons;
+    imperfections
+}
+
+fn noise(micrometres: f64) -> Imperfections {
+    let mut imperfections = Imperfections { seed: 1, ..Imperfections::default() };
+    imperfections.sensor.length_noise = 1e-6 * micrometres;
+    imperfections.sensor.rate_noise = 1e-6 * micrometres * RATE_NOISE;
+    imperfections
+}
+
+fn dead_time(milliseconds: f64) -> Imperfections {
+    let mut imperfections = Imperfections::default();
+    imperfections.drive.dead_time_ns = (1e6 * milliseconds) as u64;
+    imperfections
+}
+
+/// Mode and observer of each line.
+fn variants() -> Vec<(ControlMode, f64)> {
+    [0.0, OBSERVER_HZ].into_iter().flat_map(|hertz| ControlMode::ALL.map(|mode| (mode, hertz))).collect()
+}
+
+pub fn run(quick: bool) -> Result<(), Failure> {
+    let variants = variants();
+    let mut charts = vec![];
+    let mut rows = vec![];
+    for sweep in &SWEEPS {
+        let levels: Vec<_> = sweep.levels.iter().copied().step_by(if quick { 4 } else { 1 }).collect();
+        let run = |(mode, observer_hz): &(ControlMode, f64), level: f64| Run {
+            machine: MACHINE,
+            mode: *mode,
+            rung: Rung::Exact,
+            rate_hz: RATE_HZ,
+            observer_hz: *observer_hz,
+            imperfections: (sweep.imperfect)(level),
+        };
+        let runs: Vec<_> = variants
+            .iter()
+            .flat_map(|variant| levels.iter().map(move |level| run(variant, *level)))
+            .collect();
+        let outcomes = play(sweep.name, &runs);
+        for ((run, outcome), level) in runs.iter().zip(&outcomes).zip(levels.iter().cycle()) {
+            let lost = if outcome.rms_um().is_finite() { "" } else { outcome.lost.name() };
+            let [rms, max] = [outcome.rms_um(), outcome.max_um()].map(|error| format!("{error:.4}"));
+            rows.push(cells([&sweep.name, level, &run.mode.name(), &run.observer_hz, &rms, &max, &lost]));
+        }
+        charts.push(draw(sweep, &variants, &levels, &outcomes));
+    }
+    let header = ["what", "level", "mode", "observer_hz", "position_rms_um", "position_max_um", "lost"];
+    write_csv("closed_loop_disturbances.csv", &header, &rows)?;
+    let mut legend: Vec<_> =
+        MODES.iter().enumerate().map(|(k, name)| (Sample::Mark(Mark::Disc, k), *name)).collect();
+    legend.push((Sample::Mark(Mark::Ring, 0), "with observer"));
+    let title = "What control a scene needs: motion base, fast scene, 1 kHz";
+    Grid { title, legend, columns: 2, charts }.write_svg(&chart("closed_loop_disturbances.svg"))?;
+    Ok(())
+}
+
+/// A line per variant; where control is lost, it ends.
+fn draw<'a>(
+    sweep: &Sweep,
+    variants: &[(ControlMode, f64)],
+    levels: &[f64],
+    outcomes: &[Outcome],
+) -> Scatter<'a> {
+    let (mut points, mut lines) = (vec![], vec![]);
+    for ((mode, observer_hz), outcomes) in variants.iter().zip(outcomes.chunks(levels.len())) {
+        let color = *mode as usize;
+        let line: Vec<_> = levels
+            .iter()
+            .zip(outcomes)
+            .map(|(level, outcome)| (*level, outcome.rms_um()))
+            .take_while(|(_, rms)| rms.is_finite())
+            .collect();
+        let observed = *observer_hz > 0.0;
+        let mark = if observed { Mark::Ring } else { Mark::Disc };
+        points.extend(line.iter().map(|at| Point { at: *at, mark, color, label: Label::None }));
+        let width = if observed { Width::Hair } else { Width::Curve };
+        lines.push(Line { points: line, style: Stroke::Solid, color, width });
+    }
+    let (first, last) = (levels.first().copied().unwrap_or(1.0), levels.last().copied().unwrap_or(1.0));
+    Scatter {
+        title: "",
+        x_label: sweep.x_label,
+        y_label: "RMS position error [µm]",
+        x: 0.8 * first..1.25 * last,
+        y: 0.5..2e4,
+        points,
+        lines,
+        legend: vec![],
+    }
+}

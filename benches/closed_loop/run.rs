@@ -1,0 +1,154 @@
+//! One closed loop: a controller, the simulated hardware, the fast scene.
+
+use std::hint::black_box;
+use std::path::Path;
+use std::time::Instant;
+
+use hexad::control::controller::{Asked, Controller, Input, Measurement, Setpoint};
+use hexad::control::law::ControlMode;
+use hexad::control::state::{Cause, Request, State};
+use hexad::host::config::Config;
+use hexad::host::daemon;
+use hexad::model::ladder::Rung;
+use hexad::model::task::TaskState;
+use hexad::plant::hardware::Hardware;
+use hexad::plant::imperfections::Imperfections;
+
+use super::common::fast::Fast;
+use super::common::{Errors, angle_between};
+
+/// From measurement to force, as a share of the period: release in its middle, then reading, computing, sending.
+const DELAY: f64 = 0.6;
+
+/// What the loop has to find its pose, engage, and let an observer learn \[s\].
+const SETTLING_S: f64 = 2.0;
+
+/// The clock of a computer that has been up for a while.
+const START_NS: u64 = 86_400_000_000_000;
+
+/// What is run.
+#[derive(Clone)]
+pub struct Run {
+    pub machine: &'static str,
+    pub mode: ControlMode,
+    pub rung: Rung,
+    pub rate_hz: f64,
+    /// 0 is without.
+    pub observer_hz: f64,
+    pub imperfections: Imperfections,
+}
+
+/// What came of it: errors over the scene, none if control was lost.
+#[derive(Clone, Debug, Default)]
+pub struct Outcome {
+    /// \[m\]
+    pub position: Errors,
+    /// \[rad\]
+    pub orientation: Errors,
+    /// Why it was lost; `None` if it was not.
+    pub lost: Cause,
+}
+
+impl Outcome {
+    /// RMS of the position error \[um\].
+    pub fn rms_um(&self) -> f64 {
+        if self.lost == Cause::None { 1e6 * self.position.rms() } else { f64::NAN }
+    }
+
+    pub fn max_um(&self) -> f64 {
+        if self.lost == Cause::None { 1e6 * self.position.max } else { f64::NAN }
+    }
+}
+
+impl Run {
+    /// The daemon's own defaults for this rate; only the following error may be any, as it is what is measured.
+    fn config(&self) -> Config {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("config").join(self.machine);
+        let text = std::fs::read_to_string(path.with_extension("toml")).unwrap();
+        let Self { mode, rate_hz, observer_hz, .. } = self;
+        let run = format!(
+            "\n[realtime]\nrate_hz = {rate_hz:?}\n[control]\nmode = \"{}\"\nobserver_bandwidth_hz = {observer_hz:?}\n\
+             following_position_m = 1.0\nfollowing_orientation_rad = 1.0\n",
+            mode.name()
+        );
+        Config::parse(&(text + &run), self.machine).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// The whole scene.
+    pub fn play(&self) -> Outcome {
+        self.record(&mut |_| ())
+    }
+
+    fn record(&self, watch: &mut dyn FnMut(&Input)) -> Outcome {
+        let config = self.config();
+        let parameters = daemon::parameters(&config.machine, &config.deployment, self.rung);
+        let plant = &config.deployment.plant;
+        let mut hardware = Hardware::new(
+            &config.machine,
+            plant.brake_deceleration_m_s2,
+            plant.step_s,
+            plant.tolerance_m,
+            &self.imperfections,
+        );
+        let mut controller = Controller::new(&config.machine, parameters);
+        let scene = Fast::new(&config);
+        let period_ns = parameters.period_ns;
+        let delay_ns = (DELAY * period_ns as f64) as u64;
+        let cycles = |seconds: f64| (seconds * 1e9 / period_ns as f64) as u64;
+        let (settling, all) = (cycles(SETTLING_S), cycles(SETTLING_S + scene.duration()));
+        let mut outcome = Outcome::default();
+        let mut force = None;
+        for cycle in 0..all {
+            let now_ns = START_NS + cycle * period_ns;
+            let task: TaskState = scene.at((cycle as f64 - settling as f64) * period_ns as f64 * 1e-9);
+            if cycle >= settling {
+                let (desired, actual) = (task.motion().pose, hardware.simulator().state().pose);
+                outcome.position.add((desired.position - actual.position).norm());
+                outcome.orientation.add(angle_between(&actual.rotation, &desired.rotation));
+            }
+            let (length, rate) = hardware.measure();
+            let input = Input {
+                release_ns: now_ns + period_ns / 2,
+                setpoint: Some(Setpoint { time_ns: now_ns, task }),
+                measurement: Some(Measurement { time_ns: now_ns, length, rate }),
+                request: (cycle > 0).then_some(Asked { request: Request::Engage, message: (1, 1) }),
+                deadline_missed: false,
+            };
+            watch(&input);
+            let output = controller.step(&input);
+            if cycle >= settling && output.state != State::Active {
+                return Outcome { lost: output.cause, ..outcome };
+            }
+            hardware.advance(delay_ns, force);
+            force = output.state.controls().then_some(output.force);
+            hardware.advance(period_ns - delay_ns, force);
+        }
+        outcome
+    }
+
+    /// Median time of a cycle of the controller over the scene \[ns\], in so many passes.
+    pub fn step_ns(&self, passes: usize) -> f64 {
+        let config = self.config();
+        let mut inputs = vec![];
+        self.record(&mut |input| inputs.push(*input));
+        let mut medians: Vec<_> = (0..passes)
+            .map(|_| {
+                let parameters = daemon::parameters(&config.machine, &config.deployment, self.rung);
+                let mut controller = Controller::new(&config.machine, parameters);
+                let time = |input: &Input| {
+                    let started = Instant::now();
+                    black_box(controller.step(black_box(input)));
+                    started.elapsed().as_nanos() as f64
+                };
+                median(inputs.iter().map(time).collect())
+            })
+            .collect();
+        medians.sort_by(f64::total_cmp);
+        median(medians)
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,219 @@
+//! The control modes, all measured alike: what each leaves of the fast scene, with a right model and a wrong one,
+//! and what the observer makes of it.
+
+use hexad::control::law::ControlMode;
+use hexad::control::leg_masses::LegMasses;
+use hexad::control::state::{Cause, State};
+use hexad::host::config::Config;
+use hexad::model::task::TaskState;
+
+use super::common::deployed;
+use super::common::fast::Fast;
+use super::rig::{Rig, Tracking, parameters};
+
+/// Expected errors may be off by a fifth either way.
+const BAND: (f64, f64) = (0.8, 1.25);
+
+/// As fast as the loop, and what a machine carries whose legs are coupled as those of `fried2008`.
+const OBSERVER_HZ: f64 = 10.0;
+const LEG_OBSERVER_HZ: f64 = 0.5;
+
+fn in_mode(name: &str, mode: ControlMode, observer_hz: f64) -> Config {
+    let mut config = deployed(name);
+    config.deployment.control.mode = mode;
+    config.deployment.control.observer_bandwidth_hz = observer_hz;
+    config
+}
+
+/// The fast scene on a platform whose mass is `share` of the modelled one, once control has settled.
+fn fast(config: &Config, share: f64) -> Tracking {
+    let mut platform = config.machine.clone();
+    platform.platform.mass *= share;
+    let scene = Fast::new(config);
+    let mut rig = Rig::new(config, &platform);
+    let home = scene.at(0.0);
+    rig.engage(&home);
+    for _ in 0..1000 {
+        rig.cycle(&rig.input(&home));
+    }
+    let mut tracking = Tracking::default();
+    for cycle in 0..(scene.duration() * 1e3) as u32 {
+        let task = scene.at(1e-3 * f64::from(cycle));
+        let (desired, actual) = (task.motion().pose, rig.simulator.state().pose);
+        tracking.position.add((desired.position - actual.position).norm());
+        let output = rig.cycle(&rig.input(&task));
+        assert_eq!((output.state, output.cause), (State::Active, Cause::None), "cycle {cycle}");
+        assert_eq!(output.limiting.0 & 3, 0, "a force is limited in cycle {cycle}");
+    }
+    tracking
+}
+
+/// RMS of the position error \[um\]: the right model; a fifth too light, without observer and with.
+const EXPECTED: [(ControlMode, [f64; 3]); 4] = [
+    (ControlMode::ComputedTorque, [2.902, 260.6, 4.717]),
+    (ControlMode::FeedforwardJointPd, [3.764, 303.5, 7.176]),
+    (ControlMode::GravityJointPd, [670.1, 821.8, 185.0]),
+    (ControlMode::JointPd, [1911.0, 2212.0, 244.4]),
+];
+
+fn measured(name: &str, mode: ControlMode) -> [f64; 3] {
+    [(0.0, 1.0), (0.0, 1.2), (OBSERVER_HZ, 1.2)]
+        .map(|(observer_hz, share)| 1e6 * fast(&in_mode(name, mode, observer_hz), share).position.rms())
+}
+
+#[test]
+fn every_mode_leaves_what_it_does_not_know() {
+    println!("speed {:.2}", Fast::new(&deployed("motion_base")).speed);
+    let found = EXPECTED.map(|(mode, expected)| (mode, expected, measured("motion_base", mode)));
+    for (mode, _, found) in &found {
+        println!("{}: RMS {found:.3?} um", mode.name());
+    }
+    for (mode, expected, found) in found {
+        for (expected, found) in expected.into_iter().zip(found) {
+            let band = BAND.0 * expected..=BAND.1 * expected;
+            assert!(band.contains(&found), "{}: {found} um, not {expected}", mode.name());
+        }
+    }
+}
+
+/// A platform a fifth heavier takes the advantage away; the observer gives it back.
+#[test]
+fn computed_torque_is_twenty_times_better_than_joint_pd() {
+    for name in ["fried2008", "motion_base", "tsai2000"] {
+        let rms = |mode, observer_hz, share| fast(&in_mode(name, mode, observer_hz), share).position.rms();
+        let pd = rms(ControlMode::JointPd, 0.0, 1.0);
+        let [exact, heavy, observed] = [(0.0, 1.0), (0.0, 1.2), (OBSERVER_HZ, 1.2)]
+            .map(|(observer_hz, share)| rms(ControlMode::ComputedTorque, observer_hz, share));
+        println!("{name}: {exact:e} m, heavy {heavy:e} m, observed {observed:e} m, joint PD {pd:e} m");
+        assert!(pd > 20.0 * exact && pd > 20.0 * observed, "{name}: {pd} {exact} {observed}");
+        assert!(pd < 40.0 * heavy && observed < 3.0 * exact, "{name}: {heavy} {observed} {exact}");
+    }
+}
+
+/// Also where each leg is controlled for itself.
+#[test]
+fn with_the_observer_a_payload_leaves_nothing_at_rest() {
+    for name in ["fried2008", "motion_base", "tsai2000"] {
+        for mode in ControlMode::ALL {
+            let hertz = if mode.acts_on_legs() { LEG_OBSERVER_HZ } else { OBSERVER_HZ };
+            let [without, with] = [0.0, hertz].map(|hertz| {
+                let config = in_mode(name, mode, hertz);
+                let mut heavy = config.machine.clone();
+                heavy.platform.mass *= 1.2;
+                let mut rig = Rig::new(&config, &heavy);
+                let home = TaskState::at_rest(config.machine.home);
+                rig.engage(&home);
+                for _ in 0..5000 {
+                    assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active);
+                }
+                (rig.simulator.state().pose.position - home.motion().pose.position).norm()
+            });
+            println!("{name}, {}: {without:e} m, with the observer {with:e} m", mode.name());
+            assert!(without > 1e-4 && with < 1e-6, "{name}, {}: {without} {with}", mode.name());
+        }
+    }
+}
+
+/// The mean of the modes' loop gains is that of the law, on every machine.
+#[test]
+fn legs_that_move_together_have_the_gain_of_the_law_on_average() {
+    for name in ["fried2008", "motion_base", "tsai2000"] {
+        let legs = LegMasses::at_home(&deployed(name).machine);
+        println!("{name}: {legs:?}");
+        assert!(0.0 < legs.softest && legs.softest < 1.0 && 1.0 < legs.stiffest && legs.stiffest < 6.0);
+    }
+}
+
+/// What a push leaves fades, in each mode at its limit of bandwidth.
+#[test]
+fn the_largest_bandwidth_is_stable_in_every_mode() {
+    for name in ["fried2008", "motion_base", "tsai2000"] {
+        for mode in ControlMode::ALL {
+            let text = std::fs::read_to_string(format!("{}/config/{name}.toml", env!("CARGO_MANIFEST_DIR")));
+            let with = |hertz: f64| {
+                let mode = mode.name();
+                let control = format!("\n[control]\nmode = \"{mode}\"\nposition_bandwidth_hz = {hertz}\n");
+                Config::parse(&(text.as_ref().unwrap().clone() + &control), name)
+            };
+            let refusal = with(1e3).unwrap_err().to_string();
+            let largest = refusal.split("must be at most ").nth(1).unwrap().split(' ').next().unwrap();
+            let largest: f64 = largest.parse().unwrap();
+            assert!(with(1.01 * largest).is_err());
+            let mut config = with(largest).unwrap();
+            config.deployment.control.orientation_bandwidth_hz = largest;
+            let mut rig = Rig::new(&config, &config.machine);
+            let home = TaskState::at_rest(config.machine.home);
+            rig.engage(&home);
+            let mut cycles = |count: u32, push: f64| {
+                for _ in 0..count {
+                    let output = rig.controller.step(&rig.input(&home));
+                    assert_eq!(output.state, State::Active, "{name} {}: {:?}", mode.name(), output.cause);
+                    let mut force = output.force;
+                    force[0] += push;
+                    rig.pass(Some(force));
+                }
+                rig.simulator.state().pose.position
+            };
+            let settled = cycles(2000, 0.0);
+            let pushed = (cycles(20, 0.01 * config.machine.actuator.max_force) - settled).norm();
+            let left = (cycles(2000, 0.0) - settled).norm();
+            println!("{name}, {}: to {largest} Hz, {pushed:e} m, {left:e} m are left", mode.name());
+            assert!(pushed > 1e-6 && left < 1e-3 * pushed, "{name} {}: {left} of {pushed}", mode.name());
+        }
+    }
+}
+
+/// Every second measurement is lost: the loop goes on with what becomes of the last error, and hardly worse.
+#[test]
+fn every_mode_rides_through_missing_measurements() {
+    for mode in ControlMode::ALL {
+        let config = in_mode("motion_base", mode, 2.0);
+        let scene = Fast::new(&config);
+        let rms = [1, 2].map(|every| {
+            let mut rig = Rig::new(&config, &config.machine);
+            rig.engage(&scene.at(0.0));
+            let mut tracking = Tracking::default();
+            let mut last = rig.input(&scene.at(0.0)).measurement;
+            for cycle in 0..(scene.duration() * 1e3) as u32 {
+                let task = scene.at(1e-3 * f64::from(cycle));
+                tracking
+                    .position
+                    .add((task.motion().pose.position - rig.simulator.state().pose.position).norm());
+                let mut input = rig.input(&task);
+                if cycle % every == 0 {
+                    last = input.measurement;
+                }
+                input.measurement = last;
+                assert_eq!(rig.cycle(&input).state, State::Active);
+            }
+            tracking.position.rms()
+        });
+        println!("{}: {rms:?}", mode.name());
+        assert!(rms[1] < 3.0 * rms[0], "{}: {rms:?}", mode.name());
+    }
+}
+
+/// The forces of a law on legs come from the measured lengths and the setpoint, and change with no other pose.
+#[test]
+fn a_leg_pushes_for_its_own_error() {
+    let config = in_mode("motion_base", ControlMode::JointPd, 0.0);
+    let law = parameters(&config).law;
+    let home = TaskState::at_rest(config.machine.home);
+    let mut rig = Rig::new(&config, &config.machine);
+    rig.engage(&home);
+    (0..1000).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
+    let forces = |leg: usize, off: f64| {
+        let mut input = rig.input(&home);
+        input.measurement.as_mut().unwrap().length[leg] += off;
+        rig.controller.clone().step(&input).force
+    };
+    for leg in 0..6 {
+        let (with, without) = (forces(leg, 1e-5), forces(leg, 0.0));
+        for other in 0..6 {
+            let expected =
+                if other == leg { -1e-5 * law.position.stiffness * law.leg_mass[leg] } else { 0.0 };
+            let found = with[other] - without[other];
+            assert!((found - expected).abs() < 1e-6 * law.leg_mass[leg], "{leg} {other}: {found} {expected}");
+        }
+    }
+}
