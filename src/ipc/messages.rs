@@ -9,7 +9,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use super::statistics::Statistics;
 
 /// Version of every struct in this file. Any change of layout or meaning raises it.
-pub const SCHEMA: u32 = 3;
+pub const SCHEMA: u32 = 4;
 
 /// First field of every message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -173,6 +173,9 @@ pub struct StatusMessage {
     pub position_error_m: [f64; 3],
     /// log(R_d R^T) \[rad\].
     pub orientation_error_rad: [f64; 3],
+    /// Torque about C \[N m\], then force \[N\], base axes, that the platform gets more than was asked for: zero
+    /// unless forces are limited.
+    pub wrench_error: [f64; 6],
     /// Cycles since start.
     pub cycles: u64,
     /// Cycles that woke later than the configured threshold.

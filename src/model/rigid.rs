@@ -101,6 +101,11 @@ impl Wrench {
     pub fn vector(&self) -> Vector6<f64> {
         stack(&self.torque, &self.force)
     }
+
+    /// Inverse of [`Wrench::vector`].
+    pub fn from_vector(v: &Vector6<f64>) -> Self {
+        Self { torque: v.fixed_rows::<3>(0).into(), force: v.fixed_rows::<3>(3).into() }
+    }
 }
 
 impl Pose {

@@ -6,13 +6,14 @@ use hexad::control::controller::Output;
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, State};
 use hexad::host::config::Config;
-use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
 use hexad::model::forward_kinematics::LARGEST_CONDITION;
 use hexad::model::ladder::Exact;
-use hexad::model::rigid::Motion;
+use hexad::model::rigid::{Motion, Wrench};
 use hexad::model::stance::Stance;
 use hexad::model::task::TaskState;
 use hexad::scene::minimum_jerk::{Profile, rise};
+use nalgebra::Vector6;
 use rayon::prelude::*;
 
 use super::common::largest;
@@ -62,7 +63,17 @@ fn run(config: &Config, time_s: f64, distance: f64) -> Run {
             run.holding = run.holding.max(largest(&inverse_dynamics::<Exact>(machine, &resting).unwrap()));
         }
         if output.limiting.contains(Limit::Force) {
-            run.limited.get_or_insert(run.cycles);
+            let first = *run.limited.get_or_insert(run.cycles);
+            if run.cycles < first + 3 {
+                // What the legs give less than the motion needs in the middle of the hold, a period later.
+                let held = there_and_back(f64::from(run.cycles + 1) * 1e-3, time_s, distance).motion();
+                let load = InverseDynamics::new(machine).load_of::<Exact>(&held);
+                let more = load.leg_wrenches * Vector6::from(output.force) - load.total();
+                let apart = (output.wrench_error.vector() - more).norm() / more.norm();
+                assert!(apart < 0.05, "{more} {:?}", output.wrench_error);
+            }
+        } else {
+            assert_eq!(output.wrench_error, Wrench::default());
         }
         (run.last, run.cycles) = (output, run.cycles + 1);
     }

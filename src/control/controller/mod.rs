@@ -18,7 +18,7 @@ use crate::model::forward_kinematics::Tracker;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::ladder::Rung;
 use crate::model::machine::{LEGS, Machine};
-use crate::model::rigid::{Pose, Twist};
+use crate::model::rigid::{Pose, Twist, Wrench};
 use crate::model::stance::Stance;
 use crate::model::task::TaskState;
 
@@ -124,6 +124,8 @@ pub struct Output {
     pub refused: Cause,
     /// Forces \[N\]; zero unless the state controls.
     pub force: [f64; LEGS],
+    /// What the platform gets more than was asked for, about C: not zero where forces are limited.
+    pub wrench_error: Wrench,
     /// The limits that this cycle is at.
     pub limiting: Limiting,
     /// Cycles under control without a new measurement or setpoint to believe, since start.

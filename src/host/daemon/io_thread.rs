@@ -327,6 +327,7 @@ fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMessage {
         fault_index: output.evidence.index,
         without_measurement: output.without_measurement,
         without_setpoint: output.without_setpoint,
+        wrench_error: output.wrench_error.vector().into(),
         answered_epoch: output.answered.0,
         answered_sequence: output.answered.1,
         cycles: counters.cycles,
