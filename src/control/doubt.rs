@@ -4,7 +4,7 @@
 //! never refreshes a watchdog, and the reason of a refusal is told when the watchdog barks.
 
 use super::controller::{Measurement, Parameters, Setpoint, seconds_between};
-use super::limits::{AxisLimits, Limit, Limiting};
+use super::limits::{AxisLimits, Limit, Limiting, Limits};
 use super::reference::Segment;
 use super::state::{Cause, Trouble};
 use crate::model::inverse_geometry::leg_motion;
@@ -221,19 +221,11 @@ pub fn setpoint(
 
 fn within_limits(parameters: &Parameters, motion: &Motion, limiting: &mut Limiting) -> Result<(), Trouble> {
     let Motion { twist, acceleration, .. } = motion;
-    let limits = &parameters.limits;
-    let share = |of: [f64; 2], bounds: [f64; 2]| (of[0] / bounds[0]).max(of[1] / bounds[1]);
-    let bounds = |of: fn(&AxisLimits) -> f64| [of(&limits.orientation), of(&limits.position)];
-    for (limit, share) in [
-        (Limit::Velocity, share([twist.angular.norm(), twist.linear.norm()], bounds(|axis| axis.velocity))),
-        (
-            Limit::Acceleration,
-            share(
-                [acceleration.angular.norm(), acceleration.linear.norm()],
-                bounds(|axis| axis.acceleration),
-            ),
-        ),
-    ] {
+    let Limits { orientation, position, .. } = &parameters.limits;
+    let fastest = (twist.angular.norm() / orientation.velocity).max(twist.linear.norm() / position.velocity);
+    let strongest = (acceleration.angular.norm() / orientation.acceleration)
+        .max(acceleration.linear.norm() / position.acceleration);
+    for (limit, share) in [(Limit::Velocity, fastest), (Limit::Acceleration, strongest)] {
         if !limiting.keeps(limit, share) {
             return Err(Trouble::new(Cause::SetpointTooFast, share, 1.0));
         }
@@ -314,9 +306,10 @@ fn continues(
     let grain = SETPOINT_GRAIN * stroke(&machine.actuator);
     let time = dt.min(widest);
     let moved = before.pose.displacement_to(&now.pose);
-    let parts = |of: fn(&Motion) -> [nalgebra::Vector3<f64>; 2]| (of(now), of(before));
-    let (v, v_before) = parts(|motion| [motion.twist.angular, motion.twist.linear]);
-    let (a, a_before) = parts(|motion| [motion.acceleration.angular, motion.acceleration.linear]);
+    let rates = |motion: &Motion| [motion.twist.angular, motion.twist.linear];
+    let accelerations = |motion: &Motion| [motion.acceleration.angular, motion.acceleration.linear];
+    let (v, v_before) = (rates(now), rates(before));
+    let (a, a_before) = (accelerations(now), accelerations(before));
     let limits = [&parameters.limits.orientation, &parameters.limits.position];
     let grains = [grain / machine.joints.radius, grain];
     let each =

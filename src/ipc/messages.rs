@@ -169,6 +169,10 @@ pub struct StatusMessage {
     pub x: [f64; 6],
     /// Measured omega \[rad/s\], then v \[m/s\], base axes.
     pub twist: [f64; 6],
+    /// Condition of that pose.
+    pub condition: f64,
+    /// Until a singular pose, if the platform goes on as it does; infinite if that leads to none.
+    pub singular_in_s: f64,
     /// C_d - C \[m\].
     pub position_error_m: [f64; 3],
     /// log(R_d R^T) \[rad\].

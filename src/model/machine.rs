@@ -122,7 +122,8 @@ impl Joints {
     pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
         let turn = a.displacement_to(b).angular;
         let center = |pose: &Pose| pose.position + pose.rotation * self.center;
-        turn.norm().hypot((center(b) - center(a)).norm() / self.radius)
+        let shift = (center(b) - center(a)) / self.radius;
+        (turn.norm_squared() + shift.norm_squared()).sqrt()
     }
 
     /// The twist at C of a twist at the mean of the joints on the platform.

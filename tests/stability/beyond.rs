@@ -13,7 +13,7 @@ use hexad::scene::minimum_jerk::{Profile, rise};
 use nalgebra::Vector3;
 
 use super::common::largest;
-use super::fichter::{ANY, AT_HOME, before, motion_base, on_the_way};
+use super::fichter::{ANY, AT_HOME, CONDITION, at, before, motion_base, on_the_way};
 use super::rig::Rig;
 
 /// From home to as far beyond \[s\]: peak speeds from 2.3 to 0.028 rad/s.
@@ -122,5 +122,36 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
             }
             assert!(limited > 10 && last.state == State::Fault, "{torque} {condition}: {last:?}");
         }
+    }
+}
+
+/// With constant speed toward the singular pose, and away from it.
+#[test]
+fn the_time_to_a_singular_pose_is_told() {
+    for speed in [0.5, 0.05, -0.05] {
+        let config = motion_base(100.0);
+        let mut rig = Rig::new(&config, &config.machine);
+        let way = f64::abs(0.2 / speed);
+        let mut told = 0;
+        for k in 0..(way * 1e3) as u32 {
+            let t = f64::from(k) * 1e-3;
+            let mut task = at(AT_HOME - speed * t);
+            task.xd[2] = speed;
+            let output = carried(&mut rig, &task);
+            let distance = AT_HOME - speed * t;
+            if output.measured.is_none() || k == 0 {
+                continue;
+            }
+            told += 1;
+            let ratio = output.singular_in * speed / distance;
+            // The determinant is as good as linear at last, and taken from one measurement to the next.
+            let near = (ratio - 1.0).abs() < 4.0 * distance + 1e-3 * speed / distance;
+            assert!(
+                if speed > 0.0 { near } else { output.singular_in == f64::INFINITY },
+                "{speed} {distance}: {ratio}"
+            );
+            assert!((output.condition * distance / CONDITION - 1.0).abs() < 2.0 * distance * distance + 1e-3);
+        }
+        assert!(f64::from(told) > 0.9e3 * way, "{told}");
     }
 }

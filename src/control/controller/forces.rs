@@ -18,7 +18,9 @@ impl Controller {
         let Parameters { period_ns, law, rung, .. } = &self.parameters;
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = release_ns.saturating_add(period_ns / 2);
-        let desired = self.reference_at(middle_of_hold_ns).ok_or(Cause::SetpointLost)?;
+        let Some(desired) = self.reference_at(middle_of_hold_ns) else {
+            return Err(Cause::SetpointLost.into());
+        };
         let deviation = self.known_error.map_or(Deviation::from(&error), |known| known.acted_on);
         let asked = self.observer.asks(law, &deviation, *period_ns as f64 * 1e-9);
         let (rung, motion, own) = match law.mode {

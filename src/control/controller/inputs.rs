@@ -1,11 +1,11 @@
 //! Which inputs count in this cycle, and the pose that they say.
 
-use super::{Controller, Input, Located, Measurement};
+use super::{Closing, Controller, Input, Located, Measurement, seconds_between};
 use crate::control::doubt::{self, Aim};
 use crate::control::law::TrackingError;
 use crate::control::limits::Limiting;
 use crate::control::state::{Cause, State, Trouble};
-use crate::model::forward_kinematics::{Outcome, Tracked, Tracker};
+use crate::model::forward_kinematics::{Outcome, Tracked};
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
 
@@ -129,14 +129,20 @@ impl Controller {
                     return Err(self.lost());
                 }
                 self.known = false;
-                // Home is the one pose known to be on the right assembly mode: walk again from there.
-                self.tracker = Tracker::at(self.home);
+                self.walk_from_home();
                 return Err(Cause::PoseNotFound.into());
             }
         }
         let pose = self.tracker.pose;
         let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
+    }
+
+    /// Home is the one pose known to be on the right assembly mode.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub(super) fn walk_from_home(&mut self) {
+        self.tracker.restart(&self.home);
     }
 
     /// Behind a singular pose are poses with the lengths of those before it, and forward kinematics cannot tell
@@ -157,6 +163,18 @@ impl Controller {
 
     fn doubted(&self) -> f64 {
         self.parameters.condition.min(DOUBTED)
+    }
+
+    /// From one measurement to the next: on the way to a singular pose the determinant is at last linear.
+    pub(super) fn singular_in(&mut self, time_ns: u64) -> f64 {
+        let Closing { time_ns: before_ns, determinant: before, .. } = self.closing;
+        if time_ns != before_ns {
+            let determinant = self.tracker.stance().sensitivity().determinant;
+            let left = determinant * seconds_between(before_ns, time_ns) / (before - determinant);
+            let singular_in = if left > 0.0 { left } else { f64::INFINITY };
+            self.closing = Closing { time_ns, determinant, singular_in };
+        }
+        self.closing.singular_in
     }
 
     pub(super) fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {

@@ -133,6 +133,10 @@ pub struct Output {
     pub without_setpoint: u64,
     /// The measured pose and twist, when the pose is known.
     pub measured: Option<(Pose, Twist)>,
+    /// Of that pose, see [`crate::model::sensitivity`].
+    pub condition: f64,
+    /// Until a singular pose, if the platform goes on as it does \[s\]; infinite if that leads to none.
+    pub singular_in: f64,
     /// Reference minus measured under control; else setpoint minus measured, when both are known.
     pub error: Option<TrackingError>,
 }
@@ -155,6 +159,7 @@ pub struct Controller {
     tracker: Tracker,
     /// The pose is known, from home on without a gap.
     known: bool,
+    closing: Closing,
     /// Why the platform may be beyond a singular pose, until somebody has cleared it.
     astray: Option<Trouble>,
     measurement: Believed<Measurement>,
@@ -193,6 +198,15 @@ struct Located {
     twist: Twist,
 }
 
+/// How fast the determinant vanishes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Closing {
+    /// Of the last measurement.
+    time_ns: u64,
+    determinant: f64,
+    singular_in: f64,
+}
+
 impl Controller {
     /// Waits at the home pose for a first measurement.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
@@ -201,8 +215,9 @@ impl Controller {
             model: InverseDynamics::new(machine),
             parameters,
             home,
-            tracker: Tracker::at(home),
+            tracker: Tracker::new(machine, *home.pose()),
             known: false,
+            closing: Closing::default(),
             astray: None,
             measurement: Believed::default(),
             parting: Parting::default(),
@@ -239,6 +254,8 @@ impl Controller {
         self.decide(input, [located.map(drop), engageable, following]);
         if let Ok(at) = located {
             output.measured = Some((at.pose, at.twist));
+            output.condition = self.tracker.stance().sensitivity().condition;
+            output.singular_in = self.singular_in(at.time_ns);
             if self.mode.state != before {
                 self.enter(before, &at, now_ns);
                 self.known_error = None;
@@ -277,7 +294,7 @@ impl Controller {
         if let Some(asked) = new {
             (self.answered, self.refused) = (asked.message, refused.unwrap_or_default());
             if asked.request == Request::Clear && self.astray.take().is_some() {
-                self.tracker = Tracker::at(self.home);
+                self.walk_from_home();
             }
         }
         if mode.cause != self.mode.cause || !mode.state.controls() && mode.state != State::Fault {

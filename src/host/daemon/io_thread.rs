@@ -327,6 +327,8 @@ fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMessage {
         fault_index: output.evidence.index,
         without_measurement: output.without_measurement,
         without_setpoint: output.without_setpoint,
+        condition: output.condition,
+        singular_in_s: output.singular_in,
         wrench_error: output.wrench_error.vector().into(),
         answered_epoch: output.answered.0,
         answered_sequence: output.answered.1,

@@ -38,12 +38,12 @@ pub enum Tracked {
 impl Tracker {
     /// Starts at a known pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
-        Self::at(Stance::new(machine, pose))
+        Self { pose, stance: Stance::new(machine, pose), outcome: Outcome::Solved }
     }
 
-    /// The same, with what is known of that pose.
-    pub fn at(stance: Stance) -> Self {
-        Self { pose: *stance.pose(), stance, outcome: Outcome::Solved }
+    /// Starts anew at a pose of which all is known.
+    pub fn restart(&mut self, stance: &Stance) {
+        (self.pose, self.stance, self.outcome) = (*stance.pose(), *stance, Outcome::Solved);
     }
 
     /// The pose with its legs and factorization.
