@@ -167,14 +167,18 @@ impl Controller {
 
     /// From one measurement to the next: on the way to a singular pose the determinant is at last linear.
     pub(super) fn singular_in(&mut self, time_ns: u64) -> f64 {
-        let Closing { time_ns: before_ns, determinant: before, .. } = self.closing;
-        if time_ns != before_ns {
-            let determinant = self.tracker.stance().sensitivity().determinant;
-            let left = determinant * seconds_between(before_ns, time_ns) / (before - determinant);
-            let singular_in = if left > 0.0 { left } else { f64::INFINITY };
-            self.closing = Closing { time_ns, determinant, singular_in };
-        }
-        self.closing.singular_in
+        let determinant = self.tracker.stance().sensitivity().determinant;
+        let singular_in = match self.closing {
+            Some(last) if last.time_ns == time_ns => return last.singular_in,
+            Some(last) => {
+                let dt = seconds_between(last.time_ns, time_ns);
+                determinant * dt / (last.determinant - determinant)
+            }
+            None => f64::INFINITY,
+        };
+        let singular_in = if singular_in > 0.0 { singular_in } else { f64::INFINITY };
+        self.closing = Some(Closing { time_ns, determinant, singular_in });
+        singular_in
     }
 
     pub(super) fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {

@@ -159,7 +159,7 @@ pub struct Controller {
     tracker: Tracker,
     /// The pose is known, from home on without a gap.
     known: bool,
-    closing: Closing,
+    closing: Option<Closing>,
     /// Why the platform may be beyond a singular pose, until somebody has cleared it.
     astray: Option<Trouble>,
     measurement: Believed<Measurement>,
@@ -199,7 +199,7 @@ struct Located {
 }
 
 /// How fast the determinant vanishes.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Closing {
     /// Of the last measurement.
     time_ns: u64,
@@ -217,7 +217,7 @@ impl Controller {
             home,
             tracker: Tracker::new(machine, *home.pose()),
             known: false,
-            closing: Closing::default(),
+            closing: None,
             astray: None,
             measurement: Believed::default(),
             parting: Parting::default(),
