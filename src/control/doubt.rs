@@ -4,12 +4,13 @@
 //! never refreshes a watchdog, and the reason of a refusal is told when the watchdog barks.
 
 use super::controller::{Measurement, Parameters, Setpoint, seconds_between};
-use super::limits::{AxisLimits, Limit, Limiting};
+use super::limits::{AxisLimits, Limit, Limiting, Limits};
 use super::reference::Segment;
 use super::state::{Cause, Trouble};
-use crate::model::inverse_geometry::{leg_lengths, leg_motion};
+use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::{Actuator, LEGS, Machine};
 use crate::model::rigid::{Motion, Pose, Twist};
+use crate::model::stance::Stance;
 
 /// How far beyond the ends of its stroke a leg is believed, as a share of the stroke: encoders have
 /// offsets, end stops have springs.
@@ -196,6 +197,7 @@ pub struct Aim {
 pub fn setpoint(
     machine: &Machine,
     parameters: &Parameters,
+    home: &Stance,
     now: &Aim,
     before: Option<&Aim>,
     widest: f64,
@@ -207,7 +209,8 @@ pub fn setpoint(
     }
     within_limits(parameters, motion, limiting)?;
     within_envelope(parameters, setpoint, limiting)?;
-    within_legs(machine, parameters, motion, limiting)?;
+    within_legs(machine, motion, limiting)?;
+    with_room_to_stop(machine, parameters, home, motion, limiting)?;
     let Some(before) = before else { return Ok(()) };
     let dt = seconds_between(before.setpoint.time_ns, setpoint.time_ns);
     if dt <= 0.0 {
@@ -218,19 +221,11 @@ pub fn setpoint(
 
 fn within_limits(parameters: &Parameters, motion: &Motion, limiting: &mut Limiting) -> Result<(), Trouble> {
     let Motion { twist, acceleration, .. } = motion;
-    let limits = &parameters.limits;
-    let share = |of: [f64; 2], bounds: [f64; 2]| (of[0] / bounds[0]).max(of[1] / bounds[1]);
-    let bounds = |of: fn(&AxisLimits) -> f64| [of(&limits.orientation), of(&limits.position)];
-    for (limit, share) in [
-        (Limit::Velocity, share([twist.angular.norm(), twist.linear.norm()], bounds(|axis| axis.velocity))),
-        (
-            Limit::Acceleration,
-            share(
-                [acceleration.angular.norm(), acceleration.linear.norm()],
-                bounds(|axis| axis.acceleration),
-            ),
-        ),
-    ] {
+    let Limits { orientation, position, .. } = &parameters.limits;
+    let fastest = (twist.angular.norm() / orientation.velocity).max(twist.linear.norm() / position.velocity);
+    let strongest = (acceleration.angular.norm() / orientation.acceleration)
+        .max(acceleration.linear.norm() / position.acceleration);
+    for (limit, share) in [(Limit::Velocity, fastest), (Limit::Acceleration, strongest)] {
         if !limiting.keeps(limit, share) {
             return Err(Trouble::new(Cause::SetpointTooFast, share, 1.0));
         }
@@ -253,13 +248,8 @@ fn within_envelope(parameters: &Parameters, now: &Setpoint, limiting: &mut Limit
     Ok(())
 }
 
-/// The legs can follow, and if the next message did not come, there would be room to stop.
-fn within_legs(
-    machine: &Machine,
-    parameters: &Parameters,
-    motion: &Motion,
-    limiting: &mut Limiting,
-) -> Result<(), Trouble> {
+/// The legs can follow.
+fn within_legs(machine: &Machine, motion: &Motion, limiting: &mut Limiting) -> Result<(), Trouble> {
     let actuator = &machine.actuator;
     let legs = leg_motion(machine, motion);
     for (leg, rate) in legs.rate.iter().enumerate() {
@@ -267,12 +257,32 @@ fn within_legs(
             return Err(Trouble::new(Cause::SetpointTooFast, rate.abs() / actuator.max_rate, 1.0).at(leg));
         }
     }
-    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &legs.length)?;
-    let length = leg_lengths(machine, &where_stopped(parameters, motion));
+    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &legs.length)
+}
+
+/// If the next message did not come, the platform would come to rest within the stroke and before a singular pose.
+fn with_room_to_stop(
+    machine: &Machine,
+    parameters: &Parameters,
+    home: &Stance,
+    motion: &Motion,
+    limiting: &mut Limiting,
+) -> Result<(), Trouble> {
+    let actuator = &machine.actuator;
+    let stop = Stance::new(machine, where_stopped(parameters, motion));
+    let length = stop.lengths(machine);
     let middle = 0.5 * (actuator.min_length + actuator.max_length);
     let furthest = length.iter().fold(0.0_f64, |furthest, length| furthest.max((length - middle).abs()));
     limiting.keeps(Limit::Stroke, furthest / (0.5 * stroke(actuator)));
-    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &length)
+    within_stroke(actuator, 0.0, Cause::SetpointOutOfReach, &length)?;
+    let (there, here) = (stop.sensitivity(), home.sensitivity());
+    // On the way to the other side the condition has no bound.
+    let across = there.determinant * here.determinant < 0.0;
+    let condition = if across { f64::INFINITY } else { there.condition };
+    if !limiting.keeps(Limit::Condition, condition / parameters.condition) {
+        return Err(Trouble::new(Cause::NearSingular, condition, parameters.condition));
+    }
+    Ok(())
 }
 
 /// Where the platform stands if this is the last setpoint: carried on for the timeout, then brought to rest.
@@ -296,9 +306,10 @@ fn continues(
     let grain = SETPOINT_GRAIN * stroke(&machine.actuator);
     let time = dt.min(widest);
     let moved = before.pose.displacement_to(&now.pose);
-    let parts = |of: fn(&Motion) -> [nalgebra::Vector3<f64>; 2]| (of(now), of(before));
-    let (v, v_before) = parts(|motion| [motion.twist.angular, motion.twist.linear]);
-    let (a, a_before) = parts(|motion| [motion.acceleration.angular, motion.acceleration.linear]);
+    let rates = |motion: &Motion| [motion.twist.angular, motion.twist.linear];
+    let accelerations = |motion: &Motion| [motion.acceleration.angular, motion.acceleration.linear];
+    let (v, v_before) = (rates(now), rates(before));
+    let (a, a_before) = (accelerations(now), accelerations(before));
     let limits = [&parameters.limits.orientation, &parameters.limits.position];
     let grains = [grain / machine.joints.radius, grain];
     let each =

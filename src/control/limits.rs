@@ -11,7 +11,7 @@
 //! | 6 | acceleration | `limits.acceleration_*` | refused |
 //! | 7 | jerk | `limits.jerk_*` | refused |
 //! | 8 | following error | `control.following_*` | fault |
-//! | 9 | condition | `limits.condition` | stop, fault |
+//! | 9 | condition | `limits.condition` where the platform is; where the setpoint could be stopped | stop, fault; refused |
 //!
 //! hexad does not bend a setpoint: it follows it or it comes to rest. A refused setpoint is as good as none,
 //! so one wrong message among good ones is ridden through, and a stream of them ends in a stop.

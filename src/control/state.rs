@@ -209,8 +209,9 @@ causes! {
     PoseNotFound = 104, Brake, "", "pose not found from lengths", "compare the lengths with the machine file";
     /// The measured lengths moved further than the actuators can.
     MeasurementJumped = 105, Brake, "m", "measured lengths jumped", "see the encoders and the driver";
-    /// The pose is singular: no forces balance the load.
-    SingularPose = 106, Brake, "", "singular pose", "move the platform away by hand";
+    /// The pose is singular: no forces balance the load. Or the platform may have passed one: lengths do not tell
+    /// on which side of it they were measured.
+    SingularPose = 106, Brake, "condition", "singular pose, or beyond one", "bring the platform back to the side of home by hand, then clear";
     /// The force was not finite.
     ForceNotFinite = 107, Brake, "", "force not finite", "report it: it is a fault of hexad";
     /// The platform was further from its reference than `control.following_*`.
@@ -235,8 +236,9 @@ causes! {
     SetpointFromElsewhen = 117, Stop, "s old", "setpoint with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
     /// A measurement with a time stamp from another time than now.
     MeasurementFromElsewhen = 118, Brake, "s old", "measurement with a wrong time stamp", "stamp with CLOCK_MONOTONIC";
-    /// The pose is so near a singular one that `limits.condition` is exceeded.
-    NearSingular = 119, Stop, "condition", "near a singular pose", "keep away from this pose; hexad check";
+    /// The pose is so near a singular one that `limits.condition` is exceeded, or a setpoint could only be stopped
+    /// where it is.
+    NearSingular = 119, Stop, "condition", "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
     /// The measured rates changed faster than actuators can.
     RateJumped = 120, Brake, "m/s", "measured rates jumped", "look for a collision; see the encoders and the driver";
 }

@@ -6,7 +6,8 @@
 
 extern crate std;
 
-use core::f64::consts::PI;
+use core::f64::consts::{FRAC_PI_2, PI};
+use core::fmt;
 use std::{prelude::rust_2024::*, vec};
 
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -32,6 +33,16 @@ const DAMPING: f64 = 1e-2;
 const RELAXED: f64 = 0.2;
 const TIGHTENED: f64 = 5.0;
 
+/// Where [`others`] are looked for: further away nobody takes them for the pose itself.
+const TURN: f64 = FRAC_PI_2;
+/// In radii.
+const SHIFT: f64 = 2.0;
+/// A tenth of a second on two processors.
+const STARTS: u64 = 2000;
+
+/// Another pose this near (radian, or radius) may be where the platform is in truth.
+const NEARBY: f64 = 0.5;
+
 /// Where starts are spread.
 #[derive(Clone, Copy, Debug)]
 pub struct Region {
@@ -48,7 +59,7 @@ pub fn modes(machine: &Machine, lengths: &[f64; LEGS], region: &Region, starts: 
     let ends = (0..starts).into_par_iter().map(|k| settled(machine, lengths, start(region, k)));
     let mut found: Vec<Stance> = vec![];
     for stance in ends.collect::<Vec<_>>().into_iter().flatten() {
-        let size = |other: &Stance| distance(machine, stance.pose(), other.pose());
+        let size = |other: &Stance| machine.joints.distance(stance.pose(), other.pose());
         if found.iter().all(|other| size(other) > SAME) {
             found.push(stance);
         }
@@ -56,10 +67,50 @@ pub fn modes(machine: &Machine, lengths: &[f64; LEGS], region: &Region, starts: 
     found
 }
 
-/// How far apart two poses are: rotation \[rad\] and shift \[radius\] together.
-pub fn distance(machine: &Machine, a: &Pose, b: &Pose) -> f64 {
-    let way = a.displacement_to(b);
-    way.angular.norm().hypot(way.linear.norm() / machine.joints.radius)
+/// A pose that has the lengths of another one.
+#[derive(Clone, Copy, Debug)]
+pub struct Other {
+    /// Radian and radius together.
+    pub distance: f64,
+    turn_deg: f64,
+    shift_m: f64,
+    /// The way there crosses a singular pose, whatever it is.
+    across: bool,
+}
+
+impl Other {
+    /// Whether one may be taken for the other.
+    pub fn is_nearby(&self) -> bool {
+        self.distance < NEARBY
+    }
+}
+
+impl fmt::Display for Other {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { turn_deg, shift_m, across, .. } = self;
+        let not = if *across { "" } else { "NOT " };
+        write!(f, "{turn_deg:.1} deg and {shift_m:.3} m away, {not}across a singular pose")
+    }
+}
+
+/// Other poses with the lengths of a pose that are found around it, the nearest first.
+pub fn others(machine: &Machine, here: &Stance) -> Vec<Other> {
+    let center = *here.pose();
+    let region = Region { center, turn: TURN, shift: SHIFT * machine.joints.radius };
+    let found = modes(machine, &here.lengths(machine), &region, STARTS);
+    let other = |there: &Stance| {
+        let way = center.displacement_to(there.pose());
+        Other {
+            distance: machine.joints.distance(&center, there.pose()),
+            turn_deg: way.angular.norm().to_degrees(),
+            shift_m: way.linear.norm(),
+            across: there.sensitivity().determinant * here.sensitivity().determinant < 0.0,
+        }
+    };
+    let mut others: Vec<_> = found.iter().map(other).collect();
+    others.retain(|other| other.distance > here.sensitivity().trusted_step);
+    others.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    others
 }
 
 /// The start with this number.

@@ -2,11 +2,11 @@
 
 extern crate std;
 
-use core::f64::consts::{FRAC_PI_2, TAU};
+use core::f64::consts::TAU;
 use core::fmt;
 use std::{format, prelude::rust_2024::*, vec};
 
-use super::assembly::{self, Region};
+use super::assembly::{Other, others};
 use super::config::Config;
 use super::config::deployment::GAIN_MARGIN;
 use crate::control::leg_masses::LegMasses;
@@ -15,19 +15,9 @@ use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
 use crate::model::ladder::Exact;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::LEGS;
 use crate::model::stance::Stance;
 use crate::model::task::TaskState;
-
-/// Where other poses are looked for around home: further away nobody takes them for home.
-const TURN: f64 = FRAC_PI_2;
-/// In radii.
-const SHIFT: f64 = 2.0;
-/// A tenth of a second on two processors.
-const STARTS: u64 = 2000;
-
-/// Another pose this near (radian, or radius) may be where the platform is found at start-up.
-const NEARBY: f64 = 0.5;
 
 /// The machine at its home pose.
 pub struct Check<'a> {
@@ -42,15 +32,6 @@ pub struct Check<'a> {
     trusted_step: f64,
     /// Other poses with the same lengths, the nearest first.
     others: Vec<Other>,
-}
-
-/// A pose with the lengths of home that is not home.
-struct Other {
-    distance: f64,
-    turn_deg: f64,
-    shift_m: f64,
-    /// The way there crosses a singular pose, whatever it is.
-    across: bool,
 }
 
 impl<'a> Check<'a> {
@@ -76,28 +57,6 @@ impl<'a> Check<'a> {
             condition: condition(machine, &motion.pose),
         }
     }
-}
-
-/// Other poses with the lengths of home that are found around it.
-fn others(machine: &Machine, home: &Stance) -> Vec<Other> {
-    let center = *home.pose();
-    let region = Region { center, turn: TURN, shift: SHIFT * machine.joints.radius };
-    let found = assembly::modes(machine, &home.lengths(machine), &region, STARTS);
-    let mut others: Vec<_> = found
-        .iter()
-        .map(|other| {
-            let way = center.displacement_to(other.pose());
-            Other {
-                distance: assembly::distance(machine, &center, other.pose()),
-                turn_deg: way.angular.norm().to_degrees(),
-                shift_m: way.linear.norm(),
-                across: other.sensitivity().determinant * home.sensitivity().determinant < 0.0,
-            }
-        })
-        .filter(|other| other.distance > home.sensitivity().trusted_step)
-        .collect();
-    others.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-    others
 }
 
 impl fmt::Display for Check<'_> {
@@ -181,15 +140,8 @@ impl Check<'_> {
                 "other poses with these lengths    none found within 90 deg and 2 radii of home"
             );
         };
-        let across = if nearest.across { "across a singular pose" } else { "NOT across a singular pose" };
-        writeln!(
-            f,
-            "other poses with these lengths    {} found, the nearest {:.1} deg and {:.3} m away, {across}",
-            self.others.len(),
-            nearest.turn_deg,
-            nearest.shift_m,
-        )?;
-        if nearest.distance < NEARBY {
+        writeln!(f, "other poses with these lengths    {} found, the nearest {nearest}", self.others.len())?;
+        if nearest.is_nearby() {
             writeln!(
                 f,
                 "WARNING: at start-up lengths alone may not tell it from home; move home away from it"

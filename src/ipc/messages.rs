@@ -14,7 +14,7 @@
 //! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status` |
 //! | type name | `hexad_<last part>`, as each struct says |
 //! | settings | open or create with `max_publishers` 4, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: whoever comes first sets them for all |
-//! | size in bytes | setpoint 176, measured 232, command 40, force 112, status 1296 |
+//! | size in bytes | setpoint 176, measured 232, command 40, force 112, status 1360 |
 //! | places | iceoryx2's defaults. Where its root path is another user's: that path and `-<user ID>`, and the prefix `iox2_<user ID>_` |
 //! | user | all participants of a machine are of one |
 //! | signals | the daemon's node leaves them alone (`SignalHandlingMode::Disabled`), so may yours |
@@ -36,7 +36,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use super::statistics::Statistics;
 
 /// Version of every struct in this file. Any change of layout or meaning raises it.
-pub const SCHEMA: u32 = 3;
+pub const SCHEMA: u32 = 4;
 
 /// First field of every message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
@@ -197,10 +197,17 @@ pub struct StatusMessage {
     pub x: [f64; 6],
     /// Measured omega \[rad/s\], then v \[m/s\], base axes.
     pub twist: [f64; 6],
+    /// Condition of that pose.
+    pub condition: f64,
+    /// Until a singular pose, if the platform goes on as it does; infinite if that leads to none.
+    pub singular_in_s: f64,
     /// C_d - C \[m\].
     pub position_error_m: [f64; 3],
     /// log(R_d R^T) \[rad\].
     pub orientation_error_rad: [f64; 3],
+    /// Torque about C \[N m\], then force \[N\], base axes, that the platform gets more than was asked for: zero
+    /// unless forces are limited.
+    pub wrench_error: [f64; 6],
     /// Cycles since start.
     pub cycles: u64,
     /// Cycles that woke later than the configured threshold.

@@ -118,6 +118,14 @@ impl Joints {
         }
     }
 
+    /// How far apart two poses are: rotation \[rad\] and shift of the mean of the joints \[radius\] together.
+    pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
+        let turn = a.displacement_to(b).angular;
+        let center = |pose: &Pose| pose.position + pose.rotation * self.center;
+        let shift = (center(b) - center(a)) / self.radius;
+        (turn.norm_squared() + shift.norm_squared()).sqrt()
+    }
+
     /// The twist at C of a twist at the mean of the joints on the platform.
     pub(super) fn twist_of_origin(&self, twist: &Twist, rotation: &Matrix3<f64>) -> Twist {
         let arm = rotation * self.center;

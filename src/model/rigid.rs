@@ -47,6 +47,17 @@ pub struct Motion<T: RealField + Copy = f64> {
 }
 
 impl Motion {
+    /// `dt` seconds later (or earlier) if the acceleration stays as it is. The turn is about one axis: what the
+    /// axis itself turns meanwhile, `|omega x omega'| dt^3 / 12`, is left out.
+    pub fn after(&self, dt: f64) -> Self {
+        let (v, a) = (self.twist.vector(), self.acceleration.vector());
+        Self {
+            pose: self.pose.displaced(&Twist::from_vector(&((v + a * (0.5 * dt)) * dt))),
+            twist: Twist::from_vector(&(v + a * dt)),
+            acceleration: self.acceleration,
+        }
+    }
+
     /// Rounded to single precision.
     pub fn single(&self) -> Motion<f32> {
         let Self { pose, twist, acceleration } = self;
@@ -89,6 +100,11 @@ impl Wrench {
     /// `[torque; force]`
     pub fn vector(&self) -> Vector6<f64> {
         stack(&self.torque, &self.force)
+    }
+
+    /// Inverse of [`Wrench::vector`].
+    pub fn from_vector(v: &Vector6<f64>) -> Self {
+        Self { torque: v.fixed_rows::<3>(0).into(), force: v.fixed_rows::<3>(3).into() }
     }
 }
 

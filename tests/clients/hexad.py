@@ -18,7 +18,7 @@ from ctypes import c_double, c_uint32, c_uint64
 
 import iceoryx2 as iox2
 
-SCHEMA = 3
+SCHEMA = 4
 SIX = c_double * 6
 THREE = c_double * 3
 
@@ -132,7 +132,9 @@ class Status(Message):
         *((name, c_uint64) for name in "answered_epoch answered_sequence".split()),
         *((name, c_uint32) for name in "pose_valid error_valid".split()),
         *((name, SIX) for name in "x twist".split()),
+        *((name, c_double) for name in "condition singular_in_s".split()),
         *((name, THREE) for name in "position_error_m orientation_error_rad".split()),
+        ("wrench_error", SIX),
         *((name, c_uint64) for name in "cycles late_wakeups overruns skipped caught_up".split()),
         *((name, c_uint64) for name in "allocations io_allocations".split()),
         *((name, c_uint64) for name in "without_measurement without_setpoint".split()),

@@ -43,8 +43,8 @@ fn python_declares_the_documented_structs() {
         layout!(CommandMessage, CommandMessage::TOPIC, header request reserved),
         layout!(StatusMessage, StatusMessage::TOPIC,
             header state fault refused limiting fault_value fault_bound fault_index reserved
-            answered_epoch answered_sequence pose_valid error_valid x twist
-            position_error_m orientation_error_rad
+            answered_epoch answered_sequence pose_valid error_valid x twist condition singular_in_s
+            position_error_m orientation_error_rad wrench_error
             cycles late_wakeups overruns skipped caught_up allocations io_allocations
             without_measurement without_setpoint
             rejected_schema rejected_older_source rejected_repeated statistics),

@@ -30,6 +30,7 @@ mod in_force;
 mod killed;
 mod locked_memory;
 mod lockstep;
+mod modes;
 mod orderly_stop;
 mod overruns;
 mod paused;

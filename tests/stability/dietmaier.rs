@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use hexad::host::assembly::{Region, distance, modes};
+use hexad::host::assembly::{Region, modes};
 use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, Tracked, Tracker};
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::Machine;
@@ -62,7 +62,7 @@ fn all_forty_are_found() {
         let lengths = leg_lengths(&dietmaier, mode.pose());
         assert!(lengths.iter().zip(&LENGTHS).all(|(a, b)| (a - b).abs() < 1e-12), "{lengths:?}");
         for other in &MODES[..k] {
-            nearest = nearest.min(distance(&dietmaier, mode.pose(), other.pose()));
+            nearest = nearest.min(dietmaier.joints.distance(mode.pose(), other.pose()));
         }
     }
     let conditions = MODES.iter().map(|mode| mode.sensitivity().condition);
@@ -96,7 +96,7 @@ fn small_motions_stay_on_their_mode() {
             let there = mode.pose().displaced(&Twist { angular: Vector3::new(a, b, -b), linear: shift });
             let lengths = leg_lengths(&dietmaier, &there);
             assert_eq!(tracker.find(&dietmaier, &lengths).0, Tracked::Found, "mode {k}");
-            assert!(distance(&dietmaier, &tracker.pose, &there) < 1e-9, "mode {k}, step {step}");
+            assert!(dietmaier.joints.distance(&tracker.pose, &there) < 1e-9, "mode {k}, step {step}");
         }
     }
     assert_eq!(singular, 5);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use hexad::host::assembly::{Region, distance, modes};
+use hexad::host::assembly::{Region, modes};
 use hexad::model::forward_kinematics::{Outcome, Tracked, Tracker, refine};
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::Machine;
@@ -76,7 +76,7 @@ pub fn trial(machine: &Machine, method: Method, x: [f64; 6]) -> End {
     };
     match found {
         None => End::Failed,
-        Some(found) if distance(machine, &found, &rigid(x)) < APART => End::Right,
+        Some(found) if machine.joints.distance(&found, &rigid(x)) < APART => End::Right,
         Some(_) => End::Wrong,
     }
 }
@@ -100,9 +100,11 @@ pub fn step(machine: &Machine, x: [f64; 6], number: u64) -> End {
     let share = 10_f64.powf(-4.0 * (number % 1000) as f64 / 1000.0);
     let away: [f64; 6] = std::array::from_fn(|i| x[i] + share * (to[i] - machine.home[i]));
     let mut stance = Stance::new(machine, from);
+    let side = stance.sensitivity().determinant;
     let report = refine(machine, &mut stance, &leg_lengths(machine, &rigid(away)));
+    assert!(stance.sensitivity().determinant * side >= 0.0, "across a singular pose from {x:?}");
     match report.outcome {
-        Outcome::Solved if distance(machine, stance.pose(), &rigid(away)) < APART => End::Right,
+        Outcome::Solved if machine.joints.distance(stance.pose(), &rigid(away)) < APART => End::Right,
         Outcome::Solved => End::Wrong,
         _ => End::Failed,
     }

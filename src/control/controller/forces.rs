@@ -1,12 +1,15 @@
 //! The forces of a cycle, within what the actuators and the deployment allow.
 
+use nalgebra::Vector6;
+
 use super::{Controller, Output, Parameters};
 use crate::control::law::{ControlMode, Deviation};
 use crate::control::limits::Limit;
 use crate::control::state::{Cause, Trouble};
+use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::ladder::{Gravity, Rung};
 use crate::model::machine::LEGS;
-use crate::model::rigid::Motion;
+use crate::model::rigid::{Motion, Pose, Wrench};
 
 impl Controller {
     /// The forces of this cycle, or why there are none.
@@ -46,8 +49,17 @@ impl Controller {
             .with(Limit::ForceRate, output.force != limited);
         if output.force != force {
             self.observer.expect_nothing();
+            output.wrench_error = self.wrench_error(&motion.pose, &output.force, &force);
         }
         Ok(())
+    }
+
+    /// What the platform gets more than was asked for.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn wrench_error(&self, pose: &Pose, force: &[f64; LEGS], asked: &[f64; LEGS]) -> Wrench {
+        let more = Vector6::from(*force) - Vector6::from(*asked);
+        Wrench::from_vector(&(leg_wrenches(self.model.machine(), pose) * more))
     }
 
     /// Forces beyond the limit keep what holds the platform up and lose the same share of all else, so that

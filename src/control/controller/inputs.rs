@@ -1,15 +1,22 @@
 //! Which inputs count in this cycle, and the pose that they say.
 
-use super::{Controller, Input, Located, Measurement};
+use super::{Closing, Controller, Input, Located, Measurement, seconds_between};
 use crate::control::doubt::{self, Aim};
 use crate::control::law::TrackingError;
 use crate::control::limits::Limiting;
 use crate::control::state::{Cause, State, Trouble};
-use crate::model::forward_kinematics::{Tracked, Tracker};
+use crate::model::forward_kinematics::{Outcome, Tracked};
+use crate::model::rigid::Pose;
+use crate::model::sensitivity::Sensitivity;
 
 /// Trusted steps of forward kinematics in one cycle under control. One is far more than a cycle's motion; after a
 /// pause of the measurements it may take some.
 const STEPS: u32 = 8;
+
+/// From this condition on (or that of the limit, if it is less) it matters how far the platform moves in one
+/// measurement. Such poses are within a hundredth of the radius or of a radian of a singular one: nothing gets
+/// past them between two measurements.
+const DOUBTED: f64 = 300.0;
 
 impl Controller {
     /// Takes in what can be believed. Continuity is asked for only where it can be had: of measurements that
@@ -46,7 +53,15 @@ impl Controller {
             let verdict = doubt::time(Cause::SetpointFromElsewhen, now.setpoint.time_ns, now_ns, timeout_ns)
                 .and_then(|()| {
                     let before = setpoint.good.filter(|_| follows);
-                    doubt::setpoint(machine, parameters, &now, before.as_ref(), widest, &mut limiting)
+                    doubt::setpoint(
+                        machine,
+                        parameters,
+                        &self.home,
+                        &now,
+                        before.as_ref(),
+                        widest,
+                        &mut limiting,
+                    )
                 });
             self.setpoint_limiting = limiting;
             let gap = setpoint.good.map(|good| now.setpoint.time_ns.abs_diff(good.setpoint.time_ns));
@@ -86,7 +101,9 @@ impl Controller {
             return Err(self.measurement.absence(Cause::NoMeasurement));
         };
         self.is_young(&measurement, release_ns)?;
+        self.astray.map_or(Ok(()), Err)?;
         let machine = self.model.machine();
+        let from = self.tracker.pose;
         let controls = self.mode.state.controls();
         let trusted = self.tracker.stance().sensitivity().trusted_step * machine.joints.radius;
         let before = self.tracker.stance().lengths(machine);
@@ -96,8 +113,11 @@ impl Controller {
                 tracked = self.tracker.advance(machine, &measurement.length).0;
             }
         }
+        if tracked != Tracked::NotConverged && self.known && self.may_have_passed(&from) {
+            return Err(self.lost());
+        }
         match tracked {
-            Tracked::Found => {}
+            Tracked::Found => self.known = true,
             Tracked::Approaching if controls => {
                 let way = |(now, before): (&f64, &f64)| (now - before).abs();
                 let furthest = measurement.length.iter().zip(&before).map(way).fold(0.0, f64::max);
@@ -105,14 +125,60 @@ impl Controller {
             }
             Tracked::Approaching => return Err(Cause::FindingPose.into()),
             Tracked::NotConverged => {
-                // Home is the one pose known to be on the right assembly mode: walk again from there.
-                self.tracker = Tracker::new(machine, self.home);
+                if self.known && self.tracker.outcome() == Outcome::NearSingular {
+                    return Err(self.lost());
+                }
+                self.known = false;
+                self.walk_from_home();
                 return Err(Cause::PoseNotFound.into());
             }
         }
         let pose = self.tracker.pose;
         let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
+    }
+
+    /// Home is the one pose known to be on the right assembly mode.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub(super) fn walk_from_home(&mut self) {
+        self.tracker.restart(&self.home);
+    }
+
+    /// Behind a singular pose are poses with the lengths of those before it, and forward kinematics cannot tell
+    /// them apart. So near one, a platform that moves so far in one measurement that the next may be from there is
+    /// not known any more.
+    fn may_have_passed(&self, from: &Pose) -> bool {
+        let stance = self.tracker.stance();
+        let Sensitivity { condition, trusted_step, .. } = *stance.sensitivity();
+        condition > self.doubted() && self.model.machine().joints.distance(from, stance.pose()) > trusted_step
+    }
+
+    /// Nothing that is measured tells when the platform is back: somebody has to look, and clear it.
+    fn lost(&mut self) -> Trouble {
+        self.known = false;
+        let condition = self.tracker.stance().sensitivity().condition;
+        *self.astray.insert(Trouble::new(Cause::SingularPose, condition, self.doubted()))
+    }
+
+    fn doubted(&self) -> f64 {
+        self.parameters.condition.min(DOUBTED)
+    }
+
+    /// From one measurement to the next: on the way to a singular pose the determinant is at last linear.
+    pub(super) fn singular_in(&mut self, time_ns: u64) -> f64 {
+        let determinant = self.tracker.stance().sensitivity().determinant;
+        let singular_in = match self.closing {
+            Some(last) if last.time_ns == time_ns => return last.singular_in,
+            Some(last) => {
+                let dt = seconds_between(last.time_ns, time_ns);
+                determinant * dt / (last.determinant - determinant)
+            }
+            None => f64::INFINITY,
+        };
+        let singular_in = if singular_in > 0.0 { singular_in } else { f64::INFINITY };
+        self.closing = Some(Closing { time_ns, determinant, singular_in });
+        singular_in
     }
 
     pub(super) fn fresh_setpoint(&self, release_ns: u64) -> Result<(), Trouble> {

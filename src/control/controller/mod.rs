@@ -18,7 +18,8 @@ use crate::model::forward_kinematics::Tracker;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::ladder::Rung;
 use crate::model::machine::{LEGS, Machine};
-use crate::model::rigid::{Pose, Twist};
+use crate::model::rigid::{Pose, Twist, Wrench};
+use crate::model::stance::Stance;
 use crate::model::task::TaskState;
 
 mod forces;
@@ -123,6 +124,8 @@ pub struct Output {
     pub refused: Cause,
     /// Forces \[N\]; zero unless the state controls.
     pub force: [f64; LEGS],
+    /// What the platform gets more than was asked for, about C: not zero where forces are limited.
+    pub wrench_error: Wrench,
     /// The limits that this cycle is at.
     pub limiting: Limiting,
     /// Cycles under control without a new measurement or setpoint to believe, since start.
@@ -130,6 +133,10 @@ pub struct Output {
     pub without_setpoint: u64,
     /// The measured pose and twist, when the pose is known.
     pub measured: Option<(Pose, Twist)>,
+    /// Of that pose, see [`crate::model::sensitivity`].
+    pub condition: f64,
+    /// Until a singular pose, if the platform goes on as it does \[s\]; infinite if that leads to none.
+    pub singular_in: f64,
     /// Reference minus measured under control; else setpoint minus measured, when both are known.
     pub error: Option<TrackingError>,
 }
@@ -148,8 +155,13 @@ enum Reference {
 pub struct Controller {
     model: InverseDynamics,
     parameters: Parameters,
-    home: Pose,
+    home: Stance,
     tracker: Tracker,
+    /// The pose is known, from home on without a gap.
+    known: bool,
+    closing: Option<Closing>,
+    /// Why the platform may be beyond a singular pose, until somebody has cleared it.
+    astray: Option<Trouble>,
     measurement: Believed<Measurement>,
     parting: Parting,
     setpoint: Believed<Aim>,
@@ -186,14 +198,27 @@ struct Located {
     twist: Twist,
 }
 
+/// How fast the determinant vanishes.
+#[derive(Clone, Copy, Debug)]
+struct Closing {
+    /// Of the last measurement.
+    time_ns: u64,
+    determinant: f64,
+    singular_in: f64,
+}
+
 impl Controller {
     /// Waits at the home pose for a first measurement.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
+        let home = Stance::new(machine, TaskState::at_rest(machine.home).motion().pose);
         Self {
             model: InverseDynamics::new(machine),
             parameters,
-            home: home_pose(machine),
-            tracker: Tracker::new(machine, home_pose(machine)),
+            home,
+            tracker: Tracker::new(machine, *home.pose()),
+            known: false,
+            closing: None,
+            astray: None,
             measurement: Believed::default(),
             parting: Parting::default(),
             setpoint: Believed::default(),
@@ -229,6 +254,8 @@ impl Controller {
         self.decide(input, [located.map(drop), engageable, following]);
         if let Ok(at) = located {
             output.measured = Some((at.pose, at.twist));
+            output.condition = self.tracker.stance().sensitivity().condition;
+            output.singular_in = self.singular_in(at.time_ns);
             if self.mode.state != before {
                 self.enter(before, &at, now_ns);
                 self.known_error = None;
@@ -266,6 +293,9 @@ impl Controller {
             next(self.mode, new.map(|asked| asked.request), &findings, self.parameters.after_loss);
         if let Some(asked) = new {
             (self.answered, self.refused) = (asked.message, refused.unwrap_or_default());
+            if asked.request == Request::Clear && self.astray.take().is_some() {
+                self.walk_from_home();
+            }
         }
         if mode.cause != self.mode.cause || !mode.state.controls() && mode.state != State::Fault {
             let fits = |trouble: &Trouble| trouble.cause == mode.cause;
@@ -345,10 +375,6 @@ impl Controller {
             &leg_lengths(machine, &reference.pose),
         )
     }
-}
-
-fn home_pose(machine: &Machine) -> Pose {
-    TaskState::at_rest(machine.home).motion().pose
 }
 
 /// `to - from` in seconds, either sign.

@@ -20,13 +20,12 @@ impl Controller {
 
     /// A setpoint, carried on or back no longer than it may be.
     pub(super) fn carried(&self, aim: &Aim, instant_ns: u64) -> Motion {
-        let Aim { setpoint, motion } = aim;
-        if instant_ns == setpoint.time_ns {
-            return *motion;
+        if instant_ns == aim.setpoint.time_ns {
+            return aim.motion;
         }
         let longest = self.parameters.longest_carried_s();
-        let dt = seconds_between(setpoint.time_ns, instant_ns).max(-longest).min(longest);
-        setpoint.task.after(dt).motion()
+        // On the motion: angles are no way to go near their lock, where their rates have no bound.
+        aim.motion.after(seconds_between(aim.setpoint.time_ns, instant_ns).max(-longest).min(longest))
     }
 
     /// What the platform is to do at an instant; without control, what the setpoint says.
@@ -135,12 +134,10 @@ impl Controller {
                 Reference::From(present.pose, segment)
             }
             State::Parking => {
-                let away = self.home.displacement_to(&present.pose);
+                let home = *self.home.pose();
+                let away = home.displacement_to(&present.pose);
                 let Motion { twist: rate, acceleration, .. } = present;
-                Reference::From(
-                    self.home,
-                    Segment::vanishing(release_ns, &away, &rate, &acceleration, limits),
-                )
+                Reference::From(home, Segment::vanishing(release_ns, &away, &rate, &acceleration, limits))
             }
             State::Off | State::Standby | State::Active | State::Fault => Reference::Setpoint,
         };

@@ -147,6 +147,14 @@ fn columns() -> Vec<String> {
         words(&["omega_x", "omega_y", "omega_z", "x_rate", "y_rate", "z_rate"]),
         words(&["error_rotation_x", "error_rotation_y", "error_rotation_z", "error_x", "error_y", "error_z"]),
         legs("force"),
+        words(&[
+            "more_torque_x",
+            "more_torque_y",
+            "more_torque_z",
+            "more_force_x",
+            "more_force_y",
+            "more_force_z",
+        ]),
     ]
     .concat()
 }
@@ -154,7 +162,7 @@ fn columns() -> Vec<String> {
 /// One cycle; `t` counts from the fault. What was not there is NaN.
 fn row(record: &CycleRecord, fault: &CycleRecord, home: &[f64; 6]) -> Vec<f64> {
     let CycleRecord { cycle, wakeup_ns, compute_ns, input, output, .. } = record;
-    let Output { state, cause, evidence, limiting, force, measured, error, .. } = output;
+    let Output { state, cause, evidence, limiting, force, wrench_error, measured, error, .. } = output;
     let since = |from_ns: u64, to_ns: u64| to_ns.wrapping_sub(from_ns) as i64 as f64 * 1e-9;
     let age = |time_ns: Option<u64>| time_ns.map_or(f64::NAN, |time_ns| since(time_ns, input.release_ns));
     let absent = [f64::NAN; 6];
@@ -163,6 +171,7 @@ fn row(record: &CycleRecord, fault: &CycleRecord, home: &[f64; 6]) -> Vec<f64> {
     let legs = measurement.map_or([absent; 2], |it| [it.length, it.rate]);
     let (pose, twist) = measured
         .map_or((absent, absent), |(pose, twist)| (task_coordinates(&pose, home), twist.vector().into()));
+    let wrench_error = wrench_error.vector().into();
     let error = error.map_or(absent, |error| error.pose.vector().into());
     let mut row = vec![
         *cycle as f64,
@@ -178,7 +187,7 @@ fn row(record: &CycleRecord, fault: &CycleRecord, home: &[f64; 6]) -> Vec<f64> {
         age(setpoint.map(|it| it.time_ns)),
         age(measurement.map(|it| it.time_ns)),
     ];
-    for six in task.iter().chain(&legs).chain([&pose, &twist, &error, force]) {
+    for six in task.iter().chain(&legs).chain([&pose, &twist, &error, force, &wrench_error]) {
         row.extend(six);
     }
     row

@@ -14,6 +14,7 @@ use heapless::spsc::Consumer;
 use tracing::{info, warn};
 
 use super::fault_dump::FaultDump;
+use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::statistics::Collector;
 use crate::control::controller::Output;
@@ -43,6 +44,7 @@ pub struct Sides<'a> {
     /// Of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
     pub dump: FaultDump,
+    pub first_pose: FirstPose,
 }
 
 /// Statistics of a run.
@@ -68,6 +70,7 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
         while let Some(record) = sides.records.dequeue() {
             collector.add(&record);
             sides.dump.add(&record);
+            sides.first_pose.add(&record);
             if let Some((position, orientation)) = record.tracking_error() {
                 report.tracking.add(position, orientation);
             }

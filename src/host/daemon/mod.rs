@@ -22,6 +22,7 @@ use sd_notify::NotifyState;
 use tracing::{info, warn};
 
 use self::fault_dump::FaultDump;
+use self::first_pose::FirstPose;
 use self::hints::ThreadFiles;
 use self::io_thread::{DELAYS, IoReport, Ports, Settings};
 use self::log_thread::LogReport;
@@ -48,6 +49,7 @@ use crate::realtime::process::leave_signals_to_others;
 use crate::realtime::setup::{Shortfall, deadline, memory};
 
 mod fault_dump;
+mod first_pose;
 mod hints;
 mod io_thread;
 mod log_thread;
@@ -137,7 +139,9 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
         let _stop_all = StopOnDrop([stop_loop, stop_io, stop_log]);
         let log = spawn(threads, "hexad-log", || {
             let dump = FaultDump::new(faults, machine.home);
-            let sides = log_thread::Sides { records, sent, statistics: statistics_in, files, dump };
+            let first_pose = FirstPose::of(machine);
+            let sides =
+                log_thread::Sides { records, sent, statistics: statistics_in, files, dump, first_pose };
             log_thread::run(sides, stop_log)
         })?;
         let cyclic = spawn(threads, REALTIME_THREAD, move || {

@@ -55,7 +55,7 @@ pub enum Outcome {
     NotConverged,
     /// The lengths are further away than one trusted step.
     LeftTrustedRegion,
-    /// The pose would be singular, or worse than [`LARGEST_CONDITION`].
+    /// The pose would be singular, beyond a singular one, or worse than [`LARGEST_CONDITION`].
     NearSingular,
 }
 

@@ -201,7 +201,9 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
         legs.length = target;
         legs.inverse_length = (residual * inverse_target).mul_add(inverse_target, inverse_target);
         let sensitivity = Sensitivity::new(simd, joints, &legs, balance);
-        if !(sensitivity.condition <= LARGEST_CONDITION) {
+        // That K grows along the step could lead across, if anything could.
+        let same_side = sensitivity.determinant * stance.sensitivity.determinant > 0.0;
+        if !(same_side && sensitivity.condition <= LARGEST_CONDITION) {
             return Outcome::NearSingular;
         }
         stance.pose = at.pose(simd, joints);

@@ -41,6 +41,11 @@ impl Tracker {
         Self { pose, stance: Stance::new(machine, pose), outcome: Outcome::Solved }
     }
 
+    /// Starts anew at a pose of which all is known.
+    pub fn restart(&mut self, stance: &Stance) {
+        (self.pose, self.stance, self.outcome) = (*stance.pose(), *stance, Outcome::Solved);
+    }
+
     /// The pose with its legs and factorization.
     pub fn stance(&self) -> &Stance {
         &self.stance

@@ -1,0 +1,157 @@
+//! Poses beyond a singular one have the lengths of poses before it. A platform that got there, whoever carried it,
+//! is not taken for one that is still on the side of home: not until somebody has looked and said so.
+
+use hexad::control::controller::Output;
+use hexad::control::limits::Limit;
+use hexad::control::state::{Cause, Evidence, Request, State};
+use hexad::model::inverse_geometry::leg_motion;
+use hexad::model::rigid::{Pose, Wrench};
+use hexad::model::task::TaskState;
+use hexad::plant::imperfections::{External, Imperfections};
+use hexad::plant::simulator::Simulator;
+use hexad::scene::minimum_jerk::{Profile, rise};
+use nalgebra::Vector3;
+
+use super::common::largest;
+use super::fichter::{ANY, AT_HOME, CONDITION, at, before, motion_base, on_the_way};
+use super::rig::Rig;
+
+/// From home to as far beyond \[s\]: peak speeds from 2.3 to 0.028 rad/s.
+const TIMES_S: [f64; 4] = [0.5, 2.0, 10.0, 40.0];
+
+/// Cycles that somebody takes to look.
+const LOOK: u32 = 300;
+
+/// One cycle of a platform that is where the task says, whatever the forces.
+fn carried(rig: &mut Rig, task: &TaskState) -> Output {
+    let legs = leg_motion(rig.simulator.machine(), &task.motion());
+    let mut input = rig.input(task);
+    let measurement = input.measurement.as_mut().unwrap();
+    (measurement.length, measurement.rate) = (legs.length, legs.rate);
+    rig.now_ns += rig.period_ns;
+    rig.controller.step(&input)
+}
+
+/// The way there, and back.
+fn there_and_back(t: f64, time_s: f64) -> TaskState {
+    let (up, down) = (rise(t, time_s), rise(t - 2.0 * time_s, time_s));
+    let s = Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel };
+    on_the_way(-AT_HOME, &s)
+}
+
+fn pose_error(output: &Output, truth: &Pose) -> f64 {
+    output.measured.map_or(f64::NAN, |(pose, _)| pose.displacement_to(truth).vector().norm())
+}
+
+/// In standby, active, and in a fault; with the default limit of the condition and without one.
+#[test]
+fn a_platform_that_passed_a_singular_pose_is_not_known_until_it_is_cleared() {
+    for (condition, time_s) in [100.0, ANY].into_iter().flat_map(|c| TIMES_S.map(|t| (c, t))) {
+        for state in [State::Standby, State::Active, State::Fault] {
+            let what = format!("condition {condition}, {time_s} s, {}", state.name());
+            let config = motion_base(condition);
+            let mut rig = Rig::new(&config, &config.machine);
+            let home = on_the_way(AT_HOME, &Profile::default());
+            match state {
+                State::Active => rig.engage(&home),
+                State::Fault => rig.ask(Request::Estop),
+                _ => {}
+            }
+            assert_eq!((0..3).map(|_| carried(&mut rig, &home)).last().unwrap().state, state, "{what}");
+            let cycles = (3.0 * time_s * 1e3) as u32;
+            let mut crossed = false;
+            for k in 0..cycles {
+                let task = there_and_back(f64::from(k) * 1e-3, time_s);
+                let output = carried(&mut rig, &task);
+                let truth = task.motion().pose;
+                crossed |= !before(&config.machine, &truth);
+                assert!(output.measured.is_none() || pose_error(&output, &truth) < 1e-6, "{what}");
+                if crossed {
+                    assert!(output.measured.is_none(), "{what}: {output:?}");
+                    assert!(matches!(output.state, State::Off | State::Fault), "{what}: {output:?}");
+                }
+                if crossed && state == State::Standby {
+                    assert_eq!(output.cause, Cause::SingularPose, "{what}");
+                    let Evidence { value, bound, .. } = output.evidence;
+                    assert!(value > bound && bound == condition.min(300.0), "{what}: {value} {bound}");
+                }
+            }
+            assert!(crossed);
+            // Home again, and yet nothing happens until it is cleared.
+            rig.ask(Request::Engage);
+            for _ in 0..LOOK {
+                let output = carried(&mut rig, &home);
+                assert!(!output.state.controls() && output.measured.is_none(), "{what}: {output:?}");
+            }
+            rig.ask(Request::Clear);
+            let output = (0..3).map(|_| carried(&mut rig, &home)).last().unwrap();
+            assert_eq!((output.state, output.cause), (State::Standby, Cause::NotAsked), "{what}");
+            assert!(pose_error(&output, &home.motion().pose) < 1e-9, "{what}");
+        }
+    }
+}
+
+/// Something turns the platform harder than its drives can hold.
+#[test]
+fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
+    for torque in [4e4, 1e5, 4e5] {
+        for condition in [100.0, ANY] {
+            let mut config = motion_base(condition);
+            config.machine.actuator.max_force = 20e3;
+            config.deployment.control.following_position_m = f64::MAX;
+            config.deployment.control.following_orientation_rad = f64::MAX;
+            let wrench = Wrench { torque: Vector3::z() * torque, force: Vector3::zeros() };
+            let mut rig = Rig::new(&config, &config.machine);
+            let home = on_the_way(AT_HOME, &Profile::default());
+            rig.engage(&home);
+            let plant = &config.deployment.plant;
+            let external = External { wrench, frequency_hz: 0.0 };
+            rig.simulator = Simulator::imperfect(
+                &config.machine,
+                plant.brake_deceleration_m_s2,
+                plant.step_s,
+                plant.tolerance_m,
+                &Imperfections { external, ..Imperfections::default() },
+            );
+            let (mut limited, mut last) = (0, Output::default());
+            for _ in 0..3000 {
+                last = rig.cycle(&rig.input(&home));
+                assert!(largest(&last.force) <= 20e3);
+                assert!(!last.state.controls() || before(&config.machine, &rig.simulator.state().pose));
+                limited += u32::from(last.limiting.contains(Limit::Force));
+            }
+            assert!(limited > 10 && last.state == State::Fault, "{torque} {condition}: {last:?}");
+        }
+    }
+}
+
+/// With constant speed toward the singular pose, and away from it.
+#[test]
+fn the_time_to_a_singular_pose_is_told() {
+    for speed in [0.5, 0.05, -0.05] {
+        let config = motion_base(100.0);
+        let mut rig = Rig::new(&config, &config.machine);
+        let way = f64::abs(0.2 / speed);
+        let mut told = 0;
+        for k in 0..(way * 1e3) as u32 {
+            let t = f64::from(k) * 1e-3;
+            let mut task = at(AT_HOME - speed * t);
+            task.xd[2] = speed;
+            let output = carried(&mut rig, &task);
+            let distance = AT_HOME - speed * t;
+            if output.measured.is_none() || k == 0 {
+                continue;
+            }
+            told += 1;
+            let ratio = output.singular_in * speed / distance;
+            // The determinant is as good as linear at last, and taken from one measurement to the next.
+            let near = (ratio - 1.0).abs() < 4.0 * distance + 1e-3 * speed / distance;
+            assert!(
+                if speed > 0.0 { near } else { output.singular_in == f64::INFINITY },
+                "{speed} {distance}: {ratio}"
+            );
+            assert!((output.condition * distance / CONDITION - 1.0).abs() < 2.0 * distance * distance + 1e-3);
+        }
+        assert!(f64::from(told) > 0.9e3 * way, "{told}");
+    }
+}

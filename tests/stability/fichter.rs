@@ -1,0 +1,80 @@
+//! A motion base that works near its singular pose: a quarter turn about the vertical, as Fichter found.
+//!
+//! `distance` is the angle that is left to that pose; beyond it, it is negative.
+
+use core::f64::consts::FRAC_PI_2;
+
+use hexad::control::limits::{AxisLimits, Limits};
+use hexad::host::config::Config;
+use hexad::model::machine::Machine;
+use hexad::model::rigid::Pose;
+use hexad::model::stance::Stance;
+use hexad::model::task::TaskState;
+use hexad::scene::minimum_jerk::Profile;
+
+use super::common::{Legs, deployed};
+
+/// Of home: the condition is 10.8 there.
+pub const AT_HOME: f64 = 0.3;
+
+/// Times the distance, where that is small: the condition.
+pub const CONDITION: f64 = 3.237;
+
+/// Times the distance, where that is small: the largest of the forces that hold the platform \[N\].
+pub const HOLDING_N: f64 = 5101.0;
+
+/// No condition: what is left are the bounds of the model itself.
+pub const ANY: f64 = 1e12;
+
+/// Home so near to it, legs and drives for a quarter turn, strong enough for any pose that is found.
+pub fn motion_base(condition: f64) -> Config {
+    let mut config = deployed("motion_base");
+    let axis = AxisLimits { velocity: 10.0, acceleration: 50.0, jerk: 5000.0 };
+    let limits = &mut config.deployment.limits;
+    limits.reference = Limits { position: axis, orientation: axis, ..limits.reference };
+    (limits.condition, limits.force_rate_n_s) = (condition, f64::MAX);
+    let machine = &mut config.machine;
+    machine.home = at(AT_HOME).x.into();
+    machine.joints = Legs::of(machine).joints(&machine.home);
+    let actuator = &mut machine.actuator;
+    (actuator.min_length, actuator.max_length) = (0.9, 4.0);
+    (actuator.max_rate, actuator.max_force) = (5.0, 1e9);
+    config
+}
+
+/// At rest at a distance.
+pub fn at(distance: f64) -> TaskState {
+    TaskState::at_rest([0.0, 0.0, FRAC_PI_2 - distance, 0.0, 0.0, 1.25])
+}
+
+/// From home to a distance, along a profile from 0 to 1.
+pub fn on_the_way(distance: f64, s: &Profile) -> TaskState {
+    let way = AT_HOME - distance;
+    let mut task = at(AT_HOME - way * s.value);
+    (task.xd[2], task.xdd[2]) = (way * s.rate, way * s.accel);
+    task
+}
+
+/// Whether a pose is on the side of home.
+pub fn before(machine: &Machine, pose: &Pose) -> bool {
+    let side = |pose: &Pose| Stance::new(machine, *pose).sensitivity().determinant;
+    side(pose) * side(&at(AT_HOME).motion().pose) > 0.0
+}
+
+/// The two numbers above are what the model says.
+#[test]
+fn condition_and_forces_grow_with_the_inverse_distance() {
+    let config = motion_base(ANY);
+    for power in 3..=8 {
+        let distance = 10_f64.powi(-power);
+        let motion = at(distance).motion();
+        let condition = Stance::new(&config.machine, motion.pose).sensitivity().condition;
+        assert!((condition * distance / CONDITION - 1.0).abs() < 1e-3, "{}", condition * distance);
+        let forces = hexad::model::active_forces::inverse_dynamics::<hexad::model::ladder::Exact>(
+            &config.machine,
+            &motion,
+        );
+        let largest = super::common::largest(&forces.unwrap());
+        assert!((largest * distance / HOLDING_N - 1.0).abs() < 2e-3, "{}", largest * distance);
+    }
+}

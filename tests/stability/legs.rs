@@ -1,0 +1,200 @@
+//! Legs at their worst: through the axis of their universal joint, next to no length, next to parallel.
+
+use core::f64::consts::TAU;
+
+use hexad::control::limits::Limit;
+use hexad::control::state::State;
+use hexad::host::config::Config;
+use hexad::host::config::deployment::Fidelity;
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, refine};
+use hexad::model::inverse_geometry::{leg_directions, leg_lengths};
+use hexad::model::ladder::{Exact, MasslessLegs, RigidLegs, Rung};
+use hexad::model::machine::Machine;
+use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad::model::stance::Stance;
+use hexad::model::task::TaskState;
+use nalgebra::{Vector3, Vector6};
+
+use super::common::{Legs, deployed, largest};
+use super::rig::Rig;
+
+fn home(machine: &Machine) -> Pose {
+    TaskState::at_rest(machine.home).motion().pose
+}
+
+/// The motion base with the universal joint of its first leg turned so that the leg passes its first axis at this
+/// angle when the platform moves along the vector, which is normal to the leg.
+fn through_axis(beside: f64) -> (Config, Vector3<f64>) {
+    let mut config = deployed("motion_base");
+    let machine = &mut config.machine;
+    let n = leg_directions(machine, &home(machine))[0];
+    let along = n.cross(&Vector3::z()).normalize();
+    let mut legs = Legs::of(machine);
+    legs.universal_axis[0] = n * beside.cos() + n.cross(&along) * beside.sin();
+    machine.joints = legs.joints(&machine.home);
+    (config, along)
+}
+
+/// What the spin of the legs adds to the force on the platform \[N\], at most, while it moves along the vector with
+/// `SPEED` past the axis.
+fn spin_at_most(beside: f64) -> f64 {
+    let (config, along) = through_axis(beside);
+    let machine = &config.machine;
+    let dynamics = InverseDynamics::new(machine);
+    let at = |share: f64| {
+        let mut pose = home(machine);
+        pose.position += along * (share * beside * leg_lengths(machine, &home(machine))[0]);
+        let twist = Twist { angular: Vector3::zeros(), linear: along * SPEED };
+        let motion = Motion { pose, twist, acceleration: Acceleration::default() };
+        let spin =
+            dynamics.load_of::<Exact>(&motion).total() - dynamics.load_of::<RigidLegs>(&motion).total();
+        spin.fixed_rows::<3>(3).norm()
+    };
+    (-300..=300).map(|k| at(0.01 * f64::from(k))).fold(0.0, f64::max)
+}
+
+/// Of the platform across the leg \[m/s\].
+const SPEED: f64 = 0.3;
+
+/// A leg that passes the axis at an angle e, with v radians per second, has to spin by nearly half a turn in a time
+/// of e / v: with the inertia Ix that takes `0.572 Ix v^2 / (e^3 L)` at the joint on the platform. The exact rung says
+/// so, the others know of no spin; at the axis itself nothing turns it.
+#[test]
+fn beside_the_axis_of_its_joint_a_leg_spins_as_predicted() {
+    let machine = deployed("motion_base").machine;
+    let length = leg_lengths(&machine, &home(&machine))[0];
+    let inertia = machine.cylinder.axial_inertia + machine.rod.axial_inertia;
+    let predicted = |e: f64| 0.572_433 * inertia * (SPEED / length).powi(2) / (e.powi(3) * length);
+    for beside in [1e-2, 1e-3, 1e-4, 1e-5] {
+        let ratio = spin_at_most(beside) / predicted(beside);
+        println!("{beside:e}: {:.3e} N, {ratio:.6}", predicted(beside));
+        assert!((ratio - 1.0).abs() < 3.0 * beside + 1e-3, "{beside:e}: {ratio}");
+    }
+    // Nearer than the model looks, and through it.
+    for beside in [1e-7, 1e-9, 0.0] {
+        let most = spin_at_most(beside);
+        println!("{beside:e}: {most:.3e} N");
+        assert!(most < predicted(1e-6), "{beside:e}: {most} N");
+    }
+}
+
+/// The drives cannot do that. The exact rung asks for it and is cut, and says so; the rigid-legs rung does not know.
+#[test]
+fn through_the_axis_of_a_joint_forces_are_cut_or_know_nothing_of_it() {
+    for (rung, beside) in
+        [Rung::Exact, Rung::RigidLegs].into_iter().flat_map(|r| [1e-2, 1e-3, 1e-5].map(|e| (r, e)))
+    {
+        let (mut config, along) = through_axis(beside);
+        config.deployment.control.fidelity = Fidelity::Fixed(rung);
+        // On the machine that is controlled the joint gives way.
+        let mut rig = Rig::new(&config, &deployed("motion_base").machine);
+        rig.engage(&TaskState::at_rest(config.machine.home));
+        let (mut cut, mut most) = (0, 0.0_f64);
+        for k in 0..2000 {
+            let (t, w) = (f64::from(k) * 1e-3, TAU * 0.5);
+            let mut task = TaskState::at_rest(config.machine.home);
+            // From rest at home, in the middle through it at half a metre per second, and back to rest there.
+            let ((s, c), (s2, c2)) = ((w * t).sin_cos(), (2.0 * w * t).sin_cos());
+            let (x, v, a) = (s - 0.5 * s2, w * (c - c2), w * w * (2.0 * s2 - s));
+            for (value, share) in [(&mut task.x, x), (&mut task.xd, v), (&mut task.xdd, a)] {
+                *value += Vector6::new(0.0, 0.0, 0.0, along.x, along.y, along.z) * (0.08 * share);
+            }
+            let output = rig.cycle(&rig.input(&task));
+            assert_eq!(output.state, State::Active, "{rung:?} {beside:e}: {:?}", output.cause);
+            cut += u32::from(
+                output.limiting.contains(Limit::Force) || output.limiting.contains(Limit::ForceRate),
+            );
+            most = most.max(largest(&output.force));
+        }
+        println!("{rung:?} {beside:e}: {cut} cycles cut, {most:.0} N");
+        assert!(most <= config.machine.actuator.max_force);
+        assert_eq!(cut > 0, rung == Rung::Exact && beside < 1e-2, "{rung:?} {beside:e}: {cut} cycles");
+    }
+}
+
+/// The motion base with the first joint on its base so near to that on the platform at home.
+fn with_short_leg(length: f64) -> Machine {
+    let mut machine = deployed("motion_base").machine;
+    let at_home = home(&machine);
+    let n = leg_directions(&machine, &at_home)[0];
+    let mut legs = Legs::of(&machine);
+    legs.base[0] = at_home.position + at_home.rotation * legs.platform[0] - n * length;
+    machine.joints = legs.joints(&machine.home);
+    machine
+}
+
+/// A leg turns by a radian when its end moves by its length: nothing is trusted further than a share of it. What
+/// directions have to do with forces is exact to rounding over the length; a leg with mass turns ever faster, and its
+/// weight has ever less of an arm.
+#[test]
+fn a_leg_of_next_to_no_length_loses_what_its_length_says() {
+    let trusted = |length: f64| {
+        let machine = with_short_leg(length);
+        Stance::new(&machine, home(&machine)).sensitivity().trusted_step / length
+    };
+    let forces = |length: f64| {
+        let machine = with_short_leg(length);
+        let motion = TaskState::at_rest(machine.home).motion();
+        let dynamics = InverseDynamics::new(&machine);
+        (dynamics.forces::<MasslessLegs>(&motion).unwrap(), dynamics.forces::<Exact>(&motion).unwrap())
+    };
+    let apart =
+        |a: &[f64; 6], b: &[f64; 6]| largest(&core::array::from_fn::<_, 6, _>(|i| a[i] - b[i])) / largest(b);
+    let (small, (massless, heavy)) = (trusted(1e-4), (forces(1.0).0, largest(&forces(1e-4).1) * 1e-4));
+    for power in 3..=10 {
+        let length = 10_f64.powi(-power);
+        assert!((trusted(length) / small - 1.0).abs() < 0.01, "{length:e}: {} {small}", trusted(length));
+        let now = forces(length);
+        let bound = 2.0 * f64::EPSILON / length;
+        println!("{length:e}: {:.1e} of {bound:.1e}", apart(&now.0, &massless));
+        assert!(apart(&now.0, &massless) < bound, "{length:e}");
+        assert!((largest(&now.1) * length / heavy - 1.0).abs() < 0.05 + 100.0 * length, "{length:e}");
+        // A step of what is trusted is found, one of the length of the leg is refused.
+        let machine = with_short_leg(length);
+        let start = Stance::new(&machine, home(&machine));
+        for (share, outcome) in [(0.5, Outcome::Solved), (1.0 / small, Outcome::LeftTrustedRegion)] {
+            let mut there = home(&machine);
+            there.position.x += share * trusted(length) * length * machine.joints.radius;
+            let mut stance = start;
+            let report = refine(&machine, &mut stance, &leg_lengths(&machine, &there));
+            assert_eq!(report.outcome, outcome, "{length:e} {share}");
+        }
+    }
+}
+
+/// Legs that are parallel but for an angle: two shifts and a turn are held by that angle alone.
+fn nearly_parallel(angle: f64) -> Machine {
+    let mut machine = deployed("motion_base").machine;
+    let mut legs = Legs::of(&machine);
+    for (k, (a, b)) in legs.base.iter_mut().zip(&legs.platform).enumerate() {
+        let turned = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 1.9 * k as f64);
+        *a = *b - turned * Vector3::x() * (1.25 * angle);
+    }
+    machine.joints = legs.joints(&machine.home);
+    machine
+}
+
+#[test]
+fn the_condition_of_nearly_parallel_legs_is_the_inverse_of_their_angle() {
+    let condition = |angle: f64| {
+        let machine = nearly_parallel(angle);
+        Stance::new(&machine, home(&machine)).sensitivity().condition * angle
+    };
+    let small = condition(1e-4);
+    for power in 2..=7 {
+        let angle = 10_f64.powi(-power);
+        let ratio = condition(angle) / small;
+        println!("{angle:e}: condition {:.3e}", condition(angle) / angle);
+        assert!((ratio - 1.0).abs() < 0.02, "{angle:e}: {ratio}");
+        let machine = nearly_parallel(angle);
+        let mut stance = Stance::new(&machine, home(&machine));
+        let step = 0.5 * stance.sensitivity().trusted_step * machine.joints.radius;
+        let mut there = home(&machine);
+        there.position.z += step;
+        let outcome = refine(&machine, &mut stance, &leg_lengths(&machine, &there)).outcome;
+        let expected =
+            if small / angle < LARGEST_CONDITION { Outcome::Solved } else { Outcome::NearSingular };
+        assert_eq!(outcome, expected, "{angle:e}");
+    }
+}

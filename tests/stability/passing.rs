@@ -1,0 +1,188 @@
+//! Near a singular pose at several speeds: what passes, what is stopped before, and with which forces.
+//!
+//! The platform turns from home toward the singular pose, to a distance from it, and back.
+
+use hexad::control::controller::Output;
+use hexad::control::limits::Limit;
+use hexad::control::state::{Cause, State};
+use hexad::host::config::Config;
+use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::forward_kinematics::LARGEST_CONDITION;
+use hexad::model::inverse_jacobian::leg_wrenches;
+use hexad::model::ladder::Exact;
+use hexad::model::rigid::{Motion, Wrench};
+use hexad::model::stance::Stance;
+use hexad::model::task::TaskState;
+use hexad::scene::minimum_jerk::{Profile, rise};
+use nalgebra::Vector6;
+use rayon::prelude::*;
+
+use super::common::largest;
+use super::fichter::{ANY, AT_HOME, CONDITION, HOLDING_N, at, before, motion_base, on_the_way};
+use super::rig::Rig;
+
+/// From home to the nearest pose \[s\]: up to 0.14, 0.38 and 0.94 rad/s.
+const TIMES_S: [f64; 3] = [4.0, 1.5, 0.6];
+
+/// How a run ended.
+#[derive(Debug)]
+struct Run {
+    last: Output,
+    /// Largest condition of the true pose under control.
+    condition: f64,
+    /// Largest force.
+    force: f64,
+    /// Largest force that holds the platform where it was.
+    holding: f64,
+    /// The first cycle that was at its limits of force.
+    limited: Option<u32>,
+    cycles: u32,
+}
+
+fn there_and_back(t: f64, time_s: f64, distance: f64) -> TaskState {
+    let (up, down) = (rise(t, time_s), rise(t - time_s, time_s));
+    let s = Profile { value: up.value - down.value, rate: up.rate - down.rate, accel: up.accel - down.accel };
+    on_the_way(distance, &s)
+}
+
+/// Follows the motion as long as it is controlled, or to its end; never beyond the singular pose.
+fn run(config: &Config, time_s: f64, distance: f64) -> Run {
+    let machine = &config.machine;
+    let mut rig = Rig::new(config, machine);
+    rig.engage(&on_the_way(AT_HOME, &Profile::default()));
+    let mut run =
+        Run { last: Output::default(), condition: 0.0, force: 0.0, holding: 0.0, limited: None, cycles: 0 };
+    while f64::from(run.cycles) < 2e3 * time_s {
+        let task = there_and_back(f64::from(run.cycles) * 1e-3, time_s, distance);
+        let output = rig.cycle(&rig.input(&task));
+        let pose = rig.simulator.state().pose;
+        if output.state.controls() {
+            assert!(before(machine, &pose), "{time_s} s, {distance:e}: beyond");
+            run.condition = run.condition.max(Stance::new(machine, pose).sensitivity().condition);
+            run.force = run.force.max(largest(&output.force));
+            let resting = Motion { pose, ..TaskState::default().motion() };
+            run.holding = run.holding.max(largest(&inverse_dynamics::<Exact>(machine, &resting).unwrap()));
+        }
+        if output.limiting.contains(Limit::Force) {
+            run.limited.get_or_insert(run.cycles);
+        } else {
+            assert_eq!(output.wrench_error, Wrench::default());
+        }
+        (run.last, run.cycles) = (output, run.cycles + 1);
+    }
+    run
+}
+
+/// Every distance at every speed.
+fn runs(condition: f64) -> Vec<(f64, f64, Run)> {
+    let cases: Vec<_> =
+        (1..=8).flat_map(|power| TIMES_S.map(|time_s| (10_f64.powi(-power), time_s))).collect();
+    let config = motion_base(condition);
+    cases
+        .into_par_iter()
+        .map(|(distance, time_s)| (distance, time_s, run(&config, time_s, distance)))
+        .collect()
+}
+
+/// Forces are what holds the platform where it is; what moves it slowly comes to less than a third of that.
+fn assert_forces(run: &Run, what: &str) {
+    assert!(run.force < 1.3 * run.holding, "{what}: {} N, holding {} N", run.force, run.holding);
+    assert!(run.limited.is_none(), "{what}");
+}
+
+/// What the hardest stop within `[limits]` asks for at this distance.
+fn stopping(config: &Config, distance: f64) -> f64 {
+    let mut task = at(distance);
+    task.xdd[2] = -config.deployment.limits.reference.orientation.acceleration;
+    largest(&inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap())
+}
+
+/// The default limit is at a distance of 0.032: what comes nearer is stopped before, whatever its speed.
+#[test]
+fn nearer_than_the_limit_of_condition_is_stopped_before() {
+    let hardest = stopping(&motion_base(100.0), CONDITION / 100.0);
+    for (distance, time_s, run) in runs(100.0) {
+        let what = format!("{distance:e} rad, {time_s} s");
+        assert!(run.condition < 100.0, "{what}: {}", run.condition);
+        if distance > CONDITION / 100.0 {
+            assert_forces(&run, &what);
+            assert_eq!((run.last.state, run.last.cause), (State::Active, Cause::None), "{what}");
+            assert!((run.condition * distance / CONDITION - 1.0).abs() < 0.02, "{what}: {}", run.condition);
+            continue;
+        }
+        assert_eq!((run.last.state, run.last.cause), (State::Fault, Cause::NearSingular), "{what}");
+        assert!(run.last.evidence.value > run.last.evidence.bound && run.last.evidence.bound == 100.0);
+        assert!(run.force < hardest && run.limited.is_none(), "{what}: {} N of {hardest} N", run.force);
+        // It comes to rest where the last setpoint that was good would have ended: not far from the limit.
+        assert!(run.condition > 50.0, "{what}: stopped at a condition of {}", run.condition);
+    }
+}
+
+/// Without that limit forward kinematics ends at a condition of 10,000, a distance of 0.0003, and setpoints end
+/// where a stop could end beyond the singular pose. Forces are as large as they must be there and no larger.
+#[test]
+fn without_a_limit_the_model_ends_before_the_singular_pose() {
+    for (distance, time_s, run) in runs(ANY) {
+        let what = format!("{distance:e} rad, {time_s} s");
+        assert_forces(&run, &what);
+        if distance > CONDITION / LARGEST_CONDITION {
+            assert_eq!((run.last.state, run.last.cause), (State::Active, Cause::None), "{what}");
+            assert!((run.holding * distance / HOLDING_N - 1.0).abs() < 0.15, "{what}: {} N", run.holding);
+            continue;
+        }
+        assert_eq!(run.last.state, State::Fault, "{what}");
+        assert!(
+            [Cause::NearSingular, Cause::SingularPose].contains(&run.last.cause),
+            "{what}: {:?}",
+            run.last
+        );
+        assert!((300.0..1.2 * LARGEST_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
+    }
+}
+
+/// Drives that hold the platform to a distance of a quarter radian, and a motion that goes on. Forces stay at their
+/// limit and say so from the first cycle in which the motion asks for more; the platform gives way, and is let go.
+#[test]
+fn saturation_on_the_way_is_told_and_ends_in_a_fault() {
+    for time_s in TIMES_S {
+        for distance in [0.15, 0.1, 0.05] {
+            let what = format!("{distance} rad, {time_s} s");
+            let mut config = motion_base(ANY);
+            config.machine.actuator.max_force = 20e3;
+            let more = (0..)
+                .position(|k| {
+                    let task = there_and_back(f64::from(k) * 1e-3, time_s, distance);
+                    largest(&inverse_dynamics::<Exact>(&config.machine, &task.motion()).unwrap()) > 20e3
+                })
+                .unwrap() as u32;
+            let run = run(&config, time_s, distance);
+            assert!(run.limited.unwrap().abs_diff(more) <= 2, "{what}: {:?}, not {more}", run.limited);
+            assert_eq!(run.force, 20e3, "{what}");
+            assert_eq!((run.last.state, run.last.cause), (State::Fault, Cause::OffPath), "{what}");
+        }
+    }
+}
+
+/// Beside a controller whose drives are strong enough, until the forces part: the wrench that is missing is told.
+#[test]
+fn what_limited_forces_leave_out_is_told_as_a_wrench() {
+    let mut config = motion_base(ANY);
+    let mut strong = Rig::new(&config, &config.machine);
+    config.machine.actuator.max_force = 20e3;
+    let mut rig = Rig::new(&config, &config.machine);
+    let home = on_the_way(AT_HOME, &Profile::default());
+    rig.engage(&home);
+    strong.engage(&home);
+    for k in 0.. {
+        let task = there_and_back(f64::from(k) * 1e-3, 1.5, 0.1);
+        let (output, wanted) = (rig.cycle(&rig.input(&task)), strong.cycle(&strong.input(&task)));
+        if output.limiting.contains(Limit::Force) {
+            let more = Vector6::from(output.force) - Vector6::from(wanted.force);
+            let wrench = leg_wrenches(&config.machine, &task.motion().pose) * more;
+            let apart = (output.wrench_error.vector() - wrench).norm() / wrench.norm();
+            assert!(wrench.norm() > 10.0 && apart < 0.01, "{apart}: {wrench} {:?}", output.wrench_error);
+            break;
+        }
+        assert_eq!((output.force, output.wrench_error), (wanted.force, Wrench::default()));
+    }
+}
