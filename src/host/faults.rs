@@ -1,11 +1,11 @@
-//! `hexad faults`: the table of causes, from the one place where they are defined.
+//! `hexad faults`: the table of causes, from the one place where they are defined; and their numbers in words.
 
 extern crate std;
 
 use core::fmt;
 
 use crate::control::limits::Limit;
-use crate::control::state::{Cause, Reaction, State};
+use crate::control::state::{Cause, Evidence, Reaction, State};
 
 /// Displays as tables of states, causes and limits, by number.
 pub struct Faults;
@@ -31,5 +31,21 @@ impl fmt::Display for Faults {
             writeln!(f, "{:>3} {}", limit as u32, limit.name())?;
         }
         Ok(())
+    }
+}
+
+/// The numbers behind a cause, if it has any.
+pub struct Told(pub Cause, pub Evidence);
+
+impl fmt::Display for Told {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(cause, Evidence { value, bound, index }) = self;
+        if cause.unit().is_empty() {
+            return Ok(());
+        }
+        if *index > 0 {
+            write!(f, ", leg or axis {index}")?;
+        }
+        write!(f, ": {value:.6} {} (bound {bound:.6})", cause.unit())
     }
 }

@@ -25,6 +25,7 @@ mod numbers;
 pub mod offline;
 pub mod operator;
 pub mod plant;
+pub mod rehearsal;
 pub mod report;
 mod rows;
 pub mod scatter;

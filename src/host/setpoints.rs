@@ -17,11 +17,14 @@ use super::config::Config;
 use super::daemon::nanoseconds;
 use super::join::join;
 use super::lockstep::look_until;
+use super::numbers::percent;
 use super::offline::task_state;
 use super::operator::Operator;
 use super::plant::prepare_thread;
+use super::rehearsal::{Refusal, Rehearsal};
 use super::stop::Stop;
 use super::table::{Complaints, Table, TableError, trajectory_columns};
+use crate::control::sampled::boundary;
 use crate::control::state::{Cause, Request, State};
 use crate::ipc::messages::{MeasuredMessage, SetpointMessage, StatusMessage};
 use crate::ipc::ports::{PortError, Sink, Source, Time};
@@ -39,6 +42,15 @@ const REST_RATE: f64 = 1e-3;
 /// rows that are nearer, X'' has no digits.
 const LEAST_STEP_S: f64 = 1e-6;
 
+/// Least amplitude of a built-in motion, as a share of its usual one: what is less is not seen to move.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// A built-in motion is rehearsed in spans of this length \[s\], in which nothing is missed at 1 kHz.
+const SPAN_S: f64 = 0.1;
+
+/// And in so many at most: of a day every 43 ms is looked at, in which the fastest sine changes by a hundredth.
+const MOST_SPANS: f64 = 20_000.0;
+
 /// A daemon that has not said for this long that it is in control is not: the approach starts over \[ns\].
 const GIVEN_UP_NS: u64 = 200_000_000;
 
@@ -49,6 +61,8 @@ pub enum SetpointError {
     Port(#[from] PortError),
     #[error(transparent)]
     Table(#[from] TableError),
+    #[error("{motion:?} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}", share = percent(LEAST_SHARE))]
+    TooSmall { motion: Motion, seconds: f64, refusal: Refusal },
 }
 
 /// What to play.
@@ -59,14 +73,48 @@ pub enum Score {
 }
 
 impl Score {
-    /// A built-in motion, as large as the machine can carry.
-    pub fn motion(machine: &Machine, motion: Motion, seconds: f64) -> Self {
-        Self::Scene(fit(machine, motion, seconds))
+    /// A built-in motion, as large as the machine can carry and the daemon accepts.
+    pub fn motion(config: &Config, motion: Motion, seconds: f64) -> Result<Self, SetpointError> {
+        let rehearsal = Rehearsal::new(config).with_reserve();
+        let largest = fit(&config.machine, motion, seconds);
+        let spans = (seconds / SPAN_S).ceil().clamp(1.0, MOST_SPANS) as u32;
+        let refusal = |scene: &Scene| rehearsal.first_refusal(|t| scene.at(t), seconds, spans);
+        let Some(too_large) = refusal(&largest) else { return Ok(Self::Scene(largest)) };
+        let least = largest.smaller(LEAST_SHARE / largest.angle_share);
+        if let Some(refusal) = refusal(&least) {
+            return Err(SetpointError::TooSmall { motion, seconds, refusal });
+        }
+        let share = boundary(1.0, |share| refusal(&largest.smaller(share)).is_none());
+        info!(
+            "{motion:?} with {} of the amplitude that the drives carry: beyond, at {too_large}",
+            percent(share)
+        );
+        Ok(Self::Scene(largest.smaller(share)))
     }
 
-    /// A trajectory from a CSV file. It must begin and end at rest, with times that increase.
-    pub fn trajectory(path: &Path) -> Result<Self, SetpointError> {
-        Self::from_rows(&Table::read(path, &trajectory_columns(), &[])?, path)
+    /// A trajectory from a CSV file. It must begin and end at rest, with times that increase, and be what the
+    /// daemon accepts.
+    pub fn trajectory(config: &Config, path: &Path) -> Result<Self, SetpointError> {
+        let table = Table::read(path, &trajectory_columns(), &[])?;
+        let score = Self::from_rows(&table, path)?;
+        score.rehearsed(config, &table, path)?;
+        Ok(score)
+    }
+
+    /// Complains of each row on the way to which the daemon would refuse a setpoint.
+    fn rehearsed(&self, config: &Config, table: &Table, path: &Path) -> Result<(), TableError> {
+        let rehearsal = Rehearsal::new(config);
+        let times = table.rows().iter().filter_map(|row| row.first());
+        let first = times.clone().next().copied().unwrap_or_default();
+        let mut complaints = Complaints::about(path);
+        // What comes before the first row is the first row.
+        let befores = times.clone().take(1).chain(times.clone());
+        for ((before, now), line) in befores.zip(times).zip(table.lines()) {
+            if let Some(refusal) = rehearsal.refusal(|t| self.at(t - first), [*before, *now]) {
+                complaints.add(format!("line {line}: on the way to it, at {refusal}"));
+            }
+        }
+        complaints.verdict()
     }
 
     /// A trajectory from a table with its columns; messages call it `path`.

@@ -69,6 +69,15 @@ impl Scene {
         state
     }
 
+    /// The same with a share of its amplitude.
+    pub fn smaller(&self, share: f64) -> Self {
+        Self {
+            position_amplitude: share * self.position_amplitude,
+            angle_share: share * self.angle_share,
+            ..*self
+        }
+    }
+
     fn faded(&self, t: f64, d: &TaskState) -> TaskState {
         // A motion too short for both fades is all fade.
         scaled(d, &window(t, self.duration, FADE_S.min(0.5 * self.duration)))

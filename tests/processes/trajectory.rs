@@ -110,6 +110,51 @@ fn bad_trajectories_are_refused_by_file_and_value() {
     }
 }
 
+/// What the daemon would refuse in motion is told by the row on the way to which it would.
+#[test]
+fn what_the_daemon_would_refuse_is_told_before_it_begins() {
+    let envelope = "[envelope]\nvelocity = [9.0, 9.0, 9.0, 9.0, 9.0, 9.0]\nacceleration = [9.0, 9.0, 9.0, 9.0, 9.0, 9.0]\n\
+                    pose_min = [-0.1, -0.1, -0.1, -0.1, -0.1, -0.1]\npose_max = [0.1, 0.1, 0.1, 0.04, 0.1, 0.1]";
+    let limit = |key: &str| format!("[limits]\n{key}");
+    // The move is fastest between rows 6 and 7, strongest at a fifth, most jerky at its ends.
+    let cases: [(&str, String, &[&str]); 5] = [
+        (
+            "velocity",
+            limit("velocity_m_s = 0.06"),
+            &["line 6", "(velocity): 1.0", "times the limit (bound 1.0"],
+        ),
+        ("acceleration", limit("acceleration_m_s2 = 0.12"), &["line 4", "(acceleration): 1.0", "(bound 1.0"]),
+        ("jerk", limit("jerk_m_s3 = 0.5"), &["line 3", "t = 0.0010", "(jerk): 1.7", "(bound 1.0"]),
+        (
+            "envelope",
+            envelope.into(),
+            &["line 9", "outside of the envelope, leg or axis 4: 1.14", "(bound 1.14"],
+        ),
+        ("reach", String::new(), &["line 4", "beyond the stroke of a leg", " m (bound "]),
+    ];
+    for (name, sections, words) in cases {
+        let machine = Machine::with("beforehand", &sections);
+        let file = machine.path(&format!("{name}.csv"));
+        let mut rows = rows();
+        if name == "reach" {
+            // Ten times as far in ten times the time.
+            for row in &mut rows {
+                (row[0], row[4], row[16]) = (10.0 * row[0], HOME + 10.0 * (row[4] - HOME), 0.1 * row[16]);
+            }
+        }
+        fs::write(&file, table(&rows)).expect("a trajectory");
+        let (to, config) = (file.as_os_str(), machine.file.as_os_str());
+        let ended =
+            run(&machine, &["move".as_ref(), "--config".as_ref(), config, "--trajectory".as_ref(), to]);
+        assert_eq!(ended.status.code(), Some(2), "{name}: {}", ended.stderr);
+        let first = ended.stderr.lines().next().expect("a message");
+        assert!(first.starts_with(&format!("hexad: {}: ", file.display())), "{name}: {first}");
+        for word in words {
+            assert!(first.contains(word), "{name}: {word:?} must be in {first}");
+        }
+    }
+}
+
 /// t, X, X', X'' of a minimum-jerk move along x, by rows so far apart that what is between them matters.
 fn rows() -> Vec<Vec<f64>> {
     (0..=10)

@@ -120,7 +120,7 @@ impl Patience {
 impl What {
     pub fn score(&self, config: &Config, seconds: f64) -> Result<Score, SetpointError> {
         match (&self.trajectory, self.motion) {
-            (Some(path), _) => Score::trajectory(path),
+            (Some(path), _) => Score::trajectory(config, path),
             (None, name) => {
                 let motion = match name.unwrap_or(MotionName::Settle) {
                     MotionName::Settle => Motion::Settle,
@@ -129,7 +129,7 @@ impl What {
                     MotionName::Circle => Motion::Circle,
                     MotionName::Paper => Motion::Paper,
                 };
-                Ok(Score::motion(&config.machine, motion, seconds))
+                Score::motion(config, motion, seconds)
             }
         }
     }

@@ -2,7 +2,6 @@
 
 extern crate std;
 
-use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::prelude::rust_2024::*;
@@ -18,7 +17,8 @@ use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::statistics::Collector;
 use crate::control::controller::Output;
-use crate::control::state::{Cause, Evidence, State};
+use crate::control::state::{Cause, State};
+use crate::host::faults::Told;
 use crate::host::report::{Fault, TrackingSum};
 use crate::ipc::statistics::Statistics;
 use crate::realtime::cyclic::CycleRecord;
@@ -125,21 +125,5 @@ fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
             warn!(cycle, number = cause as u32, "stopping: {}{}", cause.name(), Told(cause, evidence))
         }
         _ => info!(cycle, "{}: {}{}", state.name(), cause.name(), Told(cause, evidence)),
-    }
-}
-
-/// The numbers behind a cause, if it has any.
-struct Told(Cause, Evidence);
-
-impl fmt::Display for Told {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(cause, Evidence { value, bound, index }) = self;
-        if cause.unit().is_empty() {
-            return Ok(());
-        }
-        if *index > 0 {
-            write!(f, ", leg or axis {index}")?;
-        }
-        write!(f, ": {value:.6} {} (bound {bound:.6})", cause.unit())
     }
 }

@@ -1,0 +1,124 @@
+//! The built-in motions: whatever their length and the deployment's limits, the controller takes every setpoint.
+
+use core::iter::repeat_n;
+
+use hexad::control::state::{Cause, State};
+use hexad::host::config::Config;
+use hexad::host::setpoints::Score;
+use hexad::model::task::TaskState;
+use hexad::scene::envelope;
+use hexad::scene::motions::{Motion, Scene, fit};
+
+use super::common::deployed;
+use super::rig::Rig;
+
+const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
+const MOTIONS: [Motion; 5] =
+    [Motion::Settle, Motion::MinimumJerk, Motion::Sines, Motion::Circle, Motion::Paper];
+
+fn shaped(config: &Config, motion: Motion, seconds: f64) -> Scene {
+    match Score::motion(config, motion, seconds) {
+        Ok(Score::Scene(scene)) => scene,
+        other => panic!("{} {motion:?} {seconds} s: {other:?}", config.name),
+    }
+}
+
+/// How much smaller it was made.
+fn share(config: &Config, scene: &Scene) -> f64 {
+    scene.angle_share / fit(&config.machine, scene.motion, scene.duration).angle_share
+}
+
+/// Plays a scene, its first instant this part of a cycle after a setpoint.
+fn is_accepted(config: &Config, scene: &Scene, phase: f64) {
+    let mut rig = Rig::new(config, &config.machine);
+    rig.engage(&scene.at(0.0));
+    let period_s = rig.period_ns as f64 * 1e-9;
+    let cycles = (scene.duration / period_s) as u32 + 10;
+    for k in 0..cycles {
+        let output = rig.cycle(&rig.input(&scene.at((f64::from(k) - phase) * period_s)));
+        let place = format!("{} {scene:?} cycle {k} {:?}", config.name, output.evidence);
+        assert_eq!((output.state, output.cause), (State::Active, Cause::None), "{place}");
+        assert_eq!(output.without_setpoint, 0, "refused: {place}");
+    }
+}
+
+#[test]
+fn of_every_length_are_accepted() {
+    for name in MACHINES {
+        let config = deployed(name);
+        for (motion, seconds) in
+            MOTIONS.into_iter().flat_map(|motion| [0.5, 1.0, 2.0, 8.0].map(|s| (motion, s)))
+        {
+            let scene = shaped(&config, motion, seconds);
+            println!("{name} {motion:?} {seconds} s: {:.4} of what the drives carry", share(&config, &scene));
+            [0.0, 0.37, 0.5].into_iter().for_each(|phase| is_accepted(&config, &scene, phase));
+            assert!(share(&config, &scene) <= 1.0);
+        }
+    }
+}
+
+/// What the limits leave room for is as it was.
+#[test]
+fn of_the_usual_length_lose_nothing() {
+    for name in MACHINES {
+        // As patient as a demonstration, too: who is carried on for longer needs more room.
+        for timeout_s in [0.05, 0.2] {
+            let mut config = deployed(name);
+            config.deployment.timeouts.setpoint_s = timeout_s;
+            for motion in MOTIONS {
+                assert_eq!(
+                    share(&config, &shaped(&config, motion, 8.0)),
+                    1.0,
+                    "{name} {motion:?} {timeout_s}"
+                );
+            }
+        }
+    }
+}
+
+/// Each limit makes a motion smaller, and no smaller than it must be.
+#[test]
+fn keep_each_limit_of_the_deployment() {
+    let tighten: [(&str, fn(&mut Config)); 7] = [
+        ("velocity", |c| c.deployment.limits.reference.position.velocity = 0.05),
+        ("acceleration", |c| c.deployment.limits.reference.position.acceleration = 0.2),
+        ("jerk", |c| c.deployment.limits.reference.position.jerk = 5.0),
+        ("turning", |c| c.deployment.limits.reference.orientation.velocity = 0.1),
+        ("turning jerk", |c| c.deployment.limits.reference.orientation.jerk = 4.0),
+        ("envelope", |c| {
+            let [half, any] = [[0.02; 6], [10.0; 6]];
+            let limits = envelope::Limits {
+                pose_min: half.map(|x| -x),
+                pose_max: half,
+                velocity: any,
+                acceleration: any,
+            };
+            c.deployment.envelope = Some(limits);
+        }),
+        ("condition", |c| {
+            let home = TaskState::at_rest(c.machine.home).motion().pose;
+            let at_home = hexad::model::stance::Stance::new(&c.machine, home).sensitivity().condition;
+            c.deployment.limits.condition = 1.02 * at_home;
+        }),
+    ];
+    for (name, (what, tighten)) in MACHINES.into_iter().flat_map(|name| repeat_n(name, 7).zip(tighten)) {
+        let mut config = deployed(name);
+        tighten(&mut config);
+        // Engaging is not what is looked at, so it need not be gentle.
+        config.deployment.limits.reference.own_share = 1.0;
+        let scene = shaped(&config, Motion::Sines, 8.0);
+        println!("{name} {what}: {:.3}", share(&config, &scene));
+        assert!((0.01..0.99).contains(&share(&config, &scene)), "{name} {what}: {}", share(&config, &scene));
+        is_accepted(&config, &scene, 0.5);
+    }
+}
+
+#[test]
+fn that_could_not_be_seen_are_refused_with_the_reason() {
+    let mut config = deployed("fried2008");
+    config.deployment.limits.reference.position.velocity = 1e-4;
+    let error = Score::motion(&config, Motion::MinimumJerk, 0.5).unwrap_err().to_string();
+    for word in ["0.100 %", "t = 0.", "(velocity)", "times the limit (bound 1.0"] {
+        assert!(error.contains(word), "{word:?} must be in {error}");
+    }
+}
