@@ -116,12 +116,12 @@ fn what_the_daemon_would_refuse_is_told_before_it_begins() {
     let envelope = "[envelope]\nvelocity = [9.0, 9.0, 9.0, 9.0, 9.0, 9.0]\nacceleration = [9.0, 9.0, 9.0, 9.0, 9.0, 9.0]\n\
                     pose_min = [-0.1, -0.1, -0.1, -0.1, -0.1, -0.1]\npose_max = [0.1, 0.1, 0.1, 0.04, 0.1, 0.1]";
     let limit = |key: &str| format!("[limits]\n{key}");
-    // The move is fastest between rows 6 and 7, strongest at a fifth, most jerky at its ends.
+    // The move is fastest in the middle, which is line 7, strongest at a fifth of the time, most jerky at its ends.
     let cases: [(&str, String, &[&str]); 5] = [
         (
             "velocity",
             limit("velocity_m_s = 0.06"),
-            &["line 6", "(velocity): 1.0", "times the limit (bound 1.0"],
+            &["line 7", "(velocity): 1.0", "times the limit (bound 1.0"],
         ),
         ("acceleration", limit("acceleration_m_s2 = 0.12"), &["line 4", "(acceleration): 1.0", "(bound 1.0"]),
         ("jerk", limit("jerk_m_s3 = 0.5"), &["line 3", "t = 0.0010", "(jerk): 1.7", "(bound 1.0"]),
@@ -130,7 +130,7 @@ fn what_the_daemon_would_refuse_is_told_before_it_begins() {
             envelope.into(),
             &["line 9", "outside of the envelope, leg or axis 4: 1.14", "(bound 1.14"],
         ),
-        ("reach", String::new(), &["line 4", "beyond the stroke of a leg", " m (bound "]),
+        ("reach", String::new(), &["line 10", "beyond the stroke of a leg", " m (bound "]),
     ];
     for (name, sections, words) in cases {
         let machine = Machine::with("beforehand", &sections);
