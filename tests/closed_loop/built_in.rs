@@ -16,6 +16,9 @@ const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 const MOTIONS: [Motion; 5] =
     [Motion::Settle, Motion::MinimumJerk, Motion::Sines, Motion::Circle, Motion::Paper];
 
+/// Makes one limit tighter.
+type Tighten = fn(&mut Config);
+
 /// In cycles.
 const LONGEST_ENGAGING: u32 = 20_000;
 
@@ -89,7 +92,7 @@ fn of_the_usual_length_lose_nothing() {
 /// Each limit makes a motion smaller, and no smaller than it must be.
 #[test]
 fn keep_each_limit_of_the_deployment() {
-    let tighten: [(&str, fn(&mut Config)); 7] = [
+    let tighten: [(&str, Tighten); 7] = [
         ("velocity", |c| c.deployment.limits.reference.position.velocity = 0.05),
         ("acceleration", |c| c.deployment.limits.reference.position.acceleration = 0.2),
         ("jerk", |c| c.deployment.limits.reference.position.jerk = 5.0),
