@@ -1,6 +1,6 @@
 //! Whether the daemon would take the setpoints of a score, by its own rule, before anything moves.
 //!
-//! What this file does not do: say whether the forces suffice, or how the platform gets to the first setpoint.
+//! What this file does not do: say whether the forces suffice; the way to the first setpoint keeps the limits by itself.
 
 extern crate std;
 

@@ -24,6 +24,7 @@ use super::plant::prepare_thread;
 use super::rehearsal::{Refusal, Rehearsal};
 use super::stop::Stop;
 use super::table::{Complaints, Table, TableError, trajectory_columns};
+use crate::control::limits::{AxisLimits, Limits};
 use crate::control::sampled::boundary;
 use crate::control::state::{Cause, Request, State};
 use crate::ipc::messages::{MeasuredMessage, SetpointMessage, StatusMessage};
@@ -31,6 +32,7 @@ use crate::ipc::ports::{PortError, Sink, Source, Time};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use crate::scene::minimum_jerk::shortest_duration;
 use crate::scene::motions::{Motion, Scene, fit};
 use crate::scene::timeline::Timeline;
 use crate::scene::trajectory::{Knot, interpolate};
@@ -51,6 +53,9 @@ const SPAN_S: f64 = 0.1;
 /// And in so many at most: of a day every 43 ms is looked at, in which the fastest sine changes by a hundredth.
 const MOST_SPANS: f64 = 20_000.0;
 
+/// What the approach uses of each limit: what angles that turn at once add to each other is within the rest.
+const APPROACH_SHARE: f64 = 0.5;
+
 /// A daemon that has not said for this long that it is in control is not: the approach starts over \[ns\].
 const GIVEN_UP_NS: u64 = 200_000_000;
 
@@ -61,7 +66,7 @@ pub enum SetpointError {
     Port(#[from] PortError),
     #[error(transparent)]
     Table(#[from] TableError),
-    #[error("{motion:?} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}", share = percent(LEAST_SHARE))]
+    #[error("{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}", name = .motion.name(), share = percent(LEAST_SHARE))]
     TooSmall { motion: Motion, seconds: f64, refusal: Refusal },
 }
 
@@ -86,7 +91,8 @@ impl Score {
         }
         let share = boundary(1.0, |share| refusal(&largest.smaller(share)).is_none());
         info!(
-            "{motion:?} with {} of the amplitude that the drives carry: beyond, at {too_large}",
+            "{} with {} of the amplitude that the drives carry: with more, at {too_large}",
+            motion.name(),
             percent(share)
         );
         Ok(Self::Scene(largest.smaller(share)))
@@ -169,7 +175,7 @@ impl Score {
 pub fn run(config: &Config, score: &Score, engage: bool, stop: &Stop) -> Result<(), SetpointError> {
     let bus = join(config)?;
     let setpoints = bus.source()?;
-    let player = Player::new(&config.machine, score, Operator::new(&bus)?, engage);
+    let player = Player::new(config, score, Operator::new(&bus)?, engage);
     info!(name = %config.name, seconds = score.duration(), "waiting for the daemon to know where the platform is");
     match bus.time() {
         Time::Real => run_in_real_time(config, player, setpoints, stop)?,
@@ -233,6 +239,7 @@ enum Cue {
 /// Where in the score we are.
 struct Player<'a> {
     machine: &'a Machine,
+    limits: &'a Limits,
     score: &'a Score,
     operator: Operator,
     /// Asks for control, until it was given.
@@ -246,8 +253,10 @@ struct Player<'a> {
 }
 
 impl<'a> Player<'a> {
-    fn new(machine: &'a Machine, score: &'a Score, operator: Operator, engage: bool) -> Self {
-        Self { machine, score, operator, engage, timeline: None, engaged_ns: None, last_active_ns: 0 }
+    fn new(config: &'a Config, score: &'a Score, operator: Operator, engage: bool) -> Self {
+        let Config { machine, deployment, .. } = config;
+        let limits = &deployment.limits.reference;
+        Self { machine, limits, score, operator, engage, timeline: None, engaged_ns: None, last_active_ns: 0 }
     }
 
     fn cue(&mut self, now_ns: u64) -> Result<Cue, PortError> {
@@ -282,12 +291,25 @@ impl<'a> Player<'a> {
             self.last_active_ns = 0;
             if self.engaged_ns.is_none() && status.pose_valid == 1 {
                 let (from, to) = (Vector6::from(status.x), self.score.at(0.0).x);
-                self.timeline = Some(Timeline::new(self.machine, &from, &to, self.score.duration()));
+                let timeline = Timeline::new(self.machine, &from, &to, self.score.duration());
+                self.timeline = Some(timeline.no_shorter_than(gentle_s(self.limits, &from, &to)));
             }
         }
         // While it engages, what was offered must stand. A platform that moves on somebody else's setpoints
         // is offered nothing.
     }
+}
+
+/// Time \[s\] of an approach that keeps the limits, in any direction.
+fn gentle_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
+    let way = to - from;
+    // No angle turns the platform further than by itself.
+    let angle = way.fixed_rows::<3>(0).abs().sum();
+    let shortest = |way: f64, limits: &AxisLimits| {
+        let AxisLimits { velocity, acceleration, jerk } = limits.share(APPROACH_SHARE);
+        shortest_duration(way, [velocity, acceleration, jerk])
+    };
+    shortest(angle, &limits.orientation).max(shortest(way.fixed_rows::<3>(3).norm(), &limits.position))
 }
 
 fn message(state: &TaskState) -> SetpointMessage {
@@ -306,6 +328,28 @@ mod tests {
     /// A row at rest with these t and x.
     fn row(t: &str, x: &str) -> String {
         format!("{t},0,0,0,{x},0,0{}\n", ",0".repeat(12))
+    }
+
+    /// From far and turned, under limits of which each binds once; a quarter of the time would not do.
+    #[test]
+    fn the_approach_keeps_the_limits() {
+        let text = include_str!("../../config/fried2008.toml");
+        for tight in
+            ["velocity_m_s = 0.02", "acceleration_m_s2 = 0.02", "jerk_m_s3 = 0.05", "jerk_rad_s3 = 0.1"]
+        {
+            let config = Config::parse(&format!("{text}\n[limits]\n{tight}\n"), "a test").unwrap();
+            let home = Vector6::from(config.machine.home);
+            let from = home + Vector6::new(0.08, -0.1, 0.09, 0.06, 0.05, -0.04);
+            let rehearsal = Rehearsal::new(&config);
+            let refused = |share: f64| {
+                let gentle_s = share * gentle_s(&config.deployment.limits.reference, &from, &home);
+                let timeline = Timeline::new(&config.machine, &from, &home, 1.0).no_shorter_than(gentle_s);
+                let at = |t| timeline.at(t, |_| TaskState::at_rest(config.machine.home));
+                rehearsal.first_refusal(at, timeline.scene_begins(), 500)
+            };
+            assert!(refused(1.0).is_none(), "{tight}: {:?}", refused(1.0));
+            assert!(refused(0.25).is_some(), "{tight}");
+        }
     }
 
     fn read(rows: &[String]) -> Result<Score, SetpointError> {

@@ -8,6 +8,16 @@ use crate::model::task::TaskState;
 /// Peak of s' for a unit duration: how much faster than its mean a move is in its middle.
 pub const PEAK_RATE: f64 = 1.875;
 
+/// Peaks of the second and third derivative of s for a unit duration: 10 / sqrt 3, and 60 at both ends.
+const PEAK_ACCEL: f64 = 5.773502691896258;
+const PEAK_JERK: f64 = 60.0;
+
+/// The shortest duration of a way that keeps a velocity, an acceleration and a jerk.
+pub fn shortest_duration(way: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
+    let by_rate = PEAK_RATE * way / velocity;
+    by_rate.max((PEAK_ACCEL * way / acceleration).sqrt()).max((PEAK_JERK * way / jerk).cbrt())
+}
+
 /// A scalar and its first two time derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Profile {
@@ -70,5 +80,19 @@ mod tests {
         let end = window(3.0, 3.0, 0.8);
         assert!(end.value.abs() < 1e-15 && end.rate.abs() < 1e-12 && end.accel.abs() < 1e-12, "{end:?}");
         assert_eq!(rise(0.5, 1.0).rate, PEAK_RATE);
+        let strongest = (0..=1000).map(|k| rise(f64::from(k) / 1000.0, 1.0).accel).fold(0.0, f64::max);
+        assert!((strongest - PEAK_ACCEL).abs() < 1e-4);
+        assert!((rise(1e-6, 1.0).accel / 1e-6 - PEAK_JERK).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_shortest_duration_is_that_of_the_limit_that_binds() {
+        let way = 0.3;
+        for limits in [[0.1, 1e9, 1e9], [1e9, 0.1, 1e9], [1e9, 1e9, 0.1]] {
+            let t = shortest_duration(way, limits);
+            let peaks = [PEAK_RATE * way / t, PEAK_ACCEL * way / (t * t), PEAK_JERK * way / (t * t * t)];
+            let share = peaks.iter().zip(limits).map(|(peak, limit)| peak / limit).fold(0.0, f64::max);
+            assert!((share - 1.0).abs() < 1e-12, "{share}");
+        }
     }
 }

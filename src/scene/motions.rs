@@ -43,6 +43,19 @@ pub enum Motion {
     Paper,
 }
 
+impl Motion {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Settle => "settle",
+            Self::MinimumJerk => "minimum-jerk",
+            Self::Sines => "sines",
+            Self::Circle => "circle",
+            Self::Paper => "paper",
+        }
+    }
+}
+
 /// A motion of a given length and size about the home pose of a machine.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {

@@ -38,6 +38,11 @@ impl Timeline {
         Self { from: *from, to: *to, approach: approach.max(SETTLE_S), scene }
     }
 
+    /// With an approach of so many seconds at least.
+    pub fn no_shorter_than(self, seconds: f64) -> Self {
+        Self { approach: self.approach.max(seconds), ..self }
+    }
+
     /// Seconds from the start to the scene's first instant.
     pub fn scene_begins(&self) -> f64 {
         2.0 * SETTLE_S + self.approach
