@@ -2,15 +2,13 @@
 
 extern crate std;
 
-use core::f64::consts::TAU;
 use core::fmt;
-use std::{format, prelude::rust_2024::*, vec};
+use std::{format, prelude::rust_2024::*};
 
 use super::assembly::{Other, others};
 use super::config::Config;
-use super::config::deployment::GAIN_MARGIN;
+use super::loops::loops;
 use crate::control::leg_masses::LegMasses;
-use crate::control::sampled::{LONGEST_DELAY, SampledLoop};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
@@ -95,10 +93,6 @@ impl Check<'_> {
             String::new()
         };
         writeln!(f, "control mode {}{observed}", control.mode.name())?;
-        let mut loops = vec![
-            ("position", control.position_bandwidth_hz, control.position_damping_ratio, 1.0),
-            ("orientation", control.orientation_bandwidth_hz, control.orientation_damping_ratio, 1.0),
-        ];
         if control.mode.acts_on_legs() {
             let legs = LegMasses::at_home(machine);
             let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
@@ -108,16 +102,12 @@ impl Check<'_> {
                 root(legs.softest),
                 root(legs.stiffest)
             )?;
-            loops =
-                vec![("legs", control.position_bandwidth_hz, control.position_damping_ratio, legs.stiffest)];
         }
-        for (what, bandwidth, damping, gain) in loops {
-            let sampled = SampledLoop {
-                observer: control.observer_bandwidth_hz / bandwidth,
-                mass_ratio: 1.0 / gain,
-                ..deployment.realtime.sampled_loop(bandwidth, damping)
-            };
-            fmt_loop(f, what, bandwidth, deployment.realtime.rate_hz, &sampled)?;
+        for control_loop in loops(self.config) {
+            writeln!(f, "{control_loop}")?;
+            if let Some(warning) = control_loop.warning() {
+                writeln!(f, "WARNING: {warning}")?;
+            }
         }
         Ok(())
     }
@@ -149,33 +139,4 @@ impl Check<'_> {
         }
         Ok(())
     }
-}
-
-/// A loop, what it carries with its delay, and how much delay it would carry.
-fn fmt_loop(
-    f: &mut fmt::Formatter<'_>,
-    what: &str,
-    bandwidth: f64,
-    rate_hz: f64,
-    sampled: &SampledLoop,
-) -> fmt::Result {
-    let (limit, margin, longest) = (sampled.largest_wn_t(), sampled.gain_margin(), sampled.longest_delay());
-    let beyond = if longest < 0.99 * LONGEST_DELAY as f64 { "" } else { "more than " };
-    writeln!(
-        f,
-        "{what:<12} bandwidth {bandwidth:>6.2} Hz at {rate_hz:.0} Hz: wn T = {:.3}, with {:.2} periods of delay stable \
-         to {limit:.3} ({:.2} Hz), gain margin {margin:.2}; stable to {beyond}{longest:.1} periods",
-        sampled.wn_t,
-        sampled.delay,
-        limit * rate_hz / TAU,
-    )?;
-    if margin < GAIN_MARGIN {
-        writeln!(
-            f,
-            "WARNING: with that delay a platform of less than {:.2} of the modelled mass is unstable; a gain margin \
-             of {GAIN_MARGIN} is usual",
-            1.0 / margin,
-        )?;
-    }
-    Ok(())
 }

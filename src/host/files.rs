@@ -2,8 +2,9 @@
 
 extern crate std;
 
+use core::fmt;
 use std::fs;
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::prelude::rust_2024::*;
 
@@ -20,6 +21,17 @@ impl FileError {
     pub fn on(path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
         let path = path.to_path_buf();
         move |cause| Self { path, cause }
+    }
+}
+
+/// Writes to standard output. Who reads it may have read enough: that is no failure.
+pub fn print(text: impl fmt::Display) -> Result<(), FileError> {
+    let mut out = io::stdout().lock();
+    match write!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(FileError::on(Path::new("standard output"))(error))
+        }
+        _ => Ok(()),
     }
 }
 

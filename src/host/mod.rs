@@ -20,6 +20,7 @@ pub mod files;
 pub mod histogram;
 mod join;
 mod lockstep;
+pub mod loops;
 mod numbers;
 pub mod offline;
 pub mod operator;

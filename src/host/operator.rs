@@ -199,16 +199,14 @@ fn outcome(request: Request, state: State) -> Option<bool> {
     }
 }
 
-/// The command: asks, waits, says what came of it.
+/// The command: asks, waits, and knows what came of it.
 pub fn run(
     config: &Config,
     request: Request,
     is_patient: bool,
     longest: Duration,
     stop: &Stop,
-) -> Result<(), OperatorError> {
+) -> Result<State, OperatorError> {
     let bus = join(config)?;
-    let state = Operator::new(&bus)?.carry_out(&config.name, request, is_patient, longest, stop)?;
-    std::println!("{}", state.name());
-    Ok(())
+    Operator::new(&bus)?.carry_out(&config.name, request, is_patient, longest, stop)
 }

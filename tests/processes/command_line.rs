@@ -1,9 +1,12 @@
 //! What is typed wrong is refused in one message, with exit code 2, before anything starts.
 
 use std::ffi::OsStr;
+use std::fs::File;
+use std::process::Stdio;
 
-use crate::support::children::run;
+use crate::support::children::{HANG, hexad, run};
 use crate::support::machine::Machine;
+use crate::support::trio::start_daemon;
 
 /// Runs a command line that must be refused with these words; nothing goes to standard output.
 fn refused(arguments: &[&str], words: &[&str]) {
@@ -99,4 +102,27 @@ fn check_shows_a_good_machine() {
         assert!(ended.stdout.contains(words), "{words:?} must be in\n{}", ended.stdout);
     }
     assert_eq!(ended.stdout.matches(" deg\n").count(), 6, "a line for each leg:\n{}", ended.stdout);
+}
+
+/// As of `hexad check | head -1`; and what could not be written is no success.
+#[test]
+fn who_has_read_enough_is_no_failure_and_a_full_disk_is_one() {
+    let mut child = hexad().arg("faults").stdout(Stdio::piped()).spawn().expect("a process");
+    drop(child.stdout.take());
+    assert_eq!(child.wait().expect("its end").code(), Some(0));
+    let full = File::options().write(true).open("/dev/full").expect("a full disk");
+    let ended = hexad().arg("faults").stdout(full).output().expect("a process");
+    assert_eq!(ended.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&ended.stderr).contains("standard output: No space left"), "{ended:?}");
+}
+
+/// `hexad check` tells it too, but who runs a daemon may not have asked.
+#[test]
+fn a_daemon_says_that_its_loop_is_bold() {
+    let machine = Machine::with("bold", "[control]\nposition_bandwidth_hz = 30.0\n");
+    let daemon = start_daemon(&machine);
+    daemon.says("WARN position loop: with 2.10 periods of delay a platform of less than 0.7");
+    daemon.says("running");
+    assert!(!daemon.words().contains("orientation loop"), "{}", daemon.words());
+    daemon.stops_on("TERM", HANG);
 }

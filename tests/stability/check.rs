@@ -50,6 +50,10 @@ fn a_loop_near_its_limit_is_told() {
         of_position[0].contains("2.10 periods of delay stable to 0.250 (39.80 Hz), gain margin 1.9"),
         "{bold}"
     );
-    assert!(of_position[1].starts_with("WARNING: with that delay a platform of less than 0.5"), "{bold}");
+    assert!(
+        of_position[1]
+            .starts_with("WARNING: position loop: with 2.10 periods of delay a platform of less than 0.5"),
+        "{bold}"
+    );
     assert!(of_position[2].starts_with("orientation ") && of_position.len() == 3, "{bold}");
 }

@@ -4,6 +4,7 @@ use hexad::host::advise::AdviseError;
 use hexad::host::config::ConfigError;
 use hexad::host::demo::DemoError;
 use hexad::host::doctor::DoctorError;
+use hexad::host::files::FileError;
 use hexad::host::offline::OfflineError;
 use hexad::host::operator::OperatorError;
 use hexad::host::setpoints::SetpointError;
@@ -25,6 +26,12 @@ impl Failure {
 impl From<ConfigError> for Failure {
     fn from(error: ConfigError) -> Self {
         Self::could_not_begin(error)
+    }
+}
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
+        Self { code: 1, what: error.to_string() }
     }
 }
 

@@ -10,6 +10,7 @@ use hexad::host::check::Check;
 use hexad::host::demo::{self, Demo};
 use hexad::host::doctor::{self, Doctor};
 use hexad::host::faults::Faults;
+use hexad::host::files::print;
 use hexad::host::stop::Stop;
 use hexad::host::workspace::Survey;
 use hexad::host::{daemon, export, offline, operator, plant, setpoints};
@@ -237,25 +238,18 @@ impl Cli {
             Command::Clear { machine, patience } => ask(&machine, Request::Clear, false, &patience),
             Command::Off { machine, patience } => ask(&machine, Request::Off, false, &patience),
             Command::Estop { machine, patience } => ask(&machine, Request::Estop, false, &patience),
-            Command::Faults => {
-                print!("{Faults}");
-                Ok(())
-            }
-            Command::Check { machine } => {
-                print!("{}", Check::new(&machine.load()?));
-                Ok(())
-            }
+            Command::Faults => Ok(print(Faults)?),
+            Command::Check { machine } => Ok(print(Check::new(&machine.load()?))?),
             Command::Doctor { config, cpu, seconds, report, disturb } => {
                 let doctor = Doctor { config, cpu, seconds, report, disturb };
                 doctor::run(&doctor, &stop()?).map_err(Failure::from)
             }
             Command::Advise { machine, trajectory } => {
-                print!("{}", Advice::new(&machine.load()?, trajectory.as_deref())?);
-                Ok(())
+                Ok(print(Advice::new(&machine.load()?, trajectory.as_deref())?)?)
             }
             Command::Workspace { machine, wish } => {
-                print!("{}", Survey::new(&machine.load()?, &wish.into()).map_err(Failure::could_not_begin)?);
-                Ok(())
+                let survey = Survey::new(&machine.load()?, &wish.into()).map_err(Failure::could_not_begin)?;
+                Ok(print(survey)?)
             }
             Command::Export { machine, format, output } => {
                 export::export(&machine.load()?, format.into(), output.as_deref())
@@ -275,7 +269,8 @@ impl Cli {
 
 fn ask(machine: &MachineFile, request: Request, wait: bool, patience: &Patience) -> Result<(), Failure> {
     let config = machine.load()?;
-    Ok(operator::run(&config, request, wait, patience.longest(), &stop()?)?)
+    let state = operator::run(&config, request, wait, patience.longest(), &stop()?)?;
+    Ok(print(format_args!("{}\n", state.name()))?)
 }
 
 /// Signals end the command in order instead of killing it.

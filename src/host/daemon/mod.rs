@@ -32,6 +32,7 @@ use super::config::deployment::{Deployment, ReleaseKey};
 use super::fidelity;
 use super::files::{FileError, write_whole};
 use super::join::join;
+use super::loops::{ControlLoop, loops};
 use super::report::{DeadlineMisses, Report};
 use super::stop::Stop;
 use crate::control::controller::{Controller, Envelope, Input, Parameters};
@@ -110,6 +111,9 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
 
 fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(Report, String), DaemonError> {
     let Config { machine, deployment, .. } = config;
+    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+        warn!("{warning}");
+    }
     let mut controller = Controller::new(machine, parameters(machine, deployment, fidelity::rung(config)));
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();

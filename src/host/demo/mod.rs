@@ -17,7 +17,7 @@ use self::summary::Summary;
 use super::charts::ChartError;
 use super::config::text::text_of;
 use super::config::{Config, ConfigError};
-use super::files::{FileError, write_whole};
+use super::files::{FileError, print, write_whole};
 use super::join::join;
 use super::operator::Operator;
 use super::report::Report;
@@ -93,11 +93,11 @@ pub fn run(demo: &Demo, stop: &Stop) -> Result<(), DemoError> {
     let mut report = Report::read(&stage.report)?;
     report.tracking = tracking.tracking();
     let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config.machine, &recording)?;
-    std::print!("{}", Summary { title: &stage.title, report: &report });
-    std::println!("pictures         {} in {}", pictures.len(), demo.charts.display());
+    print(Summary { title: &stage.title, report: &report })?;
+    print(format_args!("pictures         {} in {}\n", pictures.len(), demo.charts.display()))?;
     if let Some(path) = &demo.report {
         report.write(path)?;
-        std::println!("report           {}", path.display());
+        print(format_args!("report           {}\n", path.display()))?;
     }
     if !report.faults.is_empty() {
         return Err(DemoError::NotWell(format!("{} faults", report.faults.len())));

@@ -25,7 +25,7 @@ use super::config::{Config, ConfigError};
 use super::daemon::nanoseconds;
 use super::daemon::start::prepare_loop;
 use super::demo::DEFAULT_MACHINE;
-use super::files::{FileError, write_whole};
+use super::files::{FileError, print, write_whole};
 use super::stop::Stop;
 use crate::realtime::clock_cost::ClockCost;
 use crate::realtime::setup::idle::{self, ShallowSleep};
@@ -114,7 +114,7 @@ pub fn run(doctor: &Doctor, stop: &Stop) -> Result<(), DoctorError> {
     let host = &HostFiles::under(Path::new("/"));
     let facts = facts::all(host, realtime, &permissions, &refused, &ClockCost::measure());
     let layout = Layout::of_stdout();
-    std::print!("{}", layout.facts(&config.name, realtime, &facts));
+    print(layout.facts(&config.name, realtime, &facts))?;
 
     let controller = running::controllers(host, realtime.cpu).first().copied();
     if let Some(process) = controller.filter(|_| !doctor.disturb) {
@@ -132,10 +132,10 @@ pub fn run(doctor: &Doctor, stop: &Stop) -> Result<(), DoctorError> {
     let Doctor { seconds, .. } = *doctor;
     let diagnosis =
         Diagnosis { name: config.name, rate_hz, release, cpu: realtime.cpu, seconds, facts, rates, verdict };
-    std::print!("{}", layout.rates(&diagnosis));
+    print(layout.rates(&diagnosis))?;
     if let Some(path) = &doctor.report {
         diagnosis.write(path)?;
-        std::println!("report  {}", path.display());
+        print(format_args!("report  {}\n", path.display()))?;
     }
     match verdict {
         Judgement::Good | Judgement::Marginal => Ok(()),

@@ -34,12 +34,11 @@
 
 extern crate std;
 
-use std::io::{self, Write};
 use std::path::Path;
 use std::prelude::rust_2024::*;
 
 use super::config::Config;
-use super::files::{FileError, write_whole};
+use super::files::{FileError, print, write_whole};
 
 mod layout;
 mod mjcf;
@@ -67,6 +66,6 @@ pub fn export(config: &Config, format: Format, output: Option<&Path>) -> Result<
     let text = text(config, format);
     match output {
         Some(path) => write_whole(path, text.as_bytes()),
-        None => io::stdout().write_all(text.as_bytes()).map_err(FileError::on(Path::new("standard output"))),
+        None => print(text),
     }
 }

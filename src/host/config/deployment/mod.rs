@@ -224,10 +224,17 @@ fn observer(
     // What halving never reaches is meant too.
     let largest = (largest * (1.0 + 1e-9) * 1e3).floor() / 1e3;
     if observer_hz > largest && bandwidths.iter().all(|hertz| hertz.is_finite()) {
-        let bound = format!(
-            "must be at most {largest} at realtime.rate_hz = {rate_hz} and these bandwidths (gain margin of \
-             {GAIN_MARGIN}, and {FASTEST_OBSERVER} times the lesser bandwidth)"
-        );
+        let bound = if largest > 0.0 {
+            format!(
+                "must be at most {largest} at realtime.rate_hz = {rate_hz} and these bandwidths (gain margin of \
+                 {GAIN_MARGIN}, and {FASTEST_OBSERVER} times the lesser bandwidth)"
+            )
+        } else {
+            format!(
+                "must be 0 with these bandwidths: at realtime.rate_hz = {rate_hz} they leave less than the gain margin \
+                 of {GAIN_MARGIN} that an observer needs"
+            )
+        };
         section.refuse("observer_bandwidth_hz", bound);
     }
     observer_hz
