@@ -6,7 +6,6 @@ use crate::control::law::TrackingError;
 use crate::control::limits::Limiting;
 use crate::control::state::{Cause, State, Trouble};
 use crate::model::forward_kinematics::{Outcome, Tracked};
-use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::LEGS;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
@@ -107,6 +106,7 @@ impl Controller {
         let machine = self.model.machine();
         let from = self.tracker.pose;
         let controls = self.mode.state.controls();
+        let before = self.tracker.stance().lengths(machine);
         let mut tracked = self.tracker.advance(machine, &measurement.length).0;
         for _ in 1..if controls { STEPS } else { 1 } {
             if tracked == Tracked::Approaching {
@@ -118,7 +118,13 @@ impl Controller {
         }
         match tracked {
             Tracked::Found => self.known = true,
-            Tracked::Approaching if controls => return Err(self.out_of_steps(&from, &measurement.length)),
+            Tracked::Approaching if controls => {
+                // All legs have come the same share of their way.
+                let way = |(now, before): (&f64, &f64)| (now - before).abs();
+                let furthest = |to: &[f64; LEGS]| to.iter().zip(&before).map(way).fold(0.0, f64::max);
+                let reached = furthest(&self.tracker.stance().lengths(machine));
+                return Err(Trouble::new(Cause::MeasurementJumped, furthest(&measurement.length), reached));
+            }
             Tracked::Approaching => return Err(Cause::FindingPose.into()),
             Tracked::NotConverged => {
                 if self.known && self.tracker.outcome() == Outcome::NearSingular {
@@ -132,23 +138,6 @@ impl Controller {
         let pose = self.tracker.pose;
         let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
-    }
-
-    /// The leg that has furthest to go, against how far [`STEPS`] steps from a pose have brought it.
-    // Out of line, as it is rare: the cycle stays short.
-    #[inline(never)]
-    fn out_of_steps(&self, from: &Pose, length: &[f64; LEGS]) -> Trouble {
-        let machine = self.model.machine();
-        let (before, reached) = (leg_lengths(machine, from), self.tracker.stance().lengths(machine));
-        let (mut leg, mut way, mut come) = (0, 0.0, 0.0);
-        for (index, (length, (before, reached))) in length.iter().zip(before.iter().zip(&reached)).enumerate()
-        {
-            let furthest = (length - before).abs();
-            if furthest > way {
-                (leg, way, come) = (index, furthest, (reached - before).abs());
-            }
-        }
-        Trouble::new(Cause::MeasurementJumped, way, come).at(leg)
     }
 
     /// Home is the one pose known to be on the right assembly mode.
