@@ -188,11 +188,8 @@ fn further_than_the_steps_of_a_cycle_is_told_with_how_far_they_came() {
         }
         out_of_steps += 1;
         assert_eq!((output.state, output.cause), (State::Fault, Cause::MeasurementJumped), "{k}");
-        let Evidence { value, bound, index } = output.evidence;
-        assert!(
-            (value - largest(&ways)).abs() < 1e-12 && value == ways[index as usize - 1],
-            "{k}: {output:?}"
-        );
+        let Evidence { value, bound, .. } = output.evidence;
+        assert!((value - largest(&ways)).abs() < 1e-12, "{k}: {output:?}");
         // A way that was found is within the bound; what is told of is beyond.
         assert!(0.0 < found && found < bound && bound < value, "{k}: {found}, {output:?}");
     }
