@@ -3,6 +3,7 @@
 //!
 //! With `HEXAD_CHARTS=FOLDER` each is drawn into a picture.
 
+use hexad::control::law::ControlMode;
 use hexad::control::state::{Cause, Request, State};
 
 use super::pictures::draw;
@@ -14,7 +15,7 @@ use super::world::{Grip, Source, World};
 const DRIVES_WAIT: u32 = 50;
 
 fn standby() -> World {
-    let (config, parameters) = machine();
+    let (config, parameters) = machine(ControlMode::default());
     let mut world = World::new(Rig::new(&config, &config.machine), &config.machine, parameters);
     world.run(200);
     world
@@ -177,10 +178,12 @@ fn daemon_killed_in_motion_and_restarted() {
 /// None of this is worth anything if the worlds it begins with are not what they say.
 #[test]
 fn situations_are_what_they_say() {
-    for situation in Situation::ALL {
-        let mut world = situation.world();
-        let output = world.cycle(|_, _| {});
-        assert_eq!(output.state, situation.state());
-        assert_eq!(output.force != [0.0; 6], situation.state().controls());
+    for mode in ControlMode::ALL {
+        for situation in Situation::ALL {
+            let mut world = situation.world(mode);
+            let output = world.cycle(|_, _| {});
+            assert_eq!(output.state, situation.state());
+            assert_eq!(output.force != [0.0; 6], situation.state().controls());
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! One world in each state, a moment before something goes wrong.
 
 use hexad::control::controller::Parameters;
+use hexad::control::law::ControlMode;
 use hexad::control::state::{Cause, Request, State};
 use hexad::host::config::Config;
 use hexad::model::task::TaskState;
@@ -57,8 +58,8 @@ impl Situation {
     }
 
     /// A machine for a person, in this situation.
-    pub fn world(self) -> World {
-        let (config, parameters) = machine();
+    pub fn world(self, mode: ControlMode) -> World {
+        let (config, parameters) = machine(mode);
         let mut world = World::new(Rig::new(&config, &config.machine), &config.machine, parameters);
         let mut home = TaskState::at_rest(config.machine.home);
         match self {
@@ -103,8 +104,9 @@ impl Situation {
 
 /// The motion base, with an envelope that ends before the stroke does in one axis only, and a plant that is
 /// fast to compute.
-pub fn machine() -> (Config, Parameters) {
+pub fn machine(mode: ControlMode) -> (Config, Parameters) {
     let mut config = deployed("motion_base");
+    config.deployment.control.mode = mode;
     config.deployment.plant.step_s = 1e-3;
     let wide = [0.5, 0.5, GAMMA_RANGE, 1.0, 1.0, 1.0];
     config.deployment.envelope = Some(envelope::Limits {

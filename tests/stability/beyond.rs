@@ -155,3 +155,43 @@ fn the_time_to_a_singular_pose_is_told() {
         assert!(f64::from(told) > 0.9e3 * way, "{told}");
     }
 }
+
+/// Near a singular pose steps are short: what a platform can do in a pause of the measurements may be more of them
+/// than a cycle has.
+#[test]
+fn further_than_the_steps_of_a_cycle_is_told_with_how_far_they_came() {
+    /// Less than the timeout of measurements.
+    const PAUSE: u32 = 18;
+    let mut config = motion_base(ANY);
+    let home = at(0.012);
+    config.machine.home = home.x.into();
+    // Up, with the speed that it takes for that.
+    let after = |way: f64| {
+        let mut rig = Rig::new(&config, &config.machine);
+        rig.engage(&home);
+        rig.now_ns += u64::from(PAUSE - 1) * rig.period_ns;
+        let mut task = home;
+        task.x[5] += way;
+        task.xd[5] = 2.0 * way / (f64::from(PAUSE) * 1e-3);
+        (carried(&mut rig, &task), task)
+    };
+    let length = |task: &TaskState| leg_motion(&config.machine, &task.motion()).length;
+    let (mut found, mut out_of_steps) = (0.0, 0);
+    for k in 14..=20 {
+        let (output, task) = after(f64::from(k) * 5e-4);
+        let (now, before) = (length(&task), length(&home));
+        let ways: [f64; 6] = core::array::from_fn(|leg| (now[leg] - before[leg]).abs());
+        if output.state == State::Active {
+            assert!(out_of_steps == 0 && pose_error(&output, &task.motion().pose) < 1e-9, "{k}: {output:?}");
+            found = largest(&ways);
+            continue;
+        }
+        out_of_steps += 1;
+        assert_eq!((output.state, output.cause), (State::Fault, Cause::MeasurementJumped), "{k}");
+        let Evidence { value, bound, .. } = output.evidence;
+        assert!((value - largest(&ways)).abs() < 1e-12, "{k}: {output:?}");
+        // A way that was found is within the bound; what is told of is beyond.
+        assert!(0.0 < found && found < bound && bound < value, "{k}: {found}, {output:?}");
+    }
+    assert!(out_of_steps > 0);
+}

@@ -148,6 +148,19 @@ fn a_singular_surface_between_samples_is_found() {
     assert!(matches!(obstacle, Obstacle::Singular | Obstacle::Condition), "{found:?}");
     assert!((size - 10.0).abs() < 1e-2, "{found:?}");
     assert!(found.guaranteed > 9.9 && found.guaranteed < 10.0, "{found:?}");
+    // The proof itself: poses beyond it would be met by their sign, those of a cell that it cuts by nothing else.
+    let clearance = Clearance::new(&config.machine, 1e6);
+    let proved = |angle: f64, half: f64| {
+        let mut cell = Cell { middle: [0.0; 6], half: [0.0; 6] };
+        (cell.middle[2], cell.half[2]) = (10_f64.to_radians() + angle, half);
+        clearance.is_regular(&Shape::Box { low: high.map(|x| -x), high }, &cell)
+    };
+    for half in [1e-1, 1e-2, 1e-3, 1e-4] {
+        for share in [-0.99, -0.4, 0.1, 0.7, 0.99] {
+            assert!(!proved(share * half, half), "{half} {share}");
+        }
+        assert!(proved(-10.0 * half.min(0.02), half.min(0.02)), "{half}: not proved where nothing is");
+    }
 }
 
 /// A pose of a cell by numbers in -1..1, multiplied out without the code under test.

@@ -6,6 +6,7 @@ use crate::control::law::TrackingError;
 use crate::control::limits::Limiting;
 use crate::control::state::{Cause, State, Trouble};
 use crate::model::forward_kinematics::{Outcome, Tracked};
+use crate::model::machine::LEGS;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
 
@@ -105,7 +106,6 @@ impl Controller {
         let machine = self.model.machine();
         let from = self.tracker.pose;
         let controls = self.mode.state.controls();
-        let trusted = self.tracker.stance().sensitivity().trusted_step * machine.joints.radius;
         let before = self.tracker.stance().lengths(machine);
         let mut tracked = self.tracker.advance(machine, &measurement.length).0;
         for _ in 1..if controls { STEPS } else { 1 } {
@@ -119,9 +119,11 @@ impl Controller {
         match tracked {
             Tracked::Found => self.known = true,
             Tracked::Approaching if controls => {
+                // All legs have come the same share of their way.
                 let way = |(now, before): (&f64, &f64)| (now - before).abs();
-                let furthest = measurement.length.iter().zip(&before).map(way).fold(0.0, f64::max);
-                return Err(Trouble::new(Cause::MeasurementJumped, furthest, f64::from(STEPS) * trusted));
+                let furthest = |to: &[f64; LEGS]| to.iter().zip(&before).map(way).fold(0.0, f64::max);
+                let reached = furthest(&self.tracker.stance().lengths(machine));
+                return Err(Trouble::new(Cause::MeasurementJumped, furthest(&measurement.length), reached));
             }
             Tracked::Approaching => return Err(Cause::FindingPose.into()),
             Tracked::NotConverged => {

@@ -12,7 +12,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
 
-use crate::control::controller::{Asked, Measurement, Output, Setpoint};
+use super::translation::{force_message, measurement, status_message};
+use crate::control::controller::{Asked, Output, Setpoint};
 use crate::control::state::{Cause, Request, State};
 use crate::host::lockstep::look_until;
 use crate::ipc::exchange::{CycleInput, CycleOutput, IoSide};
@@ -21,7 +22,7 @@ use crate::ipc::messages::{
 };
 use crate::ipc::ports::{Bus, PortError, Rejected, Sink, Source, Time};
 use crate::ipc::statistics::Statistics;
-use crate::model::task::{TaskState, task_coordinates};
+use crate::model::task::TaskState;
 use crate::realtime::clock::{Clock, Grid, Monotonic, monotonic_ns, sleep_until};
 use crate::realtime::cyclic::{Release, Timing};
 use crate::realtime::newest::Reader;
@@ -360,59 +361,4 @@ impl Pause {
             sleep_until(now_ns + POLL_NS);
         }
     }
-}
-
-fn measurement(message: &MeasuredMessage) -> Measurement {
-    Measurement { time_ns: message.header.time_ns, length: message.length_m, rate: message.length_rate_m_s }
-}
-
-fn force_message(cycle: &CycleOutput) -> ForceMessage {
-    let Output { state, cause, force, limiting, .. } = cycle.output;
-    ForceMessage {
-        force_n: force,
-        valid: u32::from(state.controls()),
-        state: state as u32,
-        fault: cause as u32,
-        limiting: limiting.0,
-        release_ns: cycle.release_ns,
-        ..ForceMessage::default()
-    }
-}
-
-fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMessage {
-    let CycleOutput { output, counters, .. } = cycle;
-    let mut message = StatusMessage {
-        state: output.state as u32,
-        fault: output.cause as u32,
-        refused: output.refused as u32,
-        limiting: output.limiting.0,
-        fault_value: output.evidence.value,
-        fault_bound: output.evidence.bound,
-        fault_index: output.evidence.index,
-        without_measurement: output.without_measurement,
-        without_setpoint: output.without_setpoint,
-        condition: output.condition,
-        singular_in_s: output.singular_in,
-        wrench_error: output.wrench_error.vector().into(),
-        answered_epoch: output.answered.0,
-        answered_sequence: output.answered.1,
-        cycles: counters.cycles,
-        late_wakeups: counters.late_wakeups,
-        overruns: counters.overruns,
-        skipped: counters.skipped,
-        caught_up: counters.caught_up,
-        allocations: counters.allocations,
-        ..StatusMessage::default()
-    };
-    if let Some((pose, twist)) = &output.measured {
-        message.pose_valid = 1;
-        message.x = task_coordinates(pose, home);
-        message.twist = twist.vector().into();
-    }
-    if let Some(error) = &output.error {
-        message.error_valid = 1;
-        message.position_error_m = error.pose.linear.into();
-        message.orientation_error_rad = error.pose.angular.into();
-    }
-    message
 }

@@ -56,6 +56,7 @@ mod io_thread;
 mod log_thread;
 pub mod start;
 mod statistics;
+mod translation;
 
 /// Name of the real-time thread, by which a running daemon is found.
 pub const REALTIME_THREAD: &str = "hexad-rt";
