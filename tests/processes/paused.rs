@@ -4,16 +4,17 @@ use std::time::Duration;
 
 use hexad::control::state::{Cause, State};
 
+use crate::support::machine::{PERIOD_NS, TIMEOUT_NS};
 use crate::support::operator;
 use crate::support::recorder::Recording;
 use crate::support::trio::{Trio, let_pass, valid_after};
 use crate::support::turns;
 
 /// Longer than every timeout of the machine file.
-const PAUSE: Duration = Duration::from_millis(300);
+const PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS + TIMEOUT_NS / 2);
 
 /// Grid points within the pause, less those that a signal needs to arrive.
-const LEAST_SKIPPED: u64 = 290;
+const LEAST_SKIPPED: u64 = (TIMEOUT_NS + TIMEOUT_NS / 2) / PERIOD_NS - 10;
 
 #[test]
 fn a_paused_daemon_counts_what_it_missed_and_recovers() {
@@ -33,7 +34,7 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
     trio.moves_after(recovered_ns);
     let recording = trio.finish();
     let after = recording.statuses.last().expect("a status");
-    println!("daemon stopped for 300 ms at 1 kHz: {} skipped", after.skipped - before.skipped);
+    println!("daemon stopped for {PAUSE:?} at 1 kHz: {} skipped", after.skipped - before.skipped);
     brakes_held_until_control_was_taken_anew(from_ns, &recording);
 }
 
@@ -51,7 +52,7 @@ fn a_paused_plant_recovers() {
     trio.moves_after(recovered_ns);
     let recording = trio.finish();
     let after = recording.statuses.last().expect("a status");
-    println!("plant stopped for 300 ms: {} cycles of the daemon skipped", after.skipped - before.skipped);
+    println!("plant stopped for {PAUSE:?}: {} cycles of the daemon skipped", after.skipped - before.skipped);
     brakes_held_until_control_was_taken_anew(from_ns, &recording);
 }
 
