@@ -5,10 +5,11 @@
 use std::path::Path;
 use std::time::Instant;
 
-use hexad::host::{batch, config::Config};
+use hexad::analysis::batch;
+use hexad::config::Config;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::ladder::Rung;
-use hexad::scene::motions::{Motion, fit};
+use hexad::model::fidelity::Fidelity;
+use hexad::motion::built_in::{Motion, fit};
 use indicatif::ProgressBar;
 
 const LARGEST: usize = 10_000_000;
@@ -31,7 +32,7 @@ fn main() {
         let started = Instant::now();
         for _ in 0..repetitions {
             let part = motions.get(..size).unwrap_or_default();
-            batch::forces(&model, Rung::Exact, part, &mut forces, &ProgressBar::hidden());
+            batch::forces(&model, Fidelity::Exact, part, &mut forces, &ProgressBar::hidden());
         }
         let ns = started.elapsed().as_secs_f64() * 1e9 / (repetitions * size) as f64;
         println!("{size:>9} poses: {ns:>6.1} ns per pose");

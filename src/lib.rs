@@ -4,19 +4,23 @@
 //!
 //! # Map
 //!
-//! ```text
-//! model     mathematics of the machine           uses nothing
-//! control   control law, limits, one cycle       uses model
-//! plant     simulated platform                   uses model
-//! scene     motions, and the model they need     uses model
-//! ipc       messages, ports, exchange            uses control, model, parts of realtime
-//! realtime  threads, clock, cyclic loop          uses control, ipc::exchange
-//! host      configuration, commands, charts      uses everything
-//! ```
+//! | folder | computes | feature |
+//! | --- | --- | --- |
+//! | [`model`] | mathematics of the machine: geometry, kinematics, dynamics, fidelity | |
+//! | [`control`] | input validation, states, reference, control law, limits: one cycle | |
+//! | [`motion`] | trajectories, profiles, built-in motions | |
+//! | [`plant`] | simulated platform: forward dynamics, drives, sensors | |
+//! | `messages` | message structs and ports: what a driver needs | `client` |
+//! | `analysis` | workspace, clearance, fidelity of a motion, loop margins, assembly modes | `daemon` |
+//! | `realtime` | threads, clock, cyclic loop, exchange between threads | `daemon` |
+//! | `output` | charts, tables, CSV and JSON files | `daemon` |
+//! | `config` | machine and deployment files | `daemon` |
+//! | `daemon` | the three threads, translation between messages and controller, reports | `daemon` |
+//! | `commands` | one file or folder for each command of the command line | `daemon` |
 //!
-//! `model`, `control`, `plant` and `scene` do not allocate, do no I/O and read no clock. The root of the
-//! crate is `no_std` and only files of the other folders say `extern crate std`, so the compiler enforces
-//! it; `tests/wall.rs` checks the arrows above.
+//! A folder uses folders above it in this table and no other; `tests/wall.rs` checks that. `output` stands above
+//! `config` and `daemon`, as both write files. The first four neither allocate nor do I/O nor read a clock. Without a
+//! feature the crate is these four alone, `no_std`; `client` adds what a driver needs, `daemon` (the default) all else.
 //!
 //! # Notation, frames, units
 //!
@@ -32,17 +36,28 @@
 //!
 //! Everything is in base axes unless it says otherwise; angular parts come first; legs count 1..6 for
 //! people and 0..5 in arrays. SI units and radians; names at the edges carry their unit.
-#![no_std]
+#![cfg_attr(not(any(feature = "client", test)), no_std)]
 
+#[cfg(feature = "daemon")]
+pub mod analysis;
+#[cfg(feature = "daemon")]
+pub mod commands;
+#[cfg(feature = "daemon")]
+pub mod config;
 pub mod control;
-pub mod host;
-pub mod ipc;
+#[cfg(feature = "daemon")]
+pub mod daemon;
+#[cfg(feature = "client")]
+pub mod messages;
 pub mod model;
+pub mod motion;
+#[cfg(feature = "daemon")]
+pub mod output;
 pub mod plant;
+#[cfg(feature = "daemon")]
 pub mod realtime;
-pub mod scene;
 
 /// The driver in the README compiles.
-#[cfg(doctest)]
+#[cfg(all(doctest, feature = "daemon"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

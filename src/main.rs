@@ -5,13 +5,11 @@ use std::io::{self, IsTerminal};
 use std::process::ExitCode;
 
 use clap::Parser;
-use hexad::host::demo::children::PARENT;
+use hexad::commands::Cli;
+use hexad::commands::demo::children::PARENT;
 use hexad::realtime::allocation::CountingAllocator;
 use hexad::realtime::process::stop_with_parent;
 use tracing::level_filters::LevelFilter;
-
-#[path = "host/cli/mod.rs"]
-mod cli;
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -28,7 +26,7 @@ fn main() -> ExitCode {
     if parent.is_some_and(|parent| !stop_with_parent(parent)) {
         return ExitCode::SUCCESS;
     }
-    match cli::Cli::parse().run() {
+    match Cli::parse().run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("hexad: {}", failure.what);

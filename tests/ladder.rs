@@ -1,5 +1,5 @@
-//! Each rung of the ladder leaves out what it says: the difference to the exact model is that, computed
-//! without the rung, by the regressor form (which shares no code with the ladder) or from the vectors.
+//! Each fidelity of the ladder leaves out what it says: the difference to the exact model is that, computed
+//! without the fidelity, by the regressor form (which shares no code with the ladder) or from the vectors.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
@@ -7,8 +7,10 @@ mod common;
 
 use common::{Errors, Legs, MACHINES, Table, data, machine, motions};
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::{
+    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs,
+};
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::ladder::{Exact, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs, Rung};
 use hexad::model::machine::{Link, Machine, Platform, TransverseInertia};
 use hexad::model::regressor::{Parameters, Regressor, parameters_of, regressor, rod_mass_in_platform};
 use hexad::model::rigid::{Acceleration, Motion, Twist};
@@ -48,9 +50,9 @@ impl Row<'_> {
     }
 }
 
-/// Exact minus rung is what `left_out` says, on every row of the vectors of every machine; `nothing_at`
+/// Exact minus fidelity is what `left_out` says, on every row of the vectors of every machine; `nothing_at`
 /// names machines where that is nothing.
-fn check<M: Model>(rung: &str, nothing_at: &[&str], left_out: impl Fn(&Row) -> Vector6<f64>) {
+fn check<M: Model>(fidelity: &str, nothing_at: &[&str], left_out: impl Fn(&Row) -> Vector6<f64>) {
     for name in MACHINES {
         let model = InverseDynamics::new(&machine(name));
         let (mut errors, mut sizes) = (Errors::default(), Errors::default());
@@ -61,9 +63,9 @@ fn check<M: Model>(rung: &str, nothing_at: &[&str], left_out: impl Fn(&Row) -> V
             errors.add((difference - left_out(&row)).amax() / exact.amax());
             sizes.add(difference.amax() / exact.amax());
         }
-        println!("{name} {rung} leaves out RMS {:.1e}, max {:.1e}", sizes.rms(), sizes.max);
-        errors.assert_within(ROUNDING, &format!("{name} {rung}"));
-        assert_eq!(sizes.max < 1e3 * ROUNDING, nothing_at.contains(&name), "{name} {rung}: {sizes:?}");
+        println!("{name} {fidelity} leaves out RMS {:.1e}, max {:.1e}", sizes.rms(), sizes.max);
+        errors.assert_within(ROUNDING, &format!("{name} {fidelity}"));
+        assert_eq!(sizes.max < 1e3 * ROUNDING, nothing_at.contains(&name), "{name} {fidelity}: {sizes:?}");
     }
 }
 
@@ -164,7 +166,7 @@ fn with_points(machine: &Machine, mass: f64) -> Platform {
     Platform { mass, center_of_mass, inertia: parts.iter().map(about_center).sum() }
 }
 
-/// The simple rungs are the exact model of another machine.
+/// The simple fidelities are the exact model of another machine.
 #[test]
 fn rungs_without_links_are_exact_for_a_machine_without_them() {
     for name in MACHINES {
@@ -174,17 +176,17 @@ fn rungs_without_links_are_exact_for_a_machine_without_them() {
         let [machine, bare, lumped] = [machine, bare, lumped].map(|machine| InverseDynamics::new(&machine));
         let mut errors = Errors::default();
         for motion in motions(name) {
-            for (rung, other) in [(Rung::MasslessLegs, &bare), (Rung::LumpedLegs, &lumped)] {
-                let rung = Vector6::from(machine.forces_of(rung, &motion).unwrap());
+            for (fidelity, other) in [(Fidelity::MasslessLegs, &bare), (Fidelity::LumpedLegs, &lumped)] {
+                let fidelity = Vector6::from(machine.forces_of(fidelity, &motion).unwrap());
                 let other = Vector6::from(other.forces::<Exact>(&motion).unwrap());
-                errors.add((rung - other).amax() / other.amax());
+                errors.add((fidelity - other).amax() / other.amax());
             }
         }
         errors.assert_within(ROUNDING, &format!("{name} without links"));
     }
 }
 
-/// Errors of all rungs over the vectors, with the velocities and accelerations of a motion that runs
+/// Errors of all fidelities over the vectors, with the velocities and accelerations of a motion that runs
 /// `faster` times as fast; shares of the peak force.
 fn errors_of_rungs(name: &str, faster: f64) -> [Errors; 6] {
     let model = InverseDynamics::new(&machine(name));
@@ -198,9 +200,9 @@ fn errors_of_rungs(name: &str, faster: f64) -> [Errors; 6] {
     let exact: Vec<_> =
         motions.iter().map(|motion| Vector6::from(model.forces::<Exact>(motion).unwrap())).collect();
     let peak = exact.iter().map(Vector6::amax).fold(0.0, f64::max);
-    for (errors, rung) in all.iter_mut().zip(Rung::ALL) {
+    for (errors, fidelity) in all.iter_mut().zip(Fidelity::ALL) {
         for (motion, exact) in motions.iter().zip(&exact) {
-            errors.add((Vector6::from(model.forces_of(rung, motion).unwrap()) - exact).amax() / peak);
+            errors.add((Vector6::from(model.forces_of(fidelity, motion).unwrap()) - exact).amax() / peak);
         }
     }
     all

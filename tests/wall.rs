@@ -1,41 +1,53 @@
-//! The wall between the real-time part and the rest, checked on the source.
+//! The arrows between the folders of `src`, and what the real-time folders may use, checked on the source.
 //!
-//! The compiler does most of it: the crate's root is `no_std`, so a file that does not say
-//! `extern crate std` cannot name `Vec`, `println!` or a file. What it cannot see is who uses whom.
+//! The syntax tree is searched, not the text: a grouped import, a path in an expression and one in a macro's
+//! arguments all count.
 
 #![allow(clippy::unwrap_used, reason = "a test helper that fails is a failed test")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folder, what else of the crate it may use, whether it may use the standard library.
-const ARROWS: &[(&str, &[&str], bool)] = &[
-    ("model", &[], false),
-    ("control", &["model"], false),
-    ("plant", &["model"], false),
-    ("scene", &["model"], false),
-    (
-        "ipc",
-        &[
-            "model",
-            "control",
-            "realtime::clock",
-            "realtime::cyclic::Counters",
-            "realtime::doorbell",
-            "realtime::newest",
-        ],
-        true,
-    ),
-    ("realtime", &["model", "control", "ipc::exchange"], true),
-    ("host", &["model", "control", "plant", "scene", "ipc", "realtime"], true),
+use proc_macro2::{TokenStream, TokenTree};
+use syn::visit::{self, Visit};
+use syn::{ExprUnsafe, ItemUse, Macro, UseTree};
+
+/// The folders, from the one that uses nothing. A folder uses folders above it and no other.
+const FOLDERS: [&str; 11] = [
+    "model", "control", "motion", "plant", "analysis", "messages", "realtime", "output", "config", "daemon",
+    "commands",
 ];
 
-fn sources(folder: &Path) -> Vec<PathBuf> {
+/// Folders without the standard library.
+const NO_STD: [&str; 4] = ["model", "control", "motion", "plant"];
+
+/// Folders of the list above that a folder may nevertheless not use, and why.
+const FORBIDDEN: &[(&str, &[&str], &str)] = &[
+    ("control", &["motion", "plant"], "neither exists on a real machine"),
+    ("motion", &["control"], "a motion is the same under any control"),
+    ("plant", &["control", "motion"], "it stands in for hardware, which knows neither"),
+    ("messages", &["motion", "plant", "analysis"], "a driver needs none of them"),
+    ("realtime", &["model", "control", "motion", "plant", "analysis"], "the loop is generic"),
+    (
+        "output",
+        &["model", "control", "motion", "plant", "messages", "realtime"],
+        "it writes what it is given",
+    ),
+];
+
+/// Folders in which `unsafe` may stand, each block with its argument.
+const UNSAFE: [&str; 2] = ["messages", "realtime"];
+
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
     let mut found = vec![];
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.is_dir() {
-            found.extend(sources(&path));
+            found.extend(files(&path));
         } else if path.extension().is_some_and(|extension| extension == "rs") {
             found.push(path);
         }
@@ -43,60 +55,140 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Paths `crate::...` outside comments, braces not expanded.
-fn crate_paths(line: &str) -> impl Iterator<Item = &str> {
-    let code = line.split("//").next().unwrap_or_default();
-    code.split("crate::").skip(1).filter(move |_| !code.contains("pub(crate::"))
+/// What a file names: each path, as far as its third segment.
+#[derive(Default)]
+struct Uses {
+    paths: Vec<Vec<String>>,
+    unsafe_blocks: usize,
+}
+
+impl Uses {
+    fn of(text: &str) -> Self {
+        let mut uses = Self::default();
+        uses.visit_file(&syn::parse_file(text).unwrap());
+        uses
+    }
+
+    /// The folders of this crate that it names.
+    fn folders(&self) -> impl Iterator<Item = &str> {
+        self.paths.iter().filter_map(|path| match path.as_slice() {
+            [root, folder, ..] if root == "crate" || root == "hexad" => Some(folder.as_str()),
+            _ => None,
+        })
+    }
+
+    fn add_tree(&mut self, mut path: Vec<String>, tree: &UseTree) {
+        match tree {
+            UseTree::Path(step) => {
+                path.push(step.ident.to_string());
+                self.add_tree(path, &step.tree);
+            }
+            UseTree::Group(group) => group.items.iter().for_each(|item| self.add_tree(path.clone(), item)),
+            UseTree::Name(name) => {
+                path.push(name.ident.to_string());
+                self.paths.push(path);
+            }
+            UseTree::Rename(rename) => {
+                path.push(rename.ident.to_string());
+                self.paths.push(path);
+            }
+            UseTree::Glob(_) => self.paths.push(path),
+        }
+    }
+
+    /// Paths in the arguments of a macro, which no syntax tree shows.
+    fn add_tokens(&mut self, tokens: TokenStream) {
+        let mut path = vec![];
+        for token in tokens {
+            match token {
+                TokenTree::Ident(ident) => path.push(ident.to_string()),
+                TokenTree::Punct(punct) if punct.as_char() == ':' => {}
+                TokenTree::Group(group) => {
+                    self.paths.push(core::mem::take(&mut path));
+                    self.add_tokens(group.stream());
+                }
+                _ => self.paths.push(core::mem::take(&mut path)),
+            }
+        }
+        self.paths.push(path);
+    }
+}
+
+impl<'ast> Visit<'ast> for Uses {
+    fn visit_item_use(&mut self, item: &'ast ItemUse) {
+        self.add_tree(vec![], &item.tree);
+    }
+
+    fn visit_path(&mut self, path: &'ast syn::Path) {
+        self.paths.push(path.segments.iter().map(|segment| segment.ident.to_string()).collect());
+        visit::visit_path(self, path);
+    }
+
+    fn visit_macro(&mut self, item: &'ast Macro) {
+        self.add_tokens(item.tokens.clone());
+    }
+
+    fn visit_expr_unsafe(&mut self, block: &'ast ExprUnsafe) {
+        self.unsafe_blocks += 1;
+        visit::visit_expr_unsafe(self, block);
+    }
 }
 
 #[test]
-fn every_folder_uses_only_what_it_may() {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+fn every_folder_uses_only_folders_above_it() {
     let mut wrong = vec![];
     let mut seen = 0;
-    for (folder, allowed, _) in ARROWS {
-        for file in sources(&source.join(folder)) {
-            for (number, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
-                for path in crate_paths(line) {
-                    seen += 1;
-                    let ok = path.starts_with(folder) || allowed.iter().any(|arrow| path.starts_with(arrow));
-                    if !ok {
-                        wrong.push(format!("{}:{}: crate::{path}", file.display(), number + 1));
-                    }
+    for (place, folder) in FOLDERS.iter().enumerate() {
+        let forbidden = FORBIDDEN.iter().find(|(name, ..)| name == folder);
+        for file in files(&source().join(folder)) {
+            for used in Uses::of(&fs::read_to_string(&file).unwrap()).folders() {
+                seen += 1;
+                let stands_above = FOLDERS[..=place].contains(&used);
+                let why = forbidden.filter(|(_, names, _)| names.contains(&used)).map_or("", |(.., why)| why);
+                if !stands_above || !why.is_empty() {
+                    wrong.push(format!("{} uses {used}: {why}", file.display()));
                 }
             }
         }
     }
-    assert!(seen > 50, "only {seen} paths seen: the check looks in the wrong place");
-    assert!(wrong.is_empty(), "these reach through the wall:\n{}", wrong.join("\n"));
+    assert!(seen > 500, "only {seen} paths seen: the check looks in the wrong place");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
-fn the_pure_folders_have_no_standard_library_and_no_unsafe() {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    assert!(fs::read_to_string(source.join("lib.rs")).unwrap().lines().any(|line| line == "#![no_std]"));
-    for (folder, _, std_allowed) in ARROWS {
-        let files = sources(&source.join(folder));
-        assert!(!files.is_empty(), "{folder} is gone");
-        for file in files {
-            let text = fs::read_to_string(&file).unwrap();
-            for word in ["extern crate std", "extern crate alloc"] {
-                assert!(*std_allowed || !text.contains(word), "{}: {word}", file.display());
-            }
-            // In ipc only the derive of iceoryx2 is unsafe, and that is its own.
-            let may = *folder == "realtime";
-            assert!(may || !text.contains("unsafe {"), "{}: unsafe", file.display());
+fn the_pure_folders_name_no_standard_library_and_unsafe_stands_where_it_may() {
+    for folder in FOLDERS {
+        for file in files(&source().join(folder)) {
+            let uses = Uses::of(&fs::read_to_string(&file).unwrap());
+            let names_std = |path: &Vec<String>| {
+                ["std", "alloc"].iter().any(|name| path.first().is_some_and(|first| first == name))
+            };
+            let is_pure = NO_STD.contains(&folder);
+            assert!(!(is_pure && uses.paths.iter().any(names_std)), "{}: std", file.display());
+            assert!(UNSAFE.contains(&folder) || uses.unsafe_blocks == 0, "{}: unsafe", file.display());
         }
     }
 }
 
 #[test]
-fn every_folder_is_judged() {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    for entry in fs::read_dir(source).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap().to_string();
-        let judged = ARROWS.iter().any(|(folder, ..)| *folder == name);
-        assert!(judged || ["lib.rs", "main.rs"].contains(&name.as_str()), "{name} is not in the table");
+fn every_folder_has_its_place() {
+    for entry in fs::read_dir(source()).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        assert!(FOLDERS.contains(&name.as_str()) || ["lib.rs", "main.rs"].contains(&name.as_str()), "{name}");
+    }
+}
+
+/// The check sees what it is for.
+#[test]
+fn every_form_of_a_path_is_seen() {
+    for text in [
+        "use crate::{model::machine::Machine, daemon::run};",
+        "use crate::{self as root, daemon as d};",
+        "fn f() { crate::daemon::run() }",
+        "fn f() { println!(\"{}\", crate::daemon::NAME) }",
+        "fn f(_: Vec<crate::daemon::Report>) {}",
+        "fn f() { assert!([1].iter().any(|_| matches!(x, crate::daemon::A))) }",
+    ] {
+        assert!(Uses::of(text).folders().any(|folder| folder == "daemon"), "{text}");
     }
 }

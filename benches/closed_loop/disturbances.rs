@@ -1,14 +1,13 @@
 //! Tracking error against what the model does not know: payload, friction, noise, dead time.
 
 use hexad::control::law::ControlMode;
-use hexad::host::charts::Stroke;
-use hexad::host::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width};
-use hexad::model::ladder::Rung;
+use hexad::model::fidelity::Fidelity;
+use hexad::output::charts::Stroke;
+use hexad::output::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width};
 use hexad::plant::imperfections::Imperfections;
 
-use super::common;
 use super::run::{Outcome, Run};
-use super::{Failure, MODES, cells, chart, play, write_csv};
+use super::{Failure, MODES, cells, chart, common, play, write_csv};
 
 const MACHINE: &str = "motion_base";
 const RATE_HZ: f64 = 1e3;
@@ -93,7 +92,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         let run = |(mode, observer_hz): &(ControlMode, f64), level: f64| Run {
             machine: MACHINE,
             mode: *mode,
-            rung: Rung::Exact,
+            fidelity: Fidelity::Exact,
             rate_hz: RATE_HZ,
             observer_hz: *observer_hz,
             imperfections: (sweep.imperfect)(level),

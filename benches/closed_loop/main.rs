@@ -23,7 +23,7 @@ use std::error::Error;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use hexad::host::files::write_whole;
+use hexad::output::files::write_whole;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 

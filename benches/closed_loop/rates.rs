@@ -1,9 +1,9 @@
 //! Tracking error against compute time: mode, model, rate.
 
 use hexad::control::law::ControlMode;
-use hexad::host::charts::Stroke;
-use hexad::host::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width};
-use hexad::model::ladder::Rung;
+use hexad::model::fidelity::Fidelity;
+use hexad::output::charts::Stroke;
+use hexad::output::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width};
 use hexad::plant::imperfections::Imperfections;
 
 use super::run::{Outcome, Run};
@@ -17,8 +17,8 @@ const PASSES: usize = 15;
 /// A law with its model: a line of the chart.
 struct Method {
     mode: ControlMode,
-    rung: Rung,
-    /// Whether the mode evaluates a rung at all.
+    fidelity: Fidelity,
+    /// Whether the mode evaluates a fidelity at all.
     modelled: bool,
 }
 
@@ -26,9 +26,9 @@ fn methods() -> Vec<Method> {
     let mut methods = vec![];
     for mode in ControlMode::ALL {
         let modelled = matches!(mode, ControlMode::ComputedTorque | ControlMode::FeedforwardJointPd);
-        let rungs = Rung::ALL.into_iter().rev().filter(|rung| rung.has_inertia());
-        let rungs = rungs.take(if modelled { usize::MAX } else { 1 });
-        methods.extend(rungs.map(|rung| Method { mode, rung, modelled }));
+        let fidelities = Fidelity::ALL.into_iter().rev().filter(|fidelity| fidelity.has_inertia());
+        let fidelities = fidelities.take(if modelled { usize::MAX } else { 1 });
+        methods.extend(fidelities.map(|fidelity| Method { mode, fidelity, modelled }));
     }
     methods
 }
@@ -43,7 +43,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         let at = |method: &Method, rate_hz: f64| Run {
             machine,
             mode: method.mode,
-            rung: method.rung,
+            fidelity: method.fidelity,
             rate_hz,
             observer_hz: 0.0,
             imperfections: Imperfections::default(),
@@ -56,7 +56,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         for ((run, outcome), index) in runs.iter().zip(&outcomes).zip(0..) {
             let method = &methods[index / rates.len()];
             let step_ns = steps[index / rates.len()];
-            let model = if method.modelled { run.rung.name() } else { "none" };
+            let model = if method.modelled { run.fidelity.name() } else { "none" };
             let numbers = [
                 format!("{:.0}", run.rate_hz),
                 format!("{step_ns:.0}"),
@@ -113,7 +113,7 @@ fn draw<'a>(
             .map(|(rate, outcome)| (1e-6 * step_ns * rate, outcome.rms_um()))
             .filter(|(_, rms)| rms.is_finite())
             .collect();
-        let best = method.rung == Rung::Exact;
+        let best = method.fidelity == Fidelity::Exact;
         let mark = if best { Mark::Disc } else { Mark::Ring };
         points.extend(line.iter().map(|at| Point { at: *at, mark, color, label: Label::None }));
         let width = if best { Width::Curve } else { Width::Hair };

@@ -4,12 +4,12 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
+use hexad::config::Config;
 use hexad::control::controller::{Asked, Controller, Input, Measurement, Setpoint};
 use hexad::control::law::ControlMode;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::config::Config;
-use hexad::host::daemon;
-use hexad::model::ladder::Rung;
+use hexad::daemon;
+use hexad::model::fidelity::Fidelity;
 use hexad::model::task::TaskState;
 use hexad::plant::hardware::Hardware;
 use hexad::plant::imperfections::Imperfections;
@@ -31,7 +31,7 @@ const START_NS: u64 = 86_400_000_000_000;
 pub struct Run {
     pub machine: &'static str,
     pub mode: ControlMode,
-    pub rung: Rung,
+    pub fidelity: Fidelity,
     pub rate_hz: f64,
     /// 0 is without.
     pub observer_hz: f64,
@@ -81,7 +81,7 @@ impl Run {
 
     fn record(&self, watch: &mut dyn FnMut(&Input)) -> Outcome {
         let config = self.config();
-        let parameters = daemon::parameters(&config.machine, &config.deployment, self.rung);
+        let parameters = daemon::parameters(&config.machine, &config.deployment, self.fidelity);
         let plant = &config.deployment.plant;
         let mut hardware = Hardware::new(
             &config.machine,
@@ -133,7 +133,7 @@ impl Run {
         self.record(&mut |input| inputs.push(*input));
         let mut medians: Vec<_> = (0..passes)
             .map(|_| {
-                let parameters = daemon::parameters(&config.machine, &config.deployment, self.rung);
+                let parameters = daemon::parameters(&config.machine, &config.deployment, self.fidelity);
                 let mut controller = Controller::new(&config.machine, parameters);
                 let time = |input: &Input| {
                     let started = Instant::now();

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use hexad::host::charts::Stroke;
-use hexad::host::scatter::{Grid, Line, Sample, Scatter, Width};
+use hexad::output::charts::Stroke;
+use hexad::output::scatter::{Grid, Line, Sample, Scatter, Width};
 
 use super::Failure;
 use super::contest::Contestant;

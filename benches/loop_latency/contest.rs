@@ -5,10 +5,10 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use hexad::commands::operate::Operator;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::operator::Operator;
-use hexad::host::report::Report;
-use hexad::ipc::ports::Bus;
+use hexad::daemon::report::Report;
+use hexad::messages::ports::Bus;
 
 use super::Failure;
 use super::distribution::Distribution;

@@ -3,18 +3,18 @@
 //! that is exactly on it. So the daemon is active and works as hard as in service, and the load on the other
 //! processor is the least that this takes.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread::{JoinHandle, spawn};
 
-use hexad::ipc::messages::{MeasuredMessage, SetpointMessage};
-use hexad::ipc::ports::{Bus, PortError, Source};
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::{Bus, PortError, Source};
+use hexad::messages::structs::{MeasuredMessage, SetpointMessage};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::machine::Machine;
-use hexad::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;
-use hexad::scene::motions::{Motion, Scene, fit};
 
 use super::Failure;
 use super::rig::{DRIVER_PRIORITY, Rig};

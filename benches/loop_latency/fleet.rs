@@ -1,6 +1,6 @@
 //! Many platforms in one loop: the loop itself, with a step that steps the controller of each platform.
 //!
-//! Each has its own place on a moving path, exact rung, and is in control. What counts is the time from
+//! Each has its own place on a moving path, exact fidelity, and is in control. What counts is the time from
 //! wake-up to output; the inputs are there already.
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,19 +8,22 @@ use std::thread::{scope, sleep};
 use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
+use hexad::config::Config;
 use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Setpoint};
 use hexad::control::state::{Request, State};
-use hexad::host::config::Config;
-use hexad::host::daemon::parameters;
-use hexad::ipc::exchange::exchange;
+use hexad::daemon::cycle::CycleRecord;
+use hexad::daemon::parameters;
+use hexad::messages::clock::monotonic_ns;
+use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::ladder::Rung;
 use hexad::model::task::TaskState;
-use hexad::realtime::clock::{Monotonic, monotonic_ns};
-use hexad::realtime::cyclic::{self, CycleRecord, RECORDS, Release, Timing};
+use hexad::motion::built_in::{Motion, fit};
+use hexad::realtime::clock::Monotonic;
+use hexad::realtime::cyclic;
+use hexad::realtime::cyclic::{RECORDS, Release, Timing};
+use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OnOverrun;
 use hexad::realtime::setup::{memory, scheduling};
-use hexad::scene::motions::{Motion, fit};
 
 use super::Failure;
 use super::distribution::Distribution;
@@ -66,7 +69,7 @@ impl Fleet {
             let legs = leg_motion(machine, &state.motion());
             (state, legs.length, legs.rate)
         };
-        let controller = Controller::new(machine, parameters(machine, &config.deployment, Rung::Exact));
+        let controller = Controller::new(machine, parameters(machine, &config.deployment, Fidelity::Exact));
         let stride = (WARM_UP_STEP_S / period_s) as usize;
         let mut fleet = Self {
             controllers: vec![controller; platforms],
@@ -132,7 +135,8 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
         let thread = threads.spawn(|| {
             prepare(rig)?;
             let step = |_: &Input| fleet.next_cycle();
-            let report = cyclic::run(&mut Monotonic, &timing, step, side, records_in, &stop);
+            let report =
+                cyclic::run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop);
             fleet.all_were_active().map(|()| report)
         });
         let begin = Instant::now();

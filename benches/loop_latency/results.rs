@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hexad::host::files::write_whole;
+use hexad::output::files::write_whole;
 
 use super::Failure;
 use super::contest::{Contestant, HISTOGRAM_NS, Round};

@@ -4,13 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use hexad::host::config::Config;
-use hexad::host::demo::children::PARENT;
+use hexad::commands::demo::children::PARENT;
+use hexad::config::Config;
 use hexad::realtime::process::terminate;
 use tempfile::TempDir;
 
-use super::Failure;
-use super::tools::{self, Processors};
+use super::tools::Processors;
+use super::{Failure, tools};
 
 /// The machine that is controlled.
 const MACHINE: &str = include_str!("../../config/motion_base.toml");

@@ -10,16 +10,15 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hexad::host::charts::Stroke;
-use hexad::host::files::write_whole;
-use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width};
+use hexad::output::charts::Stroke;
+use hexad::output::files::write_whole;
+use hexad::output::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width};
 
-use super::Failure;
 use super::contest::{Watch, read_daemon, start_daemon};
 use super::distribution::{Distribution, us};
 use super::driver::Driver;
-use super::fleet;
 use super::rig::{Process, Release, Rig};
+use super::{Failure, fleet};
 
 /// Rates of the loop \[Hz\].
 pub const RATES: [u32; 2] = [1000, 4000];

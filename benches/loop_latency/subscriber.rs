@@ -6,14 +6,13 @@
 
 use std::fs;
 use std::process::Command;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread::{JoinHandle, spawn};
 
-use hexad::ipc::messages::ForceMessage;
-use hexad::ipc::ports::{Bus, Sink};
-use hexad::realtime::clock::monotonic_ns;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::{Bus, Sink};
+use hexad::messages::structs::ForceMessage;
 use hexad::realtime::setup::scheduling;
 
 use super::Failure;

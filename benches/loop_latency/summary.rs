@@ -1,11 +1,10 @@
 //! What is printed at the end: the tables, and what they say to the goals.
 
-use super::Measured;
 use super::contest::{Contestant, Round};
 use super::distribution::{Distribution, us};
 use super::results::{LATE_NS, Row, find, ratio};
 use super::rig::Release;
-use super::size;
+use super::{Measured, size};
 
 /// The goals. p99 of the wake-up latency of `sleep` over cyclictest's.
 const SLEEP_OVER_CYCLICTEST: f64 = 1.15;

@@ -1,10 +1,9 @@
 //! What the bench needs of the system: tools, processors, the right to real time.
 
-use std::env;
-use std::fs;
-use std::thread;
+use std::{env, fs, thread};
 
-use hexad::realtime::setup::{cpus::Cpus, scheduling};
+use hexad::realtime::setup::cpus::Cpus;
+use hexad::realtime::setup::scheduling;
 
 use super::Failure;
 

@@ -6,9 +6,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hexad::host::charts::Stroke;
-use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width, pareto_front};
-use hexad::model::ladder::Rung;
+use hexad::model::fidelity::Fidelity;
+use hexad::output::charts::Stroke;
+use hexad::output::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width, pareto_front};
 
 use super::Failure;
 use super::methods::BASELINE;
@@ -88,7 +88,7 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Of hexad every rung on the best instruction set, and the exact model on all of them.
+/// Of hexad every fidelity on the best instruction set, and the exact model on all of them.
 fn items(rows_of_all: &[Row]) -> Vec<Item> {
     let mut methods: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
     for row in rows_of_all {
@@ -96,25 +96,25 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
     }
     let mut items = vec![];
     for ((method, precision, isa), rows) in methods {
-        let rung = Rung::ALL.iter().any(|rung| rung.name() == method);
+        let fidelity = Fidelity::ALL.iter().any(|fidelity| fidelity.name() == method);
         let exact = method == "exact";
         let best = best_isa(rows_of_all, precision);
-        if rung && isa != best && !(exact && precision == "f64") {
+        if fidelity && isa != best && !(exact && precision == "f64") {
             continue;
         }
-        let peer = !rung && method != PAPER;
+        let peer = !fidelity && method != PAPER;
         // A peer has no machine but its own; hexad has errors on the other three.
         let worst = |pace: Pace| {
             let errors = rows.iter().filter(|row| row.pace == pace).map(|row| row.errors.max);
             errors.reduce(f64::max)
         };
         let times = rows.iter().map(|row| row.samples.throughput());
-        let (color, side) = match (rung, precision) {
+        let (color, side) = match (fidelity, precision) {
             (true, "f32") => (SINGLE, if exact { Side::Flag } else { Side::None }),
             (true, _) => (DOUBLE, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
             (false, _) => (if peer { PEER } else { DENSE }, Side::Flag),
         };
-        let name = match (rung, exact, precision) {
+        let name = match (fidelity, exact, precision) {
             (true, true, "f32") => "exact, f32".into(),
             (true, true, _) => format!("exact, {}", written(isa)),
             _ => written(method),

@@ -1,7 +1,7 @@
 //! How long one evaluation of the inverse dynamics takes, and how far its forces are from the right ones:
 //! `cargo bench --bench speed_accuracy`.
 //!
-//! Every rung of the ladder in both precisions on every instruction set of this CPU, the paper's own dense
+//! Every fidelity of the ladder in both precisions on every instruction set of this CPU, the paper's own dense
 //! form, and, once `benches/peers/run.sh` has built them, what others would use. On a slow and a fast scene
 //! of three machines and on the peers' own (see `scenes.rs`). Writes `benches/charts/speed_accuracy.csv` and
 //! `.svg`, and prints how many times faster the exact model is than each peer in the same run.
@@ -28,7 +28,7 @@ use std::time::Instant;
 use clap::Parser;
 use fearless_simd::Level;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::ladder::Rung;
+use hexad::model::fidelity::Fidelity;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use methods::{BASELINE, Method, Precision, instruction_sets};
@@ -62,7 +62,7 @@ struct Arguments {
     /// Fewer samples: within 40 s.
     #[arg(long)]
     quick: bool,
-    /// Evaluates one rung (its name on the command line of hexad) and nothing else.
+    /// Evaluates one fidelity (its name on the command line of hexad) and nothing else.
     #[arg(long, value_name = "RUNG")]
     count: Option<String>,
     /// Single precision; with --count.
@@ -82,7 +82,7 @@ struct Arguments {
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match &arguments.count {
-        Some(rung) => count(&arguments, rung),
+        Some(fidelity) => count(&arguments, fidelity),
         None => compare(arguments.quick),
     };
     outcome.map_or_else(
@@ -95,22 +95,23 @@ fn main() -> ExitCode {
 }
 
 /// Evaluates one method so many times, on the fast scene of the first machine.
-fn count(arguments: &Arguments, rung: &str) -> Result<(), Failure> {
-    let rung = Rung::ALL.into_iter().find(|known| known.name() == rung);
-    let rung =
-        rung.ok_or_else(|| format!("no such rung; one of {}", Rung::ALL.map(Rung::name).join(", ")))?;
+fn count(arguments: &Arguments, fidelity: &str) -> Result<(), Failure> {
+    let fidelity = Fidelity::ALL.into_iter().find(|known| known.name() == fidelity);
+    let fidelity = fidelity.ok_or_else(|| {
+        format!("no such fidelity; one of {}", Fidelity::ALL.map(Fidelity::name).join(", "))
+    })?;
     let precision = if arguments.single { Precision::F32 } else { Precision::F64 };
     let sets = instruction_sets(precision);
     let wanted = |name: &str| arguments.isa.as_ref().is_none_or(|isa| isa == name);
     let names = sets.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let set = sets.into_iter().find(|(name, _)| wanted(name));
     let (isa, level) = set.ok_or_else(|| format!("not on this CPU; one of {names}"))?;
-    let method = Method::new(rung, precision);
+    let method = Method::new(fidelity, precision);
     let scene = Scene::of_machines()?.into_iter().nth(1).ok_or("no scene")?;
     let dynamics = InverseDynamics::new(&scene.machine_on(level));
     let passes = arguments.evaluations.div_ceil(scene.motions.len());
     (method.sample)(&dynamics, &scene.motions, passes, false);
-    println!("{} {isa}: {} evaluations", rung.name(), passes * scene.motions.len());
+    println!("{} {isa}: {} evaluations", fidelity.name(), passes * scene.motions.len());
     Ok(())
 }
 
@@ -165,7 +166,7 @@ fn contenders(scenes: &[Scene]) -> Result<Vec<Contender>, Failure> {
     for (index, scene) in scenes.iter().enumerate() {
         for precision in Precision::ALL {
             for (isa, level) in instruction_sets(precision) {
-                let methods = Rung::ALL.map(|rung| Method::new(rung, precision));
+                let methods = Fidelity::ALL.map(|fidelity| Method::new(fidelity, precision));
                 contenders.extend(methods.map(|method| Contender::hexad(scene, index, method, isa, level)));
             }
         }
@@ -195,7 +196,7 @@ impl Contender {
         let dynamics = Box::new(InverseDynamics::new(&scene.machine_on(level)));
         let errors = scene.errors(scene.motions.iter().map(|motion| (method.forces)(&dynamics, motion)));
         let row = Row {
-            method: method.rung.name(),
+            method: method.fidelity.name(),
             precision: method.precision.name(),
             isa,
             scene: scene.name.clone(),
@@ -210,7 +211,7 @@ impl Contender {
     fn paper(scene: &Scene, index: usize) -> Option<Self> {
         let machine = scene.paper_machine.as_ref()?;
         let dynamics = InverseDynamics::new(&scene.machine);
-        let exact = Method::new(Rung::Exact, Precision::F64).forces;
+        let exact = Method::new(Fidelity::Exact, Precision::F64).forces;
         let errors = match scene.pace {
             scenes::Pace::Slow => scene.errors(scene.motions.iter().map(|motion| exact(&dynamics, motion))),
             _ => scene.errors(scene.states.iter().map(|state| Some(paper::forces(machine, state).into()))),

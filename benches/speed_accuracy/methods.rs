@@ -1,8 +1,10 @@
-//! What hexad offers: rungs of the ladder, two precisions, the instruction sets of this CPU.
+//! What hexad offers: fidelities of the ladder, two precisions, the instruction sets of this CPU.
 
 use fearless_simd::Level;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::ladder::{Exact, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs, Rung};
+use hexad::model::fidelity::{
+    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs,
+};
 use hexad::model::machine::LEGS;
 use hexad::model::rigid::Motion;
 
@@ -29,10 +31,10 @@ impl Precision {
     }
 }
 
-/// One rung in one precision.
+/// One fidelity in one precision.
 #[derive(Clone, Copy)]
 pub struct Method {
-    pub rung: Rung,
+    pub fidelity: Fidelity,
     pub precision: Precision,
     pub forces: fn(&InverseDynamics, &Motion) -> Forces,
     /// Time per evaluation \[ns\] of some passes over the motions, fenced or not. A function of its own for
@@ -41,21 +43,21 @@ pub struct Method {
 }
 
 impl Method {
-    pub fn new(rung: Rung, precision: Precision) -> Self {
-        match rung {
-            Rung::Gravity => Self::of::<Gravity>(rung, precision),
-            Rung::MasslessLegs => Self::of::<MasslessLegs>(rung, precision),
-            Rung::LumpedLegs => Self::of::<LumpedLegs>(rung, precision),
-            Rung::NoVelocity => Self::of::<NoVelocity>(rung, precision),
-            Rung::RigidLegs => Self::of::<RigidLegs>(rung, precision),
-            Rung::Exact => Self::of::<Exact>(rung, precision),
+    pub fn new(fidelity: Fidelity, precision: Precision) -> Self {
+        match fidelity {
+            Fidelity::Gravity => Self::of::<Gravity>(fidelity, precision),
+            Fidelity::MasslessLegs => Self::of::<MasslessLegs>(fidelity, precision),
+            Fidelity::LumpedLegs => Self::of::<LumpedLegs>(fidelity, precision),
+            Fidelity::NoVelocity => Self::of::<NoVelocity>(fidelity, precision),
+            Fidelity::RigidLegs => Self::of::<RigidLegs>(fidelity, precision),
+            Fidelity::Exact => Self::of::<Exact>(fidelity, precision),
         }
     }
 
-    fn of<M: Model>(rung: Rung, precision: Precision) -> Self {
+    fn of<M: Model>(fidelity: Fidelity, precision: Precision) -> Self {
         match precision {
             Precision::F64 => Self {
-                rung,
+                fidelity,
                 precision,
                 forces: |dynamics, motion| dynamics.forces::<M>(motion),
                 sample: |dynamics, motions, passes, fenced| {
@@ -63,7 +65,7 @@ impl Method {
                 },
             },
             Precision::F32 => Self {
-                rung,
+                fidelity,
                 precision,
                 forces: |dynamics, motion| dynamics.forces_f32::<M>(motion),
                 sample: |dynamics, motions, passes, fenced| {

@@ -10,15 +10,16 @@
 use std::path::Path;
 
 use fearless_simd::Level;
-use hexad::host::config::Config;
-use hexad::host::table::{Table, legs, six, trajectory_columns};
+use hexad::config::Config;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
+use hexad::output::csv_table::{Table, legs, six, trajectory_columns};
 
-use super::Failure;
 use super::methods::Forces;
-use super::paper::{self, State, common::data};
+use super::paper::State;
+use super::paper::common::data;
+use super::{Failure, paper};
 
 /// The machines whose scenes are evaluated.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];

@@ -1,8 +1,8 @@
 //! What it costs to make one step of Newton's method per cycle, from the pose of the cycle before.
 
-use hexad::host::charts::{Panel, Series, Stroke, write_svg};
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::scene::motions::{Motion, fit};
+use hexad::motion::built_in::{Motion, fit};
+use hexad::output::charts::{Panel, Series, Stroke, write_svg};
 
 use super::speed::newton;
 use super::{Failure, MACHINES, cells, chart, common, write_csv};

@@ -32,7 +32,7 @@ use std::error::Error;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-use hexad::host::files::write_whole;
+use hexad::output::files::write_whole;
 
 /// Anything that ends the run.
 type Failure = Box<dyn Error>;

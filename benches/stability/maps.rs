@@ -1,6 +1,6 @@
 //! Share of random poses that are found from home, and a million trials of ours.
 
-use hexad::host::charts::{Panel, Series, Stroke, write_svg};
+use hexad::output::charts::{Panel, Series, Stroke, write_svg};
 use rayon::prelude::*;
 
 use super::rivals::Update;

@@ -1,7 +1,7 @@
 //! Where the sampled loop turns unstable: predicted, and found with the real controller and the real plant.
 
-use hexad::control::sampled::SampledLoop;
-use hexad::host::charts::{Panel, Series, Stroke, write_svg};
+use hexad::analysis::sampled_loop::SampledLoop;
+use hexad::output::charts::{Panel, Series, Stroke, write_svg};
 use rayon::prelude::*;
 
 use super::delayed::boundary;

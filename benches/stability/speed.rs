@@ -1,22 +1,22 @@
 //! Error of the pose against time: plain Newton by the step, ours, and the others, from several starts.
 
-use hexad::host::charts::Stroke;
-use hexad::host::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width};
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::refine;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::inverse_jacobian::twist_from_rates;
-use hexad::model::ladder::Exact;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::stance::Stance;
 use hexad::model::task::task_coordinates;
+use hexad::output::charts::Stroke;
+use hexad::output::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width};
 use nalgebra::{Vector3, Vector6};
 
-use super::rivals::{self, Update};
+use super::rivals::Update;
 use super::timing::{Samples, sample};
 use super::trials::{pose, rigid};
-use super::{Failure, MACHINES, cells, chart, common, write_csv};
+use super::{Failure, MACHINES, cells, chart, common, rivals, write_csv};
 
 /// Starts by their distance: 2 mm and 0.2 degrees, a tenth and a hundredth of it, five times.
 const STARTS: [(&str, f64); 4] = [("0.02 mm", 0.01), ("0.2 mm", 0.1), ("2 mm", 1.0), ("10 mm", 5.0)];
@@ -36,7 +36,7 @@ struct Case {
     lengths: [f64; 6],
     start: Pose,
     start_x: [f64; 6],
-    stance: Stance,
+    kinematic_state: KinematicState,
 }
 
 /// So many steps of plain Newton, a new factorization each.
@@ -62,7 +62,7 @@ fn cases(machine: &Machine, distance: f64) -> Vec<Case> {
             let start = there.displaced(&Twist { angular, linear });
             let start_x = task_coordinates(&start, &x);
             let lengths = leg_lengths(machine, &there);
-            Case { there, lengths, start, start_x, stance: Stance::new(machine, start) }
+            Case { there, lengths, start, start_x, kinematic_state: KinematicState::new(machine, start) }
         })
         .collect()
 }
@@ -99,14 +99,14 @@ pub fn run() -> Result<(), Failure> {
                 add(format!("newton {steps}"), &|case| newton(&machine, &case.start, &case.lengths, steps));
             }
             add("hexad".into(), &|case| {
-                let mut stance = case.stance;
-                refine(&machine, &mut stance, &case.lengths);
-                *stance.pose()
+                let mut kinematic_state = case.kinematic_state;
+                refine(&machine, &mut kinematic_state, &case.lengths);
+                *kinematic_state.pose()
             });
             add("hexad from a pose".into(), &|case| {
-                let mut stance = Stance::new(&machine, case.start);
-                refine(&machine, &mut stance, &case.lengths);
-                *stance.pose()
+                let mut kinematic_state = KinematicState::new(&machine, case.start);
+                refine(&machine, &mut kinematic_state, &case.lengths);
+                *kinematic_state.pose()
             });
             for (method, update) in
                 [("rotation added to angles", Update::RotationAdded), ("Newton on angles", Update::Angles)]
@@ -148,7 +148,7 @@ fn shared(name: &str, machine: &Machine) {
         });
         with.take(cases.len(), SAMPLE_S, |passes, fenced| {
             sample(&cases, passes, fenced, |case| {
-                dynamics.forces_at::<Exact>(&case.stance, &twist, &acceleration)
+                dynamics.forces_at::<Exact>(&case.kinematic_state, &twist, &acceleration)
             })
         });
     }

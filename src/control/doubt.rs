@@ -8,9 +8,9 @@ use super::limits::{AxisLimits, Limit, Limiting, Limits};
 use super::reference::Segment;
 use super::state::{Cause, Trouble};
 use crate::model::inverse_geometry::leg_motion;
+use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{Actuator, LEGS, Machine};
 use crate::model::rigid::{Motion, Pose, Twist};
-use crate::model::stance::Stance;
 
 /// How far beyond the ends of its stroke a leg is believed, as a share of the stroke: encoders have
 /// offsets, end stops have springs.
@@ -197,7 +197,7 @@ pub struct Aim {
 pub fn setpoint(
     machine: &Machine,
     parameters: &Parameters,
-    home: &Stance,
+    home: &KinematicState,
     now: &Aim,
     before: Option<&Aim>,
     widest: f64,
@@ -264,12 +264,12 @@ fn within_legs(machine: &Machine, motion: &Motion, limiting: &mut Limiting) -> R
 fn with_room_to_stop(
     machine: &Machine,
     parameters: &Parameters,
-    home: &Stance,
+    home: &KinematicState,
     motion: &Motion,
     limiting: &mut Limiting,
 ) -> Result<(), Trouble> {
     let actuator = &machine.actuator;
-    let stop = Stance::new(machine, where_stopped(parameters, motion));
+    let stop = KinematicState::new(machine, where_stopped(parameters, motion));
     let length = stop.lengths(machine);
     let middle = 0.5 * (actuator.min_length + actuator.max_length);
     let furthest = length.iter().fold(0.0_f64, |furthest, length| furthest.max((length - middle).abs()));

@@ -10,6 +10,8 @@
 //! frequencies is the configured one; the softest and the stiffest say how far they are apart. That is
 //! what control leg by leg costs on a machine whose legs are coupled, at home already.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix6, Vector6};
 
 use crate::model::machine::Machine;

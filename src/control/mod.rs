@@ -3,7 +3,7 @@
 //! [`controller::Controller::step`] is a pure function of its state and its input: every run can be
 //! replayed bit for bit. In the order of a cycle: [`doubt`] decides which inputs count, [`supervisor`] which
 //! [`state`] follows and why, [`reference`] what the platform does in it, [`law`] with which acceleration,
-//! and [`limits`] names what must not be exceeded. [`sampled`] says which [`gains`] the loop can carry.
+//! and [`limits`] names what must not be exceeded.
 
 pub mod controller;
 pub mod doubt;
@@ -12,6 +12,5 @@ pub mod law;
 pub mod leg_masses;
 pub mod limits;
 pub mod reference;
-pub mod sampled;
 pub mod state;
 pub mod supervisor;

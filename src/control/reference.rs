@@ -9,6 +9,8 @@
 //! | stopping | where it began, at rest | from none, along the motion, until at rest |
 //! | parking | home, at rest | from where the platform is, to none |
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::limits::{AxisLimits, Limits};

@@ -15,14 +15,14 @@ use fearless_simd::{Simd, dispatch, f32x8, f64x8};
 use nalgebra::{Matrix6, Vector6};
 
 use super::balance::{Balance, LaneWrench, wrench_columns};
+use super::fidelity::{Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs};
 use super::inverse_geometry::LegGeometry;
-use super::ladder::{Exact, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs, Rung};
+use super::kinematic_state::KinematicState;
 use super::lanes::Eight;
 use super::leg::{LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, LEGS, Machine, at_most_256_bits};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
-use super::stance::Stance;
 use super::triples::{Constant, Lane, Triples};
 
 /// The inverse dynamic model of one machine: its constants, ready for the lanes.
@@ -79,14 +79,14 @@ impl InverseDynamics {
     /// [`InverseDynamics::forces`] at a pose whose legs and factorization are at hand.
     pub fn forces_at<M: Model>(
         &self,
-        stance: &Stance,
+        kinematic_state: &KinematicState,
         twist: &Twist,
         acceleration: &Acceleration,
     ) -> Option<[f64; LEGS]> {
-        let motion = Motion { pose: stance.pose, twist: *twist, acceleration: *acceleration };
+        let motion = Motion { pose: kinematic_state.pose, twist: *twist, acceleration: *acceleration };
         let lane = dispatch!(self.machine.level, simd => {
-            let legs = stance.legs_with::<_, f64x8<_>>(simd, &self.joints);
-            let balance = Balance::load(simd, &self.joints, &stance.factors).with_arms(&legs);
+            let legs = kinematic_state.legs_with::<_, f64x8<_>>(simd, &self.joints);
+            let balance = Balance::load(simd, &self.joints, &kinematic_state.factors).with_arms(&legs);
             let (wrench, along) = self.load::<_, _, M>(simd, &motion, &legs);
             balance.forces(&legs, &wrench, along)
         })?;
@@ -105,15 +105,15 @@ impl InverseDynamics {
         Some(self.joints.triples.unpack(&lane))
     }
 
-    /// [`InverseDynamics::forces`] of a rung chosen at run time.
-    pub fn forces_of(&self, rung: Rung, motion: &Motion) -> Option<[f64; LEGS]> {
-        match rung {
-            Rung::Gravity => self.forces::<Gravity>(motion),
-            Rung::MasslessLegs => self.forces::<MasslessLegs>(motion),
-            Rung::LumpedLegs => self.forces::<LumpedLegs>(motion),
-            Rung::NoVelocity => self.forces::<NoVelocity>(motion),
-            Rung::RigidLegs => self.forces::<RigidLegs>(motion),
-            Rung::Exact => self.forces::<Exact>(motion),
+    /// [`InverseDynamics::forces`] of a fidelity chosen at run time.
+    pub fn forces_of(&self, fidelity: Fidelity, motion: &Motion) -> Option<[f64; LEGS]> {
+        match fidelity {
+            Fidelity::Gravity => self.forces::<Gravity>(motion),
+            Fidelity::MasslessLegs => self.forces::<MasslessLegs>(motion),
+            Fidelity::LumpedLegs => self.forces::<LumpedLegs>(motion),
+            Fidelity::NoVelocity => self.forces::<NoVelocity>(motion),
+            Fidelity::RigidLegs => self.forces::<RigidLegs>(motion),
+            Fidelity::Exact => self.forces::<Exact>(motion),
         }
     }
 
@@ -151,7 +151,7 @@ impl InverseDynamics {
     ) -> (LaneWrench<V::Half>, V) {
         let machine = &self.machine;
         let velocity = legs.velocity(simd, &motion.twist);
-        // What the rung does not see is at rest.
+        // What the fidelity does not see is at rest.
         let twist = if M::VELOCITY { motion.twist } else { Twist::default() };
         let acceleration = if M::ACCELERATION { motion.acceleration } else { Acceleration::default() };
         let map = acceleration_map(&twist, &acceleration);

@@ -33,8 +33,8 @@
 
 use fearless_simd::Simd;
 
+use super::fidelity::{Legs, Model};
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
-use super::ladder::{Legs, Model};
 use super::lanes::Eight;
 use super::lanes3::Lanes3;
 use super::machine::{LEGS, Machine};

@@ -6,6 +6,8 @@
 //! What this file does not do: read or judge values. `host::config` does, and names key, value and bound.
 
 use fearless_simd::Level;
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3};
 
 use super::rigid::{Pose, Twist};
@@ -80,7 +82,7 @@ pub struct Joints {
     pub(super) center: Vector3<f64>,
     /// The `B_i` from their mean, in platform axes \[m\].
     pub(super) around_center: [Constant; 3],
-    /// The length `a` of that arm as a share of the radius, and `(1 + a^2) radius`: see `super::stance`.
+    /// The length `a` of that arm as a share of the radius, and `(1 + a^2) radius`: see `super::kinematic_state`.
     pub(super) arm_share: Constant,
     pub(super) arm_curvature: Constant,
 }

@@ -23,8 +23,8 @@
 use nalgebra::{Cholesky, Matrix6, U6, Vector3, Vector6};
 
 use super::active_forces::InverseDynamics;
+use super::fidelity::Exact;
 use super::inverse_jacobian::leg_wrenches;
-use super::ladder::Exact;
 use super::machine::Machine;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 

@@ -12,7 +12,7 @@
 //! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
-//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`ladder`], [`rigid`], [`sensitivity`], [`stance`], [`triples`], `lanes`, `lanes3`, `balance`, `lu`, [`machine`] |
+//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`triples`], `lanes`, `lanes3`, `balance`, `lu`, [`machine`] |
 //!
 //! # Errata of the print
 //!
@@ -36,10 +36,11 @@
 
 pub mod active_forces;
 mod balance;
+pub mod fidelity;
 pub mod forward_kinematics;
 pub mod inverse_geometry;
 pub mod inverse_jacobian;
-pub mod ladder;
+pub mod kinematic_state;
 mod lanes;
 mod lanes3;
 pub mod leg;
@@ -50,6 +51,5 @@ pub mod platform;
 pub mod regressor;
 pub mod rigid;
 pub mod sensitivity;
-pub mod stance;
 pub mod task;
 pub mod triples;

@@ -16,6 +16,8 @@
 //! about the centre of mass beside moments about C, without the parallel-axis term, which here is `c x f`.
 
 use fearless_simd::Simd;
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, RealField, SymmetricEigen, Vector3};
 
 use super::lanes::Four;

@@ -37,6 +37,8 @@
 //! [`INDISTINGUISHABLE`] and [`rod_mass_in_platform`] name these directions. Slow motions identify less:
 //! without velocity neither spin nor friction, at rest only what weighs.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 
 use super::inverse_geometry::{LegMotion, leg_directions, leg_motion};
@@ -135,7 +137,7 @@ pub fn rod_mass_in_platform(machine: &Machine) -> Parameters {
 
 /// Y at a motion; `None` at a singular pose.
 ///
-/// `Y parameters_of(machine)` are the forces of [`Exact`](super::ladder::Exact), to rounding times the
+/// `Y parameters_of(machine)` are the forces of [`Exact`](super::fidelity::Exact), to rounding times the
 /// condition of N (LU with partial pivoting, see [`super::inverse_jacobian::condition`]). Of `machine`,
 /// only geometry, gravity, reference lengths and smoothing are read.
 pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {

@@ -1,5 +1,7 @@
 //! Pose, twist, acceleration and wrench of the mobile platform: distinct types for distinct things.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, RealField, Vector3, Vector6};
 
 /// Where the platform is.

@@ -2,6 +2,8 @@
 //! determinant, and how far Newton's method can be trusted.
 
 use fearless_simd::Simd;
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix6, Vector6};
 
 use super::balance::{Balance, broadcast_vectors, wrench_columns};

@@ -4,6 +4,8 @@
 //! are the three joint axes of the rotation, so E is always defined. Its inverse is not, at
 //! beta = +-90 deg: nothing in the loop needs it, angles are only read at its edges.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::{ComplexField as _, RealField as _};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
 use super::rigid::{Acceleration, Motion, Pose, Twist};

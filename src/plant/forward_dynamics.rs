@@ -13,7 +13,7 @@
 use nalgebra::{Cholesky, Matrix6, U6, Vector6};
 
 use crate::model::active_forces::InverseDynamics;
-use crate::model::ladder::Exact;
+use crate::model::fidelity::Exact;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};

@@ -6,6 +6,8 @@ use super::imperfections::{DriveErrors, Imperfections, SensorErrors};
 use super::random::Random;
 use super::simulator::Simulator;
 use crate::model::machine::{LEGS, Machine};
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 
 /// A machine with its drives and sensors, in simulated time.
 #[derive(Clone, Debug)]

@@ -11,6 +11,8 @@
 //!
 //! Random numbers come from one seed: the same seed and the same forces give the same run, bit for bit.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
 use crate::model::machine::{Joints, LEGS, Machine};

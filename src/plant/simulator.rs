@@ -8,6 +8,8 @@
 //! Where legs are elastic a brake holds rod and drive alike: the deflection stays as it was, and is there
 //! when the brake opens. A drive whose brake closes pushes no more.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;
@@ -15,9 +17,9 @@ use super::imperfections::Imperfections;
 use super::integrator::{Drives, PlantState, WholeState, integrate};
 use super::terms::{Terms, legs};
 use crate::model::active_forces::inverse_dynamics;
+use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::{LegMotion, leg_lengths};
 use crate::model::inverse_jacobian::twist_from_rates;
-use crate::model::ladder::Exact;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Twist;
 use crate::model::task::TaskState;

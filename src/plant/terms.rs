@@ -16,6 +16,8 @@
 //! What it does not do: a step in which a leg meets a flank of its play or turns around in dry friction is of a
 //! lower order than that; its error is damped by the same contact, not bounded here.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;

@@ -3,8 +3,6 @@
 //! The daemon itself carries it, so "the real-time thread allocates nothing" is measured in the process
 //! that matters and not in a copy. The price is one increment of a thread-local number per call.
 
-extern crate std;
-
 use core::alloc::{GlobalAlloc, Layout};
 use core::cell::Cell;
 use std::alloc::System;

@@ -4,14 +4,7 @@
 //! plus a phase of the process's own. Plants and setpoint sources tick on the multiples, the daemon half a
 //! period later, so that it finds fresh data without anybody waiting for anybody.
 
-/// CLOCK_MONOTONIC \[ns\]. Answered by the vDSO without a system call on every usual clock source.
-pub fn monotonic_ns() -> u64 {
-    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `now` is a valid timespec for the duration of the call. The call cannot fail: the clock
-    // exists on every Linux and the pointer is valid.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut now) };
-    (now.tv_sec as u64).wrapping_mul(1_000_000_000).wrapping_add(now.tv_nsec as u64)
-}
+use crate::messages::clock::monotonic_ns;
 
 /// Sleeps until CLOCK_MONOTONIC shows `instant_ns`; returns at once if it has passed.
 pub fn sleep_until(instant_ns: u64) {

@@ -1,6 +1,6 @@
 //! What reading the clock costs, and what it would cost as a system call.
 
-use super::clock::monotonic_ns;
+use crate::messages::clock::monotonic_ns;
 
 /// Readings in a row, so that the two that time them do not count.
 const READINGS: u32 = 1_000;

@@ -15,12 +15,10 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use heapless::spsc::Producer;
 
 use super::clock::{Clock, Grid};
+use super::exchange::{CycleOutput, RealtimeSide};
 use super::overrun::OnOverrun;
 use super::usage::ThreadUsage;
 use super::waiter::Waiter;
-use crate::control::controller::{Input, Output};
-use crate::control::state::{Cause, State};
-use crate::ipc::exchange::{CycleOutput, RealtimeSide};
 
 /// Length of the queue of records to the log thread: 50 ms at 20 kHz, twice the log's own period.
 pub const RECORDS: usize = 1024;
@@ -62,9 +60,18 @@ pub struct Counters {
     pub allocations: u64,
 }
 
+/// Input of a cycle, as far as the loop needs to know it.
+pub trait CyclicInput: Copy {
+    /// Begins a cycle: its release instant \[ns\], and whether missed cycles are to be treated as a fault.
+    fn begin_cycle(&mut self, release_ns: u64, deadline_missed: bool);
+
+    /// Instant of the measured message in it \[ns\], if there is one.
+    fn measured_ns(&self) -> Option<u64>;
+}
+
 /// One cycle, for statistics and log.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct CycleRecord {
+pub struct CycleRecord<I, O> {
     /// Number of the cycle, from 1.
     pub cycle: u64,
     /// CLOCK_MONOTONIC instant at which it was due \[ns\].
@@ -73,21 +80,8 @@ pub struct CycleRecord {
     pub compute_ns: u64,
     /// The io thread had handed in nothing new since the last cycle.
     pub io_late: bool,
-    pub input: Input,
-    pub output: Output,
-}
-
-impl CycleRecord {
-    /// Age of the measurement at the release, if there is one.
-    pub fn measured_age_ns(&self) -> Option<u64> {
-        self.input.measurement.map(|it| self.input.release_ns.saturating_sub(it.time_ns))
-    }
-
-    /// Norms of the tracking error while active \[m\], \[rad\].
-    pub fn tracking_error(&self) -> Option<(f64, f64)> {
-        let error = self.output.error.filter(|_| self.output.state == State::Active)?;
-        Some((error.pose.linear.norm(), error.pose.angular.norm()))
-    }
+    pub input: I,
+    pub output: O,
 }
 
 /// What the loop used and counted.
@@ -98,34 +92,34 @@ pub struct LoopReport {
     pub usage: ThreadUsage,
 }
 
-/// Runs cycles until `stop`, then hands out one last output that is not valid.
+/// Runs cycles until `stop`, then writes `last`, an output that is not valid.
 ///
 /// This is the real-time path: nothing below the first release allocates, locks, logs or calls the system,
 /// but for the sleep. `step` is the controller's; a test may burn time in it.
-pub fn run(
+pub fn run<I: CyclicInput, O: Copy>(
     clock: &mut impl Clock,
     timing: &Timing,
-    step: impl FnMut(&Input) -> Output,
-    side: RealtimeSide,
-    records: Producer<'_, CycleRecord>,
+    step: impl FnMut(&I) -> O,
+    last: O,
+    side: RealtimeSide<I, O>,
+    records: Producer<'_, CycleRecord<I, O>>,
     stop: &AtomicBool,
 ) -> LoopReport {
     let at_start = ThreadUsage::of_this_thread();
     let counters = Counters::default();
     let mut cycles =
         Cycles { clock, timing, step, side, records, counters, allocations: at_start.allocations };
-    let last = run_cycles(&mut cycles, stop);
+    let Begin { due_ns, release_ns, .. } = run_cycles(&mut cycles, stop);
     let Cycles { mut side, counters, .. } = cycles;
     let usage = ThreadUsage::of_this_thread().since(&at_start);
-    let output = Output { cause: Cause::Stopping, ..Output::default() };
-    side.outputs.write(CycleOutput { due_ns: last.due_ns, release_ns: last.release_ns, output, counters });
+    side.outputs.write(CycleOutput { due_ns, release_ns, output: last, counters });
     LoopReport { counters, usage }
 }
 
 /// All cycles, in a function that the machine code has under this name: `tests/no_panic` begins here.
 #[inline(never)]
-fn run_cycles<C: Clock, S: FnMut(&Input) -> Output>(
-    cycles: &mut Cycles<'_, C, S>,
+fn run_cycles<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O>(
+    cycles: &mut Cycles<'_, C, I, O, S>,
     stop: &AtomicBool,
 ) -> Begin {
     match cycles.timing.release {
@@ -150,18 +144,18 @@ struct Begin {
     io_late: bool,
 }
 
-struct Cycles<'a, C, S> {
+struct Cycles<'a, C, I, O, S> {
     clock: &'a mut C,
     timing: &'a Timing,
     step: S,
-    side: RealtimeSide,
-    records: Producer<'a, CycleRecord>,
+    side: RealtimeSide<I, O>,
+    records: Producer<'a, CycleRecord<I, O>>,
     counters: Counters,
     /// Of this thread, before the first cycle.
     allocations: u64,
 }
 
-impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
+impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O> Cycles<'_, C, I, O, S> {
     fn run_on_grid(&mut self, mut waiter: Waiter, stop: &AtomicBool) -> Begin {
         let Timing { phase_ns, on_overrun, .. } = *self.timing;
         let period_ns = self.timing.period_ns.max(1);
@@ -205,16 +199,14 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
             }
             let woke_ns = self.clock.now_ns();
             let handed = self.side.inputs.value();
-            let measured = handed.input.measurement.filter(|_| rung);
+            let measured_ns = handed.input.measured_ns().filter(|_| rung);
             // Those before the first cycle were not missed.
             let skipped = seen.map_or(0, |seen| handed.measurements.saturating_sub(seen + 1));
             seen = Some(handed.measurements);
             let due_ns = if rung { handed.handed_ns } else { timeout_at_ns };
             // Without a message, the drive's clock is taken to have gone on as this one did.
-            let release_ns = measured.map_or_else(
-                || begin.release_ns + due_ns.saturating_sub(begin.due_ns),
-                |measurement| measurement.time_ns,
-            );
+            let release_ns =
+                measured_ns.unwrap_or_else(|| begin.release_ns + due_ns.saturating_sub(begin.due_ns));
             let wakeup_ns = woke_ns.saturating_sub(due_ns);
             missed |= skipped > 0;
             begin = Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited: true, missed, io_late: !rung };
@@ -230,8 +222,7 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
         let Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited, missed, io_late } = *begin;
         let Timing { period_ns, on_overrun, late_wakeup_ns, .. } = *self.timing;
         let mut input = self.side.inputs.value().input;
-        input.release_ns = release_ns;
-        input.deadline_missed = missed && on_overrun == OnOverrun::Fault;
+        input.begin_cycle(release_ns, missed && on_overrun == OnOverrun::Fault);
         let output = (self.step)(&input);
 
         let counters = &mut self.counters;
@@ -259,6 +250,6 @@ impl<C: Clock, S: FnMut(&Input) -> Output> Cycles<'_, C, S> {
 
 /// False if the record is lost. A queue of another length than [`RECORDS`] takes nothing. There is none; but a
 /// queue divides by its length, and this way the compiler sees that it is not zero.
-fn hand_over(records: &mut Producer<'_, CycleRecord>, record: CycleRecord) -> bool {
+fn hand_over<T>(records: &mut Producer<'_, T>, record: T) -> bool {
     records.capacity() == RECORDS - 1 && records.enqueue(record).is_ok()
 }

@@ -73,11 +73,10 @@ fn futex_wait(number: &AtomicU32, expected: u32, instant_ns: u64) {
 
 #[cfg(test)]
 mod tests {
-    extern crate std;
-
-    use super::super::clock::{Monotonic, monotonic_ns};
-    use super::super::newest::newest;
     use super::*;
+    use crate::messages::clock::monotonic_ns;
+    use crate::realtime::clock::Monotonic;
+    use crate::realtime::newest::newest;
     use std::thread::scope;
 
     /// Longer than any test may take.

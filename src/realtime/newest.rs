@@ -7,8 +7,6 @@
 //! Packages do the same (`triple_buffer`), but they find a slot by an index that the compiler cannot
 //! bound, so that a panic stays in the loop. Here every number means a slot.
 
-extern crate std;
-
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicU8, Ordering};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-"""hexad's topics in Python: the structs that src/ipc/messages.rs documents, and how to join.
+"""hexad's topics in Python: the structs that src/messages/structs.rs documents, and how to join.
 
     pip install iceoryx2==0.9.3        # the version that the daemon uses
 

@@ -2,12 +2,12 @@
 
 use core::iter::repeat_n;
 
+use hexad::analysis::envelope;
+use hexad::commands::r#move::Score;
+use hexad::config::Config;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::config::Config;
-use hexad::host::setpoints::Score;
 use hexad::model::task::TaskState;
-use hexad::scene::envelope;
-use hexad::scene::motions::{Motion, Scene, fit};
+use hexad::motion::built_in::{Motion, Scene, fit};
 
 use super::common::deployed;
 use super::rig::Rig;
@@ -114,7 +114,8 @@ fn keep_each_limit_of_the_deployment() {
         }),
         ("condition", |c| {
             let home = TaskState::at_rest(c.machine.home).motion().pose;
-            let at_home = hexad::model::stance::Stance::new(&c.machine, home).sensitivity().condition;
+            let at_home =
+                hexad::model::kinematic_state::KinematicState::new(&c.machine, home).sensitivity().condition;
             c.deployment.limits.condition = 1.02 * at_home;
         }),
     ];

@@ -3,9 +3,9 @@
 use hexad::control::controller::{Controller, Input, Output};
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, Request, State};
-use hexad::model::stance::Stance;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
-use hexad::scene::motions::{Motion, fit};
+use hexad::motion::built_in::{Motion, fit};
 
 use super::common::{deployed, largest};
 use super::rig::{Rig, in_motion, parameters};
@@ -214,8 +214,8 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
         let output = rig.cycle(&input);
         assert_eq!((output.state, output.cause), (State::Active, Cause::None), "{k}: {:?}", output.evidence);
     }
-    let stance = Stance::new(&config.machine, rig.simulator.state().pose);
-    let trusted = stance.sensitivity().trusted_step * config.machine.joints.radius;
+    let kinematic_state = KinematicState::new(&config.machine, rig.simulator.state().pose);
+    let trusted = kinematic_state.sensitivity().trusted_step * config.machine.joints.radius;
     assert!(furthest > 1.5 * trusted, "{furthest} m of {trusted} m");
 }
 

@@ -1,14 +1,14 @@
 //! Forces stay within what the actuators can do, whatever comes in, and lose what they must lose evenly.
 
+use hexad::config::Config;
 use hexad::control::controller::{Input, Output};
 use hexad::control::limits::{AxisLimits, Limit, Limits};
-use hexad::host::config::Config;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::ladder::Gravity;
+use hexad::model::fidelity::Gravity;
 use hexad::model::machine::LEGS;
 use hexad::model::rigid::Motion as Moving;
 use hexad::model::task::TaskState;
-use hexad::scene::motions::{Motion, fit};
+use hexad::motion::built_in::{Motion, fit};
 use nalgebra::Vector6;
 
 use super::common::{deployed, largest};

@@ -6,6 +6,7 @@ mod built_in;
 #[path = "../common/mod.rs"]
 mod common;
 mod evidence;
+mod fidelities;
 mod inputs;
 mod limits;
 mod modes;
@@ -14,5 +15,4 @@ mod poses;
 mod replay;
 #[path = "../common/rig.rs"]
 mod rig;
-mod rungs;
 mod tracking;

@@ -1,10 +1,10 @@
 //! The control modes, all measured alike: what each leaves of the fast scene, with a right model and a wrong one,
 //! and what the observer makes of it.
 
+use hexad::config::Config;
 use hexad::control::law::ControlMode;
 use hexad::control::leg_masses::LegMasses;
 use hexad::control::state::{Cause, State};
-use hexad::host::config::Config;
 use hexad::model::task::TaskState;
 
 use super::common::deployed;

@@ -1,10 +1,10 @@
 //! The observer: it removes what a wrong payload leaves, and does not wind up.
 
+use hexad::config::Config;
 use hexad::control::limits::Limit;
 use hexad::control::state::{Request, State};
-use hexad::host::config::Config;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::ladder::Gravity;
+use hexad::model::fidelity::Gravity;
 use hexad::model::task::TaskState;
 
 use super::common::deployed;

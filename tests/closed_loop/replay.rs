@@ -1,7 +1,7 @@
 //! The controller is a pure function of its inputs.
 
 use hexad::control::controller::{Controller, Input, Output};
-use hexad::scene::motions::{Motion, fit};
+use hexad::motion::built_in::{Motion, fit};
 
 use super::common::deployed;
 use super::rig::{Rig, parameters};

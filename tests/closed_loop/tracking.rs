@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 
 use hexad::control::state::State;
 use hexad::model::task::TaskState;
-use hexad::scene::motions::Motion;
+use hexad::motion::built_in::Motion;
 
 use super::common::{Errors, angle_between, deployed};
 use super::rig::{Rig, Tracking, track};
@@ -101,7 +101,7 @@ fn the_error_reported_is_the_error_made() {
     let mut platform = config.machine.clone();
     platform.platform.mass *= 1.2;
     let mut rig = Rig::new(&config, &platform);
-    let scene = hexad::scene::motions::fit(&config.machine, Motion::Sines, 4.0);
+    let scene = hexad::motion::built_in::fit(&config.machine, Motion::Sines, 4.0);
     let [mut position, mut orientation] = [Errors::default(); 2];
     let tracking = rig.play(&config.machine, &scene, |_, output| {
         let error = output.error.unwrap().pose;

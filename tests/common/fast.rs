@@ -2,12 +2,12 @@
 
 #![allow(dead_code, reason = "every test uses a part of it")]
 
-use hexad::host::config::Config;
+use hexad::config::Config;
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::ladder::Exact;
 use hexad::model::task::TaskState;
-use hexad::scene::motions::{Motion, Scene, fit};
+use hexad::motion::built_in::{Motion, Scene, fit};
 
 /// Seconds that the scene takes at its usual speed.
 const SECONDS: f64 = 8.0;

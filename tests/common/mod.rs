@@ -6,7 +6,7 @@ pub mod fast;
 
 use std::path::{Path, PathBuf};
 
-use hexad::host::config::Config;
+use hexad::config::Config;
 use hexad::model::machine::{Joints, LEGS, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;

@@ -3,18 +3,18 @@
 
 #![allow(dead_code, reason = "every test uses a part of it")]
 
+use hexad::config::Config;
+use hexad::config::deployment::FidelityChoice;
 use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::config::Config;
-use hexad::host::config::deployment::Fidelity;
-use hexad::host::daemon;
-use hexad::model::ladder::Rung;
+use hexad::daemon;
+use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::task::TaskState;
+use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::timeline::Timeline;
 use hexad::plant::simulator::Simulator;
-use hexad::scene::motions::{Motion, Scene, fit};
-use hexad::scene::timeline::Timeline;
 
 use super::common::{Errors, angle_between};
 
@@ -29,11 +29,11 @@ const START_NS: u64 = 86_400_000_000_000;
 
 /// What a deployment's sections mean to the controller.
 pub fn parameters(config: &Config) -> Parameters {
-    let rung = match config.deployment.control.fidelity {
-        Fidelity::Fixed(rung) => rung,
-        Fidelity::Auto => Rung::Exact,
+    let fidelity = match config.deployment.control.fidelity {
+        FidelityChoice::Fixed(fidelity) => fidelity,
+        FidelityChoice::Auto => Fidelity::Exact,
     };
-    daemon::parameters(&config.machine, &config.deployment, rung)
+    daemon::parameters(&config.machine, &config.deployment, fidelity)
 }
 
 /// A controller, a platform, and what is between them.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_3, FRAC_PI_6};
 
-use hexad::host::config::{Config, Violation};
+use hexad::config::{Config, Violation};
 use nalgebra::Vector3;
 
 use super::{FRIED, fried_with, refused, violations};

@@ -1,8 +1,8 @@
 //! Deployment: bounds, and what follows from the rate.
 
-use hexad::host::config::deployment::{Deployment, Fidelity};
-use hexad::host::config::{Config, Violation};
-use hexad::model::ladder::Rung;
+use hexad::config::deployment::{Deployment, FidelityChoice};
+use hexad::config::{Config, Violation};
+use hexad::model::fidelity::Fidelity;
 
 use super::{FRIED, violations};
 
@@ -144,10 +144,10 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
 fn fidelity_is_auto_or_a_rung_with_inertia() {
     let read = |text: &str| Config::parse(&format!("{FRIED}[control]\n{text}"), "test.toml").unwrap();
     let fidelity = |text: &str| read(text).deployment.control.fidelity;
-    assert_eq!(fidelity(""), Fidelity::Fixed(Rung::Exact));
-    assert_eq!(fidelity("fidelity = \"auto\""), Fidelity::Auto);
-    for rung in &Rung::ALL[1..] {
-        assert_eq!(fidelity(&format!("fidelity = \"{}\"", rung.name())), Fidelity::Fixed(*rung));
+    assert_eq!(fidelity(""), FidelityChoice::Fixed(Fidelity::Exact));
+    assert_eq!(fidelity("fidelity = \"auto\""), FidelityChoice::Auto);
+    for choice in &Fidelity::ALL[1..] {
+        assert_eq!(fidelity(&format!("fidelity = \"{}\"", choice.name())), FidelityChoice::Fixed(*choice));
     }
     assert_eq!(read("fidelity_tolerance = 1").deployment.control.fidelity_tolerance, 1.0);
     let refused = |text: &str, message: &str| {

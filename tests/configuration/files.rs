@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use hexad::host::config::Config;
+use hexad::config::Config;
 use hexad::model::inverse_jacobian::condition;
 use hexad::model::task::TaskState;
 use proptest::prelude::*;

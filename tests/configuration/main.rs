@@ -9,7 +9,7 @@ mod plant;
 mod reference;
 mod values;
 
-use hexad::host::config::{Config, ConfigError, Violation};
+use hexad::config::{Config, ConfigError, Violation};
 
 const FRIED: &str = include_str!("../../config/fried2008.toml");
 const REFERENCE: &str = include_str!("../../config/reference.toml");

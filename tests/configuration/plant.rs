@@ -1,6 +1,6 @@
 //! `[plant]` and its imperfections: where values go, and what is refused.
 
-use hexad::host::config::{Config, Violation};
+use hexad::config::{Config, Violation};
 use hexad::model::rigid::Wrench;
 use hexad::plant::imperfections::{
     BuildErrors, DriveErrors, Elastic, External, Friction, Imperfections, SensorErrors,

@@ -1,6 +1,6 @@
 //! `config/reference.toml` cannot drift from the reader: the reader itself says which keys it knows.
 
-use hexad::host::config::{Config, ConfigError, Violation};
+use hexad::config::{Config, ConfigError, Violation};
 
 use super::{REFERENCE, violations};
 

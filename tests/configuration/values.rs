@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hexad::host::config::{Config, Violation};
+use hexad::config::{Config, Violation};
 
 use super::{FRIED, fried_with, refused, violations};
 

@@ -6,9 +6,11 @@ use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
 use hexad::control::controller::{Input, Measurement, Output};
-use hexad::ipc::exchange::{CycleInput, exchange};
-use hexad::realtime::clock::{Monotonic, monotonic_ns};
-use hexad::realtime::cyclic::{CycleRecord, RECORDS, Release, Timing, run};
+use hexad::daemon::cycle::{CycleInput, CycleRecord};
+use hexad::messages::clock::monotonic_ns;
+use hexad::realtime::clock::Monotonic;
+use hexad::realtime::cyclic::{RECORDS, Release, Timing, run};
+use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OnOverrun;
 
 /// A drive's clock has nothing to do with ours.
@@ -42,7 +44,8 @@ fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
         Output::default()
     };
     let report = thread::scope(|threads| {
-        let realtime = threads.spawn(move || run(&mut Monotonic, &timing, step, side, records_in, stop));
+        let realtime = threads
+            .spawn(move || run(&mut Monotonic, &timing, step, Output::default(), side, records_in, stop));
         let mut cycle_after = |number: u64| {
             let due_ns = io.outputs.read().due_ns;
             io.inputs.write(message(number));
@@ -66,8 +69,8 @@ fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
     let drive = |number: u64| DRIVE_BEGAN_NS + number * DRIVE_PERIOD_NS;
     let by_message: Vec<_> = (3..=20).chain([24]).map(drive).collect();
     let found: Vec<_> = seen.iter().map(|(release_ns, _)| *release_ns).collect();
-    let (rung, after) = found.split_at(by_message.len());
-    assert_eq!(rung, by_message, "the times of the drive, one cycle each");
+    let (fidelity, after) = found.split_at(by_message.len());
+    assert_eq!(fidelity, by_message, "the times of the drive, one cycle each");
     let (last, watchdog) = after.split_last().expect("the last message");
     assert_eq!(*last, drive(25));
     assert!((1..=3).contains(&watchdog.len()), "{watchdog:?}");

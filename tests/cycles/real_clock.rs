@@ -6,9 +6,11 @@ use std::thread;
 
 use heapless::spsc::Queue;
 use hexad::control::controller::{Input, Output};
-use hexad::ipc::exchange::exchange;
-use hexad::realtime::clock::{Monotonic, monotonic_ns};
-use hexad::realtime::cyclic::{Counters, CycleRecord, RECORDS, Release, Timing, run};
+use hexad::daemon::cycle::CycleRecord;
+use hexad::messages::clock::monotonic_ns;
+use hexad::realtime::clock::Monotonic;
+use hexad::realtime::cyclic::{Counters, RECORDS, Release, Timing, run};
+use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OnOverrun;
 use hexad::realtime::setup::scheduling;
 
@@ -53,7 +55,7 @@ fn perform(release: Release, on_overrun: OnOverrun) -> (Vec<Cycle>, Vec<CycleRec
         let body = || {
             // Without it the test is slower, not wrong.
             let _ = scheduling::fifo_priority(50);
-            run(&mut Monotonic, &timing, step, side, records_in, &stop)
+            run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop)
         };
         threads.spawn(body).join().expect("the loop")
     });

@@ -5,9 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Queue;
 use hexad::control::controller::{Input, Output};
-use hexad::ipc::exchange::exchange;
+use hexad::daemon::cycle::CycleRecord;
 use hexad::realtime::clock::Clock;
-use hexad::realtime::cyclic::{Counters, CycleRecord, RECORDS, Release, Timing, run};
+use hexad::realtime::cyclic::{Counters, RECORDS, Release, Timing, run};
+use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OnOverrun;
 
 pub const PERIOD_NS: u64 = 1000;
@@ -76,7 +77,7 @@ pub fn perform(script: &Script, on_overrun: OnOverrun, cycles: usize) -> (Vec<Se
         stop.store(begun.len() == cycles, Ordering::Relaxed);
         Output::default()
     };
-    let report = run(&mut clock, &timing, step, side, records_in, &stop);
+    let report = run(&mut clock, &timing, step, Output::default(), side, records_in, &stop);
     written.extend(records.dequeue());
     assert_eq!(written.len(), begun.len());
     for (number, (seen, record)) in (1..).zip(begun.iter_mut().zip(&written)) {

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use hexad::control::state::State;
-use hexad::host::charts::{Panel, Series, Stroke, write_svg};
 use hexad::model::rigid::Twist;
+use hexad::output::charts::{Panel, Series, Stroke, write_svg};
 
 use super::recording::Sample;
 use super::world::World;

@@ -1,12 +1,12 @@
 //! One world in each state, a moment before something goes wrong.
 
+use hexad::analysis::envelope;
+use hexad::config::Config;
 use hexad::control::controller::Parameters;
 use hexad::control::law::ControlMode;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::config::Config;
 use hexad::model::task::TaskState;
-use hexad::scene::envelope;
-use hexad::scene::motions::{Motion, fit};
+use hexad::motion::built_in::{Motion, fit};
 
 use super::common::deployed;
 use super::rig::{Rig, parameters};

@@ -3,14 +3,14 @@
 use hexad::control::controller::{Controller, Input, Measurement, Output, Parameters, Setpoint};
 use hexad::control::state::Request;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::ladder::Gravity;
+use hexad::model::fidelity::Gravity;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::{TaskState, task_coordinates};
+use hexad::motion::built_in::Scene;
+use hexad::motion::minimum_jerk::{between, rise};
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::simulator::Simulator;
-use hexad::scene::minimum_jerk::{between, rise};
-use hexad::scene::motions::Scene;
 use nalgebra::Vector6;
 
 use super::recording::{Recording, Sample};

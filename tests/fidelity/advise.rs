@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use hexad::scene::envelope::Limits;
+use hexad::analysis::envelope::Limits;
 use tempfile::TempDir;
 
 use super::common::{Table, data, machine};
@@ -53,8 +53,8 @@ fn recommended(text: &str) -> &str {
 }
 
 /// Columns 1 to 7 of a row: mean, RMS, max \[N\], the same \[%\], time \[ns\].
-fn row(text: &str, rung: &str) -> [f64; 7] {
-    let line = text.lines().find(|line| line.starts_with(rung)).unwrap();
+fn row(text: &str, fidelity: &str) -> [f64; 7] {
+    let line = text.lines().find(|line| line.starts_with(fidelity)).unwrap();
     let numbers: Vec<f64> = line.split_whitespace().skip(1).take(7).map(|x| x.parse().unwrap()).collect();
     numbers.try_into().unwrap()
 }
@@ -64,7 +64,7 @@ fn without_times(text: &str) -> String {
     for line in text.lines() {
         let cut = ["gravity ", "massless", "lumped", "no-velocity", "rigid", "exact"]
             .iter()
-            .any(|rung| line.starts_with(rung));
+            .any(|fidelity| line.starts_with(fidelity));
         let words: Vec<_> = line.split_whitespace().collect();
         let kept = if cut { words[..7].join(" ") + &words[8..].join(" ") } else { line.to_string() };
         writeln!(stripped, "{kept}").unwrap();
@@ -93,7 +93,8 @@ fn a_telescope_and_a_motion_base_need_different_models() {
     assert!(fast.contains("leaving out spin of the legs would cost 0.2"), "{fast}");
     assert!(fast.contains("outside the actuators' stroke"), "{fast}");
     for text in [&slow, &fast] {
-        let times = ["gravity", "massless-legs", "no-velocity", "exact"].map(|rung| row(text, rung)[6]);
+        let times =
+            ["gravity", "massless-legs", "no-velocity", "exact"].map(|fidelity| row(text, fidelity)[6]);
         assert!(times.iter().all(|ns| (1.0..1e5).contains(ns)), "{times:?}");
         assert_eq!(row(text, "exact")[..6], [0.0; 6]);
     }
@@ -118,7 +119,7 @@ fn advice_is_the_same_twice_but_for_the_time() {
     assert_eq!(without_times(&said(&config, None)), without_times(&said(&config, None)));
 }
 
-/// The vectors have forces without spin by another program: what the rung must be off by.
+/// The vectors have forces without spin by another program: what the fidelity must be off by.
 #[test]
 fn a_trajectory_is_judged_by_its_rows() {
     for name in ["fried2008", "motion_base", "telescope"] {

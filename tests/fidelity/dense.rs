@@ -1,13 +1,13 @@
 //! The choice holds where the chooser did not look.
 
+use hexad::analysis::envelope::{CORNERS, Envelope, Shares};
+use hexad::analysis::fidelity_choice::Judgement;
+use hexad::analysis::fidelity_error::{Sample, Tally};
+use hexad::analysis::reachable_envelope;
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
-use hexad::model::ladder::Rung;
 use hexad::model::machine::Machine;
-use hexad::scene::envelope::{CORNERS, Envelope, Shares};
-use hexad::scene::fidelity::Judgement;
-use hexad::scene::reach;
-use hexad::scene::tally::{Sample, Tally};
 
 use super::common::{MACHINES, machine};
 use super::scenes::{Scene, scenes};
@@ -62,7 +62,7 @@ fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
         for step in 0..=90 {
             let tolerance = 10_f64.powf(-0.1 * f64::from(step));
             let choice = judgement.choice(tolerance);
-            let number = Rung::ALL.iter().position(|rung| *rung == choice).unwrap();
+            let number = Fidelity::ALL.iter().position(|fidelity| *fidelity == choice).unwrap();
             // In each set against its own peak: whoever looks at one alone must find it so.
             for (what, seen) in [("inside", &inside), ("corners", &corners)] {
                 let share = seen.errors[number].max / seen.peak;
@@ -75,9 +75,9 @@ fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
             choices.push(choice);
         }
     }
-    choices.sort_by_key(|rung| *rung as u8);
+    choices.sort_by_key(|fidelity| *fidelity as u8);
     choices.dedup();
-    assert_eq!(choices, &Rung::ALL[1..], "every rung with inertia is a choice for somebody");
+    assert_eq!(choices, &Fidelity::ALL[1..], "every fidelity with inertia is a choice for somebody");
 }
 
 /// Where every corner can be reached the errors are largest at one of them, or nearly.
@@ -92,8 +92,8 @@ fn the_worst_that_is_reported_exists() {
         let [inside, corners] = dense(&scene);
         for ((price, inside), corners) in judgement.prices.iter().zip(&inside.errors).zip(&corners.errors) {
             let (seen, name) = (inside.max.max(corners.max), &scene.name);
-            assert!(seen >= 0.95 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.rung, price.max);
-            assert!(seen <= 1.05 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.rung, price.max);
+            assert!(seen >= 0.95 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.fidelity, price.max);
+            assert!(seen <= 1.05 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.fidelity, price.max);
         }
     }
 }
@@ -113,7 +113,7 @@ fn what_is_out_of_reach_is_counted_and_passed_over() {
 fn every_machine_has_an_envelope_of_its_own() {
     for name in MACHINES {
         let mut machine = machine(name);
-        let envelope_of = |machine: &Machine| reach::envelope(&InverseDynamics::new(machine));
+        let envelope_of = |machine: &Machine| reachable_envelope::envelope(&InverseDynamics::new(machine));
         let full = envelope_of(&machine);
         assert!(full.limits().pose_max.iter().all(|x| *x > 0.0), "{name}: {full:?}");
         assert!(full.limits().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
@@ -136,7 +136,11 @@ fn every_machine_has_an_envelope_of_its_own() {
         assert_eq!(none.limits().pose_max, [0.0; 6], "{name}");
         let judgement = Judgement::of_envelope(&InverseDynamics::new(&machine), &none);
         assert!(judgement.all.judged > 0, "{name}");
-        assert!(judgement.choice(0.0) as u8 >= Rung::NoVelocity as u8, "{name}: {:?}", judgement.choice(0.0));
+        assert!(
+            judgement.choice(0.0) as u8 >= Fidelity::NoVelocity as u8,
+            "{name}: {:?}",
+            judgement.choice(0.0)
+        );
         assert_eq!(none, Envelope::new(&machine.home, *none.limits()));
     }
 }

@@ -1,6 +1,6 @@
 //! The points of an envelope: ends, evenness, corners.
 
-use hexad::scene::envelope::{CORNERS, DIMENSIONS, Envelope, Limits, Shares};
+use hexad::analysis::envelope::{CORNERS, DIMENSIONS, Envelope, Limits, Shares};
 use nalgebra::Vector6;
 
 const HOME: [f64; 6] = [0.5, 0.0, 0.0, 0.0, 0.0, 1.0];

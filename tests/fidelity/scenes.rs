@@ -1,8 +1,8 @@
 //! Machines and what they are asked to do.
 
+use hexad::analysis::envelope::{Envelope, Limits};
+use hexad::analysis::reachable_envelope;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::scene::envelope::{Envelope, Limits};
-use hexad::scene::reach;
 
 use super::common::machine;
 
@@ -51,7 +51,7 @@ pub fn scenes() -> Vec<Scene> {
     for name in ["fried2008", "motion_base", "tsai2000", "telescope"] {
         let machine = machine(name);
         let model = InverseDynamics::new(&machine);
-        let own = *reach::envelope(&model).limits();
+        let own = *reachable_envelope::envelope(&model).limits();
         let faster = |share: f64| Limits {
             velocity: own.velocity.map(|v| v * share),
             acceleration: own.acceleration.map(|a| a * share * share),

@@ -10,17 +10,17 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::{panicking, sleep};
 use std::time::{Duration, Instant};
 
-use hexad::host::config::Config;
-use hexad::host::demo::children::PARENT;
-use hexad::host::plant::hardware;
-use hexad::ipc::messages::{ForceMessage, MeasuredMessage};
-use hexad::ipc::ports::{Bus, Sink, Source, Time};
+use hexad::commands::demo::children::PARENT;
+use hexad::commands::plant::hardware;
+use hexad::config::Config;
+use hexad::messages::ports::{Bus, Sink, Source, Time};
+use hexad::messages::structs::{ForceMessage, MeasuredMessage};
 use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::ladder::Exact;
+use hexad::model::fidelity::Exact;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::model::task::{TaskState, task_coordinates};
-use hexad::scene::motions::{Motion as Scene, fit};
+use hexad::motion::built_in::{Motion as Scene, fit};
 use nalgebra::Vector6;
 
 use crate::common::{Errors, Table, largest};

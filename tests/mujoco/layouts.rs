@@ -1,13 +1,13 @@
-//! The structs of `tests/clients/hexad.py` are those of `src/ipc/messages.rs`. That they have the names of the
+//! The structs of `tests/clients/hexad.py` are those of `src/messages/structs.rs`. That they have the names of the
 //! documentation shows when they connect.
 
 use std::mem::{align_of, offset_of, size_of};
 
 use crate::python;
-use hexad::ipc::messages::{
+use hexad::messages::statistics::{LoopTimes, Statistics, Times, WorstCycle};
+use hexad::messages::structs::{
     CommandMessage, ForceMessage, Header, MeasuredMessage, Message, SCHEMA, SetpointMessage, StatusMessage,
 };
-use hexad::ipc::statistics::{LoopTimes, Statistics, Times, WorstCycle};
 
 /// A line for the struct and one for each of its fields: a field that is not listed here does not compile.
 macro_rules! layout {
@@ -69,7 +69,7 @@ fn the_documented_sizes_are_right() {
     ]
     .join(", ");
     assert!(
-        include_str!("../../src/ipc/messages.rs").contains(&format!("| size in bytes | {size} |")),
+        include_str!("../../src/messages/structs.rs").contains(&format!("| size in bytes | {size} |")),
         "{size}"
     );
 }

@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;

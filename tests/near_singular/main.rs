@@ -11,8 +11,8 @@ mod scenes;
 use std::collections::{BTreeMap, BTreeSet};
 
 use common::Errors;
+use hexad::model::fidelity::Exact;
 use hexad::model::inverse_jacobian::{leg_wrenches, twist_from_rates};
-use hexad::model::ladder::Exact;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Pose;
 use nalgebra::{Matrix3, Vector6};

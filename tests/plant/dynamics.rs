@@ -1,7 +1,7 @@
 //! Forward dynamics: its mass matrix is that of the bodies, and it inverts inverse dynamics.
 
 use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::ladder::Exact;
+use hexad::model::fidelity::Exact;
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::integrator::PlantState;

@@ -16,8 +16,8 @@ mod integration;
 mod power;
 
 use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 use hexad::model::task::TaskState;

@@ -9,10 +9,10 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hexad::control::state::State;
-use hexad::host::report::Report;
-use hexad::ipc::messages::StatusMessage;
-use hexad::ipc::ports::{Bus, Sink};
-use hexad::ipc::statistics::LoopTimes;
+use hexad::daemon::report::Report;
+use hexad::messages::ports::{Bus, Sink};
+use hexad::messages::statistics::LoopTimes;
+use hexad::messages::structs::StatusMessage;
 
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT};

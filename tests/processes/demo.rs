@@ -4,15 +4,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use hexad::host::report::Report;
-use hexad::ipc::statistics::Times;
+use hexad::daemon::report::Report;
+use hexad::messages::statistics::Times;
 use serde_json::{Map, Value};
 
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::stalls::Watchdog;
-use crate::support::turns;
-use crate::support::xml;
+use crate::support::{turns, xml};
 
 const SECONDS: f64 = 3.0;
 

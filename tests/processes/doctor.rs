@@ -6,10 +6,10 @@
 
 use std::time::Duration;
 
-use hexad::host::doctor::Diagnosis;
-use hexad::host::doctor::facts::{Fact, Rating};
-use hexad::host::doctor::latency::Waiting;
-use hexad::host::doctor::verdict::Judgement;
+use hexad::commands::doctor::Diagnosis;
+use hexad::commands::doctor::facts::{Fact, Rating};
+use hexad::commands::doctor::latency::Waiting;
+use hexad::commands::doctor::verdict::Judgement;
 
 use crate::support::children::{Ended, HANG, Hexad, run};
 use crate::support::machine::Machine;

@@ -4,11 +4,11 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::host::config::Config;
-use hexad::ipc::messages::Message;
-use hexad::ipc::ports::Bus;
+use hexad::config::Config;
+use hexad::messages::ports::Bus;
+use hexad::messages::structs::Message;
 use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::ladder::Exact;
+use hexad::model::fidelity::Exact;
 use hexad::model::task::TaskState;
 
 use crate::support::children::{HANG, Hexad};
@@ -51,7 +51,7 @@ const WRONG: [(Change, &str); 9] = [
     (|message| resealed(message, |message| message.header.epoch -= 1), "of an older daemon"),
 ];
 
-fn resealed(message: &mut hexad::ipc::messages::ForceMessage, change: Change) {
+fn resealed(message: &mut hexad::messages::structs::ForceMessage, change: Change) {
     change(message);
     message.seal();
 }

@@ -4,24 +4,23 @@ use std::collections::HashSet;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use hexad::commands::operate::Operator;
+use hexad::config::Config;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::config::Config;
-use hexad::host::operator::Operator;
-use hexad::host::report::Report;
-use hexad::ipc::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
-use hexad::ipc::ports::Bus;
+use hexad::daemon::report::Report;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::Bus;
+use hexad::messages::structs::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use hexad::plant::simulator::Simulator;
-use hexad::realtime::clock::monotonic_ns;
 use hexad::realtime::setup::scheduling;
 
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS, TIMEOUT_NS};
-use crate::support::operator;
-use crate::support::peer::{self, Controlled};
+use crate::support::peer::Controlled;
 use crate::support::recorder::{Recorder, Recording};
 use crate::support::steps::{Step, steps};
 use crate::support::trio::{let_pass, start_daemon, valid_after};
-use crate::support::turns;
+use crate::support::{operator, peer, turns};
 
 fn external(test: &str) -> Machine {
     Machine::with(test, &format!("[realtime]\nrelease = \"external\"\n{PATIENT}"))

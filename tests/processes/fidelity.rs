@@ -2,10 +2,9 @@
 
 use crate::support::children::{HANG, Hexad, run};
 use crate::support::machine::{Machine, PATIENT};
-use crate::support::operator;
 use crate::support::recorder::Recorder;
 use crate::support::trio::{start_daemon, start_plant};
-use crate::support::turns;
+use crate::support::{operator, turns};
 
 /// What the daemon says about it with these keys in `[control]`.
 fn said(keys: &str) -> String {
@@ -23,7 +22,7 @@ fn the_daemon_chooses_and_says_why() {
         "leaving out spin of the legs costs at most 0.00",
         "of the peak force, tolerance 0.1 %; velocity terms and spin would cost 0.66",
         "extent of the legs would cost",
-        "rung=\"rigid-legs\"",
+        "fidelity=\"rigid-legs\"",
     ] {
         assert!(line.contains(words), "{words:?} must be in {line}");
     }
@@ -31,8 +30,8 @@ fn the_daemon_chooses_and_says_why() {
     assert!(line.contains("nothing may be left out at a tolerance of 0.0000001 %"), "{line}");
     // Gravity would be within this tolerance.
     let line = said("fidelity = \"auto\"\nfidelity_tolerance = 1");
-    assert!(line.contains("rung=\"massless-legs\""), "{line}");
-    assert!(said("fidelity = \"no-velocity\"").contains("rung=\"no-velocity\""));
+    assert!(line.contains("fidelity=\"massless-legs\""), "{line}");
+    assert!(said("fidelity = \"no-velocity\"").contains("fidelity=\"no-velocity\""));
     assert_eq!(said("fidelity = \"exact\""), "");
 }
 
@@ -41,7 +40,7 @@ fn the_daemon_chooses_and_says_why() {
 fn the_daemon_runs_on_the_rung_it_was_told() {
     let _turn = turns::beside_others();
     let sections = format!("[control]\nfidelity = \"massless-legs\"\n{PATIENT}");
-    let machine = Machine::with("rung", &sections);
+    let machine = Machine::with("fidelity", &sections);
     let recorder = Recorder::start(&machine.name);
     let _plant = start_plant(&machine);
     let _daemon = start_daemon(&machine);

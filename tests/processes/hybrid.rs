@@ -5,11 +5,12 @@
 use std::thread::{available_parallelism, sleep};
 use std::time::{Duration, Instant};
 
-use hexad::host::config::Config;
-use hexad::host::report::Report;
-use hexad::ipc::messages::ForceMessage;
-use hexad::ipc::ports::Bus;
-use hexad::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use hexad::config::Config;
+use hexad::daemon::report::Report;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::Bus;
+use hexad::messages::structs::ForceMessage;
+use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;
 
 use crate::support::children::HANG;

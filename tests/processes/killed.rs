@@ -1,16 +1,15 @@
 //! SIGKILL in full motion, then a restart and one `engage`, without anybody cleaning up.
 
 use hexad::control::state::{Cause, Request};
-use hexad::ipc::messages::MeasuredMessage;
-use hexad::realtime::clock::monotonic_ns;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::structs::MeasuredMessage;
 
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::PERIOD_NS;
-use crate::support::operator;
 use crate::support::recorder::Recording;
 use crate::support::rules::stands;
 use crate::support::trio::{Trio, start_daemon, start_plant, start_setpoints, valid_after};
-use crate::support::turns;
+use crate::support::{operator, turns};
 
 /// An outage: from the kill to the restart \[ns\].
 struct Outage {

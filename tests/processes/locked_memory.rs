@@ -3,19 +3,16 @@
 //!
 //! 20 seconds, or a minute with `HEXAD_LONG=1`. Needs root (CAP_IPC_LOCK).
 
-use std::env;
-use std::fs;
 use std::time::{Duration, Instant};
+use std::{env, fs};
 
-use hexad::host::report::Report;
+use hexad::daemon::report::Report;
 
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
-use crate::support::operator;
 use crate::support::recorder::Recorder;
-use crate::support::rules;
 use crate::support::trio::{start_daemon, start_plant};
-use crate::support::turns;
+use crate::support::{operator, rules, turns};
 
 /// What the daemon may keep in memory \[kB\].
 const MOST_KB: u64 = 64 * 1024;

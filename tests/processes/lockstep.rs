@@ -1,24 +1,22 @@
 //! `release = "lockstep"`: everybody waits for everybody, and the forces are the same to the last bit, whoever is fast
 //! or slow.
 
-use std::env;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::thread;
 use std::time::{Duration, Instant};
+use std::{env, thread};
 
-use hexad::host::config::Config;
-use hexad::host::demo::children::PARENT;
-use hexad::host::plant::hardware;
-use hexad::ipc::messages::{ForceMessage, Header, MeasuredMessage};
-use hexad::ipc::ports::{Bus, Time};
+use hexad::commands::demo::children::PARENT;
+use hexad::commands::plant::hardware;
+use hexad::config::Config;
+use hexad::messages::ports::{Bus, Time};
+use hexad::messages::structs::{ForceMessage, Header, MeasuredMessage};
 use hexad::realtime::setup::scheduling;
 
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PERIOD_NS};
-use crate::support::operator;
 use crate::support::recorder::Recorder;
-use crate::support::turns;
+use crate::support::{operator, turns};
 
 const LOCKSTEP: &str = "[realtime]\nrelease = \"lockstep\"";
 

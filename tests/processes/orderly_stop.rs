@@ -5,15 +5,13 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::host::report::Report;
+use hexad::daemon::report::Report;
 
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
-use crate::support::operator;
 use crate::support::recorder::Recorder;
-use crate::support::rules;
 use crate::support::trio::{Trio, fastest, start_daemon, start_setpoints};
-use crate::support::turns;
+use crate::support::{operator, rules, turns};
 
 /// A person waits no longer.
 const SOON: Duration = Duration::from_secs(2);

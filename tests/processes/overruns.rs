@@ -7,18 +7,16 @@ use std::collections::HashSet;
 use std::time::Duration;
 
 use hexad::control::state::{Cause, State};
-use hexad::host::report::Report;
-use hexad::ipc::messages::ForceMessage;
+use hexad::daemon::report::Report;
+use hexad::messages::structs::ForceMessage;
 
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS, TIMEOUT_NS};
-use crate::support::operator;
 use crate::support::peer::Controlled;
 use crate::support::recorder::{Recorder, Recording};
-use crate::support::rules;
 use crate::support::steps::{Step, steps};
 use crate::support::trio::{let_pass, start_daemon};
-use crate::support::turns;
+use crate::support::{operator, rules, turns};
 
 /// Shorter than every timeout, longer than what is caught up.
 const HOLD: Duration = Duration::from_millis(30);

@@ -5,10 +5,9 @@ use std::time::Duration;
 use hexad::control::state::{Cause, State};
 
 use crate::support::machine::{PERIOD_NS, TIMEOUT_NS};
-use crate::support::operator;
 use crate::support::recorder::Recording;
 use crate::support::trio::{Trio, let_pass, valid_after};
-use crate::support::turns;
+use crate::support::{operator, turns};
 
 /// Longer than every timeout of the machine file.
 const PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS + TIMEOUT_NS / 2);

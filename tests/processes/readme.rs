@@ -1,13 +1,12 @@
 //! The driver of the README, as it stands there, connects a machine.
 
-use std::fs;
 use std::sync::Mutex;
-use std::thread;
 use std::time::Duration;
+use std::{fs, thread};
 
+use hexad::config::Config;
 use hexad::control::state::State;
-use hexad::host::config::Config;
-use hexad::ipc::messages::StatusMessage;
+use hexad::messages::structs::StatusMessage;
 use hexad::model::machine::LEGS;
 use hexad::plant::simulator::Simulator;
 use hexad::realtime::clock::{Grid, sleep_until};
@@ -15,10 +14,9 @@ use hexad::realtime::setup::scheduling;
 
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PERIOD_NS};
-use crate::support::peer;
 use crate::support::recorder::Recorder;
 use crate::support::trio::{let_pass, start_daemon};
-use crate::support::{operator, turns};
+use crate::support::{operator, peer, turns};
 
 include!("support/driver.in");
 

@@ -1,10 +1,9 @@
 //! What Linux refuses is told with the reason that holds and the remedy for it; with `require_realtime` it is
 //! a refusal to start. Each case is a real refusal by the kernel.
 
-use std::fs;
 use std::path::PathBuf;
-use std::process;
 use std::thread::available_parallelism;
+use std::{fs, process};
 
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::Machine;

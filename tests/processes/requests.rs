@@ -6,18 +6,17 @@ use std::thread::{JoinHandle, sleep, spawn};
 use std::time::Duration;
 
 use hexad::control::state::{Cause, Request, State};
-use hexad::ipc::messages::SetpointMessage;
-use hexad::ipc::ports::Bus;
-use hexad::realtime::clock::monotonic_ns;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::Bus;
+use hexad::messages::structs::SetpointMessage;
 
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::{ask, clear, does, engage, is_refused};
-use crate::support::peer::{self, Controlled};
+use crate::support::peer::Controlled;
 use crate::support::recorder::{Recorder, Recording};
-use crate::support::rules;
 use crate::support::trio::{Trio, let_pass, start_daemon, start_plant};
-use crate::support::turns;
+use crate::support::{peer, rules, turns};
 
 /// Limits with which the daemon's own motions take one to three seconds: time to do something during them.
 const SLOW: &str = "[limits]\nacceleration_m_s2 = 0.05\njerk_m_s3 = 0.2\nown_share = 1.0\n";

@@ -4,21 +4,18 @@
 //! 12 rounds, or 500 with `HEXAD_LONG=1`. `HEXAD_SEED` repeats a run, as far as the host lets it.
 
 use std::collections::BTreeMap;
-use std::env;
-use std::fs;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+use std::{env, fs};
 
 use hexad::control::state::{Request, State};
-use hexad::realtime::clock::monotonic_ns;
+use hexad::messages::clock::monotonic_ns;
 
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::TIMEOUT_NS;
-use crate::support::operator;
 use crate::support::random::Random;
-use crate::support::rules;
 use crate::support::trio::{Trio, start_daemon, start_plant, start_setpoints};
-use crate::support::turns;
+use crate::support::{operator, rules, turns};
 
 const ROUNDS: usize = 12;
 const LONG_ROUNDS: usize = 500;

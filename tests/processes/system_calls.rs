@@ -11,7 +11,7 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hexad::host::report::Report;
+use hexad::daemon::report::Report;
 
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS};

@@ -3,16 +3,14 @@
 use std::fmt::Write;
 use std::fs;
 
-use hexad::ipc::messages::{MeasuredMessage, SetpointMessage};
-use hexad::scene::minimum_jerk::rise;
+use hexad::messages::structs::{MeasuredMessage, SetpointMessage};
+use hexad::motion::minimum_jerk::rise;
 
 use crate::support::children::{HANG, Hexad, run};
 use crate::support::machine::Machine;
-use crate::support::operator;
 use crate::support::recorder::Recorder;
-use crate::support::rules;
 use crate::support::trio::{start_daemon, start_plant};
-use crate::support::turns;
+use crate::support::{operator, rules, turns};
 
 /// x of the home pose \[m\], and how far the platform moves along it.
 const HOME: f64 = 1.1;

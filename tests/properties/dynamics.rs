@@ -1,9 +1,9 @@
 //! Identities of the inverse dynamics of one machine.
 
 use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
+use hexad::model::fidelity::{Exact, RigidLegs};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::ladder::{Exact, RigidLegs};
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use nalgebra::{Vector3, Vector6};

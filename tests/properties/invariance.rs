@@ -2,9 +2,9 @@
 
 use fearless_simd::Level;
 use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::inverse_jacobian::condition;
-use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use nalgebra::{Matrix3, Vector3};

@@ -3,8 +3,8 @@
 use hexad::model::forward_kinematics::{Outcome, Tracked, Tracker, refine};
 use hexad::model::inverse_geometry::{leg_directions, leg_lengths, leg_motion};
 use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::rigid::{Motion, Twist};
-use hexad::model::stance::Stance;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 use proptest::prelude::*;
@@ -91,9 +91,9 @@ proptest! {
         // What moves a platform in a millisecond takes four steps, two or three of them with new factors.
         let Motion { twist, .. } = motion;
         let step = Twist { angular: twist.angular * 1e-3, linear: twist.linear * 1e-3 };
-        let mut stance = Stance::new(&machine, motion.pose.displaced(&step));
-        let report = refine(&machine, &mut stance, &lengths);
+        let mut kinematic_state = KinematicState::new(&machine, motion.pose.displaced(&step));
+        let report = refine(&machine, &mut kinematic_state, &lengths);
         prop_assert!(report.outcome == Outcome::Solved && report.iterations <= 4, "{report:?}");
-        prop_assert!((stance.pose().position - motion.pose.position).norm() < bound);
+        prop_assert!((kinematic_state.pose().position - motion.pose.position).norm() < bound);
     }
 }

@@ -2,10 +2,10 @@
 //! parallel legs, legs in a plane.
 
 use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
+use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::{Tracked, Tracker};
 use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
-use hexad::model::ladder::Exact;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::task::TaskState;
 use nalgebra::{Vector3, Vector6};

@@ -1,7 +1,7 @@
 //! The regressor form: exact, linear, and blind in the directions it names.
 
 use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::ladder::Exact;
+use hexad::model::fidelity::Exact;
 use hexad::model::machine::Machine;
 use hexad::model::regressor::{
     INDISTINGUISHABLE, PARAMETERS, Parameters, Regressor, parameters_of, regressor, rod_mass_in_platform,

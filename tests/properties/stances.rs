@@ -1,28 +1,28 @@
-//! What a stance keeps is what would be computed anew.
+//! What a kinematic_state keeps is what would be computed anew.
 
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::{Exact, Gravity};
 use hexad::model::forward_kinematics::{Outcome, refine};
 use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::inverse_jacobian::{condition, leg_wrenches, scaled_wrenches, twist_from_rates};
-use hexad::model::ladder::{Exact, Gravity};
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Motion, Pose, Twist, exp};
-use hexad::model::stance::Stance;
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
 
 use super::common::Legs;
 use super::{cases, machine_in_motion, relative, vector6};
 
-/// A stance that forward kinematics moved to the motion's pose.
-fn arrived(machine: &Machine, motion: &Motion, from: &Vector6<f64>) -> Stance {
+/// A kinematic_state that forward kinematics moved to the motion's pose.
+fn arrived(machine: &Machine, motion: &Motion, from: &Vector6<f64>) -> KinematicState {
     let r = machine.joints.radius;
     let away = from * 1e-3;
     let step = Twist { angular: away.fixed_rows::<3>(0).into(), linear: away.fixed_rows::<3>(3) * r };
-    let mut stance = Stance::new(machine, motion.pose.displaced(&step));
-    let report = refine(machine, &mut stance, &leg_lengths(machine, &motion.pose));
+    let mut kinematic_state = KinematicState::new(machine, motion.pose.displaced(&step));
+    let report = refine(machine, &mut kinematic_state, &leg_lengths(machine, &motion.pose));
     assert_eq!(report.outcome, Outcome::Solved, "{report:?}");
-    stance
+    kinematic_state
 }
 
 /// Displaced by `[rotation; translation / radius]` of the mean of the joints on the platform.
@@ -41,21 +41,21 @@ proptest! {
         let dynamics = InverseDynamics::new(&machine);
         let rates = leg_motion(&machine, &motion).rate;
         let bound = 1e-12 * condition(&machine, &motion.pose);
-        for stance in [Stance::new(&machine, motion.pose), arrived(&machine, &motion, &from)] {
-            let forces = dynamics.forces_at::<Exact>(&stance, &motion.twist, &motion.acceleration).unwrap();
+        for kinematic_state in [KinematicState::new(&machine, motion.pose), arrived(&machine, &motion, &from)] {
+            let forces = dynamics.forces_at::<Exact>(&kinematic_state, &motion.twist, &motion.acceleration).unwrap();
             prop_assert!(relative(&forces, &dynamics.forces::<Exact>(&motion).unwrap()) < bound);
-            let forces = dynamics.forces_at::<Gravity>(&stance, &motion.twist, &motion.acceleration).unwrap();
+            let forces = dynamics.forces_at::<Gravity>(&kinematic_state, &motion.twist, &motion.acceleration).unwrap();
             prop_assert!(relative(&forces, &dynamics.forces::<Gravity>(&motion).unwrap()) < bound);
-            let twist = stance.twist(&machine, &rates).unwrap().vector();
+            let twist = kinematic_state.twist(&machine, &rates).unwrap().vector();
             let anew = twist_from_rates(&machine, &motion.pose, &rates).unwrap().vector();
             prop_assert!(relative(twist.as_slice(), anew.as_slice()) < bound);
-            prop_assert!(relative(&stance.lengths(&machine), &leg_lengths(&machine, &motion.pose)) < 1e-12);
+            prop_assert!(relative(&kinematic_state.lengths(&machine), &leg_lengths(&machine, &motion.pose)) < 1e-12);
         }
     }
 
     #[test]
     fn sensitivity_is_that_of_n((machine, _, motion) in machine_in_motion()) {
-        let known = *Stance::new(&machine, motion.pose).sensitivity();
+        let known = *KinematicState::new(&machine, motion.pose).sensitivity();
         let n = scaled_wrenches(&machine, &motion.pose);
         let frobenius = n.norm() * n.try_inverse().unwrap().norm();
         prop_assert!((known.condition / frobenius - 1.0).abs() < 1e-11 * frobenius);
@@ -72,14 +72,14 @@ proptest! {
         towards in vector6(),
         share in prop_oneof![Just(0.9), 0.0..0.9f64],
     ) {
-        let mut stance = Stance::new(&machine, motion.pose);
+        let mut kinematic_state = KinematicState::new(&machine, motion.pose);
         let r = machine.joints.radius;
-        let size = stance.sensitivity().trusted_step * share;
+        let size = kinematic_state.sensitivity().trusted_step * share;
         let unit = towards / towards.norm().max(1e-3);
         let there = displaced_center(&machine, &motion.pose, &(unit * size));
-        let report = refine(&machine, &mut stance, &leg_lengths(&machine, &there));
+        let report = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there));
         prop_assert_eq!(report.outcome, Outcome::Solved, "{:?}", report);
-        let error = stance.pose().displacement_to(&there);
+        let error = kinematic_state.pose().displacement_to(&there);
         prop_assert!(error.angular.norm() + error.linear.norm() / r < 1e-11, "{error:?}");
     }
 }

@@ -7,9 +7,9 @@ use hexad::control::state::{Cause, Evidence, Request, State};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::rigid::{Pose, Wrench};
 use hexad::model::task::TaskState;
+use hexad::motion::minimum_jerk::{Profile, rise};
 use hexad::plant::imperfections::{External, Imperfections};
 use hexad::plant::simulator::Simulator;
-use hexad::scene::minimum_jerk::{Profile, rise};
 use nalgebra::Vector3;
 
 use super::common::largest;

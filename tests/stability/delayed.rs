@@ -2,16 +2,16 @@
 
 #![allow(dead_code, reason = "the bench uses a part of it")]
 
+use hexad::analysis::sampled_loop::SampledLoop;
+use hexad::config::Config;
+use hexad::config::deployment::FidelityChoice;
 use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
 use hexad::control::gains::Gains;
 use hexad::control::law::{ControlMode, Law};
-use hexad::control::sampled::SampledLoop;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::config::Config;
-use hexad::host::config::deployment::Fidelity;
-use hexad::host::daemon;
+use hexad::daemon;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::ladder::Exact;
+use hexad::model::fidelity::Exact;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::TaskState;
@@ -134,8 +134,8 @@ impl Delayed {
 }
 
 fn parameters(config: &Config, setup: &Setup) -> Parameters {
-    let Fidelity::Fixed(rung) = config.deployment.control.fidelity else { panic!("not fixed") };
-    let parameters = daemon::parameters(&config.machine, &config.deployment, rung);
+    let FidelityChoice::Fixed(fidelity) = config.deployment.control.fidelity else { panic!("not fixed") };
+    let parameters = daemon::parameters(&config.machine, &config.deployment, fidelity);
     let SampledLoop { wn_t, damping_ratio, observer, .. } = setup.sampled;
     let wn = wn_t * config.deployment.realtime.rate_hz;
     let gains = Gains::new(wn / core::f64::consts::TAU, damping_ratio);

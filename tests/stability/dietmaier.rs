@@ -4,12 +4,12 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use hexad::host::assembly::{Region, modes};
+use hexad::analysis::assembly_modes::{Region, modes};
 use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, Tracked, Tracker};
 use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Pose, Twist};
-use hexad::model::stance::Stance;
 use nalgebra::{Matrix3, Vector3};
 
 use super::common::{Legs, machine};
@@ -47,7 +47,7 @@ fn dietmaier() -> Machine {
     dietmaier
 }
 
-static MODES: LazyLock<Vec<Stance>> = LazyLock::new(|| {
+static MODES: LazyLock<Vec<KinematicState>> = LazyLock::new(|| {
     // The first joints are the origins, so C is at the first length from the origin.
     let center = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
     modes(&dietmaier(), &LENGTHS, &Region { center, turn: PI, shift: 1.0 }, STARTS)

@@ -4,13 +4,13 @@
 
 use core::f64::consts::FRAC_PI_2;
 
+use hexad::config::Config;
 use hexad::control::limits::{AxisLimits, Limits};
-use hexad::host::config::Config;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Pose;
-use hexad::model::stance::Stance;
 use hexad::model::task::TaskState;
-use hexad::scene::minimum_jerk::Profile;
+use hexad::motion::minimum_jerk::Profile;
 
 use super::common::{Legs, deployed};
 
@@ -57,7 +57,7 @@ pub fn on_the_way(distance: f64, s: &Profile) -> TaskState {
 
 /// Whether a pose is on the side of home.
 pub fn before(machine: &Machine, pose: &Pose) -> bool {
-    let side = |pose: &Pose| Stance::new(machine, *pose).sensitivity().determinant;
+    let side = |pose: &Pose| KinematicState::new(machine, *pose).sensitivity().determinant;
     side(pose) * side(&at(AT_HOME).motion().pose) > 0.0
 }
 
@@ -68,9 +68,9 @@ fn condition_and_forces_grow_with_the_inverse_distance() {
     for power in 3..=8 {
         let distance = 10_f64.powi(-power);
         let motion = at(distance).motion();
-        let condition = Stance::new(&config.machine, motion.pose).sensitivity().condition;
+        let condition = KinematicState::new(&config.machine, motion.pose).sensitivity().condition;
         assert!((condition * distance / CONDITION - 1.0).abs() < 1e-3, "{}", condition * distance);
-        let forces = hexad::model::active_forces::inverse_dynamics::<hexad::model::ladder::Exact>(
+        let forces = hexad::model::active_forces::inverse_dynamics::<hexad::model::fidelity::Exact>(
             &config.machine,
             &motion,
         );

@@ -3,12 +3,12 @@
 
 use core::f64::consts::FRAC_PI_2;
 
+use hexad::config::Config;
 use hexad::control::controller::Output;
 use hexad::control::state::{Cause, State};
-use hexad::host::config::Config;
 use hexad::model::rigid::{Motion, Pose};
 use hexad::model::task::TaskState;
-use hexad::scene::minimum_jerk::rise;
+use hexad::motion::minimum_jerk::rise;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::common::{Legs, deployed, largest};

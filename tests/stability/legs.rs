@@ -2,17 +2,17 @@
 
 use core::f64::consts::TAU;
 
+use hexad::config::Config;
+use hexad::config::deployment::FidelityChoice;
 use hexad::control::limits::Limit;
 use hexad::control::state::State;
-use hexad::host::config::Config;
-use hexad::host::config::deployment::Fidelity;
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::{Exact, Fidelity, MasslessLegs, RigidLegs};
 use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, refine};
 use hexad::model::inverse_geometry::{leg_directions, leg_lengths};
-use hexad::model::ladder::{Exact, MasslessLegs, RigidLegs, Rung};
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::stance::Stance;
 use hexad::model::task::TaskState;
 use nalgebra::{Vector3, Vector6};
 
@@ -58,7 +58,7 @@ fn spin_at_most(beside: f64) -> f64 {
 const SPEED: f64 = 0.3;
 
 /// A leg that passes the axis at an angle e, with v radians per second, has to spin by nearly half a turn in a time
-/// of e / v: with the inertia Ix that takes `0.572 Ix v^2 / (e^3 L)` at the joint on the platform. The exact rung says
+/// of e / v: with the inertia Ix that takes `0.572 Ix v^2 / (e^3 L)` at the joint on the platform. The exact fidelity says
 /// so, the others know of no spin; at the axis itself nothing turns it.
 #[test]
 fn beside_the_axis_of_its_joint_a_leg_spins_as_predicted() {
@@ -79,14 +79,14 @@ fn beside_the_axis_of_its_joint_a_leg_spins_as_predicted() {
     }
 }
 
-/// The drives cannot do that. The exact rung asks for it and is cut, and says so; the rigid-legs rung does not know.
+/// The drives cannot do that. The exact fidelity asks for it and is cut, and says so; the rigid-legs fidelity does not know.
 #[test]
 fn through_the_axis_of_a_joint_forces_are_cut_or_know_nothing_of_it() {
-    for (rung, beside) in
-        [Rung::Exact, Rung::RigidLegs].into_iter().flat_map(|r| [1e-2, 1e-3, 1e-5].map(|e| (r, e)))
+    for (fidelity, beside) in
+        [Fidelity::Exact, Fidelity::RigidLegs].into_iter().flat_map(|r| [1e-2, 1e-3, 1e-5].map(|e| (r, e)))
     {
         let (mut config, along) = through_axis(beside);
-        config.deployment.control.fidelity = Fidelity::Fixed(rung);
+        config.deployment.control.fidelity = FidelityChoice::Fixed(fidelity);
         // On the machine that is controlled the joint gives way.
         let mut rig = Rig::new(&config, &deployed("motion_base").machine);
         rig.engage(&TaskState::at_rest(config.machine.home));
@@ -101,15 +101,19 @@ fn through_the_axis_of_a_joint_forces_are_cut_or_know_nothing_of_it() {
                 *value += Vector6::new(0.0, 0.0, 0.0, along.x, along.y, along.z) * (0.08 * share);
             }
             let output = rig.cycle(&rig.input(&task));
-            assert_eq!(output.state, State::Active, "{rung:?} {beside:e}: {:?}", output.cause);
+            assert_eq!(output.state, State::Active, "{fidelity:?} {beside:e}: {:?}", output.cause);
             cut += u32::from(
                 output.limiting.contains(Limit::Force) || output.limiting.contains(Limit::ForceRate),
             );
             most = most.max(largest(&output.force));
         }
-        println!("{rung:?} {beside:e}: {cut} cycles cut, {most:.0} N");
+        println!("{fidelity:?} {beside:e}: {cut} cycles cut, {most:.0} N");
         assert!(most <= config.machine.actuator.max_force);
-        assert_eq!(cut > 0, rung == Rung::Exact && beside < 1e-2, "{rung:?} {beside:e}: {cut} cycles");
+        assert_eq!(
+            cut > 0,
+            fidelity == Fidelity::Exact && beside < 1e-2,
+            "{fidelity:?} {beside:e}: {cut} cycles"
+        );
     }
 }
 
@@ -131,7 +135,7 @@ fn with_short_leg(length: f64) -> Machine {
 fn a_leg_of_next_to_no_length_loses_what_its_length_says() {
     let trusted = |length: f64| {
         let machine = with_short_leg(length);
-        Stance::new(&machine, home(&machine)).sensitivity().trusted_step / length
+        KinematicState::new(&machine, home(&machine)).sensitivity().trusted_step / length
     };
     let forces = |length: f64| {
         let machine = with_short_leg(length);
@@ -152,12 +156,12 @@ fn a_leg_of_next_to_no_length_loses_what_its_length_says() {
         assert!((largest(&now.1) * length / heavy - 1.0).abs() < 0.05 + 100.0 * length, "{length:e}");
         // A step of what is trusted is found, one of the length of the leg is refused.
         let machine = with_short_leg(length);
-        let start = Stance::new(&machine, home(&machine));
+        let start = KinematicState::new(&machine, home(&machine));
         for (share, outcome) in [(0.5, Outcome::Solved), (1.0 / small, Outcome::LeftTrustedRegion)] {
             let mut there = home(&machine);
             there.position.x += share * trusted(length) * length * machine.joints.radius;
-            let mut stance = start;
-            let report = refine(&machine, &mut stance, &leg_lengths(&machine, &there));
+            let mut kinematic_state = start;
+            let report = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there));
             assert_eq!(report.outcome, outcome, "{length:e} {share}");
         }
     }
@@ -179,7 +183,7 @@ fn nearly_parallel(angle: f64) -> Machine {
 fn the_condition_of_nearly_parallel_legs_is_the_inverse_of_their_angle() {
     let condition = |angle: f64| {
         let machine = nearly_parallel(angle);
-        Stance::new(&machine, home(&machine)).sensitivity().condition * angle
+        KinematicState::new(&machine, home(&machine)).sensitivity().condition * angle
     };
     let small = condition(1e-4);
     for power in 2..=7 {
@@ -188,11 +192,11 @@ fn the_condition_of_nearly_parallel_legs_is_the_inverse_of_their_angle() {
         println!("{angle:e}: condition {:.3e}", condition(angle) / angle);
         assert!((ratio - 1.0).abs() < 0.02, "{angle:e}: {ratio}");
         let machine = nearly_parallel(angle);
-        let mut stance = Stance::new(&machine, home(&machine));
-        let step = 0.5 * stance.sensitivity().trusted_step * machine.joints.radius;
+        let mut kinematic_state = KinematicState::new(&machine, home(&machine));
+        let step = 0.5 * kinematic_state.sensitivity().trusted_step * machine.joints.radius;
         let mut there = home(&machine);
         there.position.z += step;
-        let outcome = refine(&machine, &mut stance, &leg_lengths(&machine, &there)).outcome;
+        let outcome = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there)).outcome;
         let expected =
             if small / angle < LARGEST_CONDITION { Outcome::Solved } else { Outcome::NearSingular };
         assert_eq!(outcome, expected, "{angle:e}");

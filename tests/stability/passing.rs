@@ -2,18 +2,18 @@
 //!
 //! The platform turns from home toward the singular pose, to a distance from it, and back.
 
+use hexad::config::Config;
 use hexad::control::controller::Output;
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, State};
-use hexad::host::config::Config;
 use hexad::model::active_forces::inverse_dynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::LARGEST_CONDITION;
 use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::ladder::Exact;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::rigid::{Motion, Wrench};
-use hexad::model::stance::Stance;
 use hexad::model::task::TaskState;
-use hexad::scene::minimum_jerk::{Profile, rise};
+use hexad::motion::minimum_jerk::{Profile, rise};
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
@@ -58,7 +58,7 @@ fn run(config: &Config, time_s: f64, distance: f64) -> Run {
         let pose = rig.simulator.state().pose;
         if output.state.controls() {
             assert!(before(machine, &pose), "{time_s} s, {distance:e}: beyond");
-            run.condition = run.condition.max(Stance::new(machine, pose).sensitivity().condition);
+            run.condition = run.condition.max(KinematicState::new(machine, pose).sensitivity().condition);
             run.force = run.force.max(largest(&output.force));
             let resting = Motion { pose, ..TaskState::default().motion() };
             run.holding = run.holding.max(largest(&inverse_dynamics::<Exact>(machine, &resting).unwrap()));

@@ -1,8 +1,8 @@
 //! The sampled loop: what the theory says of gains, delays, masses and sensors, and what controller and plant do.
 
-use hexad::control::sampled::SampledLoop;
+use hexad::analysis::sampled_loop::SampledLoop;
+use hexad::config::Config;
 use hexad::control::state::Cause;
-use hexad::host::config::Config;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::machine::LEGS;
 use hexad::model::task::TaskState;

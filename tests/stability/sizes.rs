@@ -2,12 +2,12 @@
 //! errors.
 
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::{Outcome, refine};
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::ladder::Exact;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
-use hexad::model::stance::Stance;
 use nalgebra::Vector3;
 
 use super::common::{Errors, Legs, machine};
@@ -56,9 +56,9 @@ fn pose_errors(radius: f64, offset: f64) -> Errors {
         let mut there = rigid(pose(&centered, 0.2, number));
         there.position += there.rotation * Vector3::repeat(offset * radius);
         let lengths = leg_lengths(machine, &there);
-        let mut stance = Stance::new(machine, nearby(&there, &center, r));
-        assert_eq!(refine(machine, &mut stance, &lengths).outcome, Outcome::Solved, "{r}");
-        let found = stance.pose();
+        let mut kinematic_state = KinematicState::new(machine, nearby(&there, &center, r));
+        assert_eq!(refine(machine, &mut kinematic_state, &lengths).outcome, Outcome::Solved, "{r}");
+        let found = kinematic_state.pose();
         let at = |pose: &Pose| pose.position + pose.rotation * center;
         errors.add((at(found) - at(&there)).norm() / r + (found.rotation - there.rotation).norm());
     }

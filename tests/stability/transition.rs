@@ -1,7 +1,7 @@
 //! The matrix of one period of the sampled loop, and what follows from it: how fast errors fade, and what noise
 //! of the sensors makes of them. Written from the recurrence, not from the polynomial that the library uses.
 
-use hexad::control::sampled::SampledLoop;
+use hexad::analysis::sampled_loop::SampledLoop;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 pub struct Transition {

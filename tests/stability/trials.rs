@@ -2,15 +2,16 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use hexad::host::assembly::{Region, modes};
+use hexad::analysis::assembly_modes::{Region, modes};
 use hexad::model::forward_kinematics::{Outcome, Tracked, Tracker, refine};
 use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Pose;
-use hexad::model::stance::Stance;
 use hexad::model::task::TaskState;
 
-use super::rivals::{self, Update};
+use super::rivals;
+use super::rivals::Update;
 
 /// Farther apart than this (radian, or radius) are two poses.
 const APART: f64 = 1e-5;
@@ -86,7 +87,7 @@ pub fn trial(machine: &Machine, method: Method, x: [f64; 6]) -> End {
 pub fn ambiguous(machine: &Machine, x: [f64; 6]) -> bool {
     let center = rigid(machine.home);
     let region = Region { center, turn: FRAC_PI_2, shift: 2.0 * machine.joints.radius };
-    let home = Stance::new(machine, center).sensitivity().determinant;
+    let home = KinematicState::new(machine, center).sensitivity().determinant;
     let found = modes(machine, &leg_lengths(machine, &rigid(x)), &region, STARTS);
     found.iter().filter(|mode| mode.sensitivity().determinant * home > 0.0).count() > 1
 }
@@ -99,12 +100,14 @@ pub fn step(machine: &Machine, x: [f64; 6], number: u64) -> End {
     // As many small ones as large ones.
     let share = 10_f64.powf(-4.0 * (number % 1000) as f64 / 1000.0);
     let away: [f64; 6] = std::array::from_fn(|i| x[i] + share * (to[i] - machine.home[i]));
-    let mut stance = Stance::new(machine, from);
-    let side = stance.sensitivity().determinant;
-    let report = refine(machine, &mut stance, &leg_lengths(machine, &rigid(away)));
-    assert!(stance.sensitivity().determinant * side >= 0.0, "across a singular pose from {x:?}");
+    let mut kinematic_state = KinematicState::new(machine, from);
+    let side = kinematic_state.sensitivity().determinant;
+    let report = refine(machine, &mut kinematic_state, &leg_lengths(machine, &rigid(away)));
+    assert!(kinematic_state.sensitivity().determinant * side >= 0.0, "across a singular pose from {x:?}");
     match report.outcome {
-        Outcome::Solved if machine.joints.distance(stance.pose(), &rigid(away)) < APART => End::Right,
+        Outcome::Solved if machine.joints.distance(kinematic_state.pose(), &rigid(away)) < APART => {
+            End::Right
+        }
         Outcome::Solved => End::Wrong,
         _ => End::Failed,
     }
@@ -115,7 +118,7 @@ pub fn within_reach(machine: &Machine, x: [f64; 6]) -> bool {
     let positive = |step: u32| {
         let share = f64::from(step) / f64::from(WAY);
         let way = std::array::from_fn(|i| machine.home[i] + share * (x[i] - machine.home[i]));
-        Stance::new(machine, rigid(way)).sensitivity().determinant > 0.0
+        KinematicState::new(machine, rigid(way)).sensitivity().determinant > 0.0
     };
     let at_home = positive(0);
     (1..=WAY).all(|step| positive(step) == at_home)

@@ -3,12 +3,12 @@
 
 use std::sync::LazyLock;
 
+use hexad::config::Config;
 use hexad::control::controller::{Input, Output};
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, Request, State};
-use hexad::host::config::Config;
 use hexad::model::task::{TaskState, task_coordinates};
-use hexad::scene::motions::{Motion, Scene, fit};
+use hexad::motion::built_in::{Motion, Scene, fit};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use hexad::analysis::pose_quality::{Effort, Workspace};
 use hexad::model::task::TaskState;
-use hexad::scene::workspace::{Effort, Workspace};
 use tempfile::TempDir;
 
 use super::common::{Table, deployed};

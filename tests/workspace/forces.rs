@@ -1,12 +1,12 @@
 //! Worst forces and payloads, found again by the ordinary inverse dynamics over many directions.
 
+use hexad::analysis::pose_quality::{Effort, Workspace};
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::ladder::Exact;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use hexad::model::task::TaskState;
-use hexad::scene::workspace::{Effort, Workspace};
 use nalgebra::Vector3;
 
 use super::common::{MACHINES, largest, machine};

@@ -8,8 +8,8 @@ mod common;
 mod forces;
 mod regions;
 
+use hexad::analysis::envelope::Envelope;
 use hexad::model::machine::Machine;
-use hexad::scene::envelope::Envelope;
 use nalgebra::Vector3;
 
 /// Numbers in -1..1, six of the k-th even point.

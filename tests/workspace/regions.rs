@@ -1,14 +1,14 @@
 //! Regions that are said to be without obstacle have none, and hardly larger ones have one.
 
-use hexad::host::config::Config;
-use hexad::host::workspace::search::{Found, largest};
+use hexad::analysis::clearance::{Cell, Clearance, Obstacle, Shape};
+use hexad::analysis::reachable_envelope::nominal_box;
+use hexad::analysis::region_search::{Found, largest};
+use hexad::config::Config;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::inverse_jacobian::scaled_wrenches;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Pose, exp};
 use hexad::model::task::TaskState;
-use hexad::scene::clearance::{Cell, Clearance, Obstacle, Shape};
-use hexad::scene::reach::nominal_box;
 use indicatif::ProgressBar;
 use nalgebra::Vector3;
 

@@ -6,8 +6,8 @@ use super::{Controller, Output, Parameters};
 use crate::control::law::{ControlMode, Deviation};
 use crate::control::limits::Limit;
 use crate::control::state::{Cause, Trouble};
+use crate::model::fidelity::{Fidelity, Gravity};
 use crate::model::inverse_jacobian::leg_wrenches;
-use crate::model::ladder::{Gravity, Rung};
 use crate::model::machine::LEGS;
 use crate::model::rigid::{Motion, Pose, Wrench};
 
@@ -15,7 +15,7 @@ impl Controller {
     /// The forces of this cycle, or why there are none.
     pub(super) fn control(&mut self, release_ns: u64, output: &mut Output) -> Result<(), Trouble> {
         let error = output.error.ok_or(Cause::SetpointLost)?;
-        let Parameters { period_ns, law, rung, .. } = &self.parameters;
+        let Parameters { period_ns, law, fidelity, .. } = &self.parameters;
         // The force is held for one period from about the release on.
         let middle_of_hold_ns = release_ns.saturating_add(period_ns / 2);
         let desired = self.reference_at(middle_of_hold_ns);
@@ -24,18 +24,18 @@ impl Controller {
         let deviation = self.known_error.map_or(Deviation::from(&error), |known| known.acted_on);
         let asked = self.observer.asks(law, &deviation, *period_ns as f64 * 1e-9);
         let command;
-        let (motion, rung) = match law.mode {
+        let (motion, fidelity) = match law.mode {
             ControlMode::ComputedTorque => {
                 command = law.command(desired, &error, &asked);
-                (&command, Some(*rung))
+                (&command, Some(*fidelity))
             }
-            ControlMode::FeedforwardJointPd => (desired, Some(*rung)),
-            ControlMode::GravityJointPd => (desired, Some(Rung::Gravity)),
+            ControlMode::FeedforwardJointPd => (desired, Some(*fidelity)),
+            ControlMode::GravityJointPd => (desired, Some(Fidelity::Gravity)),
             ControlMode::JointPd => (desired, None),
         };
         let mut force = if law.mode.acts_on_legs() { law.leg_forces(&asked) } else { [0.0; LEGS] };
-        if let Some(rung) = rung {
-            let modelled = self.model.forces_of(rung, motion).ok_or(Cause::SingularPose)?;
+        if let Some(fidelity) = fidelity {
+            let modelled = self.model.forces_of(fidelity, motion).ok_or(Cause::SingularPose)?;
             force.iter_mut().zip(modelled).for_each(|(force, modelled)| *force += modelled);
         }
         if force.iter().any(|value| !value.is_finite()) {

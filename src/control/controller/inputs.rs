@@ -1,7 +1,8 @@
 //! Which inputs count in this cycle, and the pose that they say.
 
 use super::{Closing, Controller, Input, Located, Measurement, seconds_between};
-use crate::control::doubt::{self, Aim};
+use crate::control::doubt;
+use crate::control::doubt::Aim;
 use crate::control::law::TrackingError;
 use crate::control::limits::Limiting;
 use crate::control::state::{Cause, State, Trouble};
@@ -106,7 +107,7 @@ impl Controller {
         let machine = self.model.machine();
         let from = self.tracker.pose;
         let controls = self.mode.state.controls();
-        let before = self.tracker.stance().lengths(machine);
+        let before = self.tracker.kinematic_state().lengths(machine);
         let mut tracked = self.tracker.advance(machine, &measurement.length).0;
         for _ in 1..if controls { STEPS } else { 1 } {
             if tracked == Tracked::Approaching {
@@ -122,7 +123,7 @@ impl Controller {
                 // All legs have come the same share of their way.
                 let way = |(now, before): (&f64, &f64)| (now - before).abs();
                 let furthest = |to: &[f64; LEGS]| to.iter().zip(&before).map(way).fold(0.0, f64::max);
-                let reached = furthest(&self.tracker.stance().lengths(machine));
+                let reached = furthest(&self.tracker.kinematic_state().lengths(machine));
                 return Err(Trouble::new(Cause::MeasurementJumped, furthest(&measurement.length), reached));
             }
             Tracked::Approaching => return Err(Cause::FindingPose.into()),
@@ -136,7 +137,8 @@ impl Controller {
             }
         }
         let pose = self.tracker.pose;
-        let twist = self.tracker.stance().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
+        let twist =
+            self.tracker.kinematic_state().twist(machine, &measurement.rate).ok_or(Cause::SingularPose)?;
         Ok(Located { time_ns: measurement.time_ns, pose, twist })
     }
 
@@ -151,15 +153,16 @@ impl Controller {
     /// them apart. So near one, a platform that moves so far in one measurement that the next may be from there is
     /// not known any more.
     fn may_have_passed(&self, from: &Pose) -> bool {
-        let stance = self.tracker.stance();
-        let Sensitivity { condition, trusted_step, .. } = *stance.sensitivity();
-        condition > self.doubted() && self.model.machine().joints.distance(from, stance.pose()) > trusted_step
+        let kinematic_state = self.tracker.kinematic_state();
+        let Sensitivity { condition, trusted_step, .. } = *kinematic_state.sensitivity();
+        condition > self.doubted()
+            && self.model.machine().joints.distance(from, kinematic_state.pose()) > trusted_step
     }
 
     /// Nothing that is measured tells when the platform is back: somebody has to look, and clear it.
     fn lost(&mut self) -> Trouble {
         self.known = false;
-        let condition = self.tracker.stance().sensitivity().condition;
+        let condition = self.tracker.kinematic_state().sensitivity().condition;
         *self.astray.insert(Trouble::new(Cause::SingularPose, condition, self.doubted()))
     }
 
@@ -169,7 +172,7 @@ impl Controller {
 
     /// From one measurement to the next: on the way to a singular pose the determinant is at last linear.
     pub(super) fn singular_in(&mut self, time_ns: u64) -> f64 {
-        let determinant = self.tracker.stance().sensitivity().determinant;
+        let determinant = self.tracker.kinematic_state().sensitivity().determinant;
         let singular_in = match self.closing {
             Some(last) if last.time_ns == time_ns => return last.singular_in,
             Some(last) => {

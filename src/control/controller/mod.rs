@@ -7,20 +7,23 @@
 //! The order is here; `inputs.rs` says which inputs count, `path.rs` what the platform is to do, `forces.rs`
 //! with which forces.
 
-use super::doubt::{self, Aim, Believed, Parting};
+use super::doubt;
+use super::doubt::{Aim, Believed, Parting};
 use super::law::{Deviation, Law, Observer, TrackingError};
 use super::limits::{Limit, Limiting, Limits};
 use super::reference::Segment;
 use super::state::{Cause, Evidence, Request, State, Trouble};
 use super::supervisor::{AfterStop, Findings, Mode, next};
 use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Fidelity;
 use crate::model::forward_kinematics::Tracker;
 use crate::model::inverse_geometry::leg_lengths;
-use crate::model::ladder::Rung;
+use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist, Wrench};
-use crate::model::stance::Stance;
 use crate::model::task::TaskState;
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 
 mod forces;
 mod inputs;
@@ -33,7 +36,7 @@ pub struct Parameters {
     pub law: Law,
     /// Which terms of the dynamics are evaluated. It must have inertia: what the law commands is an
     /// acceleration, and without inertia there would be no feedback.
-    pub rung: Rung,
+    pub fidelity: Fidelity,
     /// Of every reference.
     pub limits: Limits,
     /// Where setpoints may be, if anybody has said.
@@ -155,7 +158,7 @@ enum Reference {
 pub struct Controller {
     model: InverseDynamics,
     parameters: Parameters,
-    home: Stance,
+    home: KinematicState,
     tracker: Tracker,
     /// The pose is known, from home on without a gap.
     known: bool,
@@ -210,7 +213,7 @@ struct Closing {
 impl Controller {
     /// Waits at the home pose for a first measurement.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
-        let home = Stance::new(machine, TaskState::at_rest(machine.home).motion().pose);
+        let home = KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose);
         Self {
             model: InverseDynamics::new(machine),
             parameters,
@@ -254,7 +257,7 @@ impl Controller {
         self.decide(input, [located.map(drop), engageable, following]);
         if let Ok(at) = located {
             output.measured = Some((at.pose, at.twist));
-            output.condition = self.tracker.stance().sensitivity().condition;
+            output.condition = self.tracker.kinematic_state().sensitivity().condition;
             output.singular_in = self.singular_in(at.time_ns);
             if self.mode.state != before {
                 self.enter(before, &at, now_ns);
@@ -330,7 +333,7 @@ impl Controller {
 
     /// The pose is far enough from singular ones.
     fn conditioned(&self, output: &mut Output) -> Result<(), Trouble> {
-        let condition = self.tracker.stance().sensitivity().condition;
+        let condition = self.tracker.kinematic_state().sensitivity().condition;
         if output.limiting.keeps(Limit::Condition, condition / self.parameters.condition) {
             return Ok(());
         }

@@ -12,7 +12,7 @@
 //! second step of it comes as near as a new one would. With the error e and the first step q the next error is
 //! `e^2` with a new factorization, `e q` with the old one. On the way r is `(L_i^2 - |s_i|^2) / 2 L_i`, which
 //! has the same zero and needs no root and no division. The last factorization is at the solution and stays
-//! for all who need it ([`Stance`]).
+//! for all who need it ([`KinematicState`]).
 //!
 //! Lengths do not determine the pose: up to 40 real poses share them (assembly modes), and a small
 //! residual says nothing about being on the wrong one. Uniqueness comes from continuity: a step is only
@@ -34,9 +34,9 @@ use fearless_simd::{dispatch, f64x8};
 pub use tracker::{Tracked, Tracker};
 
 use super::balance::Balance;
+use super::kinematic_state::KinematicState;
 use super::lanes::Eight;
 use super::machine::{LEGS, Machine};
-use super::stance::Stance;
 use newton::Newton;
 
 /// Bound on the steps. From the edge of the trusted region six suffice to rounding, by Kantorovich.
@@ -69,14 +69,14 @@ pub struct Report {
     pub reach: f64,
 }
 
-/// Moves a stance to the pose with these leg lengths \[m\], if that is one trusted step away. Otherwise the
-/// stance stays where it is.
-pub fn refine(machine: &Machine, stance: &mut Stance, lengths: &[f64; LEGS]) -> Report {
+/// Moves a kinematic_state to the pose with these leg lengths \[m\], if that is one trusted step away. Otherwise the
+/// kinematic_state stays where it is.
+pub fn refine(machine: &Machine, kinematic_state: &mut KinematicState, lengths: &[f64; LEGS]) -> Report {
     let joints = &machine.joints;
     let target = joints.triples.pack(lengths);
     dispatch!(machine.level, simd => {
-        let legs = stance.legs.load::<_, f64x8<_>>(simd);
-        let balance = Balance::load(simd, joints, &stance.factors);
-        Newton::new(simd, joints, Eight::load(simd, &target)).refine(stance, legs, balance)
+        let legs = kinematic_state.legs.load::<_, f64x8<_>>(simd);
+        let balance = Balance::load(simd, joints, &kinematic_state.factors);
+        Newton::new(simd, joints, Eight::load(simd, &target)).refine(kinematic_state, legs, balance)
     })
 }

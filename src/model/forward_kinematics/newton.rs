@@ -1,17 +1,19 @@
 //! Newton's method and the chord method on lanes.
 
 use fearless_simd::Simd;
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::Matrix3;
 
 use super::{LARGEST_CONDITION, MAX_ITERATIONS, Outcome, Report};
 use crate::model::balance::{Balance, LaneTwist};
 use crate::model::inverse_geometry::LegGeometry;
+use crate::model::kinematic_state::{KinematicState, StoredLegs};
 use crate::model::lanes::{Eight, Four, Reals};
 use crate::model::lanes3::Lanes3;
 use crate::model::machine::Joints;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
-use crate::model::stance::{Stance, StoredLegs};
 
 /// A step this small (radian, or radius) is the last: the legs are where the pose is, to all practical digits, and
 /// the pose, which still takes it, is so to rounding.
@@ -118,19 +120,19 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
     #[inline(always)]
     pub fn refine(
         &self,
-        stance: &mut Stance,
+        kinematic_state: &mut KinematicState,
         mut legs: LegGeometry<V>,
         mut balance: Balance<'a, S, V>,
     ) -> Report {
         let Self { simd, joints, target, inverse_target } = *self;
         // Sizes are squares.
-        let last = square(last_step(joints, stance));
+        let last = square(last_step(joints, kinematic_state));
         let linear_weight = V::Half::splat(simd, 1.0 / square(joints.radius));
-        let mut at = Iterate::start(simd, joints, &stance.pose);
+        let mut at = Iterate::start(simd, joints, &kinematic_state.pose);
         let mut residual = target - legs.length;
         let mut report = Report { outcome: Outcome::NotConverged, iterations: 0, reach: f64::NAN };
         // Steps become shorter: Kantorovich halves them at least.
-        let mut longest = square(stance.sensitivity.trusted_step);
+        let mut longest = square(kinematic_state.sensitivity.trusted_step);
         loop {
             // Of the steps with one factorization.
             let mut first = 0.0;
@@ -155,14 +157,14 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
                 }
                 if size <= last && report.iterations == 1 {
                     // Already there. To move on by less than the legs follow would add up over the cycles.
-                    let sound = stance.sensitivity.condition <= LARGEST_CONDITION;
+                    let sound = kinematic_state.sensitivity.condition <= LARGEST_CONDITION;
                     report.outcome = if sound { Outcome::Solved } else { Outcome::NearSingular };
                     return report;
                 }
                 at = at.moved(simd, &step);
                 if first == 0.0 {
                     if size <= last {
-                        report.outcome = self.arrive(stance, &at, legs, residual, &balance);
+                        report.outcome = self.arrive(kinematic_state, &at, legs, residual, &balance);
                         return report;
                     }
                     first = size;
@@ -191,7 +193,7 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
     #[inline(always)]
     fn arrive(
         &self,
-        stance: &mut Stance,
+        kinematic_state: &mut KinematicState,
         at: &Iterate<V, V::Half>,
         mut legs: LegGeometry<V>,
         residual: V,
@@ -202,21 +204,21 @@ impl<'a, S: Simd, V: Eight<S, Scalar = f64>> Newton<'a, S, V> {
         legs.inverse_length = (residual * inverse_target).mul_add(inverse_target, inverse_target);
         let sensitivity = Sensitivity::new(simd, joints, &legs, balance);
         // That K grows along the step could lead across, if anything could.
-        let same_side = sensitivity.determinant * stance.sensitivity.determinant > 0.0;
+        let same_side = sensitivity.determinant * kinematic_state.sensitivity.determinant > 0.0;
         if !(same_side && sensitivity.condition <= LARGEST_CONDITION) {
             return Outcome::NearSingular;
         }
-        stance.pose = at.pose(simd, joints);
-        stance.legs = StoredLegs::new(&legs);
-        stance.factors = balance.store();
-        stance.sensitivity = sensitivity;
+        kinematic_state.pose = at.pose(simd, joints);
+        kinematic_state.legs = StoredLegs::new(&legs);
+        kinematic_state.factors = balance.store();
+        kinematic_state.sensitivity = sensitivity;
         Outcome::Solved
     }
 }
 
 /// [`LAST_STEP`], or what rounding makes of the differences of coordinates, whichever is larger.
 #[inline(always)]
-fn last_step(joints: &Joints, start: &Stance) -> f64 {
+fn last_step(joints: &Joints, start: &KinematicState) -> f64 {
     let size = start.pose.position.norm() / joints.radius;
     LAST_STEP.max(f64::EPSILON * ROUNDINGS * (1.0 + size) * start.sensitivity.condition)
 }

@@ -3,9 +3,9 @@
 use nalgebra::Vector6;
 
 use super::{Outcome, Report, refine};
+use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Pose;
-use crate::model::stance::Stance;
 
 /// How much of a trusted step is taken toward lengths that are further away: rounding must not undo it.
 const PART_OF_TRUSTED: f64 = 0.99;
@@ -20,7 +20,7 @@ pub struct Tracker {
     /// Pose of the last converged step.
     pub pose: Pose,
     /// The same with its legs and factorization.
-    stance: Stance,
+    kinematic_state: KinematicState,
     outcome: Outcome,
 }
 
@@ -38,17 +38,18 @@ pub enum Tracked {
 impl Tracker {
     /// Starts at a known pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
-        Self { pose, stance: Stance::new(machine, pose), outcome: Outcome::Solved }
+        Self { pose, kinematic_state: KinematicState::new(machine, pose), outcome: Outcome::Solved }
     }
 
     /// Starts anew at a pose of which all is known.
-    pub fn restart(&mut self, stance: &Stance) {
-        (self.pose, self.stance, self.outcome) = (*stance.pose(), *stance, Outcome::Solved);
+    pub fn restart(&mut self, kinematic_state: &KinematicState) {
+        (self.pose, self.kinematic_state, self.outcome) =
+            (*kinematic_state.pose(), *kinematic_state, Outcome::Solved);
     }
 
     /// The pose with its legs and factorization.
-    pub fn stance(&self) -> &Stance {
-        &self.stance
+    pub fn kinematic_state(&self) -> &KinematicState {
+        &self.kinematic_state
     }
 
     /// Of the last step.
@@ -63,7 +64,7 @@ impl Tracker {
         let mut report = self.step(machine, lengths, &mut iterations);
         if report.outcome == Outcome::LeftTrustedRegion {
             tracked = Tracked::Approaching;
-            let here = Vector6::from(self.stance.lengths(machine));
+            let here = Vector6::from(self.kinematic_state.lengths(machine));
             let part = here + (Vector6::from(*lengths) - here) * (PART_OF_TRUSTED / report.reach);
             report = self.step(machine, &part.into(), &mut iterations);
         }
@@ -71,9 +72,9 @@ impl Tracker {
     }
 
     fn step(&mut self, machine: &Machine, lengths: &[f64; LEGS], iterations: &mut u32) -> Report {
-        let report = refine(machine, &mut self.stance, lengths);
+        let report = refine(machine, &mut self.kinematic_state, lengths);
         *iterations += report.iterations;
-        (self.pose, self.outcome) = (*self.stance.pose(), report.outcome);
+        (self.pose, self.outcome) = (*self.kinematic_state.pose(), report.outcome);
         report
     }
 

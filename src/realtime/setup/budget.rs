@@ -1,10 +1,7 @@
 //! The real-time budget of a cgroup, where the kernel has them (CONFIG_RT_GROUP_SCHED).
 
-extern crate std;
-
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::prelude::rust_2024::*;
 
 /// What the cgroup of this process leaves to FIFO threads.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,12 +1,8 @@
 //! Sets of processors, in the words of Linux: `0-3,8`.
 
-extern crate std;
-
 use core::fmt::{self, Display, Formatter};
 use std::collections::BTreeSet;
-use std::fs;
-use std::prelude::rust_2024::*;
-use std::thread;
+use std::{fs, thread};
 
 /// Some processors, numbered from 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -108,7 +104,6 @@ impl Display for Cpus {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::string::ToString;
 
     #[test]
     fn lists_read_back_as_they_were_written() {

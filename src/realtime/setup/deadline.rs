@@ -9,14 +9,11 @@
 //! budget is held, until its deadline. Cycles that it misses then are counted like any others, and what the
 //! kernel says of it by [`times_exhausted`].
 
-extern crate std;
-
 use core::fmt::{self, Display, Formatter};
 use core::sync::atomic::{AtomicU64, Ordering};
-use std::prelude::rust_2024::*;
 
-use super::Shortfall;
-use super::refusals::{self, Step};
+use super::refusals::Step;
+use super::{Shortfall, refusals};
 
 /// Share of a period for the computing of a cycle. Many times what it takes; and with half a period of
 /// spinning before it still below the 95 % that the kernel admits.
@@ -93,8 +90,8 @@ fn count_exhaustions() {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::realtime::clock::{Grid, monotonic_ns, sleep_until};
-    use std::println;
+    use crate::messages::clock::monotonic_ns;
+    use crate::realtime::clock::{Grid, sleep_until};
     use std::thread;
 
     const PERIOD_NS: u64 = 1_000_000;

@@ -44,8 +44,6 @@ pub fn flush() {}
 
 #[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod tests {
-    extern crate std;
-
     use super::flush;
     use core::hint::black_box;
 

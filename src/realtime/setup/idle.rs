@@ -1,14 +1,11 @@
 //! Idle states of processors: the deeper one sleeps, the longer it takes to wake.
 
-extern crate std;
-
 use std::fs::File;
 use std::io::Write;
-use std::prelude::rust_2024::*;
 
-use super::Shortfall;
 use super::permissions::open_cpu_dma_latency;
-use super::refusals::{self, Step};
+use super::refusals::Step;
+use super::{Shortfall, refusals};
 
 /// A request to the kernel; it holds until this is dropped or the process ends, however that comes about.
 #[derive(Debug)]
@@ -28,7 +25,6 @@ pub fn bound_wakeup(latency_us: i32) -> Result<ShallowSleep, Shortfall> {
 mod tests {
     use super::*;
     use std::io::Read;
-    use std::println;
 
     #[test]
     fn what_is_asked_for_is_in_force_until_dropped() {

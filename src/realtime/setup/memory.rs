@@ -1,13 +1,8 @@
 //! Stack, heap and locked memory: no page is met for the first time in a cycle.
 
-extern crate std;
-
-use std::prelude::rust_2024::*;
-use std::vec;
-
-use super::Shortfall;
 use super::permissions::Permissions;
-use super::refusals::{self, Step};
+use super::refusals::Step;
+use super::{Shortfall, refusals};
 
 /// Stack touched in advance by a real-time thread: more than a cycle uses.
 const STACK_TOUCHED: usize = 128 * 1024;

@@ -4,10 +4,6 @@
 //! Each step that is refused says why and what cures it ([`Shortfall`]); the caller decides whether to go
 //! on. [`permissions`] knows the same in advance, without a step being taken.
 
-extern crate std;
-
-use std::prelude::rust_2024::*;
-
 pub mod budget;
 pub mod cpus;
 pub mod deadline;

@@ -1,12 +1,8 @@
 //! What this process may ask of the kernel, as the kernel itself tells it. Nothing is applied by looking.
 
-extern crate std;
-
-use std::format;
 use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::path::Path;
-use std::prelude::rust_2024::*;
 
 use super::budget::GroupBudget;
 use super::cpus::Cpus;

@@ -3,15 +3,10 @@
 //! The reasons are looked for in the order in which the kernel checks them, so that who follows a remedy
 //! gets one step further each time.
 
-extern crate std;
-
 use core::fmt::{self, Display, Formatter};
-use std::format;
 use std::fs;
 use std::io::Error;
 use std::os::unix::fs::MetadataExt;
-use std::prelude::rust_2024::*;
-use std::string::ToString;
 
 use super::Shortfall;
 use super::budget::GroupBudget;

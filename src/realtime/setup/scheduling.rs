@@ -1,12 +1,8 @@
 //! FIFO priority, processor and timers of the calling thread. No other thread is touched.
 
-extern crate std;
-
-use std::prelude::rust_2024::*;
-
-use super::Shortfall;
 use super::cpus::bind;
-use super::refusals::{self, Step};
+use super::refusals::Step;
+use super::{Shortfall, refusals};
 
 /// Puts the calling thread under SCHED_FIFO at this priority.
 pub fn fifo_priority(priority: i32) -> Result<(), Shortfall> {

@@ -1,12 +1,12 @@
 //! Any bytes as a configuration file: refused in so many words, or a machine that works at home.
 
-use hexad::host::check::Check;
-use hexad::host::config::text::text;
-use hexad::host::config::{Config, ConfigError, Violation};
+use hexad::commands::check::Check;
+use hexad::config::text::text;
+use hexad::config::{Config, ConfigError, Violation};
 use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Fidelity;
 use hexad::model::forward_kinematics::{Tracked, Tracker};
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::ladder::Rung;
 use hexad::model::task::TaskState;
 
 use super::{line_number, lines};
@@ -86,17 +86,17 @@ fn check_machine(config: &Config) {
     assert!(!text.contains("NaN") && !text.replacen(name, "", 1).contains("inf"), "{text}");
 }
 
-/// Every rung has forces at home, at rest and when moved as fast as one of the legs may.
+/// Every fidelity has forces at home, at rest and when moved as fast as one of the legs may.
 fn check_forces(config: &Config, home: &TaskState) {
     let model = InverseDynamics::new(&config.machine);
     let mut moved = *home;
     moved.xd[5] = config.machine.actuator.max_rate;
     moved.xdd[5] = 1.0;
-    for rung in Rung::ALL {
+    for fidelity in Fidelity::ALL {
         for state in [home, &moved] {
-            let forces = model.forces_of(rung, &state.motion());
+            let forces = model.forces_of(fidelity, &state.motion());
             let finite = forces.is_some_and(|forces| forces.iter().all(|force| force.is_finite()));
-            assert!(finite, "{} at home: {forces:?}", rung.name());
+            assert!(finite, "{} at home: {forces:?}", fidelity.name());
         }
     }
 }

@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use hexad::host::config::Config;
-use hexad::host::offline::{Start, forward_kinematics, inverse_dynamics};
-use hexad::host::setpoints::{Score, SetpointError};
-use hexad::host::table::{Table, TableError, Writer, legs, length_columns, trajectory_columns};
-use hexad::model::ladder::Rung;
+use hexad::commands::r#move::{Score, SetpointError};
+use hexad::commands::offline::{Start, forward_kinematics, inverse_dynamics};
+use hexad::config::Config;
+use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::Machine;
+use hexad::output::csv_table::{Table, TableError, Writer, legs, length_columns, trajectory_columns};
 
 use super::{line_number, lines};
 
@@ -37,7 +37,7 @@ pub fn hold(input: &[u8]) -> bool {
     };
     let motions = read(&trajectory_columns(), &[]);
     if let Some(table) = &motions {
-        check_output(table, &inverse_dynamics(&MACHINE, Rung::Exact, table).0, 1 + 4 * 6);
+        check_output(table, &inverse_dynamics(&MACHINE, Fidelity::Exact, table).0, 1 + 4 * 6);
         check_trajectory(table, input);
     }
     let lengths = read(&length_columns(), &legs("length_rate"));

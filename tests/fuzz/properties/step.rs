@@ -3,14 +3,14 @@
 
 use std::sync::LazyLock;
 
+use hexad::config::Config;
 use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
 use hexad::control::law::ControlMode;
 use hexad::control::limits::Limit;
 use hexad::control::state::{Request, State};
-use hexad::host::config::Config;
-use hexad::host::daemon;
+use hexad::daemon;
+use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::ladder::Rung;
 use hexad::model::task::TaskState;
 
 static CONFIG: LazyLock<Config> = LazyLock::new(|| {
@@ -55,7 +55,7 @@ impl<'a> Play<'a> {
     fn new(bytes: &'a [u8], mode: ControlMode, observer_hz: f64) -> Self {
         let mut deployment = CONFIG.deployment.clone();
         (deployment.control.mode, deployment.control.observer_bandwidth_hz) = (mode, observer_hz);
-        let parameters = daemon::parameters(&CONFIG.machine, &deployment, Rung::Exact);
+        let parameters = daemon::parameters(&CONFIG.machine, &deployment, Fidelity::Exact);
         Self {
             bytes,
             parameters,

@@ -7,7 +7,7 @@ use std::process::{self, Child, Command, ExitStatus, Stdio};
 use std::thread::{panicking, sleep};
 use std::time::{Duration, Instant};
 
-use hexad::host::demo::children::PARENT;
+use hexad::commands::demo::children::PARENT;
 
 use super::machine::Machine;
 use super::threads::all_stopped;

@@ -3,9 +3,9 @@
 use std::cell::Cell;
 
 use hexad::control::state::State;
-use hexad::ipc::messages::{ForceMessage, Header, Message};
-use hexad::ipc::ports::{Bus, Source};
-use hexad::realtime::clock::monotonic_ns;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::{Bus, Source};
+use hexad::messages::structs::{ForceMessage, Header, Message};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// What is done to a message after it was sealed.

@@ -1,9 +1,8 @@
 //! A machine file of a test's own, under a name nobody else has.
 
-use std::fs;
 use std::path::{Path, PathBuf};
-use std::process;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::{fs, process};
 
 use tempfile::TempDir;
 

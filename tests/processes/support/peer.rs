@@ -4,9 +4,10 @@
 use std::env;
 use std::process::{self, Command, Stdio};
 
-use hexad::ipc::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
-use hexad::ipc::ports::Bus;
-use hexad::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::Bus;
+use hexad::messages::structs::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::process as child;
 use hexad::realtime::setup::scheduling;
 

@@ -5,11 +5,11 @@ use std::sync::{Arc, Mutex, MutexGuard, mpsc};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
-use hexad::ipc::messages::{
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::ports::{Bus, Rejected, Sink, Time};
+use hexad::messages::structs::{
     CommandMessage, ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage,
 };
-use hexad::ipc::ports::{Bus, Rejected, Sink, Time};
-use hexad::realtime::clock::monotonic_ns;
 use hexad::realtime::setup::scheduling;
 
 use super::children::HANG;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use hexad::control::state::{Cause, Request, State};
-use hexad::ipc::messages::{ForceMessage, MeasuredMessage, Message, SCHEMA};
+use hexad::messages::structs::{ForceMessage, MeasuredMessage, Message, SCHEMA};
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
 use super::recorder::Recording;
@@ -54,7 +54,7 @@ pub fn ends_at_rest(recording: &Recording) {
 
 /// A driver can check each by itself, and within a life everything goes forward.
 fn forces_are_whole_and_in_order(recording: &Recording) {
-    let hexad::ipc::ports::Rejected { schema, repeated, damaged, .. } = recording.passed_over;
+    let hexad::messages::ports::Rejected { schema, repeated, damaged, .. } = recording.passed_over;
     assert_eq!((schema, repeated, damaged), (0, 0, 0), "forces passed over: {:?}", recording.passed_over);
     for force in &recording.forces {
         assert_eq!(force.checksum, force.computed_checksum(), "{force:#?}");

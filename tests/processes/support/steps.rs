@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use hexad::control::state::Cause;
-use hexad::ipc::messages::ForceMessage;
+use hexad::messages::structs::ForceMessage;
 
 use super::recorder::Recording;
 
@@ -24,7 +24,7 @@ pub struct Step {
 
 /// All of one life of the daemon, in order.
 pub fn steps(recording: &Recording) -> Vec<Step> {
-    let order = |header: &hexad::ipc::messages::Header| (header.epoch, header.sequence);
+    let order = |header: &hexad::messages::structs::Header| (header.epoch, header.sequence);
     let released: HashMap<_, _> = recording
         .forces
         .iter()

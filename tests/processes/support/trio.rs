@@ -3,14 +3,13 @@
 use std::time::Duration;
 
 use hexad::control::state::Cause;
-use hexad::ipc::messages::{ForceMessage, MeasuredMessage};
-use hexad::realtime::clock::monotonic_ns;
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::structs::{ForceMessage, MeasuredMessage};
 
 use super::children::{HANG, Hexad};
 use super::machine::Machine;
-use super::operator;
 use super::recorder::{Recorder, Recording};
-use super::rules;
+use super::{operator, rules};
 
 /// A leg faster than this is in motion \[m/s\]. The fastest legs of the motion exceed it several times over.
 const IN_MOTION: f64 = 0.1;

@@ -1,0 +1,32 @@
+//! Many poses: inverse dynamics over slices, on all processors.
+//!
+//! For trajectories, sweeps and Monte Carlo. Motions are independent, so the cost grows linearly, and the
+//! result does not depend on the number of processors.
+
+use indicatif::ProgressBar;
+use rayon::prelude::*;
+
+use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Fidelity;
+use crate::model::machine::LEGS;
+use crate::model::rigid::Motion;
+
+/// Motions per task: half a millisecond of work, long against the cost of handing it to a thread.
+const CHUNK: usize = 8192;
+
+/// Writes the forces of every motion \[N\] to the same place in `forces`, `None` at singular poses. The
+/// longer slice keeps its rest. The bar advances by motions.
+pub fn forces(
+    model: &InverseDynamics,
+    fidelity: Fidelity,
+    motions: &[Motion],
+    forces: &mut [Option<[f64; LEGS]>],
+    bar: &ProgressBar,
+) {
+    forces.par_chunks_mut(CHUNK).zip(motions.par_chunks(CHUNK)).for_each(|(forces, motions)| {
+        for (force, motion) in forces.iter_mut().zip(motions) {
+            *force = model.forces_of(fidelity, motion);
+        }
+        bar.inc(motions.len() as u64);
+    });
+}

@@ -1,0 +1,372 @@
+//! Sets of poses in which nothing is in the way: every leg within its stroke, on home's side of singular poses,
+//! no condition beyond a limit. Proved for a whole cell of poses at once, not looked for at points of it: a singular
+//! surface has no thickness, and passes between any samples.
+//!
+//! The parameters of a pose are three angles, one after the other about the axes `e` that the ones before left, and three
+//! displacements. From the middle of a cell they go at most `h` away. With arms `b` from C, `a = |b|`, moments
+//! `m = b x n`, `d` the largest displacement of C, `t` the largest rotation, `t'` of the axes themselves, and `s = d + a t`
+//! the largest displacement of a joint:
+//!
+//! ```text
+//! t^2 = (h1 + h3)^2 + h2^2        t'^2 = h1 h2 + (h1 + h2) h3        g = sum |e . m| h + sum |n| h
+//! L - L0  <=  g + (s^2 / (L0 - s) + a (t^2 + t'^2)) / 2              Taylor, with the largest L''
+//! L - L0  >= -g - a (t^2 + t'^2) / 2
+//! |n - n0| <= q = s / sqrt(L0 (L0 - s))
+//! |N - N0|^2 <= D^2 = sum of q^2 + (a' / r)^2 (t + q)^2              arms a' from the mean of the joints
+//! |N^-1| <= B / (1 - f),  B = |N0^-1|,  f = B D                      where f < 1: no pose is singular
+//! condition = |N| |N^-1| <= min(|N0| + D, sqrt 12) B / (1 - f)       Frobenius norms throughout
+//! ```
+//!
+//! Where that does not do, by Taylor: `f = sum of |N0^-1 dN_k| h_k + B F / 2`, `dN_k` the derivative of N along a parameter
+//! and `F^2` the sum of squares of the second derivatives of the columns along any way through the cell:
+//!
+//! ```text
+//! |n''| <= (a (t^2 + t'^2) + 3 s^2 / l) / l,  l = L0 - s       |m''| / r <= (a' / r) (t^2 + t'^2 + 2 t s / l + |n''|)
+//! ```
+//!
+//! Cells that cover a region around home and all pass have the sign of home's determinant everywhere.
+//!
+//! To rounding: 1e-15 of the lengths is not accounted for.
+
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::inverse_jacobian::{leg_wrenches, scaled_wrenches};
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::{LEGS, Machine};
+use crate::model::rigid::{Pose, exp, log};
+use crate::model::task::{TaskState, task_coordinates};
+
+/// Frobenius norm of N, no arm shorter than its moment: six directions, and six arms whose mean square is 1.
+const LARGEST_WRENCHES: f64 = 3.464_101_615_137_755;
+
+/// The linear part of a change is hardly less than this share of the bound of the whole one. Only time depends on it.
+const LEAST_SHARE: f64 = 0.1;
+
+/// A family of growing regions around home, and what its six parameters mean. Angular parameters first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// Positions within a radius \[m\], the size; any turn from home's orientation about any axis up to `turn` \[rad\], at
+    /// most a quarter. The angles turn home's platform.
+    Ball { turn: f64 },
+    /// Offsets of X from home within ranges (low at most 0, high at least 0) times the size.
+    Box { low: [f64; 6], high: [f64; 6] },
+}
+
+/// A box of parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    pub middle: [f64; 6],
+    pub half: [f64; 6],
+}
+
+/// What is in the way at a pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Obstacle {
+    /// A leg, counted from 0, shorter or longer than it can be.
+    Short(usize),
+    Long(usize),
+    /// Beyond a singular pose.
+    Singular,
+    /// Beyond the limit of the condition.
+    Condition,
+}
+
+/// The machine among its obstacles.
+#[derive(Clone, Debug)]
+pub struct Clearance<'a> {
+    machine: &'a Machine,
+    home: Pose,
+    home_determinant: f64,
+    largest_condition: f64,
+    /// Of the joints on the platform: from C, and from their mean in radii.
+    arms: [(f64, f64); LEGS],
+    /// The joints on the platform and their mean, in platform axes.
+    joints: [Vector3<f64>; LEGS],
+    mean: Vector3<f64>,
+}
+
+impl Shape {
+    /// The whole family up to a size.
+    pub fn cell(&self, size: f64) -> Cell {
+        let (low, high) = match *self {
+            Self::Ball { turn: t } => ([-t, -t, -t, -size, -size, -size], [t, t, t, size, size, size]),
+            Self::Box { low, high } => (low.map(|x| size * x), high.map(|x| size * x)),
+        };
+        let mut cell = Cell { middle: [0.0; 6], half: [0.0; 6] };
+        for ((middle, half), (low, high)) in
+            cell.middle.iter_mut().zip(&mut cell.half).zip(low.into_iter().zip(high))
+        {
+            (*middle, *half) = (0.5 * (low + high), 0.5 * (high - low));
+        }
+        cell
+    }
+
+    /// The size from which on the family may have poses of this cell; none if it never has.
+    pub fn size(&self, cell: &Cell) -> Option<f64> {
+        let nearest = cell.nearest();
+        match self {
+            Self::Ball { turn } => {
+                let [a, b, c, ..] = cell.middle;
+                let middle = log(&turned([a, b, c])).norm();
+                // A hair for rounding, so that a cell on the edge is not lost.
+                let within = middle - cell.turn() <= turn * (1.0 + 1e-12);
+                let [.., x, y, z] = nearest;
+                within.then(|| Vector3::new(x, y, z).norm())
+            }
+            Self::Box { low, high } => Some(
+                nearest
+                    .iter()
+                    .zip(low.iter().zip(high))
+                    .filter(|(x, _)| **x != 0.0)
+                    .map(|(x, (low, high))| if *x < 0.0 { x / low } else { x / high })
+                    .fold(0.0, f64::max),
+            ),
+        }
+    }
+
+    /// Parameters on the edge of the region of size 1, those of the turn included, by six numbers in \[-1, 1\].
+    pub fn edge(&self, numbers: &[f64; 6]) -> [f64; 6] {
+        match self {
+            Self::Ball { turn } => {
+                let [a, b, c, x, y, z] = *numbers;
+                let unit = |v: Vector3<f64>| v.try_normalize(0.0).unwrap_or_else(Vector3::x);
+                let rotation = exp(&(unit(Vector3::new(a, b, c)) * *turn));
+                let position = unit(Vector3::new(x, y, z));
+                task_coordinates(&Pose { rotation, position }, &[0.0; 6])
+            }
+            Self::Box { low, high } => {
+                let most = numbers.iter().fold(f64::MIN_POSITIVE, |most, x| f64::max(most, x.abs()));
+                let mut edge = *numbers;
+                for (x, (low, high)) in edge.iter_mut().zip(low.iter().zip(high)) {
+                    *x *= if *x < 0.0 { -low } else { *high } / most;
+                }
+                edge
+            }
+        }
+    }
+
+    /// The point of another size on the way to an edge.
+    pub fn towards(&self, edge: &[f64; 6], size: f64) -> Cell {
+        let [a, b, c, x, y, z] = edge.map(|x| size * x);
+        let middle = match (self, edge) {
+            (Self::Ball { .. }, [a, b, c, ..]) => [*a, *b, *c, x, y, z],
+            (Self::Box { .. }, _) => [a, b, c, x, y, z],
+        };
+        Cell { middle, half: [0.0; 6] }
+    }
+}
+
+/// Turned by angles, one after the other.
+fn turned([a, b, c]: [f64; 3]) -> Matrix3<f64> {
+    TaskState::at_rest([a, b, c, 0.0, 0.0, 0.0]).motion().pose.rotation
+}
+
+impl Cell {
+    /// The parameters of this cell that are nearest to home.
+    fn nearest(&self) -> [f64; 6] {
+        let mut nearest = self.middle;
+        for (x, half) in nearest.iter_mut().zip(self.half) {
+            *x = if x.abs() <= half { 0.0 } else { *x - half.copysign(*x) };
+        }
+        nearest
+    }
+
+    /// Largest rotation from the middle: the first and the third axis may come to lie on one line, the second is
+    /// perpendicular to both.
+    fn turn(&self) -> f64 {
+        let [a, b, c, ..] = self.half;
+        (a + c).hypot(b)
+    }
+
+    /// Two halves, cut where the cell is longest, angles taken at an arm.
+    pub fn halves(&self, arm: f64) -> [Self; 2] {
+        let scales = [arm, arm, arm, 1.0, 1.0, 1.0];
+        let lengths = self.half.iter().zip(scales).map(|(half, scale)| half * scale);
+        let longest = lengths.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(axis, _)| axis);
+        let mut halves = [*self; 2];
+        for (cell, side) in halves.iter_mut().zip([-0.5, 0.5]) {
+            if let (Some(middle), Some(half)) = (cell.middle.get_mut(longest), cell.half.get_mut(longest)) {
+                *middle += side * *half;
+                *half *= 0.5;
+            }
+        }
+        halves
+    }
+}
+
+impl<'a> Clearance<'a> {
+    /// Around home, with the largest condition that is allowed.
+    pub fn new(machine: &'a Machine, largest_condition: f64) -> Self {
+        let home = TaskState::at_rest(machine.home).motion().pose;
+        let joints = &machine.joints;
+        let platform = joints.triples.unpack_vectors(&joints.platform);
+        let mean = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
+        Self {
+            machine,
+            home,
+            home_determinant: KinematicState::new(machine, home).sensitivity().determinant,
+            largest_condition,
+            arms: platform.map(|arm| (arm.norm(), (arm - mean).norm() / joints.radius)),
+            joints: platform,
+            mean,
+        }
+    }
+
+    /// The leg that is nearest to an end of its stroke at the middle of a cell, and how far it is from it \[m\]. As C
+    /// may go there along that leg and no length changes by more than C goes, this is the largest ball within the
+    /// stroke at this orientation.
+    pub fn margin(&self, shape: &Shape, cell: &Cell) -> (f64, Obstacle) {
+        let actuator = &self.machine.actuator;
+        let ends = |(leg, length): (usize, f64)| {
+            [
+                (length - actuator.min_length, Obstacle::Short(leg)),
+                (actuator.max_length - length, Obstacle::Long(leg)),
+            ]
+        };
+        let lengths = leg_lengths(self.machine, &self.pose(shape, &cell.middle));
+        let nearer = |a: (f64, Obstacle), b: (f64, Obstacle)| if b.0 < a.0 { b } else { a };
+        lengths.into_iter().enumerate().flat_map(ends).fold((f64::INFINITY, Obstacle::Condition), nearer)
+    }
+
+    /// What is in the way at the middle of a cell, with the size there, if the middle is of the family.
+    pub fn obstacle(&self, shape: &Shape, cell: &Cell) -> Option<(f64, Obstacle)> {
+        let size = shape.size(&Cell { half: [0.0; 6], ..*cell })?;
+        self.obstacle_at(&self.pose(shape, &cell.middle)).map(|obstacle| (size, obstacle))
+    }
+
+    /// The pose of parameters.
+    fn pose(&self, shape: &Shape, parameters: &[f64; 6]) -> Pose {
+        let [a, b, c, x, y, z] = *parameters;
+        let position = self.home.position + Vector3::new(x, y, z);
+        let [alpha, beta, gamma, ..] = self.machine.home;
+        let rotation = match shape {
+            Shape::Ball { .. } => turned([a, b, c]) * self.home.rotation,
+            Shape::Box { .. } => turned([alpha + a, beta + b, gamma + c]),
+        };
+        Pose { rotation, position }
+    }
+
+    /// The axes of the three angles, in base axes.
+    fn axes(&self, shape: &Shape, parameters: &[f64; 6]) -> [Vector3<f64>; 3] {
+        let [a, b, ..] = *parameters;
+        let [alpha, beta, ..] = self.machine.home;
+        let (a, b) = if let Shape::Box { .. } = shape { (alpha + a, beta + b) } else { (a, b) };
+        let ((sin_a, cos_a), (sin_b, cos_b)) = (a.sin_cos(), b.sin_cos());
+        let second = Vector3::new(0.0, cos_a, sin_a);
+        [Vector3::x(), second, Vector3::new(sin_b, -sin_a * cos_b, cos_a * cos_b)]
+    }
+
+    /// What is in the way at a pose.
+    pub fn obstacle_at(&self, pose: &Pose) -> Option<Obstacle> {
+        let kinematic_state = KinematicState::new(self.machine, *pose);
+        let actuator = &self.machine.actuator;
+        for (leg, length) in kinematic_state.lengths(self.machine).into_iter().enumerate() {
+            if !(length >= actuator.min_length) {
+                return Some(Obstacle::Short(leg));
+            }
+            if !(length <= actuator.max_length) {
+                return Some(Obstacle::Long(leg));
+            }
+        }
+        let sensitivity = kinematic_state.sensitivity();
+        if !(sensitivity.determinant * self.home_determinant > 0.0) {
+            return Some(Obstacle::Singular);
+        }
+        (!(sensitivity.condition <= self.largest_condition)).then_some(Obstacle::Condition)
+    }
+
+    /// The least that [`Clearance::margin`] may be anywhere in a cell.
+    pub fn least_margin(&self, shape: &Shape, cell: &Cell) -> f64 {
+        let actuator = &self.machine.actuator;
+        let pose = self.pose(shape, &cell.middle);
+        let wrenches = leg_wrenches(self.machine, &pose);
+        let axes = self.axes(shape, &cell.middle);
+        let [ha, hb, hc, hx, hy, hz] = cell.half;
+        let (half, turn) = (Vector3::new(hx, hy, hz), cell.turn());
+        let turns_squared = turn * turn + ha * hb + (ha + hb) * hc;
+        let lengths = leg_lengths(self.machine, &pose).into_iter();
+        let margins =
+            lengths.zip(self.arms).zip(wrenches.column_iter()).map(|((length, (arm, _)), wrench)| {
+                let moment = wrench.fixed_rows::<3>(0);
+                let angular = axes.iter().zip([ha, hb, hc]).map(|(axis, half)| moment.dot(axis).abs() * half);
+                let linear = angular.sum::<f64>() + wrench.fixed_rows::<3>(3).abs().dot(&half);
+                let moved = half.norm() + arm * turn;
+                let shortest = length - moved;
+                if !(shortest > 0.0) {
+                    return f64::NEG_INFINITY;
+                }
+                let bent = 0.5 * arm * turns_squared;
+                let longest = length + linear + 0.5 * moved * moved / shortest + bent;
+                (length - linear - bent - actuator.min_length).min(actuator.max_length - longest)
+            });
+        margins.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether it is proved that no pose of a cell is singular, or of a condition beyond the limit.
+    pub fn is_regular(&self, shape: &Shape, cell: &Cell) -> bool {
+        let kinematic_state = KinematicState::new(self.machine, self.pose(shape, &cell.middle));
+        let [ha, hb, hc, hx, hy, hz] = cell.half;
+        let (shift, turn) = (Vector3::new(hx, hy, hz).norm(), cell.turn());
+        let turns_squared = turn * turn + ha * hb + (ha + hb) * hc;
+        let (mut change, mut bent) = (0.0, 0.0);
+        for (length, (arm, arm_share)) in kinematic_state.lengths(self.machine).into_iter().zip(self.arms) {
+            let moved = shift + arm * turn;
+            let shortest = length - moved;
+            if !(shortest > 0.0) {
+                return false;
+            }
+            let turned = moved / (length * shortest).sqrt();
+            change += turned * turned + (arm_share * (turn + turned)).powi(2);
+            let second = (arm * turns_squared + 3.0 * moved * moved / shortest) / shortest;
+            let second_moment = arm_share * (turns_squared + 2.0 * turn * moved / shortest + second);
+            bent += second * second + second_moment * second_moment;
+        }
+        let (change, bent) = (change.sqrt(), 0.5 * bent.sqrt());
+        let wrenches = scaled_wrenches(self.machine, kinematic_state.pose());
+        let norm = wrenches.norm();
+        let inverse = kinematic_state.sensitivity().condition / norm;
+        let most = (norm + change).min(LARGEST_WRENCHES) * inverse / self.largest_condition;
+        let does = |share: f64| most <= 1.0 - share;
+        // The second bound takes ten times as long: not where it cannot do.
+        does(inverse * change)
+            || does(inverse * (bent + change * LEAST_SHARE))
+                && self
+                    .linear_change(shape, cell, &kinematic_state, &wrenches)
+                    .is_some_and(|linear| does(linear + inverse * bent))
+    }
+
+    /// Sum of `|N0^-1 dN_k| h_k`; none at a singular pose.
+    fn linear_change(
+        &self,
+        shape: &Shape,
+        cell: &Cell,
+        kinematic_state: &KinematicState,
+        wrenches: &Matrix6<f64>,
+    ) -> Option<f64> {
+        let joints = &self.machine.joints;
+        let inverse = wrenches.try_inverse()?;
+        let rotation = kinematic_state.pose().rotation;
+        let lengths = kinematic_state.lengths(self.machine);
+        let zero = Vector3::zeros();
+        let turns = self.axes(shape, &cell.middle).map(|axis| (axis, zero));
+        let shifts = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| (zero, axis));
+        let mut sum = 0.0;
+        for ((turn, shift), half) in turns.into_iter().chain(shifts).zip(cell.half) {
+            let mut derivative = Matrix6::zeros();
+            for (((mut column, wrench), length), joint) in
+                derivative.column_iter_mut().zip(wrenches.column_iter()).zip(lengths).zip(&self.joints)
+            {
+                let direction: Vector3<f64> = wrench.fixed_rows::<3>(3).into();
+                let (arm, from_mean) = (rotation * joint, rotation * (joint - self.mean));
+                let moved = shift + turn.cross(&arm);
+                let turned = (moved - direction * direction.dot(&moved)) / length;
+                let moment = turn.cross(&from_mean).cross(&direction) + from_mean.cross(&turned);
+                column.fixed_rows_mut::<3>(0).copy_from(&(moment / joints.radius));
+                column.fixed_rows_mut::<3>(3).copy_from(&turned);
+            }
+            sum += (inverse * derivative).norm() * half;
+        }
+        Some(sum)
+    }
+}

@@ -1,0 +1,203 @@
+//! What a pose is worth: stroke left, condition, the force that an acceleration may ask for, the payload.
+//!
+//! Around a pose at rest the forces are linear in the acceleration and in an added mass p, a point fixed to the
+//! platform at its centre of mass c:
+//!
+//! ```text
+//! Gamma(p) = g + p s + (K + p P) [omega'; v']
+//! N g = W at rest     N K = M     N s = -[c x gravity; gravity]     N P = [-c~ c~, c~; -c~, U]
+//! ```
+//!
+//! with M the mass matrix. Over all `|omega'| <= w` and, independently, `|v'| <= a`, a leg's largest force is
+//!
+//! ```text
+//! f_i(p) = |g_i + p s_i| + coulomb + w |angular row i of K + p P| + a |linear row i of K + p P|
+//! ```
+//!
+//! and each of these is attained: a row meets its own direction, and a creeping platform has Coulomb's force either way.
+//! The worst force is the largest `f_i(0)`. The payload is the smallest `p >= 0` at which an `f_i` is the actuator's
+//! limit: f is convex, so Newton's method from beyond the root comes down to it without fail. A closed form by the triangle
+//! inequality would give less than the machine carries.
+//!
+//! What it does not do: velocities add forces that are not in these numbers.
+
+use nalgebra::{Matrix3, Matrix6, RowVector3, Vector3, Vector6};
+
+use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Exact;
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::{LEGS, Machine};
+use crate::model::mass_matrix::MassMatrix;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+use crate::model::task::TaskState;
+
+/// Most steps of Newton's method for a payload; five are usual.
+const STEPS: usize = 50;
+/// Steps below this share of the payload are rounding.
+const CLOSE: f64 = 1e-12;
+
+/// How hard the platform accelerates, in any direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Largest `|v'|` of C \[m/s^2\].
+    pub linear: f64,
+    /// Largest `|omega'|` \[rad/s^2\].
+    pub angular: f64,
+}
+
+/// A machine whose poses are judged.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    model: InverseDynamics,
+    mass: MassMatrix,
+    effort: Effort,
+    /// Of `det N` at home.
+    home_sign: f64,
+}
+
+/// What a pose is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// From the leg that is nearest to an end of its stroke; negative out of reach \[m\].
+    pub stroke_margin: f64,
+    /// `det N / radius^3`, positive on home's side of singular poses.
+    pub determinant: f64,
+    /// As [`crate::model::sensitivity::Sensitivity::condition`].
+    pub condition: f64,
+    /// The largest force of any leg under the effort; infinite at a singular pose \[N\].
+    pub worst_force: f64,
+    /// The largest point mass at the platform's centre of mass that leaves every force within the actuators'
+    /// limit under the effort; 0 if it is exceeded without, infinite where nothing weighs \[kg\].
+    pub payload: f64,
+}
+
+impl Quality {
+    /// Within the stroke, on home's side.
+    pub fn within_reach(&self) -> bool {
+        self.stroke_margin >= 0.0 && self.determinant > 0.0
+    }
+}
+
+impl Workspace {
+    /// Derives the constants.
+    pub fn new(machine: &Machine, effort: Effort) -> Self {
+        let home = KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose);
+        Self {
+            model: InverseDynamics::new(machine),
+            mass: MassMatrix::new(machine),
+            effort,
+            home_sign: home.sensitivity().determinant.signum(),
+        }
+    }
+
+    /// Judges a pose.
+    pub fn quality(&self, pose: &Pose) -> Quality {
+        let machine = self.model.machine();
+        let kinematic_state = KinematicState::new(machine, *pose);
+        let sensitivity = kinematic_state.sensitivity();
+        let legs = self.leg_forces(pose);
+        let worst = |legs: [LegForce; LEGS]| legs.iter().map(|leg| leg.largest(0.0).0).fold(0.0, f64::max);
+        let payload = |legs: [LegForce; LEGS]| {
+            legs.iter().map(|leg| leg.payload(machine.actuator.max_force)).fold(f64::INFINITY, f64::min)
+        };
+        Quality {
+            stroke_margin: stroke_margin(machine, &kinematic_state),
+            determinant: self.home_sign * sensitivity.determinant,
+            condition: sensitivity.condition,
+            worst_force: legs.map_or(f64::INFINITY, worst),
+            payload: legs.map_or(0.0, payload),
+        }
+    }
+
+    /// The forces of every leg, `None` at a singular pose.
+    fn leg_forces(&self, pose: &Pose) -> Option<[LegForce; LEGS]> {
+        let machine = self.model.machine();
+        let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
+        let arm = pose.rotation * machine.platform.center_of_mass;
+        let tilde = arm.cross_matrix();
+        let weight =
+            Vector6::from_iterator(arm.cross(&machine.gravity).iter().chain(&machine.gravity).copied());
+        let mut mass = Matrix6::zeros();
+        for (row, column, block) in
+            [(0, 0, -tilde * tilde), (0, 3, tilde), (3, 0, -tilde), (3, 3, Matrix3::identity())]
+        {
+            mass.fixed_view_mut::<3, 3>(row, column).copy_from(&block);
+        }
+        let factors = leg_wrenches(machine, pose).lu();
+        let [of_machine, of_mass] = [factors.solve(&self.mass.at(pose))?, factors.solve(&mass)?];
+        let still = factors.solve(&self.model.load_of::<Exact>(&rest).total())?;
+        let still_mass = factors.solve(&-weight)?;
+        let row = |matrix: &Matrix6<f64>, leg: usize, first: usize| -> RowVector3<f64> {
+            matrix.fixed_view::<1, 3>(leg, first).into()
+        };
+        let mut legs = [LegForce::default(); LEGS];
+        for (i, (leg, (own, added))) in legs.iter_mut().zip(still.iter().zip(&still_mass)).enumerate() {
+            let pair = |first| [row(&of_machine, i, first), row(&of_mass, i, first)];
+            *leg = LegForce {
+                friction: machine.actuator.coulomb_friction,
+                still: [*own, *added],
+                angular: pair(0).map(|row| row * self.effort.angular),
+                linear: pair(3).map(|row| row * self.effort.linear),
+            };
+        }
+        Some(legs)
+    }
+}
+
+/// How far the leg that is nearest to an end of its stroke is from it \[m\].
+fn stroke_margin(machine: &Machine, kinematic_state: &KinematicState) -> f64 {
+    let actuator = &machine.actuator;
+    let margin = |length: f64| (length - actuator.min_length).min(actuator.max_length - length);
+    kinematic_state.lengths(machine).into_iter().map(margin).fold(f64::INFINITY, f64::min)
+}
+
+/// The force of one leg: of the machine as it is, and of each kilogram added \[N\], \[N/kg\].
+#[derive(Clone, Copy, Debug, Default)]
+struct LegForce {
+    friction: f64,
+    still: [f64; 2],
+    /// At the effort, by direction.
+    angular: [RowVector3<f64>; 2],
+    linear: [RowVector3<f64>; 2],
+}
+
+impl LegForce {
+    /// f(p) and its slope.
+    fn largest(&self, mass: f64) -> (f64, f64) {
+        let [still, added] = self.still;
+        let force = still + mass * added;
+        let (mut sum, mut slope) = (force.abs() + self.friction, force.signum() * added);
+        for [own, added] in [self.angular, self.linear] {
+            let row: Vector3<f64> = (own + added * mass).transpose();
+            let norm = row.norm();
+            sum += norm;
+            slope += if norm > 0.0 { row.dot(&added.transpose()) / norm } else { added.norm() };
+        }
+        (sum, slope)
+    }
+
+    /// The smallest mass at which the force is the limit.
+    fn payload(&self, limit: f64) -> f64 {
+        let [_, still] = self.still;
+        let growth = still.abs() + self.angular[1].norm() + self.linear[1].norm();
+        let (bare, _) = self.largest(0.0);
+        if !(bare <= limit) {
+            return 0.0;
+        }
+        if growth == 0.0 {
+            return f64::INFINITY;
+        }
+        // f(p) >= p growth - (f(0) - friction) + friction: here it is beyond the limit.
+        let mut mass = (limit + bare - 2.0 * self.friction) / growth;
+        for _ in 0..STEPS {
+            let (force, slope) = self.largest(mass);
+            let step = (force - limit) / slope;
+            if !(step > CLOSE * mass) {
+                break;
+            }
+            mass -= step;
+        }
+        mass
+    }
+}

@@ -1,0 +1,139 @@
+//! `hexad check`: what a machine file means, in numbers an engineer can compare with the drawing.
+
+use core::fmt;
+
+use crate::analysis::assembly_modes::{Other, others};
+use crate::config::Config;
+use crate::config::control_loops::loops;
+use crate::control::leg_masses::LegMasses;
+use crate::model::active_forces::inverse_dynamics;
+use crate::model::fidelity::Exact;
+use crate::model::inverse_geometry::{leg_directions, leg_lengths};
+use crate::model::inverse_jacobian::condition;
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::LEGS;
+use crate::model::task::TaskState;
+
+/// The machine at its home pose.
+pub struct Check<'a> {
+    config: &'a Config,
+    lengths: [f64; LEGS],
+    /// Static forces; none at a singular pose.
+    forces: Option<[f64; LEGS]>,
+    /// Angle between each leg and the first axis of its universal joint \[deg\].
+    joint_angles: [f64; LEGS],
+    condition: f64,
+    /// How far one measurement may be from the next for its pose to be certain \[rad\], \[radius\].
+    trusted_step: f64,
+    /// Other poses with the same lengths, the nearest first.
+    others: Vec<Other>,
+}
+
+impl<'a> Check<'a> {
+    /// Evaluates the model at home, at rest.
+    pub fn new(config: &'a Config) -> Self {
+        let machine = &config.machine;
+        let motion = TaskState::at_rest(machine.home).motion();
+        let joints = &machine.joints;
+        let axes = joints.triples.unpack_vectors(&joints.universal_axis);
+        let directions = leg_directions(machine, &motion.pose);
+        let mut joint_angles = [0.0; LEGS];
+        for (angle, (u, n)) in joint_angles.iter_mut().zip(axes.iter().zip(&directions)) {
+            *angle = u.cross(n).norm().atan2(u.dot(n)).to_degrees();
+        }
+        let kinematic_state = KinematicState::new(machine, motion.pose);
+        Self {
+            config,
+            trusted_step: kinematic_state.sensitivity().trusted_step,
+            others: others(machine, &kinematic_state),
+            lengths: leg_lengths(machine, &motion.pose),
+            forces: inverse_dynamics::<Exact>(machine, &motion),
+            joint_angles,
+            condition: condition(machine, &motion.pose),
+        }
+    }
+}
+
+impl fmt::Display for Check<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Config { name, machine, .. } = self.config;
+        let actuator = &machine.actuator;
+        writeln!(f, "{name}: valid. At home, at rest:\n")?;
+        writeln!(f, "leg   length      to shortest  to longest   force        of the limit  to joint axis")?;
+        let forces = self.forces.unwrap_or([f64::NAN; LEGS]);
+        for (leg, ((length, force), angle)) in
+            self.lengths.iter().zip(forces).zip(self.joint_angles).enumerate()
+        {
+            writeln!(
+                f,
+                "{:>3}   {length:>7.4} m   {:>7.4} m    {:>7.4} m   {force:>9.2} N   {:>7.1} %     {angle:>7.1} deg",
+                leg + 1,
+                length - actuator.min_length,
+                actuator.max_length - length,
+                100.0 * force.abs() / actuator.max_force,
+            )?;
+        }
+        writeln!(f, "\ncondition of the Jacobian  {:.2}   (1 is best; errors grow with it)", self.condition)?;
+        self.fmt_modes(f)?;
+        self.fmt_loops(f)
+    }
+}
+
+impl Check<'_> {
+    /// How far the loops are from unstable.
+    fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Config { machine, deployment, .. } = self.config;
+        let control = &deployment.control;
+        let observed = if control.observer_bandwidth_hz > 0.0 {
+            format!(", with an observer of {} Hz", control.observer_bandwidth_hz)
+        } else {
+            String::new()
+        };
+        writeln!(f, "control mode {}{observed}", control.mode.name())?;
+        if control.mode.acts_on_legs() {
+            let legs = LegMasses::at_home(machine);
+            let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
+            writeln!(
+                f,
+                "legs         together they move like one of {:.2} to {:.2} Hz",
+                root(legs.softest),
+                root(legs.stiffest)
+            )?;
+        }
+        for control_loop in loops(self.config) {
+            writeln!(f, "{control_loop}")?;
+            if let Some(warning) = control_loop.warning() {
+                writeln!(f, "WARNING: {warning}")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What start-up and the loop can be certain of.
+    fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Config { machine, deployment, .. } = self.config;
+        let step_m = self.trusted_step * machine.joints.radius;
+        writeln!(
+            f,
+            "pose certain from cycle to cycle  up to {:.1} mm or {:.2} deg, {:.1} m/s at {:.0} Hz",
+            1e3 * step_m,
+            self.trusted_step.to_degrees(),
+            step_m * deployment.realtime.rate_hz,
+            deployment.realtime.rate_hz,
+        )?;
+        let Some(nearest) = self.others.first() else {
+            return writeln!(
+                f,
+                "other poses with these lengths    none found within 90 deg and 2 radii of home"
+            );
+        };
+        writeln!(f, "other poses with these lengths    {} found, the nearest {nearest}", self.others.len())?;
+        if nearest.is_nearby() {
+            writeln!(
+                f,
+                "WARNING: at start-up lengths alone may not tell it from home; move home away from it"
+            )?;
+        }
+        Ok(())
+    }
+}

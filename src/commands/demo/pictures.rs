@@ -1,0 +1,194 @@
+//! Pictures of a run, like figures 3 to 9 of the paper: commanded (dashed) and measured.
+
+use std::path::Path;
+
+use super::recording::{Recording, desired_motion, measured_pose};
+use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Exact;
+use crate::model::inverse_geometry::leg_motion;
+use crate::model::machine::{LEGS, Machine};
+use crate::output::charts::{ChartError, Panel, Series, Stroke, write_svg};
+
+/// Values of six coordinates over time.
+type Lines = [Vec<(f64, f64)>; LEGS];
+
+/// Writes every picture into a folder; returns their names.
+pub fn write_all(
+    folder: &Path,
+    name: &str,
+    machine: &Machine,
+    recording: &Recording,
+) -> Result<Vec<&'static str>, ChartError> {
+    let signals = Signals::new(machine, recording);
+    let mut written = vec![];
+    let mut write = |file: &'static str, title: &str, panels: &[Panel]| {
+        written.push(file);
+        write_svg(&folder.join(file), &format!("{name}: {title}"), "time [s]", panels)
+    };
+    let Signals { commanded, measured, tracking } = &signals;
+    for (file, title, angular, linear, pair) in [
+        (
+            "trajectory.svg",
+            "pose of the platform",
+            "angle [deg]",
+            "position [m]",
+            [&commanded.x, &measured.x],
+        ),
+        (
+            "velocity.svg",
+            "velocity of the platform",
+            "angular velocity [deg/s]",
+            "velocity [m/s]",
+            [&commanded.twist, &measured.twist],
+        ),
+        (
+            "acceleration.svg",
+            "acceleration of the platform",
+            "angular acceleration [deg/s²]",
+            "acceleration [m/s²]",
+            [&commanded.acceleration, &measured.acceleration],
+        ),
+    ] {
+        let axes = if file == "trajectory.svg" { POSE_AXES } else { MOTION_AXES };
+        write(file, title, &[panel(angular, &axes, pair, 0..3), panel(linear, &axes, pair, 3..6)])?;
+    }
+    for (file, title, label, pair) in [
+        ("leg_lengths.svg", "lengths of the legs", "length [m]", [&commanded.length, &measured.length]),
+        ("leg_rates.svg", "velocities of the legs", "velocity [m/s]", [&commanded.rate, &measured.rate]),
+        (
+            "leg_accelerations.svg",
+            "accelerations of the legs",
+            "acceleration [m/s²]",
+            [&commanded.accel, &measured.accel],
+        ),
+        (
+            "forces.svg",
+            "actuator forces, applied and (dashed) by inverse dynamics of the setpoint",
+            "force [N]",
+            [&commanded.force, &measured.force],
+        ),
+    ] {
+        write(file, title, &[panel(label, &LEG_NAMES, pair, 0..6)])?;
+    }
+    let error =
+        |label, lines, color| Panel { y_label: label, series: vec![line("", lines, Stroke::Solid, color)] };
+    let [position, orientation] = tracking;
+    write(
+        "tracking_error.svg",
+        "desired minus true pose",
+        &[error("position [µm]", position, 0), error("orientation [µrad]", orientation, 1)],
+    )?;
+    Ok(written)
+}
+
+const POSE_AXES: [&str; 6] = ["alpha", "beta", "gamma", "x", "y", "z"];
+const MOTION_AXES: [&str; 6] = ["x", "y", "z", "x", "y", "z"];
+const LEG_NAMES: [&str; 6] = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
+
+fn panel<'a>(
+    y_label: &'a str,
+    names: &[&'a str; 6],
+    [commanded, measured]: [&'a Lines; 2],
+    which: core::ops::Range<usize>,
+) -> Panel<'a> {
+    let count = which.len();
+    let rows = || names.iter().zip(measured.iter().zip(commanded)).enumerate().skip(which.start).take(count);
+    let solid = rows().map(|(k, (name, (lines, _)))| line(name, lines, Stroke::Solid, k));
+    // One word in the legend for all dashed lines.
+    let dashed = rows().enumerate().map(|(place, (k, (_, (_, lines))))| {
+        line(if place + 1 == count { "commanded" } else { "" }, lines, Stroke::Dashed, k)
+    });
+    Panel { y_label, series: solid.chain(dashed).collect() }
+}
+
+fn line<'a>(label: &'a str, points: &'a [(f64, f64)], style: Stroke, color: usize) -> Series<'a> {
+    Series { label, points, style, color }
+}
+
+/// Every curve of every picture.
+struct Signals {
+    commanded: Curves,
+    measured: Curves,
+    /// Norms: position \[um\], orientation \[urad\].
+    tracking: [Vec<(f64, f64)>; 2],
+}
+
+/// One side, commanded or measured. Angles in degrees.
+#[derive(Default)]
+struct Curves {
+    x: Lines,
+    twist: Lines,
+    acceleration: Lines,
+    length: Lines,
+    rate: Lines,
+    accel: Lines,
+    force: Lines,
+}
+
+impl Signals {
+    fn new(machine: &Machine, recording: &Recording) -> Self {
+        let start_ns = recording.start_ns();
+        let seconds = |time_ns: u64| (time_ns as f64 - start_ns as f64) * 1e-9;
+        let mut signals =
+            Self { commanded: Curves::default(), measured: Curves::default(), tracking: [vec![], vec![]] };
+        let Self { commanded, measured, tracking } = &mut signals;
+        let model = InverseDynamics::new(machine);
+        for setpoint in &recording.setpoints {
+            let t = seconds(setpoint.header.time_ns);
+            let motion = desired_motion(setpoint);
+            let legs = leg_motion(machine, &motion);
+            push(&mut commanded.x, t, degrees(setpoint.x));
+            push(&mut commanded.twist, t, degrees(motion.twist.vector().into()));
+            push(&mut commanded.acceleration, t, degrees(motion.acceleration.vector().into()));
+            push(&mut commanded.length, t, legs.length);
+            push(&mut commanded.rate, t, legs.rate);
+            push(&mut commanded.accel, t, legs.accel);
+            push(&mut commanded.force, t, model.forces::<Exact>(&motion).unwrap_or([f64::NAN; LEGS]));
+        }
+        // Before the first setpoint there is nothing to compare with.
+        let in_range = recording.measured.iter().filter(|message| message.header.time_ns >= start_ns);
+        for message in in_range.clone() {
+            let t = seconds(message.header.time_ns);
+            push(&mut measured.x, t, degrees(message.x));
+            push(&mut measured.twist, t, degrees(message.twist));
+            push(&mut measured.length, t, message.length_m);
+            push(&mut measured.rate, t, message.length_rate_m_s);
+        }
+        // Nobody measures accelerations: differences of the rates, over two samples.
+        for (before, after) in in_range.clone().zip(in_range.skip(2)) {
+            let (t0, t1) = (seconds(before.header.time_ns), seconds(after.header.time_ns));
+            let difference = |a: [f64; 6], b: [f64; 6]| {
+                let mut quotient = [0.0; 6];
+                for (q, (a, b)) in quotient.iter_mut().zip(a.iter().zip(b)) {
+                    *q = (b - a) / (t1 - t0);
+                }
+                quotient
+            };
+            let t = 0.5 * (t0 + t1);
+            push(&mut measured.acceleration, t, degrees(difference(before.twist, after.twist)));
+            push(&mut measured.accel, t, difference(before.length_rate_m_s, after.length_rate_m_s));
+        }
+        for force in recording.forces.iter().filter(|force| force.valid == 1) {
+            push(&mut measured.force, seconds(force.header.time_ns), force.force_n);
+        }
+        for (message, desired) in recording.pairs() {
+            let t = seconds(message.header.time_ns);
+            let error = measured_pose(message).displacement_to(&desired.motion().pose);
+            let [position, orientation] = tracking;
+            position.push((t, error.linear.norm() * 1e6));
+            orientation.push((t, error.angular.norm() * 1e6));
+        }
+        signals
+    }
+}
+
+fn push(lines: &mut Lines, t: f64, values: [f64; 6]) {
+    for (line, value) in lines.iter_mut().zip(values) {
+        line.push((t, value));
+    }
+}
+
+/// The angular half in degrees.
+fn degrees([a, b, c, x, y, z]: [f64; 6]) -> [f64; 6] {
+    [a.to_degrees(), b.to_degrees(), c.to_degrees(), x, y, z]
+}

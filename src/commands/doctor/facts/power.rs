@@ -1,0 +1,142 @@
+//! How fast the processors of the two threads run, and how deeply they sleep.
+
+use super::Fact;
+use super::processors::{CPU, Chosen};
+use crate::commands::doctor::files::HostFiles;
+use crate::realtime::setup::Shortfall;
+
+/// An idle state that is left within this does not matter beside a wake-up, which takes tens \[us\].
+const SHALLOW_US: i64 = 10;
+
+/// Who decides how fast they run.
+pub fn frequency(host: &HostFiles, chosen: &Chosen) -> Fact {
+    let name = "frequency";
+    let mut others = vec![];
+    for cpu in chosen.used() {
+        match host.text(&format!("{CPU}/cpu{cpu}/cpufreq/scaling_governor")) {
+            Ok(governor) if governor == "performance" => {}
+            Ok(governor) => others.push(format!("{governor} on CPU {cpu}")),
+            Err(reason) => {
+                let reason = format!("not set by this kernel: {reason}");
+                return Fact::unknown(name, reason, None);
+            }
+        }
+    }
+    if others.is_empty() {
+        return Fact::good(name, "governor performance");
+    }
+    Fact::fair(
+        name,
+        format!("governor {}", others.join(", ")),
+        "cpupower frequency-set --governor performance",
+    )
+}
+
+/// How deeply they sleep. `bound_us` is what the daemon asks for while it runs, `against` why it may not.
+pub fn idle(host: &HostFiles, chosen: &Chosen, bound_us: i32, against: Option<&Shortfall>) -> Fact {
+    let name = "idle states";
+    let deepest = match deepest_state(host, chosen) {
+        Ok(deepest) => deepest,
+        Err(reason) => return Fact::unknown(name, reason, None),
+    };
+    let Some((latency_us, state)) = deepest.filter(|(latency_us, _)| *latency_us > SHALLOW_US) else {
+        return Fact::good(name, format!("none takes longer than {SHALLOW_US} us to leave"));
+    };
+    let found = format!("{state} takes {latency_us} us to leave");
+    match against {
+        None if i64::from(bound_us) <= SHALLOW_US => {
+            Fact::good(name, format!("{found}; the daemon allows at most {bound_us} us while it runs"))
+        }
+        None => Fact::fair(
+            name,
+            format!("{found}; the daemon allows {bound_us} us"),
+            "lower realtime.cpu_dma_latency_us",
+        ),
+        Some(Shortfall { reason, remedy, .. }) => {
+            Fact::fair(name, format!("{found}, and the daemon cannot prevent it: {reason}"), remedy.as_str())
+        }
+    }
+}
+
+/// Latency and name of the deepest enabled idle state; `None` if there are no states.
+fn deepest_state(host: &HostFiles, chosen: &Chosen) -> Result<Option<(i64, String)>, String> {
+    let driver = host.text(&format!("{CPU}/cpuidle/current_driver"))?;
+    if driver == "none" {
+        return Ok(None);
+    }
+    let mut deepest = None;
+    for cpu in chosen.used() {
+        let mut states = (0..).map(|state| format!("{CPU}/cpu{cpu}/cpuidle/state{state}"));
+        while let Some(state) = states.next().filter(|state| host.exists(state)) {
+            if host.number(&format!("{state}/disable")) == Ok(1) {
+                continue;
+            }
+            let found = (host.number(&format!("{state}/latency"))?, host.text(&format!("{state}/name"))?);
+            deepest = deepest.max(Some(found));
+        }
+    }
+    Ok(deepest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::doctor::facts::Rating;
+    use crate::commands::doctor::facts::processors::tests::chosen;
+    use crate::commands::doctor::files::sample::host;
+
+    #[test]
+    fn governors_of_the_used_processors_count() {
+        let governor = |cpu: u32| format!("sys/devices/system/cpu/cpu{cpu}/cpufreq/scaling_governor");
+        let files = [(governor(0), "powersave"), (governor(1), "performance"), (governor(2), "performance")];
+        let files: Vec<_> = files.iter().map(|(path, text)| (path.as_str(), *text)).collect();
+        let host = host(&files);
+        for (realtime, io, permitted, rating) in [
+            (Some(1), Some(2), "0-2", Rating::Good),
+            (Some(1), Some(0), "0-2", Rating::Fair),
+            (None, None, "0-2", Rating::Fair),
+            (None, None, "1-2", Rating::Good),
+            (Some(1), Some(3), "0-3", Rating::Unknown),
+        ] {
+            let fact = frequency(&host.files, &chosen(realtime, io, permitted));
+            assert_eq!(fact.rating, rating, "{realtime:?} {io:?}: {fact:?}");
+        }
+        let fact = frequency(&host.files, &chosen(None, None, "0-2"));
+        assert_eq!(fact.found, "governor powersave on CPU 0");
+    }
+
+    #[test]
+    fn deep_idle_states_are_good_only_if_the_daemon_can_prevent_them() {
+        let state =
+            |number: u32, file: &str| format!("sys/devices/system/cpu/cpu0/cpuidle/state{number}/{file}");
+        let files = |deep: &'static str, off: &'static str| {
+            let text = [
+                ("sys/devices/system/cpu/cpuidle/current_driver".to_string(), "intel_idle"),
+                (state(0, "latency"), "0"),
+                (state(0, "name"), "POLL"),
+                (state(1, "latency"), deep),
+                (state(1, "name"), "C6"),
+                (state(1, "disable"), off),
+            ];
+            let text: Vec<_> = text.iter().map(|(path, text)| (path.as_str(), *text)).collect();
+            host(&text)
+        };
+        let against =
+            Shortfall { what: "bound".into(), reason: "it is not allowed".into(), remedy: "allow it".into() };
+        let one = chosen(Some(0), Some(0), "0");
+        for (deep, off, bound_us, against, rating) in [
+            ("133", "0", 0, None, Rating::Good),
+            ("133", "0", 200, None, Rating::Fair),
+            ("133", "0", 0, Some(&against), Rating::Fair),
+            ("133", "1", 0, Some(&against), Rating::Good),
+            ("2", "0", 0, Some(&against), Rating::Good),
+            ("deep", "0", 0, None, Rating::Unknown),
+        ] {
+            let fact = idle(&files(deep, off).files, &one, bound_us, against);
+            assert_eq!(fact.rating, rating, "{deep} {off} {bound_us}: {fact:?}");
+        }
+        let none = host(&[("sys/devices/system/cpu/cpuidle/current_driver", "none")]);
+        assert_eq!(idle(&none.files, &one, 0, None).rating, Rating::Good);
+        assert_eq!(idle(&host(&[]).files, &one, 0, None).rating, Rating::Unknown);
+    }
+}

@@ -1,0 +1,149 @@
+//! The machine at home, body by body: frames, inertias that engines of rigid bodies accept, and shapes to
+//! look at.
+
+use core::fmt;
+
+use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
+
+use crate::model::inverse_geometry::{leg_directions, leg_lengths};
+use crate::model::machine::{Link, Machine, TransverseInertia};
+use crate::model::rigid::Pose;
+use crate::model::task::TaskState;
+
+/// How far the greatest principal moment stays below the sum of the others, as a share of it. Flat plates
+/// have no distance at all, and engines refuse what rounding puts beyond.
+const INERTIA_MARGIN: f64 = 1e-12;
+
+/// Least principal moment \[kg m^2\]. MuJoCo refuses 1e-15 and less; thin rods may be configured with none.
+const LEAST_INERTIA: f64 = 1e-14;
+
+/// Numbers as XML attributes have them: shortest digits that read back the same, blanks between.
+pub(super) struct Numbers<'a>(pub &'a [f64]);
+
+impl fmt::Display for Numbers<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, x) in self.0.iter().enumerate() {
+            // Not "-0".
+            write!(f, "{}{:?}", if i == 0 { "" } else { " " }, x + 0.0)?;
+        }
+        Ok(())
+    }
+}
+
+/// One leg at home.
+pub(super) struct LegLayout {
+    /// As people count.
+    pub number: usize,
+    /// `A_i`, base axes.
+    pub base: Vector3<f64>,
+    /// `B_i`, platform axes.
+    pub platform: Vector3<f64>,
+    /// Leg axes expressed in base axes: x the second axis of the universal joint, z the leg.
+    pub rotation: Rotation3<f64>,
+    /// First axis of the universal joint, leg axes.
+    pub first_axis: Vector3<f64>,
+    /// L
+    pub length: f64,
+}
+
+/// The six legs at home.
+pub(super) fn legs(machine: &Machine) -> Vec<LegLayout> {
+    let pose = home(machine);
+    let joints = &machine.joints;
+    let universal_axes = joints.triples.unpack_vectors(&joints.universal_axis);
+    (1..)
+        .zip(joints.triples.unpack_vectors(&joints.base))
+        .zip(joints.triples.unpack_vectors(&joints.platform))
+        .zip(universal_axes.iter().zip(leg_directions(machine, &pose)))
+        .zip(leg_lengths(machine, &pose))
+        .map(|((((number, base), platform), (u, n)), length)| {
+            let second = u.cross(&n).normalize();
+            let third = n.cross(&second);
+            let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[second, third, n]));
+            let first_axis = Vector3::new(0.0, u.dot(&third), u.dot(&n));
+            LegLayout { number, base, platform, rotation, first_axis, length }
+        })
+        .collect()
+}
+
+/// The home pose.
+pub(super) fn home(machine: &Machine) -> Pose {
+    TaskState::at_rest(machine.home).motion().pose
+}
+
+/// `w x y z`
+pub(super) fn quaternion(rotation: &Rotation3<f64>) -> [f64; 4] {
+    let q = UnitQuaternion::from_rotation_matrix(rotation);
+    [q.w, q.i, q.j, q.k]
+}
+
+/// The inertia of a link about its centre of mass, leg axes, at this length.
+pub(super) fn link_inertia(link: &Link, length: f64) -> Matrix3<f64> {
+    let TransverseInertia { constant, quadratic, reference_length } = link.transverse_inertia;
+    let transverse = constant + quadratic * (length - reference_length).powi(2);
+    realizable(&Matrix3::from_diagonal(&Vector3::new(transverse, transverse, link.axial_inertia)))
+}
+
+/// The tensor with its principal moments raised, all alike, until the greatest is at most the sum of the
+/// others with [`INERTIA_MARGIN`] to spare, and the least is [`LEAST_INERTIA`]. Most bodies stay as they are;
+/// none changes by more than 1e-9 of its greatest moment, the tolerance of the configuration.
+pub(super) fn realizable(inertia: &Matrix3<f64>) -> Matrix3<f64> {
+    let principal = inertia.symmetric_eigenvalues();
+    let greatest = principal.max();
+    let lacking = 2.0 * greatest - principal.sum() + INERTIA_MARGIN * greatest;
+    inertia + Matrix3::identity() * lacking.max(LEAST_INERTIA - principal.min()).max(0.0)
+}
+
+/// Shapes to look at: nothing but pictures depends on them.
+pub(super) struct Shapes {
+    /// Radii of cylinders, rods and joints \[m\].
+    pub cylinder_radius: f64,
+    pub rod_radius: f64,
+    pub ball_radius: f64,
+    /// How long both links are drawn \[m\].
+    pub link_length: f64,
+    /// Corners of the plates that carry the joints, base axes and platform axes.
+    pub base_corners: Vec<Vector3<f64>>,
+    pub platform_corners: Vec<Vector3<f64>>,
+    /// Middle of the machine, base axes, and its size \[m\]: twice the distance of the furthest joint.
+    pub center: Vector3<f64>,
+    pub extent: f64,
+}
+
+impl Shapes {
+    pub fn new(machine: &Machine, legs: &[LegLayout]) -> Self {
+        let Pose { rotation, position } = home(machine);
+        let base: Vec<_> = legs.iter().map(|leg| leg.base).collect();
+        let platform: Vec<_> = legs.iter().map(|leg| leg.platform).collect();
+        let all: Vec<_> =
+            base.iter().copied().chain(platform.iter().map(|b| position + rotation * b)).collect();
+        let center = mean(&all);
+        let length = legs.iter().map(|leg| leg.length).sum::<f64>() / legs.len() as f64;
+        // Slim enough for six legs side by side; links that overlap from 0.7 to 1.4 of the length at home.
+        Self {
+            cylinder_radius: 0.03 * length,
+            rod_radius: 0.018 * length,
+            ball_radius: 0.035 * length,
+            link_length: 0.7 * length,
+            base_corners: plate(&base),
+            platform_corners: plate(&platform),
+            center,
+            extent: 2.0 * all.iter().map(|point| (point - center).norm()).fold(0.0, f64::max),
+        }
+    }
+}
+
+fn mean(points: &[Vector3<f64>]) -> Vector3<f64> {
+    points.iter().sum::<Vector3<f64>>() / points.len() as f64
+}
+
+/// Corners of a plate through these points: each on both sides of the plane that fits them best.
+fn plate(points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let middle = mean(points);
+    let spread: Matrix3<f64> = points.iter().map(|p| (p - middle) * (p - middle).transpose()).sum();
+    let SymmetricEigen { eigenvectors, eigenvalues } = spread.symmetric_eigen();
+    let normal: Vector3<f64> = eigenvectors.column(eigenvalues.imin()).into();
+    // A thickness that shows.
+    let half = normal * (0.02 * spread.trace().sqrt());
+    points.iter().flat_map(|point| [point + half, point - half]).collect()
+}

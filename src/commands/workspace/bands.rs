@@ -1,0 +1,109 @@
+//! What a picture shows of a pose, and the round numbers at which its colour changes.
+
+use crate::analysis::pose_quality::Quality;
+
+/// Most bands of colour.
+pub const BANDS: usize = 10;
+/// The worst band is no thinner than this share of the range, so that two numbers do not read the same.
+const THINNEST: f64 = 0.05;
+/// From this ratio of its ends on a range is divided by ratios.
+const WIDE: f64 = 8.0;
+
+/// A quantity of a pose.
+#[derive(Clone, Copy)]
+pub struct Quantity {
+    /// With its unit.
+    pub label: &'static str,
+    pub value: fn(&Quality) -> f64,
+    pub better: Better,
+    /// Beyond it there is no colour.
+    pub worst: f64,
+    /// Nor where the worst force is beyond this.
+    pub max_force: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Better {
+    Higher,
+    Lower,
+}
+
+impl Quantity {
+    /// At least 0 where a pose is as good as a threshold.
+    pub fn beyond(&self, quality: &Quality, threshold: f64) -> f64 {
+        match self.better {
+            Better::Higher => (self.value)(quality) - threshold,
+            Better::Lower => threshold - (self.value)(quality),
+        }
+    }
+
+    /// Thresholds from the worst to the best, so that something lies beyond each; none where nothing is good enough.
+    pub fn thresholds<'a>(&self, qualities: impl Iterator<Item = &'a Quality> + Clone) -> Vec<f64> {
+        let good = |quality: &&Quality| self.beyond(quality, self.worst) >= 0.0;
+        let values = qualities.clone().filter(good).map(self.value).filter(|value| value.is_finite());
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        match self.better {
+            _ if low > high => vec![],
+            Better::Higher => [self.worst].into_iter().chain(round_numbers(0.0, high)).collect(),
+            Better::Lower => {
+                let worst = if qualities.clone().all(|quality| good(&quality)) { high } else { self.worst };
+                let mut numbers = round_numbers(low, worst);
+                numbers.retain(|number| worst - number > THINNEST * (worst - low));
+                numbers.push(worst);
+                numbers.reverse();
+                numbers
+            }
+        }
+    }
+}
+
+/// Round numbers between two, in order, fewer than [`BANDS`].
+fn round_numbers(low: f64, high: f64) -> Vec<f64> {
+    let within = |number: &f64| low < *number && *number < high;
+    let by_ratio = |leads: &[f64], stride: usize| -> Vec<f64> {
+        let powers = (low.log10().floor() as i32..=high.log10().ceil() as i32).step_by(stride);
+        powers
+            .flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powi(power)))
+            .filter(within)
+            .collect()
+    };
+    let by_step = |lead: f64| -> Vec<f64> {
+        let step = lead * 10f64.powi(((high - low) / BANDS as f64).log10().floor() as i32);
+        let count = ((high - low) / step).min(100.0) as i32 + 1;
+        (0..=count).map(|k| ((low / step).floor() + f64::from(k)) * step).filter(within).collect()
+    };
+    let few = |numbers: &Vec<f64>| numbers.len() < BANDS;
+    if low > 0.0 && high / low > WIDE {
+        let leads: [&[f64]; 3] = [&[1.0, 1.5, 2.0, 3.0, 5.0, 7.0], &[1.0, 2.0, 5.0], &[1.0, 3.0]];
+        let fine = leads.into_iter().map(|leads| by_ratio(leads, 1)).find(few);
+        fine.or_else(|| (1..).map(|stride| by_ratio(&[1.0], stride)).find(few)).unwrap_or_default()
+    } else {
+        [1.0, 2.0, 5.0, 10.0, 20.0].into_iter().map(by_step).find(few).unwrap_or_default()
+    }
+}
+
+/// A threshold without digits nobody needs.
+pub fn plain(x: f64) -> String {
+    format!("{}", format!("{x:.2e}").parse().unwrap_or(x))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_round_and_few() {
+        assert_eq!(round_numbers(0.0, 0.249), [0.05, 0.1, 0.15000000000000002, 0.2]);
+        assert_eq!(round_numbers(6.1, 99.0), [7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 70.0]);
+        assert!(round_numbers(3.0, 3.0).is_empty());
+        for exponent in -12..12 {
+            for (low, high) in [(0.0, 1.0), (0.01, 1.0), (0.3, 0.31), (1e-12, 1e6), (-3.0, 5.0)] {
+                let scale = 10f64.powi(exponent);
+                let numbers = round_numbers(low * scale, high * scale);
+                assert!((2..BANDS).contains(&numbers.len()), "{numbers:?} in {low} to {high} times {scale}");
+                assert!(numbers.is_sorted());
+            }
+        }
+        assert_eq!([0.15000000000000002, 100.0, 1234.0].map(plain), ["0.15", "100", "1230"]);
+    }
+}

@@ -1,0 +1,221 @@
+//! A slice of the workspace: a grid of poses along two coordinates through one pose.
+
+use core::f64::consts::FRAC_PI_2;
+use core::fmt;
+use core::str::FromStr;
+use std::path::Path;
+
+use indicatif::ProgressBar;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::analysis::pose_quality::{Quality, Workspace};
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
+use crate::output::csv_table::{Writer, coordinates};
+use crate::output::files::FileError;
+
+/// Poses along each axis while the range is looked for.
+const COARSE: usize = 41;
+/// The first range: this to both sides, in strokes and \[rad\]. It grows by half where reach goes on.
+const FIRST_STROKES: f64 = 0.1;
+const FIRST_ANGLE: f64 = 0.1;
+const GROWTH: f64 = 1.5;
+/// Enough growth for a thousand times the first range.
+const ROUNDS: usize = 20;
+
+/// Two coordinates of X, by their places: to the right, and up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plane(pub [usize; 2]);
+
+impl Plane {
+    /// Horizontal, vertical, and tilt about both horizontal axes: what gravity says is up.
+    pub fn usual(gravity: &Vector3<f64>) -> [Self; 3] {
+        let up = if gravity.norm() > 0.0 { gravity.iamax() } else { 2 };
+        let (first, second) = match up {
+            0 => (1, 2),
+            1 => (2, 0),
+            _ => (0, 1),
+        };
+        [Self([3 + first, 3 + second]), Self([3 + first, 3 + up]), Self([first, second])]
+    }
+}
+
+impl fmt::Display for Plane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = coordinates("");
+        let name = |axis: usize| names.get(axis).map_or("", |name| name.as_str());
+        let [right, up] = self.0.map(name);
+        write!(f, "{right}-{up}")
+    }
+}
+
+impl FromStr for Plane {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names = coordinates("");
+        let axis = |name: &str| names.iter().position(|known| known == name);
+        let axes = text.split_once('-').and_then(|(right, up)| Some([axis(right)?, axis(up)?]));
+        let bound = "must be two different ones of alpha, beta, gamma, x, y, z, as in x-z";
+        axes.filter(|[right, up]| right != up).map(Self).ok_or_else(|| bound.into())
+    }
+}
+
+/// The poses of a slice and what they are worth, row by row.
+#[derive(Clone, Debug)]
+pub struct Slice {
+    pub plane: Plane,
+    /// X of the pose that the slice goes through.
+    pub through: [f64; 6],
+    /// Along both axes, absolute.
+    pub ranges: [(f64, f64); 2],
+    /// Poses along each axis.
+    pub count: usize,
+    pub qualities: Vec<Quality>,
+}
+
+impl Slice {
+    /// The part of a plane with all that is in reach around a pose. The bar advances by poses.
+    pub fn new(
+        workspace: &Workspace,
+        machine: &Machine,
+        plane: Plane,
+        through: [f64; 6],
+        count: usize,
+        bar: &ProgressBar,
+    ) -> Self {
+        let mut slice = Self { plane, through, ranges: [(0.0, 0.0); 2], count: COARSE, qualities: vec![] };
+        slice.ranges = slice.reached(workspace, machine);
+        slice.count = count;
+        slice.judge(workspace, bar);
+        slice
+    }
+
+    /// X of a pose by its places along both axes.
+    pub fn x(&self, places: [usize; 2]) -> [f64; 6] {
+        let mut x = self.through;
+        for ((axis, place), (low, high)) in self.plane.0.into_iter().zip(places).zip(self.ranges) {
+            let share = place as f64 / (self.count - 1) as f64;
+            if let Some(x) = x.get_mut(axis) {
+                // In this form the ends are exact.
+                *x = low * (1.0 - share) + high * share;
+            }
+        }
+        x
+    }
+
+    /// The quality at places along both axes.
+    pub fn at(&self, [right, up]: [usize; 2]) -> Option<&Quality> {
+        if right < self.count { self.qualities.get(up * self.count + right) } else { None }
+    }
+
+    fn judge(&mut self, workspace: &Workspace, bar: &ProgressBar) {
+        let row = |up: usize| {
+            let quality = |right| workspace.quality(&TaskState::at_rest(self.x([right, up])).motion().pose);
+            let row: Vec<_> = (0..self.count).map(quality).collect();
+            bar.inc(self.count as u64);
+            row
+        };
+        let rows: Vec<_> = (0..self.count).into_par_iter().map(row).collect();
+        self.qualities = rows.concat();
+    }
+
+    /// Ranges that grow from the pose on until reach ends within them, then shrink onto it.
+    fn reached(&mut self, workspace: &Workspace, machine: &Machine) -> [(f64, f64); 2] {
+        let stroke = machine.actuator.max_length - machine.actuator.min_length;
+        let middles = self.plane.0.map(|axis| self.through.get(axis).copied().unwrap_or_default());
+        let firsts = self.plane.0.map(|axis| if axis < 3 { FIRST_ANGLE } else { FIRST_STROKES * stroke });
+        // Angles further from the pose than a quarter turn are no tilt, and Bryan's fold over there.
+        let most = self.plane.0.map(|axis| if axis < 3 { FRAC_PI_2 } else { f64::INFINITY });
+        let mut sides = firsts.map(|first| [first; 2]);
+        for _ in 0..ROUNDS {
+            self.ranges = around(middles, sides);
+            self.judge(workspace, &ProgressBar::hidden());
+            let ends = self.ends_of_reach();
+            let last = COARSE - 1;
+            let mut grows = false;
+            for ((sides, most), (low, high)) in sides.iter_mut().zip(most).zip(ends) {
+                for (side, touches) in sides.iter_mut().zip([low == 0, high == last]) {
+                    if touches && *side < most {
+                        *side = (GROWTH * *side).min(most);
+                        grows = true;
+                    }
+                }
+            }
+            if !grows {
+                break;
+            }
+        }
+        // A step more on each side, where the coarse grid sees none of it.
+        let mut ranges = self.ranges;
+        for ((low, high), (first, last)) in ranges.iter_mut().zip(self.ends_of_reach()) {
+            let (start, step) = (*low, (*high - *low) / (COARSE - 1) as f64);
+            *low = start + step * (first as f64 - 1.5).max(0.0);
+            *high = start + step * (last as f64 + 1.5).min((COARSE - 1) as f64);
+        }
+        ranges
+    }
+
+    /// First and last place along both axes with a pose in reach; the middle, if there is none.
+    fn ends_of_reach(&self) -> [(usize, usize); 2] {
+        let mut ends = [(self.count / 2, self.count / 2); 2];
+        for (k, _) in self.qualities.iter().enumerate().filter(|(_, quality)| quality.within_reach()) {
+            for ((first, last), place) in ends.iter_mut().zip([k % self.count, k / self.count]) {
+                (*first, *last) = ((*first).min(place), (*last).max(place));
+            }
+        }
+        ends
+    }
+
+    /// Writes a row per pose, SI units and radians.
+    pub fn save(&self, path: &Path) -> Result<(), FileError> {
+        let mut columns = coordinates("");
+        columns.extend(
+            ["in_reach", "stroke_margin", "determinant", "condition", "worst_force", "payload"]
+                .map(String::from),
+        );
+        let mut writer = Writer::new(&columns);
+        for (k, quality) in self.qualities.iter().enumerate() {
+            let Quality { stroke_margin, determinant, condition, worst_force, payload } = *quality;
+            let in_reach = f64::from(u8::from(quality.within_reach()));
+            let values = [in_reach, stroke_margin, determinant, condition, worst_force, payload];
+            writer.row(self.x([k % self.count, k / self.count]).into_iter().chain(values));
+        }
+        writer.save(path)
+    }
+
+    /// `x-z.svg`
+    pub fn file(&self, extension: &str) -> String {
+        format!("{}.{extension}", self.plane)
+    }
+}
+
+fn around(middles: [f64; 2], sides: [[f64; 2]; 2]) -> [(f64, f64); 2] {
+    let [first, second] = middles;
+    let [[left, right], [down, up]] = sides;
+    [(first - left, first + right), (second - down, second + up)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_are_two_different_coordinates() {
+        assert_eq!("x-z".parse(), Ok(Plane([3, 5])));
+        assert_eq!("beta-alpha".parse::<Plane>().unwrap().to_string(), "beta-alpha");
+        for wrong in ["", "x", "xz", "x-x", "x-w", "x-y-z", "X-Y"] {
+            assert!(wrong.parse::<Plane>().unwrap_err().starts_with("must be two different"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_usual_planes_follow_gravity() {
+        let names = |x, y, z| Plane::usual(&Vector3::new(x, y, z)).map(|plane| plane.to_string());
+        assert_eq!(names(0.0, 0.0, -9.81), ["x-y", "x-z", "alpha-beta"]);
+        assert_eq!(names(-9.81, 0.0, 0.1), ["y-z", "y-x", "beta-gamma"]);
+        assert_eq!(names(0.0, 9.81, 0.1), ["z-x", "z-y", "gamma-alpha"]);
+        assert_eq!(names(0.0, 0.0, 0.0), ["x-y", "x-z", "alpha-beta"]);
+    }
+}

@@ -1,0 +1,77 @@
+//! The control loops of a deployment, and how far each is from unstable.
+
+use core::f64::consts::TAU;
+use core::fmt;
+
+use super::Config;
+use super::deployment::GAIN_MARGIN;
+use crate::analysis::sampled_loop::{LONGEST_DELAY, SampledLoop};
+use crate::control::leg_masses::LegMasses;
+
+/// One loop with the longest delay of the daemon.
+#[derive(Clone, Copy, Debug)]
+pub struct ControlLoop {
+    pub name: &'static str,
+    pub bandwidth_hz: f64,
+    pub rate_hz: f64,
+    pub sampled: SampledLoop,
+}
+
+/// Of the pose, or of the stiffest mode of the legs.
+pub fn loops(config: &Config) -> Vec<ControlLoop> {
+    let Config { machine, deployment, .. } = config;
+    let control = &deployment.control;
+    let [position, orientation] = [
+        (control.position_bandwidth_hz, control.position_damping_ratio),
+        (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+    ];
+    let each = if control.mode.acts_on_legs() {
+        vec![("legs", position, LegMasses::at_home(machine).stiffest)]
+    } else {
+        vec![("position", position, 1.0), ("orientation", orientation, 1.0)]
+    };
+    let with = |(name, (bandwidth_hz, damping_ratio), gain): (_, (f64, f64), f64)| ControlLoop {
+        name,
+        bandwidth_hz,
+        rate_hz: deployment.realtime.rate_hz,
+        sampled: SampledLoop {
+            observer: control.observer_bandwidth_hz / bandwidth_hz,
+            mass_ratio: 1.0 / gain,
+            ..deployment.realtime.sampled_loop(bandwidth_hz, damping_ratio)
+        },
+    };
+    each.into_iter().map(with).collect()
+}
+
+impl ControlLoop {
+    /// What somebody should know before a platform moves by it.
+    pub fn warning(&self) -> Option<String> {
+        let Self { name, sampled, .. } = self;
+        let (margin, delay) = (sampled.gain_margin(), sampled.delay);
+        (margin < GAIN_MARGIN).then(|| {
+            format!(
+                "{name} loop: with {delay:.2} periods of delay a platform of less than {:.2} of the modelled mass is \
+                 unstable; a gain margin of {GAIN_MARGIN} is usual",
+                1.0 / margin
+            )
+        })
+    }
+}
+
+/// The loop, what it carries with its delay, and how much delay it would carry.
+impl fmt::Display for ControlLoop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, bandwidth_hz, rate_hz, sampled } = self;
+        let (limit, margin, longest) =
+            (sampled.largest_wn_t(), sampled.gain_margin(), sampled.longest_delay());
+        let beyond = if longest < 0.99 * LONGEST_DELAY as f64 { "" } else { "more than " };
+        write!(
+            f,
+            "{name:<12} bandwidth {bandwidth_hz:>6.2} Hz at {rate_hz:.0} Hz: wn T = {:.3}, with {:.2} periods of delay \
+             stable to {limit:.3} ({:.2} Hz), gain margin {margin:.2}; stable to {beyond}{longest:.1} periods",
+            sampled.wn_t,
+            sampled.delay,
+            limit * rate_hz / TAU,
+        )
+    }
+}

@@ -1,0 +1,111 @@
+//! The report of a run: what `--report` writes as JSON.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::messages::statistics::{Times, WorstCycle};
+use crate::output::files::{FileError, write_whole};
+use crate::realtime::usage::ThreadUsage;
+
+/// Everything a run says about itself.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Report {
+    pub cycles: u64,
+    pub rate_hz: f64,
+    pub deadline_misses: DeadlineMisses,
+    /// Release to the first instruction of the cycle.
+    pub wakeup_ns: Times,
+    /// First instruction of the cycle to its output.
+    pub compute_ns: Times,
+    /// Age of the measurement at the release.
+    pub measured_age_ns: Times,
+    /// Release to the force message sent.
+    pub end_to_end_ns: Times,
+    /// The worst first.
+    pub worst_cycles: Vec<WorstCycle>,
+    pub tracking: Tracking,
+    pub rt_thread: ThreadUsage,
+    /// It allocates only while a peer comes or goes.
+    pub io_thread: ThreadUsage,
+    /// It allocates only to tell of a change of state.
+    pub log_thread: ThreadUsage,
+    pub faults: Vec<Fault>,
+}
+
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct DeadlineMisses {
+    pub late_wakeup: u64,
+    pub overrun: u64,
+    pub skipped: u64,
+    /// Cycles run at once because their release had passed; not misses of their own.
+    pub caught_up: u64,
+}
+
+/// Desired minus actual pose.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Tracking {
+    pub position_rms_m: f64,
+    pub position_max_m: f64,
+    pub orientation_rms_rad: f64,
+    pub orientation_max_rad: f64,
+}
+
+/// Control was lost for a reason that is a fault.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Fault {
+    pub cycle: u64,
+    pub number: u32,
+    pub name: String,
+}
+
+impl Report {
+    /// Writes JSON.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let json = serde_json::to_vec_pretty(self).map_err(|e| FileError::on(path)(e.into()))?;
+        write_whole(path, &json)
+    }
+
+    /// Reads JSON.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = std::fs::read(path).map_err(FileError::on(path))?;
+        serde_json::from_slice(&text).map_err(|e| FileError::on(path)(e.into()))
+    }
+}
+
+/// Accumulates tracking errors.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TrackingSum {
+    count: u64,
+    position_squares: f64,
+    orientation_squares: f64,
+    position_max: f64,
+    orientation_max: f64,
+}
+
+impl TrackingSum {
+    /// Adds one pair of error norms: \[m\], \[rad\].
+    pub fn add(&mut self, position: f64, orientation: f64) {
+        self.count += 1;
+        self.position_squares += position * position;
+        self.orientation_squares += orientation * orientation;
+        self.position_max = self.position_max.max(position);
+        self.orientation_max = self.orientation_max.max(orientation);
+    }
+
+    /// How many pairs.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// RMS and maxima; zero where nothing was added.
+    pub fn tracking(&self) -> Tracking {
+        let count = self.count.max(1) as f64;
+        Tracking {
+            position_rms_m: (self.position_squares / count).sqrt(),
+            position_max_m: self.position_max,
+            orientation_rms_rad: (self.orientation_squares / count).sqrt(),
+            orientation_max_rad: self.orientation_max,
+        }
+    }
+}

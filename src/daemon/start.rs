@@ -1,0 +1,116 @@
+//! Real-time set-up of the daemon: each thread prepares itself, the main thread what the process shares.
+//!
+//! What is refused is told with its reason and remedy. With `realtime.require_realtime` it is a refusal to
+//! start, and names all of it.
+
+use std::sync::mpsc;
+
+use tracing::warn;
+
+use super::{DaemonError, nanoseconds};
+use crate::config::deployment::{Realtime, ReleaseKey, Scheduler};
+use crate::control::controller::{Controller, Input, Measurement, Setpoint};
+use crate::messages::ports::Time;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
+use crate::realtime::setup::deadline::Reservation;
+use crate::realtime::setup::idle::ShallowSleep;
+use crate::realtime::setup::{Shortfall, deadline, denormals, idle, memory, scheduling};
+
+/// Cycles computed before the first release, so that code and data are in memory and in the cache.
+const WARM_UP_CYCLES: u32 = 1000;
+
+/// What a thread has to say before the loop may begin: what it lacks, or why it cannot run.
+pub(super) type Ready = Result<Vec<Shortfall>, DaemonError>;
+
+/// Collects what the threads and the process lack, says it, and lets the loop begin if that is
+/// acceptable. Processors sleep lightly for as long as the result lives.
+pub(super) fn start(
+    realtime: &Realtime,
+    ready: &mpsc::Receiver<Ready>,
+    go: &mpsc::Sender<()>,
+) -> Result<Option<ShallowSleep>, DaemonError> {
+    let mut shortfalls = Vec::new();
+    for _ in ["io", "real-time"] {
+        shortfalls.extend(ready.recv().map_err(|_| DaemonError::Died("io or real-time"))??);
+    }
+    let mut shallow_sleep = None;
+    if realtime.time() == Time::Real {
+        shallow_sleep = idle::bound_wakeup(realtime.cpu_dma_latency_us)
+            .map_err(|shortfall| shortfalls.push(shortfall))
+            .ok();
+        if realtime.lock_memory {
+            // Last, when all memory is there to be locked.
+            shortfalls.extend(memory::lock_all().err());
+        }
+    }
+    for shortfall in &shortfalls {
+        warn!("{shortfall}");
+    }
+    if realtime.require_realtime && !shortfalls.is_empty() {
+        return Err(DaemonError::NotRealtime(shortfalls));
+    }
+    go.send(()).map_err(|_| DaemonError::Died("real-time"))?;
+    Ok(shallow_sleep)
+}
+
+/// Prepares the calling thread for I/O: it allocates while a peer connects.
+pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
+    memory::touch_heap();
+    let scheduled = scheduling::fifo_priority(realtime.io_priority);
+    prepare(realtime.io_cpu, scheduled)
+}
+
+/// Prepares the calling thread for the loop. The warm-up comes before SCHED_DEADLINE, whose budget it would
+/// use up.
+pub(crate) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {
+    denormals::flush();
+    warm_up();
+    let scheduled = match realtime.scheduler {
+        Scheduler::Fifo => scheduling::fifo_priority(realtime.priority),
+        Scheduler::Deadline => deadline::reserve(&reservation(realtime)),
+    };
+    prepare(realtime.cpu, scheduled)
+}
+
+/// Prepares the calling thread for the loop in simulated time: the same numbers, but nothing is urgent, and who waits
+/// for others must not keep the processor from them.
+pub(super) fn prepare_simulated(warm_up: impl FnOnce()) -> Vec<Shortfall> {
+    denormals::flush();
+    warm_up();
+    vec![]
+}
+
+fn prepare(cpu: Option<usize>, scheduled: Result<(), Shortfall>) -> Vec<Shortfall> {
+    scheduling::sharp_timers();
+    memory::touch_stack();
+    let bound = cpu.and_then(|cpu| scheduling::bind_to_cpu(cpu).err());
+    scheduled.err().into_iter().chain(bound).collect()
+}
+
+/// What `realtime.scheduler = "deadline"` reserves.
+///
+/// With `release = "external"` the period is the one that the drives are expected to have. Messages that
+/// come sooner begin a new one with the full budget, unless the share of the last is used up; cycles of
+/// drives so fast that they need more than their share are held, and that is counted.
+pub fn reservation(realtime: &Realtime) -> Reservation {
+    let spin_s = if realtime.release == ReleaseKey::Hybrid { realtime.max_lead_s } else { 0.0 };
+    Reservation::new(nanoseconds(realtime.period_s()), nanoseconds(spin_s))
+}
+
+/// Runs a controller that nobody listens to, at rest at home.
+pub(super) fn warm_up(mut controller: Controller, machine: &Machine) {
+    let task = TaskState::at_rest(machine.home);
+    let length = leg_lengths(machine, &task.motion().pose);
+    let input = Input {
+        release_ns: 1,
+        setpoint: Some(Setpoint { time_ns: 1, task }),
+        measurement: Some(Measurement { time_ns: 1, length, rate: [0.0; 6] }),
+        request: None,
+        deadline_missed: false,
+    };
+    for _ in 0..WARM_UP_CYCLES {
+        core::hint::black_box(controller.step(core::hint::black_box(&input)));
+    }
+}

@@ -1,0 +1,31 @@
+//! Pieces of a file as messages show them.
+
+/// Characters shown; enough to find the place.
+const LONGEST: usize = 60;
+
+/// On one line, without what a terminal would obey, cut where it is long.
+pub fn excerpt(text: &str) -> String {
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let mut shown = String::new();
+    for (i, c) in words.chars().enumerate() {
+        match c {
+            _ if i == LONGEST => return shown + "...",
+            c if c.is_control() => shown.extend(c.escape_default()),
+            c => shown.push(c),
+        }
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_says_stays_on_one_line_and_commands_no_terminal() {
+        assert_eq!(excerpt(" [1,\n\t2]\r\n"), "[1, 2]");
+        assert_eq!(excerpt("\u{1b}[2J\0\u{9b}"), "\\u{1b}[2J\\u{0}\\u{9b}");
+        assert_eq!(excerpt(&"ä".repeat(60)), "ä".repeat(60));
+        assert_eq!(excerpt(&"ä".repeat(1_000_000)), "ä".repeat(60) + "...");
+    }
+}

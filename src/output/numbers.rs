@@ -1,0 +1,60 @@
+//! Numbers as people read and write them.
+
+/// No quantity is larger in SI units, and the products of four such still do not overflow.
+pub const LARGEST: f64 = 1e12;
+
+/// No quantity that must be positive is smaller in SI units: the inertia of a milligram within a millimetre
+/// is 1e-12 kg m^2. The products of four such, and their inverses, are still numbers.
+pub const SMALLEST: f64 = 1e-12;
+
+/// Three significant digits; plain where that is short.
+pub fn significant(x: f64) -> String {
+    let magnitude = x.abs();
+    match magnitude {
+        _ if x == 0.0 => "0".into(),
+        _ if !(9.995e-4..1e6).contains(&magnitude) => format!("{x:.2e}"),
+        _ if magnitude < 9.995e-3 => format!("{x:.5}"),
+        _ if magnitude < 9.995e-2 => format!("{x:.4}"),
+        _ if magnitude < 0.9995 => format!("{x:.3}"),
+        _ if magnitude < 9.995 => format!("{x:.2}"),
+        _ if magnitude < 99.95 => format!("{x:.1}"),
+        _ => format!("{x:.0}"),
+    }
+}
+
+/// A share in per cent.
+pub fn percent(share: f64) -> String {
+    format!("{} %", significant(100.0 * share))
+}
+
+/// A share that somebody has chosen, in per cent, without digits nobody wrote.
+pub fn plain_percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    format!("{} %", format!("{percent:.6e}").parse().unwrap_or(percent))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits() {
+        for (x, text) in [
+            (0.0, "0"),
+            (1.234e-7, "1.23e-7"),
+            (0.001234, "0.00123"),
+            (0.01234, "0.0123"),
+            (0.1234, "0.123"),
+            (0.99996, "1.00"),
+            (-1.234, "-1.23"),
+            (12.34, "12.3"),
+            (123.4, "123"),
+            (12345.6, "12346"),
+            (1.5e7, "1.50e7"),
+        ] {
+            assert_eq!(significant(x), text);
+        }
+        assert_eq!(percent(0.00123), "0.123 %");
+        assert_eq!([0.001, 0.07, 1.0].map(plain_percent), ["0.1 %", "7 %", "100 %"]);
+    }
+}

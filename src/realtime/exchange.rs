@@ -1,0 +1,55 @@
+//! Exchange between the io thread and the real-time thread: the newest value each way.
+
+use std::sync::Arc;
+
+use super::cyclic::Counters;
+use super::doorbell::Doorbell;
+use super::newest::{Reader, Writer, newest};
+
+/// Input of a cycle as the io thread writes it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CycleInput<I> {
+    /// The release instant in it is not used: the loop sets it.
+    pub input: I,
+    /// Number of measured messages received since start.
+    pub measurements: u64,
+    /// When the io thread wrote it \[ns\].
+    pub handed_ns: u64,
+}
+
+/// Output of a cycle as the real-time thread writes it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CycleOutput<O> {
+    /// CLOCK_MONOTONIC instant at which the cycle was due \[ns\].
+    pub due_ns: u64,
+    /// Instant for which it was computed \[ns\]: `due_ns`, or where measurements release cycles the measurement's.
+    pub release_ns: u64,
+    pub output: O,
+    pub counters: Counters,
+}
+
+/// The real-time thread's ends.
+pub struct RealtimeSide<I, O> {
+    pub inputs: Reader<CycleInput<I>>,
+    pub outputs: Writer<CycleOutput<O>>,
+    pub bell: Arc<Doorbell>,
+}
+
+/// The io thread's ends.
+pub struct IoSide<I, O> {
+    pub inputs: Writer<CycleInput<I>>,
+    pub outputs: Reader<CycleOutput<O>>,
+    /// Signals new inputs, with external release.
+    pub bell: Arc<Doorbell>,
+}
+
+/// Makes both. Allocates; start-up only.
+pub fn exchange<I: Copy + Default, O: Copy + Default>() -> (RealtimeSide<I, O>, IoSide<I, O>) {
+    let (inputs_writer, inputs_reader) = newest(CycleInput::default());
+    let (outputs_writer, outputs_reader) = newest(CycleOutput::default());
+    let bell = Arc::new(Doorbell::default());
+    (
+        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer, bell: bell.clone() },
+        IoSide { inputs: inputs_writer, outputs: outputs_reader, bell },
+    )
+}
