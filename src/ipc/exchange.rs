@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use crate::control::controller::{Input, Output};
 use crate::realtime::cyclic::Counters;
-use crate::realtime::doorbell::Doorbell;
-use crate::realtime::newest::{Reader, Writer, newest};
+use crate::realtime::event::Event;
+use crate::realtime::triple_buffer::{Reader, Writer, triple_buffer};
 
 /// What the io thread hands in.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,24 +35,24 @@ pub struct CycleOutput {
 pub struct RealtimeSide {
     pub inputs: Reader<CycleInput>,
     pub outputs: Writer<CycleOutput>,
-    pub bell: Arc<Doorbell>,
+    pub event: Arc<Event>,
 }
 
 /// The io thread's ends.
 pub struct IoSide {
     pub inputs: Writer<CycleInput>,
     pub outputs: Reader<CycleOutput>,
-    /// To ring for new inputs, with external release.
-    pub bell: Arc<Doorbell>,
+    /// Signals new inputs, with external release.
+    pub event: Arc<Event>,
 }
 
 /// Makes both. Allocates; start-up only.
 pub fn exchange() -> (RealtimeSide, IoSide) {
-    let (inputs_writer, inputs_reader) = newest(CycleInput::default());
-    let (outputs_writer, outputs_reader) = newest(CycleOutput::default());
-    let bell = Arc::new(Doorbell::default());
+    let (inputs_writer, inputs_reader) = triple_buffer(CycleInput::default());
+    let (outputs_writer, outputs_reader) = triple_buffer(CycleOutput::default());
+    let event = Arc::new(Event::default());
     (
-        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer, bell: bell.clone() },
-        IoSide { inputs: inputs_writer, outputs: outputs_reader, bell },
+        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer, event: event.clone() },
+        IoSide { inputs: inputs_writer, outputs: outputs_reader, event },
     )
 }

@@ -22,7 +22,7 @@ use crate::host::faults::Told;
 use crate::host::report::{Fault, TrackingSum};
 use crate::ipc::statistics::Statistics;
 use crate::realtime::cyclic::CycleRecord;
-use crate::realtime::newest::Writer;
+use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
 /// How often the queues are emptied: well before they are full at the highest rate.

@@ -1,0 +1,10 @@
+//! Building blocks of the exchange between threads.
+//!
+//! [`triple_buffer`](super::triple_buffer) and [`event`](super::event) take them from here only: `tests/loom`
+//! compiles both with a model checker's in their place.
+
+extern crate std;
+
+pub use core::cell::UnsafeCell;
+pub use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+pub use std::sync::Arc;
