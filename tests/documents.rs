@@ -49,6 +49,7 @@ fn what_the_documents_mention_is_there() {
 
 #[test]
 fn the_readme_is_short() {
-    let lines = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap().lines().count();
+    let lines =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap().lines().count();
     assert!(lines <= MAX_README_LINES, "{lines} lines");
 }

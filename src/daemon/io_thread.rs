@@ -1,10 +1,9 @@
 //! The io thread: owner of every port of the daemon, in phase with the cycle.
 //!
 //! It reads the newest messages a lead before the release and publishes when the output of the cycle
-//! appears; with external release it waits for measured messages and rings for the real-time thread; in
-//! lock-step it waits for everybody. When
-//! a peer comes or goes, the port calls here allocate and block for a moment; the real-time thread
-//! meanwhile runs on with data it knows the age of.
+//! appears; with external release it waits for measured messages and signals the real-time thread; in
+//! lock-step it waits for everybody. When a peer comes or goes, the port calls here allocate and block for a
+//! moment; the real-time thread meanwhile runs on with data it knows the age of.
 
 use super::cycle::{CycleInput, CycleOutput, IoSide};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +23,7 @@ use crate::messages::structs::{
 use crate::model::task::TaskState;
 use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
 use crate::realtime::cyclic::{Release, Timing};
-use crate::realtime::newest::Reader;
+use crate::realtime::triple_buffer::Reader;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
 
@@ -180,7 +179,7 @@ impl Io<'_> {
             let measured = self.read();
             if measured {
                 self.hand_in();
-                self.sides.exchange.bell.ring();
+                self.sides.exchange.event.signal();
             }
             self.publish_new();
             if measured || self.published > published {
@@ -214,7 +213,7 @@ impl Io<'_> {
             }
             self.read_requests(time_ns);
             self.hand_in();
-            self.sides.exchange.bell.ring();
+            self.sides.exchange.event.signal();
             let before = self.published;
             look_until(stop, || {
                 self.publish_new();

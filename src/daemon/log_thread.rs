@@ -19,7 +19,7 @@ use crate::control::controller::Output;
 use crate::control::state::{Cause, State};
 use crate::daemon::report::{Fault, TrackingSum};
 use crate::messages::statistics::Statistics;
-use crate::realtime::newest::Writer;
+use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
 /// How often the queues are emptied: well before they are full at the highest rate.

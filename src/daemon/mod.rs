@@ -40,10 +40,10 @@ use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic;
 use crate::realtime::cyclic::{LoopReport, RECORDS, Release, Timing};
 use crate::realtime::exchange::exchange;
-use crate::realtime::newest::newest;
 use crate::realtime::process::leave_signals_to_others;
 use crate::realtime::setup::{Shortfall, deadline, memory};
 use crate::realtime::stop_request::Stop;
+use crate::realtime::triple_buffer::triple_buffer;
 
 pub mod cycle;
 mod fault_dump;
@@ -118,12 +118,12 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
         Controller::new(machine, parameters(machine, deployment, fidelity::fidelity(config)));
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
-    let bell = io_side.bell.clone();
+    let event = io_side.event.clone();
     let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
     let (records_in, records) = queue.split();
     let mut delays = Box::new(Queue::<u64, DELAYS>::new());
     let (sent_in, sent) = delays.split();
-    let (statistics_in, statistics) = newest(Statistics::default());
+    let (statistics_in, statistics) = triple_buffer(Statistics::default());
     let files = &OnceLock::new();
     let [stop_loop, stop_io, stop_log] = &[const { AtomicBool::new(false) }; 3];
     let [ending, may_end] = &[const { AtomicBool::new(false) }; 2];
@@ -192,7 +192,7 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
         }
         drop(go);
         stop_loop.store(true, Ordering::Relaxed);
-        bell.ring();
+        event.signal();
         let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
         stop_io.store(true, Ordering::Relaxed);
         let io = io.join().map_err(|_| DaemonError::Died("io"));
