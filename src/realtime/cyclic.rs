@@ -19,7 +19,8 @@ use super::overrun::OnOverrun;
 use super::usage::ThreadUsage;
 use super::waiter::Waiter;
 use crate::control::controller::{Input, Output};
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::State;
 use crate::ipc::exchange::{CycleOutput, RealtimeSide};
 
 /// Length of the queue of records to the log thread: 50 ms at 20 kHz, twice the log's own period.
@@ -117,7 +118,7 @@ pub fn run(
     let last = run_cycles(&mut cycles, stop);
     let Cycles { mut side, counters, .. } = cycles;
     let usage = ThreadUsage::of_this_thread().since(&at_start);
-    let output = Output { cause: Cause::Stopping, ..Output::default() };
+    let output = Output { diagnostic: DiagnosticCode::Stopping.into(), ..Output::default() };
     side.outputs.write(CycleOutput { due_ns: last.due_ns, release_ns: last.release_ns, output, counters });
     LoopReport { counters, usage }
 }

@@ -22,7 +22,8 @@ use super::join::join;
 use super::operator::Operator;
 use super::report::Report;
 use super::stop::Stop;
-use crate::control::state::{Cause, Request, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::{Request, State};
 use crate::ipc::ports::PortError;
 
 pub mod children;
@@ -214,10 +215,10 @@ fn watch(
         recorder.poll();
         if let Some(status) = operator.status() {
             if status.state == State::Fault as u32 {
-                let cause = Cause::from_number(status.fault).unwrap_or_default();
+                let cause = DiagnosticCode::from_number(status.fault).unwrap_or_default();
                 return Err(DemoError::NotWell(format!("fault: {}; {}", cause.name(), cause.remedy())));
             }
-            if status.fault == Cause::NotAsked as u32 {
+            if status.fault == DiagnosticCode::ReadyToEngage as u32 {
                 operator.ask(Request::Engage)?;
             }
         }

@@ -18,7 +18,8 @@ use super::daemon::nanoseconds;
 use super::join::join;
 use super::lockstep::{REPEAT, look_until};
 use super::stop::Stop;
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::State;
 use crate::ipc::messages::{ForceMessage, MeasuredMessage};
 use crate::ipc::ports::{Bus, PortError, Time};
 use crate::model::machine::LEGS;
@@ -128,7 +129,7 @@ struct Driven {
     /// Forces and the instant they expire.
     force: Option<([f64; LEGS], u64)>,
     /// What the newest message says about why there is no force.
-    cause: Cause,
+    cause: DiagnosticCode,
     timeout_ns: u64,
 }
 
@@ -139,14 +140,14 @@ impl Driven {
         say_terms(config, hardware.simulator().terms());
         info!(name = %config.name, "plant at rest at home, brakes closed");
         let timeout_ns = nanoseconds(config.deployment.plant.force_timeout_s);
-        Self { hardware, time_ns, force: None, cause: Cause::None, timeout_ns }
+        Self { hardware, time_ns, force: None, cause: DiagnosticCode::None, timeout_ns }
     }
 
     /// Applies a message from the instant it was sent.
     fn receive(&mut self, message: &ForceMessage) {
         self.advance_to(message.header.time_ns);
-        self.cause = Cause::from_number(message.fault).unwrap_or_default();
-        let is_under_control = State::from_number(message.state).is_some_and(State::controls);
+        self.cause = DiagnosticCode::from_number(message.fault).unwrap_or_default();
+        let is_under_control = State::from_number(message.state).is_some_and(State::has_control);
         let is_finite = message.force_n.iter().all(|force| force.is_finite());
         let usable = message.valid == 1 && is_under_control && is_finite;
         self.force =
@@ -216,11 +217,11 @@ fn say_terms(config: &Config, terms: &Terms) {
     }
 }
 
-fn tell(before: Brakes, now: Brakes, cause: Cause) {
+fn tell(before: Brakes, now: Brakes, cause: DiagnosticCode) {
     match (before, now) {
         (Brakes::Open, Brakes::Open) | (Brakes::EndStop { .. }, _) => {}
         (Brakes::Open, Brakes::Closing { .. } | Brakes::Closed) => match cause {
-            Cause::None => warn!("forces stopped arriving: brakes closing"),
+            DiagnosticCode::None => warn!("forces stopped arriving: brakes closing"),
             cause if cause.is_fault() => warn!("no valid force ({}): brakes closing", cause.name()),
             cause => info!("no valid force ({}): brakes closing", cause.name()),
         },
