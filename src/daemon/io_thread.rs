@@ -11,8 +11,9 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use heapless::spsc::Producer;
 
 use super::translation::{force_message, measurement, status_message};
-use crate::control::controller::{Asked, Output, Setpoint};
-use crate::control::state::{Cause, Request, State};
+use crate::control::controller::{Output, Setpoint};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::{OperatorRequest, Request, State};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::look_until;
 use crate::messages::ports::{Bus, PortError, Rejected, Sink, Source, Time};
@@ -38,7 +39,7 @@ const AWAKE_NS: u64 = 50_000;
 const OLDEST_REQUEST_NS: u64 = 1_000_000_000;
 
 /// What the daemon asks itself for before it ends; no message of a source has this epoch.
-const END: Asked = Asked { request: Request::Stop, message: (0, 1) };
+const END: OperatorRequest = OperatorRequest { request: Request::Stop, message: (0, 1) };
 
 /// Messages kept per input between two reads. Only the newest counts.
 const INPUT_DEPTH: usize = 8;
@@ -262,12 +263,12 @@ impl Io<'_> {
         while let Some(message) = self.ports.command.receive_from_any() {
             let Header { epoch, sequence, time_ns, .. } = message.header;
             let Some(request) = Request::from_number(message.request) else { continue };
-            if request.takes_force() && (ending || now_ns.abs_diff(time_ns) > OLDEST_REQUEST_NS) {
+            if request.can_begin_control() && (ending || now_ns.abs_diff(time_ns) > OLDEST_REQUEST_NS) {
                 continue;
             }
             let pending = self.input.input.request.filter(|asked| asked.message != self.answered);
             if pending.is_none_or(|pending| pending.request <= request) {
-                self.input.input.request = Some(Asked { request, message: (epoch, sequence) });
+                self.input.input.request = Some(OperatorRequest { request, message: (epoch, sequence) });
             }
         }
         let pending = self.input.input.request.is_some_and(|asked| asked.message != self.answered);
@@ -285,7 +286,7 @@ impl Io<'_> {
     fn publish_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.sides.exchange.outputs.read();
         self.answered = output.answered;
-        if self.sides.ending.load(Ordering::Relaxed) && !output.state.controls() {
+        if self.sides.ending.load(Ordering::Relaxed) && !output.state.has_control() {
             self.sides.may_end.store(true, Ordering::Relaxed);
         }
         if counters.cycles > self.published {
@@ -305,11 +306,11 @@ impl Io<'_> {
         }
         let now_ns = monotonic_ns();
         let held_ns = now_ns.saturating_sub(cycle.due_ns);
-        if held_ns > self.settings.longest_hold_ns && cycle.output.state.controls() {
+        if held_ns > self.settings.longest_hold_ns && cycle.output.state.has_control() {
             // The loop finds the same at its next cycle, by the age of what it measured last.
             let output = &mut cycle.output;
-            (output.state, output.cause, output.force) =
-                (State::Fault, Cause::MeasurementLost, Output::default().force);
+            (output.state, output.diagnostic.code, output.force) =
+                (State::Fault, DiagnosticCode::MeasurementLost, Output::default().force);
         }
         self.publish_force(&cycle, now_ns);
         self.publish_status(&cycle, now_ns);
@@ -318,7 +319,7 @@ impl Io<'_> {
     fn publish_force(&mut self, cycle: &CycleOutput, now_ns: u64) {
         let sent = self.ports.force.publish(now_ns, force_message(cycle));
         self.send_failures += u64::from(sent.is_err());
-        if cycle.output.state.controls() {
+        if cycle.output.state.has_control() {
             // Full only if the log thread is held; it loses statistics, not forces.
             let _ = self.sides.sent.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
         }

@@ -27,10 +27,11 @@ use self::start::{prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use crate::config::control_loops::{ControlLoop, loops};
 use crate::config::deployment::{Deployment, ReleaseKey};
 use crate::config::{Config, fidelity};
-use crate::control::controller::{Controller, Envelope, Input, Output, Parameters};
+use crate::control::controller::{Controller, Input, Output};
+use crate::control::diagnostic::DiagnosticCode;
 use crate::control::gains::Gains;
 use crate::control::law::Law;
-use crate::control::state::Cause;
+use crate::control::parameters::{Envelope, Parameters};
 use crate::messages::ports::{Bus, PortError, Time};
 use crate::messages::statistics::Statistics;
 use crate::model::fidelity::Fidelity;
@@ -55,7 +56,6 @@ pub mod report;
 pub mod start;
 mod statistics;
 pub mod time_histogram;
-pub mod told;
 mod translation;
 
 /// Name of the real-time thread, by which a running daemon is found.
@@ -162,7 +162,7 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
             // Without the word of the main thread no cycle must begin.
             go_ahead.recv().ok()?;
             let step = |input: &Input| controller.step(input);
-            let last = Output { cause: Cause::Stopping, ..Output::default() };
+            let last = Output { diagnostic: DiagnosticCode::Stopping.into(), ..Output::default() };
             Some(cyclic::run(&mut Monotonic, timing, step, last, realtime_side, records_in, stop_loop))
         })?;
         let io = spawn(threads, "hexad-io", move || {

@@ -5,7 +5,8 @@ use core::iter::repeat_n;
 use hexad::analysis::envelope;
 use hexad::commands::r#move::Score;
 use hexad::config::Config;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{Motion, Scene, fit};
 
@@ -49,8 +50,8 @@ fn is_accepted(config: &Config, scene: &Scene, phase: f64) -> bool {
     let cycles = (scene.duration / period_s) as u32 + 10;
     (0..cycles).all(|k| {
         let output = rig.cycle(&rig.input(&scene.at((f64::from(k) - phase) * period_s)));
-        let followed = (output.state, output.cause) == (State::Active, Cause::None);
-        followed && output.without_setpoint == 0
+        let followed = (output.state, output.diagnostic.code) == (State::Active, DiagnosticCode::None);
+        followed && output.missed_setpoints == 0
     })
 }
 

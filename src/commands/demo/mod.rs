@@ -14,7 +14,8 @@ use self::summary::Summary;
 use super::operate::Operator;
 use crate::config::text::text_of;
 use crate::config::{Config, ConfigError};
-use crate::control::state::{Cause, Request, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::{Request, State};
 use crate::daemon::report::Report;
 use crate::messages::ports::PortError;
 use crate::output::charts::ChartError;
@@ -210,10 +211,10 @@ fn watch(
         recorder.poll();
         if let Some(status) = operator.status() {
             if status.state == State::Fault as u32 {
-                let cause = Cause::from_number(status.fault).unwrap_or_default();
+                let cause = DiagnosticCode::from_number(status.fault).unwrap_or_default();
                 return Err(DemoError::NotWell(format!("fault: {}; {}", cause.name(), cause.remedy())));
             }
-            if status.fault == Cause::NotAsked as u32 {
+            if status.fault == DiagnosticCode::ReadyToEngage as u32 {
                 operator.ask(Request::Engage)?;
             }
         }

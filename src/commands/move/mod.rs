@@ -13,14 +13,15 @@ use super::offline::task_state;
 use super::operate::Operator;
 use super::plant::prepare_thread;
 use crate::config::Config;
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::limits::{AxisLimits, Limits};
+use crate::control::state::{Request, State};
 use crate::daemon::nanoseconds;
 use crate::messages::lockstep::look_until;
 use crate::output::numbers::percent;
 mod precheck;
 use self::precheck::{Refusal, Rehearsal};
 use crate::analysis::sampled_loop::boundary;
-use crate::control::limits::{AxisLimits, Limits};
-use crate::control::state::{Cause, Request, State};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::ports::{PortError, Sink, Source, Time};
 use crate::messages::structs::{MeasuredMessage, SetpointMessage, StatusMessage};
@@ -259,7 +260,7 @@ impl<'a> Player<'a> {
     fn cue(&mut self, now_ns: u64) -> Result<Cue, PortError> {
         if let Some(status) = self.operator.status() {
             self.listen(now_ns, &status);
-            if self.engage && status.fault == Cause::NotAsked as u32 {
+            if self.engage && status.fault == DiagnosticCode::ReadyToEngage as u32 {
                 self.operator.ask(Request::Engage)?;
             }
         }
@@ -276,14 +277,14 @@ impl<'a> Player<'a> {
     fn listen(&mut self, now_ns: u64, status: &StatusMessage) {
         let state = State::from_number(status.state).unwrap_or_default();
         // An operator who takes control away keeps it.
-        self.engage &= !state.controls();
+        self.engage &= !state.has_control();
         if state == State::Active && self.timeline.is_some() {
             self.last_active_ns = now_ns;
             if self.engaged_ns.is_none() {
                 info!("the daemon is in control: moving");
                 self.engaged_ns = Some(now_ns);
             }
-        } else if !state.controls() {
+        } else if !state.has_control() {
             // It says so itself: no need to wait.
             self.last_active_ns = 0;
             if self.engaged_ns.is_none() && status.pose_valid == 1 {
@@ -303,7 +304,7 @@ fn gentle_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
     // No angle turns the platform further than by itself.
     let angle = way.fixed_rows::<3>(0).abs().sum();
     let shortest = |way: f64, limits: &AxisLimits| {
-        let AxisLimits { velocity, acceleration, jerk } = limits.share(APPROACH_SHARE);
+        let AxisLimits { velocity, acceleration, jerk } = limits.scaled(APPROACH_SHARE);
         shortest_duration(way, [velocity, acceleration, jerk])
     };
     shortest(angle, &limits.orientation).max(shortest(way.fixed_rows::<3>(3).norm(), &limits.position))

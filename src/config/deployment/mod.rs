@@ -288,12 +288,16 @@ fn limits(mut section: Reader, machine: &Machine) -> Limits {
         acceleration: positive("acceleration_rad_s2", 20.0),
         jerk: positive("jerk_rad_s3", 2000.0),
     };
-    let own_share = section.number_or("own_share", 0.2, Bound::UpTo(1.0));
+    let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
     let force_rate_n_s =
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
     let condition = condition(&mut section, machine);
     section.finish();
-    Limits { reference: ReferenceLimits { position, orientation, own_share }, force_rate_n_s, condition }
+    Limits {
+        reference: ReferenceLimits { position, orientation, autonomous_scale },
+        force_rate_n_s,
+        condition,
+    }
 }
 
 /// The default leaves room around a home that is badly conditioned itself; at home it must be kept.
