@@ -5,6 +5,7 @@
 
 pub mod advise;
 pub mod assembly;
+pub mod axis;
 pub mod batch;
 pub mod charts;
 pub mod check;
@@ -21,6 +22,8 @@ pub mod histogram;
 mod join;
 mod lockstep;
 pub mod loops;
+pub mod machine_drawing;
+
 mod numbers;
 pub mod offline;
 pub mod operator;
@@ -28,8 +31,8 @@ pub mod plant;
 pub mod rehearsal;
 pub mod report;
 mod rows;
-pub mod scatter;
 pub mod setpoints;
 pub mod stop;
+pub mod svg;
 pub mod table;
 pub mod workspace;

@@ -8,6 +8,7 @@ use hexad::host::files::FileError;
 use hexad::host::offline::OfflineError;
 use hexad::host::operator::OperatorError;
 use hexad::host::setpoints::SetpointError;
+use hexad::host::svg::ChartError;
 
 /// Why a command failed, and its exit code: 1 it ran and went wrong, 2 it could not begin.
 #[derive(Debug)]
@@ -31,6 +32,12 @@ impl From<ConfigError> for Failure {
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
+        Self { code: 1, what: error.to_string() }
+    }
+}
+
+impl From<ChartError> for Failure {
+    fn from(error: ChartError) -> Self {
         Self { code: 1, what: error.to_string() }
     }
 }

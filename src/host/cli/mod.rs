@@ -1,19 +1,20 @@
 //! The command line. Part of the binary, not of the library: clap's derive needs `std` at the crate root,
 //! which the library denies itself.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Parser, Subcommand, ValueEnum};
 use hexad::control::state::Request;
 use hexad::host::advise::Advice;
 use hexad::host::check::Check;
+use hexad::host::config::Config;
 use hexad::host::demo::{self, Demo};
 use hexad::host::doctor::{self, Doctor};
 use hexad::host::faults::Faults;
 use hexad::host::files::print;
 use hexad::host::stop::Stop;
 use hexad::host::workspace::Survey;
-use hexad::host::{daemon, export, offline, operator, plant, setpoints};
+use hexad::host::{daemon, export, machine_drawing, offline, operator, plant, setpoints};
 use hexad::model::ladder::Rung;
 
 use self::arguments::{
@@ -141,6 +142,9 @@ enum Command {
     Check {
         #[command(flatten)]
         machine: MachineFile,
+        /// Draw the machine at home (SVG): from above, from the side, in perspective, with numbered joints
+        #[arg(long, value_name = "FILE")]
+        drawing: Option<PathBuf>,
     },
     /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
     Doctor {
@@ -239,7 +243,7 @@ impl Cli {
             Command::Off { machine, patience } => ask(&machine, Request::Off, false, &patience),
             Command::Estop { machine, patience } => ask(&machine, Request::Estop, false, &patience),
             Command::Faults => Ok(print(Faults)?),
-            Command::Check { machine } => Ok(print(Check::new(&machine.load()?))?),
+            Command::Check { machine, drawing } => check(&machine.load()?, drawing.as_deref()),
             Command::Doctor { config, cpu, seconds, report, disturb } => {
                 let doctor = Doctor { config, cpu, seconds, report, disturb };
                 doctor::run(&doctor, &stop()?).map_err(Failure::from)
@@ -265,6 +269,14 @@ impl Cli {
             }
         }
     }
+}
+
+/// Prints the figures before it draws: they are of use where no file can be written.
+fn check(config: &Config, drawing: Option<&Path>) -> Result<(), Failure> {
+    print(Check::new(config))?;
+    let Some(path) = drawing else { return Ok(()) };
+    machine_drawing::write_svg(path, &config.name, &config.machine)?;
+    Ok(print(format_args!("drawing of the machine at home: {}\n", path.display()))?)
 }
 
 fn ask(machine: &MachineFile, request: Request, wait: bool, patience: &Patience) -> Result<(), Failure> {

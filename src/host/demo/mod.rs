@@ -14,7 +14,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use self::children::Process;
 use self::recording::{Recorder, Recording};
 use self::summary::Summary;
-use super::charts::ChartError;
 use super::config::text::text_of;
 use super::config::{Config, ConfigError};
 use super::files::{FileError, print, write_whole};
@@ -22,6 +21,7 @@ use super::join::join;
 use super::operator::Operator;
 use super::report::Report;
 use super::stop::Stop;
+use super::svg::ChartError;
 use crate::control::state::{Cause, Request, State};
 use crate::ipc::ports::PortError;
 
@@ -92,7 +92,7 @@ pub fn run(demo: &Demo, stop: &Stop) -> Result<(), DemoError> {
     let tracking = recording.tracking();
     let mut report = Report::read(&stage.report)?;
     report.tracking = tracking.tracking();
-    let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config.machine, &recording)?;
+    let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config, &recording)?;
     print(Summary { title: &stage.title, report: &report })?;
     print(format_args!("pictures         {} in {}\n", pictures.len(), demo.charts.display()))?;
     if let Some(path) = &demo.report {

@@ -1,32 +1,32 @@
-//! Points and lines on logarithmic axes, one chart or a grid of them, in the style of [`super::charts`].
+//! Points and lines on logarithmic axes, one chart or a grid of them, in the style of [`hexad::host::charts`].
 
-extern crate std;
+use std::ops::Range;
+use std::path::Path;
 
-use core::ops::Range;
+use hexad::host::axis::power_of_ten;
+use hexad::host::charts::LineStyle;
+use hexad::host::svg::{
+    Area, ChartError, DASHED_INK, DrawError, GRID, LABEL_SIZE, MARGIN, SAMPLE, TITLE_HEIGHT, UNIT, X_LABELS,
+    Y_LABELS, draw_title, house_style, legend_rows, palette, rgb, text, text_width, title_height,
+    write_picture,
+};
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
-use std::path::Path;
-use std::{format, prelude::rust_2024::*, vec};
 
-use super::charts::{
-    Area, ChartError, DASHED_INK, DrawError, GRID, INK, LEGEND_LINE, MARGIN, PALETTE, SAMPLE, Stroke,
-    TITLE_HEIGHT, UNIT, WIDTH, X_LABELS, Y_LABELS, finish, house_style, power_of_ten, rgb, text,
-};
-use super::files::write_whole;
-
-const HEIGHT: i32 = 560 * UNIT;
-/// Height of one chart of a grid.
+/// Height of a chart over the whole width, and of one beside others.
+const WIDE_HEIGHT: i32 = 520 * UNIT;
 const CELL_HEIGHT: i32 = 260 * UNIT;
-/// A decade of an axis at least this long has three ticks, a shorter one has one.
-const ROOMY_DECADE: f64 = (120 * UNIT) as f64;
 const RADIUS: i32 = 45;
-/// Width of a letter, on average, and height of a line of labels.
-const LETTER: i32 = 62;
+/// Height of a line of labels.
 const LINE: i32 = 15 * UNIT;
+/// Least gap between the numbers of an axis.
+const NUMBER_GAP: i32 = 6 * UNIT;
 /// From a point to the lowest flag above it, and to the labels left of it.
 const POLE: i32 = 14 * UNIT;
 const SIDESTEP: i32 = 34 * UNIT;
+/// Border of a range, as a share of it on the logarithmic axis.
+const BORDER: f64 = 0.05;
 
 /// How a point is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +60,7 @@ pub struct Point<'a> {
 #[derive(Debug, Clone)]
 pub struct Line {
     pub points: Vec<(f64, f64)>,
-    pub style: Stroke,
+    pub style: LineStyle,
     /// Index into the palette; dashed lines are grey.
     pub color: usize,
     pub width: Width,
@@ -77,26 +77,55 @@ pub enum Width {
     Hair,
 }
 
-/// The chart.
+/// One chart.
 #[derive(Debug, Clone, Default)]
 pub struct Scatter<'a> {
+    /// None if empty.
     pub title: &'a str,
     pub x_label: &'a str,
     pub y_label: &'a str,
-    /// Of the axes; what lies outside is not drawn.
+    /// Ranges of the axes, see [`log_range`].
     pub x: Range<f64>,
     pub y: Range<f64>,
     pub points: Vec<Point<'a>>,
     pub lines: Vec<Line>,
-    /// What the marks and the lines mean, at the upper right.
-    pub legend: Vec<(Sample, &'a str)>,
+}
+
+impl Scatter<'_> {
+    /// Positions of everything drawn.
+    fn positions(&self) -> impl Iterator<Item = (f64, f64)> {
+        let lines = self.lines.iter().flat_map(|line| &line.points).copied();
+        self.points.iter().map(|point| point.at).chain(lines)
+    }
+}
+
+/// Range of a logarithmic axis that contains these values, with a border; those that are not finite and positive count
+/// for nothing.
+pub fn log_range(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let values = values.filter(|value| value.is_finite() && *value > 0.0).map(f64::log10);
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = if low <= high { (low, high) } else { (0.0, 1.0) };
+    let border = (BORDER * (high - low)).max(0.05);
+    10f64.powf(low - border)..10f64.powf(high + border)
+}
+
+/// Sets the ranges of charts to what they draw: of each x axis its own or, like the y axis, the same for all.
+pub fn fit_ranges(charts: &mut [Scatter], shares_x: bool) {
+    let of_all = |coordinate: fn((f64, f64)) -> f64| {
+        log_range(charts.iter().flat_map(Scatter::positions).map(coordinate))
+    };
+    let (x, y) = (of_all(|at| at.0), of_all(|at| at.1));
+    for chart in charts {
+        let own = log_range(chart.positions().map(|at| at.0));
+        (chart.x, chart.y) = (if shares_x { x.clone() } else { own }, y.clone());
+    }
 }
 
 /// A mark or a line in the legend.
 #[derive(Debug, Clone)]
 pub enum Sample {
     Mark(Mark, usize),
-    Line(Stroke, Width, usize),
+    Line(LineStyle, Width, usize),
 }
 
 /// The steps along the points that no other one beats in both coordinates; each step multiplies y by `better`
@@ -118,7 +147,9 @@ pub fn pareto_front(points: impl Iterator<Item = (f64, f64)>, better: f64) -> Ve
 /// Charts side by side under one title and one legend.
 #[derive(Debug, Clone)]
 pub struct Grid<'a> {
+    /// The lines after the first are a subtitle.
     pub title: &'a str,
+    /// What the marks and the lines mean.
     pub legend: Vec<(Sample, &'a str)>,
     pub columns: usize,
     /// Row by row.
@@ -129,50 +160,34 @@ impl Grid<'_> {
     /// Writes the charts as one SVG file, complete or not at all.
     pub fn write_svg(&self, path: &Path) -> Result<(), ChartError> {
         let rows = self.charts.len().div_ceil(self.columns.max(1));
-        let head = TITLE_HEIGHT + LEGEND_LINE;
-        let svg = drawn(head + rows as i32 * CELL_HEIGHT, |root| {
-            root.draw_text(self.title, &text(15, HPos::Center), (WIDTH / 2, TITLE_HEIGHT * 3 / 5))?;
-            let mut left = Y_LABELS + MARGIN;
-            for (sample, label) in &self.legend {
-                sample.draw(root, (left, TITLE_HEIGHT + LEGEND_LINE / 2), label)?;
-                left += SAMPLE + width(label) + 5 * MARGIN;
+        let (entries, legend_height) = legend_rows(self.legend.iter().map(|(_, label)| *label));
+        let head = title_height(self.title);
+        let cell_height = if self.columns > 1 { CELL_HEIGHT } else { WIDE_HEIGHT };
+        write_picture(path, head + legend_height + rows as i32 * cell_height, |root| {
+            draw_title(root, self.title, 15)?;
+            let (_, rest) = root.split_vertically(head);
+            for ((sample, label), at) in self.legend.iter().zip(entries) {
+                sample.draw(&rest, at, label)?;
             }
-            let (_, cells) = root.split_vertically(head);
+            let (_, cells) = rest.split_vertically(legend_height);
             let cells = cells.split_evenly((rows, self.columns));
-            self.charts.iter().zip(&cells).try_for_each(|(chart, cell)| chart.draw_in(cell, 13))
-        })?;
-        Ok(write_whole(path, svg.as_bytes())?)
+            self.charts.iter().zip(&cells).try_for_each(|(chart, cell)| chart.draw_in(cell))
+        })
     }
-}
-
-/// An SVG text of this height.
-pub(super) fn drawn(
-    height: i32,
-    draw: impl FnOnce(&Area) -> Result<(), DrawError>,
-) -> Result<String, DrawError> {
-    let mut svg = String::new();
-    {
-        let size = (WIDTH.unsigned_abs(), height.unsigned_abs());
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        draw(&root)?;
-        root.present()?;
-    }
-    Ok(finish(&svg, height))
 }
 
 impl Scatter<'_> {
-    /// Writes the chart as an SVG file, complete or not at all.
-    pub fn write_svg(&self, path: &Path) -> Result<(), ChartError> {
-        Ok(write_whole(path, drawn(HEIGHT, |root| self.draw_in(root, 15))?.as_bytes())?)
-    }
-
-    fn draw_in(&self, area: &Area, title_size: i32) -> Result<(), DrawError> {
+    fn draw_in(&self, area: &Area) -> Result<(), DrawError> {
+        draw_title(area, self.title, 13)?;
+        let head = if self.title.is_empty() { 2 * MARGIN } else { TITLE_HEIGHT };
         let (width, height) = area.dim_in_pixel();
-        let middle = (MARGIN + Y_LABELS + width as i32) / 2;
-        area.draw_text(self.title, &text(title_size, HPos::Center), (middle, TITLE_HEIGHT * 3 / 5))?;
-        let (x, y) = (LogAxis::new(&self.x, width), LogAxis::new(&self.y, height));
+        let (width, height) =
+            (width as i32 - Y_LABELS - 4 * MARGIN, height as i32 - X_LABELS - head - MARGIN);
+        let number_width = |number: &str| text_width(number, LABEL_SIZE) + NUMBER_GAP;
+        let x = LogAxis::new(&self.x, width, number_width);
+        let y = LogAxis::new(&self.y, height, |_| LABEL_SIZE * UNIT + NUMBER_GAP);
         let mut chart = ChartBuilder::on(area)
-            .margin_top(TITLE_HEIGHT)
+            .margin_top(head)
             .margin_left(MARGIN)
             .margin_right(3 * MARGIN)
             .margin_bottom(MARGIN)
@@ -180,7 +195,7 @@ impl Scatter<'_> {
             .y_label_area_size(Y_LABELS)
             .build_cartesian_2d(x.clone(), y.clone())?;
         let mut mesh = chart.configure_mesh();
-        house_style(&mut mesh);
+        house_style(&mut mesh, [(self.x_label, width), (self.y_label, height)]);
         mesh.x_label_formatter(&|value| x.format_ext(value))
             .y_label_formatter(&|value| y.format_ext(value))
             .x_desc(self.x_label)
@@ -194,19 +209,7 @@ impl Scatter<'_> {
         let placed: Vec<_> =
             self.points.iter().map(|point| (point, in_area(chart.backend_coord(&point.at)))).collect();
         draw_labels(area, &placed)?;
-        for (point, at) in &placed {
-            point.mark.draw(area, *at, point.color)?;
-        }
-        self.draw_legend(area, width as i32)
-    }
-
-    fn draw_legend(&self, area: &Area, area_width: i32) -> Result<(), DrawError> {
-        let longest = self.legend.iter().map(|(_, label)| width(label)).max().unwrap_or(0);
-        let left = area_width - 5 * MARGIN - longest - SAMPLE;
-        for (row, (sample, label)) in self.legend.iter().enumerate() {
-            sample.draw(area, (left, TITLE_HEIGHT + LEGEND_LINE + row as i32 * LEGEND_LINE), label)?;
-        }
-        Ok(())
+        placed.iter().try_for_each(|(point, at)| point.mark.draw(area, *at, point.color))
     }
 }
 
@@ -220,7 +223,7 @@ impl Sample {
                 area.draw(&PathElement::new(vec![(left, y), (left + SAMPLE, y)], line.stroke()))?;
             }
         }
-        area.draw_text(label, &text(12, HPos::Left), (left + SAMPLE + MARGIN, y))
+        area.draw_text(label, &text(LABEL_SIZE, HPos::Left), (left + SAMPLE + MARGIN, y))
     }
 }
 
@@ -228,17 +231,17 @@ impl Line {
     fn stroke(&self) -> ShapeStyle {
         let color = palette(self.color);
         match (self.style, self.width) {
-            (Stroke::Dashed, _) => rgb(DASHED_INK).stroke_width(15),
-            (Stroke::Solid, Width::Band) => rgb(color).mix(0.35).stroke_width(60),
-            (Stroke::Solid, Width::Curve) => rgb(color).stroke_width(20),
-            (Stroke::Solid, Width::Hair) => rgb(color).mix(0.6).stroke_width(10),
+            (LineStyle::Dashed, _) => rgb(DASHED_INK).stroke_width(15),
+            (LineStyle::Solid, Width::Band) => color.mix(0.35).stroke_width(60),
+            (LineStyle::Solid, Width::Curve) => color.stroke_width(20),
+            (LineStyle::Solid, Width::Hair) => color.mix(0.6).stroke_width(10),
         }
     }
 }
 
 impl Mark {
     fn draw(self, root: &Area, at: (i32, i32), color: usize) -> Result<(), DrawError> {
-        let color = rgb(palette(color));
+        let color = palette(color);
         match self {
             Self::Disc => root.draw(&Circle::new(at, RADIUS, color.filled())),
             Self::Ring => root.draw(&Circle::new(at, RADIUS - 6, color.stroke_width(15))),
@@ -263,7 +266,7 @@ fn draw_labels(root: &Area, points: &[(&Point, (i32, i32))]) -> Result<(), DrawE
         let height = y.max(next);
         next = height + LINE;
         root.draw(&leader(vec![(column, height), (column + SIDESTEP / 3, height), (x, y)]))?;
-        root.draw_text(name, &text(12, HPos::Right), (column - 3 * UNIT, height))?;
+        root.draw_text(name, &text(LABEL_SIZE, HPos::Right), (column - 3 * UNIT, height))?;
     }
 
     // From right to left, each above the flags it would cover and those whose poles it would cross.
@@ -272,25 +275,16 @@ fn draw_labels(root: &Area, points: &[(&Point, (i32, i32))]) -> Result<(), DrawE
     let mut flown: Vec<(i32, i32)> = vec![];
     for (label, (x, y)) in flags {
         let Label::Flag(name) = label else { continue };
-        let end = x + width(name);
+        let end = x + text_width(name, LABEL_SIZE);
         let above = flown.iter().filter(|(start, _)| *start <= end).map(|(_, height)| height - LINE).min();
         let height = above.unwrap_or(i32::MAX).min(y - POLE);
         // A flag that is out of reach of those to the right starts low again.
         flown.retain(|(start, _)| *start <= end);
         flown.push((x, height));
         root.draw(&leader(vec![(x, y), (x, height - LINE / 3)]))?;
-        root.draw_text(name, &text(12, HPos::Left), (x + 3 * UNIT, height))?;
+        root.draw_text(name, &text(LABEL_SIZE, HPos::Left), (x + 3 * UNIT, height))?;
     }
     Ok(())
-}
-
-/// Of a label, about.
-pub(super) fn width(label: &str) -> i32 {
-    label.chars().count() as i32 * LETTER + 8 * UNIT
-}
-
-fn palette(color: usize) -> u32 {
-    PALETTE.get(color % PALETTE.len()).copied().unwrap_or(INK)
 }
 
 /// Range and ticks of a logarithmic axis.
@@ -298,19 +292,38 @@ fn palette(color: usize) -> u32 {
 struct LogAxis {
     range: Range<f64>,
     ticks: Vec<f64>,
+    /// Whether all numbers are written as decimals; else all have a power of ten.
+    is_decimal: bool,
 }
 
+/// Numbers that are short as decimals.
+const DECIMALS: Range<f64> = 0.009..1.1e5;
+
 impl LogAxis {
-    /// Ticks at 1, 2 and 5 times the powers of ten where there is room, else at these, or every second one.
-    fn new(range: &Range<f64>, length: u32) -> Self {
-        let decade = f64::from(length) / (range.end / range.start).log10();
-        let leads = if decade > ROOMY_DECADE { &[1.0, 2.0, 5.0][..] } else { &[1.0] };
-        let (low, high) = (range.start.log10().floor() as i32, range.end.log10().ceil() as i32);
-        let step = if high - low > 8 { 2 } else { 1 };
-        let powers = (low..=high).filter(|power| power % step == 0);
-        let ticks = powers.flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powi(power)));
-        let within = range.start * 0.999..range.end * 1.001;
-        Self { range: range.clone(), ticks: ticks.filter(|tick| within.contains(tick)).collect() }
+    /// Ticks at 1, 2 and 5 times the powers of ten where their numbers have room, else at the powers of ten, at every
+    /// second one, and so on. `extent` is the room that a number takes along the axis.
+    fn new(range: &Range<f64>, length: i32, extent: impl Fn(&str) -> i32) -> Self {
+        let strides = (1..).map(|stride| (&[1.0][..], stride));
+        let choices = [(&[1.0, 2.0, 5.0][..], 1)].into_iter().chain(strides);
+        let axes = choices.map(|(leads, stride)| {
+            let (low, high) = (range.start.log10().floor() as i32, range.end.log10().ceil() as i32);
+            let powers = (low..=high).filter(|power| power.rem_euclid(stride) == 0);
+            let ticks = powers.flat_map(|power| leads.iter().map(move |lead| lead * 10f64.powi(power)));
+            let ticks: Vec<_> = ticks.filter(|tick| range.contains(tick)).collect();
+            let is_decimal = ticks.iter().all(|tick| DECIMALS.contains(tick));
+            Self { range: range.clone(), ticks, is_decimal }
+        });
+        let has_room = |axis: &Self| {
+            let mut numbers = axis.ticks.iter().map(|tick| {
+                let half = 0.5 * f64::from(extent(&axis.format_ext(tick)));
+                let place = f64::from(axis.map(tick, (0, length)));
+                (place - half, place + half)
+            });
+            let mut last = f64::NEG_INFINITY;
+            numbers.all(|(start, end)| core::mem::replace(&mut last, end) <= start)
+        };
+        let mut axes = axes;
+        axes.find(has_room).unwrap_or(Self { range: range.clone(), ticks: vec![], is_decimal: true })
     }
 }
 
@@ -335,13 +348,13 @@ impl Ranged for LogAxis {
 
 impl ValueFormatter<f64> for LogAxis {
     fn format_ext(&self, value: &f64) -> String {
-        let exponent = value.log10().round() as i32;
-        if (1.0..1e5).contains(value) {
-            format!("{value:.0}")
-        } else if (value / 10f64.powi(exponent) - 1.0).abs() < 1e-9 {
-            power_of_ten(exponent)
-        } else {
-            format!("{value}")
+        // A hair more, so that 1000 does not count as 999.99.
+        let exponent = (value.log10() + 1e-9).floor() as i32;
+        let lead = (value / 10f64.powi(exponent)).round();
+        match () {
+            () if self.is_decimal => format!("{:.*}", (-exponent).max(0) as usize, value),
+            () if lead == 1.0 => power_of_ten(exponent),
+            () => format!("{lead}·{}", power_of_ten(exponent)),
         }
     }
 }
@@ -350,12 +363,31 @@ impl ValueFormatter<f64> for LogAxis {
 mod tests {
     use super::*;
 
+    fn numbers(range: Range<f64>, length: i32) -> Vec<String> {
+        let axis = LogAxis::new(&range, length, |number| text_width(number, LABEL_SIZE));
+        axis.ticks.iter().map(|tick| axis.format_ext(tick)).collect()
+    }
+
     #[test]
-    fn every_tick_says_its_value() {
-        let axis = LogAxis::new(&(0.05..2e5), 100_000);
-        let written: Vec<_> = axis.ticks.iter().map(|tick| axis.format_ext(tick)).collect();
-        assert_eq!(written.get(..5), Some(&["0.05", "10⁻¹", "0.2", "0.5", "1"].map(String::from)[..]));
-        assert_eq!(written.get(18..), Some(&["50000", "10⁵", "200000"].map(String::from)[..]));
+    fn numbers_of_an_axis_have_one_format() {
+        let decimals = numbers(0.05..9e4, 100_000);
+        assert_eq!(decimals.get(..5), Some(&["0.05", "0.1", "0.2", "0.5", "1"].map(String::from)[..]));
+        assert_eq!(decimals.get(16..), Some(&["20000", "50000"].map(String::from)[..]));
+        let powers = numbers(0.004..2.1, 100_000);
+        assert_eq!(powers.get(..3), Some(&["5·10⁻³", "10⁻²", "2·10⁻²"].map(String::from)[..]));
+        assert_eq!(powers.get(7..), Some(&["10⁰", "2·10⁰"].map(String::from)[..]));
+    }
+
+    #[test]
+    fn numbers_have_room() {
+        assert_eq!(numbers(0.9..110.0, 2000), ["1", "10", "100"]);
+        assert_eq!(numbers(1e-9..1.0, 2000), ["10⁻⁸", "10⁻⁶", "10⁻⁴", "10⁻²"]);
+    }
+
+    #[test]
+    fn ranges_contain_what_is_drawn() {
+        let range = log_range([3.0, 40.0, f64::NAN, 0.0].into_iter());
+        assert!(range.start < 3.0 && range.end > 40.0 && range.end < 60.0, "{range:?}");
     }
 
     #[test]
