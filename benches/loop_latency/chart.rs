@@ -11,6 +11,9 @@ use super::rig::Release;
 use super::shared::scatter::{Grid, Line, Sample, Scatter, Width, fit_ranges};
 use super::shared::{Failure, Figures, chart};
 
+/// One look at the clock, which is what `hybrid` spins with: shorter times are drawn as this one \[us\].
+const SHORTEST_US: f64 = 0.01;
+
 /// A point of a curve.
 #[derive(Deserialize)]
 struct Figure {
@@ -66,7 +69,7 @@ fn curves(group: &[Figure]) -> Vec<Line> {
     let mut lines = vec![Line { points: limit, style: LineStyle::Dashed, color: 0, width: Width::Curve }];
     for contestant in Contestant::ALL {
         let rows = group.iter().filter(|row| row.contestant == contestant.name());
-        let points = rows.map(|row| (row.latency_us, row.share_later)).collect();
+        let points = rows.map(|row| (row.latency_us.max(SHORTEST_US), row.share_later)).collect();
         lines.push(Line { points, style: LineStyle::Solid, color: color(contestant), width: Width::Curve });
     }
     lines

@@ -25,8 +25,8 @@ const PEER: usize = 3;
 const BETTER: f64 = 0.5;
 
 /// Factors by which the time axis goes beyond the points: room for the names on both sides.
-const NAMES_LEFT: f64 = 5.0;
-const NAMES_RIGHT: f64 = 3.0;
+const NAMES_LEFT: f64 = 4.0;
+const NAMES_RIGHT: f64 = 2.5;
 
 /// What the chart needs of a row.
 #[derive(Deserialize)]

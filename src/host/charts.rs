@@ -19,7 +19,7 @@ const PANEL_GAP: i32 = 16 * UNIT;
 /// From the plot to the samples of its legend.
 const LEGEND_GAP: i32 = 14 * UNIT;
 /// Most room for the labels of a legend; longer ones are written smaller.
-const MAX_LABEL_WIDTH: i32 = 240 * UNIT;
+const MAX_LABEL_WIDTH: i32 = 300 * UNIT;
 const TITLE_SIZE: i32 = 15;
 
 /// Most points drawn of one series, and of all together. The second bounds the size of the file.

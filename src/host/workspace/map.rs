@@ -38,7 +38,6 @@ const COLORS: [u32; BANDS] = [
 ];
 /// Of what is in reach, but beyond a limit of the machine; seen on both pages.
 const BEYOND: u32 = GRID;
-const HOME_LABEL: &str = "home";
 /// Where a singular pose ends the reach.
 const SINGULAR: u32 = 0xC8_430F;
 
@@ -62,12 +61,12 @@ impl Maps<'_> {
         let mut samples: Vec<Sample> = lines.iter().map(|(sample, _)| *sample).collect();
         samples.dedup_by_key(|(_, label)| *label);
         samples.push((rgb(BEYOND).mix(0.4).stroke_width(100), "beyond a limit"));
-        let (positions, legend_height) =
-            legend_rows(samples.iter().map(|(_, label)| *label).chain([HOME_LABEL]));
+        let labels = samples.iter().map(|(_, label)| *label).chain(["home"]);
+        let (positions, legend_height) = legend_rows(labels);
         write_picture(path, TITLE_HEIGHT + legend_height + 2 * CELL_HEIGHT, |root| {
             draw_title(root, &title, 15)?;
             let (_, rest) = root.split_vertically(TITLE_HEIGHT);
-            self.draw_legend(&rest, slice, &samples, &positions)?;
+            draw_legend(&rest, &samples, &positions, slice.through == self.machine.home)?;
             let (_, cells) = rest.split_vertically(legend_height);
             let cells = cells.split_evenly((2, 2));
             cells
@@ -164,28 +163,6 @@ impl Maps<'_> {
         slice.through == self.machine.home && slice.plane.0.iter().all(|axis| *axis >= 3)
     }
 
-    /// The last position is that of the mark of home.
-    fn draw_legend(
-        &self,
-        area: &Area,
-        slice: &Slice,
-        samples: &[Sample],
-        positions: &[(i32, i32)],
-    ) -> Result<(), DrawError> {
-        let draw_label = |label: &str, (left, y): (i32, i32)| {
-            area.draw_text(label, &text(LABEL_SIZE, HPos::Left), (left + SAMPLE + MARGIN, y))
-        };
-        for ((style, label), (left, y)) in samples.iter().zip(positions) {
-            draw_line(area, vec![(*left, *y), (left + SAMPLE, *y)], *style)?;
-            draw_label(label, (*left, *y))?;
-        }
-        let Some((left, y)) = positions.last() else { return Ok(()) };
-        draw_home(area, (left + SAMPLE / 2, *y), slice.through == self.machine.home)?;
-        draw_label(HOME_LABEL, (*left, *y))
-    }
-}
-
-impl Maps<'_> {
     fn draw_map(
         &self,
         area: &Area,
@@ -326,6 +303,25 @@ fn draw_line(area: &Area, line: Vec<(i32, i32)>, style: ShapeStyle) -> Result<()
         area.draw(&PathElement::new(line.clone(), BLACK.stroke_width(32)))?;
     }
     area.draw(&PathElement::new(line, style))
+}
+
+/// The last position is that of the mark of home.
+fn draw_legend(
+    area: &Area,
+    samples: &[Sample],
+    positions: &[(i32, i32)],
+    through_home: bool,
+) -> Result<(), DrawError> {
+    let draw_label = |label: &str, (left, y): (i32, i32)| {
+        area.draw_text(label, &text(LABEL_SIZE, HPos::Left), (left + SAMPLE + MARGIN, y))
+    };
+    for ((style, label), (left, y)) in samples.iter().zip(positions) {
+        draw_line(area, vec![(*left, *y), (left + SAMPLE, *y)], *style)?;
+        draw_label(label, (*left, *y))?;
+    }
+    let Some((left, y)) = positions.last() else { return Ok(()) };
+    draw_home(area, (left + SAMPLE / 2, *y), through_home)?;
+    draw_label("home", (*left, *y))
 }
 
 /// A disc where the slice goes through home, a ring where home lies before or behind it.
