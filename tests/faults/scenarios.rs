@@ -124,7 +124,12 @@ fn engage_with_a_wrong_setpoint_is_refused() {
     // Told with the distance: five times the tolerance of 2 mm.
     assert!((output.diagnostic.value - 5.0).abs() < 1e-3 && output.diagnostic.bound == 1.0, "{output:?}");
     let expected = [(State::Standby, DiagnosticCode::SetpointTooFar)];
-    assert_smooth("engage_refused", "engage with the setpoint 10 mm away: refused", &world, &expected);
+    assert_smooth(
+        "engage_refused",
+        "engage with the setpoint 10 mm away, five times the tolerance: refused",
+        &world,
+        &expected,
+    );
     assert_eq!(world.recording.time_to_rest(), Some(0.0));
 }
 
@@ -158,7 +163,7 @@ fn plant_killed_in_motion_and_restarted() {
     let lost = [(State::Fault, DiagnosticCode::MeasurementLost)];
     assert_smooth(
         "plant_killed",
-        "driver killed in motion and restarted; the daemon lets go after 20 ms",
+        "driver killed in motion and restarted; forces are disabled after 20 ms",
         &world,
         &twice(&lost),
     );

@@ -18,8 +18,8 @@ use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::{Request, State};
 use crate::daemon::report::Report;
 use crate::messages::ports::PortError;
-use crate::output::charts::ChartError;
 use crate::output::files::{FileError, print, write_whole};
+use crate::output::svg::ChartError;
 use crate::realtime::stop_request::Stop;
 
 pub mod children;
@@ -89,7 +89,7 @@ pub fn run(demo: &Demo, stop: &Stop) -> Result<(), DemoError> {
     let tracking = recording.tracking();
     let mut report = Report::read(&stage.report)?;
     report.tracking = tracking.tracking();
-    let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config.machine, &recording)?;
+    let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config, &recording)?;
     print(Summary { title: &stage.title, report: &report })?;
     print(format_args!("pictures         {} in {}\n", pictures.len(), demo.charts.display()))?;
     if let Some(path) = &demo.report {

@@ -16,9 +16,9 @@ use crate::analysis::region_search::{BUDGET, Found, largest};
 use crate::config::Config;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::output::charts::ChartError;
 use crate::output::files::FileError;
 use crate::output::numbers::significant;
+use crate::output::svg::ChartError;
 
 mod bands;
 mod contour;
