@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use hexad::control::state::{Cause, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::State;
 use hexad::model::rigid::Twist;
 use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
@@ -145,7 +146,10 @@ impl Curves {
                 let setpoint = now.setpoint?.motion().pose.position;
                 Some(1e3 * (setpoint - now.pose.position).norm())
             }),
-            refusal: samples.iter().find(|sample| sample.output.refused != Cause::None).map(seconds),
+            refusal: samples
+                .iter()
+                .find(|sample| sample.output.request_diagnostic.code != DiagnosticCode::None)
+                .map(seconds),
             acceleration: pairwise(&|_, now| now.acceleration.map(|a| a.linear.norm())),
             braking: pairwise(&|before, now| {
                 now.acceleration.is_none().then(|| speed_up(&before.twist, &now.twist))
