@@ -161,6 +161,8 @@ impl Curves {
             states: State::ALL.map(|state| {
                 pairwise(&|_, now| (now.output.state == state).then_some(f64::from(state as u32)))
                     .into_iter()
+                    // A state of a single cycle would have a name and no line.
+                    .filter(|piece| piece.len() > 1)
                     .map(|piece| vec![piece[0], *piece.last().unwrap()])
                     .collect()
             }),
