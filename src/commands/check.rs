@@ -90,8 +90,8 @@ impl Check<'_> {
             String::new()
         };
         writeln!(f, "control mode {}{observed}", control.mode.name())?;
+        let legs = LegMasses::at_home(machine);
         if control.mode.acts_on_legs() {
-            let legs = LegMasses::at_home(machine);
             let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
             writeln!(
                 f,
@@ -100,7 +100,7 @@ impl Check<'_> {
                 root(legs.stiffest)
             )?;
         }
-        for control_loop in loops(self.config) {
+        for control_loop in loops(self.config, &legs) {
             writeln!(f, "{control_loop}")?;
             if let Some(warning) = control_loop.warning() {
                 writeln!(f, "WARNING: {warning}")?;

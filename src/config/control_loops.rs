@@ -18,15 +18,15 @@ pub struct ControlLoop {
 }
 
 /// Of the pose, or of the stiffest mode of the legs.
-pub fn loops(config: &Config) -> Vec<ControlLoop> {
-    let Config { machine, deployment, .. } = config;
+pub fn loops(config: &Config, leg_masses: &LegMasses) -> Vec<ControlLoop> {
+    let deployment = &config.deployment;
     let control = &deployment.control;
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
     ];
     let each = if control.mode.acts_on_legs() {
-        vec![("legs", position, LegMasses::at_home(machine).stiffest)]
+        vec![("legs", position, leg_masses.stiffest)]
     } else {
         vec![("position", position, 1.0), ("orientation", orientation, 1.0)]
     };

@@ -138,7 +138,7 @@ impl Controller {
             &cycle,
             input,
             &setpoint,
-            located.as_ref().map_or_else(|diagnostic| Err(*diagnostic), |_| Ok(())),
+            located.as_ref().err().map_or(Ok(()), |diagnostic| Err(*diagnostic)),
             localization,
             reference,
             sample.as_ref(),
@@ -150,7 +150,7 @@ impl Controller {
 
         // Reference.
         if let Some(located) = located.as_ref().ok().filter(|_| next != cycle.state) {
-            reference.enter(&cycle, next, setpoint.valid, &located.platform);
+            reference.enter(&cycle, next, setpoint.valid, located);
             sample = errors.restart(&cycle, next, reference, &setpoint, located);
         }
 

@@ -42,6 +42,9 @@ const fn ratio(quantity: &'static str, bound: &'static str) -> Comparison {
 
 const NO_NUMBER: Comparison = Comparison::None;
 
+/// Remedy of a code that asks nothing of the operator.
+const NO_REMEDY: &str = "nothing";
+
 /// Leg lengths and the stroke.
 const STROKE: Comparison = absolute(
     "leg length",
@@ -240,21 +243,18 @@ impl fmt::Display for Diagnostic {
                 }
             }
         }
-        match code {
-            DiagnosticCode::None => Ok(()),
-            _ => write!(f, "; {}", code.remedy()),
-        }
+        if code.remedy() == NO_REMEDY { Ok(()) } else { write!(f, "; {}", code.remedy()) }
     }
 }
 
-/// A number to four significant digits, without trailing zeros.
+/// A number to six significant digits, without trailing zeros.
 struct Rounded(f64);
 
 impl fmt::Display for Rounded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(value) = self;
         let mut scale = 1.0;
-        while value.abs() * scale < 1e3 && scale < 1e9 {
+        while value.abs() * scale < 1e5 && scale < 1e9 {
             scale *= 10.0;
         }
         let scaled = value * scale;
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn a_diagnostic_is_a_sentence_with_value_bound_and_remedy() {
         let near_singular = Diagnostic::new(DiagnosticCode::NearSingular, 143.21, 100.0).to_string();
-        assert!(near_singular.contains("condition 143.2 exceeds limits.condition 100;"), "{near_singular}");
+        assert!(near_singular.contains("condition 143.21 exceeds limits.condition 100;"), "{near_singular}");
         let stroke = Diagnostic::new(DiagnosticCode::LengthOutOfStroke, 0.5, 1.076).at(2).to_string();
         assert!(stroke.contains("leg length 0.5 m of leg 3 is outside the stroke"), "{stroke}");
         assert!(stroke.contains(" 1.076 m; check the encoders"), "{stroke}");

@@ -24,10 +24,9 @@ const MAX_NEWTON_STEPS_PER_CYCLE: u32 = 8;
 /// platform crosses that between two measurements.
 const MAX_CERTAIN_CONDITION: f64 = 300.0;
 
-/// Pose and twist of the platform at the instant of a measurement.
+/// Pose and twist of the platform at the instant of a measurement, and how near they are to a singularity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlatformState {
-    pub time_ns: u64,
     pub pose: Pose,
     pub twist: Twist,
     /// Of the pose, see [`crate::model::sensitivity`].
@@ -114,8 +113,7 @@ impl Localization {
         let twist = kinematic_state.twist(machine, &measurement.rate).ok_or(DiagnosticCode::SingularPose)?;
         let Sensitivity { condition, determinant, .. } = *kinematic_state.sensitivity();
         let time_to_singularity = self.time_to_singularity(measurement.time_ns, determinant);
-        let time_ns = measurement.time_ns;
-        let platform = PlatformState { time_ns, pose, twist, condition, time_to_singularity };
+        let platform = PlatformState { pose, twist, condition, time_to_singularity };
         Ok(Located { measurement, platform })
     }
 

@@ -6,7 +6,7 @@ use super::controller::Cycle;
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::input_validation::{SetpointInput, SetpointMotion, check_measurable_stroke};
 use super::limits::Limits;
-use super::localization::PlatformState;
+use super::localization::Located;
 use super::parameters::{Constants, Parameters};
 use super::segment::Segment;
 use super::state::State;
@@ -115,12 +115,14 @@ impl ReferenceGenerator {
     }
 
     /// Begins the reference of the state just entered.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
     pub fn enter(
         &mut self,
         cycle: &Cycle<'_>,
         next: State,
         setpoint: Option<&SetpointMotion>,
-        platform: &PlatformState,
+        Located { measurement, platform }: &Located<'_>,
     ) {
         let Cycle { constants, release_ns, state } = *cycle;
         let (parameters, limits) = (&constants.parameters, &constants.parameters.limits);
@@ -131,7 +133,7 @@ impl ReferenceGenerator {
         self.reference = match next {
             State::Engaging => {
                 let scale = limits.autonomous_scale;
-                onto_setpoint(parameters, setpoint, &measured, platform.time_ns, scale)
+                onto_setpoint(parameters, setpoint, &measured, measurement.time_ns, scale)
             }
             State::Stopping => {
                 let segment = Segment::to_rest(release_ns, &present.twist, &present.acceleration, limits);

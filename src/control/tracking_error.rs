@@ -104,13 +104,13 @@ impl ErrorSample {
         Located { measurement, platform }: &Located<'_>,
     ) -> Option<Self> {
         let constants = cycle.constants;
-        let desired = reference.motion_at(&constants.parameters, setpoint.valid, platform.time_ns)?;
+        let desired = reference.motion_at(&constants.parameters, setpoint.valid, measurement.time_ns)?;
         let error = TrackingError::new(&desired, &platform.pose, &platform.twist);
         let deviation = match constants.parameters.law.mode {
             ControlMode::ComputedTorque => Deviation::from(&error),
             _ => Deviation::of_legs(constants.machine(), &desired, &measurement.length, &measurement.rate),
         };
-        Some(Self { time_ns: platform.time_ns, error, deviation })
+        Some(Self { time_ns: measurement.time_ns, error, deviation })
     }
 
     /// A period later, without a new measurement.
@@ -139,7 +139,7 @@ impl ErrorTracker {
     ) -> Option<ErrorSample> {
         let has_control = cycle.state.has_control();
         let located = located.filter(|_| has_control || setpoint.status.is_ok())?;
-        let sample = match self.last.filter(|last| last.time_ns == located.platform.time_ns) {
+        let sample = match self.last.filter(|last| last.time_ns == located.measurement.time_ns) {
             Some(last) => last.predicted(&cycle.constants.parameters),
             None => ErrorSample::measure(cycle, reference, setpoint, located)?,
         };

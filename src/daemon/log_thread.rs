@@ -106,7 +106,7 @@ fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
     let code = diagnostic.code;
     match state {
         State::Fault => {
-            warn!(cycle, number = code as u32, "fault: no force until cleared: {diagnostic}");
+            warn!(cycle, number = code as u32, "fault: {diagnostic}; no force until cleared");
             if faults.len() < MAX_FAULTS {
                 faults.push(Fault { cycle, number: code as u32, name: code.name().into() });
             }

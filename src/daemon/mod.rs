@@ -111,11 +111,11 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
 
 fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(Report, String), DaemonError> {
     let Config { machine, deployment, .. } = config;
-    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+    let parameters = parameters(machine, deployment, fidelity::fidelity(config));
+    for warning in loops(config, &parameters.law.leg_masses).iter().filter_map(ControlLoop::warning) {
         warn!("{warning}");
     }
-    let mut controller =
-        Controller::new(machine, parameters(machine, deployment, fidelity::fidelity(config)));
+    let mut controller = Controller::new(machine, parameters);
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
     let event = io_side.event.clone();

@@ -96,7 +96,6 @@ mod tests {
             missed_measurements: 7,
             missed_setpoints: 8,
             platform: Some(PlatformState {
-                time_ns: 52,
                 pose: TaskState::at_rest(HOME).motion().pose,
                 twist: twist(30.0),
                 condition: 50.0,

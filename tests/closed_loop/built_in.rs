@@ -136,7 +136,7 @@ fn that_could_not_be_seen_are_refused_with_the_reason() {
     let mut config = deployed("fried2008");
     config.deployment.limits.reference.position.velocity = 1e-4;
     let error = Score::motion(&config, Motion::MinimumJerk, 0.5).unwrap_err().to_string();
-    for word in ["0.100 %", "t = 0.", "(velocity)", "times the limit (bound 1.0"] {
+    for word in ["0.100 %", "t = 0.", ": velocity: ", " times the limit in [limits]"] {
         assert!(error.contains(word), "{word:?} must be in {error}");
     }
 }

@@ -41,7 +41,7 @@ fn each_request_does_what_it_says() {
     engage(machine);
     trio.moves_after(monotonic_ns());
     does(machine, "park", &[], &["off"]);
-    trio.daemon.says("off: asked for");
+    trio.daemon.says("off: requested by the operator");
     let at_home = |recording: &Recording| {
         let measured = recording.measured.last().filter(|measured| rules::stands(measured))?;
         ((measured.x[3] - 1.1).abs() < 1e-3).then_some(())
