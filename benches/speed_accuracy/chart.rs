@@ -15,8 +15,7 @@ use super::methods::BASELINE;
 use super::results::{PAPER, Row};
 use super::scenes::Pace;
 
-const DOUBLE: usize = 0;
-const SINGLE: usize = 1;
+const HEXAD: usize = 0;
 const DENSE: usize = 2;
 const PEER: usize = 3;
 
@@ -38,7 +37,6 @@ struct Item {
 enum Side {
     Left,
     Flag,
-    None,
 }
 
 pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
@@ -46,13 +44,12 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
     let (mut points, mut lines) = (vec![], vec![]);
     let fast = pareto_front(items.iter().map(|item| (item.ns, item.fast)), BETTER);
     let slow = pareto_front(items.iter().filter_map(|item| Some((item.ns, item.slow?))), BETTER);
-    lines.push(Line { points: fast, style: Stroke::Solid, color: DOUBLE, width: Width::Band });
-    lines.push(Line { points: slow, style: Stroke::Dashed, color: DOUBLE, width: Width::Band });
+    lines.push(Line { points: fast, style: Stroke::Solid, color: HEXAD, width: Width::Band });
+    lines.push(Line { points: slow, style: Stroke::Dashed, color: HEXAD, width: Width::Band });
     for item in &items {
         let label = match item.side {
             Side::Left => Label::Left(&item.name),
             Side::Flag => Label::Flag(&item.name),
-            Side::None => Label::None,
         };
         let color = item.color;
         points.push(Point { at: (item.ns, item.fast), mark: Mark::Disc, color, label });
@@ -63,9 +60,7 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
             lines.push(Line { points, style: Stroke::Solid, color, width: Width::Hair });
         }
     }
-    let best = |precision| written(best_isa(rows, precision));
-    let double_fast = format!("hexad f64 on {}, fast scenes", best("f64"));
-    let single_fast = format!("hexad f32 on {}, fast scenes", best("f32"));
+    let hexad_fast = format!("hexad on {}, fast scenes", written(best_isa(rows)));
     let chart = Scatter {
         title: "Inverse dynamics of a hexapod: time and error of one evaluation",
         x_label: "time of one evaluation, one core [ns]",
@@ -75,13 +70,12 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
         points,
         lines,
         legend: vec![
-            (Sample::Mark(Mark::Disc, DOUBLE), &double_fast),
-            (Sample::Mark(Mark::Ring, DOUBLE), "slow scenes"),
-            (Sample::Mark(Mark::Disc, SINGLE), &single_fast),
-            (Sample::Mark(Mark::Disc, PEER), "others, exact, f64"),
+            (Sample::Mark(Mark::Disc, HEXAD), &hexad_fast),
+            (Sample::Mark(Mark::Ring, HEXAD), "slow scenes"),
+            (Sample::Mark(Mark::Disc, PEER), "others, exact"),
             (Sample::Mark(Mark::Disc, DENSE), "the paper's dense matrices"),
-            (Sample::Line(Stroke::Solid, Width::Band, DOUBLE), "Pareto front, fast"),
-            (Sample::Line(Stroke::Dashed, Width::Band, DOUBLE), "Pareto front, slow"),
+            (Sample::Line(Stroke::Solid, Width::Band, HEXAD), "Pareto front, fast"),
+            (Sample::Line(Stroke::Dashed, Width::Band, HEXAD), "Pareto front, slow"),
         ],
     };
     chart.write_svg(path)?;
@@ -92,14 +86,14 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
 fn items(rows_of_all: &[Row]) -> Vec<Item> {
     let mut methods: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
     for row in rows_of_all {
-        methods.entry((row.method, row.precision, row.isa)).or_default().push(row);
+        methods.entry((row.method, row.isa)).or_default().push(row);
     }
     let mut items = vec![];
-    for ((method, precision, isa), rows) in methods {
+    for ((method, isa), rows) in methods {
         let fidelity = Fidelity::ALL.iter().any(|fidelity| fidelity.name() == method);
         let exact = method == "exact";
-        let best = best_isa(rows_of_all, precision);
-        if fidelity && isa != best && !(exact && precision == "f64") {
+        let best = best_isa(rows_of_all);
+        if fidelity && isa != best && !exact {
             continue;
         }
         let peer = !fidelity && method != PAPER;
@@ -109,16 +103,11 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
             errors.reduce(f64::max)
         };
         let times = rows.iter().map(|row| row.samples.throughput());
-        let (color, side) = match (fidelity, precision) {
-            (true, "f32") => (SINGLE, if exact { Side::Flag } else { Side::None }),
-            (true, _) => (DOUBLE, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
-            (false, _) => (if peer { PEER } else { DENSE }, Side::Flag),
+        let (color, side) = match fidelity {
+            true => (HEXAD, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
+            false => (if peer { PEER } else { DENSE }, Side::Flag),
         };
-        let name = match (fidelity, exact, precision) {
-            (true, true, "f32") => "exact, f32".into(),
-            (true, true, _) => format!("exact, {}", written(isa)),
-            _ => written(method),
-        };
+        let name = if exact { format!("exact, {}", written(isa)) } else { written(method) };
         items.push(Item {
             name,
             ns: times.sum::<f64>() / rows.len() as f64,
@@ -131,9 +120,9 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
     items
 }
 
-/// The best instruction set of a precision: its rows begin with it.
-fn best_isa(rows: &[Row], precision: &str) -> &'static str {
-    rows.iter().find(|row| row.precision == precision).map_or("", |row| row.isa)
+/// The best instruction set: the rows begin with it.
+fn best_isa(rows: &[Row]) -> &'static str {
+    rows.first().map_or("", |row| row.isa)
 }
 
 /// As people write it.

@@ -11,19 +11,17 @@
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
-use fearless_simd::{Simd, dispatch, f32x8, f64x8};
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
-use super::balance::{Balance, LaneWrench, wrench_columns};
+use super::factorization::{Factorization, LaneWrench, wrench_columns};
 use super::fidelity::{Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs};
 use super::inverse_geometry::LegGeometry;
-use super::kinematic_state::KinematicState;
-use super::lanes::Eight;
 use super::leg::{LegConstants, LegReaction};
-use super::machine::{Actuator, Joints, LEGS, Machine, at_most_256_bits};
+use super::machine::{Actuator, Joints, LEGS, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
-use super::triples::{Constant, Lane, Triples};
+use super::triples::{LegLanes, Triples};
 
 /// The inverse dynamic model of one machine: its constants, ready for the lanes.
 #[derive(Clone, Debug)]
@@ -72,36 +70,7 @@ impl InverseDynamics {
 
     /// The six actuator forces Gamma \[N\] for a motion of the platform, `None` at a singular pose.
     pub fn forces<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
-        let lane = dispatch!(self.machine.level, simd => self.balanced::<_, f64x8<_>, M>(simd, motion))?;
-        Some(self.joints.triples.unpack(&lane))
-    }
-
-    /// [`InverseDynamics::forces`] at a pose whose legs and factorization are at hand.
-    pub fn forces_at<M: Model>(
-        &self,
-        kinematic_state: &KinematicState,
-        twist: &Twist,
-        acceleration: &Acceleration,
-    ) -> Option<[f64; LEGS]> {
-        let motion = Motion { pose: kinematic_state.pose, twist: *twist, acceleration: *acceleration };
-        let lane = dispatch!(self.machine.level, simd => {
-            let legs = kinematic_state.legs_with::<_, f64x8<_>>(simd, &self.joints);
-            let balance = Balance::load(simd, &self.joints, &kinematic_state.factors).with_arms(&legs);
-            let (wrench, along) = self.load::<_, _, M>(simd, &motion, &legs);
-            balance.forces(&legs, &wrench, along)
-        })?;
-        Some(self.joints.triples.unpack(&lane))
-    }
-
-    /// [`InverseDynamics::forces`] with lanes of single precision, a fifth faster: errors below 1e-6 of the
-    /// largest force instead of 1e-15, times `1 + d / L` for a base at the distance d from the origin of the
-    /// base frame, where differences of coordinates lose digits.
-    pub fn forces_f32<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
-        // Outside of the lanes, so that they find its numbers in memory, ready to be spread: converting
-        // and spreading them one by one takes ten nanoseconds.
-        let motion = &motion.single();
-        let level = at_most_256_bits(self.machine.level);
-        let lane = dispatch!(level, simd => self.balanced::<_, f32x8<_>, M>(simd, motion))?;
+        let lane = dispatch!(self.machine.level, simd => self.balanced::<_, M>(simd, motion))?;
         Some(self.joints.triples.unpack(&lane))
     }
 
@@ -120,35 +89,35 @@ impl InverseDynamics {
     /// In lanes: sorting them is left to code for any CPU, which loads one number after the other. With
     /// AVX-512 the compiler would gather them, and a gather has to wait until what it reads is in the cache.
     #[inline(always)]
-    fn balanced<S: Simd, V: Eight<S>, M: Model>(&self, simd: S, motion: &Motion<V::Scalar>) -> Option<Lane> {
-        let legs = LegGeometry::<V>::new(simd, &self.joints, &motion.pose);
-        let balance = Balance::new(simd, &self.joints, &legs);
-        let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
-        balance.forces(&legs, &wrench, along)
+    fn balanced<S: Simd, M: Model>(&self, simd: S, motion: &Motion) -> Option<LegLanes> {
+        let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
+        let factorization = Factorization::new(simd, &self.joints, &legs);
+        let (wrench, along) = self.load::<_, M>(simd, motion, &legs);
+        factorization.forces(&legs, &wrench, along)
     }
 
     /// The load of a motion, before it is shared among the legs.
     pub fn load_of<M: Model>(&self, motion: &Motion) -> TaskLoad {
         dispatch!(self.machine.level, simd => {
             let triples = &self.joints.triples;
-            let legs = LegGeometry::<f64x8<_>>::new(simd, &self.joints, &motion.pose);
-            let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
+            let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
+            let (wrench, along) = self.load::<_, M>(simd, motion, &legs);
             TaskLoad {
                 leg_wrenches: wrench_columns(triples, &legs),
                 wrench: wrench.sum().vector(),
-                along: triples.unpack(&along.store()).into(),
+                along: triples.unpack(&along.into()).into(),
             }
         })
     }
 
     /// W, and what acts along the legs.
     #[inline(always)]
-    fn load<S: Simd, V: Eight<S>, M: Model>(
+    fn load<S: Simd, M: Model>(
         &self,
         simd: S,
-        motion: &Motion<V::Scalar>,
-        legs: &LegGeometry<V>,
-    ) -> (LaneWrench<V::Half>, V) {
+        motion: &Motion,
+        legs: &LegGeometry<S>,
+    ) -> (LaneWrench<S>, f64x8<S>) {
         let machine = &self.machine;
         let velocity = legs.velocity(simd, &motion.twist);
         // What the fidelity does not see is at rest.
@@ -156,14 +125,13 @@ impl InverseDynamics {
         let acceleration = if M::ACCELERATION { motion.acceleration } else { Acceleration::default() };
         let map = acceleration_map(&twist, &acceleration);
         let joint_acceleration = legs.joint_acceleration(simd, &acceleration, &map);
-        let reaction =
-            LegReaction::new::<S, M>(simd, machine, &self.legs, legs, &velocity, joint_acceleration);
+        let reaction = LegReaction::new::<M>(simd, machine, &self.legs, legs, &velocity, joint_acceleration);
         let mut wrench =
             LaneWrench { torque: legs.arm.cross(reaction.across).folded(), force: reaction.across.folded() };
         if !M::ACCELERATION {
             return (wrench, reaction.along);
         }
-        wrench.torque = wrench.torque + self.axes.torques::<S, V::Half>(simd, &motion.pose.rotation, &map);
+        wrench.torque = wrench.torque + self.axes.torques(simd, &motion.pose.rotation, &map);
         let mut accel = legs.direction.dot(joint_acceleration);
         if M::VELOCITY {
             accel = legs.accel(&velocity, joint_acceleration);
@@ -180,11 +148,11 @@ pub fn inverse_dynamics<M: Model>(machine: &Machine, motion: &Motion) -> Option<
 /// The drives as lanes.
 #[derive(Clone, Debug)]
 struct DriveConstants {
-    reflected_mass: Constant,
-    viscous_friction: Constant,
-    coulomb_friction: Constant,
+    reflected_mass: LegLanes,
+    viscous_friction: LegLanes,
+    coulomb_friction: LegLanes,
     /// 1 / smoothing speed
-    inverse_smoothing: Constant,
+    inverse_smoothing: LegLanes,
 }
 
 impl DriveConstants {
@@ -200,9 +168,9 @@ impl DriveConstants {
 
     /// `reflected L'' + viscous L' + coulomb sign(L')`, the sign proportional below the smoothing speed.
     #[inline(always)]
-    fn force<S: Simd, V: Eight<S>>(&self, simd: S, rate: V, accel: V) -> V {
-        let constant = |constant: &Constant| V::constant(simd, constant);
-        let one = V::splat(simd, 1.0);
+    fn force<S: Simd>(&self, simd: S, rate: f64x8<S>, accel: f64x8<S>) -> f64x8<S> {
+        let constant = |constant: &LegLanes| constant.load(simd);
+        let one = f64x8::splat(simd, 1.0);
         let sign = (rate * constant(&self.inverse_smoothing)).max(-one).min(one);
         let friction =
             constant(&self.viscous_friction).mul_add(rate, constant(&self.coulomb_friction) * sign);

@@ -4,12 +4,11 @@
 //! `N = [b x n; n]`, a column per leg, takes leg forces to the wrench on the platform about C:
 //! `W = N Gamma`. The paper orders legs 6..1, this project 1..6.
 
-use fearless_simd::{dispatch, f64x8};
+use fearless_simd::dispatch;
 use nalgebra::Matrix6;
 
-use super::balance::{Balance, wrench_columns};
+use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
-use super::lanes::Eight;
 use super::machine::{LEGS, Machine};
 use super::rigid::{Pose, Twist};
 
@@ -17,7 +16,7 @@ use super::rigid::{Pose, Twist};
 /// force rows below \[1\].
 pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
+        let legs = LegGeometry::new(simd, &machine.joints, pose);
         wrench_columns(&machine.joints.triples, &legs)
     })
 }
@@ -33,7 +32,7 @@ pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
 /// N as [`condition`] judges it.
 pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     let mut scaled = dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::around_center(simd, &machine.joints, pose);
+        let legs = LegGeometry::around_center(simd, &machine.joints, pose);
         wrench_columns(&machine.joints.triples, &legs)
     });
     scaled.fixed_rows_mut::<3>(0).unscale_mut(machine.joints.radius);
@@ -46,8 +45,8 @@ pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
 pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> Option<Twist> {
     let rates = machine.joints.triples.pack(rates);
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
-        let twist = Balance::new(simd, &machine.joints, &legs).twist(&legs, Eight::load(simd, &rates));
-        twist.map(|twist| twist.numbers())
+        let legs = LegGeometry::new(simd, &machine.joints, pose);
+        let twist = Factorization::new(simd, &machine.joints, &legs).twist(&legs, rates.load(simd));
+        twist.map(|twist| twist.first())
     })
 }

@@ -31,15 +31,14 @@
 //! for legs without axial inertia; the effect is 1e-5 to 1e-2 of the force, larger near `u || n`, where
 //! the spin itself is singular. `YY_MIN` keeps the arithmetic finite there.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f64x8, prelude::*};
 
 use super::fidelity::{Legs, Model};
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
-use super::lanes::Eight;
 use super::lanes3::Lanes3;
 use super::machine::{LEGS, Machine};
 use super::task::TaskState;
-use super::triples::{Constant, Triples};
+use super::triples::{LegLanes, Triples};
 
 /// Smallest `|u x n|^2`: a leg within 1e-6 rad of its universal joint's first axis.
 pub(super) const YY_MIN: f64 = 1e-12;
@@ -52,22 +51,22 @@ pub(super) const YY_MIN: f64 = 1e-12;
 #[derive(Clone, Debug)]
 pub(super) struct LegConstants {
     /// `Jt = jt[0] L^2 + jt[1] L + jt[2]`: the transverse inertias are quadratic in L as well.
-    jt: [Constant; 3],
+    jt: [LegLanes; 3],
     /// m2, and `m1 e1 - m2 e2`.
-    rod_mass: Constant,
-    first_moment: Constant,
+    rod_mass: LegLanes,
+    first_moment: LegLanes,
     /// `m2 e2`
-    rod_moment: Constant,
+    rod_moment: LegLanes,
     /// `Ix1 + Ix2`
-    axial_inertia: Constant,
+    axial_inertia: LegLanes,
     /// g in every lane.
-    gravity: [Constant; 3],
+    gravity: [LegLanes; 3],
     /// 1 for legs, 0 for padding.
-    legs_only: Constant,
+    legs_only: LegLanes,
     /// What of the leg hangs on B in the lumped model; the platform's mass in its padding.
-    lumped_mass: Constant,
+    lumped_mass: LegLanes,
     /// The padding alone.
-    platform_mass: Constant,
+    platform_mass: LegLanes,
 }
 
 impl LegConstants {
@@ -113,34 +112,34 @@ fn lumped_mass(machine: &Machine) -> f64 {
 }
 
 /// F per leg \[N\], base axes, in two parts.
-pub(super) struct LegReaction<V> {
+pub(super) struct LegReaction<S: Simd> {
     /// The part normal to the leg.
-    pub across: Lanes3<V>,
+    pub across: Lanes3<f64x8<S>>,
     /// The part along n.
-    pub along: V,
+    pub along: f64x8<S>,
 }
 
-impl<V> LegReaction<V> {
+impl<S: Simd> LegReaction<S> {
     /// `joint_acceleration` is aB.
     #[inline(always)]
-    pub fn new<S: Simd, M: Model>(
+    pub fn new<M: Model>(
         simd: S,
         machine: &Machine,
         constants: &LegConstants,
-        legs: &LegGeometry<V>,
-        velocity: &LegVelocity<V>,
-        joint_acceleration: Lanes3<V>,
-    ) -> Self
-    where
-        V: Eight<S>,
-    {
-        let load = |lane: &Constant| V::constant(simd, lane);
-        let gravity = Lanes3::<V>::constant(simd, &constants.gravity);
+        legs: &LegGeometry<S>,
+        velocity: &LegVelocity<S>,
+        joint_acceleration: Lanes3<f64x8<S>>,
+    ) -> Self {
+        let load = |lanes: &LegLanes| lanes.load(simd);
+        let gravity = Lanes3::load(simd, &constants.gravity);
         if M::LEGS != Legs::Links {
             // Points at B, the platform's among them: nothing is projected.
             let mass =
                 if M::LEGS == Legs::Lumped { &constants.lumped_mass } else { &constants.platform_mass };
-            return Self { across: (joint_acceleration - gravity) * load(mass), along: V::splat(simd, 0.0) };
+            return Self {
+                across: (joint_acceleration - gravity) * load(mass),
+                along: f64x8::splat(simd, 0.0),
+            };
         }
         let (n, n_rate, length, inverse_length) =
             (legs.direction, velocity.direction, legs.length, legs.inverse_length);
@@ -171,19 +170,19 @@ impl<V> LegReaction<V> {
 
 /// `sum + Ix / L ( wx n' x n + (un / yy) wx' k )`
 #[inline(always)]
-fn spin<S: Simd, V: Eight<S>>(
+fn spin<S: Simd>(
     simd: S,
     machine: &Machine,
-    legs: &LegGeometry<V>,
-    velocity: &LegVelocity<V>,
-    joint_acceleration: Lanes3<V>,
-    ix_over_l: V,
-    sum: Lanes3<V>,
-) -> Lanes3<V> {
+    legs: &LegGeometry<S>,
+    velocity: &LegVelocity<S>,
+    joint_acceleration: Lanes3<f64x8<S>>,
+    ix_over_l: f64x8<S>,
+    sum: Lanes3<f64x8<S>>,
+) -> Lanes3<f64x8<S>> {
     let (n, n_rate) = (legs.direction, velocity.direction);
-    let u = Lanes3::<V>::constant(simd, &machine.joints.universal_axis);
+    let u = Lanes3::load(simd, &machine.joints.universal_axis);
     let k = u.cross(n);
-    let inverse_yy = V::splat(simd, 1.0) / k.dot(k).max(V::splat(simd, YY_MIN));
+    let inverse_yy = f64x8::splat(simd, 1.0) / k.dot(k).max(f64x8::splat(simd, YY_MIN));
     let (un, un_rate, p) = (u.dot(n), u.dot(n_rate), n_rate.dot(k));
     let twice_rate = velocity.rate + velocity.rate;
     let p_rate = (joint_acceleration.dot(k) - twice_rate * p) * legs.inverse_length;

@@ -1,6 +1,6 @@
 //! The machine: every constant the equations need, validated once and immutable afterwards.
 //!
-//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`Constant`]): one array per
+//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`LegLanes`]): one array per
 //! coordinate, so that all six are evaluated by the same instructions.
 //!
 //! What this file does not do: read or judge values. `host::config` does, and names key, value and bound.
@@ -11,7 +11,7 @@ use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3};
 
 use super::rigid::{Pose, Twist};
-use super::triples::{Constant, Triples};
+use super::triples::{LegLanes, Triples};
 
 /// Number of legs.
 pub const LEGS: usize = 6;
@@ -67,11 +67,11 @@ pub struct Joints {
     /// Which leg is in which lane.
     pub triples: Triples,
     /// `A_i`, joint centres on the base, in base axes \[m\].
-    pub base: [Constant; 3],
+    pub base: [LegLanes; 3],
     /// `CB_i`, joint centres on the platform, in platform axes \[m\].
-    pub platform: [Constant; 3],
+    pub platform: [LegLanes; 3],
     /// `u_i`, first axis of the universal joint, fixed in the base, unit length.
-    pub universal_axis: [Constant; 3],
+    pub universal_axis: [LegLanes; 3],
     /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. Turns
     /// radians into metres wherever a tolerance must not depend on the size of the machine.
     pub radius: f64,
@@ -81,10 +81,10 @@ pub struct Joints {
     /// Mean of the `B_i`, from C, in platform axes \[m\]: the point that does not depend on the choice of C.
     pub(super) center: Vector3<f64>,
     /// The `B_i` from their mean, in platform axes \[m\].
-    pub(super) around_center: [Constant; 3],
+    pub(super) around_center: [LegLanes; 3],
     /// The length `a` of that arm as a share of the radius, and `(1 + a^2) radius`: see `super::kinematic_state`.
-    pub(super) arm_share: Constant,
-    pub(super) arm_curvature: Constant,
+    pub(super) arm_share: LegLanes,
+    pub(super) arm_curvature: LegLanes,
 }
 
 impl Joints {
@@ -107,16 +107,16 @@ impl Joints {
         let radius = mean_square.sqrt();
         Self {
             triples,
-            base: triples.pack_vectors(base).map(Constant::from),
-            platform: triples.pack_vectors(platform).map(Constant::from),
-            universal_axis: triples.pack_vectors(universal_axis).map(Constant::from),
+            base: triples.pack_vectors(base),
+            platform: triples.pack_vectors(platform),
+            universal_axis: triples.pack_vectors(universal_axis),
             radius,
             radius_cubed: radius * radius * radius,
             inverse_radius_cubed: triples.parity() / (radius * radius * radius),
             center,
-            around_center: triples.pack_vectors(&around_center).map(Constant::from),
-            arm_share: triples.pack(&around_center.map(|b| b.norm() / radius)).into(),
-            arm_curvature: triples.pack(&around_center.map(|b| radius + b.norm_squared() / radius)).into(),
+            around_center: triples.pack_vectors(&around_center),
+            arm_share: triples.pack(&around_center.map(|b| b.norm() / radius)),
+            arm_curvature: triples.pack(&around_center.map(|b| radius + b.norm_squared() / radius)),
         }
     }
 

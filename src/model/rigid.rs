@@ -2,33 +2,33 @@
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
-use nalgebra::{Matrix3, RealField, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Where the platform is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose<T: RealField + Copy = f64> {
+pub struct Pose {
     /// R, platform axes expressed in base axes.
-    pub rotation: Matrix3<T>,
+    pub rotation: Matrix3<f64>,
     /// C, the platform origin in base axes \[m\].
-    pub position: Vector3<T>,
+    pub position: Vector3<f64>,
 }
 
 /// How the platform moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Twist<T: RealField + Copy = f64> {
+pub struct Twist {
     /// omega, base axes \[rad/s\].
-    pub angular: Vector3<T>,
+    pub angular: Vector3<f64>,
     /// v, velocity of C, base axes \[m/s\].
-    pub linear: Vector3<T>,
+    pub linear: Vector3<f64>,
 }
 
 /// Time derivative of the twist, part by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Acceleration<T: RealField + Copy = f64> {
+pub struct Acceleration {
     /// omega', base axes \[rad/s^2\].
-    pub angular: Vector3<T>,
+    pub angular: Vector3<f64>,
     /// v', acceleration of C, base axes \[m/s^2\].
-    pub linear: Vector3<T>,
+    pub linear: Vector3<f64>,
 }
 
 /// What acts on the platform.
@@ -42,10 +42,10 @@ pub struct Wrench {
 
 /// Pose, twist and acceleration at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion<T: RealField + Copy = f64> {
-    pub pose: Pose<T>,
-    pub twist: Twist<T>,
-    pub acceleration: Acceleration<T>,
+pub struct Motion {
+    pub pose: Pose,
+    pub twist: Twist,
+    pub acceleration: Acceleration,
 }
 
 impl Motion {
@@ -57,19 +57,6 @@ impl Motion {
             pose: self.pose.displaced(&Twist::from_vector(&((v + a * (0.5 * dt)) * dt))),
             twist: Twist::from_vector(&(v + a * dt)),
             acceleration: self.acceleration,
-        }
-    }
-
-    /// Rounded to single precision.
-    pub fn single(&self) -> Motion<f32> {
-        let Self { pose, twist, acceleration } = self;
-        Motion {
-            pose: Pose { rotation: pose.rotation.cast(), position: pose.position.cast() },
-            twist: Twist { angular: twist.angular.cast(), linear: twist.linear.cast() },
-            acceleration: Acceleration {
-                angular: acceleration.angular.cast(),
-                linear: acceleration.linear.cast(),
-            },
         }
     }
 }

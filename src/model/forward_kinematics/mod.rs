@@ -29,13 +29,12 @@
 mod newton;
 mod tracker;
 
-use fearless_simd::{dispatch, f64x8};
+use fearless_simd::dispatch;
 
 pub use tracker::{Tracked, Tracker};
 
-use super::balance::Balance;
+use super::factorization::Factorization;
 use super::kinematic_state::KinematicState;
-use super::lanes::Eight;
 use super::machine::{LEGS, Machine};
 use newton::Newton;
 
@@ -75,8 +74,8 @@ pub fn refine(machine: &Machine, kinematic_state: &mut KinematicState, lengths: 
     let joints = &machine.joints;
     let target = joints.triples.pack(lengths);
     dispatch!(machine.level, simd => {
-        let legs = kinematic_state.legs.load::<_, f64x8<_>>(simd);
-        let balance = Balance::load(simd, joints, &kinematic_state.factors);
-        Newton::new(simd, joints, Eight::load(simd, &target)).refine(kinematic_state, legs, balance)
+        let legs = kinematic_state.legs.load(simd);
+        let factorization = Factorization::load(simd, joints, &kinematic_state.factorization);
+        Newton::new(simd, joints, target.load(simd)).refine(kinematic_state, legs, factorization)
     })
 }
