@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{
-    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs,
+    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
 };
 use hexad::model::machine::LEGS;
 use hexad::model::rigid::Motion;
@@ -35,7 +35,7 @@ impl Method {
         }
     }
 
-    fn of<M: Model>(fidelity: Fidelity) -> Self {
+    fn of<M: ModelTerms>(fidelity: Fidelity) -> Self {
         Self {
             fidelity,
             forces: |dynamics, motion| dynamics.forces::<M>(motion),

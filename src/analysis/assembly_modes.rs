@@ -17,32 +17,32 @@ use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
 
 /// Bound on the steps from a start; most need ten to twenty.
-const MAX_STEPS: usize = 400;
+const MAX_STEPS_PER_START: usize = 400;
 
 /// Lengths that fit to this share of the radius fit: rounding.
-const CLOSE: f64 = 1e-12;
+const LENGTH_TOLERANCE: f64 = 1e-12;
 
 /// Poses this near to each other (radian, or radius) are one.
-const SAME: f64 = 1e-7;
+const SAME_POSE_DISTANCE: f64 = 1e-7;
 
 /// First damping, as a share of the largest eigenvalue that `J^T J` usually has; then a factor for each step.
-const DAMPING: f64 = 1e-2;
-const RELAXED: f64 = 0.2;
-const TIGHTENED: f64 = 5.0;
+const FIRST_DAMPING: f64 = 1e-2;
+const DAMPING_DECREASE: f64 = 0.2;
+const DAMPING_INCREASE: f64 = 5.0;
 
 /// Where [`others`] are looked for: further away nobody takes them for the pose itself.
-const TURN: f64 = FRAC_PI_2;
+const SEARCH_TURN_RAD: f64 = FRAC_PI_2;
 /// In radii.
-const SHIFT: f64 = 2.0;
+const SEARCH_SHIFT_RADII: f64 = 2.0;
 /// A tenth of a second on two processors.
-const STARTS: u64 = 2000;
+const START_COUNT: u64 = 2000;
 
 /// Another pose this near (radian, or radius) may be where the platform is in truth.
-const NEARBY: f64 = 0.5;
+const CONFUSABLE_DISTANCE: f64 = 0.5;
 
 /// Where starts are spread.
 #[derive(Clone, Copy, Debug)]
-pub struct Region {
+pub struct SearchRegion {
     /// In the middle.
     pub center: Pose,
     /// Largest rotation away from it \[rad\]; pi for all orientations.
@@ -52,12 +52,17 @@ pub struct Region {
 }
 
 /// The poses with these lengths \[m\] that are found from so many starts, in the order of their finding.
-pub fn modes(machine: &Machine, lengths: &[f64; LEGS], region: &Region, starts: u64) -> Vec<KinematicState> {
+pub fn find_modes(
+    machine: &Machine,
+    lengths: &[f64; LEGS],
+    region: &SearchRegion,
+    starts: u64,
+) -> Vec<KinematicState> {
     let ends = (0..starts).into_par_iter().map(|k| settled(machine, lengths, start(region, k)));
     let mut found: Vec<KinematicState> = vec![];
     for kinematic_state in ends.collect::<Vec<_>>().into_iter().flatten() {
         let size = |other: &KinematicState| machine.joints.distance(kinematic_state.pose(), other.pose());
-        if found.iter().all(|other| size(other) > SAME) {
+        if found.iter().all(|other| size(other) > SAME_POSE_DISTANCE) {
             found.push(kinematic_state);
         }
     }
@@ -66,7 +71,7 @@ pub fn modes(machine: &Machine, lengths: &[f64; LEGS], region: &Region, starts: 
 
 /// A pose that has the lengths of another one.
 #[derive(Clone, Copy, Debug)]
-pub struct Other {
+pub struct OtherMode {
     /// Radian and radius together.
     pub distance: f64,
     turn_deg: f64,
@@ -75,14 +80,14 @@ pub struct Other {
     across: bool,
 }
 
-impl Other {
+impl OtherMode {
     /// Whether one may be taken for the other.
     pub fn is_nearby(&self) -> bool {
-        self.distance < NEARBY
+        self.distance < CONFUSABLE_DISTANCE
     }
 }
 
-impl fmt::Display for Other {
+impl fmt::Display for OtherMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { turn_deg, shift_m, across, .. } = self;
         let not = if *across { "" } else { "NOT " };
@@ -90,14 +95,15 @@ impl fmt::Display for Other {
     }
 }
 
-/// Other poses with the lengths of a pose that are found around it, the nearest first.
-pub fn others(machine: &Machine, here: &KinematicState) -> Vec<Other> {
+/// OtherMode poses with the lengths of a pose that are found around it, the nearest first.
+pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
     let center = *here.pose();
-    let region = Region { center, turn: TURN, shift: SHIFT * machine.joints.radius };
-    let found = modes(machine, &here.lengths(machine), &region, STARTS);
+    let region =
+        SearchRegion { center, turn: SEARCH_TURN_RAD, shift: SEARCH_SHIFT_RADII * machine.joints.radius };
+    let found = find_modes(machine, &here.lengths(machine), &region, START_COUNT);
     let other = |there: &KinematicState| {
         let way = center.displacement_to(there.pose());
-        Other {
+        OtherMode {
             distance: machine.joints.distance(&center, there.pose()),
             turn_deg: way.angular.norm().to_degrees(),
             shift_m: way.linear.norm(),
@@ -111,7 +117,7 @@ pub fn others(machine: &Machine, here: &KinematicState) -> Vec<Other> {
 }
 
 /// The start with this number.
-fn start(region: &Region, number: u64) -> Pose {
+fn start(region: &SearchRegion, number: u64) -> Pose {
     let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     // splitmix64, evenly in -1..1
     let mut unit = || {
@@ -132,9 +138,9 @@ fn settled(machine: &Machine, lengths: &[f64; LEGS], start: Pose) -> Option<Kine
     let scale = Vector6::new(1.0, 1.0, 1.0, radius, radius, radius);
     let residual = |pose: &Pose| Vector6::from(*lengths) - Vector6::from(leg_lengths(machine, pose));
     let (mut pose, mut rest) = (start, residual(&start));
-    let mut damping = DAMPING * radius * radius;
-    for _ in 0..MAX_STEPS {
-        if rest.norm() < CLOSE * radius {
+    let mut damping = FIRST_DAMPING * radius * radius;
+    for _ in 0..MAX_STEPS_PER_START {
+        if rest.norm() < LENGTH_TOLERANCE * radius {
             return Some(KinematicState::new(machine, pose));
         }
         let jacobian = leg_wrenches(machine, &pose).transpose() * Matrix6::from_diagonal(&scale);
@@ -143,9 +149,9 @@ fn settled(machine: &Machine, lengths: &[f64; LEGS], start: Pose) -> Option<Kine
         let next = pose.displaced(&Twist::from_vector(&step));
         let left = residual(&next);
         if left.norm() < rest.norm() {
-            (pose, rest, damping) = (next, left, damping * RELAXED);
+            (pose, rest, damping) = (next, left, damping * DAMPING_DECREASE);
         } else {
-            damping *= TIGHTENED;
+            damping *= DAMPING_INCREASE;
         }
     }
     None

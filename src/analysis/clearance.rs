@@ -38,14 +38,14 @@ use crate::model::rigid::{Pose, exp, log};
 use crate::model::task::{TaskState, task_coordinates};
 
 /// Frobenius norm of N, no arm shorter than its moment: six directions, and six arms whose mean square is 1.
-const LARGEST_WRENCHES: f64 = 3.464_101_615_137_755;
+const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_755;
 
 /// The linear part of a change is hardly less than this share of the bound of the whole one. Only time depends on it.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_LINEAR_SHARE: f64 = 0.1;
 
 /// A family of growing regions around home, and what its six parameters mean. Angular parameters first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
+pub enum RegionShape {
     /// Positions within a radius \[m\], the size; any turn from home's orientation about any axis up to `turn` \[rad\], at
     /// most a quarter. The angles turn home's platform.
     Ball { turn: f64 },
@@ -55,17 +55,17 @@ pub enum Shape {
 
 /// A box of parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell {
+pub struct PoseCell {
     pub middle: [f64; 6],
     pub half: [f64; 6],
 }
 
 /// What is in the way at a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Obstacle {
+pub enum WorkspaceLimit {
     /// A leg, counted from 0, shorter or longer than it can be.
-    Short(usize),
-    Long(usize),
+    LegTooShort(usize),
+    LegTooLong(usize),
     /// Beyond a singular pose.
     Singular,
     /// Beyond the limit of the condition.
@@ -86,14 +86,14 @@ pub struct Clearance<'a> {
     mean: Vector3<f64>,
 }
 
-impl Shape {
+impl RegionShape {
     /// The whole family up to a size.
-    pub fn cell(&self, size: f64) -> Cell {
+    pub fn cell(&self, size: f64) -> PoseCell {
         let (low, high) = match *self {
             Self::Ball { turn: t } => ([-t, -t, -t, -size, -size, -size], [t, t, t, size, size, size]),
             Self::Box { low, high } => (low.map(|x| size * x), high.map(|x| size * x)),
         };
-        let mut cell = Cell { middle: [0.0; 6], half: [0.0; 6] };
+        let mut cell = PoseCell { middle: [0.0; 6], half: [0.0; 6] };
         for ((middle, half), (low, high)) in
             cell.middle.iter_mut().zip(&mut cell.half).zip(low.into_iter().zip(high))
         {
@@ -103,7 +103,7 @@ impl Shape {
     }
 
     /// The size from which on the family may have poses of this cell; none if it never has.
-    pub fn size(&self, cell: &Cell) -> Option<f64> {
+    pub fn size(&self, cell: &PoseCell) -> Option<f64> {
         let nearest = cell.nearest();
         match self {
             Self::Ball { turn } => {
@@ -147,13 +147,13 @@ impl Shape {
     }
 
     /// The point of another size on the way to an edge.
-    pub fn towards(&self, edge: &[f64; 6], size: f64) -> Cell {
+    pub fn towards(&self, edge: &[f64; 6], size: f64) -> PoseCell {
         let [a, b, c, x, y, z] = edge.map(|x| size * x);
         let middle = match (self, edge) {
             (Self::Ball { .. }, [a, b, c, ..]) => [*a, *b, *c, x, y, z],
             (Self::Box { .. }, _) => [a, b, c, x, y, z],
         };
-        Cell { middle, half: [0.0; 6] }
+        PoseCell { middle, half: [0.0; 6] }
     }
 }
 
@@ -162,7 +162,7 @@ fn turned([a, b, c]: [f64; 3]) -> Matrix3<f64> {
     TaskState::at_rest([a, b, c, 0.0, 0.0, 0.0]).motion().pose.rotation
 }
 
-impl Cell {
+impl PoseCell {
     /// The parameters of this cell that are nearest to home.
     fn nearest(&self) -> [f64; 6] {
         let mut nearest = self.middle;
@@ -216,68 +216,72 @@ impl<'a> Clearance<'a> {
     /// The leg that is nearest to an end of its stroke at the middle of a cell, and how far it is from it \[m\]. As C
     /// may go there along that leg and no length changes by more than C goes, this is the largest ball within the
     /// stroke at this orientation.
-    pub fn margin(&self, shape: &Shape, cell: &Cell) -> (f64, Obstacle) {
+    pub fn margin(&self, shape: &RegionShape, cell: &PoseCell) -> (f64, WorkspaceLimit) {
         let actuator = &self.machine.actuator;
         let ends = |(leg, length): (usize, f64)| {
             [
-                (length - actuator.min_length, Obstacle::Short(leg)),
-                (actuator.max_length - length, Obstacle::Long(leg)),
+                (length - actuator.min_length, WorkspaceLimit::LegTooShort(leg)),
+                (actuator.max_length - length, WorkspaceLimit::LegTooLong(leg)),
             ]
         };
         let lengths = leg_lengths(self.machine, &self.pose(shape, &cell.middle));
-        let nearer = |a: (f64, Obstacle), b: (f64, Obstacle)| if b.0 < a.0 { b } else { a };
-        lengths.into_iter().enumerate().flat_map(ends).fold((f64::INFINITY, Obstacle::Condition), nearer)
+        let nearer = |a: (f64, WorkspaceLimit), b: (f64, WorkspaceLimit)| if b.0 < a.0 { b } else { a };
+        lengths
+            .into_iter()
+            .enumerate()
+            .flat_map(ends)
+            .fold((f64::INFINITY, WorkspaceLimit::Condition), nearer)
     }
 
     /// What is in the way at the middle of a cell, with the size there, if the middle is of the family.
-    pub fn obstacle(&self, shape: &Shape, cell: &Cell) -> Option<(f64, Obstacle)> {
-        let size = shape.size(&Cell { half: [0.0; 6], ..*cell })?;
+    pub fn obstacle(&self, shape: &RegionShape, cell: &PoseCell) -> Option<(f64, WorkspaceLimit)> {
+        let size = shape.size(&PoseCell { half: [0.0; 6], ..*cell })?;
         self.obstacle_at(&self.pose(shape, &cell.middle)).map(|obstacle| (size, obstacle))
     }
 
     /// The pose of parameters.
-    fn pose(&self, shape: &Shape, parameters: &[f64; 6]) -> Pose {
+    fn pose(&self, shape: &RegionShape, parameters: &[f64; 6]) -> Pose {
         let [a, b, c, x, y, z] = *parameters;
         let position = self.home.position + Vector3::new(x, y, z);
         let [alpha, beta, gamma, ..] = self.machine.home;
         let rotation = match shape {
-            Shape::Ball { .. } => turned([a, b, c]) * self.home.rotation,
-            Shape::Box { .. } => turned([alpha + a, beta + b, gamma + c]),
+            RegionShape::Ball { .. } => turned([a, b, c]) * self.home.rotation,
+            RegionShape::Box { .. } => turned([alpha + a, beta + b, gamma + c]),
         };
         Pose { rotation, position }
     }
 
     /// The axes of the three angles, in base axes.
-    fn axes(&self, shape: &Shape, parameters: &[f64; 6]) -> [Vector3<f64>; 3] {
+    fn axes(&self, shape: &RegionShape, parameters: &[f64; 6]) -> [Vector3<f64>; 3] {
         let [a, b, ..] = *parameters;
         let [alpha, beta, ..] = self.machine.home;
-        let (a, b) = if let Shape::Box { .. } = shape { (alpha + a, beta + b) } else { (a, b) };
+        let (a, b) = if let RegionShape::Box { .. } = shape { (alpha + a, beta + b) } else { (a, b) };
         let ((sin_a, cos_a), (sin_b, cos_b)) = (a.sin_cos(), b.sin_cos());
         let second = Vector3::new(0.0, cos_a, sin_a);
         [Vector3::x(), second, Vector3::new(sin_b, -sin_a * cos_b, cos_a * cos_b)]
     }
 
     /// What is in the way at a pose.
-    pub fn obstacle_at(&self, pose: &Pose) -> Option<Obstacle> {
+    pub fn obstacle_at(&self, pose: &Pose) -> Option<WorkspaceLimit> {
         let kinematic_state = KinematicState::new(self.machine, *pose);
         let actuator = &self.machine.actuator;
         for (leg, length) in kinematic_state.lengths(self.machine).into_iter().enumerate() {
             if !(length >= actuator.min_length) {
-                return Some(Obstacle::Short(leg));
+                return Some(WorkspaceLimit::LegTooShort(leg));
             }
             if !(length <= actuator.max_length) {
-                return Some(Obstacle::Long(leg));
+                return Some(WorkspaceLimit::LegTooLong(leg));
             }
         }
         let sensitivity = kinematic_state.sensitivity();
         if !(sensitivity.determinant * self.home_determinant > 0.0) {
-            return Some(Obstacle::Singular);
+            return Some(WorkspaceLimit::Singular);
         }
-        (!(sensitivity.condition <= self.largest_condition)).then_some(Obstacle::Condition)
+        (!(sensitivity.condition <= self.largest_condition)).then_some(WorkspaceLimit::Condition)
     }
 
     /// The least that [`Clearance::margin`] may be anywhere in a cell.
-    pub fn least_margin(&self, shape: &Shape, cell: &Cell) -> f64 {
+    pub fn least_margin(&self, shape: &RegionShape, cell: &PoseCell) -> f64 {
         let actuator = &self.machine.actuator;
         let pose = self.pose(shape, &cell.middle);
         let wrenches = leg_wrenches(self.machine, &pose);
@@ -304,7 +308,7 @@ impl<'a> Clearance<'a> {
     }
 
     /// Whether it is proved that no pose of a cell is singular, or of a condition beyond the limit.
-    pub fn is_regular(&self, shape: &Shape, cell: &Cell) -> bool {
+    pub fn is_regular(&self, shape: &RegionShape, cell: &PoseCell) -> bool {
         let kinematic_state = KinematicState::new(self.machine, self.pose(shape, &cell.middle));
         let [ha, hb, hc, hx, hy, hz] = cell.half;
         let (shift, turn) = (Vector3::new(hx, hy, hz).norm(), cell.turn());
@@ -326,11 +330,11 @@ impl<'a> Clearance<'a> {
         let wrenches = scaled_wrenches(self.machine, kinematic_state.pose());
         let norm = wrenches.norm();
         let inverse = kinematic_state.sensitivity().condition / norm;
-        let most = (norm + change).min(LARGEST_WRENCHES) * inverse / self.largest_condition;
+        let most = (norm + change).min(MAX_WRENCH_NORM) * inverse / self.largest_condition;
         let does = |share: f64| most <= 1.0 - share;
         // The second bound takes ten times as long: not where it cannot do.
         does(inverse * change)
-            || does(inverse * (bent + change * LEAST_SHARE))
+            || does(inverse * (bent + change * MIN_LINEAR_SHARE))
                 && self
                     .linear_change(shape, cell, &kinematic_state, &wrenches)
                     .is_some_and(|linear| does(linear + inverse * bent))
@@ -339,8 +343,8 @@ impl<'a> Clearance<'a> {
     /// Sum of `|N0^-1 dN_k| h_k`; none at a singular pose.
     fn linear_change(
         &self,
-        shape: &Shape,
-        cell: &Cell,
+        shape: &RegionShape,
+        cell: &PoseCell,
         kinematic_state: &KinematicState,
         wrenches: &Matrix6<f64>,
     ) -> Option<f64> {

@@ -11,8 +11,8 @@
 //!
 //! Points outside the actuators' stroke and singular poses are counted and passed over.
 
-use super::envelope::{CORNERS, DIMENSIONS, Envelope, Shares};
-use super::fidelity_error::{FIDELITIES, Sample, Tally, largest};
+use super::envelope::{CORNER_COUNT, DIMENSIONS, EnvelopePoint, MotionEnvelope};
+use super::fidelity_error::{ErrorStatistics, FIDELITY_COUNT, FidelitySample, largest};
 use super::reachable_envelope::within_stroke;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::{Exact, Fidelity};
@@ -20,25 +20,25 @@ use crate::model::machine::LEGS;
 
 /// Points of the even spread that are judged. With eight times as many the figures stay within a few per
 /// cent, and with this many a daemon starts without a delay that anybody sees.
-pub const SPREAD: u32 = 1 << 15;
+pub const SPREAD_POINTS: u32 = 1 << 15;
 
 /// What is taken of a tolerance, for what no sample shows: on 200,000 other points of the inside, errors of
 /// up to 1.13 times as large a share were seen where poses next to singular ones are in reach, and 1.02
 /// elsewhere.
-const MARGIN: f64 = 1.05;
+const TOLERANCE_MARGIN: f64 = 1.05;
 
 /// Where most of an envelope is out of reach: points drawn at most.
-const MOST_DRAWN: u32 = 4 * SPREAD;
+const MAX_DRAWN_POINTS: u32 = 4 * SPREAD_POINTS;
 
 /// The climb begins with steps as wide as the envelope and ends with this share of it.
-const LAST_STEP: f64 = 1.0 / 64.0;
+const MIN_CLIMB_STEP: f64 = 1.0 / 64.0;
 
 /// Sweeps over all dimensions with steps of one width, at most; they usually end after two.
-const SWEEPS: u32 = 4;
+const MAX_SWEEPS_PER_STEP: u32 = 4;
 
 /// What a fidelity costs in accuracy over a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Price {
+pub struct FidelityError {
     pub fidelity: Fidelity,
     /// Of the even spread, or of the rows \[N\].
     pub mean: f64,
@@ -52,35 +52,37 @@ pub struct Price {
 
 /// A scene, judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Judgement {
+pub struct FidelityComparison {
     /// The even spread, or the rows.
-    pub inside: Tally,
+    pub inside: ErrorStatistics,
     /// Everything.
-    pub all: Tally,
+    pub all: ErrorStatistics,
     /// In the order of [`Fidelity::ALL`].
-    pub prices: [Price; FIDELITIES],
+    pub errors: [FidelityError; FIDELITY_COUNT],
 }
 
-impl Judgement {
+impl FidelityComparison {
     /// Of an envelope. A bounded number of evaluations: at most some 200,000 points.
-    pub fn of_envelope(model: &InverseDynamics, envelope: &Envelope) -> Self {
-        let (mut inside, mut edge) = (Tally::default(), Tally::default());
-        let mut worst = [[Worst::default(); LEGS]; FIDELITIES];
-        let look = |shares: &Shares, tally: &mut Tally, worst: &mut [[Worst; LEGS]; FIDELITIES]| {
-            let sample = Sample::take(model, &envelope.at(shares));
+    pub fn of_envelope(model: &InverseDynamics, envelope: &MotionEnvelope) -> Self {
+        let (mut inside, mut edge) = (ErrorStatistics::default(), ErrorStatistics::default());
+        let mut worst = [[WorstPoint::default(); LEGS]; FIDELITY_COUNT];
+        let look = |shares: &EnvelopePoint,
+                    tally: &mut ErrorStatistics,
+                    worst: &mut [[WorstPoint; LEGS]; FIDELITY_COUNT]| {
+            let sample = FidelitySample::take(model, &envelope.at(shares));
             tally.add(&sample);
             if let Ok(sample) = sample {
                 let errors = sample.errors.as_flattened();
                 worst.as_flattened_mut().iter_mut().zip(errors).for_each(|(worst, e)| worst.note(*e, shares));
             }
         };
-        for k in 0..MOST_DRAWN {
-            look(&Envelope::spread(k), &mut inside, &mut worst);
-            if inside.judged >= u64::from(SPREAD) {
+        for k in 0..MAX_DRAWN_POINTS {
+            look(&MotionEnvelope::spread(k), &mut inside, &mut worst);
+            if inside.judged >= u64::from(SPREAD_POINTS) {
                 break;
             }
         }
-        for k in 0..CORNERS {
+        for k in 0..CORNER_COUNT {
             look(&envelope.corner(k), &mut edge, &mut worst);
         }
         let mut all = inside.and(&edge);
@@ -98,19 +100,19 @@ impl Judgement {
     }
 
     /// Of rows that were looked at one by one.
-    pub fn of_rows(rows: Tally) -> Self {
+    pub fn of_rows(rows: ErrorStatistics) -> Self {
         Self::new(&[rows], rows)
     }
 
     /// The first part is what is called the inside.
-    fn new(parts: &[Tally], all: Tally) -> Self {
+    fn new(parts: &[ErrorStatistics], all: ErrorStatistics) -> Self {
         let inside = parts.first().copied().unwrap_or_default();
-        let nothing = Price { fidelity: Fidelity::Exact, mean: 0.0, rms: 0.0, max: 0.0, share: 0.0 };
-        let mut prices = [nothing; FIDELITIES];
-        for (number, (price, fidelity)) in prices.iter_mut().zip(Fidelity::ALL).enumerate() {
-            let errors = |tally: &Tally| tally.errors.get(number).copied().unwrap_or_default();
-            let share = |tally: &Tally| share(errors(tally).max, tally.peak);
-            *price = Price {
+        let nothing = FidelityError { fidelity: Fidelity::Exact, mean: 0.0, rms: 0.0, max: 0.0, share: 0.0 };
+        let mut errors = [nothing; FIDELITY_COUNT];
+        for (number, (error, fidelity)) in errors.iter_mut().zip(Fidelity::ALL).enumerate() {
+            let errors = |tally: &ErrorStatistics| tally.errors.get(number).copied().unwrap_or_default();
+            let share = |tally: &ErrorStatistics| share(errors(tally).max, tally.peak);
+            *error = FidelityError {
                 fidelity,
                 mean: inside.mean(&errors(&inside)),
                 rms: inside.rms(&errors(&inside)),
@@ -118,20 +120,20 @@ impl Judgement {
                 share: parts.iter().map(share).fold(share(&all), f64::max),
             };
         }
-        Self { inside, all, prices }
+        Self { inside, all, errors }
     }
 
     /// The fidelities whose largest error is within a tolerance, given as a share of the peak force, less 5 %; the
     /// cheapest first, by the order of the ladder. That order is the same on every computer and in every
     /// run, as a measured time is not. The last one is the exact model.
-    pub fn within(&self, tolerance: f64) -> impl Iterator<Item = &Price> {
-        self.prices.iter().filter(move |price| MARGIN * price.share <= tolerance)
+    pub fn within(&self, tolerance: f64) -> impl Iterator<Item = &FidelityError> {
+        self.errors.iter().filter(move |error| TOLERANCE_MARGIN * error.share <= tolerance)
     }
 
-    /// The first of [`Judgement::within`] that a control loop can run on.
+    /// The first of [`FidelityComparison::within`] that a control loop can run on.
     pub fn choice(&self, tolerance: f64) -> Fidelity {
         self.within(tolerance)
-            .map(|price| price.fidelity)
+            .map(|error| error.fidelity)
             .find(|fidelity| fidelity.has_inertia())
             .unwrap_or(Fidelity::Exact)
     }
@@ -139,19 +141,19 @@ impl Judgement {
 
 /// Where an error was largest.
 #[derive(Clone, Copy, Debug)]
-struct Worst {
+struct WorstPoint {
     error: f64,
-    shares: Shares,
+    shares: EnvelopePoint,
 }
 
-impl Default for Worst {
+impl Default for WorstPoint {
     fn default() -> Self {
-        Self { error: 0.0, shares: Shares::zeros() }
+        Self { error: 0.0, shares: EnvelopePoint::zeros() }
     }
 }
 
-impl Worst {
-    fn note(&mut self, error: f64, shares: &Shares) {
+impl WorstPoint {
+    fn note(&mut self, error: f64, shares: &EnvelopePoint) {
         if error > self.error {
             *self = Self { error, shares: *shares };
         }
@@ -162,12 +164,12 @@ impl Worst {
 /// halved where none leads up.
 fn climb(
     model: &InverseDynamics,
-    envelope: &Envelope,
+    envelope: &MotionEnvelope,
     fidelity: Fidelity,
     leg: usize,
-    start: &Worst,
-) -> Worst {
-    let error_at = |shares: &Shares| -> Option<f64> {
+    start: &WorstPoint,
+) -> WorstPoint {
+    let error_at = |shares: &EnvelopePoint| -> Option<f64> {
         let state = envelope.at(shares);
         if !within_stroke(model.machine(), &state) {
             return None;
@@ -180,8 +182,8 @@ fn climb(
     let mut best = *start;
     let mut step = 1.0;
     // Where nothing is wrong, as with the exact model, there is nothing to climb.
-    while best.error > 0.0 && step >= LAST_STEP {
-        for _ in 0..SWEEPS {
+    while best.error > 0.0 && step >= MIN_CLIMB_STEP {
+        for _ in 0..MAX_SWEEPS_PER_STEP {
             let before = best.error;
             for (axis, way) in (0..DIMENSIONS).flat_map(|axis| [(axis, step), (axis, -step)]) {
                 let mut shares = best.shares;

@@ -7,36 +7,36 @@ use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
 
 /// Rungs of the ladder.
-pub const FIDELITIES: usize = Fidelity::ALL.len();
+pub const FIDELITY_COUNT: usize = Fidelity::ALL.len();
 
 /// Forces of all fidelities at one point against the exact ones.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub struct FidelitySample {
     /// Largest exact force \[N\].
     pub peak: f64,
     /// Error of each fidelity and leg \[N\], in the order of [`Fidelity::ALL`].
-    pub errors: [[f64; LEGS]; FIDELITIES],
+    pub errors: [[f64; LEGS]; FIDELITY_COUNT],
 }
 
 /// Why a point has no sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Skipped {
+pub enum NotEvaluated {
     OutsideStroke,
     Singular,
 }
 
-impl Sample {
+impl FidelitySample {
     /// Evaluates every fidelity.
-    pub fn take(model: &InverseDynamics, state: &TaskState) -> Result<Self, Skipped> {
+    pub fn take(model: &InverseDynamics, state: &TaskState) -> Result<Self, NotEvaluated> {
         if !within_stroke(model.machine(), state) {
-            return Err(Skipped::OutsideStroke);
+            return Err(NotEvaluated::OutsideStroke);
         }
         let motion = state.motion();
         let of = |fidelity| model.forces_of(fidelity, &motion).filter(|f| f.iter().all(|f| f.is_finite()));
-        let exact = of(Fidelity::Exact).ok_or(Skipped::Singular)?;
-        let mut errors = [[0.0; LEGS]; FIDELITIES];
+        let exact = of(Fidelity::Exact).ok_or(NotEvaluated::Singular)?;
+        let mut errors = [[0.0; LEGS]; FIDELITY_COUNT];
         for (errors, fidelity) in errors.iter_mut().zip(Fidelity::ALL) {
-            let forces = of(fidelity).ok_or(Skipped::Singular)?;
+            let forces = of(fidelity).ok_or(NotEvaluated::Singular)?;
             for (error, (force, exact)) in errors.iter_mut().zip(forces.iter().zip(&exact)) {
                 *error = (force - exact).abs();
             }
@@ -56,7 +56,7 @@ pub struct Errors {
 
 /// What has been seen of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tally {
+pub struct ErrorStatistics {
     /// Points with a sample.
     pub judged: u64,
     /// Points outside the actuators' stroke.
@@ -66,16 +66,16 @@ pub struct Tally {
     /// Largest exact force \[N\].
     pub peak: f64,
     /// In the order of [`Fidelity::ALL`].
-    pub errors: [Errors; FIDELITIES],
+    pub errors: [Errors; FIDELITY_COUNT],
 }
 
-impl Tally {
+impl ErrorStatistics {
     /// Takes note of one point.
-    pub fn add(&mut self, sample: &Result<Sample, Skipped>) {
+    pub fn add(&mut self, sample: &Result<FidelitySample, NotEvaluated>) {
         let sample = match sample {
             Ok(sample) => sample,
-            Err(Skipped::OutsideStroke) => return self.outside += 1,
-            Err(Skipped::Singular) => return self.singular += 1,
+            Err(NotEvaluated::OutsideStroke) => return self.outside += 1,
+            Err(NotEvaluated::Singular) => return self.singular += 1,
         };
         self.judged += 1;
         self.peak = self.peak.max(sample.peak);

@@ -33,13 +33,13 @@ use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::task::TaskState;
 
 /// Most steps of Newton's method for a payload; five are usual.
-const STEPS: usize = 50;
+const MAX_PAYLOAD_STEPS: usize = 50;
 /// Steps below this share of the payload are rounding.
-const CLOSE: f64 = 1e-12;
+const PAYLOAD_TOLERANCE: f64 = 1e-12;
 
 /// How hard the platform accelerates, in any direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+pub struct AccelerationDemand {
     /// Largest `|v'|` of C \[m/s^2\].
     pub linear: f64,
     /// Largest `|omega'|` \[rad/s^2\].
@@ -48,17 +48,17 @@ pub struct Effort {
 
 /// A machine whose poses are judged.
 #[derive(Clone, Debug)]
-pub struct Workspace {
+pub struct PoseEvaluator {
     model: InverseDynamics,
     mass: MassMatrix,
-    effort: Effort,
+    effort: AccelerationDemand,
     /// Of `det N` at home.
     home_sign: f64,
 }
 
 /// What a pose is worth.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Quality {
+pub struct PoseQuality {
     /// From the leg that is nearest to an end of its stroke; negative out of reach \[m\].
     pub stroke_margin: f64,
     /// `det N / radius^3`, positive on home's side of singular poses.
@@ -72,16 +72,16 @@ pub struct Quality {
     pub payload: f64,
 }
 
-impl Quality {
+impl PoseQuality {
     /// Within the stroke, on home's side.
     pub fn within_reach(&self) -> bool {
         self.stroke_margin >= 0.0 && self.determinant > 0.0
     }
 }
 
-impl Workspace {
+impl PoseEvaluator {
     /// Derives the constants.
-    pub fn new(machine: &Machine, effort: Effort) -> Self {
+    pub fn new(machine: &Machine, effort: AccelerationDemand) -> Self {
         let home = KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose);
         Self {
             model: InverseDynamics::new(machine),
@@ -92,16 +92,17 @@ impl Workspace {
     }
 
     /// Judges a pose.
-    pub fn quality(&self, pose: &Pose) -> Quality {
+    pub fn quality(&self, pose: &Pose) -> PoseQuality {
         let machine = self.model.machine();
         let kinematic_state = KinematicState::new(machine, *pose);
         let sensitivity = kinematic_state.sensitivity();
         let legs = self.leg_forces(pose);
-        let worst = |legs: [LegForce; LEGS]| legs.iter().map(|leg| leg.largest(0.0).0).fold(0.0, f64::max);
-        let payload = |legs: [LegForce; LEGS]| {
+        let worst =
+            |legs: [LegForceBound; LEGS]| legs.iter().map(|leg| leg.largest(0.0).0).fold(0.0, f64::max);
+        let payload = |legs: [LegForceBound; LEGS]| {
             legs.iter().map(|leg| leg.payload(machine.actuator.max_force)).fold(f64::INFINITY, f64::min)
         };
-        Quality {
+        PoseQuality {
             stroke_margin: stroke_margin(machine, &kinematic_state),
             determinant: self.home_sign * sensitivity.determinant,
             condition: sensitivity.condition,
@@ -111,7 +112,7 @@ impl Workspace {
     }
 
     /// The forces of every leg, `None` at a singular pose.
-    fn leg_forces(&self, pose: &Pose) -> Option<[LegForce; LEGS]> {
+    fn leg_forces(&self, pose: &Pose) -> Option<[LegForceBound; LEGS]> {
         let machine = self.model.machine();
         let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
         let arm = pose.rotation * machine.platform.center_of_mass;
@@ -131,10 +132,10 @@ impl Workspace {
         let row = |matrix: &Matrix6<f64>, leg: usize, first: usize| -> RowVector3<f64> {
             matrix.fixed_view::<1, 3>(leg, first).into()
         };
-        let mut legs = [LegForce::default(); LEGS];
+        let mut legs = [LegForceBound::default(); LEGS];
         for (i, (leg, (own, added))) in legs.iter_mut().zip(still.iter().zip(&still_mass)).enumerate() {
             let pair = |first| [row(&of_machine, i, first), row(&of_mass, i, first)];
-            *leg = LegForce {
+            *leg = LegForceBound {
                 friction: machine.actuator.coulomb_friction,
                 still: [*own, *added],
                 angular: pair(0).map(|row| row * self.effort.angular),
@@ -154,7 +155,7 @@ fn stroke_margin(machine: &Machine, kinematic_state: &KinematicState) -> f64 {
 
 /// The force of one leg: of the machine as it is, and of each kilogram added \[N\], \[N/kg\].
 #[derive(Clone, Copy, Debug, Default)]
-struct LegForce {
+struct LegForceBound {
     friction: f64,
     still: [f64; 2],
     /// At the effort, by direction.
@@ -162,7 +163,7 @@ struct LegForce {
     linear: [RowVector3<f64>; 2],
 }
 
-impl LegForce {
+impl LegForceBound {
     /// f(p) and its slope.
     fn largest(&self, mass: f64) -> (f64, f64) {
         let [still, added] = self.still;
@@ -190,10 +191,10 @@ impl LegForce {
         }
         // f(p) >= p growth - (f(0) - friction) + friction: here it is beyond the limit.
         let mut mass = (limit + bare - 2.0 * self.friction) / growth;
-        for _ in 0..STEPS {
+        for _ in 0..MAX_PAYLOAD_STEPS {
             let (force, slope) = self.largest(mass);
             let step = (force - limit) / slope;
-            if !(step > CLOSE * mass) {
+            if !(step > PAYLOAD_TOLERANCE * mass) {
                 break;
             }
             mass -= step;

@@ -7,7 +7,7 @@
 
 use core::f64::consts::TAU;
 
-use super::envelope::{CORNERS, Envelope, Limits};
+use super::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
@@ -16,8 +16,8 @@ use crate::model::task::TaskState;
 
 /// Half of the box before it shrinks: in position as a share of the platform's radius, in angle \[rad\].
 /// As the built-in motions.
-const POSITION_SHARE: f64 = 0.2;
-const ANGLE: f64 = 0.105;
+const POSITION_OVER_RADIUS: f64 = 0.2;
+const ANGLE_RAD: f64 = 0.105;
 
 /// The sine's frequency before it goes down \[Hz\]: about that of the built-in motions.
 const FREQUENCY_HZ: f64 = 0.5;
@@ -26,30 +26,30 @@ const FREQUENCY_HZ: f64 = 0.5;
 const USABLE_SHARE: f64 = 0.8;
 
 /// Each step takes a fifth: 40 of them reach 1e-4, and what is still too large then is nothing.
-const STEPS: i32 = 40;
+const MAX_SHRINK_STEPS: i32 = 40;
 
 /// The envelope of a machine.
-pub fn envelope(model: &InverseDynamics) -> Envelope {
+pub fn reachable_envelope(model: &InverseDynamics) -> MotionEnvelope {
     let machine = model.machine();
     let boxed = |share: f64| {
-        let nominal = nominal_box(machine);
+        let nominal = nominal_bounds(machine);
         let [pose_min, pose_max] = [nominal.pose_min, nominal.pose_max].map(|ends| ends.map(|a| a * share));
-        Limits { pose_min, pose_max, ..nominal }
+        EnvelopeBounds { pose_min, pose_max, ..nominal }
     };
     let pose = shrunk(machine, boxed, |state| within_stroke(machine, state));
     let moving = |share: f64| {
         let omega = TAU * FREQUENCY_HZ * share;
         let velocity = pose.pose_max.map(|a| a * omega);
-        Limits { velocity, acceleration: velocity.map(|v| v * omega), ..pose }
+        EnvelopeBounds { velocity, acceleration: velocity.map(|v| v * omega), ..pose }
     };
-    Envelope::new(&machine.home, shrunk(machine, moving, |state| has_reserve(model, state)))
+    MotionEnvelope::new(&machine.home, shrunk(machine, moving, |state| has_reserve(model, state)))
 }
 
 /// The box before it shrinks, at rest.
-pub fn nominal_box(machine: &Machine) -> Limits {
-    let p = POSITION_SHARE * machine.joints.radius;
-    let half = [ANGLE, ANGLE, ANGLE, p, p, p];
-    Limits { pose_min: half.map(|a| -a), pose_max: half, velocity: [0.0; 6], acceleration: [0.0; 6] }
+pub fn nominal_bounds(machine: &Machine) -> EnvelopeBounds {
+    let p = POSITION_OVER_RADIUS * machine.joints.radius;
+    let half = [ANGLE_RAD, ANGLE_RAD, ANGLE_RAD, p, p, p];
+    EnvelopeBounds { pose_min: half.map(|a| -a), pose_max: half, velocity: [0.0; 6], acceleration: [0.0; 6] }
 }
 
 /// Whether every leg is within its stroke.
@@ -59,12 +59,16 @@ pub fn within_stroke(machine: &Machine, state: &TaskState) -> bool {
 }
 
 /// The largest of a family of limits that will do at every corner; the one of size 0 if none does.
-fn shrunk(machine: &Machine, sized: impl Fn(f64) -> Limits, will_do: impl Fn(&TaskState) -> bool) -> Limits {
-    let all_corners_will = |limits: &Limits| {
-        let envelope = Envelope::new(&machine.home, *limits);
-        (0..CORNERS).all(|k| will_do(&envelope.at(&envelope.corner(k))))
+fn shrunk(
+    machine: &Machine,
+    sized: impl Fn(f64) -> EnvelopeBounds,
+    will_do: impl Fn(&TaskState) -> bool,
+) -> EnvelopeBounds {
+    let all_corners_will = |limits: &EnvelopeBounds| {
+        let envelope = MotionEnvelope::new(&machine.home, *limits);
+        (0..CORNER_COUNT).all(|k| will_do(&envelope.at(&envelope.corner(k))))
     };
-    let mut sizes = (0..STEPS).map(|step| sized(0.8_f64.powi(step)));
+    let mut sizes = (0..MAX_SHRINK_STEPS).map(|step| sized(0.8_f64.powi(step)));
     sizes.find(all_corners_will).unwrap_or_else(|| sized(0.0))
 }
 

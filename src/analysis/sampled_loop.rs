@@ -36,13 +36,13 @@
 
 /// Longest delay that is looked at, in periods: of the loops that are slow enough for more, nobody needs to
 /// know how much more.
-pub const LONGEST_DELAY: usize = 64;
+pub const MAX_DELAY_PERIODS: usize = 64;
 
 /// Coefficients of the polynomial with that delay and an observer.
-const MOST: usize = LONGEST_DELAY + 5;
+const MAX_COEFFICIENTS: usize = MAX_DELAY_PERIODS + 5;
 
 /// Halvings of an interval, down to rounding.
-const HALVINGS: u32 = 60;
+const BISECTION_STEPS: u32 = 60;
 
 /// The sampled loop of one axis, without units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +68,7 @@ impl SampledLoop {
 
     /// The characteristic polynomial, lowest coefficient first, and its degree; the commands of `after` periods
     /// are under way, the oldest for a share `f` of a period more.
-    fn characteristic(&self, after: usize, f: f64) -> ([f64; MOST], usize) {
+    fn characteristic(&self, after: usize, f: f64) -> ([f64; MAX_COEFFICIENTS], usize) {
         let h = 1.0 - f;
         let [stiffness, damping] = self.observed();
         let kp = stiffness * self.wn_t * self.wn_t / self.mass_ratio;
@@ -76,7 +76,7 @@ impl SampledLoop {
         let ki = self.observer * self.wn_t * self.wn_t * self.wn_t / self.mass_ratio;
         let [q0, q1, q2] = [0.5 * f * f, 0.5 + h * f, 0.5 * h * h];
         let [n0, n1, n2] = [kp * q0 - kd * f, kp * q1 + kd * (f - h), kp * q2 + kd * h];
-        let mut coefficients = [0.0; MOST];
+        let mut coefficients = [0.0; MAX_COEFFICIENTS];
         let mut add = |lowest: usize, terms: [f64; 4]| {
             for (sum, term) in coefficients.iter_mut().skip(lowest).zip(terms) {
                 *sum += term;
@@ -125,17 +125,17 @@ impl SampledLoop {
         self.mass_ratio * self.observer / (stiffness * damping)
     }
 
-    /// The longest delay that is stable, in periods; no longer than [`LONGEST_DELAY`]. Shorter ones are too, down
+    /// The longest delay that is stable, in periods; no longer than [`MAX_DELAY_PERIODS`]. Shorter ones are too, down
     /// to a quarter of a period; below, a strong damping term would need some.
     pub fn longest_delay(&self) -> f64 {
-        boundary(LONGEST_DELAY as f64, |delay| self.wn_t < Self { delay, ..*self }.largest_wn_t())
+        boundary(MAX_DELAY_PERIODS as f64, |delay| self.wn_t < Self { delay, ..*self }.largest_wn_t())
     }
 }
 
 /// Where what holds from 0 on ceases to, at the latest at `high`. Looks from above.
 pub fn boundary(mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let mut low = 0.0;
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTION_STEPS {
         let middle = 0.5 * (low + high);
         if holds(middle) {
             low = middle;

@@ -161,7 +161,7 @@ impl Operator {
                     };
                 }
             }
-            if stop.requested() {
+            if stop.is_requested() {
                 return Err(OperatorError::Interrupted);
             }
             if heard.elapsed() > SILENCE {

@@ -6,7 +6,7 @@
 //! Gamma_i += reflected L''_i + viscous L'_i + coulomb sign(L'_i)        the drives
 //! ```
 //!
-//! The part of `F_i` along the leg needs no balance, it is leg i's own: only the part across goes into W.
+//! The part of `F_i` along leg i is balanced by that leg's actuator alone: only the transverse part goes into W.
 //!
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
@@ -15,7 +15,9 @@ use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
 use super::factorization::{Factorization, LaneWrench, wrench_columns};
-use super::fidelity::{Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs};
+use super::fidelity::{
+    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
+};
 use super::inverse_geometry::LegGeometry;
 use super::leg::{LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, LEGS, Machine};
@@ -23,7 +25,19 @@ use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
 use super::triples::{LegLanes, Triples};
 
-/// The inverse dynamic model of one machine: its constants, ready for the lanes.
+/// Inverse dynamic model of one machine: from a motion of the platform to the six actuator forces.
+///
+/// ```
+/// use hexad::model::{active_forces::InverseDynamics, fidelity::Exact, inverse_jacobian::leg_wrenches};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let model = InverseDynamics::new(&machine);
+/// let rest = hexad::model::task::TaskState::at_rest(machine.home).motion();
+/// let forces = model.forces::<Exact>(&rest).unwrap();
+/// // At rest the legs carry at least the platform, and the rest of the weight stands on the base joints.
+/// let wrench = leg_wrenches(&machine, &rest.pose) * nalgebra::Vector6::from(forces);
+/// let lifted = -wrench.fixed_rows::<3>(3).dot(&machine.gravity.normalize());
+/// assert!(lifted > machine.platform.mass * machine.gravity.norm());
+/// ```
 #[derive(Clone, Debug)]
 pub struct InverseDynamics {
     machine: Machine,
@@ -33,26 +47,26 @@ pub struct InverseDynamics {
     drives: DriveConstants,
 }
 
-/// What the actuators have to balance: `N (Gamma - along) = wrench`.
+/// Load on the actuators of one motion: `N (Gamma - axial_forces) = wrench`.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskLoad {
     /// N, see [`super::inverse_jacobian::leg_wrenches`].
     pub leg_wrenches: Matrix6<f64>,
-    /// W without what acts along the legs, torque about C first \[N m\], \[N\].
+    /// W without the forces along the legs, torque about C first \[N m\], \[N\].
     pub wrench: Vector6<f64>,
-    /// What acts along each leg, drive included \[N\].
-    pub along: Vector6<f64>,
+    /// Load along each leg, drive included \[N\].
+    pub axial_forces: Vector6<f64>,
 }
 
 impl TaskLoad {
-    /// `W + N along`: everything the actuators have to balance, as a wrench about C \[N m\], \[N\].
+    /// `W + N axial_forces`: the whole load as a wrench about C \[N m\], \[N\].
     pub fn total(&self) -> Vector6<f64> {
-        self.wrench + self.leg_wrenches * self.along
+        self.wrench + self.leg_wrenches * self.axial_forces
     }
 }
 
 impl InverseDynamics {
-    /// Derives the constants. Not for the loop.
+    /// Derives the constants of the model. Not for the cycle: it decomposes the inertia tensor.
     pub fn new(machine: &Machine) -> Self {
         Self {
             joints: machine.joints.with_point(&machine.platform.center_of_mass),
@@ -63,13 +77,13 @@ impl InverseDynamics {
         }
     }
 
-    /// The machine it was made for.
+    /// The machine that this model describes.
     pub fn machine(&self) -> &Machine {
         &self.machine
     }
 
     /// The six actuator forces Gamma \[N\] for a motion of the platform, `None` at a singular pose.
-    pub fn forces<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
+    pub fn forces<M: ModelTerms>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
         let lane = dispatch!(self.machine.level, simd => self.balanced::<_, M>(simd, motion))?;
         Some(self.joints.triples.unpack(&lane))
     }
@@ -87,32 +101,32 @@ impl InverseDynamics {
     }
 
     /// In lanes: sorting them is left to code for any CPU, which loads one number after the other. With
-    /// AVX-512 the compiler would gather them, and a gather has to wait until what it reads is in the cache.
+    /// AVX-512 the compiler would gather them, and a gather waits until its operands are in the cache.
     #[inline(always)]
-    fn balanced<S: Simd, M: Model>(&self, simd: S, motion: &Motion) -> Option<LegLanes> {
+    fn balanced<S: Simd, M: ModelTerms>(&self, simd: S, motion: &Motion) -> Option<LegLanes> {
         let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
         let factorization = Factorization::new(simd, &self.joints, &legs);
-        let (wrench, along) = self.load::<_, M>(simd, motion, &legs);
-        factorization.forces(&legs, &wrench, along)
+        let (wrench, axial) = self.load::<_, M>(simd, motion, &legs);
+        factorization.forces(&legs, &wrench, axial)
     }
 
-    /// The load of a motion, before it is shared among the legs.
-    pub fn load_of<M: Model>(&self, motion: &Motion) -> TaskLoad {
+    /// The load of a motion, before the six forces are solved for.
+    pub fn load_of<M: ModelTerms>(&self, motion: &Motion) -> TaskLoad {
         dispatch!(self.machine.level, simd => {
             let triples = &self.joints.triples;
             let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
-            let (wrench, along) = self.load::<_, M>(simd, motion, &legs);
+            let (wrench, axial) = self.load::<_, M>(simd, motion, &legs);
             TaskLoad {
                 leg_wrenches: wrench_columns(triples, &legs),
                 wrench: wrench.sum().vector(),
-                along: triples.unpack(&along.into()).into(),
+                axial_forces: triples.unpack(&axial.into()).into(),
             }
         })
     }
 
-    /// W, and what acts along the legs.
+    /// W, and the load along the legs.
     #[inline(always)]
-    fn load<S: Simd, M: Model>(
+    fn load<S: Simd, M: ModelTerms>(
         &self,
         simd: S,
         motion: &Motion,
@@ -120,28 +134,30 @@ impl InverseDynamics {
     ) -> (LaneWrench<S>, f64x8<S>) {
         let machine = &self.machine;
         let velocity = legs.velocity(simd, &motion.twist);
-        // What the fidelity does not see is at rest.
+        // Terms that the fidelity leaves out are those of a platform at rest.
         let twist = if M::VELOCITY { motion.twist } else { Twist::default() };
         let acceleration = if M::ACCELERATION { motion.acceleration } else { Acceleration::default() };
         let map = acceleration_map(&twist, &acceleration);
         let joint_acceleration = legs.joint_acceleration(simd, &acceleration, &map);
         let reaction = LegReaction::new::<M>(simd, machine, &self.legs, legs, &velocity, joint_acceleration);
-        let mut wrench =
-            LaneWrench { torque: legs.arm.cross(reaction.across).folded(), force: reaction.across.folded() };
+        let mut wrench = LaneWrench {
+            torque: legs.arm.cross(reaction.transverse).folded(),
+            force: reaction.transverse.folded(),
+        };
         if !M::ACCELERATION {
-            return (wrench, reaction.along);
+            return (wrench, reaction.axial);
         }
         wrench.torque = wrench.torque + self.axes.torques(simd, &motion.pose.rotation, &map);
         let mut accel = legs.direction.dot(joint_acceleration);
         if M::VELOCITY {
             accel = legs.accel(&velocity, joint_acceleration);
         }
-        (wrench, reaction.along + self.drives.force(simd, velocity.rate, accel))
+        (wrench, reaction.axial + self.drives.force(simd, velocity.rate, accel))
     }
 }
 
-/// The forces of one motion, for those who need no second: a loop keeps an [`InverseDynamics`].
-pub fn inverse_dynamics<M: Model>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
+/// The six actuator forces \[N\] of one motion, with constants derived anew; for more than one keep an [`InverseDynamics`].
+pub fn inverse_dynamics<M: ModelTerms>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
     InverseDynamics::new(machine).forces::<M>(motion)
 }
 

@@ -1,4 +1,4 @@
-//! The 6 x 6 balance `N Gamma = W`, `N = [m; n]` with `m_i = b_i x n_i`, and its transpose
+//! Factorization of `N`, for the balance of forces `N Gamma = W`, `N = [m; n]` with `m_i = b_i x n_i`, and its transpose
 //! `N^T [omega; v] = L'`, by block elimination on two triples of legs, A and B.
 //!
 //! ```text
@@ -14,7 +14,7 @@
 //!
 //! Every 3 x 3 inverse is cross products of rotated lanes: two divisions in all, where an LU of the 6 x 6
 //! matrix has six one after the other. The pivoting is done in advance: [`Triples::best`] splits the legs
-//! so that A resists forces best at home. Where a pose comes too near to a singularity of A or of S (both
+//! so that A spans the largest volume at home. Where a pose comes too near to a singularity of A or of S (both
 //! determinants are at hand) LU with partial pivoting takes over: over many poses
 //! no worse than twice that method.
 
@@ -62,7 +62,7 @@ pub(super) struct Factorization<'a, S: Simd> {
     pub is_regular: bool,
 }
 
-/// A [`Factorization`] in memory, both triples' halves in one lane.
+/// A [`Factorization`] in memory, the halves of both triples in one lane.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StoredFactorization {
     /// m of A, c.
@@ -75,7 +75,7 @@ pub(super) struct StoredFactorization {
     is_regular: bool,
 }
 
-/// A wrench about C as the sum of what is in four lanes.
+/// A wrench about C as the sum of four lanes.
 pub(super) struct LaneWrench<S: Simd> {
     pub torque: Lanes3<f64x4<S>>,
     pub force: Lanes3<f64x4<S>>,
@@ -147,26 +147,26 @@ impl<'a, S: Simd> Factorization<'a, S> {
         -d_a * d_s
     }
 
-    /// `Gamma + along` with `N Gamma = W`, still in lanes; `None` at a singular pose.
+    /// `Gamma + axial` with `N Gamma = W`, still in lanes; `None` at a singular pose.
     #[inline(always)]
-    pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, along: f64x8<S>) -> Option<LegLanes> {
+    pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, axial: f64x8<S>) -> Option<LegLanes> {
         let simd = self.simd;
         let triples = &self.joints.triples;
         if !self.is_regular {
             let n = wrench_columns(triples, legs);
-            let forces = forces_by_lu(&n, &wrench.sum(), &triples.unpack(&along.into()))?;
+            let forces = forces_by_lu(&n, &wrench.sum(), &triples.unpack(&axial.into()))?;
             return Some(triples.pack(&forces));
         }
         let force = wrench.force.total();
         let g = self.inverse_a.dot(force);
-        // The lane of padding is nobody's force.
+        // The lane of padding is no leg's force.
         let g_of_legs = g * f64x4::load_array(simd, [1.0, 1.0, 1.0, 0.0]);
         let torque = wrench.torque.minus_scaled(g_of_legs, self.moment_a);
         let gamma_b = self.adjugate_s.dot(torque.total()) * self.inverse_d_s;
         let [g0, g1, g2] = broadcasts(gamma_b);
         let [x0, x1, x2] = Triple::transposed(self.x);
         let gamma_a = g - g0 * x0 - g1 * x1 - g2 * x2;
-        Some((gamma_a.combine(gamma_b) + along).into())
+        Some((gamma_a.combine(gamma_b) + axial).into())
     }
 
     /// `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
@@ -181,7 +181,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
                 |twist| LaneTwist::splat(simd, &twist),
             );
         }
-        // The lane of padding is nobody's rate.
+        // The lane of padding is no leg's rate.
         let of_legs = f64x4::load_array(simd, [1.0, 1.0, 1.0, 0.0]);
         let (r_a, r_b) = rates.split();
         let [r0, r1, r2] = broadcasts(r_a);
@@ -226,9 +226,9 @@ impl<S: Simd> LaneWrench<S> {
 /// By LU with partial pivoting.
 #[cold]
 #[inline(never)]
-fn forces_by_lu(n: &Matrix6<f64>, wrench: &Wrench, along: &[f64; LEGS]) -> Option<[f64; LEGS]> {
+fn forces_by_lu(n: &Matrix6<f64>, wrench: &Wrench, axial: &[f64; LEGS]) -> Option<[f64; LEGS]> {
     let balancing = lu::solve(&n.transpose().into(), &wrench.vector().into())?;
-    Some((Vector6::from(balancing) + Vector6::from(*along)).into())
+    Some((Vector6::from(balancing) + Vector6::from(*axial)).into())
 }
 
 /// By LU with partial pivoting.

@@ -92,15 +92,27 @@ impl<S: Simd> LegGeometry<S> {
     }
 }
 
-/// Lengths of the legs and their time derivatives: \[m\], \[m/s\], \[m/s^2\].
+/// Lengths of the six legs and their time derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LegMotion {
+    /// L \[m\]
     pub length: [f64; LEGS],
+    /// L' \[m/s\]
     pub rate: [f64; LEGS],
+    /// L'' \[m/s^2\]
     pub accel: [f64; LEGS],
 }
 
 /// Lengths, rates and accelerations of the six legs for a motion of the platform.
+///
+/// ```
+/// use hexad::model::{inverse_geometry::{leg_lengths, leg_motion}, task::TaskState};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let state = TaskState { xd: [0.1, 0.2, 0.0, 0.0, 0.3, 0.1].into(), ..TaskState::at_rest(machine.home) };
+/// // A rate is the derivative of the length.
+/// let [before, after] = [-1e-6, 1e-6].map(|dt| leg_lengths(&machine, &state.after(dt).motion().pose)[0]);
+/// assert!(((after - before) / 2e-6 - leg_motion(&machine, &state.motion()).rate[0]).abs() < 1e-8);
+/// ```
 pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
     let unpack = |lane: LegLanes| machine.joints.triples.unpack(&lane);
     dispatch!(machine.level, simd => {
@@ -116,7 +128,7 @@ pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
     })
 }
 
-/// `L_i` \[m\].
+/// Lengths `L_i` of the six legs at a pose \[m\].
 pub fn leg_lengths(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::new(simd, &machine.joints, pose);
@@ -124,7 +136,7 @@ pub fn leg_lengths(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     })
 }
 
-/// `n_i`, unit vectors from base to platform, base axes.
+/// Directions `n_i` of the six legs at a pose: unit vectors from base to platform, base axes.
 pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::new(simd, &machine.joints, pose);

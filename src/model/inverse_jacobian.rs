@@ -12,8 +12,18 @@ use super::inverse_geometry::LegGeometry;
 use super::machine::{LEGS, Machine};
 use super::rigid::{Pose, Twist};
 
-/// N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],
+/// Matrix N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],
 /// force rows below \[1\].
+///
+/// ```
+/// use hexad::model::{inverse_jacobian::{leg_wrenches, twist_from_rates}, rigid::Twist};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let (pose, twist) = (machine.home_pose(), Twist { linear: [0.0, 0.1, 0.2].into(), ..Twist::default() });
+/// // Its transpose takes a twist to leg rates, and twist_from_rates takes them back.
+/// let rates = leg_wrenches(&machine, &pose).tr_mul(&twist.vector());
+/// let found = twist_from_rates(&machine, &pose, &rates.into()).unwrap();
+/// assert!((found.vector() - twist.vector()).amax() < 1e-14);
+/// ```
 pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     dispatch!(machine.level, simd => {
         let legs = LegGeometry::new(simd, &machine.joints, pose);
@@ -29,7 +39,7 @@ pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
     singular_values.max() / singular_values.min()
 }
 
-/// N as [`condition`] judges it.
+/// The matrix whose condition is [`condition`]: N with torques about the mean of the joints over the radius.
 pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     let mut scaled = dispatch!(machine.level, simd => {
         let legs = LegGeometry::around_center(simd, &machine.joints, pose);

@@ -1,5 +1,7 @@
-//! The platform at one pose with everything that is worth computing once: its legs and the factorization of
-//! `N`. Forward kinematics ends with one; twist, forces, condition and determinant then cost no second one.
+//! The platform at one pose with its legs and the factorization of `N`, computed once.
+//!
+//! Forward kinematics ends with a kinematic state; twist, condition and determinant then need no second factorization.
+//! Legs have their arms from the mean of the joints on the platform, so that nothing depends on the choice of C.
 
 use fearless_simd::{Simd, dispatch};
 
@@ -11,7 +13,15 @@ use super::rigid::{Pose, Twist};
 use super::sensitivity::Sensitivity;
 use super::triples::LegLanes;
 
-/// One pose, its legs, its factorization.
+/// Kinematic state of the platform: a pose with its legs, the factorization of N and the sensitivity.
+///
+/// ```
+/// use hexad::model::{inverse_geometry::leg_lengths, kinematic_state::KinematicState};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let home = KinematicState::new(&machine, machine.home_pose());
+/// assert_eq!(home.lengths(&machine), leg_lengths(&machine, home.pose()));
+/// assert!(home.sensitivity().condition < 100.0, "legs hold the platform in every direction");
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct KinematicState {
     pub(super) pose: Pose,
@@ -52,7 +62,7 @@ impl StoredLegs {
 }
 
 impl KinematicState {
-    /// At a known pose.
+    /// The kinematic state at a pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
         let joints = &machine.joints;
         dispatch!(machine.level, simd => {
@@ -67,17 +77,17 @@ impl KinematicState {
         })
     }
 
-    /// Where the platform is.
+    /// The pose.
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// `L_i` \[m\].
+    /// Leg lengths `L_i` \[m\].
     pub fn lengths(&self, machine: &Machine) -> [f64; LEGS] {
         machine.joints.triples.unpack(&self.legs.length)
     }
 
-    /// How near to a singular pose.
+    /// Condition, determinant and trusted step at the pose.
     pub fn sensitivity(&self) -> &Sensitivity {
         &self.sensitivity
     }

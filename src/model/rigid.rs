@@ -4,7 +4,17 @@
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
-/// Where the platform is.
+/// Pose of the platform: orientation and position in the base frame.
+///
+/// ```
+/// use hexad::model::rigid::{Pose, Twist};
+/// use nalgebra::{Matrix3, Vector3};
+/// let start = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
+/// let step = Twist { angular: Vector3::new(0.3, -0.2, 0.1), linear: Vector3::new(0.0, 0.0, 0.5) };
+/// // displacement_to inverts displaced: a rotation vector, never a difference of angles.
+/// let back = start.displacement_to(&start.displaced(&step));
+/// assert!((back.vector() - step.vector()).amax() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// R, platform axes expressed in base axes.
@@ -13,7 +23,15 @@ pub struct Pose {
     pub position: Vector3<f64>,
 }
 
-/// How the platform moves.
+/// Twist of the platform: angular velocity, and velocity of the platform origin C.
+///
+/// ```
+/// use hexad::model::rigid::{Twist, Wrench};
+/// // Power is wrench times twist: 2 N m at 3 rad/s, and 5 N against 1 m/s.
+/// let twist = Twist { angular: [3.0, 0.0, 0.0].into(), linear: [0.0, 0.0, -1.0].into() };
+/// let wrench = Wrench { torque: [2.0, 0.0, 0.0].into(), force: [0.0, 0.0, 5.0].into() };
+/// assert_eq!(wrench.vector().dot(&twist.vector()), 1.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
     /// omega, base axes \[rad/s\].
@@ -22,7 +40,7 @@ pub struct Twist {
     pub linear: Vector3<f64>,
 }
 
-/// Time derivative of the twist, part by part.
+/// Acceleration of the platform: the time derivative of its twist, part by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Acceleration {
     /// omega', base axes \[rad/s^2\].
@@ -31,7 +49,7 @@ pub struct Acceleration {
     pub linear: Vector3<f64>,
 }
 
-/// What acts on the platform.
+/// Wrench on the platform: torque about C, and force.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
     /// Torque about C, base axes \[N m\].
@@ -40,17 +58,20 @@ pub struct Wrench {
     pub force: Vector3<f64>,
 }
 
-/// Pose, twist and acceleration at one instant.
+/// Motion of the platform at one instant: pose, twist and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
+    /// R and C.
     pub pose: Pose,
+    /// omega and v.
     pub twist: Twist,
+    /// omega' and v'.
     pub acceleration: Acceleration,
 }
 
 impl Motion {
-    /// `dt` seconds later (or earlier) if the acceleration stays as it is. The turn is about one axis: what the
-    /// axis itself turns meanwhile, `|omega x omega'| dt^3 / 12`, is left out.
+    /// `dt` seconds later (or earlier) if the acceleration stays as it is. The rotation is about one axis: the
+    /// rotation of the axis itself, `|omega x omega'| dt^3 / 12`, is left out.
     pub fn after(&self, dt: f64) -> Self {
         let (v, a) = (self.twist.vector(), self.acceleration.vector());
         Self {

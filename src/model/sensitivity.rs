@@ -1,5 +1,12 @@
-//! How near to a singular pose, for the price of a few more lanes after the factorization: condition,
-//! determinant, and how far Newton's method can be trusted.
+//! Sensitivity of a pose, from its factorization: condition, determinant, and the step for which Newton's method is
+//! proved to converge.
+//!
+//! ```text
+//! condition = |N| |N^-1|      determinant = det N / radius^3      trusted_step = h / (|K| |N^-1|),  h = 0.4
+//! ```
+//!
+//! Frobenius norms, torques about the mean of the joints and divided by the radius. Valid at every pose; at a singular one
+//! the condition is not finite and the trusted step is zero or not a number.
 
 use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
@@ -12,7 +19,7 @@ use super::lanes::Triple;
 use super::lu;
 use super::machine::{Joints, LEGS};
 
-/// How a pose answers to errors, torques and angles measured at the radius. All without units.
+/// Sensitivity of a pose to errors of leg lengths, torques and angles measured at the radius. All without units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sensitivity {
     /// Frobenius condition of N: never below the 2-norm condition and at most six times it, at a singular pose
@@ -20,11 +27,11 @@ pub struct Sensitivity {
     pub condition: f64,
     /// `det N / radius^3`: changes its sign where the platform passes a singular pose.
     pub determinant: f64,
-    /// Largest step (radian, or radius) for which Newton's method is known to find the only pose nearby.
+    /// Largest step (radian, or radius) for which Newton's method is proved to find the only pose nearby.
     pub trusted_step: f64,
 }
 
-/// The share of Kantorovich's bound that is used. His theorem: from a start with `h = B K s <= 1/2` (B norm of the
+/// Largest h of a trusted step. Kantorovich's theorem: from a start with `h = B K s <= 1/2` (B norm of the
 /// inverse Jacobian, K Lipschitz constant of the Jacobian, s size of the first step) Newton's method converges
 /// quadratically to a solution, and within the radius `(1 - sqrt(1 - 2 h)) / (B K)` there is no other. K is
 /// taken at the start; that it grows along the step costs less than the fifth that is left.
@@ -64,8 +71,8 @@ fn sum_legs<S: Simd>(v: f64x8<S>) -> f64 {
     (first + second).legs().into_iter().sum()
 }
 
-/// Square of the Frobenius norm of `N^-1`, torques divided by the radius: what a unit of wrench, in newtons
-/// at the radius, asks of the legs at most. Not finite at a singular pose.
+/// Square of the Frobenius norm of `N^-1`, torques divided by the radius: a bound on the leg forces that balance a unit
+/// wrench, in newtons at the radius. Not finite at a singular pose.
 ///
 /// ```text
 /// rows of B: torque t_j = c_j / dS               force p_j = -sum_i (t_j . m_i) a_i / dA

@@ -1,7 +1,7 @@
 //! Which leg is in which lane, and numbers per lane in memory.
 //!
 //! Eight lanes hold two triples of legs, each with a lane of padding that repeats the triple's first leg, so
-//! that it never divides by zero; nobody reads it:
+//! that it never divides by zero; it is never read:
 //!
 //! ```text
 //! lane   0    1    2    3       4    5    6    7
@@ -40,7 +40,7 @@ impl<S: Simd> From<f64x8<S>> for LegLanes {
     }
 }
 
-/// Which leg is in which lane: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
+/// Assignment of the six legs to lanes: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Triples {
     /// LegLanes of each leg.
@@ -62,8 +62,7 @@ impl Triples {
         Self { lanes: [0, 4, 5, 6, 1, 2] },
     ];
 
-    /// The split whose first triple spans the largest volume: of these directions of the legs, the three
-    /// that resist a force best go first.
+    /// The split whose first triple spans the largest volume, given the directions of the legs.
     pub fn best(directions: &[Vector3<f64>; LEGS]) -> Self {
         let volume = |triples: &Self| {
             let [x, y, z] = triples.pack_vectors(directions).map(|lane| lane.0);
@@ -104,7 +103,7 @@ impl Triples {
     /// Lanes to one number per leg.
     #[inline(always)]
     pub fn unpack(&self, lane: &LegLanes) -> [f64; LEGS] {
-        // The remainder tells the compiler that there is nothing to check.
+        // With the remainder the compiler leaves out the check of the index.
         self.lanes.map(|index| lane.0.get(index % 8).copied().unwrap_or_default())
     }
 

@@ -10,7 +10,7 @@ use nalgebra::ComplexField as _;
 
 use nalgebra::Vector6;
 
-use super::minimum_jerk::{between, rise, scaled, window};
+use super::minimum_jerk::{rise, scaled_by_profile, straight_move, window};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
@@ -21,17 +21,17 @@ use crate::model::task::TaskState;
 const FADE_S: f64 = 1.0;
 
 /// Amplitude in position as a share of the platform's radius before fitting: 0.1 m for a 0.5 m platform.
-const POSITION_SHARE: f64 = 0.2;
+const POSITION_OVER_RADIUS: f64 = 0.2;
 
 /// Amplitude in each angle before fitting \[rad\]: 6 degrees.
-const ANGLE_AMPLITUDE: f64 = 0.105;
+const ANGLE_AMPLITUDE_RAD: f64 = 0.105;
 
 /// Share of stroke, rate and force a fitted motion may use.
 const USABLE_SHARE: f64 = 0.8;
 
 /// A named motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum BuiltInMotion {
     /// Stand at home.
     Settle,
     /// Minimum-jerk moves along every axis in turn, there and back.
@@ -45,7 +45,7 @@ pub enum Motion {
     Paper,
 }
 
-impl Motion {
+impl BuiltInMotion {
     /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -60,8 +60,8 @@ impl Motion {
 
 /// A motion of a given length and size about the home pose of a machine.
 #[derive(Clone, Copy, Debug)]
-pub struct Scene {
-    pub motion: Motion,
+pub struct FittedMotion {
+    pub motion: BuiltInMotion,
     /// Duration \[s\].
     pub duration: f64,
     /// Amplitude in position \[m\] and in angle, as a share of the motion's own angles.
@@ -70,15 +70,15 @@ pub struct Scene {
     home: Vector6<f64>,
 }
 
-impl Scene {
+impl FittedMotion {
     /// X, X', X'' at `t` seconds after the start; at rest at home outside \[0, duration\].
     pub fn at(&self, t: f64) -> TaskState {
         let mut state = match self.motion {
-            Motion::Settle => TaskState::default(),
-            Motion::MinimumJerk => self.moves(t),
-            Motion::Sines => self.faded(t, &self.sines(t)),
-            Motion::Circle => self.faded(t, &self.circle(t)),
-            Motion::Paper => self.faded(t, &self.paper(t)),
+            BuiltInMotion::Settle => TaskState::default(),
+            BuiltInMotion::MinimumJerk => self.moves(t),
+            BuiltInMotion::Sines => self.faded(t, &self.sines(t)),
+            BuiltInMotion::Circle => self.faded(t, &self.circle(t)),
+            BuiltInMotion::Paper => self.faded(t, &self.paper(t)),
         };
         state.x += self.home;
         state
@@ -95,7 +95,7 @@ impl Scene {
 
     fn faded(&self, t: f64, d: &TaskState) -> TaskState {
         // A motion too short for both fades is all fade.
-        scaled(d, &window(t, self.duration, FADE_S.min(0.5 * self.duration)))
+        scaled_by_profile(d, &window(t, self.duration, FADE_S.min(0.5 * self.duration)))
     }
 
     fn amplitude(&self, angle: f64) -> Vector6<f64> {
@@ -106,7 +106,7 @@ impl Scene {
     fn sines(&self, t: f64) -> TaskState {
         // No two alike, none a multiple of another within the usual ten seconds.
         let omega = Vector6::new(0.47, 0.59, 0.71, 0.53, 0.61, 0.43) * TAU;
-        let amplitude = self.amplitude(ANGLE_AMPLITUDE);
+        let amplitude = self.amplitude(ANGLE_AMPLITUDE_RAD);
         harmonic(&amplitude, &omega, &Vector6::zeros(), t)
     }
 
@@ -130,12 +130,12 @@ impl Scene {
         let each = self.duration / 12.0;
         let number = (t / each).floor().clamp(0.0, 11.0);
         let axis = (number * 0.5).floor() as usize;
-        let away = Vector6::ith(axis.min(5), 1.0).component_mul(&self.amplitude(ANGLE_AMPLITUDE));
+        let away = Vector6::ith(axis.min(5), 1.0).component_mul(&self.amplitude(ANGLE_AMPLITUDE_RAD));
         let s = rise(t - number * each, each);
         if number % 2.0 == 0.0 {
-            between(&Vector6::zeros(), &away, &s)
+            straight_move(&Vector6::zeros(), &away, &s)
         } else {
-            between(&away, &Vector6::zeros(), &s)
+            straight_move(&away, &Vector6::zeros(), &s)
         }
     }
 }
@@ -152,11 +152,11 @@ fn harmonic(amplitude: &Vector6<f64>, omega: &Vector6<f64>, phase: &Vector6<f64>
 }
 
 /// The motion as large as its nominal size, or as large as the machine can carry it with reserve.
-pub fn fit(machine: &Machine, motion: Motion, duration: f64) -> Scene {
-    let sized = |share: f64| Scene {
+pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMotion {
+    let sized = |share: f64| FittedMotion {
         motion,
         duration,
-        position_amplitude: share * POSITION_SHARE * machine.joints.radius,
+        position_amplitude: share * POSITION_OVER_RADIUS * machine.joints.radius,
         angle_share: share,
         home: machine.home.into(),
     };
@@ -173,7 +173,7 @@ pub fn fit(machine: &Machine, motion: Motion, duration: f64) -> Scene {
 }
 
 /// Whether stroke, rates and forces keep their reserve, on a thousand samples.
-fn carries(model: &InverseDynamics, scene: &Scene) -> bool {
+fn carries(model: &InverseDynamics, scene: &FittedMotion) -> bool {
     const SAMPLES: u32 = 1000;
     let machine = model.machine();
     let actuator = &machine.actuator;

@@ -51,13 +51,13 @@ pub fn window(t: f64, end: f64, fade: f64) -> Profile {
 }
 
 /// The straight move in task coordinates along this profile.
-pub fn between(from: &Vector6<f64>, to: &Vector6<f64>, s: &Profile) -> TaskState {
+pub fn straight_move(from: &Vector6<f64>, to: &Vector6<f64>, s: &Profile) -> TaskState {
     let way = to - from;
     TaskState { x: from + way * s.value, xd: way * s.rate, xdd: way * s.accel }
 }
 
 /// `s(t) d(t)` with both derivatives, by the product rule.
-pub fn scaled(d: &TaskState, s: &Profile) -> TaskState {
+pub fn scaled_by_profile(d: &TaskState, s: &Profile) -> TaskState {
     TaskState {
         x: d.x * s.value,
         xd: d.xd * s.value + d.x * s.rate,

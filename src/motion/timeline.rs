@@ -6,7 +6,7 @@
 
 use nalgebra::Vector6;
 
-use super::minimum_jerk::{PEAK_RATE, between, rise};
+use super::minimum_jerk::{PEAK_RATE, rise, straight_move};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
@@ -39,26 +39,26 @@ impl Timeline {
     }
 
     /// With an approach of so many seconds at least.
-    pub fn no_shorter_than(self, seconds: f64) -> Self {
+    pub fn with_shortest_approach(self, seconds: f64) -> Self {
         Self { approach: self.approach.max(seconds), ..self }
     }
 
     /// Seconds from the start to the scene's first instant.
-    pub fn scene_begins(&self) -> f64 {
+    pub fn motion_start(&self) -> f64 {
         2.0 * SETTLE_S + self.approach
     }
 
     /// Seconds from the start to the end of everything.
-    pub fn ends(&self) -> f64 {
-        self.scene_begins() + self.scene + SETTLE_S
+    pub fn end(&self) -> f64 {
+        self.motion_start() + self.scene + SETTLE_S
     }
 
     /// X, X', X'' at `t`, given the scene as a function of its own time; that function is only asked
     /// within \[0, duration\].
     pub fn at(&self, t: f64, scene: impl FnOnce(f64) -> TaskState) -> TaskState {
-        let scene_time = t - self.scene_begins();
+        let scene_time = t - self.motion_start();
         if scene_time < 0.0 {
-            return between(&self.from, &self.to, &rise(t - SETTLE_S, self.approach));
+            return straight_move(&self.from, &self.to, &rise(t - SETTLE_S, self.approach));
         }
         if scene_time <= self.scene {
             return scene(scene_time);

@@ -19,7 +19,7 @@ use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 
 /// Largest element of `N^T M^-1 N` \[1/kg\] that is believed.
-const HIGHEST_MOBILITY: f64 = 1e100;
+const MAX_MOBILITY: f64 = 1e100;
 
 /// Forward dynamics of one machine.
 #[derive(Clone, Debug)]
@@ -69,7 +69,7 @@ impl ForwardDynamics {
     pub fn smallest_leg_mass(&self, pose: &Pose) -> Option<f64> {
         let mobility = self.mass.leg_mobility(pose)?;
         // The search for eigenvalues squares, and does not end where that overflows.
-        let believed = mobility.iter().all(|element| element.abs() < HIGHEST_MOBILITY);
+        let believed = mobility.iter().all(|element| element.abs() < MAX_MOBILITY);
         believed.then(|| 1.0 / mobility.symmetric_eigenvalues().max())
     }
 }

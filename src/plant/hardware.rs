@@ -1,7 +1,7 @@
 //! The simulated hardware as a controller meets it: commands go in, measured lengths and rates come out, and
 //! between them is everything that [`super::imperfections`] lists.
 
-use super::delay::{Command, Delay};
+use super::delay::{DeadTime, DriveCommand};
 use super::imperfections::{DriveErrors, Imperfections, SensorErrors};
 use super::random::Random;
 use super::simulator::Simulator;
@@ -15,7 +15,7 @@ pub struct Hardware {
     simulator: Simulator,
     drive: DriveErrors,
     sensor: SensorErrors,
-    delay: Delay,
+    delay: DeadTime,
     random: Random,
 }
 
@@ -34,7 +34,7 @@ impl Hardware {
             simulator: Simulator::imperfect(&built, deceleration, max_step, tolerance, wanted),
             drive: wanted.drive,
             sensor: wanted.sensor,
-            delay: Delay::new(wanted.drive.dead_time_ns),
+            delay: DeadTime::new(wanted.drive.dead_time_ns),
             random,
         }
     }
@@ -45,7 +45,7 @@ impl Hardware {
     }
 
     /// Lets `duration_ns` pass under a constant command.
-    pub fn advance(&mut self, duration_ns: u64, command: Command) {
+    pub fn advance(&mut self, duration_ns: u64, command: DriveCommand) {
         let command = command.map(|force| force.map(|newtons| rounded(newtons, self.drive.force_step)));
         let Self { simulator, delay, .. } = self;
         delay.pass(duration_ns, command, |nanoseconds, command| {

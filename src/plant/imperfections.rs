@@ -29,10 +29,10 @@ pub struct Imperfections {
     pub drive: DriveErrors,
     pub friction: Friction,
     /// Legs that give way; `None` if they are rigid.
-    pub leg: Option<Elastic>,
+    pub leg: Option<ElasticLeg>,
     pub sensor: SensorErrors,
     pub build: BuildErrors,
-    pub external: External,
+    pub external: ExternalWrench,
 }
 
 /// What a drive makes of a commanded force.
@@ -61,7 +61,7 @@ pub struct Friction {
 
 /// A leg that is a spring between drive and rod, with play.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Elastic {
+pub struct ElasticLeg {
     /// \[N/m\]
     pub stiffness: f64,
     /// \[N s/m\]
@@ -93,7 +93,7 @@ pub struct BuildErrors {
 
 /// What else pushes the platform: `wrench cos(2 pi frequency t)`, t since the plant was started.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct External {
+pub struct ExternalWrench {
     /// About C, base axes.
     pub wrench: Wrench,
     /// \[Hz\]; 0 if it is constant.
@@ -122,7 +122,7 @@ impl Friction {
     }
 }
 
-impl Elastic {
+impl ElasticLeg {
     /// The force that pushes drive and rod apart when the drive is `pressed` beyond the leg's length \[m\], at
     /// this rate \[m/s\]. None within the play.
     pub fn force(&self, pressed: f64, rate: f64) -> f64 {
@@ -137,7 +137,7 @@ impl Elastic {
     }
 }
 
-impl External {
+impl ExternalWrench {
     /// The wrench `time` after the start of the plant.
     pub fn at(&self, time: f64) -> Wrench {
         let phase = core::f64::consts::TAU * self.frequency_hz * time;

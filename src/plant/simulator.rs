@@ -14,8 +14,8 @@ use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;
 use super::imperfections::Imperfections;
-use super::integrator::{Drives, PlantState, WholeState, integrate};
-use super::terms::{Terms, legs};
+use super::integrator::{DriveStates, PlantState, PlatformState, integrate};
+use super::terms::{PlantTerms, legs};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::{LegMotion, leg_lengths};
@@ -41,8 +41,8 @@ pub enum Brakes {
 #[derive(Clone, Debug)]
 pub struct Simulator {
     dynamics: ForwardDynamics,
-    terms: Terms,
-    state: WholeState,
+    terms: PlantTerms,
+    state: PlantState,
     brakes: Brakes,
     deceleration: f64,
     /// What the drives push with \[N\].
@@ -71,7 +71,7 @@ impl Simulator {
         tolerance: f64,
         wanted: &Imperfections,
     ) -> Self {
-        let terms = Terms::choose(machine, wanted, max_step, tolerance);
+        let terms = PlantTerms::choose(machine, wanted, max_step, tolerance);
         let machine = terms.machine(machine);
         let home = TaskState::at_rest(machine.home).motion();
         let mut length = Vector6::from(leg_lengths(&machine, &home.pose));
@@ -81,9 +81,9 @@ impl Simulator {
         Self {
             dynamics: ForwardDynamics::new(&machine),
             terms,
-            state: WholeState {
-                platform: PlantState { pose: home.pose, twist: Twist::default() },
-                drives: Drives { length, rate: Vector6::zeros() },
+            state: PlantState {
+                platform: PlatformState { pose: home.pose, twist: Twist::default() },
+                drives: DriveStates { length, rate: Vector6::zeros() },
             },
             brakes: Brakes::Closed,
             deceleration,
@@ -93,7 +93,7 @@ impl Simulator {
     }
 
     /// Pose and twist.
-    pub fn state(&self) -> &PlantState {
+    pub fn state(&self) -> &PlatformState {
         &self.state.platform
     }
 
@@ -108,7 +108,7 @@ impl Simulator {
     }
 
     /// The terms that are evaluated.
-    pub fn terms(&self) -> &Terms {
+    pub fn terms(&self) -> &PlantTerms {
         &self.terms
     }
 
@@ -152,7 +152,7 @@ impl Simulator {
 
     fn drive(&mut self, force: &[f64; LEGS], step: f64) {
         let Self { dynamics, terms, state, push, time, .. } = &*self;
-        let accelerations = |state: &WholeState, dt: f64| {
+        let accelerations = |state: &PlantState, dt: f64| {
             terms.accelerations(dynamics, state, &terms.push(push, force, dt), time + dt)
         };
         match integrate(state, step, accelerations) {
@@ -191,13 +191,13 @@ impl Simulator {
         let elapsed = elapsed + step;
         let standing = !(elapsed < duration);
         let twist = if standing { Twist::default() } else { twist_at(elapsed, &pose) };
-        self.carry_drives(PlantState { pose, twist });
+        self.carry_drives(PlatformState { pose, twist });
         self.brakes =
             if standing { Brakes::Closed } else { Brakes::Closing { rates: *rates, elapsed, duration } };
     }
 
     /// The platform moves on; drives keep their distance from the legs.
-    fn carry_drives(&mut self, platform: PlantState) {
+    fn carry_drives(&mut self, platform: PlatformState) {
         let before = legs(self.machine(), &self.state);
         self.state.platform = platform;
         let after = legs(self.machine(), &self.state);

@@ -21,33 +21,33 @@ use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;
-use super::imperfections::{Elastic, External, Friction, Imperfections};
-use super::integrator::{Accelerations, WholeState};
+use super::imperfections::{ElasticLeg, ExternalWrench, Friction, Imperfections};
+use super::integrator::{Accelerations, PlantState};
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
 use crate::model::machine::{Actuator, LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion};
 use crate::model::task::TaskState;
 
 /// Longest step times rate, whatever the tolerance: Runge-Kutta is stable to 2.78, and 1 is also accurate.
-const LONGEST: f64 = 1.0;
+const MAX_STEP_TIMES_RATE: f64 = 1.0;
 
 /// What acts on a machine besides its model.
 #[derive(Clone, Copy, Debug)]
-pub struct Terms {
+pub struct PlantTerms {
     /// Rate of the drives' lag \[rad/s\].
     pub lag: Option<f64>,
     /// The spring, and the mass of the drive behind it \[kg\].
-    pub elastic: Option<(Elastic, f64)>,
+    pub elastic: Option<(ElasticLeg, f64)>,
     /// Step of the integration \[s\].
     pub step: f64,
     /// Where legs are rigid, what the machine does not have; else all of it.
     friction: Friction,
     /// Speed below which the sign of dry friction is proportional \[m/s\].
     smoothing: f64,
-    external: External,
+    external: ExternalWrench,
 }
 
-impl Terms {
+impl PlantTerms {
     /// Chooses terms and step, at most `longest_step`, for positions exact to `tolerance` \[m\]. A leg is elastic
     /// only where its drive has mass.
     pub fn choose(machine: &Machine, wanted: &Imperfections, longest_step: f64, tolerance: f64) -> Self {
@@ -62,10 +62,10 @@ impl Terms {
         let drive_mass = actuator.reflected_mass;
         let mut step = longest_step;
         let mut limit = |rate: f64, effect: f64, divisor: f64| {
-            step = step.min((divisor * tolerance / effect).powf(0.25).min(LONGEST) / rate);
+            step = step.min((divisor * tolerance / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
         };
 
-        let deflection = |spring: &Elastic| actuator.max_force / spring.stiffness + 0.5 * spring.backlash;
+        let deflection = |spring: &ElasticLeg| actuator.max_force / spring.stiffness + 0.5 * spring.backlash;
         let spring = wanted.leg.filter(|spring| drive_mass > 0.0 && deflection(spring) > tolerance);
         let mut friction = wanted.friction;
         let mut moved = leg_mass;
@@ -84,7 +84,7 @@ impl Terms {
             limit(rate, way(rate), 2880.0);
         }
         if friction.viscous > 0.0 {
-            step = step.min(LONGEST * moved / friction.viscous);
+            step = step.min(MAX_STEP_TIMES_RATE * moved / friction.viscous);
         }
         Self {
             lag,
@@ -120,11 +120,11 @@ impl Terms {
     pub fn accelerations(
         &self,
         dynamics: &ForwardDynamics,
-        state: &WholeState,
+        state: &PlantState,
         push: &[f64; LEGS],
         time: f64,
     ) -> Option<Accelerations> {
-        let WholeState { platform, drives } = state;
+        let PlantState { platform, drives } = state;
         let mut force = *push;
         let mut drives_accelerate = Vector6::zeros();
         if let Some((spring, drive_mass)) = self.elastic {
@@ -149,7 +149,7 @@ impl Terms {
 }
 
 /// Lengths and rates of the legs themselves.
-pub(super) fn legs(machine: &Machine, state: &WholeState) -> LegMotion {
+pub(super) fn legs(machine: &Machine, state: &PlantState) -> LegMotion {
     let (pose, twist) = (state.platform.pose, state.platform.twist);
     let motion = Motion { pose, twist, acceleration: Acceleration::default() };
     LegMotion { accel: [0.0; LEGS], ..leg_motion(machine, &motion) }

@@ -3,9 +3,9 @@
 use crate::messages::clock::monotonic_ns;
 
 /// Readings in a row, so that the two that time them do not count.
-const READINGS: u32 = 1_000;
+const READINGS_PER_ROW: u32 = 1_000;
 /// The cheapest of so many rows: the others were interrupted.
-const ROWS: u32 = 20;
+const ROW_COUNT: u32 = 20;
 
 /// Nanoseconds.
 #[derive(Clone, Copy, Debug)]
@@ -35,10 +35,10 @@ fn call() {
 fn cost_ns(read: impl Fn()) -> f64 {
     let row = |_| {
         let start_ns = monotonic_ns();
-        (0..READINGS).for_each(|_| read());
+        (0..READINGS_PER_ROW).for_each(|_| read());
         monotonic_ns() - start_ns
     };
-    (0..ROWS).map(row).min().unwrap_or_default() as f64 / f64::from(READINGS)
+    (0..ROW_COUNT).map(row).min().unwrap_or_default() as f64 / f64::from(READINGS_PER_ROW)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 
 /// What follows a cycle that was not done at its next release, or a thread that was held for whole periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OnOverrun {
+pub enum OverrunPolicy {
     /// The next point is waited for: fixed period, never a burst.
     Skip,
     /// At most so many of the points passed are run at once; those before them are skipped.
@@ -13,7 +13,7 @@ pub enum OnOverrun {
     Fault,
 }
 
-impl OnOverrun {
+impl OverrunPolicy {
     /// How many of the points left `behind` are skipped, the earliest first; the others are run at once.
     pub fn skipped(self, behind: u64) -> u64 {
         behind.saturating_sub(self.most())

@@ -18,7 +18,7 @@ pub fn stop_with_parent(parent: u32) -> bool {
 
 /// Has signals to this process handled by its other threads. Linux may choose any thread that does not
 /// refuse, and a handler calls the system.
-pub fn leave_signals_to_others() {
+pub fn block_signals() {
     // SAFETY: all-zero is a valid signal set, filled before it is read; a null pointer for the old mask is
     // allowed. Cannot fail with these arguments.
     unsafe {

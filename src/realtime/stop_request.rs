@@ -23,18 +23,18 @@ impl Stop {
     }
 
     /// Whether it is time to stop.
-    pub fn requested(&self) -> bool {
+    pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed) > 0
     }
 
     /// Whether it was said more than once: at once, then, and not in order.
-    pub fn insisted(&self) -> bool {
+    pub fn is_repeated(&self) -> bool {
         self.0.load(Ordering::Relaxed) > 1
     }
 
     /// Sleeps until a signal; for the thread that called [`Stop::on_signals`].
     pub fn wait(&self) {
-        while !self.requested() {
+        while !self.is_requested() {
             // A signal unparks at once; the time-out only guards against an unpark that came too early.
             thread::park_timeout(Duration::from_secs(1));
         }

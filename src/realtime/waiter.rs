@@ -9,10 +9,10 @@ use super::clock::Clock;
 
 /// The lead forgets a high latency with this time constant \[cycles\]: about the 99.9th percentile stays
 /// covered.
-const MEMORY: u64 = 1024;
+const LATENCY_MEMORY_CYCLES: u64 = 1024;
 
 /// From the end of a sleep to the first look at the clock, and from a look to the next \[ns\].
-const MARGIN_NS: u64 = 1_000;
+const WAKE_MARGIN_NS: u64 = 1_000;
 
 /// Waits; knows how long before an instant it has to wake.
 #[derive(Clone, Copy, Debug)]
@@ -49,12 +49,13 @@ impl Waiter {
     }
 
     fn adapt(&mut self, latency_ns: u64) {
-        let needed_ns = latency_ns + MARGIN_NS;
+        let needed_ns = latency_ns + WAKE_MARGIN_NS;
         if needed_ns > self.max_lead_ns {
             // No lead within the bound helps against this one; nothing is learned from it.
             return;
         }
-        let forgotten_ns = self.lead_ns - self.lead_ns.saturating_sub(needed_ns).div_ceil(MEMORY);
+        let forgotten_ns =
+            self.lead_ns - self.lead_ns.saturating_sub(needed_ns).div_ceil(LATENCY_MEMORY_CYCLES);
         self.lead_ns = forgotten_ns.max(needed_ns);
     }
 }

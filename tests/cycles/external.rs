@@ -11,7 +11,7 @@ use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::Monotonic;
 use hexad::realtime::cyclic::{RECORDS, Release, Timing, run};
 use hexad::realtime::exchange::exchange;
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 
 /// A drive's clock has nothing to do with ours.
 const DRIVE_BEGAN_NS: u64 = 5_000;
@@ -35,7 +35,7 @@ fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
         period_ns: DRIVE_PERIOD_NS,
         phase_ns: 0,
         release: Release::External { timeout_ns },
-        on_overrun: OnOverrun::Fault,
+        on_overrun: OverrunPolicy::Fault,
         late_wakeup_ns: 100_000_000,
     };
     let mut seen = vec![];

@@ -8,7 +8,7 @@ use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, State};
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::LARGEST_CONDITION;
+use hexad::model::forward_kinematics::MAX_CONDITION;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::rigid::{Motion, Wrench};
@@ -125,7 +125,7 @@ fn without_a_limit_the_model_ends_before_the_singular_pose() {
     for (distance, time_s, run) in runs(ANY) {
         let what = format!("{distance:e} rad, {time_s} s");
         assert_forces(&run, &what);
-        if distance > CONDITION / LARGEST_CONDITION {
+        if distance > CONDITION / MAX_CONDITION {
             assert_eq!((run.last.state, run.last.cause), (State::Active, Cause::None), "{what}");
             assert!((run.holding * distance / HOLDING_N - 1.0).abs() < 0.15, "{what}: {} N", run.holding);
             continue;
@@ -136,7 +136,7 @@ fn without_a_limit_the_model_ends_before_the_singular_pose() {
             "{what}: {:?}",
             run.last
         );
-        assert!((300.0..1.2 * LARGEST_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
+        assert!((300.0..1.2 * MAX_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
     }
 }
 

@@ -6,7 +6,7 @@ use crate::control::doubt::Aim;
 use crate::control::law::TrackingError;
 use crate::control::limits::Limiting;
 use crate::control::state::{Cause, State, Trouble};
-use crate::model::forward_kinematics::{Outcome, Tracked};
+use crate::model::forward_kinematics::{Outcome, TrackingResult};
 use crate::model::machine::LEGS;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
@@ -110,24 +110,24 @@ impl Controller {
         let before = self.tracker.kinematic_state().lengths(machine);
         let mut tracked = self.tracker.advance(machine, &measurement.length).0;
         for _ in 1..if controls { STEPS } else { 1 } {
-            if tracked == Tracked::Approaching {
+            if tracked == TrackingResult::Approaching {
                 tracked = self.tracker.advance(machine, &measurement.length).0;
             }
         }
-        if tracked != Tracked::NotConverged && self.known && self.may_have_passed(&from) {
+        if tracked != TrackingResult::NotConverged && self.known && self.may_have_passed(&from) {
             return Err(self.lost());
         }
         match tracked {
-            Tracked::Found => self.known = true,
-            Tracked::Approaching if controls => {
+            TrackingResult::Found => self.known = true,
+            TrackingResult::Approaching if controls => {
                 // All legs have come the same share of their way.
                 let way = |(now, before): (&f64, &f64)| (now - before).abs();
                 let furthest = |to: &[f64; LEGS]| to.iter().zip(&before).map(way).fold(0.0, f64::max);
                 let reached = furthest(&self.tracker.kinematic_state().lengths(machine));
                 return Err(Trouble::new(Cause::MeasurementJumped, furthest(&measurement.length), reached));
             }
-            Tracked::Approaching => return Err(Cause::FindingPose.into()),
-            Tracked::NotConverged => {
+            TrackingResult::Approaching => return Err(Cause::FindingPose.into()),
+            TrackingResult::NotConverged => {
                 if self.known && self.tracker.outcome() == Outcome::NearSingular {
                     return Err(self.lost());
                 }

@@ -5,7 +5,7 @@ use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 use nalgebra::ComplexField as _;
 use nalgebra::Matrix3;
 
-use super::{LARGEST_CONDITION, MAX_ITERATIONS, Outcome, Report};
+use super::{MAX_CONDITION, MAX_NEWTON_STEPS, NewtonReport, Outcome};
 use crate::model::factorization::{Factorization, LaneTwist};
 use crate::model::inverse_geometry::LegGeometry;
 use crate::model::kinematic_state::{KinematicState, StoredLegs};
@@ -17,10 +17,10 @@ use crate::model::sensitivity::Sensitivity;
 
 /// A step this small (radian, or radius) is the last: the legs are where the pose is, to all practical digits, and
 /// the pose, which still takes it, is so to rounding.
-const LAST_STEP: f64 = 1e-12;
+const CONVERGED_STEP: f64 = 1e-12;
 
 /// Errors of rounding that add up in a residual, about.
-const ROUNDINGS: f64 = 8.0;
+const ROUNDING_ERRORS_PER_RESIDUAL: f64 = 8.0;
 
 /// Newton's method toward some lengths.
 pub(super) struct Newton<'a, S: Simd> {
@@ -102,41 +102,41 @@ impl<'a, S: Simd> Newton<'a, S> {
         kinematic_state: &mut KinematicState,
         mut legs: LegGeometry<S>,
         mut factorization: Factorization<'a, S>,
-    ) -> Report {
+    ) -> NewtonReport {
         let Self { simd, joints, target, inverse_target } = *self;
         // Sizes are squares.
         let last = square(last_step(joints, kinematic_state));
         let linear_weight = f64x4::splat(simd, 1.0 / square(joints.radius));
         let mut at = Iterate::start(simd, joints, &kinematic_state.pose);
         let mut residual = target - legs.length;
-        let mut report = Report { outcome: Outcome::NotConverged, iterations: 0, reach: f64::NAN };
+        let mut report = NewtonReport { outcome: Outcome::NotConverged, iterations: 0, step_ratio: f64::NAN };
         // Steps become shorter: Kantorovich halves them at least.
         let mut longest = square(kinematic_state.sensitivity.trusted_step);
         loop {
-            // Of the steps with one factorization.
+            // Size of the first step with this factorization.
             let mut first = 0.0;
             let s = loop {
-                if report.iterations == MAX_ITERATIONS {
+                if report.iterations == MAX_NEWTON_STEPS {
                     return report;
                 }
                 report.iterations += 1;
                 let Some(step) = factorization.twist(&legs, residual) else {
-                    return Report { outcome: Outcome::NearSingular, ..report };
+                    return NewtonReport { outcome: Outcome::NearSingular, ..report };
                 };
                 let linear = step.linear.dot(step.linear);
                 let size = linear.mul_add(linear_weight, step.angular.dot(step.angular)).first();
                 if report.iterations == 1 {
-                    report.reach = (size / longest).sqrt();
+                    report.step_ratio = (size / longest).sqrt();
                     // Also where it is not a number.
-                    if !(report.reach <= 1.0) {
-                        return Report { outcome: Outcome::LeftTrustedRegion, ..report };
+                    if !(report.step_ratio <= 1.0) {
+                        return NewtonReport { outcome: Outcome::LeftTrustedRegion, ..report };
                     }
                 } else if !(size <= longest) {
                     return report;
                 }
                 if size <= last && report.iterations == 1 {
-                    // Already there. To move on by less than the legs follow would add up over the cycles.
-                    let sound = kinematic_state.sensitivity.condition <= LARGEST_CONDITION;
+                    // Already at the pose. Steps smaller than rounding in the legs would add up over the cycles.
+                    let sound = kinematic_state.sensitivity.condition <= MAX_CONDITION;
                     report.outcome = if sound { Outcome::Solved } else { Outcome::NearSingular };
                     return report;
                 }
@@ -167,8 +167,8 @@ impl<'a, S: Simd> Newton<'a, S> {
         self.target.mul_sub(self.target, s.dot(s)) * self.inverse_target * f64x8::splat(self.simd, 0.5)
     }
 
-    /// The last step brings the pose to the target lengths; what was left before it changes the directions of
-    /// the legs by rounding only.
+    /// Stores the last step, which brings the pose to the target lengths and changes the directions of the legs by rounding
+    /// only.
     #[inline(always)]
     fn arrive(
         &self,
@@ -184,7 +184,7 @@ impl<'a, S: Simd> Newton<'a, S> {
         let sensitivity = Sensitivity::new(simd, joints, &legs, factorization);
         // That K grows along the step could lead across, if anything could.
         let same_side = sensitivity.determinant * kinematic_state.sensitivity.determinant > 0.0;
-        if !(same_side && sensitivity.condition <= LARGEST_CONDITION) {
+        if !(same_side && sensitivity.condition <= MAX_CONDITION) {
             return Outcome::NearSingular;
         }
         kinematic_state.pose = at.pose(simd, joints);
@@ -195,11 +195,12 @@ impl<'a, S: Simd> Newton<'a, S> {
     }
 }
 
-/// [`LAST_STEP`], or what rounding makes of the differences of coordinates, whichever is larger.
+/// The larger of [`CONVERGED_STEP`] and the rounding of differences of coordinates.
 #[inline(always)]
 fn last_step(joints: &Joints, start: &KinematicState) -> f64 {
     let size = start.pose.position.norm() / joints.radius;
-    LAST_STEP.max(f64::EPSILON * ROUNDINGS * (1.0 + size) * start.sensitivity.condition)
+    CONVERGED_STEP
+        .max(f64::EPSILON * ROUNDING_ERRORS_PER_RESIDUAL * (1.0 + size) * start.sensitivity.condition)
 }
 
 fn square(x: f64) -> f64 {

@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GroupBudget {
     /// Not limited by group: no such kernel, or the root group.
-    None,
+    Unlimited,
     /// cgroup v1 \[us\] per period; with 0 every FIFO thread is refused.
-    Of { file: PathBuf, budget_us: i64 },
+    Limited { file: PathBuf, budget_us: i64 },
     /// A group of cgroup v2, which has no file for it: a kernel with such budgets gives it none.
-    Unseen { group: PathBuf },
+    Unknown { group: PathBuf },
 }
 
 impl GroupBudget {
@@ -22,12 +22,12 @@ impl GroupBudget {
         if let Some(folder) = folder(&groups, &mounts, Hierarchy::Cpu) {
             let file = folder.join("cpu.rt_runtime_us");
             let budget_us = fs::read_to_string(&file).ok().and_then(|text| text.trim().parse().ok());
-            return budget_us.map_or(Self::None, |budget_us| Self::Of { file, budget_us });
+            return budget_us.map_or(Self::Unlimited, |budget_us| Self::Limited { file, budget_us });
         }
         // The root group alone has no type.
         folder(&groups, &mounts, Hierarchy::Unified)
             .filter(|folder| folder.join("cgroup.type").exists())
-            .map_or(Self::None, |group| Self::Unseen { group })
+            .map_or(Self::Unlimited, |group| Self::Unknown { group })
     }
 }
 

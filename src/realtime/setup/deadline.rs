@@ -12,12 +12,12 @@
 use core::fmt::{self, Display, Formatter};
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use super::refusals::Step;
+use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
 
 /// Share of a period for the computing of a cycle. Many times what it takes; and with half a period of
 /// spinning before it still below the 95 % that the kernel admits.
-const COMPUTING: f64 = 0.4;
+const COMPUTING_SHARE: f64 = 0.4;
 
 /// What is asked for. The period is the cycle's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub struct Reservation {
 impl Reservation {
     /// For cycles of this period, each after a spin of at most `spin_ns`.
     pub fn new(period_ns: u64, spin_ns: u64) -> Self {
-        Self { budget_ns: spin_ns + (COMPUTING * period_ns as f64) as u64, period_ns }
+        Self { budget_ns: spin_ns + (COMPUTING_SHARE * period_ns as f64) as u64, period_ns }
     }
 }
 
@@ -41,16 +41,16 @@ impl Display for Reservation {
 }
 
 /// How often the kernel said that a budget was used up, in this process.
-static EXHAUSTED: AtomicU64 = AtomicU64::new(0);
+static BUDGET_OVERRUNS: AtomicU64 = AtomicU64::new(0);
 
 /// How often the kernel has said that the budget of a thread of this process was used up. It says so at a
 /// tick of its own that finds the thread running, so this is a lower bound.
 pub fn times_exhausted() -> u64 {
-    EXHAUSTED.load(Ordering::Relaxed)
+    BUDGET_OVERRUNS.load(Ordering::Relaxed)
 }
 
 extern "C" fn count_exhausted(_: libc::c_int) {
-    EXHAUSTED.fetch_add(1, Ordering::Relaxed);
+    BUDGET_OVERRUNS.fetch_add(1, Ordering::Relaxed);
 }
 
 /// Puts the calling thread under SCHED_DEADLINE. It can start no thread from then on.
@@ -71,7 +71,7 @@ pub fn reserve(reservation: &Reservation) -> Result<(), Shortfall> {
     if unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) } == 0 {
         return Ok(());
     }
-    Err(refusals::of(&Step::Deadline(*reservation)))
+    Err(refusals::of(&SetupStep::Deadline(*reservation)))
 }
 
 /// SIGXCPU is how the kernel says it. Left alone it would end the process.
@@ -98,7 +98,7 @@ mod tests {
 
     /// Of a thread that never sleeps, the budget's share, with as much again for what the kernel notices late:
     /// it looks at its ticks, some ms apart.
-    const MOST: f64 = 2.0 * 0.1;
+    const MAX_PROCESSOR_SHARE: f64 = 2.0 * 0.1;
 
     fn in_force() -> libc::sched_attr {
         // SAFETY: all-zero is a valid sched_attr, plain numbers.
@@ -145,7 +145,7 @@ mod tests {
         let Some(share) = reserved(Reservation { budget_ns: 2_000_000, period_ns: 20_000_000 }, spins) else {
             return;
         };
-        assert!(share < MOST, "{share} of a processor, with a tenth reserved");
+        assert!(share < MAX_PROCESSOR_SHARE, "{share} of a processor, with a tenth reserved");
         assert!(times_exhausted() > before);
     }
 

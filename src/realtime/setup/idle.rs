@@ -4,21 +4,21 @@ use std::fs::File;
 use std::io::Write;
 
 use super::permissions::open_cpu_dma_latency;
-use super::refusals::Step;
+use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
 
 /// A request to the kernel; it holds until this is dropped or the process ends, however that comes about.
 #[derive(Debug)]
-pub struct ShallowSleep(#[allow(dead_code, reason = "the request lives as long as the file is open")] File);
+pub struct PmQosRequest(#[allow(dead_code, reason = "the request lives as long as the file is open")] File);
 
 /// Asks that no processor choose an idle state that takes longer than this to wake from.
-pub fn bound_wakeup(latency_us: i32) -> Result<ShallowSleep, Shortfall> {
+pub fn limit_wakeup_latency(latency_us: i32) -> Result<PmQosRequest, Shortfall> {
     let ask = || {
         let mut file = open_cpu_dma_latency()?;
         // Four bytes are a number in the machine's own order; more would be text.
-        file.write_all(&latency_us.to_ne_bytes()).map(|()| ShallowSleep(file))
+        file.write_all(&latency_us.to_ne_bytes()).map(|()| PmQosRequest(file))
     };
-    ask().map_err(|error| refusals::explained(&Step::ShallowSleep, &error))
+    ask().map_err(|error| refusals::explained(&SetupStep::WakeupLatency, &error))
 }
 
 #[cfg(test)]
@@ -29,7 +29,7 @@ mod tests {
     #[test]
     fn what_is_asked_for_is_in_force_until_dropped() {
         const ASKED_US: i32 = 123;
-        let mut held = match bound_wakeup(ASKED_US) {
+        let mut held = match limit_wakeup_latency(ASKED_US) {
             Ok(held) => held,
             Err(shortfall) => return println!("SKIPPED, as there is {shortfall}"),
         };

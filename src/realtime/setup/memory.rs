@@ -1,27 +1,27 @@
 //! Stack, heap and locked memory: no page is met for the first time in a cycle.
 
 use super::permissions::Permissions;
-use super::refusals::Step;
+use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
 
 /// Stack touched in advance by a real-time thread: more than a cycle uses.
-const STACK_TOUCHED: usize = 128 * 1024;
+const PREFAULTED_STACK_BYTES: usize = 128 * 1024;
 
 /// Heap touched in advance by a thread that allocates while a peer connects: many times what it then uses.
-const HEAP_TOUCHED: usize = 1024 * 1024;
+const PREFAULTED_HEAP_BYTES: usize = 1024 * 1024;
 
 /// Keeps every present and future page of the process in memory.
 ///
 /// Not tried with a limit that leaves peers no room: a peer that connected later could not be served.
 pub fn lock_all() -> Result<(), Shortfall> {
-    if let Some(shortfall) = Permissions::of_this_process().against(&Step::LockedMemory) {
+    if let Some(shortfall) = Permissions::of_this_process().refusal_of(&SetupStep::LockedMemory) {
         return Err(shortfall);
     }
     // SAFETY: takes flags only; affects where pages live, not what they hold.
     if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0 {
         return Ok(());
     }
-    Err(refusals::of(&Step::LockedMemory))
+    Err(refusals::of(&SetupStep::LockedMemory))
 }
 
 /// Has the allocator keep what it once had from the kernel: freed memory is not given back, and large blocks
@@ -45,14 +45,14 @@ pub fn keep_heap() {}
 
 /// Touches heap for the calling thread; after [`keep_heap`] its allocations up to that size meet no page
 /// for the first time.
-pub fn touch_heap() {
+pub fn prefault_heap() {
     // Not zero: the kernel's own zero pages would do for that, untouched.
-    drop(core::hint::black_box(vec![1_u8; HEAP_TOUCHED]));
+    drop(core::hint::black_box(vec![1_u8; PREFAULTED_HEAP_BYTES]));
 }
 
 /// Touches the stack of the calling thread down to what a cycle may need.
 #[inline(never)]
-pub fn touch_stack() {
-    let pages = [0_u8; STACK_TOUCHED];
+pub fn prefault_stack() {
+    let pages = [0_u8; PREFAULTED_STACK_BYTES];
     core::hint::black_box(&pages);
 }

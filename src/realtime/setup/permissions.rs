@@ -12,11 +12,11 @@ const CAP_IPC_LOCK: u32 = 14;
 const CAP_SYS_NICE: u32 = 23;
 
 /// Inodes of the namespaces that the kernel begins with; see `linux/nsfs.h`.
-const FIRST_USER_NAMESPACE: &str = "user:[4026531837]";
-const FIRST_PROCESS_NAMESPACE: &str = "pid:[4026531836]";
+const INITIAL_USER_NAMESPACE: &str = "user:[4026531837]";
+const INITIAL_PID_NAMESPACE: &str = "pid:[4026531836]";
 
 /// `SECCOMP_MODE_FILTER` in `/proc/self/status`.
-const FILTERED: u64 = 2;
+const SECCOMP_MODE_FILTER: u64 = 2;
 
 /// Where the longest wake-up of idle processors is asked for.
 pub const CPU_DMA_LATENCY: &str = "/dev/cpu_dma_latency";
@@ -60,7 +60,7 @@ impl Permissions {
     /// Looks. Allocates, reads files and starts a thread.
     pub fn of_this_process() -> Self {
         let status = fs::read_to_string("/proc/thread-self/status").unwrap_or_default();
-        let user_namespace = !is_namespace("user", FIRST_USER_NAMESPACE);
+        let user_namespace = !is_namespace("user", INITIAL_USER_NAMESPACE);
         let capabilities = field(&status, "CapEff:", 16);
         let has = |bit: u32| !user_namespace && capabilities >> bit & 1 == 1;
         let limits = fs::read_to_string("/proc/self/limits").unwrap_or_default();
@@ -68,8 +68,8 @@ impl Permissions {
             sys_nice: has(CAP_SYS_NICE),
             ipc_lock: has(CAP_IPC_LOCK),
             user_namespace,
-            container: !is_namespace("pid", FIRST_PROCESS_NAMESPACE),
-            filtered: field(&status, "Seccomp:", 10) == FILTERED,
+            container: !is_namespace("pid", INITIAL_PID_NAMESPACE),
+            filtered: field(&status, "Seccomp:", 10) == SECCOMP_MODE_FILTER,
             priority_limit: limit(&limits, "Max realtime priority").unwrap_or(u64::MAX),
             locked_limit_kb: limit(&limits, "Max locked memory").map(|bytes| bytes / 1024),
             mapped_kb: field(&status, "VmSize:", 10),
