@@ -2,7 +2,8 @@
 //!
 //! Every motion fades in and out with the minimum-jerk window, so that it begins and ends at rest at
 //! home. Amplitudes follow the machine: its size first, then [`fit`] shrinks the motion until stroke, rate
-//! and force have reserve.
+//! and force have reserve at a thousand samples. Limits of a deployment and singular poses between samples are not
+//! checked here.
 
 use core::f64::consts::TAU;
 #[cfg(not(feature = "client"))]
@@ -17,7 +18,7 @@ use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 
-/// Seconds a motion takes to fade in, and out again.
+/// Time a motion takes to fade in, and out again \[s\].
 const FADE_S: f64 = 1.0;
 
 /// Amplitude in position as a share of the platform's radius before fitting: 0.1 m for a 0.5 m platform.
@@ -29,7 +30,7 @@ const ANGLE_AMPLITUDE_RAD: f64 = 0.105;
 /// Share of stroke, rate and force a fitted motion may use.
 const USABLE_SHARE: f64 = 0.8;
 
-/// A named motion.
+/// Name of a built-in motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BuiltInMotion {
     /// Stand at home.
@@ -58,14 +59,25 @@ impl BuiltInMotion {
     }
 }
 
-/// A motion of a given length and size about the home pose of a machine.
+/// Built-in motion of a given duration and size about the home pose of a machine.
+///
+/// ```
+/// use hexad::motion::built_in::{BuiltInMotion, fit};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let motion = fit(&machine, BuiltInMotion::Sines, 6.0);
+/// let (start, middle) = (motion.at(0.0), motion.at(2.7));
+/// assert_eq!((start.x, start.xd.norm()), (machine.home.into(), 0.0));
+/// assert!((middle.x - start.x).norm() > 0.01 && middle.xd.norm() > 0.01);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct FittedMotion {
+    /// Its shape.
     pub motion: BuiltInMotion,
     /// Duration \[s\].
     pub duration: f64,
-    /// Amplitude in position \[m\] and in angle, as a share of the motion's own angles.
+    /// Amplitude in position \[m\].
     pub position_amplitude: f64,
+    /// Amplitude in angle as a share of the motion's nominal angles.
     pub angle_share: f64,
     home: Vector6<f64>,
 }
@@ -84,7 +96,7 @@ impl FittedMotion {
         state
     }
 
-    /// The same with a share of its amplitude.
+    /// The same motion with a share of its amplitude.
     pub fn smaller(&self, share: f64) -> Self {
         Self {
             position_amplitude: share * self.position_amplitude,
@@ -151,7 +163,7 @@ fn harmonic(amplitude: &Vector6<f64>, omega: &Vector6<f64>, phase: &Vector6<f64>
     }
 }
 
-/// The motion as large as its nominal size, or as large as the machine can carry it with reserve.
+/// The motion at its nominal size, or shrunk until stroke, rates and forces keep a reserve of a fifth.
 pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMotion {
     let sized = |share: f64| FittedMotion {
         motion,
@@ -164,7 +176,7 @@ pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMot
     let model = InverseDynamics::new(machine);
     let mut share = 1.0;
     for _ in 0..40 {
-        if carries(&model, &sized(share)) {
+        if has_reserve(&model, &sized(share)) {
             break;
         }
         share *= 0.8;
@@ -173,14 +185,14 @@ pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMot
 }
 
 /// Whether stroke, rates and forces keep their reserve, on a thousand samples.
-fn carries(model: &InverseDynamics, scene: &FittedMotion) -> bool {
+fn has_reserve(model: &InverseDynamics, fitted: &FittedMotion) -> bool {
     const SAMPLES: u32 = 1000;
     let machine = model.machine();
     let actuator = &machine.actuator;
-    let margin = 0.5 * (1.0 - USABLE_SHARE) * (actuator.max_length - actuator.min_length);
+    let margin = 0.5 * (1.0 - USABLE_SHARE) * actuator.stroke();
     let stroke = (actuator.min_length + margin)..=(actuator.max_length - margin);
     (0..=SAMPLES).all(|k| {
-        let motion = scene.at(scene.duration * f64::from(k) / f64::from(SAMPLES)).motion();
+        let motion = fitted.at(fitted.duration * f64::from(k) / f64::from(SAMPLES)).motion();
         let legs = leg_motion(machine, &motion);
         let force = model.forces::<Exact>(&motion);
         legs.length.iter().all(|length| stroke.contains(length))

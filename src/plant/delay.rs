@@ -1,17 +1,17 @@
-//! Dead time: what is commanded now acts later, each command for as long as it stood.
+//! Dead time of the drives: each command acts later by a fixed time, for as long as it was commanded.
 
 use heapless::Deque;
 
 use crate::model::machine::LEGS;
 
-/// A force, or none.
+/// Command to the drives: six forces \[N\], or none.
 pub type DriveCommand = Option<[f64; LEGS]>;
 
 /// Most changes of the command within a dead time. A loop of 20 kHz makes 200 in the longest, 10 ms, and a
 /// plant that starts and stops between them cuts each into three.
 const MAX_QUEUED_COMMANDS: usize = 1024;
 
-/// A line of commands as long as the dead time.
+/// Queue of commands as long as the dead time.
 #[derive(Clone, Debug, Default)]
 pub struct DeadTime {
     /// Oldest first, with the time each stood or has yet to act \[ns\].
@@ -19,7 +19,7 @@ pub struct DeadTime {
 }
 
 impl DeadTime {
-    /// Nothing was commanded before the start.
+    /// A queue without a command in it.
     pub fn new(dead_time_ns: u64) -> Self {
         let mut delay = Self::default();
         if dead_time_ns > 0 {
@@ -28,7 +28,7 @@ impl DeadTime {
         delay
     }
 
-    /// Lets `duration_ns` of `command` in; what comes out at the other end goes to `act`, piece by piece.
+    /// Takes in `command` for `duration_ns` and passes the commands that leave the queue meanwhile to `act`, piece by piece.
     pub fn pass(&mut self, duration_ns: u64, command: DriveCommand, mut act: impl FnMut(u64, &DriveCommand)) {
         if self.line.is_empty() {
             return act(duration_ns, &command);

@@ -10,14 +10,16 @@ use nalgebra::{Vector3, Vector6};
 
 use crate::model::rigid::{Acceleration, Pose, Twist};
 
-/// Pose and twist of the platform.
+/// State of the platform: pose and twist.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlatformState {
+    /// R and C.
     pub pose: Pose,
+    /// omega and v.
     pub twist: Twist,
 }
 
-/// Where the drives of elastic legs are, as lengths of legs without load; not used where legs are rigid.
+/// State of the drives of elastic legs, as lengths of legs without load; not used where legs are rigid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveStates {
     /// \[m\]
@@ -26,16 +28,19 @@ pub struct DriveStates {
     pub rate: Vector6<f64>,
 }
 
-/// Everything that moves.
+/// State of the plant: platform and drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantState {
+    /// Pose and twist.
     pub platform: PlatformState,
+    /// Lengths and rates.
     pub drives: DriveStates,
 }
 
-/// What everything accelerates by.
+/// Accelerations of platform and drives.
 #[derive(Clone, Copy, Debug)]
 pub struct Accelerations {
+    /// omega' and v'.
     pub platform: Acceleration,
     /// \[m/s^2\]; zeros where legs are rigid.
     pub drives: Vector6<f64>,
@@ -49,7 +54,7 @@ struct Slope {
     drives: DriveStates,
 }
 
-/// The state `step` seconds later; `None` where the dynamics are not defined. `accelerations` gets a state and
+/// The state `step` seconds later; `None` where the dynamics are not defined. `accelerations` takes a state and
 /// its time since the start of the step.
 pub fn integrate(
     start: &PlantState,
