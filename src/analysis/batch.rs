@@ -1,6 +1,6 @@
-//! Many poses: inverse dynamics over slices, on all processors.
+//! Inverse dynamics of many motions, on all processors.
 //!
-//! For trajectories, sweeps and Monte Carlo. Motions are independent, so the cost grows linearly, and the
+//! For trajectories, sweeps and Monte Carlo. Motions are independent: the cost grows linearly, and the
 //! result does not depend on the number of processors.
 
 use indicatif::ProgressBar;
@@ -14,8 +14,8 @@ use crate::model::rigid::Motion;
 /// Motions per task: half a millisecond of work, long against the cost of handing it to a thread.
 const MOTIONS_PER_TASK: usize = 8192;
 
-/// Writes the forces of every motion \[N\] to the same place in `forces`, `None` at singular poses. The
-/// longer slice keeps its rest. The bar advances by motions.
+/// Writes the forces of every motion \[N\] to the same place in `forces`, `None` at singular poses. Elements
+/// beyond the shorter slice are left as they are. The bar advances by motions.
 pub fn forces(
     model: &InverseDynamics,
     fidelity: Fidelity,

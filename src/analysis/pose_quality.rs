@@ -1,4 +1,4 @@
-//! What a pose is worth: stroke left, condition, the force that an acceleration may ask for, the payload.
+//! PoseQuality of a pose: stroke margin, condition, largest force under given accelerations, payload.
 //!
 //! Around a pose at rest the forces are linear in the acceleration and in an added mass p, a point fixed to the
 //! platform at its centre of mass c:
@@ -16,10 +16,10 @@
 //!
 //! and each of these is attained: a row meets its own direction, and a creeping platform has Coulomb's force either way.
 //! The worst force is the largest `f_i(0)`. The payload is the smallest `p >= 0` at which an `f_i` is the actuator's
-//! limit: f is convex, so Newton's method from beyond the root comes down to it without fail. A closed form by the triangle
+//! limit: f is convex, so Newton's method from beyond the root always converges to it. A closed form by the triangle
 //! inequality would give less than the machine carries.
 //!
-//! What it does not do: velocities add forces that are not in these numbers.
+//! Valid at regular poses at rest: velocities add forces that are not included.
 
 use nalgebra::{Matrix3, Matrix6, RowVector3, Vector3, Vector6};
 
@@ -30,14 +30,13 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
-use crate::model::task::TaskState;
 
-/// Most steps of Newton's method for a payload; five are usual.
+/// Bound on the steps of Newton's method for a payload; five are usual.
 const MAX_PAYLOAD_STEPS: usize = 50;
-/// Steps below this share of the payload are rounding.
+/// Step of Newton's method, as a share of the payload, that ends it: rounding.
 const PAYLOAD_TOLERANCE: f64 = 1e-12;
 
-/// How hard the platform accelerates, in any direction.
+/// Accelerations that the platform must reach, in any direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AccelerationDemand {
     /// Largest `|v'|` of C \[m/s^2\].
@@ -46,34 +45,45 @@ pub struct AccelerationDemand {
     pub angular: f64,
 }
 
-/// A machine whose poses are judged.
+/// Evaluator of the quality of poses of one machine.
+///
+/// ```
+/// use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let [still, agile] = [0.0, 2.0].map(|linear| {
+///     PoseEvaluator::new(&machine, AccelerationDemand { linear, angular: 0.0 }).quality(&machine.home_pose())
+/// });
+/// assert!(still.within_reach() && still.condition > 1.0);
+/// // Acceleration takes force that is then missing for payload.
+/// assert!(agile.worst_force > still.worst_force && agile.payload < still.payload);
+/// ```
 #[derive(Clone, Debug)]
 pub struct PoseEvaluator {
     model: InverseDynamics,
     mass: MassMatrix,
-    effort: AccelerationDemand,
-    /// Of `det N` at home.
+    demand: AccelerationDemand,
+    /// Sign of `det N` at home.
     home_sign: f64,
 }
 
-/// What a pose is worth.
+/// PoseQuality of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseQuality {
-    /// From the leg that is nearest to an end of its stroke; negative out of reach \[m\].
+    /// Smallest distance of a leg from an end of its stroke; negative outside of it \[m\].
     pub stroke_margin: f64,
     /// `det N / radius^3`, positive on home's side of singular poses.
     pub determinant: f64,
     /// As [`crate::model::sensitivity::Sensitivity::condition`].
     pub condition: f64,
-    /// The largest force of any leg under the effort; infinite at a singular pose \[N\].
+    /// The largest force of any leg under the demanded accelerations; infinite at a singular pose \[N\].
     pub worst_force: f64,
     /// The largest point mass at the platform's centre of mass that leaves every force within the actuators'
-    /// limit under the effort; 0 if it is exceeded without, infinite where nothing weighs \[kg\].
+    /// limit under the demanded accelerations; 0 if it is exceeded without payload, infinite without gravity and acceleration \[kg\].
     pub payload: f64,
 }
 
 impl PoseQuality {
-    /// Within the stroke, on home's side.
+    /// Whether every leg is within its stroke and the pose on home's side of singular poses.
     pub fn within_reach(&self) -> bool {
         self.stroke_margin >= 0.0 && self.determinant > 0.0
     }
@@ -81,17 +91,17 @@ impl PoseQuality {
 
 impl PoseEvaluator {
     /// Derives the constants.
-    pub fn new(machine: &Machine, effort: AccelerationDemand) -> Self {
-        let home = KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose);
+    pub fn new(machine: &Machine, demand: AccelerationDemand) -> Self {
+        let home = KinematicState::new(machine, machine.home_pose());
         Self {
             model: InverseDynamics::new(machine),
             mass: MassMatrix::new(machine),
-            effort,
+            demand,
             home_sign: home.sensitivity().determinant.signum(),
         }
     }
 
-    /// Judges a pose.
+    /// The quality of a pose.
     pub fn quality(&self, pose: &Pose) -> PoseQuality {
         let machine = self.model.machine();
         let kinematic_state = KinematicState::new(machine, *pose);
@@ -103,7 +113,11 @@ impl PoseEvaluator {
             legs.iter().map(|leg| leg.payload(machine.actuator.max_force)).fold(f64::INFINITY, f64::min)
         };
         PoseQuality {
-            stroke_margin: stroke_margin(machine, &kinematic_state),
+            stroke_margin: kinematic_state
+                .lengths(machine)
+                .map(|length| machine.actuator.margin(length))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min),
             determinant: self.home_sign * sensitivity.determinant,
             condition: sensitivity.condition,
             worst_force: legs.map_or(f64::INFINITY, worst),
@@ -138,27 +152,20 @@ impl PoseEvaluator {
             *leg = LegForceBound {
                 friction: machine.actuator.coulomb_friction,
                 still: [*own, *added],
-                angular: pair(0).map(|row| row * self.effort.angular),
-                linear: pair(3).map(|row| row * self.effort.linear),
+                angular: pair(0).map(|row| row * self.demand.angular),
+                linear: pair(3).map(|row| row * self.demand.linear),
             };
         }
         Some(legs)
     }
 }
 
-/// How far the leg that is nearest to an end of its stroke is from it \[m\].
-fn stroke_margin(machine: &Machine, kinematic_state: &KinematicState) -> f64 {
-    let actuator = &machine.actuator;
-    let margin = |length: f64| (length - actuator.min_length).min(actuator.max_length - length);
-    kinematic_state.lengths(machine).into_iter().map(margin).fold(f64::INFINITY, f64::min)
-}
-
-/// The force of one leg: of the machine as it is, and of each kilogram added \[N\], \[N/kg\].
+/// Bound on the force of one leg: of the machine without payload, and per kilogram of payload \[N\], \[N/kg\].
 #[derive(Clone, Copy, Debug, Default)]
 struct LegForceBound {
     friction: f64,
     still: [f64; 2],
-    /// At the effort, by direction.
+    /// Under the demanded accelerations, by direction.
     angular: [RowVector3<f64>; 2],
     linear: [RowVector3<f64>; 2],
 }

@@ -1,34 +1,34 @@
-//! The envelope of a machine about which nothing else is known: as large as it can carry with reserve.
+//! Default envelope of a machine: as large as stroke, rates and forces allow with reserve.
 //!
 //! The box of the pose starts at a nominal size and shrinks until all of its corners are within the stroke;
 //! then the frequency of a sine through that box, which gives velocity `w a` and acceleration `w^2 a`,
-//! goes down until rates and forces have reserve at every corner of the envelope. Whatever the
-//! machine, the result is an envelope it can reach; for one without any room it is home alone, at rest.
+//! goes down until rates and forces have reserve at every corner of the envelope. Every
+//! machine reaches the result; for one without any stroke left it is home alone, at rest. Corners are checked, not the
+//! inside.
 
 use core::f64::consts::TAU;
 
 use super::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
-use crate::model::inverse_geometry::leg_motion;
+use crate::model::inverse_geometry::{leg_lengths, leg_motion};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 
-/// Half of the box before it shrinks: in position as a share of the platform's radius, in angle \[rad\].
-/// As the built-in motions.
+/// Half of the box before it shrinks, as the built-in motions: in position as a share of the platform's radius, in angle.
 const POSITION_OVER_RADIUS: f64 = 0.2;
 const ANGLE_RAD: f64 = 0.105;
 
-/// The sine's frequency before it goes down \[Hz\]: about that of the built-in motions.
+/// First frequency of the sine \[Hz\]: about that of the built-in motions.
 const FREQUENCY_HZ: f64 = 0.5;
 
-/// Share of rate and force to be used.
+/// Share of the limits of rate and force that the envelope uses.
 const USABLE_SHARE: f64 = 0.8;
 
-/// Each step takes a fifth: 40 of them reach 1e-4, and what is still too large then is nothing.
+/// Each step shrinks by a fifth: 40 of them reach 1e-4 of the size, and a box still too large then counts as empty.
 const MAX_SHRINK_STEPS: i32 = 40;
 
-/// The envelope of a machine.
+/// The default envelope of a machine.
 pub fn reachable_envelope(model: &InverseDynamics) -> MotionEnvelope {
     let machine = model.machine();
     let boxed = |share: f64| {
@@ -45,31 +45,30 @@ pub fn reachable_envelope(model: &InverseDynamics) -> MotionEnvelope {
     MotionEnvelope::new(&machine.home, shrunk(machine, moving, |state| has_reserve(model, state)))
 }
 
-/// The box before it shrinks, at rest.
+/// Bounds of the box before it shrinks, at rest.
 pub fn nominal_bounds(machine: &Machine) -> EnvelopeBounds {
     let p = POSITION_OVER_RADIUS * machine.joints.radius;
     let half = [ANGLE_RAD, ANGLE_RAD, ANGLE_RAD, p, p, p];
     EnvelopeBounds { pose_min: half.map(|a| -a), pose_max: half, velocity: [0.0; 6], acceleration: [0.0; 6] }
 }
 
-/// Whether every leg is within its stroke.
+/// Whether every leg is within its stroke at a state.
 pub fn within_stroke(machine: &Machine, state: &TaskState) -> bool {
-    let stroke = machine.actuator.min_length..=machine.actuator.max_length;
-    leg_motion(machine, &state.motion()).length.iter().all(|length| stroke.contains(length))
+    leg_lengths(machine, &state.motion().pose).iter().all(|length| machine.actuator.contains(*length))
 }
 
-/// The largest of a family of limits that will do at every corner; the one of size 0 if none does.
+/// The largest of a family of bounds that is feasible at every corner; the one of size 0 if none is.
 fn shrunk(
     machine: &Machine,
     sized: impl Fn(f64) -> EnvelopeBounds,
-    will_do: impl Fn(&TaskState) -> bool,
+    is_feasible: impl Fn(&TaskState) -> bool,
 ) -> EnvelopeBounds {
-    let all_corners_will = |limits: &EnvelopeBounds| {
+    let is_feasible_at_all_corners = |limits: &EnvelopeBounds| {
         let envelope = MotionEnvelope::new(&machine.home, *limits);
-        (0..CORNER_COUNT).all(|k| will_do(&envelope.at(&envelope.corner(k))))
+        (0..CORNER_COUNT).all(|k| is_feasible(&envelope.at(&envelope.corner(k))))
     };
     let mut sizes = (0..MAX_SHRINK_STEPS).map(|step| sized(0.8_f64.powi(step)));
-    sizes.find(all_corners_will).unwrap_or_else(|| sized(0.0))
+    sizes.find(is_feasible_at_all_corners).unwrap_or_else(|| sized(0.0))
 }
 
 /// Whether rates and forces keep their reserve.

@@ -49,7 +49,7 @@ pub struct Advice {
     scene: String,
     /// Of an actuator \[N\].
     max_force: f64,
-    judgement: FidelityComparison,
+    comparison: FidelityComparison,
     /// Median time of an evaluation, in the order of [`Fidelity::ALL`] \[ns\].
     times: [f64; FIDELITY_COUNT],
     tolerance: f64,
@@ -59,7 +59,7 @@ impl Advice {
     /// Judges the configured envelope, or a trajectory.
     pub fn new(config: &Config, trajectory: Option<&Path>) -> Result<Self, AdviseError> {
         let model = InverseDynamics::new(&config.machine);
-        let (scene, judgement, motions) = match trajectory {
+        let (scene, comparison, motions) = match trajectory {
             Some(path) => judge_trajectory(&model, path)?,
             None => judge_envelope(config, &model),
         };
@@ -67,7 +67,7 @@ impl Advice {
             name: config.name.clone(),
             scene,
             max_force: config.machine.actuator.max_force,
-            judgement,
+            comparison,
             times: time(&model, &motions),
             tolerance: config.deployment.control.fidelity_tolerance,
         })
@@ -79,8 +79,8 @@ impl Advice {
             let times = Fidelity::ALL.into_iter().zip(self.times);
             times.filter(|(timed, _)| *timed == fidelity).map(|(_, time)| time).sum::<f64>()
         };
-        let first = self.judgement.choice(self.tolerance);
-        let allowed = self.judgement.within(self.tolerance).map(|error| error.fidelity);
+        let first = self.comparison.choice(self.tolerance);
+        let allowed = self.comparison.within(self.tolerance).map(|error| error.fidelity);
         allowed.filter(|fidelity| fidelity.has_inertia()).fold(first, |best, fidelity| {
             if time(fidelity) < (1.0 - QUICKER) * time(best) { fidelity } else { best }
         })
@@ -89,17 +89,17 @@ impl Advice {
 
 fn judge_envelope(config: &Config, model: &InverseDynamics) -> (String, FidelityComparison, Vec<Motion>) {
     let envelope = envelope(config, model);
-    let judgement = FidelityComparison::of_envelope(model, &envelope);
+    let comparison = FidelityComparison::of_envelope(model, &envelope);
     let origin = if config.deployment.envelope.is_some() {
         "its [envelope]"
     } else {
         "an envelope derived from the machine"
     };
-    let points = judgement.all.judged - judgement.inside.judged;
+    let points = comparison.all.evaluated - comparison.inside.evaluated;
     let scene = format!(
         "{origin}:\n{}{} motions spread over the inside, {points} of {CORNER_COUNT} at corners, and a climb from the worst of them",
-        limits(envelope.limits()),
-        judgement.inside.judged
+        limits(envelope.bounds()),
+        comparison.inside.evaluated
     );
     let within =
         |k| Some(envelope.at(&MotionEnvelope::spread(k))).filter(|s| FidelitySample::take(model, s).is_ok());
@@ -108,7 +108,7 @@ fn judge_envelope(config: &Config, model: &InverseDynamics) -> (String, Fidelity
     if motions.is_empty() {
         motions.push(envelope.at(&envelope.rest()).motion());
     }
-    (scene, judgement, motions)
+    (scene, comparison, motions)
 }
 
 /// The ranges, as motion bases are specified.
@@ -157,11 +157,11 @@ fn judge_trajectory(
         bar.set_draw_target(ProgressDrawTarget::hidden());
         bar.finish_and_clear();
     }
-    if tally.judged == 0 {
+    if tally.evaluated == 0 {
         let ErrorStatistics { outside, singular, .. } = tally;
         return Err(AdviseError::NothingJudged { path: path.into(), outside, singular });
     }
-    let scene = format!("the rows of {}:\n{} motions", path.display(), tally.judged);
+    let scene = format!("the rows of {}:\n{} motions", path.display(), tally.evaluated);
     Ok((scene, FidelityComparison::of_rows(tally), motions))
 }
 
@@ -185,8 +185,8 @@ fn time(model: &InverseDynamics, motions: &[Motion]) -> [f64; FIDELITY_COUNT] {
 
 impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, scene, max_force, judgement, times, tolerance } = self;
-        let (inside, all) = (&judgement.inside, &judgement.all);
+        let Self { name, scene, max_force, comparison, times, tolerance } = self;
+        let (inside, all) = (&comparison.inside, &comparison.all);
         writeln!(f, "{name} over {scene}")?;
         for (count, what) in
             [(all.outside, "outside the actuators' stroke"), (all.singular, "at singular poses")]
@@ -205,7 +205,7 @@ impl fmt::Display for Advice {
         writeln!(f, "\n\n{:<14} {:^26} {:>24}", "", "error of a leg's force [N]", "share of the peak [%]")?;
         let numbers = ["mean", "RMS", "max", "mean", "RMS", "max"].map(|what| format!("{what:>8}")).join(" ");
         writeln!(f, "{:<14} {numbers} {:>5}  leaves out", "fidelity", "ns")?;
-        for (error, time) in judgement.errors.iter().zip(times) {
+        for (error, time) in comparison.errors.iter().zip(times) {
             let share = |error: f64| if error == 0.0 { 0.0 } else { 100.0 * error / inside.peak };
             let [mean, rms, max] = [error.mean, error.rms, error.max].map(significant);
             let shares = [share(error.mean), share(error.rms), 100.0 * error.share].map(significant);
@@ -225,8 +225,8 @@ impl Advice {
     fn fmt_recommendation(&self, f: &mut fmt::Formatter<'_>, tolerance: &str) -> fmt::Result {
         let choice = self.choice();
         writeln!(f, "\nrecommended: fidelity = \"{}\", at a tolerance of {tolerance}", choice.name())?;
-        let kept: Vec<_> = self.judgement.errors.iter().filter(|error| error.fidelity != choice).collect();
-        for error in &self.judgement.errors {
+        let kept: Vec<_> = self.comparison.errors.iter().filter(|error| error.fidelity != choice).collect();
+        for error in &self.comparison.errors {
             if error.fidelity == choice && choice != Fidelity::Exact {
                 let (what, max, share) =
                     (choice.left_out_terms(), significant(error.max), percent(error.share));
@@ -234,7 +234,7 @@ impl Advice {
             }
         }
         let within = |fidelity: Fidelity| {
-            self.judgement.within(self.tolerance).any(|error| error.fidelity == fidelity)
+            self.comparison.within(self.tolerance).any(|error| error.fidelity == fidelity)
         };
         for error in kept.into_iter().rev().filter(|error| !within(error.fidelity)) {
             let (what, share) = (error.fidelity.left_out_terms(), percent(error.share));

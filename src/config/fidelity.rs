@@ -34,22 +34,22 @@ pub fn fidelity(config: &Config) -> Fidelity {
         }
         FidelityChoice::Auto => {
             let model = InverseDynamics::new(&config.machine);
-            let judgement = FidelityComparison::of_envelope(&model, &envelope(config, &model));
-            let fidelity = judgement.choice(tolerance);
-            info!(fidelity = fidelity.name(), "fidelity: {}", reason(&judgement, tolerance));
+            let comparison = FidelityComparison::of_envelope(&model, &envelope(config, &model));
+            let fidelity = comparison.choice(tolerance);
+            info!(fidelity = fidelity.name(), "fidelity: {}", reason(&comparison, tolerance));
             fidelity
         }
     }
 }
 
-/// Why a judgement leads to its choice.
-pub fn reason(judgement: &FidelityComparison, tolerance: f64) -> String {
+/// Why a comparison leads to its choice.
+pub fn reason(comparison: &FidelityComparison, tolerance: f64) -> String {
     use core::fmt::Write as _;
-    let chosen = judgement.choice(tolerance);
+    let chosen = comparison.choice(tolerance);
     let tolerance = plain_percent(tolerance);
     let mut text = String::new();
     // A String takes all.
-    for error in judgement.errors.iter().rev() {
+    for error in comparison.errors.iter().rev() {
         let (what, share) = (error.fidelity.left_out_terms(), percent(error.share));
         let _ = match error.fidelity {
             fidelity if fidelity == chosen && fidelity == Fidelity::Exact => {

@@ -55,20 +55,20 @@ fn dense(scene: &Scene) -> [ErrorStatistics; 2] {
 fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
     let mut choices = vec![];
     for scene in scenes() {
-        let judgement = FidelityComparison::of_envelope(&scene.model, &scene.envelope);
+        let comparison = FidelityComparison::of_envelope(&scene.model, &scene.envelope);
         let [inside, corners] = dense(&scene);
-        assert!(inside.judged > u64::from(DENSE) / 10, "{}: {inside:?}", scene.name);
+        assert!(inside.evaluated > u64::from(DENSE) / 10, "{}: {inside:?}", scene.name);
         // 1e-9 to 1, ten to a decade.
         for step in 0..=90 {
             let tolerance = 10_f64.powf(-0.1 * f64::from(step));
-            let choice = judgement.choice(tolerance);
+            let choice = comparison.choice(tolerance);
             let number = Fidelity::ALL.iter().position(|fidelity| *fidelity == choice).unwrap();
             // In each set against its own peak: whoever looks at one alone must find it so.
             for (what, seen) in [("inside", &inside), ("corners", &corners)] {
                 let share = seen.errors[number].max / seen.peak;
                 let name = &scene.name;
                 assert!(
-                    seen.judged == 0 || share <= 1.1 * tolerance,
+                    seen.evaluated == 0 || share <= 1.1 * tolerance,
                     "{name}, {what}: {choice:?} is off by {share:.3e} for {tolerance:.3e}"
                 );
             }
@@ -84,13 +84,13 @@ fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
 #[test]
 fn the_worst_that_is_reported_exists() {
     for scene in scenes() {
-        let judgement = FidelityComparison::of_envelope(&scene.model, &scene.envelope);
+        let comparison = FidelityComparison::of_envelope(&scene.model, &scene.envelope);
         if ["wide", "moog", "camera"].iter().any(|kind| scene.name.ends_with(kind)) {
             continue;
         }
-        assert_eq!(judgement.all.outside, 0, "{}", scene.name);
+        assert_eq!(comparison.all.outside, 0, "{}", scene.name);
         let [inside, corners] = dense(&scene);
-        for ((error, inside), corners) in judgement.errors.iter().zip(&inside.errors).zip(&corners.errors) {
+        for ((error, inside), corners) in comparison.errors.iter().zip(&inside.errors).zip(&corners.errors) {
             let (seen, name) = (inside.max.max(corners.max), &scene.name);
             assert!(seen >= 0.95 * error.max, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max);
             assert!(seen <= 1.05 * error.max, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max);
@@ -102,11 +102,11 @@ fn the_worst_that_is_reported_exists() {
 fn what_is_out_of_reach_is_counted_and_passed_over() {
     let scenes = scenes();
     let moog = scenes.iter().find(|scene| scene.name == "motion_base moog").unwrap();
-    let judgement = FidelityComparison::of_envelope(&moog.model, &moog.envelope);
-    assert!(judgement.all.outside > 1000 && judgement.all.judged > 32_768, "{:?}", judgement.all);
+    let comparison = FidelityComparison::of_envelope(&moog.model, &moog.envelope);
+    assert!(comparison.all.outside > 1000 && comparison.all.evaluated > 32_768, "{:?}", comparison.all);
     let own = FidelityComparison::of_envelope(&scenes[0].model, &scenes[0].envelope);
     assert_eq!((own.all.outside, own.all.singular), (0, 0));
-    assert_eq!(own.all.judged, 32_768 + u64::from(CORNER_COUNT));
+    assert_eq!(own.all.evaluated, 32_768 + u64::from(CORNER_COUNT));
 }
 
 #[test]
@@ -116,8 +116,8 @@ fn every_machine_has_an_envelope_of_its_own() {
         let envelope_of =
             |machine: &Machine| reachable_envelope::reachable_envelope(&InverseDynamics::new(machine));
         let full = envelope_of(&machine);
-        assert!(full.limits().pose_max.iter().all(|x| *x > 0.0), "{name}: {full:?}");
-        assert!(full.limits().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
+        assert!(full.bounds().pose_max.iter().all(|x| *x > 0.0), "{name}: {full:?}");
+        assert!(full.bounds().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
         for k in 0..CORNER_COUNT {
             let sample = FidelitySample::take(&InverseDynamics::new(&machine), &full.at(&full.corner(k)));
             assert!(sample.is_ok_and(|s| s.peak < 0.8 * machine.actuator.max_force), "{name}, corner {k}");
@@ -130,18 +130,18 @@ fn every_machine_has_an_envelope_of_its_own() {
         }
         // Too weak to hold itself, or without room: it stays at home, and still there is a choice.
         machine.actuator.max_force = 1e-3;
-        assert_eq!(envelope_of(&machine).limits().velocity, [0.0; 6]);
+        assert_eq!(envelope_of(&machine).bounds().velocity, [0.0; 6]);
         let length = leg_lengths(&machine, &full.at(&full.rest()).motion().pose);
         machine.actuator.max_length = length.iter().copied().fold(0.0, f64::max);
         let none = envelope_of(&machine);
-        assert_eq!(none.limits().pose_max, [0.0; 6], "{name}");
-        let judgement = FidelityComparison::of_envelope(&InverseDynamics::new(&machine), &none);
-        assert!(judgement.all.judged > 0, "{name}");
+        assert_eq!(none.bounds().pose_max, [0.0; 6], "{name}");
+        let comparison = FidelityComparison::of_envelope(&InverseDynamics::new(&machine), &none);
+        assert!(comparison.all.evaluated > 0, "{name}");
         assert!(
-            judgement.choice(0.0) as u8 >= Fidelity::NoVelocity as u8,
+            comparison.choice(0.0) as u8 >= Fidelity::NoVelocity as u8,
             "{name}: {:?}",
-            judgement.choice(0.0)
+            comparison.choice(0.0)
         );
-        assert_eq!(none, MotionEnvelope::new(&machine.home, *none.limits()));
+        assert_eq!(none, MotionEnvelope::new(&machine.home, *none.bounds()));
     }
 }

@@ -51,7 +51,7 @@ pub fn scenes() -> Vec<Scene> {
     for name in ["fried2008", "motion_base", "tsai2000", "telescope"] {
         let machine = machine(name);
         let model = InverseDynamics::new(&machine);
-        let own = *reachable_envelope::reachable_envelope(&model).limits();
+        let own = *reachable_envelope::reachable_envelope(&model).bounds();
         let faster = |share: f64| EnvelopeBounds {
             velocity: own.velocity.map(|v| v * share),
             acceleration: own.acceleration.map(|a| a * share * share),

@@ -78,7 +78,7 @@ fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
             let bad = (0..SAMPLES).find(|k| !is_fine(&config, &of_ball(machine, *k, found.guaranteed, turn)));
             assert_eq!(bad, None, "{name}: {found:?}");
             // C comes as far along a leg as that leg has stroke left: that is the ball of an orientation.
-            let (size, obstacle) = found.obstacle.unwrap();
+            let (size, obstacle) = found.violation.unwrap();
             let least = (0..SAMPLES).map(|k| margin(machine, &of_ball(machine, 2 * k, 0.0, turn)));
             let least = least.fold(f64::INFINITY, f64::min);
             match obstacle {
@@ -96,7 +96,7 @@ fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
         println!("{name}, box: {found:?}");
         let fine = |size: f64| (0..SAMPLES).find(|k| !is_fine(&config, &of_box(machine, *k, size)));
         assert_eq!(fine(found.guaranteed), None, "{name}: {found:?}");
-        assert!(fine(1.02 * found.obstacle.unwrap().0).is_some(), "{name}: {found:?}");
+        assert!(fine(1.02 * found.violation.unwrap().0).is_some(), "{name}: {found:?}");
     }
 }
 
@@ -113,7 +113,7 @@ fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
         ];
         for shape in shapes {
             let found = found(&config, &shape);
-            let (size, _) = found.obstacle.unwrap();
+            let (size, _) = found.violation.unwrap();
             assert!(
                 found.guaranteed <= size && found.guaranteed > 0.95 * size,
                 "{name}, {shape:?}: {found:?}"
@@ -127,7 +127,7 @@ fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
 fn a_turn_that_home_has_no_room_for_has_no_ball() {
     let config = Config::load(&data("telescope", "toml")).unwrap();
     let none = found(&config, &RegionShape::Ball { turn: TURN });
-    let (size, obstacle) = none.obstacle.unwrap();
+    let (size, obstacle) = none.violation.unwrap();
     assert!(none.guaranteed == 0.0 && size <= 0.0, "{none:?}");
     assert!(matches!(obstacle, WorkspaceLimit::LegTooShort(_) | WorkspaceLimit::LegTooLong(_)), "{none:?}");
 }
@@ -144,7 +144,7 @@ fn a_singular_surface_between_samples_is_found() {
     let mut high = [0.0; 6];
     high[2] = 1_f64.to_radians();
     let found = found(&config, &RegionShape::Box { low: high.map(|x| -x), high });
-    let (size, obstacle) = found.obstacle.unwrap();
+    let (size, obstacle) = found.violation.unwrap();
     assert!(matches!(obstacle, WorkspaceLimit::Singular | WorkspaceLimit::Condition), "{found:?}");
     assert!((size - 10.0).abs() < 1e-2, "{found:?}");
     assert!(found.guaranteed > 9.9 && found.guaranteed < 10.0, "{found:?}");

@@ -78,7 +78,7 @@ impl Survey {
         let largest_condition = deployment.limits.condition;
         let clearance = Clearance::new(machine, largest_condition);
         let through = wish.through.unwrap_or(machine.home);
-        if let Some(obstacle) = clearance.obstacle_at(&TaskState::at_rest(through).motion().pose) {
+        if let Some(obstacle) = clearance.violation_at(&TaskState::at_rest(through).motion().pose) {
             let reason =
                 format!("must be a pose the platform can take: {}", Reason(obstacle, largest_condition));
             return Err(WorkspaceError::Through { x: through, reason });
@@ -243,7 +243,7 @@ impl Survey {
                 if k < 2 { format!("{} mm", significant(1e3 * size)) } else { significant(size) }
             };
             write!(f, "{name:<45}{:>10}", size(found.guaranteed))?;
-            match found.obstacle {
+            match found.violation {
                 Some((at, obstacle)) if at <= 0.0 => {
                     writeln!(f, "; without going anywhere {}", Reason(obstacle, self.largest_condition))?;
                 }
