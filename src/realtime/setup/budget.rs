@@ -3,19 +3,27 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What the cgroup of this process leaves to FIFO threads.
+/// Real-time budget of the cgroup of this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GroupBudget {
     /// Not limited by group: no such kernel, or the root group.
     Unlimited,
     /// cgroup v1 \[us\] per period; with 0 every FIFO thread is refused.
-    Limited { file: PathBuf, budget_us: i64 },
+    Limited {
+        /// The file that sets it.
+        file: PathBuf,
+        /// Per period.
+        budget_us: i64,
+    },
     /// A group of cgroup v2, which has no file for it: a kernel with such budgets gives it none.
-    Unknown { group: PathBuf },
+    Unknown {
+        /// Its folder.
+        group: PathBuf,
+    },
 }
 
 impl GroupBudget {
-    /// Of the cgroup of this process.
+    /// Reads the budget of this process' cgroup.
     pub fn of_this_process() -> Self {
         let [groups, mounts] = ["/proc/self/cgroup", "/proc/self/mountinfo"]
             .map(|path| fs::read_to_string(path).unwrap_or_default());

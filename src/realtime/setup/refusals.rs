@@ -1,7 +1,6 @@
-//! Explanation a step is refused, and what cures that.
+//! Reason and remedy of every set-up step that the kernel refuses.
 //!
-//! The reasons are looked for in the order in which the kernel checks them, so that who follows a remedy
-//! gets one step further each time.
+//! Reasons are checked in the order in which the kernel checks them, so that each remedy leads one check further.
 
 use core::fmt::{self, Display, Formatter};
 use std::fs;
@@ -48,7 +47,7 @@ impl Display for SetupStep {
 type Explanation = (String, String);
 
 impl Permissions {
-    /// What stands against a step; `None` if nothing does that can be seen.
+    /// The refusal to expect for a step; `None` if the permissions suffice.
     pub fn refusal_of(&self, step: &SetupStep) -> Option<Shortfall> {
         let why = match step {
             SetupStep::Fifo(priority) => self.why_no_fifo(*priority),
@@ -149,7 +148,7 @@ impl Permissions {
                 format!("{CPU_DMA_LATENCY} is {}", owner_and_mode()),
                 format!("give this user's group the right to it (chgrp and chmod 660 {CPU_DMA_LATENCY})"),
             ),
-            // The file allows it: what refuses is the list of devices of the cgroup.
+            // The file allows it: the list of devices of the cgroup does not.
             libc::EPERM => (
                 format!("the cgroup does not allow {CPU_DMA_LATENCY}"),
                 format!("allow it (DeviceAllow={CPU_DMA_LATENCY} rw, docker --device={CPU_DMA_LATENCY})"),
@@ -158,7 +157,7 @@ impl Permissions {
         })
     }
 
-    /// The remedy where one of the two suffices. What a container has not been given it cannot give on.
+    /// The remedy where one of the two suffices. A container cannot grant a right that it does not have.
     fn capability_or_limit(&self, capability: &str, unit: &str, container: &str) -> String {
         let first = "the container needs it first";
         match (self.user_namespace, self.container) {
@@ -170,13 +169,13 @@ impl Permissions {
         }
     }
 
-    /// "no CAP_...", and where the one that it seems to have does not count.
+    /// "no CAP_...", in a user namespace "of the host".
     fn without(&self, capability: &str) -> String {
         let whose = if self.user_namespace { " of the host (this is a user namespace)" } else { "" };
         format!("no {capability}{whose}")
     }
 
-    /// For a refusal that `against` does not foresee.
+    /// Reason and remedy of a refusal that [`Permissions::refusal_of`] does not foresee.
     fn unforeseen(&self, step: &SetupStep, error: &Error) -> Explanation {
         let fifo = matches!(step, SetupStep::Fifo(_));
         match (error.raw_os_error(), &self.group_budget) {
@@ -197,12 +196,12 @@ impl Permissions {
     }
 }
 
-/// The last system call of this thread was refused: why.
+/// The refusal of a step by the last system call of this thread.
 pub(super) fn of(step: &SetupStep) -> Shortfall {
     explained(step, &Error::last_os_error())
 }
 
-/// This error was the answer to a step: why.
+/// The refusal of a step with this error.
 pub(super) fn explained(step: &SetupStep, error: &Error) -> Shortfall {
     let facts = Permissions::of_this_process();
     facts.refusal_of(step).unwrap_or_else(|| shortfall(step, facts.unforeseen(step, error)))
@@ -248,7 +247,7 @@ mod tests {
     const DEADLINE: SetupStep = SetupStep::Deadline(Reservation { budget_ns: 400_000, period_ns: 1_000_000 });
 
     #[test]
-    fn a_container_is_told_how_to_start_it() {
+    fn a_container_gets_the_options_to_start_it_with() {
         let facts = contained();
         for (step, reason, remedy) in [
             (
@@ -271,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_granted_has_nothing_against_it() {
+    fn a_granted_step_is_not_refused() {
         let limits = Permissions { priority_limit: 80, locked_limit_kb: None, ..contained() };
         let capable = Permissions { sys_nice: true, ipc_lock: true, cpu_dma_latency: Ok(()), ..contained() };
         for (facts, step) in [
@@ -297,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_fact_foresees_is_told_by_the_error() {
+    fn an_unforeseen_refusal_is_explained_by_the_error() {
         let group = GroupBudget::Unknown { group: "/sys/fs/cgroup/a.slice".into() };
         let grouped = Permissions { group_budget: group, ..contained() };
         let filtered = Permissions { filtered: true, ..grouped.clone() };

@@ -21,8 +21,8 @@ pub fn bind_to_cpu(cpu: usize) -> Result<(), Shortfall> {
     if bind(core::iter::once(cpu)) { Ok(()) } else { Err(refusals::of(&SetupStep::Cpu(cpu))) }
 }
 
-/// Asks for timers of the calling thread to fire within a nanosecond instead of the default 50 us. Only
-/// threads without FIFO priority are affected. Cannot fail on Linux.
+/// Sets the timer slack of the calling thread to a nanosecond instead of the default 50 us. Affects only
+/// threads without FIFO priority. Cannot fail on Linux.
 pub fn set_shortest_timer_slack() {
     // SAFETY: plain numbers.
     unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_usize, 0_usize, 0_usize, 0_usize) };
