@@ -60,7 +60,7 @@ pub struct SearchRegion {
 /// let home = machine.home_pose();
 /// let region = SearchRegion { center: home, turn: 1.0, shift: 0.5 };
 /// let lengths = leg_lengths(&machine, &home);
-/// let modes = find_modes(&machine, &lengths, region, 100);
+/// let modes = find_modes(&machine, &lengths, &region, 100);
 /// assert!(modes.iter().any(|mode| machine.joints.distance(mode.pose(), &home) < 1e-6));
 /// ```
 pub fn find_modes(

@@ -18,7 +18,7 @@
 //! ```
 //!
 //! Where that bound is too large, by Taylor: `f = sum of |N0^-1 dN_k| h_k + B F / 2`, `dN_k` the derivative of N along a parameter
-//! and `F^2` the sum of squares of the second derivatives of the columns along any way through the cell:
+//! and `F^2` the sum of squares of the second derivatives of the columns along any path through the cell:
 //!
 //! ```text
 //! |n''| <= (a (t^2 + t'^2) + 3 s^2 / l) / l,  l = L0 - s       |m''| / r <= (a' / r) (t^2 + t'^2 + 2 t s / l + |n''|)

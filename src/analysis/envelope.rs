@@ -33,7 +33,7 @@ const POSE_CORNERS: u32 = 64;
 /// Patterns of signs for the twelve velocities and accelerations.
 const SIGN_PATTERNS: u32 = 32;
 
-/// How many corners [`MotionEnvelope::corner`] knows: home and the corners of the pose, each at rest and with
+/// Number of corners of [`MotionEnvelope::corner`]: home and the corners of the pose, each at rest and with
 /// every pattern.
 pub const CORNER_COUNT: u32 = (1 + POSE_CORNERS) * (1 + SIGN_PATTERNS);
 

@@ -2,7 +2,7 @@
 //!
 //! The box of the pose starts at a nominal size and shrinks until all of its corners are within the stroke;
 //! then the frequency of a sine through that box, which gives velocity `w a` and acceleration `w^2 a`,
-//! goes down until rates and forces have reserve at every corner of the envelope. Every
+//! is lowered until rates and forces have reserve at every corner of the envelope. Every
 //! machine reaches the result; for one without any stroke left it is home alone, at rest. Corners are checked, not the
 //! inside.
 
@@ -29,6 +29,13 @@ const USABLE_SHARE: f64 = 0.8;
 const MAX_SHRINK_STEPS: i32 = 40;
 
 /// The default envelope of a machine.
+///
+/// ```
+/// use hexad::analysis::{envelope::CORNER_COUNT, reachable_envelope::{reachable_envelope, within_stroke}};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let envelope = reachable_envelope(&hexad::model::active_forces::InverseDynamics::new(&machine));
+/// assert!((0..CORNER_COUNT).all(|k| within_stroke(&machine, &envelope.at(&envelope.corner(k)))));
+/// ```
 pub fn reachable_envelope(model: &InverseDynamics) -> MotionEnvelope {
     let machine = model.machine();
     let boxed = |share: f64| {

@@ -11,7 +11,7 @@
 //! and the drives hold it for a period from `k T + delay` on. The delay is the sum of the age of the
 //! measurement, computing, sending and dead time. Neither the reference nor its instant appears: the error compares both at
 //! the same instant, so a delay makes no error, but it remains in the loop. With
-//! `delay = (d + f) T`, `0 <= f < 1`, `h = 1 - f`, a period makes of the state with its commands under way
+//! `delay = (d + f) T`, `0 <= f < 1`, `h = 1 - f`, one period takes the state, with its pending commands, to
 //!
 //! ```text
 //!           e_k+1 = e_k + T e'_k - T^2 / m (h^2 / 2 u_k-d + (1 - h^2) / 2 u_k-d-1)
@@ -75,7 +75,7 @@ impl SampledLoop {
     }
 
     /// The characteristic polynomial, lowest coefficient first, and its degree; the commands of `after` periods
-    /// are under way, the oldest for a share `f` of a period more.
+    /// are pending, the oldest for a share `f` of a period more.
     fn characteristic(&self, after: usize, f: f64) -> ([f64; MAX_COEFFICIENTS], usize) {
         let h = 1.0 - f;
         let [stiffness, damping] = self.observed();

@@ -23,7 +23,7 @@ use super::leg::{LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, LEGS, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
-use super::triples::{LegLanes, Triples};
+use super::triples::LegLanes;
 
 /// Inverse dynamic model of one machine: from a motion of the platform to the six actuator forces.
 ///
@@ -44,7 +44,8 @@ pub struct InverseDynamics {
     joints: Joints,
     legs: LegConstants,
     axes: PrincipalAxes,
-    drives: DriveConstants,
+    /// 1 / smoothing speed of Coulomb friction \[s/m\].
+    inverse_smoothing: f64,
 }
 
 /// Load on the actuators of one motion: `N (Gamma - axial_forces) = wrench`.
@@ -72,7 +73,7 @@ impl InverseDynamics {
             joints: machine.joints.with_point(&machine.platform.center_of_mass),
             legs: LegConstants::new(machine),
             axes: PrincipalAxes::new(machine),
-            drives: DriveConstants::new(&machine.actuator),
+            inverse_smoothing: 1.0 / machine.actuator.coulomb_smoothing,
             machine: machine.clone(),
         }
     }
@@ -152,44 +153,22 @@ impl InverseDynamics {
         if M::VELOCITY {
             accel = legs.accel(&velocity, joint_acceleration);
         }
-        (wrench, reaction.axial + self.drives.force(simd, velocity.rate, accel))
+        (wrench, reaction.axial + self.drive_force(simd, velocity.rate, accel))
+    }
+
+    /// `reflected L'' + viscous L' + coulomb sign(L')`, the sign proportional below the smoothing speed.
+    #[inline(always)]
+    fn drive_force<S: Simd>(&self, simd: S, rate: f64x8<S>, accel: f64x8<S>) -> f64x8<S> {
+        let Actuator { reflected_mass, viscous_friction, coulomb_friction, .. } = self.machine.actuator;
+        let splat = |value: f64| f64x8::splat(simd, value);
+        let one = splat(1.0);
+        let sign = (rate * splat(self.inverse_smoothing)).max(-one).min(one);
+        let friction = splat(viscous_friction).mul_add(rate, splat(coulomb_friction) * sign);
+        splat(reflected_mass).mul_add(accel, friction)
     }
 }
 
 /// The six actuator forces \[N\] of one motion, with constants derived anew; for more than one keep an [`InverseDynamics`].
 pub fn inverse_dynamics<M: ModelTerms>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
     InverseDynamics::new(machine).forces::<M>(motion)
-}
-
-/// The drives as lanes.
-#[derive(Clone, Debug)]
-struct DriveConstants {
-    reflected_mass: LegLanes,
-    viscous_friction: LegLanes,
-    coulomb_friction: LegLanes,
-    /// 1 / smoothing speed
-    inverse_smoothing: LegLanes,
-}
-
-impl DriveConstants {
-    fn new(actuator: &Actuator) -> Self {
-        let all = |value: f64| Triples::uniform(value, [value; 2]);
-        Self {
-            reflected_mass: all(actuator.reflected_mass),
-            viscous_friction: all(actuator.viscous_friction),
-            coulomb_friction: all(actuator.coulomb_friction),
-            inverse_smoothing: all(1.0 / actuator.coulomb_smoothing),
-        }
-    }
-
-    /// `reflected L'' + viscous L' + coulomb sign(L')`, the sign proportional below the smoothing speed.
-    #[inline(always)]
-    fn force<S: Simd>(&self, simd: S, rate: f64x8<S>, accel: f64x8<S>) -> f64x8<S> {
-        let constant = |constant: &LegLanes| constant.load(simd);
-        let one = f64x8::splat(simd, 1.0);
-        let sign = (rate * constant(&self.inverse_smoothing)).max(-one).min(one);
-        let friction =
-            constant(&self.viscous_friction).mul_add(rate, constant(&self.coulomb_friction) * sign);
-        constant(&self.reflected_mass).mul_add(accel, friction)
-    }
 }

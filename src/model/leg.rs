@@ -58,8 +58,6 @@ pub(super) struct LegConstants {
     rod_moment: LegLanes,
     /// `Ix1 + Ix2`
     axial_inertia: LegLanes,
-    /// g in every lane.
-    gravity: [LegLanes; 3],
     /// 1 for legs, 0 for padding.
     legs_only: LegLanes,
     /// Mass of the leg that is concentrated at B in the lumped model; the platform's mass in its padding.
@@ -73,7 +71,7 @@ impl LegConstants {
         let (cylinder, rod) = (&machine.cylinder, &machine.rod);
         let (m1, e1, m2, e2) = (cylinder.mass, cylinder.center_of_mass, rod.mass, rod.center_of_mass);
         let (it1, it2) = (&cylinder.transverse_inertia, &rod.transverse_inertia);
-        let legs = |value: f64, platform: f64| Triples::uniform(value, [platform, 0.0]);
+        let legs = Triples::uniform;
         let linear = m2 * e2 + it1.quadratic * it1.reference_length + it2.quadratic * it2.reference_length;
         let constant = m1 * e1 * e1
             + m2 * e2 * e2
@@ -92,8 +90,6 @@ impl LegConstants {
             first_moment: legs(m1 * e1 - m2 * e2, 0.0),
             rod_moment: legs(m2 * e2, 0.0),
             axial_inertia: legs(cylinder.axial_inertia + rod.axial_inertia, 0.0),
-            gravity: [machine.gravity.x, machine.gravity.y, machine.gravity.z]
-                .map(|g| Triples::uniform(g, [g; 2])),
             legs_only: legs(1.0, 0.0),
             lumped_mass: legs(lumped_mass(machine), mass),
             platform_mass: legs(0.0, mass),
@@ -129,7 +125,7 @@ impl<S: Simd> LegReaction<S> {
         joint_acceleration: Lanes3<f64x8<S>>,
     ) -> Self {
         let load = |lanes: &LegLanes| lanes.load(simd);
-        let gravity = Lanes3::load(simd, &constants.gravity);
+        let gravity = Lanes3::splat(simd, &machine.gravity);
         if M::LEGS != LegInertia::Links {
             // Points at B, the platform's among them: nothing is projected.
             let mass =

@@ -82,41 +82,26 @@ impl Motion {
     }
 }
 
-impl Twist {
-    /// `[omega; v]`
-    pub fn vector(&self) -> Vector6<f64> {
-        stack(&self.angular, &self.linear)
-    }
+macro_rules! six_numbers {
+    ($name:ident, $first:ident, $second:ident, $doc:literal) => {
+        impl $name {
+            #[doc = $doc]
+            pub fn vector(&self) -> Vector6<f64> {
+                let (a, b) = (&self.$first, &self.$second);
+                Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+            }
 
-    /// Inverse of [`Twist::vector`].
-    pub fn from_vector(v: &Vector6<f64>) -> Self {
-        Self { angular: v.fixed_rows::<3>(0).into(), linear: v.fixed_rows::<3>(3).into() }
-    }
+            /// Inverse of `vector`.
+            pub fn from_vector(v: &Vector6<f64>) -> Self {
+                Self { $first: v.fixed_rows::<3>(0).into(), $second: v.fixed_rows::<3>(3).into() }
+            }
+        }
+    };
 }
 
-impl Acceleration {
-    /// `[omega'; v']`
-    pub fn vector(&self) -> Vector6<f64> {
-        stack(&self.angular, &self.linear)
-    }
-
-    /// Inverse of [`Acceleration::vector`].
-    pub fn from_vector(v: &Vector6<f64>) -> Self {
-        Self { angular: v.fixed_rows::<3>(0).into(), linear: v.fixed_rows::<3>(3).into() }
-    }
-}
-
-impl Wrench {
-    /// `[torque; force]`
-    pub fn vector(&self) -> Vector6<f64> {
-        stack(&self.torque, &self.force)
-    }
-
-    /// Inverse of [`Wrench::vector`].
-    pub fn from_vector(v: &Vector6<f64>) -> Self {
-        Self { torque: v.fixed_rows::<3>(0).into(), force: v.fixed_rows::<3>(3).into() }
-    }
-}
+six_numbers!(Twist, angular, linear, "`[omega; v]`");
+six_numbers!(Acceleration, angular, linear, "`[omega'; v']`");
+six_numbers!(Wrench, torque, force, "`[torque; force]`");
 
 impl Pose {
     /// The pose after the displacement `[dw; dv]`: `R <- exp(dw~) R`, `C <- C + dv`, both in base axes.
@@ -180,10 +165,6 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
 /// One step of Newton's iteration for the polar factor: `R (3 I - R^T R) / 2`.
 fn orthonormalized(r: &Matrix3<f64>) -> Matrix3<f64> {
     r * (Matrix3::identity() * 3.0 - r.transpose() * r) * 0.5
-}
-
-fn stack(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
 #[cfg(test)]

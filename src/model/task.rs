@@ -19,7 +19,7 @@ use super::rigid::{Acceleration, Motion, Pose, Twist};
 /// let state = TaskState { xd: [0.0, 0.0, 2.0, 0.0, 0.0, 0.0].into(), ..TaskState::at_rest([0.0, 0.5, 0.0, 0.0, 0.0, 1.0]) };
 /// // gamma turns about the platform's z axis, which beta has inclined.
 /// let omega = state.motion().twist.angular;
-/// assert!((omega - nalgebra::vector![2.0 * 0.5_f64.sin(), 0.0, 2.0 * 0.5_f64.cos()]).norm() < 1e-15);
+/// assert!((omega - nalgebra::Vector3::new(2.0 * 0.5_f64.sin(), 0.0, 2.0 * 0.5_f64.cos())).norm() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TaskState {

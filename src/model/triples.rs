@@ -95,9 +95,9 @@ impl Triples {
         LegLanes([a, b, c, a, d, e, f, d])
     }
 
-    /// The same number for every leg, in whatever lane, and others for the padding.
-    pub(super) fn uniform(leg: f64, [first, second]: [f64; 2]) -> LegLanes {
-        LegLanes([leg, leg, leg, first, leg, leg, leg, second])
+    /// The same number for every leg, another for the first lane of padding, and 0 for the second.
+    pub(super) fn uniform(leg: f64, padding: f64) -> LegLanes {
+        LegLanes([leg, leg, leg, padding, leg, leg, leg, 0.0])
     }
 
     /// Lanes to one number per leg.

@@ -16,7 +16,7 @@ pub const PEAK_RATE: f64 = 1.875;
 const PEAK_ACCEL: f64 = 5.773502691896258;
 const PEAK_JERK: f64 = 60.0;
 
-/// Shortest duration \[s\] of a minimum-jerk move of length `way` within limits of velocity, acceleration and jerk.
+/// Shortest duration \[s\] of a minimum-jerk move of length `distance` within limits of velocity, acceleration and jerk.
 ///
 /// ```
 /// use hexad::motion::minimum_jerk::{PEAK_RATE, shortest_duration};
@@ -24,9 +24,9 @@ const PEAK_JERK: f64 = 60.0;
 /// let duration = shortest_duration(0.3, [0.1, 1e9, 1e9]);
 /// assert!((duration - PEAK_RATE * 0.3 / 0.1).abs() < 1e-12);
 /// ```
-pub fn shortest_duration(way: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
-    let by_rate = PEAK_RATE * way / velocity;
-    by_rate.max((PEAK_ACCEL * way / acceleration).sqrt()).max((PEAK_JERK * way / jerk).cbrt())
+pub fn shortest_duration(distance: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
+    let by_rate = PEAK_RATE * distance / velocity;
+    by_rate.max((PEAK_ACCEL * distance / acceleration).sqrt()).max((PEAK_JERK * distance / jerk).cbrt())
 }
 
 /// Value of a profile and its first two time derivatives.
@@ -72,8 +72,8 @@ pub fn window(t: f64, end: f64, fade: f64) -> Profile {
 
 /// The straight move in task coordinates along this profile.
 pub fn straight_move(from: &Vector6<f64>, to: &Vector6<f64>, s: &Profile) -> TaskState {
-    let way = to - from;
-    TaskState { x: from + way * s.value, xd: way * s.rate, xdd: way * s.accel }
+    let change = to - from;
+    TaskState { x: from + change * s.value, xd: change * s.rate, xdd: change * s.accel }
 }
 
 /// `s(t) d(t)` with both derivatives, by the product rule.

@@ -2,7 +2,7 @@
 //!
 //! | imperfection | where it acts |
 //! | --- | --- |
-//! | force step, dead time, bandwidth | on the way from the force message to the drive, in this order |
+//! | force step, dead time, bandwidth | between the force message and the drive, in this order |
 //! | friction with stiction | on the drive, beyond that of `actuator` |
 //! | stiffness, damping, backlash | between drive and rod; reflected mass and friction stay with the drive |
 //! | steps and noise of sensors | on the lengths and rates that are published |
@@ -29,7 +29,7 @@ pub struct Imperfections {
     pub drive: DriveErrors,
     /// Friction beyond that of the machine.
     pub friction: Friction,
-    /// Legs that give way; `None` if they are rigid.
+    /// Elastic legs; `None` if they are rigid.
     pub leg: Option<ElasticLeg>,
     /// Noise and resolution.
     pub sensor: SensorErrors,

@@ -10,9 +10,9 @@ use nalgebra::{Vector3, Vector6};
 
 use crate::model::rigid::{Acceleration, Pose, Twist};
 
-/// State of the platform: pose and twist.
+/// State of the platform as a rigid body: pose and twist.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlatformState {
+pub struct BodyState {
     /// R and C.
     pub pose: Pose,
     /// omega and v.
@@ -32,7 +32,7 @@ pub struct DriveStates {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantState {
     /// Pose and twist.
-    pub platform: PlatformState,
+    pub platform: BodyState,
     /// Lengths and rates.
     pub drives: DriveStates,
 }
@@ -93,7 +93,7 @@ pub fn integrate(
 fn advanced(start: &PlantState, slope: &Slope, dt: f64) -> PlantState {
     let PlantState { platform, drives } = start;
     PlantState {
-        platform: PlatformState {
+        platform: BodyState {
             pose: platform
                 .pose
                 .displaced(&Twist { angular: slope.pose.angular * dt, linear: slope.pose.linear * dt }),

@@ -5,8 +5,8 @@
 //! platform follows the legs, whatever its weight. Then it stands. A leg that reaches its end of stroke
 //! closes the brakes until the plant is started anew: on hardware an operator would inspect it first.
 //!
-//! Where legs are elastic a brake holds rod and drive alike: the deflection stays as it was, and is there
-//! when the brake opens. A drive whose brake closes pushes no more.
+//! Where legs are elastic a brake holds rod and drive alike: the deflection remains until the brake
+//! opens. A drive whose brake closes exerts no force.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -14,7 +14,7 @@ use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;
 use super::imperfections::Imperfections;
-use super::integrator::{DriveStates, PlantState, PlatformState, integrate};
+use super::integrator::{BodyState, DriveStates, PlantState, integrate};
 use super::terms::{PlantTerms, legs};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
@@ -105,7 +105,7 @@ impl Simulator {
             dynamics: ForwardDynamics::new(&machine),
             terms,
             state: PlantState {
-                platform: PlatformState { pose: home.pose, twist: Twist::default() },
+                platform: BodyState { pose: home.pose, twist: Twist::default() },
                 drives: DriveStates { length, rate: Vector6::zeros() },
             },
             brakes: Brakes::Closed,
@@ -116,7 +116,7 @@ impl Simulator {
     }
 
     /// Pose and twist.
-    pub fn state(&self) -> &PlatformState {
+    pub fn state(&self) -> &BodyState {
         &self.state.platform
     }
 
@@ -211,13 +211,13 @@ impl Simulator {
         let elapsed = elapsed + step;
         let standing = !(elapsed < duration);
         let twist = if standing { Twist::default() } else { twist_at(elapsed, &pose) };
-        self.carry_drives(PlatformState { pose, twist });
+        self.carry_drives(BodyState { pose, twist });
         self.brakes =
             if standing { Brakes::Closed } else { Brakes::Closing { rates: *rates, elapsed, duration } };
     }
 
     /// Moves the platform; drives keep their distance from the legs.
-    fn carry_drives(&mut self, platform: PlatformState) {
+    fn carry_drives(&mut self, platform: BodyState) {
         let before = legs(self.machine(), &self.state);
         self.state.platform = platform;
         let after = legs(self.machine(), &self.state);

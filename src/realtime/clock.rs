@@ -48,6 +48,11 @@ impl Clock for Monotonic {
 }
 
 /// Release grid: points in time `k * period + phase`.
+///
+/// ```
+/// let grid = hexad::realtime::clock::Grid::new(1000, 500);
+/// assert_eq!([grid.next_after(1499), grid.next_after(1500)], [1500, 2500]);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
     period_ns: u64,

@@ -63,7 +63,7 @@ impl Waiter {
 mod tests {
     use super::*;
 
-    /// A clock whose sleeps end late by a fixed time and whose every look costs one nanosecond.
+    /// A clock whose sleeps end late by a fixed time and whose every reading costs one nanosecond.
     struct Late {
         now_ns: u64,
         latency_ns: u64,

@@ -26,7 +26,7 @@ use hexad::plant::hardware::Hardware;
 use hexad::plant::imperfections::{
     BuildErrors, DriveErrors, ElasticLeg, ExternalWrench, Friction, Imperfections, SensorErrors,
 };
-use hexad::plant::integrator::{Accelerations, DriveStates, PlantState, PlatformState};
+use hexad::plant::integrator::{Accelerations, BodyState, DriveStates, PlantState};
 use hexad::plant::simulator::Simulator;
 use nalgebra::{Vector3, Vector6};
 
@@ -76,17 +76,17 @@ fn without_drives(mut machine: Machine) -> Machine {
     machine
 }
 
-fn home(machine: &Machine) -> PlatformState {
-    PlatformState { pose: TaskState::at_rest(machine.home).motion().pose, twist: Twist::default() }
+fn home(machine: &Machine) -> BodyState {
+    BodyState { pose: TaskState::at_rest(machine.home).motion().pose, twist: Twist::default() }
 }
 
 /// The model's state a step later under constant forces.
 fn integrate(
     dynamics: &ForwardDynamics,
-    start: &PlatformState,
+    start: &BodyState,
     force: &[f64; LEGS],
     step: f64,
-) -> Option<PlatformState> {
+) -> Option<BodyState> {
     let start = PlantState { platform: *start, drives: DriveStates::default() };
     let accelerations = |state: &PlantState, _| {
         let platform = dynamics.acceleration(&state.platform.pose, &state.platform.twist, force)?;
@@ -96,7 +96,7 @@ fn integrate(
 }
 
 /// Lengths and rates of the legs.
-fn legs(machine: &Machine, state: &PlatformState) -> ([f64; LEGS], [f64; LEGS]) {
+fn legs(machine: &Machine, state: &BodyState) -> ([f64; LEGS], [f64; LEGS]) {
     let motion = Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() };
     let legs = leg_motion(machine, &motion);
     (legs.length, legs.rate)
@@ -104,7 +104,7 @@ fn legs(machine: &Machine, state: &PlatformState) -> ([f64; LEGS], [f64; LEGS]) 
 
 /// Forces that carry the platform and shake it about home: six sines of up to `size` radii and as many
 /// radians, below `hertz`, and a damped spring of that frequency that brings it back.
-fn shaking(machine: &Machine, state: &PlatformState, t: f64, size: f64, hertz: f64) -> [f64; LEGS] {
+fn shaking(machine: &Machine, state: &BodyState, t: f64, size: f64, hertz: f64) -> [f64; LEGS] {
     let w = core::f64::consts::TAU * hertz;
     let sine = |k: f64| (w * (0.3 + 0.09 * k) * t).sin() * size;
     let back = state.pose.displacement_to(&home(machine).pose);

@@ -4,13 +4,13 @@
 //! residual r_i = L_i - L_i(pose)      J^-1 [dw; dv] = r      R <- turn(dw) R,   M <- M + dv
 //! ```
 //!
-//! M is the mean of the joints on the platform, so that the way to the solution does not depend on where C
+//! M is the mean of the joints on the platform, so that the path to the solution does not depend on where C
 //! is; `turn` is Cayley's rotation, which differs from `exp` by a third power. Steps are added to the rotation,
 //! not to Bryan angles (which converges only linearly).
 //!
 //! A factorization costs more than an evaluation of the lengths, so it is used again (the chord method) where a
 //! second step of it comes as near as a new one would. With the error e and the first step q the next error is
-//! `e^2` with a new factorization, `e q` with the old one. On the way r is `(L_i^2 - |s_i|^2) / 2 L_i`, which
+//! `e^2` with a new factorization, `e q` with the old one. Before the last step r is `(L_i^2 - |s_i|^2) / 2 L_i`, which
 //! has the same zero and needs no root and no division. The last factorization is at the solution and remains
 //! in the [`KinematicState`].
 //!

@@ -23,7 +23,7 @@ impl Cpus {
     pub fn of_this_thread() -> Self {
         // SAFETY: all-zero is the empty set.
         let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
-        // SAFETY: 0 means the calling thread; the size is that of `set`. If it fails the set stays empty.
+        // SAFETY: 0 means the calling thread; the size is that of `set`. If it fails the set remains empty.
         unsafe { libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &mut set) };
         // SAFETY: every number is below the size of the set.
         Self((0..libc::CPU_SETSIZE as usize).filter(|cpu| unsafe { libc::CPU_ISSET(*cpu, &set) }).collect())
