@@ -16,8 +16,7 @@ use super::shared::scatter::{
 };
 use super::shared::{Failure, Figures, chart};
 
-const DOUBLE: usize = 0;
-const SINGLE: usize = 1;
+const HEXAD: usize = 0;
 const DENSE: usize = 2;
 const PEER: usize = 3;
 
@@ -32,7 +31,6 @@ const NAMES_RIGHT: f64 = 2.5;
 #[derive(Deserialize)]
 struct Row {
     method: String,
-    precision: String,
     isa: String,
     scene: String,
     ns_median: f64,
@@ -54,7 +52,6 @@ struct Item {
 enum Side {
     Left,
     Flag,
-    None,
 }
 
 pub fn draw() -> Result<(), Failure> {
@@ -64,13 +61,12 @@ pub fn draw() -> Result<(), Failure> {
     let (mut points, mut lines) = (vec![], vec![]);
     let fast = pareto_front(items.iter().map(|item| (item.ns, item.fast)), BETTER);
     let slow = pareto_front(items.iter().filter_map(|item| Some((item.ns, item.slow?))), BETTER);
-    lines.push(Line { points: fast, style: LineStyle::Solid, color: DOUBLE, width: Width::Band });
-    lines.push(Line { points: slow, style: LineStyle::Dashed, color: DOUBLE, width: Width::Band });
+    lines.push(Line { points: fast, style: LineStyle::Solid, color: HEXAD, width: Width::Band });
+    lines.push(Line { points: slow, style: LineStyle::Dashed, color: HEXAD, width: Width::Band });
     for item in &items {
         let label = match item.side {
             Side::Left => Label::Left(&item.name),
             Side::Flag => Label::Flag(&item.name),
-            Side::None => Label::None,
         };
         let color = item.color;
         points.push(Point { at: (item.ns, item.fast), mark: Mark::Disc, color, label });
@@ -81,17 +77,14 @@ pub fn draw() -> Result<(), Failure> {
             lines.push(Line { points, style: LineStyle::Solid, color, width: Width::Hair });
         }
     }
-    let best = |precision| written(best_isa(rows, precision));
-    let double_fast = format!("hexad f64 on {}, fast scenes", best("f64"));
-    let single_fast = format!("hexad f32 on {}, fast scenes", best("f32"));
+    let hexad_fast = format!("hexad on {}, fast scenes", written(best_isa(rows)));
     let legend = vec![
-        (Sample::Mark(Mark::Disc, DOUBLE), &*double_fast),
-        (Sample::Mark(Mark::Ring, DOUBLE), "slow scenes"),
-        (Sample::Mark(Mark::Disc, SINGLE), &single_fast),
-        (Sample::Mark(Mark::Disc, PEER), "others, exact, f64"),
+        (Sample::Mark(Mark::Disc, HEXAD), &*hexad_fast),
+        (Sample::Mark(Mark::Ring, HEXAD), "slow scenes"),
+        (Sample::Mark(Mark::Disc, PEER), "others, exact"),
         (Sample::Mark(Mark::Disc, DENSE), "the paper's dense matrices"),
-        (Sample::Line(LineStyle::Solid, Width::Band, DOUBLE), "Pareto front, fast"),
-        (Sample::Line(LineStyle::Dashed, Width::Band, DOUBLE), "Pareto front, slow"),
+        (Sample::Line(LineStyle::Solid, Width::Band, HEXAD), "Pareto front, fast"),
+        (Sample::Line(LineStyle::Dashed, Width::Band, HEXAD), "Pareto front, slow"),
     ];
     let times = log_range(points.iter().map(|point| point.at.0));
     let errors = log_range(points.iter().map(|point| point.at.1));
@@ -113,14 +106,14 @@ pub fn draw() -> Result<(), Failure> {
 fn items(rows_of_all: &[Row]) -> Vec<Item> {
     let mut methods: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
     for row in rows_of_all {
-        methods.entry((&*row.method, &*row.precision, &*row.isa)).or_default().push(row);
+        methods.entry((&*row.method, &*row.isa)).or_default().push(row);
     }
     let mut items = vec![];
-    for ((method, precision, isa), rows) in methods {
+    for ((method, isa), rows) in methods {
         let fidelity = Fidelity::ALL.iter().any(|fidelity| fidelity.name() == method);
         let exact = method == "exact";
-        let best = best_isa(rows_of_all, precision);
-        if fidelity && isa != best && !(exact && precision == "f64") {
+        let best = best_isa(rows_of_all);
+        if fidelity && isa != best && !exact {
             continue;
         }
         let peer = !fidelity && method != PAPER;
@@ -130,16 +123,11 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
             errors.reduce(f64::max)
         };
         let times = rows.iter().map(|row| row.ns_median);
-        let (color, side) = match (fidelity, precision) {
-            (true, "f32") => (SINGLE, if exact { Side::Flag } else { Side::None }),
-            (true, _) => (DOUBLE, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
-            (false, _) => (if peer { PEER } else { DENSE }, Side::Flag),
+        let (color, side) = match fidelity {
+            true => (HEXAD, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
+            false => (if peer { PEER } else { DENSE }, Side::Flag),
         };
-        let name = match (fidelity, exact, precision) {
-            (true, true, "f32") => "exact, f32".into(),
-            (true, true, _) => format!("exact, {}", written(isa)),
-            _ => written(method),
-        };
+        let name = if exact { format!("exact, {}", written(isa)) } else { written(method) };
         items.push(Item {
             name,
             ns: times.sum::<f64>() / rows.len() as f64,
@@ -152,9 +140,9 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
     items
 }
 
-/// The best instruction set of a precision: its rows begin with it.
-fn best_isa<'a>(rows: &'a [Row], precision: &str) -> &'a str {
-    rows.iter().find(|row| row.precision == precision).map_or("", |row| &row.isa)
+/// The best instruction set: the rows begin with it.
+fn best_isa(rows: &[Row]) -> &str {
+    rows.first().map_or("", |row| &row.isa)
 }
 
 /// As people write it.

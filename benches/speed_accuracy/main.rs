@@ -1,7 +1,7 @@
 //! How long one evaluation of the inverse dynamics takes, and how far its forces are from the right ones:
 //! `cargo bench --bench speed_accuracy`.
 //!
-//! Every fidelity of the ladder in both precisions on every instruction set of this CPU, the paper's own dense
+//! Every fidelity on every instruction set of this CPU, the paper's own dense
 //! form, and, once `benches/peers/run.sh` has built them, what others would use. On a slow and a fast scene
 //! of three machines and on the peers' own (see `scenes.rs`). Writes `benches/charts/speed_accuracy.csv` and
 //! `.svg`, and prints how many times faster the exact model is than each peer in the same run.
@@ -31,7 +31,7 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use methods::{BASELINE, Method, Precision, instruction_sets};
+use methods::{BASELINE, Method, instruction_sets};
 use peers::{PEERS, Peer};
 use results::{Row, print_ratios, write_csv};
 use scenes::Scene;
@@ -66,9 +66,6 @@ struct Arguments {
     /// Evaluates one fidelity (its name on the command line of hexad) and nothing else.
     #[arg(long, value_name = "RUNG")]
     count: Option<String>,
-    /// Single precision; with --count.
-    #[arg(long, requires = "count")]
-    single: bool,
     /// Instruction set, the best if absent; with --count.
     #[arg(long, requires = "count")]
     isa: Option<String>,
@@ -102,13 +99,12 @@ fn count(arguments: &Arguments, fidelity: &str) -> Result<(), Failure> {
     let fidelity = fidelity.ok_or_else(|| {
         format!("no such fidelity; one of {}", Fidelity::ALL.map(Fidelity::name).join(", "))
     })?;
-    let precision = if arguments.single { Precision::F32 } else { Precision::F64 };
-    let sets = instruction_sets(precision);
+    let sets = instruction_sets();
     let wanted = |name: &str| arguments.isa.as_ref().is_none_or(|isa| isa == name);
     let names = sets.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let set = sets.into_iter().find(|(name, _)| wanted(name));
     let (isa, level) = set.ok_or_else(|| format!("not on this CPU; one of {names}"))?;
-    let method = Method::new(fidelity, precision);
+    let method = Method::new(fidelity);
     let scene = Scene::of_machines()?.into_iter().nth(1).ok_or("no scene")?;
     let dynamics = InverseDynamics::new(&scene.machine_on(level));
     let passes = arguments.evaluations.div_ceil(scene.motions.len());
@@ -162,11 +158,9 @@ fn scenes() -> Result<Vec<Scene>, Failure> {
 fn contenders(scenes: &[Scene]) -> Result<Vec<Contender>, Failure> {
     let mut contenders = vec![];
     for (index, scene) in scenes.iter().enumerate() {
-        for precision in Precision::ALL {
-            for (isa, level) in instruction_sets(precision) {
-                let methods = Fidelity::ALL.map(|fidelity| Method::new(fidelity, precision));
-                contenders.extend(methods.map(|method| Contender::hexad(scene, index, method, isa, level)));
-            }
+        for (isa, level) in instruction_sets() {
+            let methods = Fidelity::ALL.map(Method::new);
+            contenders.extend(methods.map(|method| Contender::hexad(scene, index, method, isa, level)));
         }
         contenders.extend(Contender::paper(scene, index));
     }
@@ -195,7 +189,6 @@ impl Contender {
         let errors = scene.errors(scene.motions.iter().map(|motion| (method.forces)(&dynamics, motion)));
         let row = Row {
             method: method.fidelity.name(),
-            precision: method.precision.name(),
             isa,
             scene: scene.name.clone(),
             pace: scene.pace,
@@ -209,14 +202,13 @@ impl Contender {
     fn paper(scene: &Scene, index: usize) -> Option<Self> {
         let machine = scene.paper_machine.as_ref()?;
         let dynamics = InverseDynamics::new(&scene.machine);
-        let exact = Method::new(Fidelity::Exact, Precision::F64).forces;
+        let exact = Method::new(Fidelity::Exact).forces;
         let errors = match scene.pace {
             scenes::Pace::Slow => scene.errors(scene.motions.iter().map(|motion| exact(&dynamics, motion))),
             _ => scene.errors(scene.states.iter().map(|state| Some(paper::forces(machine, state).into()))),
         };
         let row = Row {
             method: results::PAPER,
-            precision: "f64",
             isa: BASELINE,
             scene: scene.name.clone(),
             pace: scene.pace,
@@ -229,7 +221,6 @@ impl Contender {
     fn peer(peer: &'static Peer) -> Result<Self, Failure> {
         let row = Row {
             method: peer.name,
-            precision: "f64",
             isa: "native",
             scene: "peers".into(),
             pace: scenes::Pace::Peers,
@@ -270,7 +261,7 @@ impl Contender {
 
 /// The exact model and the peers do the same work.
 fn agree(rows: &[Row]) -> Result<(), Failure> {
-    let exact = |row: &&Row| row.is_exact("f64") && row.pace == scenes::Pace::Peers;
+    let exact = |row: &&Row| row.is_exact() && row.pace == scenes::Pace::Peers;
     for row in rows.iter().filter(exact) {
         let error = row.errors.max;
         if !(error <= AGREEMENT) {

@@ -1,7 +1,7 @@
 //! What it costs to make one step of Newton's method per cycle, from the pose of the cycle before.
 
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
 use super::shared::provenance;
@@ -16,7 +16,7 @@ pub fn run() -> Result<(), Failure> {
     let (mut rows, mut lines) = (vec![], vec![]);
     for name in MACHINES {
         let machine = common::machine(name);
-        let scene = fit(&machine, Motion::Sines, SECONDS);
+        let scene = fit(&machine, BuiltInMotion::Sines, SECONDS);
         for rate_hz in RATES_HZ {
             let mut estimate = scene.at(0.0).motion().pose;
             let (mut worst, mut squares, mut points) = (0.0_f64, 0.0, vec![]);

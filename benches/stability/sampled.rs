@@ -12,7 +12,7 @@ use super::{Failure, cells, chart, common, write_csv};
 const FILE: &str = "stability_sampled.csv";
 
 /// In periods.
-const LONGEST_DELAY: u32 = 2;
+const MAX_DELAY_PERIODS: u32 = 2;
 /// Points per period: of the simulation, and of the line.
 const FOUND: u32 = 4;
 const PREDICTED: u32 = 100;
@@ -127,7 +127,7 @@ fn lines(
 
 /// From none to the longest.
 fn delays(per_period: u32) -> Vec<f64> {
-    (0..=LONGEST_DELAY * per_period).map(|k| f64::from(k) / f64::from(per_period)).collect()
+    (0..=MAX_DELAY_PERIODS * per_period).map(|k| f64::from(k) / f64::from(per_period)).collect()
 }
 
 fn diamond((x, y): At, dx: f64, dy: f64) -> Vec<At> {

@@ -1,13 +1,11 @@
 //! Error of the pose against time: plain Newton by the step, ours, and the others, from several starts.
 
-use hexad::model::active_forces::InverseDynamics;
-use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::refine;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::inverse_jacobian::twist_from_rates;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad::model::rigid::{Pose, Twist};
 use hexad::model::task::task_coordinates;
 use hexad::output::charts::LineStyle;
 use nalgebra::{Vector3, Vector6};
@@ -121,7 +119,6 @@ pub fn run() -> Result<(), Failure> {
                 });
             }
         }
-        shared(name, &machine);
     }
     for row in rows.iter().filter(|row| row.start == "2 mm") {
         println!("{:<12}{:<26}{:>8.0} ns{:>10.1e} m", row.machine, row.method, row.ns, row.error);
@@ -134,32 +131,6 @@ pub fn run() -> Result<(), Failure> {
         })
         .collect();
     write_csv(FILE, &["machine", "method", "start", "ns_fenced", "error_max_m"], &table)
-}
-
-/// What the factorization that is left saves the inverse dynamics.
-fn shared(name: &str, machine: &Machine) {
-    let dynamics = InverseDynamics::new(machine);
-    let cases = cases(machine, 1.0);
-    let (twist, acceleration) =
-        (Twist::default(), Acceleration { linear: Vector3::x(), ..Default::default() });
-    let (mut alone, mut with) = (Samples::default(), Samples::default());
-    for _ in 0..ROUNDS {
-        alone.take(cases.len(), SAMPLE_S, |passes, fenced| {
-            sample(&cases, passes, fenced, |case| {
-                dynamics.forces::<Exact>(&Motion { pose: case.start, twist, acceleration })
-            })
-        });
-        with.take(cases.len(), SAMPLE_S, |passes, fenced| {
-            sample(&cases, passes, fenced, |case| {
-                dynamics.forces_at::<Exact>(&case.kinematic_state, &twist, &acceleration)
-            })
-        });
-    }
-    println!(
-        "{name}: forces {:.0} ns, with the factors of the pose {:.0} ns",
-        alone.latency(),
-        with.latency()
-    );
 }
 
 /// What the chart needs of a row.

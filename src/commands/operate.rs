@@ -162,7 +162,7 @@ impl Operator {
                     };
                 }
             }
-            if stop.requested() {
+            if stop.is_requested() {
                 return Err(OperatorError::Interrupted);
             }
             if heard.elapsed() > SILENCE {

@@ -5,7 +5,7 @@ use core::fmt;
 
 use super::Config;
 use super::deployment::GAIN_MARGIN;
-use crate::analysis::sampled_loop::{LONGEST_DELAY, SampledLoop};
+use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
 use crate::control::leg_masses::LegMasses;
 
 /// One loop with the longest delay of the daemon.
@@ -64,7 +64,7 @@ impl fmt::Display for ControlLoop {
         let Self { name, bandwidth_hz, rate_hz, sampled } = self;
         let (limit, margin, longest) =
             (sampled.largest_wn_t(), sampled.gain_margin(), sampled.longest_delay());
-        let beyond = if longest < 0.99 * LONGEST_DELAY as f64 { "" } else { "more than " };
+        let beyond = if longest < 0.99 * MAX_DELAY_PERIODS as f64 { "" } else { "more than " };
         write!(
             f,
             "{name:<12} bandwidth {bandwidth_hz:>6.2} Hz at {rate_hz:.0} Hz: wn T = {:.3}, with {:.2} periods of delay \

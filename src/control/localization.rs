@@ -9,7 +9,7 @@ use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::input_validation::seconds_between;
 use super::limits::{Limit, LimitSet};
 use super::parameters::{Constants, Parameters};
-use crate::model::forward_kinematics::{Outcome, Tracked, Tracker};
+use crate::model::forward_kinematics::{Outcome, Tracker, TrackingResult};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::LEGS;
 use crate::model::rigid::{Pose, Twist};
@@ -85,25 +85,25 @@ impl Localization {
         let start_length = self.tracker.kinematic_state().lengths(machine);
         let mut tracked = self.tracker.advance(machine, &measurement.length).0;
         for _ in 1..if state.has_control() { MAX_NEWTON_STEPS_PER_CYCLE } else { 1 } {
-            if tracked == Tracked::Approaching {
+            if tracked == TrackingResult::Approaching {
                 tracked = self.tracker.advance(machine, &measurement.length).0;
             }
         }
         let is_uncertain = self.is_known
             && match tracked {
-                Tracked::NotConverged => self.tracker.outcome() == Outcome::NearSingular,
+                TrackingResult::NotConverged => self.tracker.outcome() == Outcome::NearSingular,
                 _ => self.is_assembly_mode_uncertain(constants, &start),
             };
         if is_uncertain {
             return Err(self.fail_assembly_mode(parameters));
         }
         match tracked {
-            Tracked::Found => self.is_known = true,
-            Tracked::Approaching if state.has_control() => {
+            TrackingResult::Found => self.is_known = true,
+            TrackingResult::Approaching if state.has_control() => {
                 return Err(self.jump(constants, &start_length, &measurement.length));
             }
-            Tracked::Approaching => return Err(DiagnosticCode::FindingPose.into()),
-            Tracked::NotConverged => {
+            TrackingResult::Approaching => return Err(DiagnosticCode::FindingPose.into()),
+            TrackingResult::NotConverged => {
                 self.is_known = false;
                 self.restart(&constants.home);
                 return Err(DiagnosticCode::PoseNotFound.into());

@@ -11,7 +11,7 @@ use rayon::ThreadPoolBuilder;
 use tracing::warn;
 
 use super::STACK;
-use crate::analysis::assembly_modes::others;
+use crate::analysis::assembly_modes::other_modes;
 use crate::control::localization::PlatformState;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
@@ -45,7 +45,7 @@ impl FirstPose {
 /// Says what is nearby. Where there is nothing, there is nothing to say.
 fn look_around(machine: &Machine, pose: Pose) {
     let Ok(pool) = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build() else { return };
-    let others = pool.install(|| others(machine, &KinematicState::new(machine, pose)));
+    let others = pool.install(|| other_modes(machine, &KinematicState::new(machine, pose)));
     if let Some(nearest) = others.first().filter(|nearest| nearest.is_nearby()) {
         let x = task_coordinates(&pose, &machine.home);
         warn!(

@@ -41,7 +41,7 @@ use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic;
 use crate::realtime::cyclic::{LoopReport, RECORDS, Release, Timing};
 use crate::realtime::exchange::exchange;
-use crate::realtime::process::leave_signals_to_others;
+use crate::realtime::process::block_signals;
 use crate::realtime::setup::{Shortfall, deadline, memory};
 use crate::realtime::stop_request::Stop;
 use crate::realtime::triple_buffer::triple_buffer;
@@ -209,7 +209,7 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
 fn wait_for_rest(may_end: &AtomicBool, stop: &Stop) {
     let began = Instant::now();
     while !may_end.load(Ordering::Relaxed) {
-        if stop.insisted() || began.elapsed() > LONGEST_STOP {
+        if stop.is_repeated() || began.elapsed() > LONGEST_STOP {
             warn!("the platform did not come to rest: ending without");
             return;
         }
@@ -233,7 +233,7 @@ fn spawn<'scope, T: Send + 'scope>(
 ) -> io::Result<ScopedJoinHandle<'scope, T>> {
     let body = || {
         // The main thread waits for them.
-        leave_signals_to_others();
+        block_signals();
         body()
     };
     Builder::new().name(name.into()).stack_size(STACK).spawn_scoped(threads, body)

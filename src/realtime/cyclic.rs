@@ -8,7 +8,7 @@
 //! | late wake-up | a cycle that was waited for began later after its release than the threshold |
 //! | overrun | a cycle began before its next release and was still computing at it |
 //! | skipped | per grid point, or with external release per message, that no cycle was run for |
-//! | caught up | a cycle was run at once because its release had passed ([`OnOverrun::CatchUp`]) |
+//! | caught up | a cycle was run at once because its release had passed ([`OverrunPolicy::CatchUp`]) |
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,7 +16,7 @@ use heapless::spsc::Producer;
 
 use super::clock::{Clock, Grid};
 use super::exchange::{CycleOutput, RealtimeSide};
-use super::overrun::OnOverrun;
+use super::overrun::OverrunPolicy;
 use super::usage::ThreadUsage;
 use super::waiter::Waiter;
 
@@ -31,7 +31,7 @@ pub struct Timing {
     /// Offset of the grid from the multiples of the period.
     pub phase_ns: u64,
     pub release: Release,
-    pub on_overrun: OnOverrun,
+    pub on_overrun: OverrunPolicy,
     /// A wake-up later than this after its release is a miss.
     pub late_wakeup_ns: u64,
 }
@@ -223,7 +223,7 @@ impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O> Cycles<'_, C, I, O, S
         let Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited, missed, io_late } = *begin;
         let Timing { period_ns, on_overrun, late_wakeup_ns, .. } = *self.timing;
         let mut input = self.side.inputs.value().input;
-        input.begin_cycle(release_ns, missed && on_overrun == OnOverrun::Fault);
+        input.begin_cycle(release_ns, missed && on_overrun == OverrunPolicy::Fault);
         let output = (self.step)(&input);
 
         let counters = &mut self.counters;

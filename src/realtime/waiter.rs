@@ -1,20 +1,19 @@
-//! Waiting for an instant: asleep, or asleep and for the last moment awake.
+//! Waiting for an instant: by sleep, or by sleep and a spin at the end.
 //!
 //! A sleeping thread wakes some tens of microseconds late. A thread that wakes a lead earlier and spins is
-//! on time within a fraction of a microsecond, for the price of the lead in processor time. The lead
-//! follows the wake-up latency that is seen: up at once, down slowly. It never exceeds its bound, so no
-//! period is ever spun as a whole, and Linux's real-time throttle (950 ms of each second) is never met.
+//! on time within a fraction of a microsecond, at the cost of the lead in processor time. The lead
+//! follows the measured wake-up latency: up at once, down slowly. It never exceeds its bound, so the thread never spins
+//! for a whole period, and Linux's real-time throttle (950 ms of each second) never applies.
 
 use super::clock::Clock;
 
-/// The lead forgets a high latency with this time constant \[cycles\]: about the 99.9th percentile stays
-/// covered.
-const MEMORY: u64 = 1024;
+/// Time constant of the decay of the lead \[cycles\]: about the 99.9th percentile remains covered.
+const LATENCY_MEMORY_CYCLES: u64 = 1024;
 
-/// From the end of a sleep to the first look at the clock, and from a look to the next \[ns\].
-const MARGIN_NS: u64 = 1_000;
+/// Time from the end of a sleep to the first reading of the clock, and between readings \[ns\].
+const WAKE_MARGIN_NS: u64 = 1_000;
 
-/// Waits; knows how long before an instant it has to wake.
+/// Waiter with an adaptive lead.
 #[derive(Clone, Copy, Debug)]
 pub struct Waiter {
     lead_ns: u64,
@@ -43,18 +42,19 @@ impl Waiter {
         now_ns
     }
 
-    /// What is spun at present \[ns\].
+    /// The present lead \[ns\].
     pub fn lead_ns(&self) -> u64 {
         self.lead_ns
     }
 
     fn adapt(&mut self, latency_ns: u64) {
-        let needed_ns = latency_ns + MARGIN_NS;
+        let needed_ns = latency_ns + WAKE_MARGIN_NS;
         if needed_ns > self.max_lead_ns {
-            // No lead within the bound helps against this one; nothing is learned from it.
+            // No lead within the bound covers this latency, so it does not change the lead.
             return;
         }
-        let forgotten_ns = self.lead_ns - self.lead_ns.saturating_sub(needed_ns).div_ceil(MEMORY);
+        let forgotten_ns =
+            self.lead_ns - self.lead_ns.saturating_sub(needed_ns).div_ceil(LATENCY_MEMORY_CYCLES);
         self.lead_ns = forgotten_ns.max(needed_ns);
     }
 }

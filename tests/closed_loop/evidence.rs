@@ -133,7 +133,7 @@ fn setpoints_are_refused_with_axis_or_leg_and_share_of_the_limit() {
 fn a_setpoint_out_of_the_envelope_is_refused_with_axis_value_and_end() {
     let mut config = deployed("motion_base");
     let range = [0.1, 0.2, 0.3, 0.01, 0.02, 0.03];
-    config.deployment.envelope = Some(hexad::analysis::envelope::Limits {
+    config.deployment.envelope = Some(hexad::analysis::envelope::EnvelopeBounds {
         pose_min: range.map(|x| -x),
         pose_max: range,
         velocity: [1.0; 6],
@@ -163,7 +163,7 @@ fn a_setpoint_out_of_the_envelope_is_refused_with_axis_value_and_end() {
 fn what_is_near_a_limit_says_so() {
     let mut config = deployed("motion_base");
     let wide = [0.1, 1.0, 1.0, 1.0, 1.0, 1.0];
-    config.deployment.envelope = Some(hexad::analysis::envelope::Limits {
+    config.deployment.envelope = Some(hexad::analysis::envelope::EnvelopeBounds {
         pose_min: wide.map(|x| -x),
         pose_max: wide,
         velocity: [1.0; 6],

@@ -6,7 +6,7 @@ use hexad::control::limits::Limit;
 use hexad::control::state::{Request, State};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::{deployed, largest};
 use super::rig::{Rig, in_motion, parameters};
@@ -204,7 +204,7 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
     let mut config = deployed("fried2008");
     config.deployment.timeouts.measured_s = 0.2;
     let (mut rig, _) = in_motion(&config);
-    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
     let stale = rig.input(&scene.at(1.5)).measurement.unwrap();
     let mut furthest = 0.0_f64;
     for k in 0..=150 {
@@ -238,7 +238,7 @@ fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
         (0.0035, (State::Fault, DiagnosticCode::SetpointJumped)),
     ] {
         let (mut rig, _) = in_motion(&config);
-        let scene = fit(&config.machine, Motion::Sines, 8.0);
+        let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
         let last = rig.input(&scene.at(1.5)).setpoint;
         let (mut twist, mut before) = (rig.simulator.state().twist.linear, None);
         let (mut strongest, mut jolt) = (0.0_f64, 0.0_f64);
@@ -276,7 +276,7 @@ fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
 #[test]
 fn a_message_seen_only_after_a_pause_does_not_make_the_next_one_a_jump() {
     let config = deployed("fried2008");
-    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
     let (mut rig, _) = in_motion(&config);
     let [mut seen, mut kept] = [Input::default(); 2];
     for k in 0..6000 {

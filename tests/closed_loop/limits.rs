@@ -8,7 +8,7 @@ use hexad::model::fidelity::Gravity;
 use hexad::model::machine::LEGS;
 use hexad::model::rigid::Motion as Moving;
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
 use super::common::{deployed, largest};
@@ -114,7 +114,7 @@ fn a_hopeless_platform_gets_no_more_than_the_limit() {
         platform.platform.mass *= 5.0;
         platform.platform.center_of_mass.x += config.machine.joints.radius;
         let mut rig = Rig::new(&config, &platform);
-        let scene = fit(&config.machine, Motion::Sines, 4.0);
+        let scene = fit(&config.machine, BuiltInMotion::Sines, 4.0);
         rig.play(&config.machine, &scene, |_, output| {
             assert!(largest(&output.force) <= limit, "{name}: {:?}", output.force);
             if has(output, Limit::Force) {

@@ -15,7 +15,7 @@ use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::motion::timeline::Timeline;
 use hexad::plant::simulator::Simulator;
 
@@ -123,7 +123,7 @@ impl Rig {
     pub fn play(
         &mut self,
         machine: &Machine,
-        scene: &Scene,
+        scene: &FittedMotion,
         mut watch: impl FnMut(&Input, &Output),
     ) -> Tracking {
         let timeline = Timeline::new(machine, &machine.home.into(), &scene.at(0.0).x, scene.duration);
@@ -132,7 +132,7 @@ impl Rig {
         let mut tracking = Tracking::default();
         loop {
             let t = (self.now_ns - start_ns) as f64 * 1e-9;
-            if t > timeline.ends() {
+            if t > timeline.end() {
                 return tracking;
             }
             let task = timeline.at(t, |t| scene.at(t));
@@ -147,7 +147,7 @@ impl Rig {
 }
 
 /// Plays a motion of `seconds` on a platform of its own; every cycle must be in control.
-pub fn track(config: &Config, platform: &Machine, motion: Motion, seconds: f64) -> Tracking {
+pub fn track(config: &Config, platform: &Machine, motion: BuiltInMotion, seconds: f64) -> Tracking {
     let scene = fit(&config.machine, motion, seconds);
     let mut cycles = 0;
     let tracking = Rig::new(config, platform).play(&config.machine, &scene, |_, output| {
@@ -168,7 +168,7 @@ pub fn track(config: &Config, platform: &Machine, motion: Motion, seconds: f64) 
 /// A rig in the middle of a motion, and the task at its next cycle.
 pub fn in_motion(config: &Config) -> (Rig, TaskState) {
     let mut rig = Rig::new(config, &config.machine);
-    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
     let period_s = rig.period_ns as f64 * 1e-9;
     rig.engage(&scene.at(0.0));
     for k in 0..1500 {

@@ -13,7 +13,7 @@ use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::Monotonic;
 use hexad::realtime::cyclic::{LoopReport, RECORDS, Release, Timing, run};
 use hexad::realtime::exchange::exchange;
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 
 /// A drive's clock has nothing to do with ours.
 const DRIVE_BEGAN_NS: u64 = 5_000;
@@ -47,7 +47,7 @@ impl Loop {
             period_ns: DRIVE_PERIOD_NS,
             phase_ns: 0,
             release: Release::External { timeout_ns: TIMEOUT_NS },
-            on_overrun: OnOverrun::Fault,
+            on_overrun: OverrunPolicy::Fault,
             late_wakeup_ns: 100_000_000,
         };
         let stopped = stop.clone();

@@ -11,7 +11,7 @@ use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::{Clock, sleep_until};
 use hexad::realtime::cyclic::{Counters, RECORDS, Release, Timing, run};
 use hexad::realtime::exchange::exchange;
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 use hexad::realtime::setup::scheduling;
 
 const PERIOD_NS: u64 = 500_000;
@@ -53,7 +53,7 @@ struct Cycle {
     told: bool,
 }
 
-fn perform(release: Release, on_overrun: OnOverrun) -> (Vec<Cycle>, Vec<CycleRecord>, Counters) {
+fn perform(release: Release, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<CycleRecord>, Counters) {
     let (side, _io) = exchange();
     let mut queue = Queue::<CycleRecord, RECORDS>::new();
     let (records_in, mut records) = queue.split();
@@ -90,7 +90,7 @@ fn perform(release: Release, on_overrun: OnOverrun) -> (Vec<Cycle>, Vec<CycleRec
 #[test]
 fn burnt_time_is_counted_as_the_test_saw_it() {
     for release in [Release::Grid { max_lead_ns: 0 }, Release::Grid { max_lead_ns: 100_000 }] {
-        for policy in [OnOverrun::Skip, OnOverrun::Fault, OnOverrun::CatchUp { most: 3 }] {
+        for policy in [OverrunPolicy::Skip, OverrunPolicy::Fault, OverrunPolicy::CatchUp { most: 3 }] {
             let (seen, records, counters) = perform(release, policy);
             let case = format!("{release:?} {policy:?}");
             assert_eq!(
@@ -106,7 +106,7 @@ fn burnt_time_is_counted_as_the_test_saw_it() {
                 let late_ns = ended_ns - due_ns;
                 let cycle = i as u64 + 1;
                 let case = format!("{case} cycle {cycle}: ended {late_ns} ns after its release");
-                if burns(cycle) && !matches!(policy, OnOverrun::CatchUp { .. }) {
+                if burns(cycle) && !matches!(policy, OverrunPolicy::CatchUp { .. }) {
                     assert!(records[i].compute_ns >= PERIOD_NS * 5 / 2, "{case}: {:?}", records[i]);
                     // At least the points that had passed when the test looked; more only if the loop or
                     // the sleep after it was held.
@@ -116,7 +116,7 @@ fn burnt_time_is_counted_as_the_test_saw_it() {
                         || records[i + 1].wakeup_ns >= PERIOD_NS
                         || (late_ns + SLACK_NS) / PERIOD_NS > passed;
                     assert!(steps == passed + 1 || held && steps > passed, "{case}: next after {steps}");
-                    assert_eq!(told, policy == OnOverrun::Fault, "{case}");
+                    assert_eq!(told, policy == OverrunPolicy::Fault, "{case}");
                 }
             }
             // A cycle that began in time and ended after its next release; who was late already is not one.

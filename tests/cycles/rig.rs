@@ -9,7 +9,7 @@ use hexad::daemon::cycle::CycleRecord;
 use hexad::realtime::clock::Clock;
 use hexad::realtime::cyclic::{Counters, RECORDS, Release, Timing, run};
 use hexad::realtime::exchange::exchange;
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 
 pub const PERIOD_NS: u64 = 1000;
 pub const PHASE_NS: u64 = 500;
@@ -65,7 +65,7 @@ impl Clock for Scripted<'_> {
 }
 
 /// Runs so many cycles from time 0 on.
-pub fn perform(script: &Script, on_overrun: OnOverrun, cycles: usize) -> (Vec<Seen>, Counters) {
+pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Vec<Seen>, Counters) {
     let now_ns = Cell::new(0);
     let latencies_ns = script.latencies_ns.clone().into_iter();
     let mut clock = Scripted { now_ns: &now_ns, latencies_ns, last_ns: 0, looks: 0 };

@@ -7,7 +7,7 @@ use hexad::control::law::ControlMode;
 use hexad::control::parameters::Parameters;
 use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
 use super::rig::{Rig, parameters};
@@ -110,7 +110,7 @@ pub fn machine(mode: ControlMode) -> (Config, Parameters) {
     config.deployment.control.mode = mode;
     config.deployment.plant.step_s = 1e-3;
     let wide = [0.5, 0.5, GAMMA_RANGE, 1.0, 1.0, 1.0];
-    config.deployment.envelope = Some(envelope::Limits {
+    config.deployment.envelope = Some(envelope::EnvelopeBounds {
         pose_min: wide.map(|x| -x),
         pose_max: wide,
         velocity: [1.0; 6],
@@ -127,7 +127,7 @@ pub const GAMMA_RANGE: f64 = 0.3;
 fn moving(world: &mut World) {
     world.ask(Request::Engage);
     world.until(|output| output.state == State::Active);
-    let scene = fit(&world.machine, Motion::Sines, 8.0);
+    let scene = fit(&world.machine, BuiltInMotion::Sines, 8.0);
     world.source = Source::Plays(scene, world.rig.now_ns);
     world.run(1900);
     let speed = world.rig.simulator.state().twist.linear.norm();

@@ -9,7 +9,7 @@ use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::rigid::{Pose, Wrench};
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{Profile, rise};
-use hexad::plant::imperfections::{External, Imperfections};
+use hexad::plant::imperfections::{ExternalWrench, Imperfections};
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector3;
 
@@ -110,7 +110,7 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
             let home = on_the_way(AT_HOME, &Profile::default());
             rig.engage(&home);
             let plant = &config.deployment.plant;
-            let external = External { wrench, frequency_hz: 0.0 };
+            let external = ExternalWrench { wrench, frequency_hz: 0.0 };
             rig.simulator = Simulator::imperfect(
                 &config.machine,
                 plant.brake_deceleration_m_s2,

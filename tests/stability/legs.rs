@@ -8,7 +8,7 @@ use hexad::control::limits::Limit;
 use hexad::control::state::State;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{Exact, Fidelity, MasslessLegs, RigidLegs};
-use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, refine};
+use hexad::model::forward_kinematics::{MAX_CONDITION, Outcome, refine};
 use hexad::model::inverse_geometry::{leg_directions, leg_lengths};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
@@ -198,8 +198,7 @@ fn the_condition_of_nearly_parallel_legs_is_the_inverse_of_their_angle() {
         let mut there = home(&machine);
         there.position.z += step;
         let outcome = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there)).outcome;
-        let expected =
-            if small / angle < LARGEST_CONDITION { Outcome::Solved } else { Outcome::NearSingular };
+        let expected = if small / angle < MAX_CONDITION { Outcome::Solved } else { Outcome::NearSingular };
         assert_eq!(outcome, expected, "{angle:e}");
     }
 }

@@ -9,7 +9,7 @@ use hexad::control::limits::Limit;
 use hexad::control::state::State;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::LARGEST_CONDITION;
+use hexad::model::forward_kinematics::MAX_CONDITION;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::rigid::{Motion, Wrench};
@@ -134,7 +134,7 @@ fn without_a_limit_the_model_ends_before_the_singular_pose() {
     for (distance, time_s, run) in runs(ANY) {
         let what = format!("{distance:e} rad, {time_s} s");
         assert_forces(&run, &what);
-        if distance > CONDITION / LARGEST_CONDITION {
+        if distance > CONDITION / MAX_CONDITION {
             assert_eq!(
                 (run.last.state, run.last.diagnostic.code),
                 (State::Active, DiagnosticCode::None),
@@ -149,7 +149,7 @@ fn without_a_limit_the_model_ends_before_the_singular_pose() {
             "{what}: {:?}",
             run.last
         );
-        assert!((300.0..1.2 * LARGEST_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
+        assert!((300.0..1.2 * MAX_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
     }
 }
 

@@ -10,7 +10,7 @@ use hexad::control::limits::Limit;
 use hexad::control::localization::PlatformState;
 use hexad::control::state::{Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -23,7 +23,7 @@ static CONFIG: LazyLock<Config> = LazyLock::new(|| {
     config.deployment.control.observer_bandwidth_hz = 0.3;
     config
 });
-static SCENE: LazyLock<Scene> = LazyLock::new(|| fit(&CONFIG.machine, Motion::Sines, 8.0));
+static SCENE: LazyLock<FittedMotion> = LazyLock::new(|| fit(&CONFIG.machine, BuiltInMotion::Sines, 8.0));
 
 /// What is wrong with the inputs for a while.
 #[derive(Clone, Copy, Debug)]

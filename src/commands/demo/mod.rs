@@ -205,7 +205,7 @@ fn watch(
     let started = Instant::now();
     let bar = progress(seconds + AROUND_S);
     loop {
-        if stop.requested() {
+        if stop.is_requested() {
             return Err(DemoError::Interrupted);
         }
         recorder.poll();

@@ -23,7 +23,7 @@ use crate::model::task::task_coordinates;
 use crate::plant::hardware::Hardware;
 use crate::plant::imperfections::Imperfections;
 use crate::plant::simulator::Brakes;
-use crate::plant::terms::Terms;
+use crate::plant::terms::PlantTerms;
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::setup::scheduling;
 use crate::realtime::stop_request::Stop;
@@ -56,7 +56,7 @@ fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortE
     let mut driven = Driven::new(config, tick_ns);
     let mut doubt = Doubt::default();
     let mut pending = None;
-    while !stop.requested() {
+    while !stop.is_requested() {
         sleep_until(tick_ns);
         if tick_ns - driven.time_ns > LONGEST_PAUSE_NS {
             warn!(seconds = (tick_ns - driven.time_ns) as f64 * 1e-9, "was paused; time goes on from now");
@@ -93,13 +93,13 @@ fn run_in_lockstep(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortEr
     let period_ns = nanoseconds(config.deployment.realtime.period_s());
     let mut driven = Driven::new(config, 0);
     info!("waiting for the daemon and a setpoint source in each step");
-    while !stop.requested() {
+    while !stop.is_requested() {
         let time_ns = driven.time_ns;
         let message = measured_message(&mut driven.hardware);
         measured.publish(time_ns, message)?;
         let mut said = Instant::now();
         let answer = look_until(
-            || stop.requested(),
+            || stop.is_requested(),
             || {
                 if said.elapsed() > REPEAT {
                     said = Instant::now();
@@ -196,7 +196,7 @@ pub fn hardware(config: &Config) -> Hardware {
 }
 
 /// What is simulated beyond the model, and what of it the tolerance leaves out.
-fn say_terms(config: &Config, terms: &Terms) {
+fn say_terms(config: &Config, terms: &PlantTerms) {
     let plant = &config.deployment.plant;
     if plant.imperfections == (Imperfections { seed: plant.imperfections.seed, ..Imperfections::default() }) {
         return;
@@ -233,7 +233,7 @@ fn tell(before: Brakes, now: Brakes, cause: DiagnosticCode) {
 /// Best effort: a simulator or a setpoint source below the daemon's priority, so that on a busy host it
 /// is as punctual as hardware.
 pub(super) fn prepare_thread(config: &Config) {
-    scheduling::sharp_timers();
+    scheduling::set_shortest_timer_slack();
     if let Err(shortfall) = scheduling::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {
         debug!("{shortfall}");
     }

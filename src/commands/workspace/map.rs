@@ -9,7 +9,7 @@ use plotters::style::text_anchor::HPos;
 use super::bands::{BANDS, Better, Quantity, plain};
 use super::contour::{Corner, outlines};
 use super::slice::Slice;
-use crate::analysis::pose_quality::Quality;
+use crate::analysis::pose_quality::PoseQuality;
 use crate::model::machine::Machine;
 use crate::output::axis::Axis;
 use crate::output::svg::{
@@ -130,9 +130,9 @@ impl Maps<'_> {
 
     /// What is drawn over the colours, in the units of the axes.
     fn lines(&self, slice: &Slice) -> Vec<(Sample, Vec<(f64, f64)>)> {
-        let edge = |quality: &Quality| [quality.stroke_margin, quality.determinant];
+        let edge = |quality: &PoseQuality| [quality.stroke_margin, quality.determinant];
         let reach = outlines(slice.count, |places| slice.at(places).map(edge));
-        let limit = |quality: &Quality| {
+        let limit = |quality: &PoseQuality| {
             [quality.stroke_margin, quality.determinant, self.largest_condition - quality.condition]
         };
         let limited = outlines(slice.count, |places| slice.at(places).map(limit));
@@ -218,7 +218,7 @@ impl Maps<'_> {
     /// The part of the reach that is as good as a threshold (all of it for NaN) as one polygon: outlines one after the
     /// other, each from and back to the first, by bridges without width.
     fn part(&self, slice: &Slice, quantity: &Quantity, threshold: f64) -> Vec<(f64, f64)> {
-        let numbers = |quality: &Quality| {
+        let numbers = |quality: &PoseQuality| {
             let [beyond, spare] = match threshold {
                 _ if threshold.is_nan() => [0.0; 2],
                 _ => [quantity.beyond(quality, threshold), quantity.max_force - quality.worst_force],

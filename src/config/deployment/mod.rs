@@ -70,7 +70,7 @@ pub struct Deployment {
     /// The simulated hardware.
     pub plant: Plant,
     /// What the platform will be asked to do; `None` if nobody has said.
-    pub envelope: Option<envelope::Limits>,
+    pub envelope: Option<envelope::EnvelopeBounds>,
 }
 
 /// `[control]`: the law's error dynamics, and how near the set point must be to engage.
@@ -322,7 +322,7 @@ fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
 }
 
 /// All four keys, or none.
-fn envelope(mut section: Reader) -> Option<envelope::Limits> {
+fn envelope(mut section: Reader) -> Option<envelope::EnvelopeBounds> {
     let pose = |angle: Bound, position: Bound| [angle, angle, angle, position, position, position];
     let keys = [
         ("pose_min", pose(Bound::Within(-HALF_TURN, 0.0), Bound::NotPositive)),
@@ -338,7 +338,7 @@ fn envelope(mut section: Reader) -> Option<envelope::Limits> {
     }
     section.finish();
     let [Some(pose_min), Some(pose_max), Some(velocity), Some(acceleration)] = found else { return None };
-    Some(envelope::Limits { pose_min, pose_max, velocity, acceleration })
+    Some(envelope::EnvelopeBounds { pose_min, pose_max, velocity, acceleration })
 }
 
 /// A peer that sends once a cycle is silent for one period: a timeout must be longer.
