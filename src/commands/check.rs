@@ -1,7 +1,9 @@
-//! `hexad check`: what a machine file means, in numbers an engineer can compare with the drawing.
+//! `hexad check`: the machine of a file at home, in numbers that an engineer can compare with the drawing.
 
 use core::fmt;
 
+use super::arguments::MachineFile;
+use super::failure::Failure;
 use crate::analysis::assembly_modes::{Other, others};
 use crate::config::Config;
 use crate::config::control_loops::loops;
@@ -13,17 +15,31 @@ use crate::model::inverse_jacobian::condition;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
+use crate::output::files::print;
+use crate::output::text_table::{Right, text_table};
 
-/// The machine at its home pose.
+#[derive(Debug, clap::Args)]
+pub struct CheckArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+}
+
+impl CheckArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        Ok(print(Check::new(&self.machine.load()?))?)
+    }
+}
+
+/// Lengths, forces, conditioning and control loops of a machine at its home pose; displays as text.
 pub struct Check<'a> {
     config: &'a Config,
     lengths: [f64; LEGS],
-    /// Static forces; none at a singular pose.
+    /// Static forces \[N\]; none at a singular pose.
     forces: Option<[f64; LEGS]>,
     /// Angle between each leg and the first axis of its universal joint \[deg\].
     joint_angles: [f64; LEGS],
     condition: f64,
-    /// How far one measurement may be from the next for its pose to be certain \[rad\], \[radius\].
+    /// Largest motion from one measurement to the next for which the pose is certain \[rad\], \[radius\].
     trusted_step: f64,
     /// Other poses with the same lengths, the nearest first.
     others: Vec<Other>,
@@ -59,20 +75,21 @@ impl fmt::Display for Check<'_> {
         let Config { name, machine, .. } = self.config;
         let actuator = &machine.actuator;
         writeln!(f, "{name}: valid. At home, at rest:\n")?;
-        writeln!(f, "leg   length      to shortest  to longest   force        of the limit  to joint axis")?;
         let forces = self.forces.unwrap_or([f64::NAN; LEGS]);
-        for (leg, ((length, force), angle)) in
-            self.lengths.iter().zip(forces).zip(self.joint_angles).enumerate()
-        {
-            writeln!(
-                f,
-                "{:>3}   {length:>7.4} m   {:>7.4} m    {:>7.4} m   {force:>9.2} N   {:>7.1} %     {angle:>7.1} deg",
-                leg + 1,
-                length - actuator.min_length,
-                actuator.max_length - length,
-                100.0 * force.abs() / actuator.max_force,
-            )?;
-        }
+        let legs = self.lengths.iter().zip(forces).zip(self.joint_angles).enumerate();
+        let header = ["leg", "length", "to shortest", "to longest", "force", "of the limit", "to joint axis"];
+        let rows = legs.map(|(leg, ((length, force), angle))| {
+            [
+                format!("{}", leg + 1),
+                format!("{length:.4} m"),
+                format!("{:.4} m", length - actuator.min_length),
+                format!("{:.4} m", actuator.max_length - length),
+                format!("{force:.2} N"),
+                format!("{:.1} %", 100.0 * force.abs() / actuator.max_force),
+                format!("{angle:.1} deg"),
+            ]
+        });
+        write!(f, "{}", text_table(2, &header.map(|name| (name, Right)), rows))?;
         writeln!(f, "\ncondition of the Jacobian  {:.2}   (1 is best; errors grow with it)", self.condition)?;
         self.fmt_modes(f)?;
         self.fmt_loops(f)
@@ -80,7 +97,7 @@ impl fmt::Display for Check<'_> {
 }
 
 impl Check<'_> {
-    /// How far the loops are from unstable.
+    /// Writes the stability margins of the control loops.
     fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Config { machine, deployment, .. } = self.config;
         let control = &deployment.control;
@@ -95,7 +112,7 @@ impl Check<'_> {
             let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
             writeln!(
                 f,
-                "legs         together they move like one of {:.2} to {:.2} Hz",
+                "legs         coupled, they move with {:.2} to {:.2} Hz",
                 root(legs.softest),
                 root(legs.stiffest)
             )?;
@@ -109,7 +126,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// What start-up and the loop can be certain of.
+    /// Writes within which bounds start-up and the loop know the pose.
     fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Config { machine, deployment, .. } = self.config;
         let step_m = self.trusted_step * machine.joints.radius;

@@ -4,17 +4,17 @@ use core::fmt;
 
 use toml::de::DeValue;
 
-use crate::output::numbers::{LARGEST, SMALLEST};
+use crate::output::numbers::{MAX_MAGNITUDE, MIN_POSITIVE_VALUE};
 
 /// What a number must be, besides finite.
 #[derive(Clone, Copy)]
 pub(super) enum Bound {
     Finite,
-    /// At least [`SMALLEST`].
+    /// At least [`MIN_POSITIVE_VALUE`].
     Positive,
     NotNegative,
     NotPositive,
-    /// At least [`SMALLEST`] and up to the limit.
+    /// At least [`MIN_POSITIVE_VALUE`] and up to the limit.
     UpTo(f64),
     /// Both ends included.
     Within(f64, f64),
@@ -31,17 +31,19 @@ impl Bound {
         };
         let admits = match self {
             Self::Finite => true,
-            Self::Positive => x >= SMALLEST,
+            Self::Positive => x >= MIN_POSITIVE_VALUE,
             Self::NotNegative => x >= 0.0,
             Self::NotPositive => x <= 0.0,
-            Self::UpTo(high) => x >= SMALLEST && x <= high,
+            Self::UpTo(high) => x >= MIN_POSITIVE_VALUE && x <= high,
             Self::Within(low, high) => (low..=high).contains(&x),
         };
-        match (x.abs() <= LARGEST, admits) {
+        match (x.abs() <= MAX_MAGNITUDE, admits) {
             (true, true) => None,
-            (true, false) if x > 0.0 && x < SMALLEST => Some(format!("must be at least {SMALLEST:e}")),
+            (true, false) if x > 0.0 && x < MIN_POSITIVE_VALUE => {
+                Some(format!("must be at least {MIN_POSITIVE_VALUE:e}"))
+            }
             (true, false) => Some(format!("must be {self}")),
-            (false, _) => Some(format!("must be a finite number, at most {LARGEST:e} in magnitude")),
+            (false, _) => Some(format!("must be a finite number, at most {MAX_MAGNITUDE:e} in magnitude")),
         }
     }
 }

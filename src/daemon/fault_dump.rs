@@ -11,7 +11,7 @@ use tracing::{info, warn};
 use crate::control::controller::Output;
 use crate::control::state::{Cause, State};
 use crate::model::task::task_coordinates;
-use crate::output::csv_table::{Writer, coordinates, legs};
+use crate::output::csv_table::{CsvWriter, coordinates, legs};
 
 /// Cycles kept: two seconds at 1 kHz, 100 ms at 20 kHz. The cause of a fault is rarely older than its timeouts.
 const KEPT: usize = 2000;
@@ -41,7 +41,7 @@ struct Writing {
     path: PathBuf,
     fault: CycleRecord,
     cycles: VecDeque<CycleRecord>,
-    table: Writer,
+    table: CsvWriter,
 }
 
 impl FaultDump {
@@ -92,7 +92,7 @@ impl FaultDump {
         }
         let number = fault.output.cause as u32;
         let path = folder.join(format!("fault-{number}-cycle-{}.csv", fault.cycle));
-        let table = Writer::new(&columns());
+        let table = CsvWriter::new(&columns());
         self.writing = Some(Writing { path, fault, cycles: self.cycles.clone(), table });
     }
 

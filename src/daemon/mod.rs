@@ -25,7 +25,7 @@ use self::log_thread::LogReport;
 use self::report::{DeadlineMisses, Report};
 use self::start::{prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use crate::config::control_loops::{ControlLoop, loops};
-use crate::config::deployment::{Deployment, ReleaseKey};
+use crate::config::deployment::{Deployment, ReleaseMode};
 use crate::config::{Config, fidelity};
 use crate::control::controller::{Controller, Envelope, Input, Output, Parameters};
 use crate::control::gains::Gains;
@@ -282,11 +282,11 @@ pub(super) fn timing(deployment: &Deployment) -> Timing {
         period_ns,
         phase_ns: period_ns / 2,
         release: match realtime.release {
-            ReleaseKey::Sleep => Release::Grid { max_lead_ns: 0 },
-            ReleaseKey::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
-            ReleaseKey::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
+            ReleaseMode::Sleep => Release::Grid { max_lead_ns: 0 },
+            ReleaseMode::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
+            ReleaseMode::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
             // Simulated time stands while nobody measures.
-            ReleaseKey::Lockstep => Release::External { timeout_ns: u64::MAX },
+            ReleaseMode::Lockstep => Release::External { timeout_ns: u64::MAX },
         },
         on_overrun: realtime.on_overrun,
         late_wakeup_ns: nanoseconds(realtime.late_wakeup_s),

@@ -30,6 +30,7 @@ const ANGLE_AMPLITUDE: f64 = 0.105;
 const USABLE_SHARE: f64 = 0.8;
 
 /// A named motion.
+#[cfg_attr(feature = "daemon", derive(clap::ValueEnum))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Stand at home.

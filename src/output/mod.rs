@@ -1,4 +1,4 @@
-//! What is written for people and other programs: charts, CSV tables, files.
+//! Everything written for people and other programs: charts, tables, CSV and JSON files.
 
 pub mod charts;
 pub mod csv_rows;
@@ -7,3 +7,4 @@ pub mod excerpt;
 pub mod files;
 pub mod numbers;
 pub mod scatter;
+pub mod text_table;
