@@ -7,7 +7,6 @@ use super::failure::Failure;
 use crate::analysis::assembly_modes::{Other, others};
 use crate::config::Config;
 use crate::config::control_loops::loops;
-use crate::control::leg_masses::LegMasses;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
@@ -99,8 +98,7 @@ impl fmt::Display for Check<'_> {
 impl Check<'_> {
     /// Writes the stability margins of the control loops.
     fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Config { machine, deployment, .. } = self.config;
-        let control = &deployment.control;
+        let control = &self.config.deployment.control;
         let observed = if control.observer_bandwidth_hz > 0.0 {
             format!(", with an observer of {} Hz", control.observer_bandwidth_hz)
         } else {
@@ -108,7 +106,7 @@ impl Check<'_> {
         };
         writeln!(f, "control mode {}{observed}", control.mode.name())?;
         if control.mode.acts_on_legs() {
-            let legs = LegMasses::at_home(machine);
+            let legs = &control.leg_masses;
             let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
             writeln!(
                 f,

@@ -28,7 +28,8 @@ impl fmt::Display for FaultTables {
             let text = paragraph("    ", &format!("{reaction}{}", cause.remedy()), stdout_width());
             write!(f, "{:>3} {}\n{text}", *cause as u32, cause.name())?;
         }
+        writeln!(f, "\nbits of `limiting`")?;
         let limits = Limit::ALL.map(|limit| [(limit as u32).to_string(), limit.name().into()]);
-        write!(f, "\n{}", text_table(2, &[("bit of `limiting`", Right), ("", Left)], limits))
+        write!(f, "{}", text_table(2, &[("bit", Right), ("limit", Left)], limits))
     }
 }

@@ -1,4 +1,4 @@
-//! What a number must be, and the words for it.
+//! Bounds of the numbers in a configuration.
 
 use core::fmt;
 
@@ -6,7 +6,7 @@ use toml::de::DeValue;
 
 use crate::output::numbers::{MAX_MAGNITUDE, MIN_POSITIVE_VALUE};
 
-/// What a number must be, besides finite.
+/// Bound of a number that must be finite.
 #[derive(Clone, Copy)]
 pub(super) enum Bound {
     Finite,
@@ -21,8 +21,8 @@ pub(super) enum Bound {
 }
 
 impl Bound {
-    /// What is wrong with a value, if anything; `None` is a value that is no number.
-    pub fn refusal(self, value: Option<f64>) -> Option<String> {
+    /// Requirement that a value violates, if any; `None` is a value that is no number.
+    pub fn violation(self, value: Option<f64>) -> Option<String> {
         let Some(x) = value else {
             return Some(match self {
                 Self::Finite => format!("must be {self}"),
@@ -61,7 +61,7 @@ impl fmt::Display for Bound {
     }
 }
 
-/// A float, or an integer that 128 bits hold.
+/// Number of a value: a float, or an integer of at most 128 bits.
 pub(super) fn number(value: &DeValue) -> Option<f64> {
     match value {
         DeValue::Integer(x) => i128::from_str_radix(x.as_str(), x.radix()).ok().map(|x| x as f64),
@@ -70,7 +70,7 @@ pub(super) fn number(value: &DeValue) -> Option<f64> {
     }
 }
 
-/// An integer that 32 bits hold.
+/// Integer of a value, of at most 32 bits.
 pub(super) fn integer(value: &DeValue) -> Option<i32> {
     value.as_integer().and_then(|x| i32::from_str_radix(x.as_str(), x.radix()).ok())
 }

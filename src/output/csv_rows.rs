@@ -32,7 +32,7 @@ impl<R: Read> CsvRows<R> {
     }
 
     /// The next row that is not blank, with its line; or an error, after which there is no other row.
-    pub fn next(&mut self) -> Result<Option<(u64, &ByteRecord)>, String> {
+    pub fn next_row(&mut self) -> Result<Option<(u64, &ByteRecord)>, String> {
         loop {
             let above = self.reader.position().line();
             // One more, to see whether the row goes on.

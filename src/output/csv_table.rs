@@ -76,13 +76,13 @@ impl NumberTable {
     ) -> Result<(), String> {
         let names = |record: &csv::ByteRecord| record.iter().map(|name| cell(name).trim().into()).collect();
         let (line, header): (_, Vec<String>) =
-            source.next()?.map_or((1, vec![]), |(line, record)| (line, names(record)));
+            source.next_row()?.map_or((1, vec![]), |(line, record)| (line, names(record)));
         let columns = errors.columns(line, &header, required, optional);
         if !errors.list.is_empty() {
             return Ok(());
         }
         let mut read = 0;
-        while let Some((line, record)) = source.next()? {
+        while let Some((line, record)) = source.next_row()? {
             if read == MAX_ROWS {
                 return Err(format!("line {line}: a row after {MAX_ROWS}: must be at most those"));
             }

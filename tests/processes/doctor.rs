@@ -60,7 +60,10 @@ fn text_and_json_and_exit_code_agree() {
         );
         let remedy_shown = remedy.as_ref().is_none_or(|remedy| text.contains(&format!("-> {remedy}")));
         assert!(remedy_shown, "{remedy:?} must be in\n{stdout}");
-        assert!(remedy.is_some() || [Assessment::Good, Assessment::Unknown].contains(assessment), "{name} has no remedy");
+        assert!(
+            remedy.is_some() || [Assessment::Good, Assessment::Unknown].contains(assessment),
+            "{name} has no remedy"
+        );
     }
     assert_eq!(diagnosis.rates.len(), 10);
     for rate in &diagnosis.rates {
@@ -101,7 +104,8 @@ fn what_is_configured_is_what_is_judged() {
         assert!(latency.lead_ns <= half_ns.min(300_000));
     }
     let releases = |rate_hz, release| {
-        let rate = diagnosis.rates.iter().find(|rate| rate.latency.is_of(rate_hz, release)).expect("measured");
+        let rate =
+            diagnosis.rates.iter().find(|rate| rate.latency.is_of(rate_hz, release)).expect("measured");
         rate.latency.wakeup_ns.count + rate.latency.missed
     };
     // It has 4 of the 15 parts of that second, the others one each.

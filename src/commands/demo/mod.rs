@@ -15,7 +15,7 @@ use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, duration};
 use super::failure::{CommandError, Failure};
 use super::operate::Operator;
 use super::progress::time_bar;
-use crate::config::text::text_of;
+use crate::config::text::read_file;
 use crate::config::{Config, ConfigError};
 use crate::control::state::{Cause, Request, State};
 use crate::daemon::report::Report;
@@ -268,7 +268,7 @@ fn watch(
 }
 
 fn read(path: Option<&Path>) -> Result<(String, String), ConfigError> {
-    path.map_or_else(|| Ok((DEFAULT_CONFIG.into(), DEFAULT_CONFIG_NAME.into())), text_of)
+    path.map_or_else(|| Ok((DEFAULT_CONFIG.into(), DEFAULT_CONFIG_NAME.into())), read_file)
 }
 
 /// The configuration under another name and rate. The text has been parsed before.

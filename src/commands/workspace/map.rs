@@ -10,8 +10,8 @@ use super::map_content::{MapLine, in_unit};
 use super::slice::Slice;
 use crate::model::machine::Machine;
 use crate::output::charts::{
-    Area, Axis, ChartError, DrawError, GRID, LEGEND_LINE, MARGIN, SAMPLE, TITLE_HEIGHT,
-    UNIT, WIDTH, X_LABELS, Y_LABELS, house_style, rgb, text,
+    Area, Axis, ChartError, DrawError, GRID, LEGEND_LINE, MARGIN, SAMPLE, TITLE_HEIGHT, UNIT, WIDTH,
+    X_LABELS, Y_LABELS, house_style, rgb, text,
 };
 use crate::output::files::write_whole;
 use crate::output::scatter::{drawn, width};

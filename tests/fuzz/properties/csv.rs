@@ -10,7 +10,9 @@ use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::Machine;
-use hexad::output::csv_table::{CsvWriter, NumberTable, TableError, legs, length_columns, trajectory_columns};
+use hexad::output::csv_table::{
+    CsvWriter, NumberTable, TableError, legs, length_columns, trajectory_columns,
+};
 
 use super::{line_number, lines};
 
