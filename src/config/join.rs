@@ -1,4 +1,4 @@
-//! Joining the topics of the machine that a configuration describes.
+//! Access to the topics of the machine that a configuration describes.
 
 use tracing::warn;
 

@@ -12,7 +12,7 @@ use crate::control::controller::Output;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::State;
 use crate::model::task::task_coordinates;
-use crate::output::csv_table::{Writer, coordinates, legs};
+use crate::output::csv_table::{CsvWriter, coordinates, legs};
 
 /// Cycles kept: two seconds at 1 kHz, 100 ms at 20 kHz. The cause of a fault is rarely older than its timeouts.
 const KEPT: usize = 2000;
@@ -42,7 +42,7 @@ struct Writing {
     path: PathBuf,
     fault: CycleRecord,
     cycles: VecDeque<CycleRecord>,
-    table: Writer,
+    table: CsvWriter,
 }
 
 impl FaultDump {
@@ -93,7 +93,7 @@ impl FaultDump {
         }
         let number = fault.output.diagnostic.code as u32;
         let path = folder.join(format!("fault-{number}-cycle-{}.csv", fault.cycle));
-        let table = Writer::new(&columns());
+        let table = CsvWriter::new(&columns());
         self.writing = Some(Writing { path, fault, cycles: self.cycles.clone(), table });
     }
 

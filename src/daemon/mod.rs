@@ -25,7 +25,7 @@ use self::log_thread::LogReport;
 use self::report::{DeadlineMisses, Report};
 use self::start::{prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use crate::config::control_loops::{ControlLoop, loops};
-use crate::config::deployment::{Deployment, ReleaseKey};
+use crate::config::deployment::{Deployment, ReleaseMode};
 use crate::config::{Config, fidelity};
 use crate::control::controller::{Controller, Input, Output};
 use crate::control::diagnostic::DiagnosticCode;
@@ -112,7 +112,7 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
 fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(Report, String), DaemonError> {
     let Config { machine, deployment, .. } = config;
     let parameters = parameters(machine, deployment, fidelity::fidelity(config));
-    for warning in loops(config, &parameters.law.leg_masses).iter().filter_map(ControlLoop::warning) {
+    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
         warn!("{warning}");
     }
     let mut controller = Controller::new(machine, parameters);
@@ -256,6 +256,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
                 Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
                 Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
             ],
+            control.leg_masses,
             core::f64::consts::TAU * control.observer_bandwidth_hz,
             &limits.reference,
         ),
@@ -282,11 +283,11 @@ pub(super) fn timing(deployment: &Deployment) -> Timing {
         period_ns,
         phase_ns: period_ns / 2,
         release: match realtime.release {
-            ReleaseKey::Sleep => Release::Grid { max_lead_ns: 0 },
-            ReleaseKey::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
-            ReleaseKey::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
+            ReleaseMode::Sleep => Release::Grid { max_lead_ns: 0 },
+            ReleaseMode::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
+            ReleaseMode::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
             // Simulated time stands while nobody measures.
-            ReleaseKey::Lockstep => Release::External { timeout_ns: u64::MAX },
+            ReleaseMode::Lockstep => Release::External { timeout_ns: u64::MAX },
         },
         on_overrun: realtime.on_overrun,
         late_wakeup_ns: nanoseconds(realtime.late_wakeup_s),

@@ -1,4 +1,4 @@
-//! What is written for people and other programs: charts, CSV tables, files.
+//! Everything written for people and other programs: charts, tables, CSV and JSON files.
 
 pub mod axis;
 pub mod charts;
@@ -6,6 +6,6 @@ pub mod csv_rows;
 pub mod csv_table;
 pub mod excerpt;
 pub mod files;
-pub mod machine_drawing;
 pub mod numbers;
 pub mod svg;
+pub mod text_table;

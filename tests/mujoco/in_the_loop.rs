@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::{panicking, sleep};
 use std::time::{Duration, Instant};
 
-use hexad::commands::demo::children::PARENT;
+use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
 use hexad::messages::ports::{Bus, Sink, Source, Time};
@@ -110,7 +110,7 @@ impl Stage {
     fn daemon(&self) -> Process {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
         command.args(["run", "--config"]).arg(self.path("machine.toml"));
-        command.env(PARENT, process::id().to_string()).env_remove("HEXAD_LOG");
+        command.env(PARENT_VARIABLE, process::id().to_string()).env_remove("HEXAD_LOG");
         let daemon = Process::start(command, self.path("daemon.txt"));
         daemon.says("running");
         daemon

@@ -1,4 +1,4 @@
-//! What went over the topics during a demonstration, and how well it was tracked.
+//! Recording of the topics during a demonstration, and its tracking error.
 
 use crate::daemon::report::TrackingSum;
 use crate::messages::ports::{Bus, PortError, Sink};
@@ -7,17 +7,17 @@ use crate::model::rigid::{Motion, Pose};
 use crate::model::task::TaskState;
 
 /// Messages kept between two polls: all that the topic can hold.
-const DEPTH: usize = usize::MAX;
+const TOPIC_DEPTH: usize = usize::MAX;
 
-/// Subscribes to everything.
-pub struct Recorder {
+/// Subscriber to setpoints, measurements and forces, which keeps every message.
+pub struct TopicRecorder {
     setpoints: Sink<SetpointMessage>,
     measured: Sink<MeasuredMessage>,
     forces: Sink<ForceMessage>,
     recording: Recording,
 }
 
-/// All messages, in order.
+/// All messages of a demonstration, in order.
 #[derive(Default)]
 pub struct Recording {
     pub setpoints: Vec<SetpointMessage>,
@@ -25,25 +25,25 @@ pub struct Recording {
     pub forces: Vec<ForceMessage>,
 }
 
-impl Recorder {
-    /// Begins to listen.
+impl TopicRecorder {
+    /// Subscribes to the topics of a machine.
     pub fn new(bus: &Bus) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.sink(DEPTH)?,
-            measured: bus.sink(DEPTH)?,
-            forces: bus.sink(DEPTH)?,
+            setpoints: bus.sink(TOPIC_DEPTH)?,
+            measured: bus.sink(TOPIC_DEPTH)?,
+            forces: bus.sink(TOPIC_DEPTH)?,
             recording: Recording::default(),
         })
     }
 
-    /// Takes what has arrived.
+    /// Takes the messages that have arrived since the last call.
     pub fn poll(&mut self) {
         self.recording.setpoints.extend(core::iter::from_fn(|| self.setpoints.receive()));
         self.recording.measured.extend(core::iter::from_fn(|| self.measured.receive()));
         self.recording.forces.extend(core::iter::from_fn(|| self.forces.receive()));
     }
 
-    /// What was recorded.
+    /// The recording, with the messages that have arrived last.
     pub fn finish(mut self) -> Recording {
         self.poll();
         self.recording
@@ -51,7 +51,7 @@ impl Recorder {
 }
 
 impl Recording {
-    /// The instant that charts call zero: the first setpoint.
+    /// Instant of the first setpoint, which is time zero of the charts.
     pub fn start_ns(&self) -> u64 {
         self.setpoints.first().map_or(0, |message| message.header.time_ns)
     }
@@ -106,12 +106,12 @@ pub fn task_state(message: &SetpointMessage) -> TaskState {
     TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() }
 }
 
-/// The pose a plant says it has.
+/// True pose of the plant in a message.
 pub fn measured_pose(message: &MeasuredMessage) -> Pose {
     TaskState::at_rest(message.x).motion().pose
 }
 
-/// Desired motion of a setpoint.
+/// Desired motion of a setpoint message.
 pub fn desired_motion(message: &SetpointMessage) -> Motion {
     task_state(message).motion()
 }
