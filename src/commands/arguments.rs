@@ -8,12 +8,13 @@ use clap::Args;
 
 use crate::config::{Config, ConfigError};
 
-/// Configuration of the machine that drives every demonstration and diagnosis without one of its own.
+/// Configuration of demonstrations and diagnoses without `--config`.
 pub const DEFAULT_CONFIG: &str = include_str!("../../config/fried2008.toml");
 
 /// File name of [`DEFAULT_CONFIG`] in error texts.
 pub const DEFAULT_CONFIG_NAME: &str = "fried2008.toml";
 
+// Doc comments of fields are the help texts.
 #[derive(Debug, Args)]
 pub struct MachineFile {
     /// Machine file (TOML)

@@ -6,7 +6,7 @@ use nalgebra::Vector6;
 
 use super::arguments::{MachineFile, TableFiles};
 use super::failure::Failure;
-use super::offline_tables::{OfflineError, UnsolvedRows, time};
+use super::offline_tables::{UnsolvedRows, time};
 use super::progress::item_bar;
 use crate::model::forward_kinematics::{Tracker, TrackingResult};
 use crate::model::machine::{LEGS, Machine};
@@ -37,10 +37,9 @@ pub enum StartPose {
 impl ForwardKinematicsArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let machine = self.machine.load()?.machine;
-        let table = NumberTable::read(&self.files.input, &length_columns(), &legs("length_rate"));
-        let (mut output, result) =
-            forward_kinematics(&machine, self.start, &table.map_err(OfflineError::from)?);
-        output.save(&self.files.output).map_err(OfflineError::from)?;
+        let table = NumberTable::read(&self.files.input, &length_columns(), &legs("length_rate"))?;
+        let (mut output, result) = forward_kinematics(&machine, self.start, &table);
+        output.save(&self.files.output).map_err(Failure::before_start)?;
         Ok(result?)
     }
 }
@@ -50,7 +49,7 @@ pub fn forward_kinematics(
     machine: &Machine,
     start: StartPose,
     table: &NumberTable,
-) -> (CsvWriter, Result<(), OfflineError>) {
+) -> (CsvWriter, Result<(), UnsolvedRows>) {
     let has_rates = table.rows().first().is_some_and(|row| row.len() > 1 + LEGS);
     let mut columns = vec!["t".into()];
     columns.extend(coordinates(""));
@@ -58,7 +57,8 @@ pub fn forward_kinematics(
     if has_rates {
         columns.extend(["omega_x", "omega_y", "omega_z", "x_rate", "y_rate", "z_rate"].map(String::from));
     }
-    let (mut writer, mut unsolved) = (CsvWriter::new(&columns), UnsolvedRows::default());
+    let mut writer = CsvWriter::new(&columns);
+    let mut unsolved = UnsolvedRows::new("did not converge (column converged)");
     let home = Tracker::new(machine, TaskState::at_rest(machine.home).motion().pose);
     let (mut tracker, mut near) = (home, machine.home);
     for row in table.rows().iter().progress_with(item_bar(table.rows().len(), "rows")) {
@@ -80,5 +80,5 @@ pub fn forward_kinematics(
         let found = [f64::from(iterations), f64::from(u8::from(converged))];
         writer.row([time(row)].into_iter().chain(x).chain(found).chain(twist.iter().flatten().copied()));
     }
-    (writer, unsolved.into_result(table.rows().len(), "did not converge (column converged)"))
+    (writer, unsolved.into_result())
 }

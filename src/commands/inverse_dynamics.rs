@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::arguments::{MachineFile, TableFiles};
 use super::failure::Failure;
-use super::offline_tables::{OfflineError, UnsolvedRows, read_trajectory, task_state, time};
+use super::offline_tables::{UnsolvedRows, read_trajectory, task_state, time};
 use super::progress::item_bar;
 use crate::analysis::batch;
 use crate::model::active_forces::InverseDynamics;
@@ -28,9 +28,9 @@ pub struct InverseDynamicsArguments {
 impl InverseDynamicsArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let machine = self.machine.load()?.machine;
-        let table = read_trajectory(&self.files.input).map_err(OfflineError::from)?;
+        let table = read_trajectory(&self.files.input)?;
         let (mut output, result) = inverse_dynamics(&machine, self.fidelity, &table);
-        output.save(&self.files.output).map_err(OfflineError::from)?;
+        output.save(&self.files.output).map_err(Failure::before_start)?;
         Ok(result?)
     }
 }
@@ -47,7 +47,7 @@ pub fn inverse_dynamics(
     machine: &Machine,
     fidelity: Fidelity,
     table: &NumberTable,
-) -> (CsvWriter, Result<(), OfflineError>) {
+) -> (CsvWriter, Result<(), UnsolvedRows>) {
     let mut columns = vec!["t".into()];
     for stem in ["force", "length", "length_rate", "length_accel"] {
         columns.extend(legs(stem));
@@ -57,12 +57,13 @@ pub fn inverse_dynamics(
     let bar = item_bar(motions.len(), "rows");
     batch::forces(&InverseDynamics::new(machine), fidelity, &motions, &mut forces, &bar);
     bar.finish_and_clear();
-    let (mut writer, mut unsolved) = (CsvWriter::new(&columns), UnsolvedRows::default());
+    let mut writer = CsvWriter::new(&columns);
+    let mut unsolved = UnsolvedRows::new("are at singular poses and have no forces");
     for (row, (motion, forces)) in table.rows().iter().zip(motions.iter().zip(forces)) {
         unsolved.add(time(row), forces.is_some());
         let (forces, legs) = (forces.unwrap_or([f64::NAN; LEGS]), leg_motion(machine, motion));
         writer
             .row([time(row)].into_iter().chain(forces).chain(legs.length).chain(legs.rate).chain(legs.accel));
     }
-    (writer, unsolved.into_result(table.rows().len(), "are at singular poses and have no forces"))
+    (writer, unsolved.into_result())
 }

@@ -2,52 +2,47 @@
 
 use std::path::Path;
 
+use super::failure::CommandError;
 use crate::model::task::TaskState;
 use crate::output::csv_table::{NumberTable, TableError, six, trajectory_columns};
-use crate::output::files::FileError;
 
-use super::failure::CommandError;
-
-/// Error of an offline command.
-#[derive(Debug, thiserror::Error)]
-pub enum OfflineError {
-    #[error(transparent)]
-    Input(#[from] TableError),
-    #[error(transparent)]
-    Output(#[from] FileError),
-    /// The output is complete and marks the rows; the error makes sure that nobody misses them.
-    #[error("{count} of {rows} rows {problem}, the first at t = {first:?}")]
-    Unsolved { count: usize, rows: usize, problem: &'static str, first: f64 },
-}
-
-impl CommandError for OfflineError {
-    fn has_begun(&self) -> bool {
-        matches!(self, Self::Unsolved { .. })
-    }
-}
-
-/// Count of the rows without a solution.
-#[derive(Default)]
+/// Error for rows without a solution. The output is complete and marks them; the error makes sure that nobody misses
+/// them.
+#[derive(Debug, Default, thiserror::Error)]
+#[error("{count} of {rows} rows {problem}, the first at t = {first:?}")]
 pub struct UnsolvedRows {
     count: usize,
+    rows: usize,
+    problem: &'static str,
     first: f64,
 }
 
+impl CommandError for UnsolvedRows {
+    fn has_begun(&self) -> bool {
+        true
+    }
+}
+
+impl CommandError for TableError {}
+
 impl UnsolvedRows {
-    /// Counts the row of time `t` unless it is solved.
+    /// Count of zero; `problem` says what an unsolved row lacks.
+    pub fn new(problem: &'static str) -> Self {
+        Self { problem, ..Self::default() }
+    }
+
+    /// Counts the row of time `t`.
     pub fn add(&mut self, t: f64, is_solved: bool) {
+        self.rows += 1;
         if !is_solved {
-            if self.count == 0 {
-                self.first = t;
-            }
+            self.first = if self.count == 0 { t } else { self.first };
             self.count += 1;
         }
     }
 
-    /// Error if any of `rows` is unsolved; `problem` says what an unsolved row lacks.
-    pub fn into_result(self, rows: usize, problem: &'static str) -> Result<(), OfflineError> {
-        let Self { count, first } = self;
-        if count == 0 { Ok(()) } else { Err(OfflineError::Unsolved { count, rows, problem, first }) }
+    /// Itself as an error, if any row is unsolved.
+    pub fn into_result(self) -> Result<(), Self> {
+        if self.count == 0 { Ok(()) } else { Err(self) }
     }
 }
 

@@ -10,7 +10,9 @@ use std::{fmt, io, path::Path};
 
 use thiserror::Error;
 use toml::de::DeTable;
+use tracing::warn;
 
+use crate::messages::ports::{Bus, PortError, Time};
 use crate::model::machine::Machine;
 
 use self::deployment::Deployment;
@@ -21,7 +23,6 @@ pub mod control_loops;
 pub mod deployment;
 pub mod fidelity;
 mod geometry;
-mod join;
 mod machine;
 mod reader;
 mod syntax;
@@ -99,6 +100,19 @@ impl Config {
             violations if violations.is_empty() => Ok(Self { name, machine, deployment }),
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }
+    }
+
+    /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.
+    pub fn join(&self) -> Result<Bus, PortError> {
+        let time = self.deployment.realtime.time();
+        if time == Time::Simulated {
+            warn!(
+                "TIME IS SIMULATED (realtime.release = \"lockstep\"): no hardware receives messages, topics are \
+                 hexad-simulated/{}/...",
+                self.name
+            );
+        }
+        Bus::join_in(&self.name, time)
     }
 }
 

@@ -91,7 +91,9 @@ fn imperfections_are_refused_with_key_value_and_bound() {
     refused(
         "stiffness_n_m = 5e7\n",
         "",
-        &["plant.leg.backlash_m = 7e-5: must be 0 without stiffness_n_m: play has flanks"],
+        &[
+            "plant.leg.backlash_m = 7e-5: must be 0 without stiffness_n_m: the flanks of a backlash are springs",
+        ],
     );
     // Too fast to be simulated in real time.
     refused(

@@ -157,7 +157,7 @@ impl Check<'_> {
         if nearest.is_nearby() {
             writeln!(
                 f,
-                "WARNING: at start-up lengths alone may not tell it from home; move home away from it"
+                "WARNING: at start-up the lengths alone may not distinguish it from home; choose a home further away from it"
             )?;
         }
         Ok(())

@@ -73,7 +73,7 @@ pub enum DoctorError {
     )]
     CpuWithDeadline,
     #[error(
-        "not measured: it would delay the controller of process {0}; stop that, choose another --cpu, or say --disturb"
+        "not measured: it would delay the controller of process {0}; stop that, choose another --cpu, or add --disturb"
     )]
     ControllerRuns(u32),
     #[error("cannot start a thread: {0}")]

@@ -155,7 +155,8 @@ fn notes(diagnosis: &Diagnosis) -> Vec<String> {
     let Diagnosis { seconds, rates, facts, .. } = diagnosis;
     let mut notes = Vec::new();
     let stolen_ms: Option<u64> = rates.iter().map(|rate| rate.latency.stolen_ms).sum();
-    if let Some(stolen_ms) = stolen_ms.filter(|_| facts.contains(&surroundings::virtual_machine())) {
+    let is_virtual = facts.iter().any(|fact| fact.found == surroundings::virtual_machine().found);
+    if let Some(stolen_ms) = stolen_ms.filter(|_| is_virtual) {
         notes.push(format!(
             "The longest wake-ups may be pauses by the host of this virtual machine. The host reports that it took \
              {stolen_ms} ms of processor time meanwhile; it may take more at any time."
@@ -228,7 +229,8 @@ mod tests {
     #[test]
     fn lines_fit_the_terminal_and_lose_no_word() {
         let realtime = Config::parse(DEFAULT_CONFIG, "test").unwrap().deployment.realtime;
-        let facts = [Fact::fair("isolation", "one two three ".repeat(20).trim(), "four ".repeat(30).trim())];
+        let fact = Fact::fair("one two three ".repeat(20).trim(), "four ".repeat(30).trim());
+        let facts = [Fact { name: "isolation".into(), ..fact }];
         for width in [60, 80, 100] {
             let layout = TextStyle { width, has_colours: false };
             let text = layout.facts("test", &realtime, &facts);

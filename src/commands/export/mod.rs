@@ -14,13 +14,13 @@
 //! | actuator | `force_i` | Gamma \[N\]: positive pushes the platform away from the base |
 //!
 //! Rotations are right-handed. MJCF closes the loops by `connect` constraints `ball_i`; URDF cannot, and
-//! leaves it to its reader that `ball_rod_i` and `ball_platform_i` coincide.
+//! leaves it to the reader of the file to make `ball_rod_i` and `ball_platform_i` coincide.
 //!
 //! | of the configuration | MJCF | URDF |
 //! | --- | --- | --- |
 //! | masses, centres, inertias | exact, one body a link | the same |
 //! | `c + q (L - l0)^2` | its value at home, and `c q l0` in `custom/numeric` | its value at home |
-//! | reflected mass | `armature` of `prismatic_i` | none: URDF has no word for it |
+//! | reflected mass | `armature` of `prismatic_i` | none: URDF has no element for it |
 //! | viscous friction | `damping` | `damping` |
 //! | Coulomb friction | `frictionloss`: a constraint, creeps where hexad's is proportional | `friction` |
 //! | stroke, force, rate | `range`, `ctrlrange`, none | `limit` |
@@ -30,7 +30,7 @@
 //! the paper does, Newton-Euler with the instantaneous value, a reader of the MJCF does by setting
 //! `body_inertia` from the numbers before each step (`tests/clients/machine.py`).
 //!
-//! What it does not do: brakes, drives, controllers. Without forces the machine falls.
+//! The models have no brakes, drives or controllers. Without forces the machine falls.
 
 use std::path::PathBuf;
 

@@ -42,7 +42,7 @@ pub struct MoveArguments {
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
-    /// Also ask for control, once, as soon as it can be had
+    /// Also request control, once, as soon as the daemon can give it
     #[arg(long)]
     engage: bool,
 }

@@ -162,8 +162,8 @@ fn observer(
     observer_hz
 }
 
-/// Bandwidth and damping ratio of one loop, the stiffest of whose modes has so many times its gain; refused where
-/// that is unstable with the longest delay.
+/// Reads bandwidth and damping ratio of a loop, and rejects a bandwidth that is unstable with the longest delay.
+/// `stiffest` is the gain of the stiffest mode as a multiple of the gain of the loop.
 fn gains(
     section: &mut SectionReader,
     [bandwidth_key, damping_key]: [&'static str; 2],

@@ -12,7 +12,7 @@ use crate::model::task::TaskState;
 /// worth following, faster than any motion.
 const FORCE_RISE_S: f64 = 0.01;
 /// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
-/// a load asks for up to a hundred times its size of the legs.
+/// a load needs leg forces of up to a hundred times its size.
 const DEFAULT_CONDITION: f64 = 100.0;
 
 /// Section `[limits]`.

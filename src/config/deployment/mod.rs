@@ -1,4 +1,4 @@
-//! The sections that say how a machine is run: `[realtime]`, `[control]`, `[limits]`, `[timeouts]`,
+//! The sections of the deployment: `[realtime]`, `[control]`, `[limits]`, `[timeouts]`,
 //! `[plant]`, `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer

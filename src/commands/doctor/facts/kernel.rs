@@ -1,6 +1,6 @@
 //! Facts about the kernel: preemption, throttling of real-time threads, clock.
 
-use super::Fact;
+use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::clock_cost::ClockCost;
 
@@ -15,39 +15,34 @@ const REALTIME_KERNEL: &str =
     "use a kernel with PREEMPT_RT (Debian, Ubuntu: linux-image-rt-amd64, linux-realtime)";
 
 /// Version and preemption model of the kernel.
-pub fn preemption(host: &HostFiles) -> Fact {
-    let name = "kernel";
+pub fn preemption(host: &HostFiles) -> Examined {
     let read = |file: &str| host.text(&format!("proc/sys/kernel/{file}"));
-    let (release, version) = match (read("osrelease"), read("version")) {
-        (Ok(release), Ok(version)) => (release, version),
-        (Err(reason), _) | (_, Err(reason)) => return Fact::unknown(name, reason, None),
-    };
+    let (release, version) = (read("osrelease")?, read("version")?);
     let is = |word: &str| version.split_whitespace().any(|found| found == word);
     if is("PREEMPT_RT") || host.text("sys/kernel/realtime").is_ok_and(|text| text == "1") {
-        return Fact::good(name, format!("Linux {release}, PREEMPT_RT"));
+        return Ok(Fact::good(format!("Linux {release}, PREEMPT_RT")));
     }
     if is("PREEMPT_DYNAMIC") {
-        return dynamic(name, host, &release);
+        return dynamic(host, &release);
     }
     if is("PREEMPT") {
-        return Fact::fair(name, format!("Linux {release}, preemptible but not PREEMPT_RT"), REALTIME_KERNEL);
+        return Ok(Fact::fair(format!("Linux {release}, preemptible but not PREEMPT_RT"), REALTIME_KERNEL));
     }
-    Fact::bad(name, format!("Linux {release}, not preemptible"), REALTIME_KERNEL)
+    Ok(Fact::bad(format!("Linux {release}, not preemptible"), REALTIME_KERNEL))
 }
 
 /// Fact about a kernel whose preemption model is chosen at boot.
-fn dynamic(name: &str, host: &HostFiles, release: &str) -> Fact {
+fn dynamic(host: &HostFiles, release: &str) -> Examined {
     let boot = format!("{REALTIME_KERNEL}, or boot with preempt=full");
     match mode(host, release) {
         Ok(mode) if mode == "full" || mode == "lazy" => {
-            Fact::fair(name, format!("Linux {release}, preempt={mode}, not PREEMPT_RT"), REALTIME_KERNEL)
+            Ok(Fact::fair(format!("Linux {release}, preempt={mode}, not PREEMPT_RT"), REALTIME_KERNEL))
         }
-        Ok(mode) => Fact::bad(name, format!("Linux {release}, preempt={mode}"), boot),
-        Err(reason) => Fact::unknown(
-            name,
+        Ok(mode) => Ok(Fact::bad(format!("Linux {release}, preempt={mode}"), boot)),
+        Err(reason) => Ok(Fact::unknown(
             format!("Linux {release}, not PREEMPT_RT; how it preempts was chosen at boot, and {reason}"),
             Some(&format!("as root, mount -t debugfs debugfs /sys/kernel/debug shows it; better {boot}")),
-        ),
+        )),
     }
 }
 
@@ -77,16 +72,11 @@ pub(super) fn boot_parameter(host: &HostFiles, name: &str) -> Option<String> {
 }
 
 /// Share of each processor that all real-time threads together may use.
-pub fn throttling(host: &HostFiles) -> Fact {
-    let name = "throttling";
-    let [runtime, period] =
-        ["runtime", "period"].map(|which| host.number(&format!("proc/sys/kernel/sched_rt_{which}_us")));
-    let (runtime_us, period_us) = match (runtime, period) {
-        (Ok(runtime), Ok(period)) => (runtime, period),
-        (Err(reason), _) | (_, Err(reason)) => return Fact::unknown(name, reason, None),
-    };
+pub fn throttling(host: &HostFiles) -> Examined {
+    let read = |which| host.number(&format!("proc/sys/kernel/sched_rt_{which}_us"));
+    let (runtime_us, period_us) = (read("runtime")?, read("period")?);
     if runtime_us < 0 {
-        return Fact::good(name, "none for real-time threads");
+        return Ok(Fact::good("none for real-time threads"));
     }
     let found = format!(
         "real-time threads may use {} of each {} ms",
@@ -94,33 +84,29 @@ pub fn throttling(host: &HostFiles) -> Fact {
         period_us as f64 / 1e3
     );
     if runtime_us as f64 >= MIN_RUNTIME_SHARE * period_us as f64 {
-        return Fact::good(name, found);
+        return Ok(Fact::good(found));
     }
-    Fact::bad(name, found, "sysctl -w kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000")
+    Ok(Fact::bad(found, "sysctl -w kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000"))
 }
 
 /// Clock source, and the cost of reading it.
-pub fn clock(host: &HostFiles, cost: &ClockCost) -> Fact {
-    let name = "clock";
-    let source = match host.text("sys/devices/system/clocksource/clocksource0/current_clocksource") {
-        Ok(source) => source,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
+pub fn clock(host: &HostFiles, cost: &ClockCost) -> Examined {
+    let source = host.text("sys/devices/system/clocksource/clocksource0/current_clocksource")?;
     let ClockCost { reading_ns, system_call_ns } = *cost;
     if reading_ns < MAX_READING_SHARE * system_call_ns {
-        return Fact::good(name, format!("{source}, {reading_ns:.0} ns a reading, without a system call"));
+        return Ok(Fact::good(format!("{source}, {reading_ns:.0} ns a reading, without a system call")));
     }
-    Fact::bad(
-        name,
+    Ok(Fact::bad(
         format!("{source}, {reading_ns:.0} ns a reading: each is a system call"),
         "find the reason why the kernel abandoned a faster one: dmesg | grep -i -e clocksource -e tsc",
-    )
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::commands::doctor::facts::Assessment;
+    use crate::commands::doctor::facts::tests::examined;
     use crate::commands::doctor::files::sample::host;
 
     const RELEASE: (&str, &str) = ("proc/sys/kernel/osrelease", "6.12.1");
@@ -128,7 +114,7 @@ mod tests {
     fn kernel(version: &str, more: &[(&str, &str)]) -> Fact {
         let mut files = vec![RELEASE, ("proc/sys/kernel/version", version)];
         files.extend(more);
-        preemption(&host(&files).files)
+        examined(preemption(&host(&files).files))
     }
 
     #[test]
@@ -166,7 +152,10 @@ mod tests {
             assert!(fact.found.contains(words), "{fact:?}");
             assert_eq!(fact.remedy.is_none(), assessment == Assessment::Good, "{fact:?}");
         }
-        assert_eq!(preemption(&host(&[RELEASE]).files).found, "there is no /proc/sys/kernel/version");
+        assert_eq!(
+            examined(preemption(&host(&[RELEASE]).files)).found,
+            "there is no /proc/sys/kernel/version"
+        );
     }
 
     #[test]
@@ -182,19 +171,20 @@ mod tests {
                 ("proc/sys/kernel/sched_rt_runtime_us", runtime),
                 ("proc/sys/kernel/sched_rt_period_us", period),
             ]);
-            assert_eq!(throttling(&host.files).assessment, assessment, "{runtime} of {period}");
+            assert_eq!(examined(throttling(&host.files)).assessment, assessment, "{runtime} of {period}");
         }
-        assert_eq!(throttling(&host(&[]).files).assessment, Assessment::Unknown);
+        assert_eq!(examined(throttling(&host(&[]).files)).assessment, Assessment::Unknown);
     }
 
     #[test]
     fn a_clock_that_costs_a_system_call_is_bad() {
         let empty = host(&[]);
         let host = host(&[("sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc")]);
-        let fact = |reading_ns| clock(&host.files, &ClockCost { reading_ns, system_call_ns: 120.0 });
-        assert_eq!(fact(25.0), Fact::good("clock", "tsc, 25 ns a reading, without a system call"));
+        let fact =
+            |reading_ns| examined(clock(&host.files, &ClockCost { reading_ns, system_call_ns: 120.0 }));
+        assert_eq!(fact(25.0), Fact::good("tsc, 25 ns a reading, without a system call"));
         assert_eq!(fact(125.0).assessment, Assessment::Bad);
         let cost = ClockCost { reading_ns: 25.0, system_call_ns: 120.0 };
-        assert_eq!(clock(&empty.files, &cost).assessment, Assessment::Unknown);
+        assert_eq!(examined(clock(&empty.files, &cost)).assessment, Assessment::Unknown);
     }
 }

@@ -43,25 +43,28 @@ pub struct Fact {
     pub remedy: Option<String>,
 }
 
+/// Outcome of an examination: a fact without its name, or the reason why it is unknown.
+type Examined = Result<Fact, String>;
+
 impl Fact {
     /// Good fact.
-    pub fn good(name: &str, found: impl Into<String>) -> Self {
-        Self { name: name.into(), assessment: Assessment::Good, found: found.into(), remedy: None }
+    pub fn good(found: impl Into<String>) -> Self {
+        Self { name: String::new(), assessment: Assessment::Good, found: found.into(), remedy: None }
     }
 
     /// Fair fact.
-    pub fn fair(name: &str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { assessment: Assessment::Fair, remedy: Some(remedy.into()), ..Self::good(name, found) }
+    pub fn fair(found: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { assessment: Assessment::Fair, remedy: Some(remedy.into()), ..Self::good(found) }
     }
 
     /// Bad fact.
-    pub fn bad(name: &str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { assessment: Assessment::Bad, ..Self::fair(name, found, remedy) }
+    pub fn bad(found: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { assessment: Assessment::Bad, ..Self::fair(found, remedy) }
     }
 
     /// Unknown fact; `remedy` is how it can be determined.
-    pub fn unknown(name: &str, reason: impl Into<String>, remedy: Option<&str>) -> Self {
-        Self { assessment: Assessment::Unknown, remedy: remedy.map(Into::into), ..Self::good(name, reason) }
+    pub fn unknown(reason: impl Into<String>, remedy: Option<&str>) -> Self {
+        Self { assessment: Assessment::Unknown, remedy: remedy.map(Into::into), ..Self::good(reason) }
     }
 }
 
@@ -75,26 +78,42 @@ pub fn all(
 ) -> Vec<Fact> {
     let permitted = permissions.cpus_permitted.clone();
     let chosen = &LoopCpus { realtime: realtime.cpu, io: realtime.io_cpu, permitted };
-    let mut facts = vec![kernel::preemption(host), surroundings::machine(host)];
-    facts.extend(permissions::scheduling(permissions, realtime, refused));
-    facts.extend([
-        permissions::locked_memory(permissions, realtime, refused),
-        permissions::cgroup(permissions, refused),
-        permissions::container(permissions),
-        kernel::throttling(host),
-        processors::count(chosen),
-        processors::isolation(host, chosen),
-        processors::siblings(host, chosen),
-    ]);
-    facts.extend(processors::interrupts(host, chosen));
     let idle_us = realtime.cpu_dma_latency_us;
+    let mut facts = vec![("kernel", kernel::preemption(host)), ("machine", surroundings::machine(host))];
+    let scheduling = permissions::scheduling(permissions, realtime, refused);
+    facts.extend(scheduling.into_iter().map(|fact| ("scheduling", Ok(fact))));
     facts.extend([
-        power::frequency(host, chosen),
-        power::idle(host, chosen, idle_us, refused.idle_bound.as_ref()),
-        kernel::clock(host, cost),
-        surroundings::swap(host),
-        surroundings::huge_pages(host),
-        surroundings::shared_memory(host, Bus::places_of_its_own().as_deref()),
+        ("locked memory", Ok(permissions::locked_memory(permissions, realtime, refused))),
+        ("cgroup", Ok(permissions::cgroup(permissions, refused))),
+        ("container", Ok(permissions::container(permissions))),
+        ("throttling", kernel::throttling(host)),
+        ("processors", Ok(processors::count(chosen))),
+        ("isolation", processors::isolation(host, chosen)),
+        ("hyper-threading", processors::siblings(host, chosen)),
     ]);
-    facts
+    facts.extend(processors::interrupts(host, chosen).map(|fact| ("interrupts", Ok(fact))));
+    facts.extend([
+        ("frequency", power::frequency(host, chosen)),
+        ("idle states", power::idle(host, chosen, idle_us, refused.idle_bound.as_ref())),
+        ("clock", kernel::clock(host, cost)),
+        ("swap", surroundings::swap(host)),
+        ("huge pages", surroundings::huge_pages(host)),
+        ("shared memory", surroundings::shared_memory(host, Bus::places_of_its_own().as_deref())),
+    ]);
+    facts.into_iter().map(|(name, examined)| named(name, examined)).collect()
+}
+
+/// The fact under a name, unknown if its examination failed.
+fn named(name: &str, examined: Examined) -> Fact {
+    Fact { name: name.into(), ..examined.unwrap_or_else(|reason| Fact::unknown(reason, None)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A fact as [`all`] has it, but for the name.
+    pub fn examined(examined: Examined) -> Fact {
+        named("", examined)
+    }
 }

@@ -23,16 +23,15 @@ impl RefusedRights {
 }
 
 /// Bad fact for a refused right.
-fn refused_fact(name: &str, shortfall: &Shortfall) -> Fact {
+fn refused_fact(shortfall: &Shortfall) -> Fact {
     let Shortfall { what, reason, remedy } = shortfall;
-    Fact::bad(name, format!("no {what}: {reason}"), remedy.as_str())
+    Fact::bad(format!("no {what}: {reason}"), remedy.as_str())
 }
 
 /// Scheduling class, priority and binding of the real-time thread.
 pub fn scheduling(permissions: &Permissions, realtime: &Realtime, refused: &RefusedRights) -> Vec<Fact> {
-    let name = "scheduling";
     if !refused.thread.is_empty() {
-        return refused.thread.iter().map(|shortfall| refused_fact(name, shortfall)).collect();
+        return refused.thread.iter().map(refused_fact).collect();
     }
     let class = match realtime.scheduler {
         Scheduler::Fifo => format!("FIFO priority {}", realtime.priority),
@@ -40,58 +39,53 @@ pub fn scheduling(permissions: &Permissions, realtime: &Realtime, refused: &Refu
     };
     let limit = permissions.priority_limit;
     let by = if permissions.sys_nice { "CAP_SYS_NICE".into() } else { format!("RLIMIT_RTPRIO {limit}") };
-    vec![Fact::good(name, format!("{class} granted ({by})"))]
+    vec![Fact::good(format!("{class} granted ({by})"))]
 }
 
 /// Whether the pages of the process stay in memory.
 pub fn locked_memory(permissions: &Permissions, realtime: &Realtime, refused: &RefusedRights) -> Fact {
-    let name = "locked memory";
     if !realtime.lock_memory {
         return Fact::bad(
-            name,
             "not requested: the kernel may move pages to a disk",
             "realtime.lock_memory = true",
         );
     }
     match (&refused.locked_memory, permissions.locked_limit_kb) {
-        (Some(shortfall), _) => refused_fact(name, shortfall),
-        (None, _) if permissions.ipc_lock => Fact::good(name, "granted (CAP_IPC_LOCK)"),
-        (None, Some(limit)) => Fact::good(name, format!("granted (RLIMIT_MEMLOCK {limit} kB)")),
-        (None, None) => Fact::good(name, "granted (RLIMIT_MEMLOCK unlimited)"),
+        (Some(shortfall), _) => refused_fact(shortfall),
+        (None, _) if permissions.ipc_lock => Fact::good("granted (CAP_IPC_LOCK)"),
+        (None, Some(limit)) => Fact::good(format!("granted (RLIMIT_MEMLOCK {limit} kB)")),
+        (None, None) => Fact::good("granted (RLIMIT_MEMLOCK unlimited)"),
     }
 }
 
 /// Budget of the process's cgroup for real-time scheduling.
 pub fn cgroup(permissions: &Permissions, refused: &RefusedRights) -> Fact {
-    let name = "cgroup";
     match &permissions.group_budget {
-        GroupBudget::Unlimited => Fact::good(name, "does not limit real-time threads"),
+        GroupBudget::Unlimited => Fact::good("does not limit real-time threads"),
         GroupBudget::Limited { file, budget_us: 0 } => Fact::bad(
-            name,
             format!("has no budget for real-time threads ({})", file.display()),
             format!("write one there, in the groups above it first: echo 950000 > {}", file.display()),
         ),
         GroupBudget::Limited { file, budget_us } => {
-            Fact::good(name, format!("{budget_us} us a period for real-time threads ({})", file.display()))
+            Fact::good(format!("{budget_us} us a period for real-time threads ({})", file.display()))
         }
         GroupBudget::Unknown { group } if refused.thread.is_empty() => {
-            Fact::good(name, format!("{} does not limit real-time threads", group.display()))
+            Fact::good(format!("{} does not limit real-time threads", group.display()))
         }
         GroupBudget::Unknown { group } => {
-            Fact::unknown(name, format!("{} does not show its budget", group.display()), None)
+            Fact::unknown(format!("{} does not show its budget", group.display()), None)
         }
     }
 }
 
 /// Whether the process runs in a container, which limits its rights.
 pub fn container(permissions: &Permissions) -> Fact {
-    let name = "container";
     let found = match (permissions.container, permissions.user_namespace) {
-        (false, false) => return Fact::good(name, "none"),
+        (false, false) => return Fact::good("none"),
         (_, true) => "of a user namespace: no capability of the host holds",
         (true, false) => "its rights come from how it was started",
     };
-    Fact::fair(name, found, "or run the daemon on the host itself")
+    Fact::fair(found, "or run the daemon on the host itself")
 }
 
 #[cfg(test)]
@@ -127,7 +121,7 @@ mod tests {
             ]
         );
         let fact = locked_memory(&permissions, &realtime(), &refused);
-        assert_eq!(fact, Fact::bad("locked memory", "no locked memory: it is not allowed", "allow it"));
+        assert_eq!(fact, Fact::bad("no locked memory: it is not allowed", "allow it"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Facts about the power management of the processors: frequency, idle states.
 
-use super::Fact;
 use super::processors::{CPU, LoopCpus};
+use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::setup::Shortfall;
 
@@ -9,8 +9,7 @@ use crate::realtime::setup::Shortfall;
 const MAX_SHALLOW_EXIT_US: i64 = 10;
 
 /// Frequency governors of the processors.
-pub fn frequency(host: &HostFiles, chosen: &LoopCpus) -> Fact {
-    let name = "frequency";
+pub fn frequency(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     let mut others = vec![];
     for cpu in chosen.used() {
         match host.text(&format!("{CPU}/cpu{cpu}/cpufreq/scaling_governor")) {
@@ -18,43 +17,34 @@ pub fn frequency(host: &HostFiles, chosen: &LoopCpus) -> Fact {
             Ok(governor) => others.push(format!("{governor} on CPU {cpu}")),
             Err(reason) => {
                 let reason = format!("not set by this kernel: {reason}");
-                return Fact::unknown(name, reason, None);
+                return Ok(Fact::unknown(reason, None));
             }
         }
     }
     if others.is_empty() {
-        return Fact::good(name, "governor performance");
+        return Ok(Fact::good("governor performance"));
     }
-    Fact::fair(
-        name,
-        format!("governor {}", others.join(", ")),
-        "cpupower frequency-set --governor performance",
-    )
+    Ok(Fact::fair(format!("governor {}", others.join(", ")), "cpupower frequency-set --governor performance"))
 }
 
 /// Deepest idle state of the processors. `bound_us` is the bound that the daemon requests while it runs, `refused` the reason if it may not.
-pub fn idle(host: &HostFiles, chosen: &LoopCpus, bound_us: i32, refused: Option<&Shortfall>) -> Fact {
-    let name = "idle states";
-    let deepest = match deepest_state(host, chosen) {
-        Ok(deepest) => deepest,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
-    let Some((latency_us, state)) = deepest.filter(|(latency_us, _)| *latency_us > MAX_SHALLOW_EXIT_US)
+pub fn idle(host: &HostFiles, chosen: &LoopCpus, bound_us: i32, refused: Option<&Shortfall>) -> Examined {
+    let Some((latency_us, state)) =
+        deepest_state(host, chosen)?.filter(|(latency_us, _)| *latency_us > MAX_SHALLOW_EXIT_US)
     else {
-        return Fact::good(name, format!("none takes longer than {MAX_SHALLOW_EXIT_US} us to leave"));
+        return Ok(Fact::good(format!("none takes longer than {MAX_SHALLOW_EXIT_US} us to leave")));
     };
     let found = format!("{state} takes {latency_us} us to leave");
     match refused {
         None if i64::from(bound_us) <= MAX_SHALLOW_EXIT_US => {
-            Fact::good(name, format!("{found}; the daemon allows at most {bound_us} us while it runs"))
+            Ok(Fact::good(format!("{found}; the daemon allows at most {bound_us} us while it runs")))
         }
-        None => Fact::fair(
-            name,
+        None => Ok(Fact::fair(
             format!("{found}; the daemon allows {bound_us} us"),
             "lower realtime.cpu_dma_latency_us",
-        ),
+        )),
         Some(Shortfall { reason, remedy, .. }) => {
-            Fact::fair(name, format!("{found}, and the daemon cannot prevent it: {reason}"), remedy.as_str())
+            Ok(Fact::fair(format!("{found}, and the daemon cannot prevent it: {reason}"), remedy.as_str()))
         }
     }
 }
@@ -84,6 +74,7 @@ mod tests {
     use super::*;
     use crate::commands::doctor::facts::Assessment;
     use crate::commands::doctor::facts::processors::tests::chosen;
+    use crate::commands::doctor::facts::tests::examined;
     use crate::commands::doctor::files::sample::host;
 
     #[test]
@@ -99,10 +90,10 @@ mod tests {
             (None, None, "1-2", Assessment::Good),
             (Some(1), Some(3), "0-3", Assessment::Unknown),
         ] {
-            let fact = frequency(&host.files, &chosen(realtime, io, permitted));
+            let fact = examined(frequency(&host.files, &chosen(realtime, io, permitted)));
             assert_eq!(fact.assessment, assessment, "{realtime:?} {io:?}: {fact:?}");
         }
-        let fact = frequency(&host.files, &chosen(None, None, "0-2"));
+        let fact = examined(frequency(&host.files, &chosen(None, None, "0-2")));
         assert_eq!(fact.found, "governor powersave on CPU 0");
     }
 
@@ -133,11 +124,11 @@ mod tests {
             ("2", "0", 0, Some(&against), Assessment::Good),
             ("deep", "0", 0, None, Assessment::Unknown),
         ] {
-            let fact = idle(&files(deep, off).files, &one, bound_us, against);
+            let fact = examined(idle(&files(deep, off).files, &one, bound_us, against));
             assert_eq!(fact.assessment, assessment, "{deep} {off} {bound_us}: {fact:?}");
         }
         let none = host(&[("sys/devices/system/cpu/cpuidle/current_driver", "none")]);
-        assert_eq!(idle(&none.files, &one, 0, None).assessment, Assessment::Good);
-        assert_eq!(idle(&host(&[]).files, &one, 0, None).assessment, Assessment::Unknown);
+        assert_eq!(examined(idle(&none.files, &one, 0, None)).assessment, Assessment::Good);
+        assert_eq!(examined(idle(&host(&[]).files, &one, 0, None)).assessment, Assessment::Unknown);
     }
 }

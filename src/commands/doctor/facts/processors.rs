@@ -1,7 +1,7 @@
 //! Facts about the processors of the real-time and the io thread: number, isolation, siblings, interrupts.
 
-use super::Fact;
 use super::kernel::boot_parameter;
+use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::setup::cpus::Cpus;
 
@@ -43,85 +43,77 @@ fn set(host: &HostFiles, path: &str) -> Result<Cpus, String> {
 
 /// Number of processors.
 pub fn count(chosen: &LoopCpus) -> Fact {
-    let (name, permitted) = ("processors", &chosen.permitted);
+    let permitted = &chosen.permitted;
     if chosen.realtime.is_some() && chosen.realtime == chosen.io {
         let cpu = chosen.realtime.unwrap_or_default();
         let found = format!("real-time and io thread are both on CPU {cpu}: each delays the other");
-        return Fact::bad(name, found, "choose different realtime.cpu and realtime.io_cpu");
+        return Fact::bad(found, "choose different realtime.cpu and realtime.io_cpu");
     }
     let number = permitted.iter().count();
     if number < MIN_PROCESSORS {
         let found = format!("only CPU {permitted}: real-time and io thread delay each other");
-        return Fact::bad(name, found, "allow this process at least two (cpuset, taskset), better three");
+        return Fact::bad(found, "allow this process at least two (cpuset, taskset), better three");
     }
     if number == MIN_PROCESSORS {
         let found = format!("{number} (CPU {permitted}): real-time and io thread leave none for the rest");
-        return Fact::fair(name, found, "a third leaves one for everything else");
+        return Fact::fair(found, "a third leaves one for everything else");
     }
-    Fact::good(name, format!("{number} (CPU {permitted})"))
+    Fact::good(format!("{number} (CPU {permitted})"))
 }
 
 /// Whether the kernel keeps other work off the processor of the real-time thread.
-pub fn isolation(host: &HostFiles, chosen: &LoopCpus) -> Fact {
-    let name = "isolation";
-    let isolated = match set(host, &format!("{CPU}/isolated")) {
-        Ok(isolated) => isolated,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
+pub fn isolation(host: &HostFiles, chosen: &LoopCpus) -> Examined {
+    let isolated = set(host, &format!("{CPU}/isolated"))?;
     let Some(cpu) = chosen.realtime else {
         let found = format!("no CPU is chosen for the real-time thread; isolated: {isolated}");
-        return Fact::fair(name, found, "choose realtime.cpu, and boot with isolcpus= for it");
+        return Ok(Fact::fair(found, "choose realtime.cpu, and boot with isolcpus= for it"));
     };
     let boot = format!("boot with isolcpus=managed_irq,domain,{cpu} nohz_full={cpu} rcu_nocbs={cpu}");
     if !isolated.contains(cpu) {
-        return Fact::fair(name, format!("CPU {cpu} is shared with everything else"), boot);
+        return Ok(Fact::fair(format!("CPU {cpu} is shared with everything else"), boot));
     }
     let no_ticks = set(host, &format!("{CPU}/nohz_full")).is_ok_and(|cpus| cpus.contains(cpu));
     let listed = boot_parameter(host, "rcu_nocbs").and_then(|list| Cpus::parse(&list));
     // The former implies the latter.
     let no_callbacks = no_ticks || listed.is_some_and(|cpus| cpus.contains(cpu));
     match (no_ticks, no_callbacks) {
-        (true, _) => Fact::good(name, format!("CPU {cpu}: isolated, without ticks and RCU callbacks")),
-        (false, true) => Fact::fair(name, format!("CPU {cpu}: isolated, but ticking"), boot),
+        (true, _) => Ok(Fact::good(format!("CPU {cpu}: isolated, without ticks and RCU callbacks"))),
+        (false, true) => Ok(Fact::fair(format!("CPU {cpu}: isolated, but ticking"), boot)),
         (false, false) => {
-            Fact::fair(name, format!("CPU {cpu}: isolated, but ticking and with RCU callbacks"), boot)
+            Ok(Fact::fair(format!("CPU {cpu}: isolated, but ticking and with RCU callbacks"), boot))
         }
     }
 }
 
 /// Whether the real-time thread shares its core with another hardware thread.
-pub fn siblings(host: &HostFiles, chosen: &LoopCpus) -> Fact {
-    let name = "hyper-threading";
+pub fn siblings(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     let Some(cpu) = chosen.realtime else {
         return match host.number(&format!("{CPU}/smt/active")) {
-            Ok(0) => Fact::good(name, "off"),
-            Ok(_) => Fact::fair(
-                name,
+            Ok(0) => Ok(Fact::good("off")),
+            Ok(_) => Ok(Fact::fair(
                 "on: what runs on the other half of a core slows this one",
                 "boot with nosmt, or choose realtime.cpu and switch its sibling off",
-            ),
-            Err(reason) => Fact::unknown(name, reason, None),
+            )),
+            Err(reason) => Ok(Fact::unknown(reason, None)),
         };
     };
     let siblings = set(host, &format!("{CPU}/cpu{cpu}/topology/thread_siblings_list"));
     match siblings.map(|siblings| siblings.iter().find(|sibling| *sibling != cpu)) {
-        Ok(None) => Fact::good(name, format!("CPU {cpu} has its core to itself")),
-        Ok(Some(sibling)) => Fact::fair(
-            name,
+        Ok(None) => Ok(Fact::good(format!("CPU {cpu} has its core to itself"))),
+        Ok(Some(sibling)) => Ok(Fact::fair(
             format!("CPU {cpu} shares its core with CPU {sibling}"),
             format!("echo 0 > /{CPU}/cpu{sibling}/online"),
-        ),
-        Err(reason) => Fact::unknown(name, reason, None),
+        )),
+        Err(reason) => Ok(Fact::unknown(reason, None)),
     }
 }
 
 /// Interrupts that the processor of the real-time thread may get. `None` where no processor is configured.
 pub fn interrupts(host: &HostFiles, chosen: &LoopCpus) -> Option<Fact> {
-    let name = "interrupts";
     let cpu = chosen.realtime?;
     let lines = host.numbered("proc/irq");
     if lines.is_empty() {
-        return Some(Fact::unknown(name, "there is nothing in /proc/irq", None));
+        return Some(Fact::unknown("there is nothing in /proc/irq", None));
     }
     let allowed = |line: &&u32| {
         let place = |file| set(host, &format!("proc/irq/{line}/{file}"));
@@ -136,10 +128,9 @@ pub fn interrupts(host: &HostFiles, chosen: &LoopCpus) -> Option<Fact> {
         .any(|process| host.text(&format!("proc/{process}/comm")).is_ok_and(|name| name == "irqbalance"));
     let balance = if balanced { "; irqbalance moves them" } else { "" };
     if hitting == 0 && !balanced {
-        return Some(Fact::good(name, format!("none of {} on CPU {cpu}", lines.len())));
+        return Some(Fact::good(format!("none of {} on CPU {cpu}", lines.len())));
     }
     Some(Fact::fair(
-        name,
         format!("{hitting} of {} may hit CPU {cpu}{balance}", lines.len()),
         format!("boot with irqaffinity= without {cpu}, and IRQBALANCE_BANNED_CPULIST={cpu} or no irqbalance"),
     ))
@@ -149,6 +140,7 @@ pub fn interrupts(host: &HostFiles, chosen: &LoopCpus) -> Option<Fact> {
 pub mod tests {
     use super::*;
     use crate::commands::doctor::facts::Assessment;
+    use crate::commands::doctor::facts::tests::examined;
     use crate::commands::doctor::files::sample::host;
 
     pub fn chosen(realtime: Option<usize>, io: Option<usize>, permitted: &str) -> LoopCpus {
@@ -191,7 +183,7 @@ pub mod tests {
             (vec![(isolated, "three")], &mine, Assessment::Unknown, "no list of CPUs"),
             (vec![], &mine, Assessment::Unknown, "there is no /sys/devices"),
         ] {
-            let fact = isolation(&host(&files).files, chosen);
+            let fact = examined(isolation(&host(&files).files, chosen));
             assert_eq!(fact.assessment, assessment, "{files:?}: {fact:?}");
             assert!(fact.found.contains(words), "{fact:?}");
         }
@@ -210,9 +202,9 @@ pub mod tests {
             (vec![(active, "1")], &any, Assessment::Fair),
             (vec![], &any, Assessment::Unknown),
         ] {
-            assert_eq!(siblings(&host(&files).files, chosen).assessment, assessment, "{files:?}");
+            assert_eq!(examined(siblings(&host(&files).files, chosen)).assessment, assessment, "{files:?}");
         }
-        let fact = siblings(&host(&[(list, "1,3")]).files, &mine);
+        let fact = examined(siblings(&host(&[(list, "1,3")]).files, &mine));
         assert_eq!(fact.remedy.unwrap(), "echo 0 > /sys/devices/system/cpu/cpu3/online");
     }
 

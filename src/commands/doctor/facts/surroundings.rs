@@ -1,88 +1,73 @@
 //! Facts about the host beyond the kernel: virtualization, swap, huge pages, shared memory.
 
-use super::Fact;
+use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
-
-const MACHINE: &str = "machine";
 
 /// Fact for a host that is a virtual machine.
 pub fn virtual_machine() -> Fact {
     Fact::bad(
-        MACHINE,
         "virtual: its host can take the processors away at any time",
         "use a real computer, or processors that the host pins and reserves",
     )
 }
 
 /// Whether the host is a virtual machine, whose own host may take the processors away.
-pub fn machine(host: &HostFiles) -> Fact {
-    let name = MACHINE;
-    let processors = match host.text("proc/cpuinfo") {
-        Ok(processors) => processors,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
+pub fn machine(host: &HostFiles) -> Examined {
+    let processors = host.text("proc/cpuinfo")?;
     let flags = processors.lines().find_map(|line| line.strip_prefix("flags"));
     let reported = flags.map(|flags| flags.split_whitespace().any(|flag| flag == "hypervisor"));
     let tree = "proc/device-tree";
     match reported.or_else(|| host.exists(tree).then(|| host.exists(&format!("{tree}/hypervisor")))) {
-        Some(true) => virtual_machine(),
-        Some(false) => Fact::good(name, "real, by its processor flags"),
-        None => Fact::unknown(name, "this architecture does not show whether it is virtual", None),
+        Some(true) => Ok(virtual_machine()),
+        Some(false) => Ok(Fact::good("real, by its processor flags")),
+        None => Ok(Fact::unknown("this architecture does not show whether it is virtual", None)),
     }
 }
 
 /// Whether the kernel may move memory to a disk.
-pub fn swap(host: &HostFiles) -> Fact {
-    let name = "swap";
+pub fn swap(host: &HostFiles) -> Examined {
     match host.text("proc/swaps").map(|text| text.lines().count().saturating_sub(1)) {
-        Ok(0) => Fact::good(name, "none"),
-        Ok(_) => Fact::fair(
-            name,
+        Ok(0) => Ok(Fact::good("none")),
+        Ok(_) => Ok(Fact::fair(
             "on: memory that is not locked may be on a disk, that of drivers included",
             "swapoff -a",
-        ),
-        Err(reason) => Fact::unknown(name, reason, None),
+        )),
+        Err(reason) => Ok(Fact::unknown(reason, None)),
     }
 }
 
 /// Whether the kernel rearranges memory into huge pages by itself.
-pub fn huge_pages(host: &HostFiles) -> Fact {
-    let name = "huge pages";
+pub fn huge_pages(host: &HostFiles) -> Examined {
     let setting = "sys/kernel/mm/transparent_hugepage/enabled";
     match host.text(setting) {
-        Ok(text) if text.contains("[always]") => Fact::fair(
-            name,
+        Ok(text) if text.contains("[always]") => Ok(Fact::fair(
             "always: the kernel moves memory to make them",
             format!("echo madvise > /{setting}"),
-        ),
-        Ok(text) if text.contains("[madvise]") => Fact::good(name, "only on request"),
-        Ok(text) if text.contains("[never]") => Fact::good(name, "never"),
-        Ok(text) => Fact::unknown(name, format!("/{setting} is {text:?}"), None),
-        Err(reason) => Fact::unknown(name, reason, None),
+        )),
+        Ok(text) if text.contains("[madvise]") => Ok(Fact::good("only on request")),
+        Ok(text) if text.contains("[never]") => Ok(Fact::good("never")),
+        Ok(text) => Ok(Fact::unknown(format!("/{setting} is {text:?}"), None)),
+        Err(reason) => Ok(Fact::unknown(reason, None)),
     }
 }
 
 /// File system of the shared memory; `fallback` is the reason why this user has a location of its own, if so.
-pub fn shared_memory(host: &HostFiles, fallback: Option<&str>) -> Fact {
-    let name = "shared memory";
-    let mounts = match host.text("proc/self/mountinfo") {
-        Ok(mounts) => mounts,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
+pub fn shared_memory(host: &HostFiles, fallback: Option<&str>) -> Examined {
+    let mounts = host.text("proc/self/mountinfo")?;
     // The last mount hides those before it.
     let kind = mounts.lines().rev().find_map(|line| {
         let (mount, kind) = line.split_once(" - ")?;
         (mount.split(' ').nth(4)? == "/dev/shm").then(|| kind.split(' ').next())?
     });
     match (kind, fallback) {
-        (Some("tmpfs"), None) => Fact::good(name, "/dev/shm"),
+        (Some("tmpfs"), None) => Ok(Fact::good("/dev/shm")),
         (Some("tmpfs"), Some(reason)) => {
-            Fact::fair(name, reason, "run all participants of a machine as one user")
+            Ok(Fact::fair(reason, "run all participants of a machine as one user"))
         }
         (Some(kind), _) => {
-            Fact::bad(name, format!("/dev/shm is {kind} and not memory"), "mount -t tmpfs tmpfs /dev/shm")
+            Ok(Fact::bad(format!("/dev/shm is {kind} and not memory"), "mount -t tmpfs tmpfs /dev/shm"))
         }
-        (None, _) => Fact::bad(name, "nothing is mounted on /dev/shm", "mount -t tmpfs tmpfs /dev/shm"),
+        (None, _) => Ok(Fact::bad("nothing is mounted on /dev/shm", "mount -t tmpfs tmpfs /dev/shm")),
     }
 }
 
@@ -90,6 +75,7 @@ pub fn shared_memory(host: &HostFiles, fallback: Option<&str>) -> Fact {
 mod tests {
     use super::*;
     use crate::commands::doctor::facts::Assessment;
+    use crate::commands::doctor::facts::tests::examined;
     use crate::commands::doctor::files::sample::host;
 
     #[test]
@@ -103,7 +89,7 @@ mod tests {
             (vec![cpuinfo("processor : 0")], Assessment::Unknown),
             (vec![], Assessment::Unknown),
         ] {
-            assert_eq!(machine(&host(&files).files).assessment, assessment, "{files:?}");
+            assert_eq!(examined(machine(&host(&files).files)).assessment, assessment, "{files:?}");
         }
     }
 
@@ -115,7 +101,7 @@ mod tests {
             (vec![("proc/swaps", "Filename Type\n/dev/sda2 partition")], Assessment::Fair),
             (vec![], Assessment::Unknown),
         ] {
-            assert_eq!(swap(&host(&files).files).assessment, assessment, "{files:?}");
+            assert_eq!(examined(swap(&host(&files).files)).assessment, assessment, "{files:?}");
         }
     }
 
@@ -128,9 +114,13 @@ mod tests {
             ("always madvise [never]", Assessment::Good),
             ("always", Assessment::Unknown),
         ] {
-            assert_eq!(huge_pages(&host(&[(setting, text)]).files).assessment, assessment, "{text}");
+            assert_eq!(
+                examined(huge_pages(&host(&[(setting, text)]).files)).assessment,
+                assessment,
+                "{text}"
+            );
         }
-        assert_eq!(huge_pages(&host(&[]).files).assessment, Assessment::Unknown);
+        assert_eq!(examined(huge_pages(&host(&[]).files)).assessment, Assessment::Unknown);
     }
 
     #[test]
@@ -146,9 +136,9 @@ mod tests {
             (disk, None, Assessment::Bad),
             (elsewhere, None, Assessment::Bad),
         ] {
-            let fact = shared_memory(&host(&[("proc/self/mountinfo", mounts)]).files, fallback);
+            let fact = examined(shared_memory(&host(&[("proc/self/mountinfo", mounts)]).files, fallback));
             assert_eq!(fact.assessment, assessment, "{mounts}: {fact:?}");
         }
-        assert_eq!(shared_memory(&host(&[]).files, None).assessment, Assessment::Unknown);
+        assert_eq!(examined(shared_memory(&host(&[]).files, None)).assessment, Assessment::Unknown);
     }
 }
