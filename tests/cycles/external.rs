@@ -46,7 +46,7 @@ impl Loop {
             phase_ns: 0,
             release: Release::External { timeout_ns: TIMEOUT_NS },
             on_overrun: OnOverrun::Fault,
-            late_wakeup_ns: 100_000_000,
+            late_wakeup_ns: TIMEOUT_NS / 2,
         };
         let stopped = stop.clone();
         thread::spawn(move || {
@@ -99,6 +99,8 @@ fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
     assert!((1..=3).contains(&watchdog.len()), "{watchdog:?}");
     assert!(watchdog.iter().all(|release_ns| *release_ns >= drive(24) + TIMEOUT_NS), "{watchdog:?}");
     assert_eq!(report.counters.skipped, 3, "21, 22, 23");
+    // A sleep that no signal ends is as long as the timeout; a host that takes the processor away does so rarely.
+    assert!(report.counters.late_wakeups < 5, "{:?}", report.counters);
     assert!(seen[by_message.len() - 1].1, "the cycle after them is told");
     let io_late = records.iter().filter(|record| record.io_late).count();
     assert_eq!(io_late, watchdog.len(), "only the cycles of the watchdog had nothing new");
