@@ -7,6 +7,8 @@
 mod common;
 mod in_the_loop;
 mod layouts;
+#[path = "../common/not_run.rs"]
+mod not_run;
 mod python;
 #[path = "../processes/support/stalls.rs"]
 mod stalls;
@@ -90,6 +92,9 @@ fn without_dry_friction(mut machine: Machine) -> Machine {
 
 #[test]
 fn mujoco_computes_the_same_forces_from_the_mjcf() {
+    if python::is_lacking() {
+        return;
+    }
     for name in MACHINES {
         let found = forces_by_mujoco(name, "mjcf", &exported(name, "mjcf"));
         let errors = differences(&without_dry_friction(machine(name)), &motions(name), &found);
@@ -100,6 +105,9 @@ fn mujoco_computes_the_same_forces_from_the_mjcf() {
 /// URDF has no gravity (MuJoCo takes its own), no reflected mass, and inertias as at home.
 #[test]
 fn mujoco_computes_the_same_forces_from_the_urdf() {
+    if python::is_lacking() {
+        return;
+    }
     for name in MACHINES {
         let mut machine = without_dry_friction(machine(name));
         let home = TaskState::at_rest(machine.home).motion().pose;
@@ -119,6 +127,9 @@ fn mujoco_computes_the_same_forces_from_the_urdf() {
 /// what is allowed above.
 #[test]
 fn mujoco_sees_what_is_wrong_in_a_model() {
+    if python::is_lacking() {
+        return;
+    }
     let name = "motion_base";
     let right = exported(name, "mjcf");
     let wrong = [
@@ -163,6 +174,9 @@ fn poses(machine: &Machine) -> Vec<[f64; 6]> {
 
 #[test]
 fn mujoco_holds_the_machine_with_the_same_forces() {
+    if python::is_lacking() {
+        return;
+    }
     for name in DEPLOYED {
         let machine = machine(name);
         let [model, input, output] =
