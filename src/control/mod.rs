@@ -2,7 +2,7 @@
 //!
 //! [`controller::Controller::step`] is a pure function of its state and its input: every run can be
 //! replayed bit for bit. In the order of a cycle: [`doubt`] decides which inputs count, [`supervisor`] which
-//! [`state`] follows and why, [`reference`] what the platform does in it, [`law`] with which acceleration,
+//! [`state`] follows and why, [`mod@reference`] what the platform does in it, [`law`] with which acceleration,
 //! and [`limits`] names what must not be exceeded. [`sampled`] says which [`gains`] the loop can carry.
 
 pub mod controller;

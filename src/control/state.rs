@@ -140,6 +140,7 @@ macro_rules! causes {
         /// | number | what | the daemon | what to do |
         /// | --- | --- | --- | --- |
         $(#[doc = concat!("| ", $number, " | ", $name, " | ", reaction!($reaction), " | ", $remedy, " |")])*
+        #[allow(rustdoc::broken_intra_doc_links, reason = "what is in brackets is a section of the configuration")]
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         #[repr(u32)]
         pub enum Cause { $($(#[$doc])* $variant = $number,)* }
