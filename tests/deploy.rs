@@ -2,8 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "a test helper that fails is a failed test")]
 
-#[path = "common/not_run.rs"]
-mod not_run;
+mod common;
 
 use std::process::Command;
 
@@ -15,7 +14,7 @@ fn systemd_analyze(arguments: &[&str]) -> Option<(String, Option<i32>)> {
     let output = match Command::new("systemd-analyze").args(arguments).output() {
         Ok(output) => output,
         Err(error) => {
-            not_run::lacking(&format!("systemd-analyze: {error}; apt-get install systemd"));
+            common::not_run::lacking(&format!("systemd-analyze: {error}; apt-get install systemd"));
             return None;
         }
     };

@@ -3,15 +3,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
-mod in_the_loop;
-mod layouts;
-#[path = "../common/not_run.rs"]
-mod not_run;
-mod python;
-#[path = "../processes/support/stalls.rs"]
-mod stalls;
+
+mod mujoco {
+    use super::*;
+
+    mod in_the_loop;
+    mod layouts;
+    pub mod python;
+}
 
 use std::ffi::OsStr;
 use std::fs;
@@ -25,9 +25,10 @@ use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;
+use mujoco::python;
 use nalgebra::Vector3;
 
-use self::common::{Errors, MACHINES, Table, data, largest, machine, motions};
+use common::{Errors, MACHINES, Table, data, largest, machine, motions};
 
 /// The machines that come with hexad.
 const DEPLOYED: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];

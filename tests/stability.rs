@@ -2,21 +2,20 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod beyond;
-mod check;
-#[path = "../common/mod.rs"]
 mod common;
-mod delayed;
-mod dietmaier;
-mod fichter;
-mod gimbal;
-mod legs;
-mod passing;
-mod random;
-#[path = "../common/rig.rs"]
-mod rig;
-mod rivals;
-mod sampled;
-mod sizes;
-mod transition;
-mod trials;
+
+mod stability {
+    use super::*;
+
+    mod beyond;
+    mod check;
+    mod dietmaier;
+    mod fichter;
+    mod gimbal;
+    mod legs;
+    mod passing;
+    mod random;
+    mod sampled;
+    mod sizes;
+    mod transition;
+}

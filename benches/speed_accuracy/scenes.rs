@@ -17,8 +17,9 @@ use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 
 use super::Failure;
+use super::common::data;
 use super::methods::Forces;
-use super::paper::{self, State, common::data};
+use super::paper::{self, State};
 
 /// The machines whose scenes are evaluated.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];

@@ -16,17 +16,13 @@
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod cycles;
-#[path = "../../tests/stability/delayed.rs"]
-mod delayed;
 mod maps;
-#[path = "../../tests/stability/rivals.rs"]
-mod rivals;
 mod sampled;
 mod speed;
 #[path = "../speed_accuracy/timing.rs"]
 mod timing;
-#[path = "../../tests/stability/trials.rs"]
-mod trials;
+
+use common::stability::{delayed, rivals, trials};
 
 use std::error::Error;
 use std::fmt::Display;

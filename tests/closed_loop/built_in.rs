@@ -10,7 +10,7 @@ use hexad::scene::envelope;
 use hexad::scene::motions::{Motion, Scene, fit};
 
 use super::common::deployed;
-use super::rig::Rig;
+use super::common::rig::Rig;
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 const MOTIONS: [Motion; 5] =

@@ -8,7 +8,7 @@ use hexad::model::ladder::Rung;
 use hexad::scene::motions::{Motion, fit};
 
 use super::common::deployed;
-use super::rig::{Rig, parameters, track};
+use super::common::rig::{Rig, parameters, track};
 
 #[test]
 fn the_loop_tracks_on_every_rung_with_inertia_and_better_on_higher_ones() {

@@ -3,8 +3,6 @@
 //! A running test can only pass or fail for Rust's test harness, which counts these as passed. So they are named
 //! below its result, on standard error. With `HEXAD_REQUIRE_REALTIME=1` one that lacks a right or a tool fails.
 
-#![allow(dead_code, reason = "every test uses a part of it")]
-
 use std::sync::Mutex;
 use std::{env, thread};
 

@@ -1,8 +1,6 @@
 //! The loop without threads: measurement and setpoint at k T, release at k T + T / 2, force on the platform
 //! from 100 us after the release on.
 
-#![allow(dead_code, reason = "every test uses a part of it")]
-
 use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
 use hexad::control::limits::Limit;
 use hexad::control::state::{Cause, Request, State};
@@ -16,7 +14,7 @@ use hexad::plant::simulator::Simulator;
 use hexad::scene::motions::{Motion, Scene, fit};
 use hexad::scene::timeline::Timeline;
 
-use super::common::{Errors, angle_between};
+use super::{Errors, angle_between};
 
 /// What reading, computing and sending take, about as on a common computer.
 const FORCE_DELAY_NS: u64 = 100_000;

@@ -6,8 +6,8 @@
 use hexad::control::law::ControlMode;
 use hexad::control::state::{Cause, Request, State};
 
+use super::common::rig::Rig;
 use super::pictures::draw;
-use super::rig::Rig;
 use super::situations::{Situation, machine};
 use super::world::{Grip, Source, World};
 

@@ -9,7 +9,7 @@ use hexad::scene::envelope;
 use hexad::scene::motions::{Motion, fit};
 
 use super::common::deployed;
-use super::rig::{Rig, parameters};
+use super::common::rig::{Rig, parameters};
 use super::world::{Source, World};
 
 /// In the order of the columns of the table.

@@ -13,8 +13,8 @@ use hexad::scene::minimum_jerk::{between, rise};
 use hexad::scene::motions::Scene;
 use nalgebra::Vector6;
 
+use super::common::rig::Rig;
 use super::recording::{Recording, Sample};
-use super::rig::Rig;
 
 /// Where setpoints come from.
 #[derive(Clone)]

@@ -23,9 +23,9 @@ use hexad::model::task::{TaskState, task_coordinates};
 use hexad::scene::motions::{Motion as Scene, fit};
 use nalgebra::Vector6;
 
+use super::common::stalls::Watchdog;
+use super::{DEPLOYED, file, python};
 use crate::common::{Errors, Table, largest};
-use crate::stalls::Watchdog;
-use crate::{DEPLOYED, file, python};
 
 const PERIOD_NS: u64 = 1_000_000;
 const PERIOD_S: f64 = 1e-3;

@@ -3,7 +3,7 @@
 
 use std::mem::{align_of, offset_of, size_of};
 
-use crate::python;
+use super::python;
 use hexad::ipc::messages::{
     CommandMessage, ForceMessage, Header, MeasuredMessage, Message, SCHEMA, SetpointMessage, StatusMessage,
 };

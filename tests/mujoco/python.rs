@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use super::not_run::lacking;
+use super::common::not_run::lacking;
 
 /// The engine. Pinned: what it makes of a model may change.
 const MUJOCO: &str = "mujoco==4.0.0";

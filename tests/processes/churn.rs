@@ -14,7 +14,7 @@ use hexad::ipc::messages::StatusMessage;
 use hexad::ipc::ports::{Bus, Sink};
 use hexad::ipc::statistics::LoopTimes;
 
-use crate::not_run::lacking;
+use crate::common::not_run::lacking;
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::peer::Controlled;

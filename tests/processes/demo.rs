@@ -8,10 +8,10 @@ use hexad::host::report::Report;
 use hexad::ipc::statistics::Times;
 use serde_json::{Map, Value};
 
-use crate::not_run::not_run;
+use crate::common::not_run::not_run;
+use crate::common::stalls::Watchdog;
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT};
-use crate::support::stalls::Watchdog;
 use crate::support::turns;
 use crate::support::xml;
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use crate::not_run::lacking;
+use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::trio::start_daemon;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use hexad::host::report::Report;
 
-use crate::not_run::lacking;
+use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::operator;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process;
 use std::thread::available_parallelism;
 
-use crate::not_run::{lacking, not_run};
+use crate::common::not_run::{lacking, not_run};
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::nobody::{AS_NOBODY, NO_LIMITS_RAISED, OWN_PLACES, cannot, wrapped};

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use hexad::host::report::Report;
 
-use crate::not_run::lacking;
+use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS};
 use crate::support::peer::Controlled;

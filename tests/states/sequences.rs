@@ -12,8 +12,8 @@ use hexad::scene::motions::{Motion, Scene, fit};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
+use super::common::rig::Rig;
 use super::common::{deployed, largest};
-use super::rig::Rig;
 
 static CONFIG: LazyLock<Config> = LazyLock::new(|| {
     let mut config = deployed("motion_base");

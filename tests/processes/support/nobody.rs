@@ -7,7 +7,7 @@ use std::process::Command;
 
 use super::children::hexad;
 use super::machine::Machine;
-use crate::not_run::lacking;
+use crate::common::not_run::lacking;
 
 /// `nobody` on every Linux.
 const NOBODY: &str = "65534";
