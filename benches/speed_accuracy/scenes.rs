@@ -16,10 +16,10 @@ use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use hexad::output::csv_table::{NumberTable, legs, six, trajectory_columns};
 
+use super::Failure;
+use super::common::data;
 use super::methods::Forces;
-use super::paper::State;
-use super::paper::common::data;
-use super::{Failure, paper};
+use super::paper::{self, State};
 
 /// The machines whose scenes are evaluated.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];

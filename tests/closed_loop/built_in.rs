@@ -11,7 +11,7 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 
 use super::common::deployed;
-use super::rig::Rig;
+use super::common::rig::Rig;
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 const MOTIONS: [BuiltInMotion; 5] = [

@@ -9,7 +9,7 @@ use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 
 use super::common::deployed;
-use super::rig::{Rig, parameters};
+use super::common::rig::{Rig, parameters};
 
 /// Active, at rest at home.
 fn at_rest() -> (Rig, TaskState) {

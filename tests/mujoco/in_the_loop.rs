@@ -23,9 +23,9 @@ use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
+use super::common::stalls::Watchdog;
+use super::{DEPLOYED, file, python};
 use crate::common::{Errors, Table, largest};
-use crate::stalls::Watchdog;
-use crate::{DEPLOYED, file, python};
 
 const PERIOD_NS: u64 = 1_000_000;
 const PERIOD_S: f64 = 1e-3;
@@ -327,6 +327,9 @@ impl Run {
 /// Daemon and plant have the same parameters, so what is off is what a period makes of a force, in both engines alike.
 #[test]
 fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
+    if python::is_lacking() {
+        return;
+    }
     let _turn = turn();
     for machine in DEPLOYED {
         let [mujoco, ours] = ["mujoco", "ours"].map(|who| Stage::new(machine, who, LOCKSTEP));
@@ -356,6 +359,9 @@ fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
 /// typical error counts. Where it held somebody for longer than a driver waits, it is tried again.
 #[test]
 fn a_platform_in_mujoco_moves_in_real_time() {
+    if python::is_lacking() {
+        return;
+    }
     let _turn = turn();
     for attempt in 1.. {
         let host = Watchdog::start();

@@ -155,7 +155,7 @@ fn a_signal_ends_it() {
 #[test]
 fn nobody_is_told_what_is_lacking() {
     let nobody = [NO_LIMITS_RAISED, AS_NOBODY];
-    if cannot("nobody_is_told_what_is_lacking", &nobody) {
+    if cannot(&nobody) {
         return;
     }
     let _turn = turns::alone();

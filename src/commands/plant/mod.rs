@@ -3,7 +3,7 @@
 //! In real time it ticks on the multiples of the period. At each tick it lets the time since the last one pass, with
 //! every force applied from the instant its message was sent, as a drive would; then it publishes lengths
 //! and rates. A force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if it
-//! can be believed ([`doubt`]).
+//! can be believed (`doubt`).
 
 use std::time::Instant;
 

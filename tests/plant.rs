@@ -3,17 +3,21 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod brakes;
-#[path = "../common/mod.rs"]
 mod common;
-mod dynamics;
-mod elastic;
-mod energy;
-mod friction;
-mod hardware;
-mod imperfect;
-mod integration;
-mod power;
+
+mod plant {
+    use super::*;
+
+    mod brakes;
+    mod dynamics;
+    mod elastic;
+    mod energy;
+    mod friction;
+    mod hardware;
+    mod imperfect;
+    mod integration;
+    mod power;
+}
 
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
