@@ -13,9 +13,10 @@
 use core::hint::black_box;
 use core::panic::PanicInfo;
 
-use hexad::control::controller::{Controller, Input, Output, Parameters};
+use hexad::control::controller::{Controller, Input, Output};
+use hexad::control::parameters::Parameters;
 use hexad::model::machine::{LEGS, Machine};
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::plant::simulator::Simulator;
 
 /// Where the processor would begin. A function whose address is used is linked with all that it calls.
@@ -24,8 +25,8 @@ extern "C" fn _start() -> ! {
     black_box(Controller::new as fn(&Machine, Parameters) -> Controller);
     black_box(Controller::step as fn(&mut Controller, &Input) -> Output);
     black_box(Simulator::advance as fn(&mut Simulator, f64, Option<&[f64; LEGS]>));
-    black_box(fit as fn(&Machine, Motion, f64) -> Scene);
-    black_box(Scene::at as fn(&Scene, f64) -> _);
+    black_box(fit as fn(&Machine, BuiltInMotion, f64) -> FittedMotion);
+    black_box(FittedMotion::at as fn(&FittedMotion, f64) -> _);
     stop()
 }
 
