@@ -25,7 +25,7 @@ pub struct Check<'a> {
     condition: f64,
     /// How far one measurement may be from the next for its pose to be certain \[rad\], \[radius\].
     trusted_step: f64,
-    /// OtherMode poses with the same lengths, the nearest first.
+    /// Other poses with the same lengths, the nearest first.
     others: Vec<OtherMode>,
 }
 

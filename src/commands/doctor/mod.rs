@@ -49,7 +49,7 @@ pub struct Doctor {
     pub disturb: bool,
 }
 
-/// Explanation there is no diagnosis, or a bad one.
+/// Why there is no diagnosis, or a bad one.
 #[derive(Debug, thiserror::Error)]
 pub enum DoctorError {
     #[error(transparent)]
@@ -173,7 +173,7 @@ fn prepare(realtime: &Realtime) -> Result<(Refused, Option<PmQosRequest>), Docto
     Ok((refused, shallow_sleep.ok()))
 }
 
-/// Explanation the daemon would not start.
+/// Why the daemon would not start.
 fn refusal(realtime: &Realtime, refused: &Refused) -> Option<String> {
     let lacking: Vec<_> = refused.all().map(|shortfall| shortfall.what.as_str()).collect();
     (realtime.require_realtime && !lacking.is_empty()).then(|| {
