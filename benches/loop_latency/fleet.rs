@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
 use hexad::config::Config;
-use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Setpoint};
-use hexad::control::state::{Request, State};
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon::cycle::CycleRecord;
 use hexad::daemon::parameters;
 use hexad::messages::clock::monotonic_ns;
@@ -80,13 +80,13 @@ impl Fleet {
         };
         for number in 1..=WARM_UP_STEPS as u64 {
             fleet.cycle += stride;
-            fleet.step_all(Some(Asked { request: Request::Engage, message: (1, number) }));
+            fleet.step_all(Some(OperatorRequest { request: Request::Engage, message: (1, number) }));
         }
         fleet.inactive = 0;
         fleet
     }
 
-    fn step_all(&mut self, request: Option<Asked>) -> Output {
+    fn step_all(&mut self, request: Option<OperatorRequest>) -> Output {
         let release_ns = self.cycle as u64 * self.period_ns;
         let mut last = Output::default();
         for (number, controller) in self.controllers.iter_mut().enumerate() {

@@ -6,22 +6,24 @@
 //! of three machines and on the peers' own (see `scenes.rs`). Writes `benches/charts/speed_accuracy.csv` and
 //! `.svg`, and prints how many times faster the exact model is than each peer in the same run.
 //!
-//! `-- --quick` takes fewer samples. `-- --count exact` only evaluates, for instruction counts:
+//! `-- --quick` takes fewer samples; `-- --redraw` none, and draws the chart from the CSV file. `-- --count exact` only evaluates, for instruction counts:
 //!
 //! ```text
 //! valgrind --tool=callgrind target/release/deps/speed_accuracy-* --count exact --evaluations 10000
 //! ```
 
 mod chart;
+#[path = "../../tests/common/mod.rs"]
+mod common;
 mod methods;
 mod paper;
 mod peers;
 mod results;
 mod scenes;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod timing;
 
-use std::error::Error;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -35,10 +37,8 @@ use methods::{BASELINE, Method, instruction_sets};
 use peers::{PEERS, Peer};
 use results::{Row, print_ratios, write_csv};
 use scenes::Scene;
+use shared::Failure;
 use timing::{Samples, sample};
-
-/// Anything that ends the run.
-type Failure = Box<dyn Error>;
 
 /// Samples of each method on each scene, spread over the run: in all a minute, or ten seconds.
 const ROUNDS: usize = 101;
@@ -62,6 +62,9 @@ struct Arguments {
     /// Fewer samples: within 40 s.
     #[arg(long)]
     quick: bool,
+    /// Measures nothing and draws the chart from the CSV file.
+    #[arg(long)]
+    redraw: bool,
     /// Evaluates one fidelity (its name on the command line of hexad) and nothing else.
     #[arg(long, value_name = "RUNG")]
     count: Option<String>,
@@ -80,6 +83,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match &arguments.count {
         Some(fidelity) => count(&arguments, fidelity),
+        None if arguments.redraw => chart::draw(),
         None => compare(arguments.quick),
     };
     outcome.map_or_else(
@@ -135,12 +139,8 @@ fn compare(quick: bool) -> Result<(), Failure> {
         println!("a debug build: these times mean nothing and nothing was written; use cargo bench");
         return Ok(());
     }
-    let charts = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/charts");
-    std::fs::create_dir_all(&charts)?;
-    write_csv(&charts.join("speed_accuracy.csv"), &rows)?;
-    chart::write(&charts.join("speed_accuracy.svg"), &rows)?;
-    println!("written: {}/speed_accuracy.csv and .svg", charts.display());
-    Ok(())
+    write_csv(&rows)?;
+    chart::draw()
 }
 
 /// Those of the machines, and the peers' where they have been built.

@@ -1,13 +1,11 @@
 //! What was measured: as a file, and as a table of ratios.
 
-use std::path::Path;
-
-use hexad::output::files::write_whole;
-
-use super::Failure;
 use super::peers::PEERS;
 use super::scenes::{Errors, Pace};
+use super::shared::{self, Failure};
 use super::timing::Samples;
+
+pub const FILE: &str = "speed_accuracy.csv";
 
 /// The dense form's name.
 pub const PAPER: &str = "paper-dense";
@@ -30,31 +28,16 @@ impl Row {
 }
 
 /// `method, isa, scene, ns_median, ns_latency, error_max_rel, error_rms_rel`
-pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), Failure> {
-    let mut csv = csv::Writer::from_writer(vec![]);
-    csv.write_record([
-        "method",
-        "isa",
-        "scene",
-        "ns_median",
-        "ns_latency",
-        "error_max_rel",
-        "error_rms_rel",
-    ])?;
-    for row in rows {
+pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
+    let header = ["method", "isa", "scene", "ns_median", "ns_latency", "error_max_rel", "error_rms_rel"];
+    let records = rows.iter().map(|row| {
         let Errors { max, rms } = row.errors;
-        csv.write_record([
-            row.method,
-            row.isa,
-            &row.scene,
-            &format!("{:.1}", row.samples.throughput()),
-            &format!("{:.1}", row.samples.latency()),
-            &format!("{max:.2e}"),
-            &format!("{rms:.2e}"),
-        ])?;
-    }
-    write_whole(path, &csv.into_inner()?)?;
-    Ok(())
+        let [method, isa, scene] = [row.method, row.isa, &row.scene].map(String::from);
+        let times = [row.samples.throughput(), row.samples.latency()].map(|ns| format!("{ns:.1}"));
+        let errors = [max, rms].map(|error| format!("{error:.2e}"));
+        [method, isa, scene].into_iter().chain(times).chain(errors)
+    });
+    shared::write_csv(FILE, &header, records)
 }
 
 /// How many times longer the peers take than the exact model on the same inputs.

@@ -2,8 +2,9 @@
 
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::motion::built_in::{BuiltInMotion, fit};
-use hexad::output::charts::{Panel, Series, Stroke, write_svg};
+use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
+use super::shared::provenance;
 use super::speed::newton;
 use super::{Failure, MACHINES, cells, chart, common, write_csv};
 
@@ -44,10 +45,11 @@ pub fn run() -> Result<(), Failure> {
             .iter()
             .zip(&labels)
             .enumerate()
-            .map(|(color, (points, label))| Series { label, points, style: Stroke::Solid, color })
+            .map(|(color, (points, label))| Series { label, points, style: LineStyle::Solid, color })
             .collect(),
     });
     let title = "Position error of one step of Newton's method per cycle, built-in sines";
-    write_svg(&chart("stability_one_step.svg"), title, "time [s]", &panels.collect::<Vec<_>>())?;
+    let title = format!("{title}\n{}", provenance());
+    write_svg(&chart("stability_one_step.svg"), &title, "time [s]", &panels.collect::<Vec<_>>())?;
     Ok(())
 }

@@ -9,7 +9,8 @@ use std::thread;
 use std::time::Instant;
 
 use crate::config::Config;
-use crate::control::state::{Cause, Request, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::{Request, State};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::ports::{Bus, PortError, Sink, Source, Time};
 use crate::messages::structs::{CommandMessage, StatusMessage};
@@ -44,23 +45,23 @@ pub enum OperatorError {
 /// A cause, with what the status says about it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Reason {
-    cause: Cause,
+    cause: DiagnosticCode,
     /// What the daemon is in, and why.
     state: State,
-    state_cause: Cause,
+    state_cause: DiagnosticCode,
     /// \[m\], \[rad\], where they say something.
     distance: Option<(f64, f64)>,
 }
 
 impl Reason {
-    fn new(cause: Cause, status: &StatusMessage) -> Self {
+    fn new(cause: DiagnosticCode, status: &StatusMessage) -> Self {
         let norm = |v: [f64; 3]| nalgebra::Vector3::from(v).norm();
         let distance = (norm(status.position_error_m), norm(status.orientation_error_rad));
-        let told = cause == Cause::SetpointTooFar && status.error_valid == 1;
+        let told = cause == DiagnosticCode::SetpointTooFar && status.error_valid == 1;
         Self {
             cause,
             state: State::from_number(status.state).unwrap_or_default(),
-            state_cause: Cause::from_number(status.fault).unwrap_or_default(),
+            state_cause: DiagnosticCode::from_number(status.fault).unwrap_or_default(),
             distance: told.then_some(distance),
         }
     }
@@ -68,7 +69,7 @@ impl Reason {
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.cause == Cause::NotNow {
+        if self.cause == DiagnosticCode::InvalidInState {
             write!(f, "not possible in state {}", self.state.name())?;
             return match self.state {
                 State::Fault => write!(f, " ({}); hexad clear first", self.state_cause.name()),
@@ -141,12 +142,12 @@ impl Operator {
             if let Some(status) = self.status() {
                 heard = Instant::now();
                 state = State::from_number(status.state).unwrap_or_default();
-                reason = Reason::new(Cause::from_number(status.fault).unwrap_or_default(), &status);
+                reason = Reason::new(DiagnosticCode::from_number(status.fault).unwrap_or_default(), &status);
                 if (status.answered_epoch, status.answered_sequence) >= self.first
                     && status.answered_epoch == self.first.0
                 {
-                    match Cause::from_number(status.refused).unwrap_or_default() {
-                        Cause::None => accepted = true,
+                    match DiagnosticCode::from_number(status.refused).unwrap_or_default() {
+                        DiagnosticCode::None => accepted = true,
                         _ if accepted => {}
                         // Nobody else leaves a fault.
                         cause if is_patient && may_come(cause) && state != State::Fault => {}
@@ -176,8 +177,8 @@ impl Operator {
 }
 
 /// Whether what is lacking may come without anybody's correction: who was lost may be about to come back.
-fn may_come(cause: Cause) -> bool {
-    !cause.is_fault() || matches!(cause, Cause::SetpointLost | Cause::MeasurementLost)
+fn may_come(cause: DiagnosticCode) -> bool {
+    !cause.is_fault() || matches!(cause, DiagnosticCode::SetpointLost | DiagnosticCode::MeasurementLost)
 }
 
 /// Whether a state is what an accepted request was to lead to; `None` while it is on the way.
@@ -186,10 +187,10 @@ fn outcome(request: Request, state: State) -> Option<bool> {
         (Request::Engage, State::Engaging) => None,
         (Request::Engage, state) => Some(state == State::Active),
         (Request::Stop | Request::Park, State::Stopping) | (Request::Park, State::Parking) => None,
-        (Request::Stop, state) => Some(!state.controls() && state != State::Fault),
+        (Request::Stop, state) => Some(!state.has_control() && state != State::Fault),
         (Request::Park, state) => Some(state == State::Off),
         // A fault stays one, and has no force either.
-        (Request::Off, state) => Some(!state.controls()),
+        (Request::Off, state) => Some(!state.has_control()),
         (Request::Clear, state) => Some(state != State::Fault),
         (Request::Estop, state) => Some(state == State::Fault),
     }

@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 use tracing::{info, warn};
 
 use crate::control::controller::Output;
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::State;
 use crate::model::task::task_coordinates;
-use crate::output::csv_table::{Writer, coordinates, legs};
+use crate::output::csv_table::{CsvWriter, coordinates, legs};
 
 /// Cycles kept: two seconds at 1 kHz, 100 ms at 20 kHz. The cause of a fault is rarely older than its timeouts.
 const KEPT: usize = 2000;
@@ -30,7 +31,7 @@ pub struct FaultDump {
     folder: Option<PathBuf>,
     home: [f64; 6],
     cycles: VecDeque<CycleRecord>,
-    last: Cause,
+    last: DiagnosticCode,
     /// The fault to write, and how many cycles after it are missing.
     due: Option<(CycleRecord, usize)>,
     writing: Option<Writing>,
@@ -41,7 +42,7 @@ struct Writing {
     path: PathBuf,
     fault: CycleRecord,
     cycles: VecDeque<CycleRecord>,
-    table: Writer,
+    table: CsvWriter,
 }
 
 impl FaultDump {
@@ -51,7 +52,7 @@ impl FaultDump {
             folder: folder.map(Path::to_path_buf),
             home,
             cycles: VecDeque::with_capacity(if folder.is_some() { KEPT } else { 0 }),
-            last: Cause::None,
+            last: DiagnosticCode::None,
             due: None,
             writing: None,
             files: 0,
@@ -67,7 +68,7 @@ impl FaultDump {
             self.cycles.pop_front();
         }
         self.cycles.push_back(*record);
-        let cause = record.output.cause;
+        let cause = record.output.diagnostic.code;
         // Without force there is no fault, only something missing.
         let takes_force_away = matches!(record.output.state, State::Stopping | State::Fault);
         if cause != self.last && cause.is_fault() && takes_force_away && self.due.is_none() {
@@ -90,9 +91,9 @@ impl FaultDump {
         if self.files == MOST_FILES {
             warn!("this was fault number {MOST_FILES}: the cycles of later ones are not written");
         }
-        let number = fault.output.cause as u32;
+        let number = fault.output.diagnostic.code as u32;
         let path = folder.join(format!("fault-{number}-cycle-{}.csv", fault.cycle));
-        let table = Writer::new(&columns());
+        let table = CsvWriter::new(&columns());
         self.writing = Some(Writing { path, fault, cycles: self.cycles.clone(), table });
     }
 
@@ -158,26 +159,27 @@ fn columns() -> Vec<String> {
 /// One cycle; `t` counts from the fault. What was not there is NaN.
 fn row(record: &CycleRecord, fault: &CycleRecord, home: &[f64; 6]) -> Vec<f64> {
     let CycleRecord { cycle, wakeup_ns, compute_ns, input, output, .. } = record;
-    let Output { state, cause, evidence, limiting, force, wrench_error, measured, error, .. } = output;
+    let Output { state, diagnostic, force, wrench_error, active_limits, platform, error, .. } = output;
     let since = |from_ns: u64, to_ns: u64| to_ns.wrapping_sub(from_ns) as i64 as f64 * 1e-9;
     let age = |time_ns: Option<u64>| time_ns.map_or(f64::NAN, |time_ns| since(time_ns, input.release_ns));
     let absent = [f64::NAN; 6];
     let (setpoint, measurement) = (&input.setpoint, &input.measurement);
     let task = setpoint.map_or([absent; 3], |it| [it.task.x.into(), it.task.xd.into(), it.task.xdd.into()]);
     let legs = measurement.map_or([absent; 2], |it| [it.length, it.rate]);
-    let (pose, twist) = measured
-        .map_or((absent, absent), |(pose, twist)| (task_coordinates(&pose, home), twist.vector().into()));
+    let (pose, twist) = platform.map_or((absent, absent), |platform| {
+        (task_coordinates(&platform.pose, home), platform.twist.vector().into())
+    });
     let wrench_error = wrench_error.vector().into();
     let error = error.map_or(absent, |error| error.pose.vector().into());
     let mut row = vec![
         *cycle as f64,
         since(fault.input.release_ns, input.release_ns),
         f64::from(*state as u32),
-        f64::from(*cause as u32),
-        evidence.value,
-        evidence.bound,
-        f64::from(evidence.index),
-        f64::from(limiting.0),
+        f64::from(diagnostic.code as u32),
+        diagnostic.value,
+        diagnostic.bound,
+        f64::from(diagnostic.index),
+        f64::from(active_limits.0),
         *wakeup_ns as f64,
         *compute_ns as f64,
         age(setpoint.map(|it| it.time_ns)),
@@ -194,11 +196,16 @@ mod tests {
     use super::*;
     use crate::control::controller::Input;
 
-    fn record(cycle: u64, cause: Cause) -> CycleRecord {
+    fn record(cycle: u64, cause: DiagnosticCode) -> CycleRecord {
         CycleRecord {
             cycle,
             input: Input { release_ns: cycle * 1_000_000, ..Input::default() },
-            output: Output { state: State::Stopping, cause, force: [7.5; 6], ..Output::default() },
+            output: Output {
+                state: State::Stopping,
+                diagnostic: cause.into(),
+                force: [7.5; 6],
+                ..Output::default()
+            },
             ..CycleRecord::default()
         }
     }
@@ -209,9 +216,9 @@ mod tests {
         let mut dump = FaultDump::new(Some(folder.path()), [0.0; 6]);
         for cycle in 1..=9000 {
             let cause = match cycle {
-                3000..3500 => Cause::OffPath,
-                8950.. => Cause::MeasurementLost,
-                _ => Cause::None,
+                3000..3500 => DiagnosticCode::FollowingError,
+                8950.. => DiagnosticCode::MeasurementLost,
+                _ => DiagnosticCode::None,
             };
             dump.add(&record(cycle, cause));
             dump.step();
@@ -247,7 +254,7 @@ mod tests {
     #[test]
     fn without_a_folder_nothing_is_kept() {
         let mut dump = FaultDump::new(None, [0.0; 6]);
-        dump.add(&record(1, Cause::OffPath));
+        dump.add(&record(1, DiagnosticCode::FollowingError));
         dump.finish();
         assert_eq!(dump.cycles.capacity(), 0);
     }

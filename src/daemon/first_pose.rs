@@ -12,6 +12,7 @@ use tracing::warn;
 
 use super::STACK;
 use crate::analysis::assembly_modes::other_modes;
+use crate::control::localization::PlatformState;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
@@ -28,7 +29,7 @@ impl FirstPose {
 
     /// Takes a cycle in. The search begins with the first that has a pose.
     pub fn add(&mut self, record: &CycleRecord) {
-        let Some((pose, _)) = record.output.measured else { return };
+        let Some(PlatformState { pose, .. }) = record.output.platform else { return };
         let Some(machine) = self.0.take() else { return };
         // The daemon does not wait for it to end.
         let search = Builder::new()

@@ -1,10 +1,9 @@
 //! The io thread: owner of every port of the daemon, in phase with the cycle.
 //!
 //! It reads the newest messages a lead before the release and publishes when the output of the cycle
-//! appears; with external release it waits for measured messages and rings for the real-time thread; in
-//! lock-step it waits for everybody. When
-//! a peer comes or goes, the port calls here allocate and block for a moment; the real-time thread
-//! meanwhile runs on with data it knows the age of.
+//! appears; with external release it waits for measured messages and signals the real-time thread; in
+//! lock-step it waits for everybody. When a peer comes or goes, the port calls here allocate and block for a
+//! moment; the real-time thread meanwhile runs on with data it knows the age of.
 
 use super::cycle::{CycleInput, CycleOutput, IoSide};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -12,8 +11,9 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use heapless::spsc::Producer;
 
 use super::translation::{force_message, measurement, status_message};
-use crate::control::controller::{Asked, Output, Setpoint};
-use crate::control::state::{Cause, Request, State};
+use crate::control::controller::{Output, Setpoint};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::{OperatorRequest, Request, State};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::look_until;
 use crate::messages::ports::{Bus, PortError, Rejected, Sink, Source, Time};
@@ -24,7 +24,7 @@ use crate::messages::structs::{
 use crate::model::task::TaskState;
 use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
 use crate::realtime::cyclic::{Release, Timing};
-use crate::realtime::newest::Reader;
+use crate::realtime::triple_buffer::Reader;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
 
@@ -39,7 +39,7 @@ const AWAKE_NS: u64 = 50_000;
 const OLDEST_REQUEST_NS: u64 = 1_000_000_000;
 
 /// What the daemon asks itself for before it ends; no message of a source has this epoch.
-const END: Asked = Asked { request: Request::Stop, message: (0, 1) };
+const END: OperatorRequest = OperatorRequest { request: Request::Stop, message: (0, 1) };
 
 /// Messages kept per input between two reads. Only the newest counts.
 const INPUT_DEPTH: usize = 8;
@@ -180,7 +180,7 @@ impl Io<'_> {
             let measured = self.read();
             if measured {
                 self.hand_in();
-                self.sides.exchange.bell.ring();
+                self.sides.exchange.event.signal();
             }
             self.publish_new();
             if measured || self.published > published {
@@ -214,7 +214,7 @@ impl Io<'_> {
             }
             self.read_requests(time_ns);
             self.hand_in();
-            self.sides.exchange.bell.ring();
+            self.sides.exchange.event.signal();
             let before = self.published;
             look_until(stop, || {
                 self.publish_new();
@@ -263,12 +263,12 @@ impl Io<'_> {
         while let Some(message) = self.ports.command.receive_from_any() {
             let Header { epoch, sequence, time_ns, .. } = message.header;
             let Some(request) = Request::from_number(message.request) else { continue };
-            if request.takes_force() && (ending || now_ns.abs_diff(time_ns) > OLDEST_REQUEST_NS) {
+            if request.can_begin_control() && (ending || now_ns.abs_diff(time_ns) > OLDEST_REQUEST_NS) {
                 continue;
             }
             let pending = self.input.input.request.filter(|asked| asked.message != self.answered);
             if pending.is_none_or(|pending| pending.request <= request) {
-                self.input.input.request = Some(Asked { request, message: (epoch, sequence) });
+                self.input.input.request = Some(OperatorRequest { request, message: (epoch, sequence) });
             }
         }
         let pending = self.input.input.request.is_some_and(|asked| asked.message != self.answered);
@@ -286,7 +286,7 @@ impl Io<'_> {
     fn publish_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.sides.exchange.outputs.read();
         self.answered = output.answered;
-        if self.sides.ending.load(Ordering::Relaxed) && !output.state.controls() {
+        if self.sides.ending.load(Ordering::Relaxed) && !output.state.has_control() {
             self.sides.may_end.store(true, Ordering::Relaxed);
         }
         if counters.cycles > self.published {
@@ -306,11 +306,11 @@ impl Io<'_> {
         }
         let now_ns = monotonic_ns();
         let held_ns = now_ns.saturating_sub(cycle.due_ns);
-        if held_ns > self.settings.longest_hold_ns && cycle.output.state.controls() {
+        if held_ns > self.settings.longest_hold_ns && cycle.output.state.has_control() {
             // The loop finds the same at its next cycle, by the age of what it measured last.
             let output = &mut cycle.output;
-            (output.state, output.cause, output.force) =
-                (State::Fault, Cause::MeasurementLost, Output::default().force);
+            (output.state, output.diagnostic.code, output.force) =
+                (State::Fault, DiagnosticCode::MeasurementLost, Output::default().force);
         }
         self.publish_force(&cycle, now_ns);
         self.publish_status(&cycle, now_ns);
@@ -319,7 +319,7 @@ impl Io<'_> {
     fn publish_force(&mut self, cycle: &CycleOutput, now_ns: u64) {
         let sent = self.ports.force.publish(now_ns, force_message(cycle));
         self.send_failures += u64::from(sent.is_err());
-        if cycle.output.state.controls() {
+        if cycle.output.state.has_control() {
             // Full only if the log thread is held; it loses statistics, not forces.
             let _ = self.sides.sent.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
         }

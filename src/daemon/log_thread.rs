@@ -1,7 +1,6 @@
 //! The log thread: turns the records of the other two threads into statistics and into words.
 
 use super::cycle::{CycleRecord, tracking_error};
-use super::told::Told;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::sync::OnceLock;
@@ -16,10 +15,11 @@ use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::statistics::Collector;
 use crate::control::controller::Output;
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::State;
 use crate::daemon::report::{Fault, TrackingSum};
 use crate::messages::statistics::Statistics;
-use crate::realtime::newest::Writer;
+use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
 /// How often the queues are emptied: well before they are full at the highest rate.
@@ -58,7 +58,7 @@ pub struct LogReport {
 pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
     let mut collector = Collector::default();
     let mut report = LogReport { faults: Vec::with_capacity(MAX_FAULTS), ..LogReport::default() };
-    let mut last = (State::Off, Cause::None);
+    let mut last = (State::Off, DiagnosticCode::None);
     let mut hints = Hints::default();
     let mut window_began = Instant::now();
     let at_start = ThreadUsage::of_this_thread();
@@ -71,7 +71,7 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
             if let Some((position, orientation)) = tracking_error(&record) {
                 report.tracking.add(position, orientation);
             }
-            let now = (record.output.state, record.output.cause);
+            let now = (record.output.state, record.output.diagnostic.code);
             if now != last {
                 tell(&record, &mut report.faults);
                 last = now;
@@ -102,25 +102,19 @@ pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
 }
 
 fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
-    let CycleRecord { cycle, output: Output { state, cause, evidence, .. }, .. } = *record;
+    let CycleRecord { cycle, output: Output { state, diagnostic, .. }, .. } = *record;
+    let code = diagnostic.code;
     match state {
         State::Fault => {
-            warn!(
-                cycle,
-                number = cause as u32,
-                "fault: {}{}; no force until cleared; {}",
-                cause.name(),
-                Told(cause, evidence),
-                cause.remedy()
-            );
+            warn!(cycle, number = code as u32, "fault: {diagnostic}; no force until cleared");
             if faults.len() < MAX_FAULTS {
-                faults.push(Fault { cycle, number: cause as u32, name: cause.name().into() });
+                faults.push(Fault { cycle, number: code as u32, name: code.name().into() });
             }
         }
         State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
-        State::Stopping if cause.is_fault() => {
-            warn!(cycle, number = cause as u32, "stopping: {}{}", cause.name(), Told(cause, evidence))
+        State::Stopping if code.is_fault() => {
+            warn!(cycle, number = code as u32, "stopping: {diagnostic}")
         }
-        _ => info!(cycle, "{}: {}{}", state.name(), cause.name(), Told(cause, evidence)),
+        _ => info!(cycle, "{}: {diagnostic}", state.name()),
     }
 }

@@ -25,12 +25,13 @@ use self::log_thread::LogReport;
 use self::report::{DeadlineMisses, Report};
 use self::start::{prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use crate::config::control_loops::{ControlLoop, loops};
-use crate::config::deployment::{Deployment, ReleaseKey};
+use crate::config::deployment::{Deployment, ReleaseMode};
 use crate::config::{Config, fidelity};
-use crate::control::controller::{Controller, Envelope, Input, Output, Parameters};
+use crate::control::controller::{Controller, Input, Output};
+use crate::control::diagnostic::DiagnosticCode;
 use crate::control::gains::Gains;
 use crate::control::law::Law;
-use crate::control::state::Cause;
+use crate::control::parameters::{Envelope, Parameters};
 use crate::messages::ports::{Bus, PortError, Time};
 use crate::messages::statistics::Statistics;
 use crate::model::fidelity::Fidelity;
@@ -40,10 +41,10 @@ use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic;
 use crate::realtime::cyclic::{LoopReport, RECORDS, Release, Timing};
 use crate::realtime::exchange::exchange;
-use crate::realtime::newest::newest;
 use crate::realtime::process::block_signals;
 use crate::realtime::setup::{Shortfall, deadline, memory};
 use crate::realtime::stop_request::Stop;
+use crate::realtime::triple_buffer::triple_buffer;
 
 pub mod cycle;
 mod fault_dump;
@@ -55,7 +56,6 @@ pub mod report;
 pub mod start;
 mod statistics;
 pub mod time_histogram;
-pub mod told;
 mod translation;
 
 /// Name of the real-time thread, by which a running daemon is found.
@@ -111,19 +111,19 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
 
 fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(Report, String), DaemonError> {
     let Config { machine, deployment, .. } = config;
+    let parameters = parameters(machine, deployment, fidelity::fidelity(config));
     for warning in loops(config).iter().filter_map(ControlLoop::warning) {
         warn!("{warning}");
     }
-    let mut controller =
-        Controller::new(machine, parameters(machine, deployment, fidelity::fidelity(config)));
+    let mut controller = Controller::new(machine, parameters);
     let timing = &timing(deployment);
     let (realtime_side, io_side) = exchange();
-    let bell = io_side.bell.clone();
+    let event = io_side.event.clone();
     let mut queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
     let (records_in, records) = queue.split();
     let mut delays = Box::new(Queue::<u64, DELAYS>::new());
     let (sent_in, sent) = delays.split();
-    let (statistics_in, statistics) = newest(Statistics::default());
+    let (statistics_in, statistics) = triple_buffer(Statistics::default());
     let files = &OnceLock::new();
     let [stop_loop, stop_io, stop_log] = &[const { AtomicBool::new(false) }; 3];
     let [ending, may_end] = &[const { AtomicBool::new(false) }; 2];
@@ -162,7 +162,7 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
             // Without the word of the main thread no cycle must begin.
             go_ahead.recv().ok()?;
             let step = |input: &Input| controller.step(input);
-            let last = Output { cause: Cause::Stopping, ..Output::default() };
+            let last = Output { diagnostic: DiagnosticCode::Stopping.into(), ..Output::default() };
             Some(cyclic::run(&mut Monotonic, timing, step, last, realtime_side, records_in, stop_loop))
         })?;
         let io = spawn(threads, "hexad-io", move || {
@@ -192,7 +192,7 @@ fn run_threads(config: &Config, faults: Option<&Path>, stop: &Stop) -> Result<(R
         }
         drop(go);
         stop_loop.store(true, Ordering::Relaxed);
-        bell.ring();
+        event.signal();
         let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
         stop_io.store(true, Ordering::Relaxed);
         let io = io.join().map_err(|_| DaemonError::Died("io"));
@@ -256,6 +256,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
                 Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
                 Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
             ],
+            control.leg_masses,
             core::f64::consts::TAU * control.observer_bandwidth_hz,
             &limits.reference,
         ),
@@ -282,11 +283,11 @@ pub(super) fn timing(deployment: &Deployment) -> Timing {
         period_ns,
         phase_ns: period_ns / 2,
         release: match realtime.release {
-            ReleaseKey::Sleep => Release::Grid { max_lead_ns: 0 },
-            ReleaseKey::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
-            ReleaseKey::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
+            ReleaseMode::Sleep => Release::Grid { max_lead_ns: 0 },
+            ReleaseMode::Hybrid => Release::Grid { max_lead_ns: nanoseconds(realtime.max_lead_s) },
+            ReleaseMode::External => Release::External { timeout_ns: nanoseconds(timeouts.measured_s) },
             // Simulated time stands while nobody measures.
-            ReleaseKey::Lockstep => Release::External { timeout_ns: u64::MAX },
+            ReleaseMode::Lockstep => Release::External { timeout_ns: u64::MAX },
         },
         on_overrun: realtime.on_overrun,
         late_wakeup_ns: nanoseconds(realtime.late_wakeup_s),

@@ -8,7 +8,7 @@ use std::sync::mpsc;
 use tracing::warn;
 
 use super::{DaemonError, nanoseconds};
-use crate::config::deployment::{Realtime, ReleaseKey, Scheduler};
+use crate::config::deployment::{Realtime, ReleaseMode, Scheduler};
 use crate::control::controller::{Controller, Input, Measurement, Setpoint};
 use crate::messages::ports::Time;
 use crate::model::inverse_geometry::leg_lengths;
@@ -95,7 +95,7 @@ fn prepare(cpu: Option<usize>, scheduled: Result<(), Shortfall>) -> Vec<Shortfal
 /// come sooner begin a new one with the full budget, unless the share of the last is used up; cycles of
 /// drives so fast that they need more than their share are held, and that is counted.
 pub fn reservation(realtime: &Realtime) -> Reservation {
-    let spin_s = if realtime.release == ReleaseKey::Hybrid { realtime.max_lead_s } else { 0.0 };
+    let spin_s = if realtime.release == ReleaseMode::Hybrid { realtime.max_lead_s } else { 0.0 };
     Reservation::new(nanoseconds(realtime.period_s()), nanoseconds(spin_s))
 }
 

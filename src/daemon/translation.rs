@@ -12,13 +12,13 @@ pub(super) fn measurement(message: &MeasuredMessage) -> Measurement {
 
 /// What the drives are to do.
 pub(super) fn force_message(cycle: &CycleOutput) -> ForceMessage {
-    let Output { state, cause, force, limiting, .. } = cycle.output;
+    let Output { state, diagnostic, force, active_limits, .. } = cycle.output;
     ForceMessage {
         force_n: force,
-        valid: u32::from(state.controls()),
+        valid: u32::from(state.has_control()),
         state: state as u32,
-        fault: cause as u32,
-        limiting: limiting.0,
+        fault: diagnostic.code as u32,
+        limiting: active_limits.0,
         release_ns: cycle.release_ns,
         ..ForceMessage::default()
     }
@@ -29,16 +29,14 @@ pub(super) fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMess
     let CycleOutput { output, counters, .. } = cycle;
     let mut message = StatusMessage {
         state: output.state as u32,
-        fault: output.cause as u32,
-        refused: output.refused as u32,
-        limiting: output.limiting.0,
-        fault_value: output.evidence.value,
-        fault_bound: output.evidence.bound,
-        fault_index: output.evidence.index,
-        without_measurement: output.without_measurement,
-        without_setpoint: output.without_setpoint,
-        condition: output.condition,
-        singular_in_s: output.singular_in,
+        fault: output.diagnostic.code as u32,
+        refused: output.request_diagnostic.code as u32,
+        limiting: output.active_limits.0,
+        fault_value: output.diagnostic.value,
+        fault_bound: output.diagnostic.bound,
+        fault_index: output.diagnostic.index,
+        without_measurement: output.missed_measurements,
+        without_setpoint: output.missed_setpoints,
         wrench_error: output.wrench_error.vector().into(),
         answered_epoch: output.answered.0,
         answered_sequence: output.answered.1,
@@ -50,10 +48,12 @@ pub(super) fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMess
         allocations: counters.allocations,
         ..StatusMessage::default()
     };
-    if let Some((pose, twist)) = &output.measured {
+    if let Some(platform) = &output.platform {
         message.pose_valid = 1;
-        message.x = task_coordinates(pose, home);
-        message.twist = twist.vector().into();
+        message.x = task_coordinates(&platform.pose, home);
+        message.twist = platform.twist.vector().into();
+        message.condition = platform.condition;
+        message.singular_in_s = platform.time_to_singularity;
     }
     if let Some(error) = &output.error {
         message.error_valid = 1;
@@ -66,9 +66,11 @@ pub(super) fn status_message(home: &[f64; 6], cycle: &CycleOutput) -> StatusMess
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::law::TrackingError;
-    use crate::control::limits::Limiting;
-    use crate::control::state::{Cause, Evidence, State};
+    use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+    use crate::control::limits::LimitSet;
+    use crate::control::localization::PlatformState;
+    use crate::control::state::State;
+    use crate::control::tracking_error::TrackingError;
     use crate::model::rigid::{Twist, Wrench};
     use crate::model::task::TaskState;
     use crate::realtime::cyclic::Counters;
@@ -85,18 +87,20 @@ mod tests {
         let twist = |first: f64| Twist::from_vector(&Vector6::from(six(first)));
         let output = Output {
             state: State::Active,
-            cause: Cause::SetpointTooFar,
-            evidence: Evidence { value: 1.0, bound: 2.0, index: 3 },
+            diagnostic: Diagnostic { code: DiagnosticCode::SetpointTooFar, value: 1.0, bound: 2.0, index: 3 },
             answered: (4, 5),
-            refused: Cause::NotNow,
+            request_diagnostic: DiagnosticCode::InvalidInState.into(),
             force: six(10.0),
             wrench_error: Wrench::from_vector(&Vector6::from(six(20.0))),
-            limiting: Limiting(6),
-            without_measurement: 7,
-            without_setpoint: 8,
-            measured: Some((TaskState::at_rest(HOME).motion().pose, twist(30.0))),
-            condition: 50.0,
-            singular_in: 51.0,
+            active_limits: LimitSet(6),
+            missed_measurements: 7,
+            missed_setpoints: 8,
+            platform: Some(PlatformState {
+                pose: TaskState::at_rest(HOME).motion().pose,
+                twist: twist(30.0),
+                condition: 50.0,
+                time_to_singularity: 51.0,
+            }),
             error: Some(TrackingError { pose: twist(60.0), twist: twist(70.0) }),
         };
         let counters = Counters {
@@ -115,7 +119,13 @@ mod tests {
     fn a_status_says_what_the_cycle_said() {
         let message = status_message(&HOME, &cycle());
         let numbers = [message.state, message.fault, message.refused, message.limiting, message.fault_index];
-        let said = [State::Active as u32, Cause::SetpointTooFar as u32, Cause::NotNow as u32, 6, 3];
+        let said = [
+            State::Active as u32,
+            DiagnosticCode::SetpointTooFar as u32,
+            DiagnosticCode::InvalidInState as u32,
+            6,
+            3,
+        ];
         assert_eq!(numbers, said);
         assert_eq!([message.fault_value, message.fault_bound], [1.0, 2.0]);
         assert_eq!([message.answered_epoch, message.answered_sequence], [4, 5]);
@@ -140,11 +150,11 @@ mod tests {
         let mut cycle = cycle();
         let message = force_message(&cycle);
         let numbers = [message.valid, message.state, message.fault, message.limiting];
-        assert_eq!(numbers, [1, State::Active as u32, Cause::SetpointTooFar as u32, 6]);
+        assert_eq!(numbers, [1, State::Active as u32, DiagnosticCode::SetpointTooFar as u32, 6]);
         assert_eq!((message.force_n, message.release_ns), (six(10.0), 91));
         for state in State::ALL {
             cycle.output.state = state;
-            assert_eq!(force_message(&cycle).valid, u32::from(state.controls()), "{state:?}");
+            assert_eq!(force_message(&cycle).valid, u32::from(state.has_control()), "{state:?}");
         }
     }
 

@@ -116,7 +116,7 @@ pub struct ForceMessage {
     pub valid: u32,
     /// Number of [`crate::control::state::State`].
     pub state: u32,
-    /// Number of [`crate::control::state::Cause`].
+    /// Number of [`crate::control::diagnostic::DiagnosticCode`].
     pub fault: u32,
     /// Bits of the [`crate::control::limits::Limit`]s that this cycle is at.
     pub limiting: u32,
@@ -172,14 +172,14 @@ pub struct StatusMessage {
     pub header: Header,
     /// Number of [`crate::control::state::State`].
     pub state: u32,
-    /// Number of [`crate::control::state::Cause`].
+    /// Number of [`crate::control::diagnostic::DiagnosticCode`].
     pub fault: u32,
-    /// Number of the [`crate::control::state::Cause`] why the request `answered_*` was refused; 0 if it was
+    /// Number of the [`crate::control::diagnostic::DiagnosticCode`] why the request `answered_*` was refused; 0 if it was
     /// not.
     pub refused: u32,
     /// Bits of the [`crate::control::limits::Limit`]s that this cycle is at.
     pub limiting: u32,
-    /// The number behind `fault` and its bound, in the [`crate::control::state::Cause::unit`] of the fault.
+    /// The number behind `fault` and its bound, in the [`crate::control::diagnostic::DiagnosticCode::unit`] of the fault.
     pub fault_value: f64,
     pub fault_bound: f64,
     /// Leg or axis of the fault, from 1; 0 if it is of neither.

@@ -41,7 +41,7 @@ pub struct Timing {
 pub enum Release {
     /// A point of the grid. The last `max_lead_ns` at most are spun; 0 sleeps.
     Grid { max_lead_ns: u64 },
-    /// A measured message, rung for by the io thread. When none comes for `timeout_ns`, a cycle is run all
+    /// A measured message, signalled by the io thread. When none comes for `timeout_ns`, a cycle is run all
     /// the same, so that the loss is noticed. In simulated time there is no such end.
     External { timeout_ns: u64 },
 }
@@ -193,23 +193,24 @@ impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O> Cycles<'_, C, I, O, S
         let mut missed = false;
         loop {
             let timeout_at_ns = done_ns.saturating_add(timeout_ns);
-            let rung = self.side.bell.wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
+            let signalled = self.side.event.wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
             if stop.load(Ordering::Relaxed) {
                 break;
             }
             let woke_ns = self.clock.now_ns();
             let handed = self.side.inputs.value();
-            let measured_ns = handed.input.measured_ns().filter(|_| rung);
+            let measured_ns = handed.input.measured_ns().filter(|_| signalled);
             // Those before the first cycle were not missed.
             let skipped = seen.map_or(0, |seen| handed.measurements.saturating_sub(seen + 1));
             seen = Some(handed.measurements);
-            let due_ns = if rung { handed.handed_ns } else { timeout_at_ns };
+            let due_ns = if signalled { handed.handed_ns } else { timeout_at_ns };
             // Without a message, the drive's clock is taken to have gone on as this one did.
             let release_ns =
                 measured_ns.unwrap_or_else(|| begin.release_ns + due_ns.saturating_sub(begin.due_ns));
             let wakeup_ns = woke_ns.saturating_sub(due_ns);
             missed |= skipped > 0;
-            begin = Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited: true, missed, io_late: !rung };
+            begin =
+                Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited: true, missed, io_late: !signalled };
             self.counters.skipped += skipped;
             done_ns = self.run_one(&begin);
             missed = done_ns >= due_ns + self.timing.period_ns;

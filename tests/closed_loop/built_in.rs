@@ -3,14 +3,15 @@
 use core::iter::repeat_n;
 
 use hexad::analysis::envelope;
-use hexad::commands::r#move::Score;
+use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 
 use super::common::deployed;
-use super::rig::Rig;
+use super::common::rig::Rig;
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 const MOTIONS: [BuiltInMotion; 5] = [
@@ -28,8 +29,8 @@ type Tighten = fn(&mut Config);
 const LONGEST_ENGAGING: u32 = 20_000;
 
 fn shaped(config: &Config, motion: BuiltInMotion, seconds: f64) -> FittedMotion {
-    match Score::motion(config, motion, seconds) {
-        Ok(Score::FittedMotion(scene)) => scene,
+    match Trajectory::built_in(config, motion, seconds) {
+        Ok(Trajectory::BuiltIn(scene)) => scene,
         other => panic!("{} {motion:?} {seconds} s: {other:?}", config.name),
     }
 }
@@ -54,8 +55,8 @@ fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
     let cycles = (scene.duration / period_s) as u32 + 10;
     (0..cycles).all(|k| {
         let output = rig.cycle(&rig.input(&scene.at((f64::from(k) - phase) * period_s)));
-        let followed = (output.state, output.cause) == (State::Active, Cause::None);
-        followed && output.without_setpoint == 0
+        let followed = (output.state, output.diagnostic.code) == (State::Active, DiagnosticCode::None);
+        followed && output.missed_setpoints == 0
     })
 }
 
@@ -139,8 +140,8 @@ fn keep_each_limit_of_the_deployment() {
 fn that_could_not_be_seen_are_refused_with_the_reason() {
     let mut config = deployed("fried2008");
     config.deployment.limits.reference.position.velocity = 1e-4;
-    let error = Score::motion(&config, BuiltInMotion::MinimumJerk, 0.5).unwrap_err().to_string();
-    for word in ["0.100 %", "t = 0.", "(velocity)", "times the limit (bound 1.0"] {
+    let error = Trajectory::built_in(&config, BuiltInMotion::MinimumJerk, 0.5).unwrap_err().to_string();
+    for word in ["0.100 %", "t = 0.", ": velocity: ", " times the limit in [limits]"] {
         assert!(error.contains(word), "{word:?} must be in {error}");
     }
 }

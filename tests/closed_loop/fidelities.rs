@@ -2,13 +2,15 @@
 //! long as the fidelity has the inertia to do it.
 
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::controller::{Controller, Parameters};
-use hexad::control::state::{Cause, State};
+use hexad::control::controller::Controller;
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::parameters::Parameters;
+use hexad::control::state::State;
 use hexad::model::fidelity::Fidelity;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
-use super::rig::{Rig, parameters, track};
+use super::common::rig::{Rig, parameters, track};
 
 #[test]
 fn the_loop_tracks_on_every_rung_with_inertia_and_better_on_higher_ones() {
@@ -40,7 +42,11 @@ fn without_inertia_there_is_no_feedback() {
         let input = rig.input(&scene.at(1e-3 * f64::from(k)));
         let output = rig.cycle(&input);
         if output.state != State::Active {
-            assert_eq!((output.state, output.cause), (State::Fault, Cause::OffPath), "cycle {k}");
+            assert_eq!(
+                (output.state, output.diagnostic.code),
+                (State::Fault, DiagnosticCode::FollowingError),
+                "cycle {k}"
+            );
             return;
         }
     }

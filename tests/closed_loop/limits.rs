@@ -11,8 +11,8 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
+use super::common::rig::{Rig, in_motion};
 use super::common::{deployed, largest};
-use super::rig::{Rig, in_motion};
 
 /// Without a bound on what a setpoint may ask for.
 fn unbounded(name: &str) -> Config {
@@ -25,7 +25,7 @@ fn unbounded(name: &str) -> Config {
 }
 
 fn has(output: &Output, limit: Limit) -> bool {
-    output.limiting.contains(limit)
+    output.active_limits.contains(limit)
 }
 
 /// How much of `whole` is left in `part`, and what of it is not in its direction, as a share.
@@ -58,7 +58,7 @@ fn beyond_the_limit_all_legs_lose_the_same_share_of_what_is_not_weight() {
         let input = pushed(&rig, &task, push);
         let wanted = strong.controller.clone().step(&input);
         let output = rig.controller.clone().step(&input);
-        assert!(output.state.controls() && !has(&wanted, Limit::Force));
+        assert!(output.state.has_control() && !has(&wanted, Limit::Force));
         assert_eq!(has(&output, Limit::Force), largest(&wanted.force) > limit);
         if !has(&output, Limit::Force) {
             assert_eq!(output.force, wanted.force);
@@ -121,7 +121,7 @@ fn a_hopeless_platform_gets_no_more_than_the_limit() {
                 assert!((largest(&output.force) - limit).abs() < 1e-9 * limit);
                 limited += 1;
             }
-            assert!(output.state.controls() || output.force == [0.0; LEGS]);
+            assert!(output.state.has_control() || output.force == [0.0; LEGS]);
         });
     }
     assert!(limited > 100, "{limited}");
@@ -149,8 +149,8 @@ fn noise_gets_no_more_than_the_limit() {
             measurement.rate.iter_mut().for_each(|rate| *rate += 100.0 * size * random());
             let output = rig.cycle(&input);
             assert!(largest(&output.force) <= limit);
-            assert!(output.state.controls() || output.force == [0.0; LEGS]);
-            active += u32::from(output.state.controls());
+            assert!(output.state.has_control() || output.force == [0.0; LEGS]);
+            active += u32::from(output.state.has_control());
         }
     }
     assert!((500..2900).contains(&active), "{active} of 3000 cycles in control");

@@ -1,13 +1,14 @@
 //! The loop without threads: measurement and setpoint at k T, release at k T + T / 2, force on the platform
 //! from 100 us after the release on.
 
-#![allow(dead_code, reason = "every test uses a part of it")]
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::parameters::Parameters;
 
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::{LEGS, Machine};
@@ -16,7 +17,7 @@ use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::motion::timeline::Timeline;
 use hexad::plant::simulator::Simulator;
 
-use super::common::{Errors, angle_between};
+use super::{Errors, angle_between};
 
 /// What reading, computing and sending take, about as on a common computer.
 const FORCE_DELAY_NS: u64 = 100_000;
@@ -44,7 +45,7 @@ pub struct Rig {
     pub now_ns: u64,
     pub period_ns: u64,
     /// The newest request.
-    pub asked: Option<Asked>,
+    pub asked: Option<OperatorRequest>,
     /// On the platform now.
     pub force: Option<[f64; LEGS]>,
 }
@@ -74,7 +75,7 @@ impl Rig {
     /// A request, from the next input on.
     pub fn ask(&mut self, request: Request) {
         let number = self.asked.map_or(1, |asked| asked.message.1 + 1);
-        self.asked = Some(Asked { request, message: (START_NS, number) });
+        self.asked = Some(OperatorRequest { request, message: (START_NS, number) });
     }
 
     /// Asks to engage and goes on until active, on a setpoint at rest.
@@ -103,7 +104,7 @@ impl Rig {
     /// One cycle of the controller and one period of the platform.
     pub fn cycle(&mut self, input: &Input) -> Output {
         let output = self.controller.step(input);
-        self.pass(output.state.controls().then_some(output.force));
+        self.pass(output.state.has_control().then_some(output.force));
         output
     }
 
@@ -148,10 +149,14 @@ pub fn track(config: &Config, platform: &Machine, motion: BuiltInMotion, seconds
     let scene = fit(&config.machine, motion, seconds);
     let mut cycles = 0;
     let tracking = Rig::new(config, platform).play(&config.machine, &scene, |_, output| {
-        assert!(output.state.controls() && output.cause == Cause::None, "{:?}", output.cause);
+        assert!(
+            output.state.has_control() && output.diagnostic.code == DiagnosticCode::None,
+            "{:?}",
+            output.diagnostic.code
+        );
         assert!(output.state == State::Active || cycles < LONGEST_ENGAGING);
         cycles += 1;
-        let cut = [Limit::Force, Limit::ForceRate].map(|limit| output.limiting.contains(limit));
+        let cut = [Limit::Force, Limit::ForceRate].map(|limit| output.active_limits.contains(limit));
         assert_eq!(cut, [false; 2], "cycle {cycles}");
     });
     assert!(cycles > LONGEST_ENGAGING);

@@ -8,7 +8,7 @@ use heapless::spsc::Queue;
 use hexad::control::controller::{Input, Output};
 use hexad::daemon::cycle::CycleRecord;
 use hexad::messages::clock::monotonic_ns;
-use hexad::realtime::clock::Monotonic;
+use hexad::realtime::clock::{Clock, sleep_until};
 use hexad::realtime::cyclic::{Counters, RECORDS, Release, Timing, run};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
@@ -24,6 +24,25 @@ const CYCLES: u64 = 1000;
 /// Every fiftieth cycle burns two and a half periods.
 fn burns(cycle: u64) -> bool {
     cycle.is_multiple_of(50)
+}
+
+/// CLOCK_MONOTONIC. A sleep for longer than the loop may sleep fails at once.
+#[derive(Default)]
+struct Watched {
+    sleeps: u64,
+}
+
+impl Clock for Watched {
+    fn now_ns(&mut self) -> u64 {
+        monotonic_ns()
+    }
+
+    fn sleep_until(&mut self, instant_ns: u64) {
+        let for_ns = instant_ns.saturating_sub(monotonic_ns());
+        assert!(for_ns <= PERIOD_NS, "the loop sleeps for {for_ns} ns");
+        self.sleeps += 1;
+        sleep_until(instant_ns);
+    }
 }
 
 /// What the test saw of a cycle.
@@ -51,14 +70,18 @@ fn perform(release: Release, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<Cycl
         stop.store(seen.len() as u64 == CYCLES, Ordering::Relaxed);
         Output::default()
     };
+    let mut clock = Watched::default();
     let report = thread::scope(|threads| {
         let body = || {
             // Without it the test is slower, not wrong.
             let _ = scheduling::fifo_priority(50);
-            run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop)
+            run(&mut clock, &timing, step, Output::default(), side, records_in, &stop)
         };
         threads.spawn(body).join().expect("the loop")
     });
+    assert!(clock.sleeps > CYCLES / 2, "{} sleeps in {CYCLES} cycles", clock.sleeps);
+    let early = seen.iter().filter(|cycle| cycle.began_ns < cycle.due_ns).count();
+    assert_eq!(early, 0, "cycles that began before their release");
     let mut written = vec![];
     written.extend(std::iter::from_fn(|| records.dequeue()));
     (seen, written, report.counters)

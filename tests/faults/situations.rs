@@ -2,14 +2,15 @@
 
 use hexad::analysis::envelope;
 use hexad::config::Config;
-use hexad::control::controller::Parameters;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::parameters::Parameters;
+use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
-use super::rig::{Rig, parameters};
+use super::common::rig::{Rig, parameters};
 use super::world::{Source, World};
 
 /// In the order of the columns of the table.
@@ -47,12 +48,12 @@ impl Situation {
     }
 
     /// Before anything goes wrong.
-    pub fn begins(self) -> (State, Cause) {
+    pub fn begins(self) -> (State, DiagnosticCode) {
         let cause = match self {
-            Self::Standby => Cause::NotAsked,
-            Self::Engaging | Self::AtRest | Self::InMotion => Cause::None,
-            Self::Stopping | Self::Parking => Cause::Asked,
-            Self::Fault => Cause::EmergencyStop,
+            Self::Standby => DiagnosticCode::ReadyToEngage,
+            Self::Engaging | Self::AtRest | Self::InMotion => DiagnosticCode::None,
+            Self::Stopping | Self::Parking => DiagnosticCode::OperatorRequest,
+            Self::Fault => DiagnosticCode::EmergencyStop,
         };
         (self.state(), cause)
     }
@@ -96,7 +97,7 @@ impl Situation {
             }
         }
         let output = world.cycle(|_, _| {});
-        assert_eq!((output.state, output.cause), self.begins());
+        assert_eq!((output.state, output.diagnostic.code), self.begins());
         world.recording.samples.clear();
         world
     }

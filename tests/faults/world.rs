@@ -1,6 +1,7 @@
 //! A controller, a platform, a setpoint source, and what may go wrong between them.
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::parameters::Parameters;
 use hexad::control::state::Request;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Gravity;
@@ -13,8 +14,8 @@ use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector6;
 
+use super::common::rig::Rig;
 use super::recording::{Recording, Sample};
-use super::rig::Rig;
 
 /// Where setpoints come from.
 #[derive(Clone)]
@@ -107,7 +108,7 @@ impl World {
         }
         let output = self.rig.controller.step(&input);
         self.last = input;
-        let force = output.state.controls().then_some(output.force);
+        let force = output.state.has_control().then_some(output.force);
         let applied = self.applied(force);
         self.rig.pass(applied);
         self.record(now_ns, &output);

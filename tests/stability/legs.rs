@@ -16,8 +16,8 @@ use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use hexad::model::task::TaskState;
 use nalgebra::{Vector3, Vector6};
 
+use super::common::rig::Rig;
 use super::common::{Legs, deployed, largest};
-use super::rig::Rig;
 
 fn home(machine: &Machine) -> Pose {
     TaskState::at_rest(machine.home).motion().pose
@@ -101,9 +101,10 @@ fn through_the_axis_of_a_joint_forces_are_cut_or_know_nothing_of_it() {
                 *value += Vector6::new(0.0, 0.0, 0.0, along.x, along.y, along.z) * (0.08 * share);
             }
             let output = rig.cycle(&rig.input(&task));
-            assert_eq!(output.state, State::Active, "{fidelity:?} {beside:e}: {:?}", output.cause);
+            assert_eq!(output.state, State::Active, "{fidelity:?} {beside:e}: {:?}", output.diagnostic.code);
             cut += u32::from(
-                output.limiting.contains(Limit::Force) || output.limiting.contains(Limit::ForceRate),
+                output.active_limits.contains(Limit::Force)
+                    || output.active_limits.contains(Limit::ForceRate),
             );
             most = most.max(largest(&output.force));
         }

@@ -1,4 +1,4 @@
-//! What went over the topics during a demonstration, and how well it was tracked.
+//! Recording of the topics during a demonstration, and its tracking error.
 
 use crate::daemon::report::TrackingSum;
 use crate::messages::ports::{Bus, PortError, Sink};
@@ -7,17 +7,17 @@ use crate::model::rigid::{Motion, Pose};
 use crate::model::task::TaskState;
 
 /// Messages kept between two polls: all that the topic can hold.
-const DEPTH: usize = usize::MAX;
+const TOPIC_DEPTH: usize = usize::MAX;
 
-/// Subscribes to everything.
-pub struct Recorder {
+/// Subscriber to setpoints, measurements and forces, which keeps every message.
+pub struct TopicRecorder {
     setpoints: Sink<SetpointMessage>,
     measured: Sink<MeasuredMessage>,
     forces: Sink<ForceMessage>,
     recording: Recording,
 }
 
-/// All messages, in order.
+/// All messages of a demonstration, in order.
 #[derive(Default)]
 pub struct Recording {
     pub setpoints: Vec<SetpointMessage>,
@@ -25,25 +25,25 @@ pub struct Recording {
     pub forces: Vec<ForceMessage>,
 }
 
-impl Recorder {
-    /// Begins to listen.
+impl TopicRecorder {
+    /// Subscribes to the topics of a machine.
     pub fn new(bus: &Bus) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.sink(DEPTH)?,
-            measured: bus.sink(DEPTH)?,
-            forces: bus.sink(DEPTH)?,
+            setpoints: bus.sink(TOPIC_DEPTH)?,
+            measured: bus.sink(TOPIC_DEPTH)?,
+            forces: bus.sink(TOPIC_DEPTH)?,
             recording: Recording::default(),
         })
     }
 
-    /// Takes what has arrived.
+    /// Takes the messages that have arrived since the last call.
     pub fn poll(&mut self) {
         self.recording.setpoints.extend(core::iter::from_fn(|| self.setpoints.receive()));
         self.recording.measured.extend(core::iter::from_fn(|| self.measured.receive()));
         self.recording.forces.extend(core::iter::from_fn(|| self.forces.receive()));
     }
 
-    /// What was recorded.
+    /// The recording, with the messages that have arrived last.
     pub fn finish(mut self) -> Recording {
         self.poll();
         self.recording
@@ -51,24 +51,21 @@ impl Recorder {
 }
 
 impl Recording {
-    /// The instant that charts call zero: the first setpoint.
+    /// Instant of the first setpoint, which is time zero of the charts.
     pub fn start_ns(&self) -> u64 {
         self.setpoints.first().map_or(0, |message| message.header.time_ns)
     }
 
     /// Measurements with the desired motion at their instant, while setpoints cover it.
     pub fn pairs(&self) -> impl Iterator<Item = (&MeasuredMessage, TaskState)> {
-        let mut newest = 0;
-        self.measured.iter().filter_map(move |measured| {
-            let time_ns = measured.header.time_ns;
-            while self.setpoints.get(newest + 1).is_some_and(|next| next.header.time_ns <= time_ns) {
-                newest += 1;
-            }
-            let setpoint = self.setpoints.get(newest)?;
-            let age_ns = time_ns.checked_sub(setpoint.header.time_ns)?;
-            // A source that paused longer than this was not a source at that instant.
-            (age_ns < 100_000_000).then(|| (measured, task_state(setpoint).after(age_ns as f64 * 1e-9)))
-        })
+        with_desired(&self.setpoints, &self.measured, |message| message.header.time_ns)
+    }
+
+    /// Applied forces with the desired motion that they belong to: that in the middle of the period for which they are
+    /// held.
+    pub fn force_pairs(&self, period_ns: u64) -> impl Iterator<Item = (&ForceMessage, TaskState)> {
+        let middle_ns = move |message: &ForceMessage| message.release_ns.saturating_add(period_ns / 2);
+        with_desired(&self.setpoints, &self.forces, middle_ns).filter(|(force, _)| force.valid == 1)
     }
 
     /// Error between the desired pose and the plant's true one, over the instants in motion; over all if
@@ -85,17 +82,36 @@ impl Recording {
     }
 }
 
+/// Messages with the desired motion at an instant of each, while setpoints cover it.
+fn with_desired<'a, T>(
+    setpoints: &'a [SetpointMessage],
+    messages: &'a [T],
+    instant_ns: impl Fn(&T) -> u64 + 'a,
+) -> impl Iterator<Item = (&'a T, TaskState)> {
+    let mut newest = 0;
+    messages.iter().filter_map(move |message| {
+        let time_ns = instant_ns(message);
+        while setpoints.get(newest + 1).is_some_and(|next| next.header.time_ns <= time_ns) {
+            newest += 1;
+        }
+        let setpoint = setpoints.get(newest)?;
+        let age_ns = time_ns.checked_sub(setpoint.header.time_ns)?;
+        // A source that paused longer than this was not a source at that instant.
+        (age_ns < 100_000_000).then(|| (message, task_state(setpoint).after(age_ns as f64 * 1e-9)))
+    })
+}
+
 /// X, X', X'' of a message.
 pub fn task_state(message: &SetpointMessage) -> TaskState {
     TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() }
 }
 
-/// The pose a plant says it has.
+/// True pose of the plant in a message.
 pub fn measured_pose(message: &MeasuredMessage) -> Pose {
     TaskState::at_rest(message.x).motion().pose
 }
 
-/// Desired motion of a setpoint.
+/// Desired motion of a setpoint message.
 pub fn desired_motion(message: &SetpointMessage) -> Motion {
     task_state(message).motion()
 }

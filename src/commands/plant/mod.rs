@@ -3,7 +3,7 @@
 //! In real time it ticks on the multiples of the period. At each tick it lets the time since the last one pass, with
 //! every force applied from the instant its message was sent, as a drive would; then it publishes lengths
 //! and rates. A force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if it
-//! can be believed ([`doubt`]).
+//! can be believed (`doubt`).
 
 use std::time::Instant;
 
@@ -11,7 +11,8 @@ use tracing::{debug, info, warn};
 
 use self::doubt::Doubt;
 use crate::config::Config;
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::State;
 use crate::daemon::nanoseconds;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::{REPEAT, look_until};
@@ -125,7 +126,7 @@ struct Driven {
     /// Forces and the instant they expire.
     force: Option<([f64; LEGS], u64)>,
     /// What the newest message says about why there is no force.
-    cause: Cause,
+    cause: DiagnosticCode,
     timeout_ns: u64,
 }
 
@@ -136,14 +137,14 @@ impl Driven {
         say_terms(config, hardware.simulator().terms());
         info!(name = %config.name, "plant at rest at home, brakes closed");
         let timeout_ns = nanoseconds(config.deployment.plant.force_timeout_s);
-        Self { hardware, time_ns, force: None, cause: Cause::None, timeout_ns }
+        Self { hardware, time_ns, force: None, cause: DiagnosticCode::None, timeout_ns }
     }
 
     /// Applies a message from the instant it was sent.
     fn receive(&mut self, message: &ForceMessage) {
         self.advance_to(message.header.time_ns);
-        self.cause = Cause::from_number(message.fault).unwrap_or_default();
-        let is_under_control = State::from_number(message.state).is_some_and(State::controls);
+        self.cause = DiagnosticCode::from_number(message.fault).unwrap_or_default();
+        let is_under_control = State::from_number(message.state).is_some_and(State::has_control);
         let is_finite = message.force_n.iter().all(|force| force.is_finite());
         let usable = message.valid == 1 && is_under_control && is_finite;
         self.force =
@@ -213,11 +214,11 @@ fn say_terms(config: &Config, terms: &PlantTerms) {
     }
 }
 
-fn tell(before: Brakes, now: Brakes, cause: Cause) {
+fn tell(before: Brakes, now: Brakes, cause: DiagnosticCode) {
     match (before, now) {
         (Brakes::Open, Brakes::Open) | (Brakes::EndStop { .. }, _) => {}
         (Brakes::Open, Brakes::Closing { .. } | Brakes::Closed) => match cause {
-            Cause::None => warn!("forces stopped arriving: brakes closing"),
+            DiagnosticCode::None => warn!("forces stopped arriving: brakes closing"),
             cause if cause.is_fault() => warn!("no valid force ({}): brakes closing", cause.name()),
             cause => info!("no valid force ({}): brakes closing", cause.name()),
         },

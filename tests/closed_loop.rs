@@ -1,0 +1,20 @@
+//! Controller and simulated platform in one loop, in simulated time: tracking, replay, faults.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+mod common;
+
+mod closed_loop {
+    use super::*;
+
+    mod built_in;
+    mod evidence;
+    mod fidelities;
+    mod inputs;
+    mod limits;
+    mod modes;
+    mod observer;
+    mod poses;
+    mod replay;
+    mod tracking;
+}

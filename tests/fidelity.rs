@@ -1,0 +1,14 @@
+//! How much of the model a scene needs: judged, chosen, advised.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+mod common;
+
+mod fidelity {
+    use super::*;
+
+    mod advise;
+    mod dense;
+    mod envelope;
+    mod scenes;
+}
