@@ -73,7 +73,7 @@ fn holding(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     inverse_dynamics::<Exact>(machine, &motion).unwrap()
 }
 
-/// DriveStates that only push.
+/// Drives that only push.
 fn without_drives(mut machine: Machine) -> Machine {
     let actuator = &mut machine.actuator;
     (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) = (0.0, 0.0, 0.0);

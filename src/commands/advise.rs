@@ -219,8 +219,9 @@ impl fmt::Display for Advice {
             let [mean, rms, max] = [error.mean, error.rms, error.max].map(significant);
             let shares = [share(error.mean), share(error.rms), 100.0 * error.share].map(significant);
             let [mean_share, rms_share, max_share] = shares;
-            let (name, leaves_out) = (error.fidelity.name().into(), error.fidelity.left_out_terms().into());
-            [name, mean, rms, max, mean_share, rms_share, max_share, format!("{time:.0}"), leaves_out]
+            let (name, left_out_terms) =
+                (error.fidelity.name().into(), error.fidelity.left_out_terms().into());
+            [name, mean, rms, max, mean_share, rms_share, max_share, format!("{time:.0}"), left_out_terms]
         });
         writeln!(f, "\n\nerror of a leg's force [N], and as a share of the peak force [%]:")?;
         write!(f, "{}", text_table(1, &columns, rows))?;

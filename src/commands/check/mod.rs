@@ -51,7 +51,7 @@ pub struct Check<'a> {
     condition: f64,
     /// Largest motion from one measurement to the next for which the pose is certain \[rad\], \[radius\].
     trusted_step: f64,
-    /// OtherMode poses with the same lengths, the nearest first.
+    /// Other poses with the same lengths, the nearest first.
     others: Vec<OtherMode>,
 }
 
