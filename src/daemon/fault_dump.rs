@@ -11,7 +11,8 @@ use tracing::{info, warn};
 use crate::control::controller::Output;
 use crate::control::state::{Cause, State};
 use crate::model::task::task_coordinates;
-use crate::output::csv_table::{CsvWriter, coordinates, legs};
+use crate::output::csv_table::{coordinates, legs};
+use crate::output::csv_writer::CsvWriter;
 
 /// Cycles kept: two seconds at 1 kHz, 100 ms at 20 kHz. The cause of a fault is rarely older than its timeouts.
 const KEPT: usize = 2000;
