@@ -12,7 +12,8 @@ use crate::control::controller::Output;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::State;
 use crate::model::task::task_coordinates;
-use crate::output::csv_table::{CsvWriter, coordinates, legs};
+use crate::output::csv_table::{coordinates, legs};
+use crate::output::csv_writer::CsvWriter;
 
 /// Cycles kept: two seconds at 1 kHz, 100 ms at 20 kHz. The cause of a fault is rarely older than its timeouts.
 const KEPT: usize = 2000;
