@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use hexad::commands::operate::Operator;
 use hexad::control::state::{Cause, Request, State};
 use hexad::daemon::report::Report;
-use hexad::messages::ports::Bus;
+use hexad::messages::Bus;
 
 use super::Failure;
 use super::distribution::Distribution;
@@ -76,7 +76,7 @@ impl Watch {
                     if status.state == State::Active as u32 {
                         break;
                     }
-                    let cause = Cause::from_number(status.fault).unwrap_or_default();
+                    let cause = Cause::from_number(status.diagnostic.code).unwrap_or_default();
                     why = cause.name();
                     if cause == Cause::NotAsked {
                         operator.ask(Request::Engage)?;

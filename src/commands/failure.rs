@@ -37,7 +37,7 @@ impl From<FileError> for Failure {
 
 impl From<OperatorError> for Failure {
     fn from(error: OperatorError) -> Self {
-        let code = if matches!(error, OperatorError::Port(_) | OperatorError::Silent(_)) { 2 } else { 1 };
+        let code = if matches!(error, OperatorError::Port(_) | OperatorError::NoStatus(_)) { 2 } else { 1 };
         Self { code, what: error.to_string() }
     }
 }

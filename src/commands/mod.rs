@@ -10,6 +10,8 @@ use self::check::Check;
 use self::demo::Demo;
 use self::doctor::Doctor;
 use self::faults::Faults;
+use self::messages::{Declarations, Language};
+use self::operate::Order;
 use self::workspace::Survey;
 use crate::control::state::Request;
 use crate::daemon;
@@ -31,6 +33,7 @@ pub mod doctor;
 pub mod export;
 mod failure;
 pub mod faults;
+pub mod messages;
 pub mod r#move;
 pub mod offline;
 pub mod operate;
@@ -150,6 +153,12 @@ enum Command {
     },
     /// Show what the numbers of states, faults and limits mean, and what to do
     Faults,
+    /// Print the declarations of the messages for a driver in another language
+    Messages {
+        /// The language of the declarations
+        #[arg(long, value_enum)]
+        language: Language,
+    },
     /// Validate a machine file and show the machine at home
     Check {
         #[command(flatten)]
@@ -252,6 +261,7 @@ impl Cli {
             Command::Off { machine, patience } => ask(&machine, Request::Off, false, &patience),
             Command::Estop { machine, patience } => ask(&machine, Request::Estop, false, &patience),
             Command::Faults => Ok(print(Faults)?),
+            Command::Messages { language } => Ok(print(Declarations(language))?),
             Command::Check { machine } => Ok(print(Check::new(&machine.load()?))?),
             Command::Doctor { config, cpu, seconds, report, disturb } => {
                 let doctor = Doctor { config, cpu, seconds, report, disturb };
@@ -282,7 +292,8 @@ impl Cli {
 
 fn ask(machine: &MachineFile, request: Request, wait: bool, patience: &Patience) -> Result<(), Failure> {
     let config = machine.load()?;
-    let state = operate::run(&config, request, wait, patience.longest(), &stop()?)?;
+    let order = Order { request, is_patient: wait, timeout: patience.longest() };
+    let state = operate::run(&config, &order, &stop()?)?;
     Ok(print(format_args!("{}\n", state.name()))?)
 }
 

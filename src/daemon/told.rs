@@ -19,3 +19,9 @@ impl fmt::Display for Told {
         write!(f, ": {value:.6} {} (bound {bound:.6})", cause.unit())
     }
 }
+
+impl fmt::Display for crate::control::state::Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}; {}", self.cause.name(), Told(self.cause, self.evidence), self.cause.remedy())
+    }
+}

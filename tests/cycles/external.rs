@@ -9,7 +9,7 @@ use hexad::control::controller::{Input, Measurement, Output};
 use hexad::daemon::cycle::{CycleInput, CycleRecord};
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::Monotonic;
-use hexad::realtime::cyclic::{RECORDS, Release, Timing, run};
+use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing, run};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OnOverrun;
 
@@ -34,7 +34,9 @@ fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
     let timing = Timing {
         period_ns: DRIVE_PERIOD_NS,
         phase_ns: 0,
-        release: Release::External { timeout_ns },
+        release: ReleaseMode::External,
+        max_lead_ns: 0,
+        timeout_ns,
         on_overrun: OnOverrun::Fault,
         late_wakeup_ns: 100_000_000,
     };

@@ -4,10 +4,10 @@
 use std::mem::{align_of, offset_of, size_of};
 
 use crate::python;
-use hexad::messages::statistics::{LoopTimes, Statistics, Times, WorstCycle};
-use hexad::messages::structs::{
+use hexad::messages::{
     CommandMessage, ForceMessage, Header, MeasuredMessage, Message, SCHEMA, SetpointMessage, StatusMessage,
 };
+use hexad::messages::{LoopTimes, Statistics, Times, WorstCycle};
 
 /// A line for the struct and one for each of its fields: a field that is not listed here does not compile.
 macro_rules! layout {

@@ -5,8 +5,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hexad::config::Config;
-use hexad::messages::ports::Bus;
-use hexad::messages::structs::Message;
+use hexad::messages::Bus;
+use hexad::messages::Message;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::task::TaskState;
@@ -51,7 +51,7 @@ const WRONG: [(Change, &str); 9] = [
     (|message| resealed(message, |message| message.header.epoch -= 1), "of an older daemon"),
 ];
 
-fn resealed(message: &mut hexad::messages::structs::ForceMessage, change: Change) {
+fn resealed(message: &mut hexad::messages::ForceMessage, change: Change) {
     change(message);
     message.seal();
 }

@@ -8,9 +8,9 @@ use hexad::commands::operate::Operator;
 use hexad::config::Config;
 use hexad::control::state::{Cause, Request, State};
 use hexad::daemon::report::Report;
+use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::Bus;
-use hexad::messages::structs::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use hexad::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use hexad::plant::simulator::Simulator;
 use hexad::realtime::setup::scheduling;
 
@@ -103,7 +103,11 @@ fn every_message_is_counted(recording: &Recording, steps: &[Step]) {
         } else {
             silent += 1;
             assert_eq!((step.cycles, step.skipped), (1, 0), "{step:#?}");
-            assert_eq!((step.after.valid, step.after.fault), (0, Cause::MeasurementLost as u32), "{step:#?}");
+            assert_eq!(
+                (step.after.valid, step.after.diagnostic_code),
+                (0, Cause::MeasurementLost as u32),
+                "{step:#?}"
+            );
             assert!(after_ns - before_ns >= TIMEOUT_NS, "{step:#?}");
         }
     }
@@ -136,9 +140,9 @@ fn lock_step() {
     let plant = &config.deployment.plant;
     let mut simulator = Simulator::new(&config.machine, plant.brake_deceleration_m_s2, plant.step_s);
     let bus = Bus::join(&machine.name).expect("to join");
-    let mut measured = bus.source::<MeasuredMessage>().expect("to publish");
-    let mut setpoints = bus.source::<SetpointMessage>().expect("to publish");
-    let mut forces = bus.sink::<ForceMessage>(8).expect("to subscribe");
+    let mut measured = bus.publisher::<MeasuredMessage>().expect("to publish");
+    let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
+    let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
     let mut operator = Operator::new(&bus).expect("to ask");
     let mut took = vec![];
     let mut under_control = 0;
@@ -154,7 +158,7 @@ fn lock_step() {
         setpoints.publish(time_ns, peer::setpoint(time_ns)).expect("to send");
         measured.publish(time_ns, message).expect("to send");
         let force = loop {
-            match forces.newest().filter(|force| force.release_ns == time_ns) {
+            match forces.receive_latest().filter(|force| force.release_ns == time_ns) {
                 Some(force) => break force,
                 None => std::hint::spin_loop(),
             }
@@ -164,7 +168,7 @@ fn lock_step() {
         under_control += usize::from(force.valid == 1);
         took.push(asked.elapsed());
         match (took.len() < CYCLES, force.valid) {
-            (true, 0) if force.fault == Cause::NotAsked as u32 => {
+            (true, 0) if force.diagnostic_code == Cause::NotAsked as u32 => {
                 operator.ask(Request::Engage).expect("to send");
             }
             (false, 0) => break,

@@ -16,7 +16,7 @@ use crate::config::text::text_of;
 use crate::config::{Config, ConfigError};
 use crate::control::state::{Cause, Request, State};
 use crate::daemon::report::Report;
-use crate::messages::ports::PortError;
+use crate::messages::PortError;
 use crate::output::charts::ChartError;
 use crate::output::files::{FileError, print, write_whole};
 use crate::realtime::stop_request::Stop;
@@ -210,11 +210,11 @@ fn watch(
         recorder.poll();
         if let Some(status) = operator.status() {
             if status.state == State::Fault as u32 {
-                let cause = Cause::from_number(status.fault).unwrap_or_default();
+                let cause = Cause::from_number(status.diagnostic.code).unwrap_or_default();
                 return Err(DemoError::NotWell(format!("fault: {}; {}", cause.name(), cause.remedy())));
             }
-            if status.fault == Cause::NotAsked as u32 {
-                operator.ask(Request::Engage)?;
+            if status.diagnostic.code == Cause::NotAsked as u32 {
+                operator.send(Request::Engage)?;
             }
         }
         for process in processes.iter_mut() {

@@ -1,8 +1,8 @@
 //! What went over the topics during a demonstration, and how well it was tracked.
 
 use crate::daemon::report::TrackingSum;
-use crate::messages::ports::{Bus, PortError, Sink};
-use crate::messages::structs::{ForceMessage, MeasuredMessage, SetpointMessage};
+use crate::messages::{Bus, PortError, Subscriber};
+use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage};
 use crate::model::rigid::{Motion, Pose};
 use crate::model::task::TaskState;
 
@@ -11,9 +11,9 @@ const DEPTH: usize = usize::MAX;
 
 /// Subscribes to everything.
 pub struct Recorder {
-    setpoints: Sink<SetpointMessage>,
-    measured: Sink<MeasuredMessage>,
-    forces: Sink<ForceMessage>,
+    setpoints: Subscriber<SetpointMessage>,
+    measured: Subscriber<MeasuredMessage>,
+    forces: Subscriber<ForceMessage>,
     recording: Recording,
 }
 
@@ -29,9 +29,9 @@ impl Recorder {
     /// Begins to listen.
     pub fn new(bus: &Bus) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.sink(DEPTH)?,
-            measured: bus.sink(DEPTH)?,
-            forces: bus.sink(DEPTH)?,
+            setpoints: bus.subscriber(DEPTH)?,
+            measured: bus.subscriber(DEPTH)?,
+            forces: bus.subscriber(DEPTH)?,
             recording: Recording::default(),
         })
     }

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::daemon::report::Report;
-use crate::messages::statistics::{Times, WorstCycle};
+use crate::messages::{Times, WorstCycle};
 
 /// The table printed at the end.
 pub struct Summary<'a> {

@@ -13,14 +13,14 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
 use super::files::HostFiles;
-use crate::config::deployment::{Deployment, Realtime, ReleaseKey};
+use crate::config::deployment::{Deployment, Realtime};
 use crate::daemon::start::prepare_loop;
 use crate::daemon::time_histogram::TimeHistogram;
 use crate::daemon::{nanoseconds, timing};
+use crate::messages::Times;
 use crate::messages::clock::monotonic_ns;
-use crate::messages::statistics::Times;
 use crate::realtime::clock::{Grid, Monotonic};
-use crate::realtime::cyclic::{Release, Timing};
+use crate::realtime::cyclic::{ReleaseMode, Timing};
 use crate::realtime::stop_request::Stop;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
@@ -55,9 +55,9 @@ impl Waiting {
     }
 }
 
-impl From<ReleaseKey> for Waiting {
-    fn from(release: ReleaseKey) -> Self {
-        if release == ReleaseKey::Hybrid { Self::Hybrid } else { Self::Sleep }
+impl From<ReleaseMode> for Waiting {
+    fn from(release: ReleaseMode) -> Self {
+        if release == ReleaseMode::Hybrid { Self::Hybrid } else { Self::Sleep }
     }
 }
 
@@ -134,7 +134,7 @@ fn plans(deployment: &Deployment, seconds: f64) -> Vec<Plan> {
         rates.sort_by(f64::total_cmp);
     }
     let whole = WEIGHT + 2.0 * rates.len() as f64 - 1.0;
-    let each = [(ReleaseKey::Sleep, Waiting::Sleep), (ReleaseKey::Hybrid, Waiting::Hybrid)];
+    let each = [(ReleaseMode::Sleep, Waiting::Sleep), (ReleaseMode::Hybrid, Waiting::Hybrid)];
     let plan = |rate_hz: f64| {
         each.map(|(release, waiting)| {
             let asked = rate_hz == configured.rate_hz && waiting == configured.release.into();
@@ -188,8 +188,8 @@ fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
         histogram.record(monotonic_ns());
         histogram.clear();
     });
-    let Timing { period_ns, phase_ns, release, late_wakeup_ns, .. } = timing(deployment);
-    let max_lead_ns = if let Release::Grid { max_lead_ns } = release { max_lead_ns } else { 0 };
+    let Timing { period_ns, phase_ns, late_wakeup_ns, .. } = timing(deployment);
+    let max_lead_ns = timing(deployment).spin_ns();
     let (grid, mut waiter) = (Grid::new(period_ns, phase_ns), Waiter::new(max_lead_ns));
     let (mut late_wakeups, mut missed) = (0, 0);
     let at_start = ThreadUsage::of_this_thread();

@@ -8,7 +8,8 @@ use super::facts::{Fact, Rating, surroundings};
 use super::latency::{Latency, Waiting};
 use super::verdict::Judgement;
 use super::{Diagnosis, Rate};
-use crate::config::deployment::{Realtime, ReleaseKey};
+use crate::config::deployment::Realtime;
+use crate::realtime::cyclic::ReleaseMode;
 
 /// Longer lines are hard to read, even where the terminal has room.
 const WIDEST: usize = 100;
@@ -41,8 +42,8 @@ impl Layout {
     /// What was looked at, and the facts.
     pub fn facts(&self, name: &str, realtime: &Realtime, facts: &[Fact]) -> String {
         let release = match realtime.release {
-            ReleaseKey::External => "sleep (instead of external)",
-            ReleaseKey::Lockstep => "sleep (instead of lockstep)",
+            ReleaseMode::External => "sleep (instead of external)",
+            ReleaseMode::Lockstep => "sleep (instead of lockstep)",
             release => Waiting::from(release).name(),
         };
         let on = realtime.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
@@ -197,7 +198,7 @@ mod tests {
     use super::*;
     use crate::commands::demo::DEFAULT_MACHINE;
     use crate::config::Config;
-    use crate::messages::statistics::Times;
+    use crate::messages::Times;
     use crate::realtime::usage::ThreadUsage;
 
     const RARE: u64 = 123_456_789;

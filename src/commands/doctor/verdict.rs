@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::latency::Latency;
 use super::text::microseconds;
-use crate::messages::statistics::Times;
+use crate::messages::Times;
 
 /// Of the period, for the 99.9th percentile: the rest is for reading, computing and sending.
 const GOOD_SHARE: f64 = 0.2;

@@ -14,7 +14,7 @@ use super::operate::Operator;
 use super::plant::prepare_thread;
 use crate::config::Config;
 use crate::daemon::nanoseconds;
-use crate::messages::lockstep::look_until;
+use crate::messages::lockstep::poll_until;
 use crate::output::numbers::percent;
 mod precheck;
 use self::precheck::{Refusal, Rehearsal};
@@ -22,8 +22,8 @@ use crate::analysis::sampled_loop::boundary;
 use crate::control::limits::{AxisLimits, Limits};
 use crate::control::state::{Cause, Request, State};
 use crate::messages::clock::monotonic_ns;
-use crate::messages::ports::{PortError, Sink, Source, Time};
-use crate::messages::structs::{MeasuredMessage, SetpointMessage, StatusMessage};
+use crate::messages::{MeasuredMessage, SetpointMessage, StatusMessage};
+use crate::messages::{PortError, Publisher, Subscriber};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::motion::built_in::{Motion, Scene, fit};
@@ -171,12 +171,12 @@ impl Score {
 /// Plays the score once, or until `stop`. With `engage` it also asks for control, once.
 pub fn run(config: &Config, score: &Score, engage: bool, stop: &Stop) -> Result<(), SetpointError> {
     let bus = config.join()?;
-    let setpoints = bus.source()?;
+    let setpoints = bus.publisher()?;
     let player = Player::new(config, score, Operator::new(&bus)?, engage);
     info!(name = %config.name, seconds = score.duration(), "waiting for the daemon to know where the platform is");
-    match bus.time() {
-        Time::Real => run_in_real_time(config, player, setpoints, stop)?,
-        Time::Simulated => run_in_lockstep(bus.sink(8)?, player, setpoints, stop)?,
+    match bus.is_simulated() {
+        false => run_in_real_time(config, player, setpoints, stop)?,
+        true => run_in_lockstep(bus.subscriber(8)?, player, setpoints, stop)?,
     }
     Ok(())
 }
@@ -184,7 +184,7 @@ pub fn run(config: &Config, score: &Score, engage: bool, stop: &Stop) -> Result<
 fn run_in_real_time(
     config: &Config,
     mut player: Player,
-    mut setpoints: Source<SetpointMessage>,
+    mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
 ) -> Result<(), PortError> {
     prepare_thread(config);
@@ -194,7 +194,7 @@ fn run_in_real_time(
         sleep_until(tick_ns);
         match player.cue(tick_ns)? {
             Cue::Silent => {}
-            Cue::Play(state) => setpoints.publish(tick_ns, message(&state))?,
+            Cue::Play(state) => setpoints.publish(tick_ns, (&state).into())?,
             Cue::Finished => break,
         }
         tick_ns = grid.next_after(tick_ns.max(monotonic_ns()));
@@ -204,19 +204,19 @@ fn run_in_real_time(
 
 /// Each measurement is answered, as everybody waits for it; what has no answer yet, with home.
 fn run_in_lockstep(
-    mut measured: Sink<MeasuredMessage>,
+    mut measured: Subscriber<MeasuredMessage>,
     mut player: Player,
-    mut setpoints: Source<SetpointMessage>,
+    mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
 ) -> Result<(), PortError> {
     let mut answered = None;
-    while let Some(asked) = look_until(|| stop.requested(), || measured.receive()) {
+    while let Some(asked) = poll_until(|| stop.requested(), || measured.receive()) {
         let time_ns = asked.header.time_ns;
         let answer = match answered {
             Some((same_ns, answer)) if same_ns == time_ns => answer,
             _ => match player.cue(time_ns)? {
-                Cue::Silent => message(&TaskState::at_rest(player.machine.home)),
-                Cue::Play(state) => message(&state),
+                Cue::Silent => (&TaskState::at_rest(player.machine.home)).into(),
+                Cue::Play(state) => (&state).into(),
                 Cue::Finished => break,
             },
         };
@@ -259,8 +259,8 @@ impl<'a> Player<'a> {
     fn cue(&mut self, now_ns: u64) -> Result<Cue, PortError> {
         if let Some(status) = self.operator.status() {
             self.listen(now_ns, &status);
-            if self.engage && status.fault == Cause::NotAsked as u32 {
-                self.operator.ask(Request::Engage)?;
+            if self.engage && status.diagnostic.code == Cause::NotAsked as u32 {
+                self.operator.send(Request::Engage)?;
             }
         }
         if self.engaged_ns.is_some() && now_ns.saturating_sub(self.last_active_ns) > GIVEN_UP_NS {
@@ -307,15 +307,6 @@ fn gentle_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
         shortest_duration(way, [velocity, acceleration, jerk])
     };
     shortest(angle, &limits.orientation).max(shortest(way.fixed_rows::<3>(3).norm(), &limits.position))
-}
-
-fn message(state: &TaskState) -> SetpointMessage {
-    SetpointMessage {
-        x: state.x.into(),
-        x_rate: state.xd.into(),
-        x_accel: state.xdd.into(),
-        ..SetpointMessage::default()
-    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use core::f64::consts::TAU;
 
 pub use self::plant::Plant;
-pub use self::realtime::{Realtime, ReleaseKey, Scheduler};
+pub use self::realtime::{Realtime, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::Reader;

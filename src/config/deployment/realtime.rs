@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 use crate::analysis::sampled_loop::SampledLoop;
 use crate::config::bound::Bound;
 use crate::config::reader::Reader;
-use crate::messages::ports::Time;
+use crate::realtime::cyclic::ReleaseMode;
 use crate::realtime::overrun::OnOverrun;
 
 /// Slowest and fastest loop \[Hz\]. Above, one wake-up costs more than the period leaves.
@@ -35,7 +35,7 @@ pub struct Realtime {
     /// Cycles per second.
     pub rate_hz: f64,
     /// What begins a cycle.
-    pub release: ReleaseKey,
+    pub release: ReleaseMode,
     /// Longest spin before a release, where there is one.
     pub max_lead_s: f64,
     /// What follows a cycle that was not done at its next release.
@@ -62,19 +62,6 @@ pub struct Realtime {
     pub require_realtime: bool,
 }
 
-/// `realtime.release`: what begins a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReleaseKey {
-    /// A point of the grid, slept for.
-    Sleep,
-    /// A point of the grid, slept for but for a lead that is spun.
-    Hybrid,
-    /// A measured message.
-    External,
-    /// A measured message and the setpoint of its instant, in simulated time.
-    Lockstep,
-}
-
 /// `realtime.scheduler`: the scheduling class of the real-time thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scheduler {
@@ -90,9 +77,9 @@ impl Realtime {
         1.0 / self.rate_hz
     }
 
-    /// Which time the participants live in.
-    pub fn time(&self) -> Time {
-        if self.release == ReleaseKey::Lockstep { Time::Simulated } else { Time::Real }
+    /// Whether all times are those of the plant.
+    pub fn is_simulated(&self) -> bool {
+        self.release == ReleaseMode::Lockstep
     }
 
     /// Longest time from a measurement to its force, in periods, of a loop that misses nothing and whose driver
@@ -100,9 +87,9 @@ impl Realtime {
     /// release, and the force may come at the next release. What the drives wait or sleep comes on top.
     pub fn longest_delay(&self) -> f64 {
         match self.release {
-            ReleaseKey::Sleep | ReleaseKey::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
+            ReleaseMode::Sleep | ReleaseMode::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
             // Released by the measurement itself.
-            ReleaseKey::External | ReleaseKey::Lockstep => 1.0,
+            ReleaseMode::External | ReleaseMode::Lockstep => 1.0,
         }
     }
 
@@ -121,13 +108,13 @@ impl Realtime {
 pub(super) fn read(mut section: Reader) -> Realtime {
     let rate_hz = section.number_or("rate_hz", 1000.0, RATE_HZ);
     let releases = [
-        ("sleep", ReleaseKey::Sleep),
-        ("hybrid", ReleaseKey::Hybrid),
-        ("external", ReleaseKey::External),
-        ("lockstep", ReleaseKey::Lockstep),
+        ("sleep", ReleaseMode::Sleep),
+        ("hybrid", ReleaseMode::Hybrid),
+        ("external", ReleaseMode::External),
+        ("lockstep", ReleaseMode::Lockstep),
     ];
-    let release = section.choice_or("release", ReleaseKey::Sleep, &releases);
-    let io_lead_us = if release == ReleaseKey::Hybrid { IO_LEAD_AWAKE_US } else { IO_LEAD_US };
+    let release = section.choice_or("release", ReleaseMode::Sleep, &releases);
+    let io_lead_us = if release == ReleaseMode::Hybrid { IO_LEAD_AWAKE_US } else { IO_LEAD_US };
     let schedulers = [("fifo", Scheduler::Fifo), ("deadline", Scheduler::Deadline)];
     let scheduler = section.choice_or("scheduler", Scheduler::Fifo, &schedulers);
     let (low, high) = PRIORITY;
@@ -158,19 +145,19 @@ pub(super) fn read(mut section: Reader) -> Realtime {
             "must not be given with realtime.scheduler = \"deadline\" (Linux places such threads itself)",
         );
     }
-    if realtime.release == ReleaseKey::External && matches!(realtime.on_overrun, OnOverrun::CatchUp { .. }) {
+    if realtime.release == ReleaseMode::External && matches!(realtime.on_overrun, OnOverrun::CatchUp { .. }) {
         section.refuse(
             "on_overrun",
             "must be one of \"skip\", \"fault\" with realtime.release = \"external\" (only the newest message is kept)",
         );
     }
-    if realtime.release == ReleaseKey::Lockstep && realtime.require_realtime {
+    if realtime.release == ReleaseMode::Lockstep && realtime.require_realtime {
         section.refuse(
             "require_realtime",
             "must be false with realtime.release = \"lockstep\" (simulated time)",
         );
     }
-    if realtime.release == ReleaseKey::Lockstep && realtime.on_overrun != OnOverrun::Skip {
+    if realtime.release == ReleaseMode::Lockstep && realtime.on_overrun != OnOverrun::Skip {
         section.refuse(
             "on_overrun",
             "must be \"skip\" with realtime.release = \"lockstep\" (simulated time waits for the loop)",

@@ -8,7 +8,7 @@ use self::permissions::Refused;
 use self::processors::Chosen;
 use super::files::HostFiles;
 use crate::config::deployment::Realtime;
-use crate::messages::ports::Bus;
+use crate::messages::Bus;
 use crate::realtime::clock_cost::ClockCost;
 use crate::realtime::setup::permissions::Permissions;
 
@@ -94,7 +94,7 @@ pub fn all(
         kernel::clock(host, cost),
         surroundings::swap(host),
         surroundings::huge_pages(host),
-        surroundings::shared_memory(host, Bus::places_of_its_own().as_deref()),
+        surroundings::shared_memory(host, Bus::fallback_location().as_deref()),
     ]);
     facts
 }
