@@ -13,7 +13,7 @@ use crate::messages::{MESSAGES, SCHEMA};
 /// Language of the declarations.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Language {
-    /// A C header (C11)
+    /// A header for C11 and C++
     C,
     /// A Python module with ctypes structures
     Python,
@@ -83,8 +83,7 @@ fn class(layout: &Layout) -> String {
 
 /// Meaning and unit, on one line.
 fn comment(field: &Field) -> String {
-    let mut text =
-        field.doc.split_whitespace().collect::<Vec<_>>().join(" ").replace("[`", "`").replace("`]", "`");
+    let mut text = field.doc.split_whitespace().collect::<Vec<_>>().join(" ");
     if !field.unit.is_empty() {
         let _ = write!(text, " [{}]", field.unit);
     }
@@ -98,7 +97,10 @@ fn summary(layout: &Layout) -> String {
 fn c_header(f: &mut fmt::Formatter<'_>) -> fmt::Result {
     writeln!(f, "/* Messages of hexad, by `hexad messages --language c`. */")?;
     writeln!(f, "#ifndef HEXAD_MESSAGES_H\n#define HEXAD_MESSAGES_H\n")?;
-    writeln!(f, "#include <stddef.h>\n#include <stdint.h>\n\n#define HEXAD_SCHEMA {SCHEMA}u\n")?;
+    writeln!(
+        f,
+        "#include <assert.h>\n#include <stdalign.h>\n#include <stddef.h>\n#include <stdint.h>\n\n#define HEXAD_SCHEMA {SCHEMA}u\n"
+    )?;
     for (prefix, name, number) in constants() {
         writeln!(f, "#define HEXAD_{prefix}_{name} {number}u")?;
     }
@@ -118,10 +120,10 @@ fn c_header(f: &mut fmt::Formatter<'_>) -> fmt::Result {
             let comment = comment.map_or(String::new(), |comment| format!(" /* {comment} */"));
             writeln!(f, "    {kind} {}{count};{comment}", field.name)?;
         }
-        writeln!(f, "}};\n_Static_assert(sizeof(struct {type_name}) == {size}, \"size\");")?;
-        writeln!(f, "_Static_assert(_Alignof(struct {type_name}) == {align}, \"alignment\");")?;
+        writeln!(f, "}};\nstatic_assert(sizeof(struct {type_name}) == {size}, \"size\");")?;
+        writeln!(f, "static_assert(alignof(struct {type_name}) == {align}, \"alignment\");")?;
         for Field { name, offset, .. } in layout.fields {
-            writeln!(f, "_Static_assert(offsetof(struct {type_name}, {name}) == {offset}, \"{name}\");")?;
+            writeln!(f, "static_assert(offsetof(struct {type_name}, {name}) == {offset}, \"{name}\");")?;
         }
     }
     writeln!(f, "\n#endif")

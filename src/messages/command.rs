@@ -10,7 +10,7 @@ message! {
     /// Operator request, one per message.
     CommandMessage = "hexad_command" on "command" {
         header: super::Header,
-        /// Number of [`crate::control::state::Request`].
+        /// Number of the `Request`.
         request: u32,
         /// Zero.
         reserved: u32,

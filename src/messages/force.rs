@@ -18,11 +18,11 @@ message! {
         force_n: [f64; 6] ["N"],
         /// 1 if the forces may be applied, else 0.
         valid: u32,
-        /// Number of [`crate::control::state::State`].
+        /// Number of the `State`.
         state: u32,
-        /// Number of the [`crate::control::state::Cause`] of the state.
+        /// Number of the `Cause` of the state.
         diagnostic_code: u32,
-        /// Bits of the [`crate::control::limits::Limit`]s that this cycle is at.
+        /// Bits of the `Limit`s that this cycle is at.
         limiting: u32,
         /// Instant for which the forces were computed: the cycle's release, or with external release the time of the
         /// measurement that released it.

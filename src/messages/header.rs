@@ -10,7 +10,7 @@ pub const SCHEMA: u32 = 5;
 message! {
     /// First field of every message; the publisher fills it in.
     Header = "hexad_header" {
-        /// Version of the structs, [`SCHEMA`].
+        /// Version of the structs, `SCHEMA`.
         schema: u32,
         /// Zero.
         reserved: u32,

@@ -11,7 +11,7 @@ use crate::model::task::task_coordinates;
 message! {
     /// Diagnostic: what happened, with the number that was found and its bound.
     DiagnosticRecord = "hexad_diagnostic" {
-        /// Number of [`crate::control::state::Cause`].
+        /// Number of the `Cause`.
         code: u32,
         /// Leg or axis, from 1; 0 if it concerns neither.
         index: u32,
@@ -26,9 +26,9 @@ message! {
     /// State of the daemon, published every cycle.
     StatusMessage = "hexad_status" on "status" {
         header: super::Header,
-        /// Number of [`crate::control::state::State`].
+        /// Number of the `State`.
         state: u32,
-        /// Bits of the [`crate::control::limits::Limit`]s that this cycle is at.
+        /// Bits of the `Limit`s that this cycle is at.
         limiting: u32,
         /// Why the state is not active, or soon will not be.
         diagnostic: DiagnosticRecord,
