@@ -79,7 +79,7 @@ impl Watch {
                     let cause = Cause::from_number(status.diagnostic.code).unwrap_or_default();
                     why = cause.name();
                     if cause == Cause::NotAsked {
-                        operator.ask(Request::Engage)?;
+                        operator.send(Request::Engage)?;
                     }
                 }
                 for daemon in daemons.iter_mut() {

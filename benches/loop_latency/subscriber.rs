@@ -10,9 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread::{JoinHandle, spawn};
 
+use hexad::messages::Bus;
 use hexad::messages::ForceMessage;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{Bus, Subscriber};
 use hexad::realtime::setup::scheduling;
 
 use super::Failure;
@@ -67,7 +67,7 @@ impl Subscriber {
     }
 }
 
-fn prepare(cpu: usize) -> Result<Subscriber<ForceMessage>, String> {
+fn prepare(cpu: usize) -> Result<hexad::messages::Subscriber<ForceMessage>, String> {
     scheduling::bind_to_cpu(cpu).map_err(|shortfall| shortfall.to_string())?;
     let thread = fs::read_link("/proc/thread-self").map_err(|error| error.to_string())?;
     let number = thread.file_name().unwrap_or_default();

@@ -217,7 +217,7 @@ impl Section {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::controller::Input;
+    use crate::control::controller::{Input, Output};
 
     fn record(cycle: u64, cause: Cause) -> CycleRecord {
         CycleRecord {

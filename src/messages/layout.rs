@@ -154,7 +154,10 @@ macro_rules! message {
         impl $crate::messages::layout::Declared for $name {
             const LAYOUT: $crate::messages::layout::Layout = $crate::messages::layout::Layout {
                 type_name: $type_name,
-                topic: [$(Some($topic),)? None].as_slice()[0],
+                topic: {
+                    let topic: &[&'static str] = &[$($topic)?];
+                    topic.first().copied()
+                },
                 size: size_of::<Self>(),
                 align: align_of::<Self>(),
                 fields: &[$($crate::messages::layout::Field {

@@ -169,10 +169,10 @@ fn lock_step() {
         took.push(asked.elapsed());
         match (took.len() < CYCLES, force.valid) {
             (true, 0) if force.diagnostic_code == Cause::NotAsked as u32 => {
-                operator.ask(Request::Engage).expect("to send");
+                operator.send(Request::Engage).expect("to send");
             }
             (false, 0) => break,
-            (false, _) => operator.ask(Request::Stop).expect("to send"),
+            (false, _) => operator.send(Request::Stop).expect("to send"),
             _ => {}
         }
     }

@@ -212,7 +212,7 @@ fn of_two_setpoint_sources_the_newer_counts_and_the_other_is_counted() {
     assert_eq!(State::from_number(status.state), Some(State::Active), "both say the same: {status:#?}");
     drop((older, newer));
     let words = daemon.stops_on("TERM", HANG).stderr;
-    assert!(words.contains("messages passed over: an older source; were there two at once?"), "{words}");
+    assert!(words.contains("messages rejected: an older publisher; were there two at once?"), "{words}");
     plant.stops_on("TERM", HANG);
     rules::hold(&recorder.finish());
 }

@@ -101,7 +101,7 @@ fn takes_part() {
     for tick in 0_u64.. {
         sleep_until(tick_ns);
         setpoints.publish(tick_ns, setpoint(tick_ns)).expect("to send");
-        let _ = (forces.receive_latest(), statuses.latest());
+        let _ = (forces.receive_latest(), statuses.receive_latest());
         if tick == 0 {
             eprintln!("here");
         }
