@@ -2,6 +2,8 @@
 
 #![allow(clippy::expect_used, reason = "a bench that cannot load its machine has nothing to measure")]
 
+mod shared;
+
 use std::path::Path;
 use std::time::Instant;
 
@@ -9,7 +11,7 @@ use hexad::analysis::batch;
 use hexad::config::Config;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 use indicatif::ProgressBar;
 
 const LARGEST: usize = 10_000_000;
@@ -18,7 +20,7 @@ fn main() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/motion_base.toml");
     let machine = Config::load(&path).expect("a machine of the project").machine;
     let model = InverseDynamics::new(&machine);
-    let scene = fit(&machine, Motion::Sines, 60.0);
+    let scene = fit(&machine, BuiltInMotion::Sines, 60.0);
     let bar = ProgressBar::new(LARGEST as u64);
     let motions: Vec<_> = (0..LARGEST)
         .map(|k| scene.at(60.0 * k as f64 / LARGEST as f64).motion())
@@ -26,6 +28,7 @@ fn main() {
         .collect();
     bar.finish_and_clear();
     let mut forces = vec![None; LARGEST];
+    println!("{}", shared::provenance());
     println!("{} threads", rayon::current_num_threads());
     for size in [1_000, 10_000, 100_000, 1_000_000, LARGEST] {
         let repetitions = (LARGEST / size).min(1_000);

@@ -9,11 +9,12 @@ use std::env;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, CommandMessage, PortError, SetpointMessage, StatusMessage};
 use hexad::model::task::TaskState;
-use hexad::motion::minimum_jerk::{between, window};
+use hexad::motion::minimum_jerk::{straight_move, window};
 use nalgebra::Vector6;
 
 const PERIOD: Duration = Duration::from_millis(1);
@@ -43,9 +44,9 @@ fn main() -> Result<(), PortError> {
                 }
                 _ => {}
             }
-            if began_ns.is_none() && status.diagnostic.code == Cause::NotAsked as u32 {
+            if began_ns.is_none() && status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
                 commands.publish(now_ns, Request::Engage.into())?;
-            } else if began_ns.is_some() && !state.controls() {
+            } else if began_ns.is_some() && !state.has_control() {
                 println!("control ended: {}", state.name());
                 return Ok(());
             }
@@ -56,7 +57,7 @@ fn main() -> Result<(), PortError> {
         if t > DURATION_S + 1.0 {
             return Ok(());
         }
-        let task: TaskState = between(&start, &top, &window(t, DURATION_S, RISE_S));
+        let task: TaskState = straight_move(&start, &top, &window(t, DURATION_S, RISE_S));
         setpoints.publish(now_ns, (&task).into())?;
     }
 }

@@ -36,6 +36,61 @@
 //!
 //! Everything is in base axes unless it says otherwise; angular parts come first; legs count 1..6 for
 //! people and 0..5 in arrays. SI units and radians; names at the edges carry their unit.
+//!
+//! # Glossary
+//!
+//! | word | meaning |
+//! | --- | --- |
+//! | active, engaging, parking, stopping, standby, off, fault | states of the controller, see [`control::state`] |
+//! | actuator, drive | prismatic joint of a leg with its motor; stroke, rate and force are limited |
+//! | assembly mode | one of the up to 40 poses that share the same six leg lengths |
+//! | axial, transverse | along a leg; normal to it |
+//! | brakes | hold the legs while forces are disabled |
+//! | clear | operator request that ends a fault, after inspection |
+//! | computed torque | control law: inverse dynamics of the desired acceleration plus feedback on the tracking error |
+//! | condition | ratio of the largest to the smallest amplification of leg forces, see [`model::sensitivity`] |
+//! | cycle | one run of the controller, from measurement to force |
+//! | demand | accelerations that a task requires in every direction |
+//! | deployment | how a machine is run: rate, processors, gains, limits, timeouts, topics |
+//! | diagnostic | result of a check: code, value, bound, index |
+//! | disturbance observer | estimate of the acceleration that cancels unmodelled forces |
+//! | driver | process that measures the legs and applies the forces |
+//! | engage | operator request to take the platform under control |
+//! | envelope | range of pose, velocity and acceleration of a task |
+//! | estop, off | operator requests that disable forces at once; after estop until `clear` |
+//! | fault | state without valid forces until an operator clears it |
+//! | fidelity | which terms of the dynamics the model evaluates, from `gravity` to `exact`, see [`model::fidelity`] |
+//! | fit | shrinking a built-in motion until stroke, rates and forces keep a reserve |
+//! | following error | distance of the platform from the reference |
+//! | hold | constant force or pose between two instants |
+//! | home | pose of the machine's configuration from which it is started and to which it parks |
+//! | innovation | measured minus predicted motion |
+//! | kinematic state | pose with its leg lengths and the factorization of N, see [`model::kinematic_state`] |
+//! | lane | element of a SIMD vector; one leg each |
+//! | leg masses | effective mass that each actuator moves at home |
+//! | limit | largest velocity, acceleration, jerk, force or condition; a force at its limit is saturated |
+//! | lockstep | plant, daemon and setpoint source advance in turn, in simulated time |
+//! | margin | distance from a bound: of a leg's length from the ends of its stroke, of a loop from instability |
+//! | measurement | leg lengths and rates at an instant, optionally a pose and twist |
+//! | operator | person or program that sends requests over the control socket |
+//! | overrun | cycle that is not finished at the next release |
+//! | park | operator request to move home and disable forces |
+//! | plant | simulated platform with drives and sensors, see [`plant`] |
+//! | plausibility window | longest time over which lengths and rates of a measurement are compared |
+//! | prefault | touch memory in advance, so that no cycle causes a page fault |
+//! | reference | motion that the controller tracks; generated from the setpoint, within all limits |
+//! | regressor | matrix that takes inertial parameters to forces, see [`model::regressor`] |
+//! | release | instant at which a cycle begins, on a fixed grid |
+//! | reservation | processor time that SCHED_DEADLINE guarantees in each period |
+//! | saturation | a quantity held at its limit |
+//! | setpoint | X, X', X'' that a source requests for an instant |
+//! | shortfall | set-up step that the kernel refused, with reason and remedy |
+//! | singular pose, singularity | pose at which the legs cannot hold the platform; det N = 0 |
+//! | stamp | CLOCK_MONOTONIC time in a message \[ns\] |
+//! | stroke | range of a leg's length |
+//! | timeline | hold, approach, settle, motion, settle |
+//! | trusted step | change of pose for which Newton's method is proved to find the only solution |
+//! | twist, wrench | angular and linear velocity; torque and force; angular part first |
 #![cfg_attr(not(any(feature = "client", test)), no_std)]
 
 #[cfg(feature = "daemon")]

@@ -7,7 +7,7 @@
 use std::hint::black_box;
 use std::thread;
 
-use hexad::realtime::setup::memory::{keep_heap, touch_heap};
+use hexad::realtime::setup::memory::{keep_heap, prefault_heap};
 use hexad::realtime::usage::ThreadUsage;
 
 const PAGE: usize = 4096;
@@ -15,7 +15,7 @@ const PAGE: usize = 4096;
 /// Pages that a thread met for the first time while it allocated twice, small blocks and a large one.
 fn pages_met(large: usize) -> u64 {
     let allocate = move || {
-        touch_heap();
+        prefault_heap();
         let before = ThreadUsage::of_this_thread();
         for _ in 0..2 {
             let small: Vec<_> = (0..100).map(|_| vec![1_u8; 1000]).collect();

@@ -8,11 +8,13 @@ mod common;
 use common::{Errors, Legs, MACHINES, Table, data, machine, motions};
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{
-    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs,
+    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
 };
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::{Link, Machine, Platform, TransverseInertia};
-use hexad::model::regressor::{Parameters, Regressor, parameters_of, regressor, rod_mass_in_platform};
+use hexad::model::regressor::{
+    InertialParameters, Regressor, inertial_parameters, regressor, rod_mass_null_direction,
+};
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::model::task::TaskState;
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -31,7 +33,7 @@ impl Row<'_> {
         self.model.machine()
     }
 
-    fn forces<M: Model>(&self) -> Vector6<f64> {
+    fn forces<M: ModelTerms>(&self) -> Vector6<f64> {
         self.model.forces::<M>(&self.motion).unwrap().into()
     }
 
@@ -45,14 +47,14 @@ impl Row<'_> {
 
     /// The share of some parameters in the forces.
     fn share(&self, y: &Regressor, parameters: impl Fn(usize) -> bool) -> Vector6<f64> {
-        let all = parameters_of(self.machine());
-        y * Parameters::from_fn(|k, _| if parameters(k) { all[k] } else { 0.0 })
+        let all = inertial_parameters(self.machine());
+        y * InertialParameters::from_fn(|k, _| if parameters(k) { all[k] } else { 0.0 })
     }
 }
 
 /// Exact minus fidelity is what `left_out` says, on every row of the vectors of every machine; `nothing_at`
 /// names machines where that is nothing.
-fn check<M: Model>(fidelity: &str, nothing_at: &[&str], left_out: impl Fn(&Row) -> Vector6<f64>) {
+fn check<M: ModelTerms>(fidelity: &str, nothing_at: &[&str], left_out: impl Fn(&Row) -> Vector6<f64>) {
     for name in MACHINES {
         let model = InverseDynamics::new(&machine(name));
         let (mut errors, mut sizes) = (Errors::default(), Errors::default());
@@ -83,8 +85,8 @@ fn of_spin(index: usize) -> bool {
 fn gravity_leaves_out_all_but_weight() {
     check::<Gravity>("gravity", &[], |row| {
         let held = Motion { twist: Twist::default(), acceleration: Acceleration::default(), ..row.motion };
-        let weight = regressor(row.machine(), &held).unwrap() * parameters_of(row.machine());
-        row.regressor() * parameters_of(row.machine()) - weight
+        let weight = regressor(row.machine(), &held).unwrap() * inertial_parameters(row.machine());
+        row.regressor() * inertial_parameters(row.machine()) - weight
     });
 }
 
@@ -97,7 +99,7 @@ fn massless_legs_leave_out_the_legs() {
 fn lumped_legs_leave_out_all_but_points_in_the_platform() {
     check::<LumpedLegs>("lumped-legs", &[], |row| {
         let y = row.regressor();
-        let points = y * rod_mass_in_platform(row.machine()) - y.column(14);
+        let points = y * rod_mass_null_direction(row.machine()) - y.column(14);
         row.share(&y, of_legs) + points * lumped_mass(row.machine())
     });
 }
@@ -107,7 +109,7 @@ fn no_velocity_leaves_out_what_grows_with_it_but_friction_and_the_spin() {
     check::<NoVelocity>("no-velocity", &[], |row| {
         let (y, at_rest) = (row.regressor(), row.regressor_at_rest());
         let friction = row.share(&y, |k| k >= 20);
-        (y - at_rest) * parameters_of(row.machine()) - friction + row.share(&at_rest, of_spin)
+        (y - at_rest) * inertial_parameters(row.machine()) - friction + row.share(&at_rest, of_spin)
     });
 }
 
@@ -222,42 +224,4 @@ fn on_fast_scenes_the_rungs_are_ordered() {
         assert!(rigid > 0.0 || SPINLESS.contains(&name), "{name}");
         assert_eq!(exact, 0.0);
     }
-}
-
-/// Single precision rounds by 6e-8. Some thirty roundings in a row, amplified by the condition, stay below
-/// 2e-6 of the largest force where C and the base are near the origin: five digits and more. Joints are
-/// differences of coordinates, so with the base `far` from the origin this much of the legs' directions is
-/// lost before the dynamics begin: `far / L` times as much as otherwise.
-#[test]
-fn single_precision_is_good_for_five_digits() {
-    for name in MACHINES {
-        for far in [0.0, 10.0, 100.0] {
-            let machine = moved(&machine(name), far);
-            let model = InverseDynamics::new(&machine);
-            let mut errors = Errors::default();
-            let mut shortest = f64::INFINITY;
-            for mut motion in motions(name) {
-                motion.pose.position += away(far);
-                let single = Vector6::from(model.forces_f32::<Exact>(&motion).unwrap());
-                let exact = Vector6::from(model.forces::<Exact>(&motion).unwrap());
-                errors.add((single - exact).amax() / exact.amax());
-                shortest = leg_lengths(&machine, &motion.pose).into_iter().fold(shortest, f64::min);
-            }
-            errors.assert_within(2e-6 * (1.0 + far / shortest), &format!("{name} in f32, {far} m away"));
-            assert!(errors.max > 1e-8, "{name}: that was not single precision");
-        }
-    }
-}
-
-fn away(distance: f64) -> Vector3<f64> {
-    Vector3::new(0.6, -0.64, 0.48) * distance
-}
-
-/// The machine with its base moved within the base frame.
-fn moved(machine: &Machine, distance: f64) -> Machine {
-    let mut legs = Legs::of(machine);
-    legs.base.iter_mut().for_each(|a| *a += away(distance));
-    let mut home = machine.home;
-    home[3..].iter_mut().zip(away(distance).iter()).for_each(|(x, d)| *x += d);
-    Machine { joints: legs.joints(&home), home, ..machine.clone() }
 }

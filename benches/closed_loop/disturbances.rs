@@ -2,12 +2,16 @@
 
 use hexad::control::law::ControlMode;
 use hexad::model::fidelity::Fidelity;
-use hexad::output::charts::Stroke;
-use hexad::output::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width};
+use hexad::output::charts::LineStyle;
 use hexad::plant::imperfections::Imperfections;
+use serde::Deserialize;
 
-use super::run::{Outcome, Run};
+use super::run::Run;
+use super::shared::Figures;
+use super::shared::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
 use super::{Failure, MODES, cells, chart, common, play, write_csv};
+
+const FILE: &str = "closed_loop_disturbances.csv";
 
 const MACHINE: &str = "motion_base";
 const RATE_HZ: f64 = 1e3;
@@ -85,7 +89,6 @@ fn variants() -> Vec<(ControlMode, f64)> {
 
 pub fn run(quick: bool) -> Result<(), Failure> {
     let variants = variants();
-    let mut charts = vec![];
     let mut rows = vec![];
     for sweep in &SWEEPS {
         let levels: Vec<_> = sweep.levels.iter().copied().step_by(if quick { 4 } else { 1 }).collect();
@@ -107,49 +110,53 @@ pub fn run(quick: bool) -> Result<(), Failure> {
             let [rms, max] = [outcome.rms_um(), outcome.max_um()].map(|error| format!("{error:.4}"));
             rows.push(cells([&sweep.name, level, &run.mode.name(), &run.observer_hz, &rms, &max, &lost]));
         }
-        charts.push(draw(sweep, &variants, &levels, &outcomes));
     }
     let header = ["what", "level", "mode", "observer_hz", "position_rms_um", "position_max_um", "lost"];
-    write_csv("closed_loop_disturbances.csv", &header, &rows)?;
+    write_csv(FILE, &header, &rows)
+}
+
+/// What the chart needs of a row.
+#[derive(Deserialize)]
+struct Figure {
+    what: String,
+    level: f64,
+    mode: String,
+    observer_hz: f64,
+    position_rms_um: f64,
+}
+
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Figure>::read(FILE)?;
+    let sweeps = figures.rows.chunk_by(|a, b| a.what == b.what);
+    let mut charts: Vec<_> = sweeps.map(draw_sweep).collect();
+    fit_ranges(&mut charts, false);
     let mut legend: Vec<_> =
         MODES.iter().enumerate().map(|(k, name)| (Sample::Mark(Mark::Disc, k), *name)).collect();
     legend.push((Sample::Mark(Mark::Ring, 0), "with observer"));
-    let title = "What control a scene needs: motion base, fast scene, 1 kHz";
-    Grid { title, legend, columns: 2, charts }.write_svg(&chart("closed_loop_disturbances.svg"))?;
+    let title = figures.titled("What control a scene needs: motion base, fast scene, 1 kHz");
+    Grid { title: &title, legend, columns: 2, charts }.write_svg(&chart("closed_loop_disturbances.svg"))?;
     Ok(())
 }
 
-/// A line per variant; where control is lost, it ends.
-fn draw<'a>(
-    sweep: &Sweep,
-    variants: &[(ControlMode, f64)],
-    levels: &[f64],
-    outcomes: &[Outcome],
-) -> Scatter<'a> {
+/// A line per mode, with and without observer; where control is lost, it ends.
+fn draw_sweep(rows: &[Figure]) -> Scatter<'static> {
     let (mut points, mut lines) = (vec![], vec![]);
-    for ((mode, observer_hz), outcomes) in variants.iter().zip(outcomes.chunks(levels.len())) {
-        let color = *mode as usize;
-        let line: Vec<_> = levels
-            .iter()
-            .zip(outcomes)
-            .map(|(level, outcome)| (*level, outcome.rms_um()))
-            .take_while(|(_, rms)| rms.is_finite())
-            .collect();
-        let observed = *observer_hz > 0.0;
+    for variant in rows.chunk_by(|a, b| (&a.mode, a.observer_hz) == (&b.mode, b.observer_hz)) {
+        let color = ControlMode::ALL.iter().position(|mode| mode.name() == variant[0].mode).unwrap();
+        let at = |row: &Figure| (row.level, row.position_rms_um);
+        let line: Vec<_> = variant.iter().map(at).take_while(|(_, rms)| rms.is_finite()).collect();
+        let observed = variant[0].observer_hz > 0.0;
         let mark = if observed { Mark::Ring } else { Mark::Disc };
         points.extend(line.iter().map(|at| Point { at: *at, mark, color, label: Label::None }));
         let width = if observed { Width::Hair } else { Width::Curve };
-        lines.push(Line { points: line, style: Stroke::Solid, color, width });
+        lines.push(Line { points: line, style: LineStyle::Solid, color, width });
     }
-    let (first, last) = (levels.first().copied().unwrap_or(1.0), levels.last().copied().unwrap_or(1.0));
+    let sweep = SWEEPS.iter().find(|sweep| sweep.name == rows[0].what).unwrap();
     Scatter {
-        title: "",
         x_label: sweep.x_label,
         y_label: "RMS position error [µm]",
-        x: 0.8 * first..1.25 * last,
-        y: 0.1..2e4,
         points,
         lines,
-        legend: vec![],
+        ..Scatter::default()
     }
 }

@@ -3,7 +3,7 @@
 //! The controller against the simulated hardware, in one process and in simulated time, on the fast scene of a
 //! machine: tracking error against compute time for every control mode, model and rate; and against payload,
 //! friction, noise and dead time, with and without the observer. Writes `benches/charts/closed_loop_*.csv` and
-//! `.svg`. `-- --quick` takes fewer of each.
+//! `.svg`. `-- --quick` takes fewer of each; `-- --redraw` measures nothing and draws the charts from the CSV files.
 
 #![allow(
     dead_code,
@@ -18,24 +18,23 @@ mod common;
 mod disturbances;
 mod rates;
 mod run;
+#[path = "../shared/mod.rs"]
+mod shared;
 
-use std::error::Error;
-use std::fmt::Display;
-use std::path::{Path, PathBuf};
-
-use hexad::output::files::write_whole;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use run::{Outcome, Run};
-
-/// Anything that ends the bench.
-type Failure = Box<dyn Error>;
+use shared::{Failure, cells, chart, write_csv};
 
 fn main() -> Result<(), Failure> {
-    let quick = std::env::args().any(|argument| argument == "--quick");
-    rates::run(quick)?;
-    disturbances::run(quick)
+    let has = |flag: &str| std::env::args().any(|argument| argument == flag);
+    if !has("--redraw") {
+        rates::run(has("--quick"))?;
+        disturbances::run(has("--quick"))?;
+    }
+    rates::draw()?;
+    disturbances::draw()
 }
 
 /// All runs, on all processors, with their outcomes in the same order.
@@ -48,27 +47,6 @@ fn play(what: &str, runs: &[Run]) -> Vec<Outcome> {
     let outcomes = runs.par_iter().map(|run| (run.play(), bar.inc(1)).0).collect();
     bar.finish_and_clear();
     outcomes
-}
-
-/// `benches/charts/NAME`
-fn chart(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/charts").join(name)
-}
-
-/// A CSV file of numbers and names.
-fn write_csv(name: &str, header: &[&str], rows: &[Vec<String>]) -> Result<(), Failure> {
-    let mut csv = csv::Writer::from_writer(vec![]);
-    csv.write_record(header)?;
-    for row in rows {
-        csv.write_record(row)?;
-    }
-    write_whole(&chart(name), &csv.into_inner()?)?;
-    println!("written: {}", chart(name).display());
-    Ok(())
-}
-
-fn cells<const N: usize>(cells: [&dyn Display; N]) -> Vec<String> {
-    cells.map(ToString::to_string).into()
 }
 
 /// Names of the modes in a legend, in the order of the palette.

@@ -2,17 +2,24 @@
 
 use hexad::control::law::ControlMode;
 use hexad::model::fidelity::Fidelity;
-use hexad::output::charts::Stroke;
-use hexad::output::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width};
+use hexad::output::charts::LineStyle;
 use hexad::plant::imperfections::Imperfections;
+use serde::Deserialize;
 
-use super::run::{Outcome, Run};
+use super::run::Run;
+use super::shared::Figures;
+use super::shared::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
 use super::{Failure, MODES, cells, chart, play, write_csv};
+
+const FILE: &str = "closed_loop_rates.csv";
 
 const MACHINES: [&str; 2] = ["fried2008", "motion_base"];
 const RATES_HZ: [f64; 7] = [250.0, 500.0, 1e3, 2e3, 4e3, 10e3, 20e3];
 /// Passes over the scene to time a cycle.
 const PASSES: usize = 15;
+
+/// In the place of the model of a mode that evaluates none.
+const NO_MODEL: &str = "none";
 
 /// A law with its model: a line of the chart.
 struct Method {
@@ -35,10 +42,8 @@ fn methods() -> Vec<Method> {
 
 pub fn run(quick: bool) -> Result<(), Failure> {
     let rates = if quick { &RATES_HZ[2..5] } else { &RATES_HZ[..] };
-    let mut charts = vec![];
     let mut rows = vec![];
-    let titles = MACHINES.map(|machine| format!("{machine}, fast scene"));
-    for (machine, title) in MACHINES.into_iter().zip(&titles) {
+    for machine in MACHINES {
         let methods = methods();
         let at = |method: &Method, rate_hz: f64| Run {
             machine,
@@ -56,7 +61,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         for ((run, outcome), index) in runs.iter().zip(&outcomes).zip(0..) {
             let method = &methods[index / rates.len()];
             let step_ns = steps[index / rates.len()];
-            let model = if method.modelled { run.fidelity.name() } else { "none" };
+            let model = if method.modelled { run.fidelity.name() } else { NO_MODEL };
             let numbers = [
                 format!("{:.0}", run.rate_hz),
                 format!("{step_ns:.0}"),
@@ -74,7 +79,6 @@ pub fn run(quick: bool) -> Result<(), Failure> {
                 );
             }
         }
-        charts.push(draw(title, &methods, &steps, rates, &outcomes));
     }
     let header = [
         "machine",
@@ -87,46 +91,55 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         "orientation_rms_urad",
         "orientation_max_urad",
     ];
-    write_csv("closed_loop_rates.csv", &header, &rows)?;
+    write_csv(FILE, &header, &rows)
+}
+
+/// What the chart needs of a row.
+#[derive(Deserialize)]
+struct Figure {
+    machine: String,
+    mode: String,
+    model: String,
+    rate_hz: f64,
+    step_ns: f64,
+    position_rms_um: f64,
+}
+
+/// A line per method, from the lowest rate to the highest.
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Figure>::read(FILE)?;
+    let machines: Vec<_> = figures.rows.chunk_by(|a, b| a.machine == b.machine).collect();
+    let titles: Vec<_> = machines.iter().map(|rows| format!("{}, fast scene", rows[0].machine)).collect();
+    let mut charts: Vec<_> =
+        machines.iter().zip(&titles).map(|(rows, title)| draw_machine(title, rows)).collect();
+    fit_ranges(&mut charts, true);
     let mut legend: Vec<_> =
         MODES.iter().enumerate().map(|(k, name)| (Sample::Mark(Mark::Disc, k), *name)).collect();
     legend.push((Sample::Mark(Mark::Ring, 0), "cheaper models"));
     let title = "Control without disturbance: RMS error against compute time, 250 Hz to 20 kHz";
-    Grid { title, legend, columns: 2, charts }.write_svg(&chart("closed_loop_rates.svg"))?;
+    Grid { title: &figures.titled(title), legend, columns: 2, charts }
+        .write_svg(&chart("closed_loop_rates.svg"))?;
     Ok(())
 }
 
-/// A line per method, from the lowest rate to the highest.
-fn draw<'a>(
-    title: &'a str,
-    methods: &[Method],
-    steps: &[f64],
-    rates: &[f64],
-    outcomes: &[Outcome],
-) -> Scatter<'a> {
+fn draw_machine<'a>(title: &'a str, rows: &[Figure]) -> Scatter<'a> {
     let (mut points, mut lines) = (vec![], vec![]);
-    for ((method, step_ns), outcomes) in methods.iter().zip(steps).zip(outcomes.chunks(rates.len())) {
-        let color = method.mode as usize;
-        let line: Vec<_> = rates
-            .iter()
-            .zip(outcomes)
-            .map(|(rate, outcome)| (1e-6 * step_ns * rate, outcome.rms_um()))
-            .filter(|(_, rms)| rms.is_finite())
-            .collect();
-        let best = method.fidelity == Fidelity::Exact;
+    for method in rows.chunk_by(|a, b| (&a.mode, &a.model) == (&b.mode, &b.model)) {
+        let color = ControlMode::ALL.iter().position(|mode| mode.name() == method[0].mode).unwrap();
+        let at = |row: &Figure| (1e-6 * row.step_ns * row.rate_hz, row.position_rms_um);
+        let line: Vec<_> = method.iter().map(at).filter(|(_, rms)| rms.is_finite()).collect();
+        let best = [Fidelity::Exact.name(), NO_MODEL].contains(&&*method[0].model);
         let mark = if best { Mark::Disc } else { Mark::Ring };
         points.extend(line.iter().map(|at| Point { at: *at, mark, color, label: Label::None }));
         let width = if best { Width::Curve } else { Width::Hair };
-        lines.push(Line { points: line, style: Stroke::Solid, color, width });
+        lines.push(Line { points: line, style: LineStyle::Solid, color, width });
     }
     Scatter {
         title,
         x_label: "compute time per second of control [ms]",
         y_label: "RMS position error [µm]",
-        x: 0.1..50.0,
-        y: 1e-3..2e4,
         points,
         lines,
-        legend: vec![],
+        ..Scatter::default()
     }
 }

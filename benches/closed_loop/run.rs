@@ -5,9 +5,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use hexad::config::Config;
-use hexad::control::controller::{Asked, Controller, Input, Measurement, Setpoint};
+use hexad::control::controller::{Controller, Input, Measurement, Setpoint};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::task::TaskState;
@@ -46,17 +47,17 @@ pub struct Outcome {
     /// \[rad\]
     pub orientation: Errors,
     /// Why it was lost; `None` if it was not.
-    pub lost: Cause,
+    pub lost: DiagnosticCode,
 }
 
 impl Outcome {
     /// RMS of the position error \[um\].
     pub fn rms_um(&self) -> f64 {
-        if self.lost == Cause::None { 1e6 * self.position.rms() } else { f64::NAN }
+        if self.lost == DiagnosticCode::None { 1e6 * self.position.rms() } else { f64::NAN }
     }
 
     pub fn max_um(&self) -> f64 {
-        if self.lost == Cause::None { 1e6 * self.position.max } else { f64::NAN }
+        if self.lost == DiagnosticCode::None { 1e6 * self.position.max } else { f64::NAN }
     }
 }
 
@@ -111,16 +112,16 @@ impl Run {
                 release_ns: now_ns + period_ns / 2,
                 setpoint: Some(Setpoint { time_ns: now_ns, task }),
                 measurement: Some(Measurement { time_ns: now_ns, length, rate }),
-                request: (cycle > 0).then_some(Asked { request: Request::Engage, message: (1, 1) }),
+                request: (cycle > 0).then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
                 deadline_missed: false,
             };
             watch(&input);
             let output = controller.step(&input);
             if cycle >= settling && output.state != State::Active {
-                return Outcome { lost: output.cause, ..outcome };
+                return Outcome { lost: output.diagnostic.code, ..outcome };
             }
             hardware.advance(delay_ns, force);
-            force = output.state.controls().then_some(output.force);
+            force = output.state.has_control().then_some(output.force);
             hardware.advance(period_ns - delay_ns, force);
         }
         outcome

@@ -1,21 +1,28 @@
 //! The figure of the latencies: for each rate, idle and loaded, the share of wake-ups that came later than a
 //! time, ours against cyclictest's. A curve further left and lower is better.
 
-use std::path::Path;
+use hexad::output::charts::LineStyle;
+use serde::Deserialize;
 
-use hexad::output::charts::Stroke;
-use hexad::output::scatter::{Grid, Line, Sample, Scatter, Width};
-
-use super::Failure;
 use super::contest::Contestant;
 use super::distribution::us;
-use super::results::Row;
+use super::results::{DISTRIBUTIONS, late_ns};
 use super::rig::Release;
+use super::shared::scatter::{Grid, Line, Sample, Scatter, Width, fit_ranges};
+use super::shared::{Failure, Figures, chart};
 
-/// Of the time axis \[us\]: one look at the clock, which is what `hybrid` spins with, to a pause of the host.
-const TIMES_US: std::ops::Range<f64> = 0.01..20e3;
-/// One of all wake-ups, in the longest of usual runs.
-const SHARES: std::ops::Range<f64> = 1e-6..1.0;
+/// One look at the clock, which is what `hybrid` spins with: shorter times are drawn as this one \[us\].
+const SHORTEST_US: f64 = 0.01;
+
+/// A point of a curve.
+#[derive(Deserialize)]
+struct Figure {
+    rate_hz: u32,
+    load: String,
+    contestant: String,
+    latency_us: f64,
+    share_later: f64,
+}
 
 fn color(contestant: Contestant) -> usize {
     match contestant {
@@ -26,51 +33,51 @@ fn color(contestant: Contestant) -> usize {
 }
 
 /// Idle on the left, loaded on the right, a line for each rate.
-pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
-    let groups: Vec<_> =
-        rows.chunk_by(Row::compares_with).filter(|group| group.iter().all(|row| !row.seen)).collect();
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Figure>::read(DISTRIBUTIONS)?;
+    let groups = figures.rows.chunk_by(|a, b| (a.rate_hz, &a.load) == (b.rate_hz, &b.load));
+    let groups: Vec<_> = groups.collect();
     let titles: Vec<_> = groups.iter().map(|group| title(group)).collect();
     let last = groups.len().saturating_sub(2);
     let charts = groups.iter().zip(&titles).enumerate().map(|(index, (group, title))| Scatter {
         title,
         x_label: if index >= last { "wake-up latency [µs]" } else { "" },
         y_label: if index % 2 == 0 { "share of wake-ups later" } else { "" },
-        x: TIMES_US,
-        y: SHARES,
-        points: vec![],
-        lines: lines(group),
-        legend: vec![],
+        lines: curves(group),
+        ..Scatter::default()
     });
-    let title = "Wake-up latency of the loop and of cyclictest, same processor, same run";
-    Grid { title, legend: legend(), columns: 2, charts: charts.collect() }.write_svg(path)?;
+    let mut charts: Vec<_> = charts.collect();
+    fit_ranges(&mut charts, true);
+    let title = figures.titled("Wake-up latency of the loop and of cyclictest, same processor, same run");
+    Grid { title: &title, legend: legend(), columns: 2, charts }.write_svg(&chart("loop_latency.svg"))?;
     Ok(())
 }
 
-fn title(group: &[Row]) -> String {
+fn title(group: &[Figure]) -> String {
     let Some(row) = group.first() else { return String::new() };
-    let load = if row.loaded { "under stress-ng" } else { "idle" };
+    let load = if row.load == "idle" { "idle" } else { "under stress-ng" };
     match row.rate_hz {
         rate_hz if rate_hz < 1000 => format!("{rate_hz} Hz, {load}"),
         rate_hz => format!("{} kHz, {load}", rate_hz / 1000),
     }
 }
 
-fn lines(group: &[Row]) -> Vec<Line> {
-    let limit = group.first().map(|row| us(row.late_ns()));
-    let limit = limit.map(|limit| vec![(limit, SHARES.start), (limit, SHARES.end)]).unwrap_or_default();
-    let mut lines = vec![Line { points: limit, style: Stroke::Dashed, color: 0, width: Width::Curve }];
-    for row in group {
-        let curve = row.pooled(|round| &round.wakeup).curve().into_iter();
-        let points = curve.map(|(us, share)| (us.clamp(TIMES_US.start, TIMES_US.end), share)).collect();
-        let color = color(row.contestant);
-        lines.push(Line { points, style: Stroke::Solid, color, width: Width::Curve });
+fn curves(group: &[Figure]) -> Vec<Line> {
+    let smallest = group.iter().map(|row| row.share_later).fold(1.0, f64::min);
+    let limit = group.first().map(|row| us(late_ns(row.rate_hz)));
+    let limit = limit.map(|limit| vec![(limit, smallest), (limit, 1.0)]).unwrap_or_default();
+    let mut lines = vec![Line { points: limit, style: LineStyle::Dashed, color: 0, width: Width::Curve }];
+    for contestant in Contestant::ALL {
+        let rows = group.iter().filter(|row| row.contestant == contestant.name());
+        let points = rows.map(|row| (row.latency_us.max(SHORTEST_US), row.share_later)).collect();
+        lines.push(Line { points, style: LineStyle::Solid, color: color(contestant), width: Width::Curve });
     }
     lines
 }
 
 fn legend() -> Vec<(Sample, &'static str)> {
-    let curve = |contestant| Sample::Line(Stroke::Solid, Width::Curve, color(contestant));
+    let curve = |contestant| Sample::Line(LineStyle::Solid, Width::Curve, color(contestant));
     let contestants = Contestant::ALL.map(|contestant| (curve(contestant), contestant.name()));
-    let limit = (Sample::Line(Stroke::Dashed, Width::Curve, 0), "late beyond this");
+    let limit = (Sample::Line(LineStyle::Dashed, Width::Curve, 0), "late beyond this");
     contestants.into_iter().chain([limit]).collect()
 }

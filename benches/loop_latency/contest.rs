@@ -6,7 +6,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hexad::commands::operate::Operator;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::daemon::report::Report;
 use hexad::messages::Bus;
 
@@ -76,9 +77,9 @@ impl Watch {
                     if status.state == State::Active as u32 {
                         break;
                     }
-                    let cause = Cause::from_number(status.diagnostic.code).unwrap_or_default();
+                    let cause = DiagnosticCode::from_number(status.diagnostic.code).unwrap_or_default();
                     why = cause.name();
-                    if cause == Cause::NotAsked {
+                    if cause == DiagnosticCode::ReadyToEngage {
                         operator.send(Request::Engage)?;
                     }
                 }

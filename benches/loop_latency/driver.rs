@@ -12,7 +12,7 @@ use hexad::messages::{Bus, PortError, Publisher};
 use hexad::messages::{MeasuredMessage, SetpointMessage};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::machine::Machine;
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;
 
@@ -76,7 +76,7 @@ fn prepare(machines: usize, cpu: usize) -> Result<Vec<Ports>, String> {
 }
 
 fn drive(machine: &Machine, grid: &Grid, mut ports: Vec<Ports>, stop: &AtomicBool) {
-    let path = fit(machine, Motion::Sines, PATH_S);
+    let path = fit(machine, BuiltInMotion::Sines, PATH_S);
     let mut tick_ns = grid.next_after(monotonic_ns());
     while !stop.load(Ordering::Relaxed) {
         sleep_until(tick_ns);
@@ -90,7 +90,7 @@ fn drive(machine: &Machine, grid: &Grid, mut ports: Vec<Ports>, stop: &AtomicBoo
     }
 }
 
-fn at(machine: &Machine, path: &Scene, time_ns: u64) -> (SetpointMessage, MeasuredMessage) {
+fn at(machine: &Machine, path: &FittedMotion, time_ns: u64) -> (SetpointMessage, MeasuredMessage) {
     let mut state = path.at(time_ns as f64 * 1e-9 / SLOWER % PATH_S);
     state.xd /= SLOWER;
     state.xdd /= SLOWER * SLOWER;

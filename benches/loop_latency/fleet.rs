@@ -9,20 +9,20 @@ use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
 use hexad::config::Config;
-use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Setpoint};
-use hexad::control::state::{Request, State};
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon::cycle::CycleRecord;
 use hexad::daemon::parameters;
 use hexad::messages::clock::monotonic_ns;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::realtime::clock::Monotonic;
 use hexad::realtime::cyclic;
 use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 use hexad::realtime::setup::{memory, scheduling};
 
 use super::Failure;
@@ -63,7 +63,7 @@ impl Fleet {
     /// In control, with inputs for so many cycles at a rate.
     fn new(config: &Config, platforms: usize, period_s: f64, cycles: usize) -> Self {
         let machine = &config.machine;
-        let scene = fit(machine, Motion::Sines, PATH_S);
+        let scene = fit(machine, BuiltInMotion::Sines, PATH_S);
         let row = |index: usize| {
             let state = scene.at(BEGIN_S + index as f64 * period_s);
             let legs = leg_motion(machine, &state.motion());
@@ -80,13 +80,13 @@ impl Fleet {
         };
         for number in 1..=WARM_UP_STEPS as u64 {
             fleet.cycle += stride;
-            fleet.step_all(Some(Asked { request: Request::Engage, message: (1, number) }));
+            fleet.step_all(Some(OperatorRequest { request: Request::Engage, message: (1, number) }));
         }
         fleet.inactive = 0;
         fleet
     }
 
-    fn step_all(&mut self, request: Option<Asked>) -> Output {
+    fn step_all(&mut self, request: Option<OperatorRequest>) -> Output {
         let release_ns = self.cycle as u64 * self.period_ns;
         let mut last = Output::default();
         for (number, controller) in self.controllers.iter_mut().enumerate() {
@@ -123,7 +123,7 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
         release: ReleaseMode::Sleep,
         max_lead_ns: 0,
         timeout_ns: 0,
-        on_overrun: OnOverrun::Skip,
+        on_overrun: OverrunPolicy::Skip,
         late_wakeup_ns: period_ns / 2,
     };
     let cycles = (seconds * f64::from(rate_hz)) as usize;
@@ -173,8 +173,8 @@ pub fn steps(rig: &Rig) -> Result<Distribution, Failure> {
 }
 
 fn prepare(rig: &Rig) -> Result<(), String> {
-    scheduling::sharp_timers();
-    memory::touch_stack();
+    scheduling::set_shortest_timer_slack();
+    memory::prefault_stack();
     scheduling::bind_to_cpu(rig.processors.contestant).map_err(|shortfall| shortfall.to_string())?;
     scheduling::fifo_priority(PRIORITY).map_err(|shortfall| shortfall.to_string())
 }

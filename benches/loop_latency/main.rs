@@ -23,6 +23,7 @@
 //!
 //! Needs root or the right to FIFO priority, two processors, cyclictest, stress-ng and strace; names what is
 //! missing and ends with 2. `-- --quick` takes one short round of everything: within 60 s instead of 12 min.
+//! `-- --redraw` measures nothing and draws the charts from the CSV files.
 
 mod chart;
 mod contest;
@@ -32,14 +33,14 @@ mod fleet;
 mod load;
 mod results;
 mod rig;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod size;
 mod subscriber;
 mod summary;
 mod syscalls;
 mod tools;
 
-use std::error::Error;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -52,10 +53,8 @@ use driver::Driver;
 use load::Load;
 use results::Row;
 use rig::{Release, Rig};
+use shared::Failure;
 use size::{Effort, Size, Unit};
-
-/// Anything that ends the run.
-type Failure = Box<dyn Error + Send + Sync>;
 
 /// Rates of the loop \[Hz\].
 const RATES: [u32; 5] = [250, 1000, 4000, 10_000, 20_000];
@@ -95,6 +94,9 @@ struct Arguments {
     /// One short round of everything: within 60 s.
     #[arg(long)]
     quick: bool,
+    /// Measures nothing and draws the charts from the CSV files.
+    #[arg(long)]
+    redraw: bool,
     /// What `cargo bench` adds.
     #[arg(long, hide = true)]
     bench: bool,
@@ -104,6 +106,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let plan = if arguments.quick { QUICK } else { FULL };
     let (outcome, code) = match Rig::new() {
+        _ if arguments.redraw => (draw(), ExitCode::FAILURE),
         Ok(rig) => (run(&rig, plan), ExitCode::FAILURE),
         Err(failure) => (Err(failure), ExitCode::from(CANNOT_BEGIN)),
     };
@@ -208,13 +211,13 @@ fn sizes(rig: &Rig, effort: Effort, spinner: &ProgressBar) -> Result<Vec<Size>, 
 }
 
 fn write(measured: &Measured) -> Result<(), Failure> {
-    let charts = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/charts");
-    std::fs::create_dir_all(&charts)?;
-    results::write_csv(&charts.join("loop_latency.csv"), &measured.rows)?;
-    results::write_distributions(&charts.join("loop_latency_distribution.csv"), &measured.rows)?;
-    chart::write(&charts.join("loop_latency.svg"), &measured.rows)?;
-    size::write_csv(&charts.join("loop_size.csv"), &measured.sizes, &measured.steps)?;
-    size::write_chart(&charts.join("loop_size.svg"), &measured.sizes)?;
-    println!("written: loop_latency*.csv, loop_size.csv and two .svg in {}", charts.display());
-    Ok(())
+    results::write_csv(&measured.rows)?;
+    results::write_distributions(&measured.rows)?;
+    size::write_csv(&measured.sizes, &measured.steps)?;
+    draw()
+}
+
+fn draw() -> Result<(), Failure> {
+    chart::draw()?;
+    size::draw()
 }

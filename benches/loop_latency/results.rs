@@ -1,12 +1,11 @@
 //! What was measured against cyclictest, and its files.
 
-use std::path::Path;
-
-use hexad::output::files::write_whole;
-
-use super::Failure;
 use super::contest::{Contestant, HISTOGRAM_NS, Round};
 use super::distribution::{Distribution, us};
+use super::shared::{self, Failure};
+
+/// Curves of the chart.
+pub const DISTRIBUTIONS: &str = "loop_latency_distribution.csv";
 
 /// A wake-up later than this is a miss, or later than half a period if that is less: the daemon's default
 /// of `late_wakeup_us` \[ns\].
@@ -72,7 +71,7 @@ impl Row {
 
     /// Beyond this a wake-up is a miss.
     pub fn late_ns(&self) -> u64 {
-        LATE_NS.min(self.period_ns() / 2)
+        late_ns(self.rate_hz)
     }
 
     pub fn late(&self) -> u64 {
@@ -90,6 +89,11 @@ impl Row {
     }
 }
 
+/// Beyond this a wake-up at a rate is a miss.
+pub fn late_ns(rate_hz: u32) -> u64 {
+    LATE_NS.min(500_000_000 / u64::from(rate_hz))
+}
+
 /// The row of a contestant, without a subscriber.
 pub fn find(rows: &[Row], rate_hz: u32, loaded: bool, contestant: Contestant) -> Option<&Row> {
     rows.iter().find(|row| {
@@ -98,8 +102,7 @@ pub fn find(rows: &[Row], rate_hz: u32, loaded: bool, contestant: Contestant) ->
 }
 
 /// One line per row: quantiles are medians over the rounds, p9999 and max are of all rounds together.
-pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), Failure> {
-    let mut csv = csv::Writer::from_writer(vec![]);
+pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
     let names = |stem: &str| QUANTILES.map(|(quantile, _)| format!("{stem}_{quantile}_us"));
     let mut header: Vec<String> =
         ["rate_hz", "load", "contestant", "subscriber", "rounds", "cycles"].map(String::from).into();
@@ -121,12 +124,8 @@ pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), Failure> {
         header.extend(names(stem));
     }
     header.push("steal_ms".into());
-    csv.write_record(&header)?;
-    for row in rows {
-        csv.write_record(record(row, rows))?;
-    }
-    write_whole(path, &csv.into_inner()?)?;
-    Ok(())
+    let header: Vec<_> = header.iter().map(String::as_str).collect();
+    shared::write_csv("loop_latency.csv", &header, rows.iter().map(|row| record(row, rows)))
 }
 
 fn record(row: &Row, rows: &[Row]) -> Vec<String> {
@@ -174,20 +173,14 @@ pub fn ratio(row: &Row, rows: &[Row]) -> Option<f64> {
 }
 
 /// `rate_hz, load, contestant, latency_us, share_later`: the curves of the chart.
-pub fn write_distributions(path: &Path, rows: &[Row]) -> Result<(), Failure> {
-    let mut csv = csv::Writer::from_writer(vec![]);
-    csv.write_record(["rate_hz", "load", "contestant", "latency_us", "share_later"])?;
-    for row in rows.iter().filter(|row| !row.seen) {
-        for (latency_us, share) in row.pooled(|round| &round.wakeup).curve() {
-            csv.write_record([
-                &row.rate_hz.to_string(),
-                row.load(),
-                row.contestant.name(),
-                &format!("{latency_us:.3}"),
-                &format!("{share:.3e}"),
-            ])?;
-        }
-    }
-    write_whole(path, &csv.into_inner()?)?;
-    Ok(())
+pub fn write_distributions(rows: &[Row]) -> Result<(), Failure> {
+    let header = ["rate_hz", "load", "contestant", "latency_us", "share_later"];
+    let records = rows.iter().filter(|row| !row.seen).flat_map(|row| {
+        let curve = row.pooled(|round| &round.wakeup).curve();
+        curve.into_iter().map(|(latency_us, share)| {
+            let [latency_us, share] = [format!("{latency_us:.3}"), format!("{share:.3e}")];
+            [row.rate_hz.to_string(), row.load().into(), row.contestant.name().into(), latency_us, share]
+        })
+    });
+    shared::write_csv(DISTRIBUTIONS, &header, records)
 }

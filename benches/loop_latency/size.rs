@@ -6,19 +6,21 @@
 //! overruns, and a size while most of its repetitions do. Daemons also have to be in control and to send 99
 //! of 100 forces within the period, as their io threads share a processor too.
 
-use std::path::Path;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hexad::output::charts::Stroke;
-use hexad::output::files::write_whole;
-use hexad::output::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width};
+use hexad::output::charts::LineStyle;
+use serde::Deserialize;
 
 use super::contest::{Watch, read_daemon, start_daemon};
 use super::distribution::{Distribution, us};
 use super::driver::Driver;
+use super::fleet;
 use super::rig::{Process, Release, Rig};
-use super::{Failure, fleet};
+use super::shared::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
+use super::shared::{self, Failure, Figures, chart};
+
+const FILE: &str = "loop_size.csv";
 
 /// Rates of the loop \[Hz\].
 pub const RATES: [u32; 2] = [1000, 4000];
@@ -180,9 +182,8 @@ pub fn print(sizes: &[Size]) {
 /// `unit, rate_hz, count, cycles, busy_p50_us, busy_p99_us, busy_max_us, repetitions, repetitions_carried`
 ///
 /// The first row is a single step of one controller, outside of a loop.
-pub fn write_csv(path: &Path, sizes: &[Size], steps: &Distribution) -> Result<(), Failure> {
-    let mut csv = csv::Writer::from_writer(vec![]);
-    csv.write_record([
+pub fn write_csv(sizes: &[Size], steps: &Distribution) -> Result<(), Failure> {
+    let header = [
         "unit",
         "rate_hz",
         "count",
@@ -192,66 +193,89 @@ pub fn write_csv(path: &Path, sizes: &[Size], steps: &Distribution) -> Result<()
         "busy_max_us",
         "repetitions",
         "repetitions_carried",
-    ])?;
-    let times = |busy: &Distribution| {
-        let cycles = busy.count().to_string();
-        let [p50, p99, max] = [busy.quantile(0.5), busy.quantile(0.99), busy.max()].map(us);
-        [cycles, format!("{p50:.2}"), format!("{p99:.2}"), format!("{max:.1}")]
-    };
-    let [cycles, p50, p99, max] = times(steps);
-    csv.write_record(["Controller::step", "", "1", &cycles, &p50, &p99, &max, "1", ""])?;
-    for Size { unit, rate_hz, count, busy, repetitions, carried } in sizes {
-        let [cycles, p50, p99, max] = times(busy);
-        let [rate_hz, count] = [*rate_hz as usize, *count].map(|number| number.to_string());
-        let [repetitions, carried] = [repetitions, carried].map(usize::to_string);
-        csv.write_record([unit.name(), &rate_hz, &count, &cycles, &p50, &p99, &max, &repetitions, &carried])?;
-    }
-    write_whole(path, &csv.into_inner()?)?;
-    Ok(())
+    ];
+    let record =
+        |unit: &str, rate_hz: String, count: usize, busy: &Distribution, repetitions: [String; 2]| {
+            let [p50, p99, max] = [busy.quantile(0.5), busy.quantile(0.99), busy.max()].map(us);
+            let times =
+                [busy.count().to_string(), format!("{p50:.2}"), format!("{p99:.2}"), format!("{max:.1}")];
+            [unit.into(), rate_hz, count.to_string()].into_iter().chain(times).chain(repetitions)
+        };
+    let step = record("Controller::step", String::new(), 1, steps, ["1".into(), String::new()]);
+    let sizes = sizes.iter().map(|size| {
+        let Size { unit, rate_hz, count, busy, repetitions, carried } = size;
+        record(unit.name(), rate_hz.to_string(), *count, busy, [repetitions, carried].map(usize::to_string))
+    });
+    shared::write_csv(FILE, &header, [step].into_iter().chain(sizes))
 }
 
-/// Of the axes: sizes, and times \[us\] from less than one platform takes. They end where the legend has room.
-const COUNTS: std::ops::Range<f64> = 1.0..20e3;
-const TIMES_US: std::ops::Range<f64> = 0.5..20e3;
+/// What the chart needs of a row. The step of one controller has no rate.
+#[derive(Deserialize)]
+struct Figure {
+    unit: String,
+    rate_hz: Option<u32>,
+    count: usize,
+    busy_p50_us: f64,
+    busy_p99_us: f64,
+    repetitions: usize,
+    repetitions_carried: Option<usize>,
+}
+
+impl Figure {
+    fn carries(&self) -> bool {
+        self.repetitions_carried.is_some_and(|carried| 2 * carried > self.repetitions)
+    }
+}
+
+type Quantile = fn(&Figure) -> f64;
 
 /// Busy time of a cycle against the number of platforms, with the periods as bounds.
-pub fn write_chart(path: &Path, sizes: &[Size]) -> Result<(), Failure> {
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Figure>::read(FILE)?;
+    let of_rate = |rate_hz: u32| {
+        let of_unit = figures.rows.iter().filter(|row| row.unit == Unit::Platforms.name());
+        of_unit.filter(move |row| row.rate_hz == Some(rate_hz))
+    };
+    let most = figures.rows.iter().map(|row| row.count).max().unwrap_or(1);
     let (mut lines, mut points) = (vec![], vec![]);
-    let largest = RATES
-        .map(|rate_hz| format!("{} at {} kHz", largest(sizes, Unit::Platforms, rate_hz), rate_hz / 1000));
-    let title = format!("Platforms driven by one loop on one processor: {}", largest.join(", "));
     for (color, rate_hz) in RATES.into_iter().enumerate() {
         let period_us = 1e6 / f64::from(rate_hz);
-        let bound = vec![(COUNTS.start, period_us), (COUNTS.end, period_us)];
-        lines.push(Line { points: bound, style: Stroke::Dashed, color, width: Width::Curve });
-        let of_rate = || sizes.iter().filter(|it| it.unit == Unit::Platforms && it.rate_hz == rate_hz);
-        for (q, width) in [(0.5, Width::Curve), (0.99, Width::Hair)] {
-            let at = |size: &Size| (size.count as f64, us(size.busy.quantile(q)));
-            lines.push(Line { points: of_rate().map(at).collect(), style: Stroke::Solid, color, width });
+        let bound = vec![(1.0, period_us), (most as f64, period_us)];
+        lines.push(Line { points: bound, style: LineStyle::Dashed, color, width: Width::Curve });
+        let quantiles: [(Quantile, _); 2] =
+            [(|row| row.busy_p50_us, Width::Curve), (|row| row.busy_p99_us, Width::Hair)];
+        for (quantile, width) in quantiles {
+            let line = of_rate(rate_hz).map(|row| (row.count as f64, quantile(row))).collect();
+            lines.push(Line { points: line, style: LineStyle::Solid, color, width });
         }
-        for size in of_rate() {
-            let at = (size.count as f64, us(size.busy.quantile(0.5)));
-            let mark = if size.carries() { Mark::Disc } else { Mark::Ring };
-            points.push(Point { at, mark, color, label: Label::None });
-        }
+        points.extend(of_rate(rate_hz).map(|row| Point {
+            at: (row.count as f64, row.busy_p50_us),
+            mark: if row.carries() { Mark::Disc } else { Mark::Ring },
+            color,
+            label: Label::None,
+        }));
     }
-    let chart = Scatter {
-        title: &title,
+    let mut charts = vec![Scatter {
         x_label: "platforms",
         y_label: "wake-up to output [µs]",
-        x: COUNTS,
-        y: TIMES_US,
         points,
         lines,
-        legend: vec![
-            (Sample::Line(Stroke::Solid, Width::Curve, 0), "1 kHz, median"),
-            (Sample::Line(Stroke::Solid, Width::Hair, 0), "1 kHz, 99th percentile"),
-            (Sample::Line(Stroke::Solid, Width::Curve, 1), "4 kHz, median"),
-            (Sample::Line(Stroke::Solid, Width::Hair, 1), "4 kHz, 99th percentile"),
-            (Sample::Mark(Mark::Ring, 0), "overruns in most runs"),
-            (Sample::Line(Stroke::Dashed, Width::Curve, 0), "period"),
-        ],
-    };
-    chart.write_svg(path)?;
+        ..Scatter::default()
+    }];
+    fit_ranges(&mut charts, true);
+    let sizes = RATES.map(|rate_hz| {
+        let carried = of_rate(rate_hz).take_while(|row| row.carries()).last().map_or(0, |row| row.count);
+        format!("{carried} at {} kHz", rate_hz / 1000)
+    });
+    let title = format!("Platforms driven by one loop on one processor: {}", sizes.join(", "));
+    let legend = vec![
+        (Sample::Line(LineStyle::Solid, Width::Curve, 0), "1 kHz, median"),
+        (Sample::Line(LineStyle::Solid, Width::Hair, 0), "1 kHz, 99th percentile"),
+        (Sample::Line(LineStyle::Solid, Width::Curve, 1), "4 kHz, median"),
+        (Sample::Line(LineStyle::Solid, Width::Hair, 1), "4 kHz, 99th percentile"),
+        (Sample::Mark(Mark::Ring, 0), "overruns in most runs"),
+        (Sample::Line(LineStyle::Dashed, Width::Curve, 0), "period"),
+    ];
+    Grid { title: &figures.titled(&title), legend, columns: 1, charts }.write_svg(&chart("loop_size.svg"))?;
     Ok(())
 }

@@ -4,24 +4,38 @@
 //! the fast scenes and a ring for the slow ones, joined where they differ. The peers have their own scene.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use hexad::model::fidelity::Fidelity;
-use hexad::output::charts::Stroke;
-use hexad::output::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width, pareto_front};
+use hexad::output::charts::LineStyle;
+use serde::Deserialize;
 
-use super::Failure;
 use super::methods::BASELINE;
-use super::results::{PAPER, Row};
-use super::scenes::Pace;
+use super::results::{FILE, PAPER};
+use super::shared::scatter::{
+    Grid, Label, Line, Mark, Point, Sample, Scatter, Width, log_range, pareto_front,
+};
+use super::shared::{Failure, Figures, chart};
 
-const DOUBLE: usize = 0;
-const SINGLE: usize = 1;
+const HEXAD: usize = 0;
 const DENSE: usize = 2;
 const PEER: usize = 3;
 
 /// A front goes down by at least this factor: one rounding error is as good as another.
 const BETTER: f64 = 0.5;
+
+/// Factors by which the time axis goes beyond the points: room for the names on both sides.
+const NAMES_LEFT: f64 = 4.0;
+const NAMES_RIGHT: f64 = 2.5;
+
+/// What the chart needs of a row.
+#[derive(Deserialize)]
+struct Row {
+    method: String,
+    isa: String,
+    scene: String,
+    ns_median: f64,
+    error_max_rel: f64,
+}
 
 /// What is drawn of one method.
 struct Item {
@@ -38,21 +52,21 @@ struct Item {
 enum Side {
     Left,
     Flag,
-    None,
 }
 
-pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Row>::read(FILE)?;
+    let rows = &figures.rows;
     let items = items(rows);
     let (mut points, mut lines) = (vec![], vec![]);
     let fast = pareto_front(items.iter().map(|item| (item.ns, item.fast)), BETTER);
     let slow = pareto_front(items.iter().filter_map(|item| Some((item.ns, item.slow?))), BETTER);
-    lines.push(Line { points: fast, style: Stroke::Solid, color: DOUBLE, width: Width::Band });
-    lines.push(Line { points: slow, style: Stroke::Dashed, color: DOUBLE, width: Width::Band });
+    lines.push(Line { points: fast, style: LineStyle::Solid, color: HEXAD, width: Width::Band });
+    lines.push(Line { points: slow, style: LineStyle::Dashed, color: HEXAD, width: Width::Band });
     for item in &items {
         let label = match item.side {
             Side::Left => Label::Left(&item.name),
             Side::Flag => Label::Flag(&item.name),
-            Side::None => Label::None,
         };
         let color = item.color;
         points.push(Point { at: (item.ns, item.fast), mark: Mark::Disc, color, label });
@@ -60,31 +74,31 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
         if let Some(slow) = item.slow.filter(|slow| *slow < 0.5 * item.fast) {
             points.push(Point { at: (item.ns, slow), mark: Mark::Ring, color, label: Label::None });
             let points = vec![(item.ns, item.fast), (item.ns, slow)];
-            lines.push(Line { points, style: Stroke::Solid, color, width: Width::Hair });
+            lines.push(Line { points, style: LineStyle::Solid, color, width: Width::Hair });
         }
     }
-    let best = |precision| written(best_isa(rows, precision));
-    let double_fast = format!("hexad f64 on {}, fast scenes", best("f64"));
-    let single_fast = format!("hexad f32 on {}, fast scenes", best("f32"));
-    let chart = Scatter {
-        title: "Inverse dynamics of a hexapod: time and error of one evaluation",
+    let hexad_fast = format!("hexad on {}, fast scenes", written(best_isa(rows)));
+    let legend = vec![
+        (Sample::Mark(Mark::Disc, HEXAD), &*hexad_fast),
+        (Sample::Mark(Mark::Ring, HEXAD), "slow scenes"),
+        (Sample::Mark(Mark::Disc, PEER), "others, exact"),
+        (Sample::Mark(Mark::Disc, DENSE), "the paper's dense matrices"),
+        (Sample::Line(LineStyle::Solid, Width::Band, HEXAD), "Pareto front, fast"),
+        (Sample::Line(LineStyle::Dashed, Width::Band, HEXAD), "Pareto front, slow"),
+    ];
+    let times = log_range(points.iter().map(|point| point.at.0));
+    let errors = log_range(points.iter().map(|point| point.at.1));
+    let charts = vec![Scatter {
+        title: "",
         x_label: "time of one evaluation, one core [ns]",
         y_label: "largest error of a force / largest force",
-        x: 10.0..50e3,
-        y: 1e-16..10.0,
+        x: times.start / NAMES_LEFT..times.end * NAMES_RIGHT,
+        y: errors,
         points,
         lines,
-        legend: vec![
-            (Sample::Mark(Mark::Disc, DOUBLE), &double_fast),
-            (Sample::Mark(Mark::Ring, DOUBLE), "slow scenes"),
-            (Sample::Mark(Mark::Disc, SINGLE), &single_fast),
-            (Sample::Mark(Mark::Disc, PEER), "others, exact, f64"),
-            (Sample::Mark(Mark::Disc, DENSE), "the paper's dense matrices"),
-            (Sample::Line(Stroke::Solid, Width::Band, DOUBLE), "Pareto front, fast"),
-            (Sample::Line(Stroke::Dashed, Width::Band, DOUBLE), "Pareto front, slow"),
-        ],
-    };
-    chart.write_svg(path)?;
+    }];
+    let title = figures.titled("Inverse dynamics of a hexapod: time and error of one evaluation");
+    Grid { title: &title, legend, columns: 1, charts }.write_svg(&chart("speed_accuracy.svg"))?;
     Ok(())
 }
 
@@ -92,38 +106,33 @@ pub fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
 fn items(rows_of_all: &[Row]) -> Vec<Item> {
     let mut methods: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
     for row in rows_of_all {
-        methods.entry((row.method, row.precision, row.isa)).or_default().push(row);
+        methods.entry((&*row.method, &*row.isa)).or_default().push(row);
     }
     let mut items = vec![];
-    for ((method, precision, isa), rows) in methods {
+    for ((method, isa), rows) in methods {
         let fidelity = Fidelity::ALL.iter().any(|fidelity| fidelity.name() == method);
         let exact = method == "exact";
-        let best = best_isa(rows_of_all, precision);
-        if fidelity && isa != best && !(exact && precision == "f64") {
+        let best = best_isa(rows_of_all);
+        if fidelity && isa != best && !exact {
             continue;
         }
         let peer = !fidelity && method != PAPER;
         // A peer has no machine but its own; hexad has errors on the other three.
-        let worst = |pace: Pace| {
-            let errors = rows.iter().filter(|row| row.pace == pace).map(|row| row.errors.max);
+        let worst = |scenes: &str| {
+            let errors = rows.iter().filter(|row| row.scene.ends_with(scenes)).map(|row| row.error_max_rel);
             errors.reduce(f64::max)
         };
-        let times = rows.iter().map(|row| row.samples.throughput());
-        let (color, side) = match (fidelity, precision) {
-            (true, "f32") => (SINGLE, if exact { Side::Flag } else { Side::None }),
-            (true, _) => (DOUBLE, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
-            (false, _) => (if peer { PEER } else { DENSE }, Side::Flag),
+        let times = rows.iter().map(|row| row.ns_median);
+        let (color, side) = match fidelity {
+            true => (HEXAD, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
+            false => (if peer { PEER } else { DENSE }, Side::Flag),
         };
-        let name = match (fidelity, exact, precision) {
-            (true, true, "f32") => "exact, f32".into(),
-            (true, true, _) => format!("exact, {}", written(isa)),
-            _ => written(method),
-        };
+        let name = if exact { format!("exact, {}", written(isa)) } else { written(method) };
         items.push(Item {
             name,
             ns: times.sum::<f64>() / rows.len() as f64,
-            fast: worst(if peer { Pace::Peers } else { Pace::Fast }).unwrap_or(f64::NAN),
-            slow: if peer { None } else { worst(Pace::Slow) },
+            fast: worst(if peer { "peers" } else { "_fast" }).unwrap_or(f64::NAN),
+            slow: if peer { None } else { worst("_slow") },
             color,
             side,
         });
@@ -131,9 +140,9 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
     items
 }
 
-/// The best instruction set of a precision: its rows begin with it.
-fn best_isa(rows: &[Row], precision: &str) -> &'static str {
-    rows.iter().find(|row| row.precision == precision).map_or("", |row| row.isa)
+/// The best instruction set: the rows begin with it.
+fn best_isa(rows: &[Row]) -> &str {
+    rows.first().map_or("", |row| &row.isa)
 }
 
 /// As people write it.

@@ -1,12 +1,12 @@
 //! How long one evaluation of the inverse dynamics takes, and how far its forces are from the right ones:
 //! `cargo bench --bench speed_accuracy`.
 //!
-//! Every fidelity of the ladder in both precisions on every instruction set of this CPU, the paper's own dense
+//! Every fidelity on every instruction set of this CPU, the paper's own dense
 //! form, and, once `benches/peers/run.sh` has built them, what others would use. On a slow and a fast scene
 //! of three machines and on the peers' own (see `scenes.rs`). Writes `benches/charts/speed_accuracy.csv` and
 //! `.svg`, and prints how many times faster the exact model is than each peer in the same run.
 //!
-//! `-- --quick` takes fewer samples. `-- --count exact` only evaluates, for instruction counts:
+//! `-- --quick` takes fewer samples; `-- --redraw` none, and draws the chart from the CSV file. `-- --count exact` only evaluates, for instruction counts:
 //!
 //! ```text
 //! valgrind --tool=callgrind target/release/deps/speed_accuracy-* --count exact --evaluations 10000
@@ -18,10 +18,10 @@ mod paper;
 mod peers;
 mod results;
 mod scenes;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod timing;
 
-use std::error::Error;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -31,14 +31,12 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use methods::{BASELINE, Method, Precision, instruction_sets};
+use methods::{BASELINE, Method, instruction_sets};
 use peers::{PEERS, Peer};
 use results::{Row, print_ratios, write_csv};
 use scenes::Scene;
+use shared::Failure;
 use timing::{Samples, sample};
-
-/// Anything that ends the run.
-type Failure = Box<dyn Error>;
 
 /// Samples of each method on each scene, spread over the run: in all a minute, or ten seconds.
 const ROUNDS: usize = 101;
@@ -62,12 +60,12 @@ struct Arguments {
     /// Fewer samples: within 40 s.
     #[arg(long)]
     quick: bool,
+    /// Measures nothing and draws the chart from the CSV file.
+    #[arg(long)]
+    redraw: bool,
     /// Evaluates one fidelity (its name on the command line of hexad) and nothing else.
     #[arg(long, value_name = "RUNG")]
     count: Option<String>,
-    /// Single precision; with --count.
-    #[arg(long, requires = "count")]
-    single: bool,
     /// Instruction set, the best if absent; with --count.
     #[arg(long, requires = "count")]
     isa: Option<String>,
@@ -83,6 +81,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match &arguments.count {
         Some(fidelity) => count(&arguments, fidelity),
+        None if arguments.redraw => chart::draw(),
         None => compare(arguments.quick),
     };
     outcome.map_or_else(
@@ -100,13 +99,12 @@ fn count(arguments: &Arguments, fidelity: &str) -> Result<(), Failure> {
     let fidelity = fidelity.ok_or_else(|| {
         format!("no such fidelity; one of {}", Fidelity::ALL.map(Fidelity::name).join(", "))
     })?;
-    let precision = if arguments.single { Precision::F32 } else { Precision::F64 };
-    let sets = instruction_sets(precision);
+    let sets = instruction_sets();
     let wanted = |name: &str| arguments.isa.as_ref().is_none_or(|isa| isa == name);
     let names = sets.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
     let set = sets.into_iter().find(|(name, _)| wanted(name));
     let (isa, level) = set.ok_or_else(|| format!("not on this CPU; one of {names}"))?;
-    let method = Method::new(fidelity, precision);
+    let method = Method::new(fidelity);
     let scene = Scene::of_machines()?.into_iter().nth(1).ok_or("no scene")?;
     let dynamics = InverseDynamics::new(&scene.machine_on(level));
     let passes = arguments.evaluations.div_ceil(scene.motions.len());
@@ -139,12 +137,8 @@ fn compare(quick: bool) -> Result<(), Failure> {
         println!("a debug build: these times mean nothing and nothing was written; use cargo bench");
         return Ok(());
     }
-    let charts = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/charts");
-    std::fs::create_dir_all(&charts)?;
-    write_csv(&charts.join("speed_accuracy.csv"), &rows)?;
-    chart::write(&charts.join("speed_accuracy.svg"), &rows)?;
-    println!("written: {}/speed_accuracy.csv and .svg", charts.display());
-    Ok(())
+    write_csv(&rows)?;
+    chart::draw()
 }
 
 /// Those of the machines, and the peers' where they have been built.
@@ -164,11 +158,9 @@ fn scenes() -> Result<Vec<Scene>, Failure> {
 fn contenders(scenes: &[Scene]) -> Result<Vec<Contender>, Failure> {
     let mut contenders = vec![];
     for (index, scene) in scenes.iter().enumerate() {
-        for precision in Precision::ALL {
-            for (isa, level) in instruction_sets(precision) {
-                let methods = Fidelity::ALL.map(|fidelity| Method::new(fidelity, precision));
-                contenders.extend(methods.map(|method| Contender::hexad(scene, index, method, isa, level)));
-            }
+        for (isa, level) in instruction_sets() {
+            let methods = Fidelity::ALL.map(Method::new);
+            contenders.extend(methods.map(|method| Contender::hexad(scene, index, method, isa, level)));
         }
         contenders.extend(Contender::paper(scene, index));
     }
@@ -197,7 +189,6 @@ impl Contender {
         let errors = scene.errors(scene.motions.iter().map(|motion| (method.forces)(&dynamics, motion)));
         let row = Row {
             method: method.fidelity.name(),
-            precision: method.precision.name(),
             isa,
             scene: scene.name.clone(),
             pace: scene.pace,
@@ -211,14 +202,13 @@ impl Contender {
     fn paper(scene: &Scene, index: usize) -> Option<Self> {
         let machine = scene.paper_machine.as_ref()?;
         let dynamics = InverseDynamics::new(&scene.machine);
-        let exact = Method::new(Fidelity::Exact, Precision::F64).forces;
+        let exact = Method::new(Fidelity::Exact).forces;
         let errors = match scene.pace {
             scenes::Pace::Slow => scene.errors(scene.motions.iter().map(|motion| exact(&dynamics, motion))),
             _ => scene.errors(scene.states.iter().map(|state| Some(paper::forces(machine, state).into()))),
         };
         let row = Row {
             method: results::PAPER,
-            precision: "f64",
             isa: BASELINE,
             scene: scene.name.clone(),
             pace: scene.pace,
@@ -231,7 +221,6 @@ impl Contender {
     fn peer(peer: &'static Peer) -> Result<Self, Failure> {
         let row = Row {
             method: peer.name,
-            precision: "f64",
             isa: "native",
             scene: "peers".into(),
             pace: scenes::Pace::Peers,
@@ -272,7 +261,7 @@ impl Contender {
 
 /// The exact model and the peers do the same work.
 fn agree(rows: &[Row]) -> Result<(), Failure> {
-    let exact = |row: &&Row| row.is_exact("f64") && row.pace == scenes::Pace::Peers;
+    let exact = |row: &&Row| row.is_exact() && row.pace == scenes::Pace::Peers;
     for row in rows.iter().filter(exact) {
         let error = row.errors.max;
         if !(error <= AGREEMENT) {

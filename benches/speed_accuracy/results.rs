@@ -1,13 +1,11 @@
 //! What was measured: as a file, and as a table of ratios.
 
-use std::path::Path;
-
-use hexad::output::files::write_whole;
-
-use super::Failure;
 use super::peers::PEERS;
 use super::scenes::{Errors, Pace};
+use super::shared::{self, Failure};
 use super::timing::Samples;
+
+pub const FILE: &str = "speed_accuracy.csv";
 
 /// The dense form's name.
 pub const PAPER: &str = "paper-dense";
@@ -15,7 +13,6 @@ pub const PAPER: &str = "paper-dense";
 /// One method on one scene.
 pub struct Row {
     pub method: &'static str,
-    pub precision: &'static str,
     pub isa: &'static str,
     pub scene: String,
     pub pace: Pace,
@@ -25,54 +22,37 @@ pub struct Row {
 
 impl Row {
     /// hexad with every term.
-    pub fn is_exact(&self, precision: &str) -> bool {
-        self.method == "exact" && self.precision == precision
+    pub fn is_exact(&self) -> bool {
+        self.method == "exact"
     }
 }
 
-/// `method, precision, isa, scene, ns_median, ns_latency, error_max_rel, error_rms_rel`
-pub fn write_csv(path: &Path, rows: &[Row]) -> Result<(), Failure> {
-    let mut csv = csv::Writer::from_writer(vec![]);
-    csv.write_record([
-        "method",
-        "precision",
-        "isa",
-        "scene",
-        "ns_median",
-        "ns_latency",
-        "error_max_rel",
-        "error_rms_rel",
-    ])?;
-    for row in rows {
+/// `method, isa, scene, ns_median, ns_latency, error_max_rel, error_rms_rel`
+pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
+    let header = ["method", "isa", "scene", "ns_median", "ns_latency", "error_max_rel", "error_rms_rel"];
+    let records = rows.iter().map(|row| {
         let Errors { max, rms } = row.errors;
-        csv.write_record([
-            row.method,
-            row.precision,
-            row.isa,
-            &row.scene,
-            &format!("{:.1}", row.samples.throughput()),
-            &format!("{:.1}", row.samples.latency()),
-            &format!("{max:.2e}"),
-            &format!("{rms:.2e}"),
-        ])?;
-    }
-    write_whole(path, &csv.into_inner()?)?;
-    Ok(())
+        let [method, isa, scene] = [row.method, row.isa, &row.scene].map(String::from);
+        let times = [row.samples.throughput(), row.samples.latency()].map(|ns| format!("{ns:.1}"));
+        let errors = [max, rms].map(|error| format!("{error:.2e}"));
+        [method, isa, scene].into_iter().chain(times).chain(errors)
+    });
+    shared::write_csv(FILE, &header, records)
 }
 
 /// How many times longer the peers take than the exact model on the same inputs.
 pub fn print_ratios(rows: &[Row]) {
     let mut at_peers = rows.iter().filter(|row| row.pace == Pace::Peers);
     // The best instruction set comes first.
-    let Some(exact) = at_peers.find(|row| row.is_exact("f64")) else { return };
-    println!("\nThe peers' machine and inputs, exact model, f64; hexad on {}:", exact.isa);
+    let Some(exact) = at_peers.find(|row| row.is_exact()) else { return };
+    println!("\nThe peers' machine and inputs, exact model; hexad on {}:", exact.isa);
     println!(
         "{:<26}{:>10}{:>9}{:>10}{:>9}{:>8}{:>12}",
         "", "ns", "ratio", "fenced", "ratio", "goal", "max error"
     );
-    let others = |row: &&Row| PEERS.iter().any(|peer| peer.name == row.method) || row.is_exact("f64");
+    let others = |row: &&Row| PEERS.iter().any(|peer| peer.name == row.method) || row.is_exact();
     for row in rows.iter().filter(|row| row.pace == Pace::Peers).filter(others) {
-        let name = if row.is_exact("f64") { format!("hexad {}", row.isa) } else { row.method.into() };
+        let name = if row.is_exact() { format!("hexad {}", row.isa) } else { row.method.into() };
         let goal = PEERS.iter().find(|peer| peer.name == row.method).and_then(|peer| peer.goal);
         let (ns, fenced) = (row.samples.throughput(), row.samples.latency());
         println!(

@@ -1,9 +1,10 @@
 //! What it costs to make one step of Newton's method per cycle, from the pose of the cycle before.
 
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::motion::built_in::{Motion, fit};
-use hexad::output::charts::{Panel, Series, Stroke, write_svg};
+use hexad::motion::built_in::{BuiltInMotion, fit};
+use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
+use super::shared::provenance;
 use super::speed::newton;
 use super::{Failure, MACHINES, cells, chart, common, write_csv};
 
@@ -15,7 +16,7 @@ pub fn run() -> Result<(), Failure> {
     let (mut rows, mut lines) = (vec![], vec![]);
     for name in MACHINES {
         let machine = common::machine(name);
-        let scene = fit(&machine, Motion::Sines, SECONDS);
+        let scene = fit(&machine, BuiltInMotion::Sines, SECONDS);
         for rate_hz in RATES_HZ {
             let mut estimate = scene.at(0.0).motion().pose;
             let (mut worst, mut squares, mut points) = (0.0_f64, 0.0, vec![]);
@@ -44,10 +45,11 @@ pub fn run() -> Result<(), Failure> {
             .iter()
             .zip(&labels)
             .enumerate()
-            .map(|(color, (points, label))| Series { label, points, style: Stroke::Solid, color })
+            .map(|(color, (points, label))| Series { label, points, style: LineStyle::Solid, color })
             .collect(),
     });
     let title = "Position error of one step of Newton's method per cycle, built-in sines";
-    write_svg(&chart("stability_one_step.svg"), title, "time [s]", &panels.collect::<Vec<_>>())?;
+    let title = format!("{title}\n{}", provenance());
+    write_svg(&chart("stability_one_step.svg"), &title, "time [s]", &panels.collect::<Vec<_>>())?;
     Ok(())
 }

@@ -3,7 +3,7 @@
 //! Success from home against the spread of the poses; error against time for 1, 2, 3 ... steps; what one step of
 //! Newton's method per cycle costs at two rates; where the sampled loop turns unstable; and a million trials in
 //! which ours must not be deceived. Writes `benches/charts/stability_*.csv` and `.svg`. `-- --quick` makes a
-//! twentieth of the trials.
+//! twentieth of the trials; `-- --redraw` measures no times, makes no trials and draws the charts from the CSV files.
 
 #![allow(
     dead_code,
@@ -22,49 +22,29 @@ mod maps;
 #[path = "../../tests/stability/rivals.rs"]
 mod rivals;
 mod sampled;
+#[path = "../shared/mod.rs"]
+mod shared;
 mod speed;
 #[path = "../speed_accuracy/timing.rs"]
 mod timing;
 #[path = "../../tests/stability/trials.rs"]
 mod trials;
 
-use std::error::Error;
-use std::fmt::Display;
-use std::path::{Path, PathBuf};
-
-use hexad::output::files::write_whole;
-
-/// Anything that ends the run.
-type Failure = Box<dyn Error>;
+use shared::{Failure, cells, chart, write_csv};
 
 /// The machines that are looked at.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];
 
 fn main() -> Result<(), Failure> {
-    let quick = std::env::args().any(|argument| argument == "--quick");
-    speed::run()?;
-    cycles::run()?;
-    sampled::run()?;
-    maps::run(if quick { 20 } else { 1 })
-}
-
-/// `benches/charts/NAME`
-fn chart(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/charts").join(name)
-}
-
-/// A CSV file of numbers and names.
-fn write_csv(name: &str, header: &[&str], rows: &[Vec<String>]) -> Result<(), Failure> {
-    let mut csv = csv::Writer::from_writer(vec![]);
-    csv.write_record(header)?;
-    for row in rows {
-        csv.write_record(row)?;
+    let has = |flag: &str| std::env::args().any(|argument| argument == flag);
+    if !has("--redraw") {
+        speed::run()?;
+        sampled::run()?;
+        maps::run(if has("--quick") { 20 } else { 1 })?;
     }
-    write_whole(&chart(name), &csv.into_inner()?)?;
-    println!("written: {}", chart(name).display());
-    Ok(())
-}
-
-fn cells<const N: usize>(cells: [&dyn Display; N]) -> Vec<String> {
-    cells.map(ToString::to_string).into()
+    // Takes no time, and its file has not all that is drawn.
+    cycles::run()?;
+    speed::draw()?;
+    sampled::draw()?;
+    maps::draw()
 }

@@ -1,9 +1,11 @@
 //! Share of random poses that are found from home, and a million trials of ours.
 
-use hexad::output::charts::{Panel, Series, Stroke, write_svg};
+use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 use rayon::prelude::*;
+use serde::Deserialize;
 
 use super::rivals::Update;
+use super::shared::Figures;
 use super::trials::{End, Method, ambiguous, pose, step, trial, within_reach};
 use super::{Failure, MACHINES, cells, chart, common, write_csv};
 
@@ -11,6 +13,7 @@ use super::{Failure, MACHINES, cells, chart, common, write_csv};
 const ANGLES_DEG: [u32; 12] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60];
 const POSES: u64 = 5000;
 const MILLION: u64 = 1_000_000;
+const FILE: &str = "stability_maps.csv";
 const METHODS: [(&str, Method); 3] = [
     ("hexad", Method::Hexad),
     ("rotation added to angles (genhexkins)", Method::Rival(Update::RotationAdded)),
@@ -19,11 +22,9 @@ const METHODS: [(&str, Method); 3] = [
 
 pub fn run(fewer: u64) -> Result<(), Failure> {
     let mut rows = vec![];
-    let mut lines = vec![];
     for name in MACHINES {
         let machine = common::machine(name);
         for (method_name, method) in METHODS {
-            let (mut failed, mut wrong) = (vec![], vec![]);
             for angle_deg in ANGLES_DEG {
                 let angle = f64::from(angle_deg).to_radians();
                 let poses = (0..POSES / fewer).into_par_iter().map(|number| pose(&machine, angle, number));
@@ -32,8 +33,6 @@ pub fn run(fewer: u64) -> Result<(), Failure> {
                     .map(|x| trial(&machine, method, x))
                     .collect();
                 let share = |end: End| ends.iter().filter(|e| **e == end).count() as f64 / ends.len() as f64;
-                failed.push((f64::from(angle_deg), 100.0 * share(End::Failed)));
-                wrong.push((f64::from(angle_deg), 100.0 * share(End::Wrong)));
                 let shares = [End::Right, End::Failed, End::Wrong].map(share);
                 rows.push(cells([
                     &name,
@@ -45,35 +44,50 @@ pub fn run(fewer: u64) -> Result<(), Failure> {
                     &shares[2],
                 ]));
             }
-            lines.push([failed, wrong]);
         }
     }
     let header = ["machine", "method", "angle_deg", "reachable_poses", "right", "failed", "wrong"];
-    write_csv("stability_maps.csv", &header, &rows)?;
-    draw(&lines)?;
+    write_csv(FILE, &header, &rows)?;
     million(fewer)
 }
 
-/// Share of failed and of wrong poses against the angle, of one method on one machine.
-type Lines = [Vec<(f64, f64)>; 2];
+/// What the chart needs of a row.
+#[derive(Deserialize)]
+struct Figure {
+    machine: String,
+    method: String,
+    angle_deg: f64,
+    failed: f64,
+    wrong: f64,
+}
 
-/// Two panels per machine.
-fn draw(lines: &[Lines]) -> Result<(), Failure> {
-    let labels: Vec<_> = MACHINES
-        .iter()
-        .flat_map(|name| ["failed", "wrong"].map(|what| format!("{what}, {name} [%]")))
-        .collect();
-    let mut panels = vec![];
-    for (index, of_machine) in lines.chunks(METHODS.len()).enumerate() {
-        for what in 0..2 {
-            let series = of_machine.iter().zip(METHODS).enumerate().map(|(color, (line, (label, _)))| {
-                Series { label, points: &line[what], style: Stroke::Solid, color }
+type Share = fn(&Figure) -> f64;
+
+/// Share of failed and of wrong poses against the angle: two panels per machine, a line per method.
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Figure>::read(FILE)?;
+    let shares: [(&str, Share); 2] = [("failed", |row| row.failed), ("wrong", |row| row.wrong)];
+    let mut drawn = vec![];
+    for machine in figures.rows.chunk_by(|a, b| a.machine == b.machine) {
+        for (what, share) in shares {
+            let lines = machine.chunk_by(|a, b| a.method == b.method).map(|method| {
+                let points = method.iter().map(|row| (row.angle_deg, 100.0 * share(row)));
+                (&*method[0].method, points.collect::<Vec<_>>())
             });
-            panels.push(Panel { y_label: &labels[2 * index + what], series: series.collect() });
+            drawn.push((format!("{what}, {} [%]", machine[0].machine), lines.collect::<Vec<_>>()));
         }
     }
-    let title = "Poses that are not found from home, within reach without a singular pose";
-    write_svg(&chart("stability_maps.svg"), title, "largest angle on every axis [deg]", &panels)?;
+    let panels = drawn.iter().map(|(y_label, lines)| Panel {
+        y_label,
+        series: lines
+            .iter()
+            .enumerate()
+            .map(|(color, (label, points))| Series { label, points, style: LineStyle::Solid, color })
+            .collect(),
+    });
+    let title = figures.titled("Poses that are not found from home, within reach without a singular pose");
+    let panels: Vec<_> = panels.collect();
+    write_svg(&chart("stability_maps.svg"), &title, "largest angle on every axis [deg]", &panels)?;
     Ok(())
 }
 

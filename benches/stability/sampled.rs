@@ -1,14 +1,18 @@
 //! Where the sampled loop turns unstable: predicted, and found with the real controller and the real plant.
 
 use hexad::analysis::sampled_loop::SampledLoop;
-use hexad::output::charts::{Panel, Series, Stroke, write_svg};
+use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 use rayon::prelude::*;
+use serde::Deserialize;
 
 use super::delayed::boundary;
+use super::shared::Figures;
 use super::{Failure, cells, chart, common, write_csv};
 
+const FILE: &str = "stability_sampled.csv";
+
 /// In periods.
-const LONGEST_DELAY: u32 = 2;
+const MAX_DELAY_PERIODS: u32 = 2;
 /// Points per period: of the simulation, and of the line.
 const FOUND: u32 = 4;
 const PREDICTED: u32 = 100;
@@ -26,9 +30,8 @@ const MARK: (f64, f64) = (0.016, 0.018);
 /// A point: delay, `wn T`.
 type At = (f64, f64);
 
-pub fn run() -> Result<(), Failure> {
-    let mut config = common::deployed("fried2008");
-    config.machine.gravity.fill(0.0);
+/// The loops of the chart, without delay.
+fn loops() -> Vec<SampledLoop> {
     let of = |damping_ratio, mass_ratio| SampledLoop {
         wn_t: f64::NAN,
         damping_ratio,
@@ -36,66 +39,95 @@ pub fn run() -> Result<(), Failure> {
         delay: f64::NAN,
         mass_ratio,
     };
-    let dampings = DAMPING_RATIOS.map(|ratio| (format!("damping ratio {ratio}"), of(ratio, 1.0)));
-    let masses = MASS_RATIOS.map(|ratio| (format!("{ratio} of the modelled mass"), of(1.0, ratio)));
+    let dampings = DAMPING_RATIOS.map(|ratio| of(ratio, 1.0));
+    let masses = MASS_RATIOS.map(|ratio| of(1.0, ratio));
+    dampings.into_iter().chain(masses).collect()
+}
+
+pub fn run() -> Result<(), Failure> {
+    let mut config = common::deployed("fried2008");
+    config.machine.gravity.fill(0.0);
     let mut rows = vec![];
-    let mut drawn = vec![];
-    for (y_label, curves) in
-        [("largest wn T, mass as modelled", &dampings[..]), ("largest wn T, damping ratio 1", &masses)]
-    {
-        let mut lines = vec![];
-        for (label, sampled) in curves {
-            let predict = |delay| SampledLoop { delay, ..*sampled }.largest_wn_t();
-            let found: Vec<At> = delays(FOUND)
-                .into_par_iter()
-                .map(|delay| (delay, boundary(&config, &SampledLoop { delay, ..*sampled })))
-                .collect();
-            let mut worst = 0.0_f64;
-            for (delay, found) in &found {
-                let predicted = predict(*delay);
-                worst = worst.max((found / predicted - 1.0).abs());
-                let SampledLoop { damping_ratio, mass_ratio, .. } = sampled;
-                let [predicted, found] = [predicted, *found].map(|wn_t| format!("{wn_t:.4}"));
-                rows.push(cells([damping_ratio, mass_ratio, delay, &predicted, &found]));
-            }
-            println!("sampled loop, {label}: limit as predicted to {:.2} %", 100.0 * worst);
-            if worst > TOLERANCE {
-                return Err(format!("{label}: the limit is not the predicted one").into());
-            }
-            let predicted: Vec<At> =
-                delays(PREDICTED).into_iter().map(|delay| (delay, predict(delay))).collect();
-            lines.push((label, predicted, found));
+    for sampled in loops() {
+        let SampledLoop { damping_ratio, mass_ratio, .. } = sampled;
+        let found: Vec<At> = delays(FOUND)
+            .into_par_iter()
+            .map(|delay| (delay, boundary(&config, &SampledLoop { delay, ..sampled })))
+            .collect();
+        let mut worst = 0.0_f64;
+        for (delay, found) in &found {
+            let predicted = SampledLoop { delay: *delay, ..sampled }.largest_wn_t();
+            worst = worst.max((found / predicted - 1.0).abs());
+            let [predicted, found] = [predicted, *found].map(|wn_t| format!("{wn_t:.4}"));
+            rows.push(cells([&damping_ratio, &mass_ratio, delay, &predicted, &found]));
         }
-        let largest = lines.iter().flat_map(|(_, line, _)| line).map(|(_, wn_t)| *wn_t).fold(0.0, f64::max);
-        let mark = |at| diamond(at, MARK.0, MARK.1 * largest);
-        let marked = lines
-            .into_iter()
-            .map(|(label, line, found)| (label, line, found.into_iter().map(mark).collect::<Vec<_>>()));
-        drawn.push((y_label, marked.collect::<Vec<_>>()));
+        let label = format!("damping ratio {damping_ratio}, {mass_ratio} of the modelled mass");
+        println!("sampled loop, {label}: limit as predicted to {:.2} %", 100.0 * worst);
+        if worst > TOLERANCE {
+            return Err(format!("{label}: the limit is not the predicted one").into());
+        }
     }
     let header = ["damping_ratio", "mass_ratio", "delay_periods", "wn_t_predicted", "wn_t_simulated"];
-    write_csv("stability_sampled.csv", &header, &rows)?;
-    let panels = drawn.iter().map(|(y_label, lines)| Panel {
+    write_csv(FILE, &header, &rows)
+}
+
+/// What the chart needs of a row.
+#[derive(Deserialize)]
+struct Figure {
+    delay_periods: f64,
+    wn_t_simulated: f64,
+}
+
+/// Predicted limits as lines, simulated ones as diamonds.
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Figure>::read(FILE)?;
+    let found: Vec<_> = figures.rows.chunks(delays(FOUND).len()).collect();
+    let loops = loops();
+    let (dampings, masses) = loops.split_at(DAMPING_RATIOS.len());
+    let (found_of_dampings, found_of_masses) = found.split_at(DAMPING_RATIOS.len());
+    let panels = [
+        lines(dampings, found_of_dampings, |sampled| format!("damping ratio {}", sampled.damping_ratio)),
+        lines(masses, found_of_masses, |sampled| format!("{} of the modelled mass", sampled.mass_ratio)),
+    ];
+    let y_labels = ["largest wn T, mass as modelled", "largest wn T, damping ratio 1"];
+    let panels = panels.iter().zip(y_labels).map(|(lines, y_label)| Panel {
         y_label,
         series: lines
             .iter()
             .enumerate()
             .flat_map(|(color, (label, predicted, found))| {
-                let series = move |label, points| Series { label, points, style: Stroke::Solid, color };
+                let series = move |label, points| Series { label, points, style: LineStyle::Solid, color };
                 let marks = found.iter().map(move |mark| series("", &mark[..]));
                 [series(label, &predicted[..])].into_iter().chain(marks)
             })
             .collect(),
     });
-    let title = "Stability limit of the sampled loop: lines predicted, diamonds simulated";
+    let title = figures.titled("Stability limit of the sampled loop: lines predicted, diamonds simulated");
     let x_label = "from measurement to force [periods]";
-    write_svg(&chart("stability_sampled.svg"), title, x_label, &panels.collect::<Vec<_>>())?;
+    write_svg(&chart("stability_sampled.svg"), &title, x_label, &panels.collect::<Vec<_>>())?;
     Ok(())
+}
+
+/// Label, predicted line and diamonds of each loop.
+fn lines(
+    loops: &[SampledLoop],
+    found: &[&[Figure]],
+    label: fn(&SampledLoop) -> String,
+) -> Vec<(String, Vec<At>, Vec<Vec<At>>)> {
+    let predict = |sampled: &SampledLoop| -> Vec<At> {
+        let limit = |delay| SampledLoop { delay, ..*sampled }.largest_wn_t();
+        delays(PREDICTED).into_iter().map(|delay| (delay, limit(delay))).collect()
+    };
+    let predicted: Vec<_> = loops.iter().map(predict).collect();
+    let largest = predicted.iter().flatten().map(|(_, wn_t)| *wn_t).fold(0.0, f64::max);
+    let mark = |row: &Figure| diamond((row.delay_periods, row.wn_t_simulated), MARK.0, MARK.1 * largest);
+    let lines = loops.iter().zip(predicted).zip(found);
+    lines.map(|((sampled, line), rows)| (label(sampled), line, rows.iter().map(mark).collect())).collect()
 }
 
 /// From none to the longest.
 fn delays(per_period: u32) -> Vec<f64> {
-    (0..=LONGEST_DELAY * per_period).map(|k| f64::from(k) / f64::from(per_period)).collect()
+    (0..=MAX_DELAY_PERIODS * per_period).map(|k| f64::from(k) / f64::from(per_period)).collect()
 }
 
 fn diamond((x, y): At, dx: f64, dy: f64) -> Vec<At> {

@@ -1,22 +1,24 @@
 //! Error of the pose against time: plain Newton by the step, ours, and the others, from several starts.
 
-use hexad::model::active_forces::InverseDynamics;
-use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::refine;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::inverse_jacobian::twist_from_rates;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
-use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
+use hexad::model::rigid::{Pose, Twist};
 use hexad::model::task::task_coordinates;
-use hexad::output::charts::Stroke;
-use hexad::output::scatter::{Label, Line, Mark, Point, Sample, Scatter, Width};
+use hexad::output::charts::LineStyle;
 use nalgebra::{Vector3, Vector6};
+use serde::Deserialize;
 
 use super::rivals::Update;
+use super::shared::Figures;
+use super::shared::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
 use super::timing::{Samples, sample};
 use super::trials::{pose, rigid};
 use super::{Failure, MACHINES, cells, chart, common, rivals, write_csv};
+
+const FILE: &str = "stability_speed.csv";
 
 /// Starts by their distance: 2 mm and 0.2 degrees, a tenth and a hundredth of it, five times.
 const STARTS: [(&str, f64); 4] = [("0.02 mm", 0.01), ("0.2 mm", 0.1), ("2 mm", 1.0), ("10 mm", 5.0)];
@@ -117,7 +119,6 @@ pub fn run() -> Result<(), Failure> {
                 });
             }
         }
-        shared(name, &machine);
     }
     for row in rows.iter().filter(|row| row.start == "2 mm") {
         println!("{:<12}{:<26}{:>8.0} ns{:>10.1e} m", row.machine, row.method, row.ns, row.error);
@@ -129,78 +130,54 @@ pub fn run() -> Result<(), Failure> {
             cells([&row.machine, &row.method, &row.start, &ns, &error])
         })
         .collect();
-    write_csv("stability_speed.csv", &["machine", "method", "start", "ns_fenced", "error_max_m"], &table)?;
-    draw(&rows)
+    write_csv(FILE, &["machine", "method", "start", "ns_fenced", "error_max_m"], &table)
 }
 
-/// What the factorization that is left saves the inverse dynamics.
-fn shared(name: &str, machine: &Machine) {
-    let dynamics = InverseDynamics::new(machine);
-    let cases = cases(machine, 1.0);
-    let (twist, acceleration) =
-        (Twist::default(), Acceleration { linear: Vector3::x(), ..Default::default() });
-    let (mut alone, mut with) = (Samples::default(), Samples::default());
-    for _ in 0..ROUNDS {
-        alone.take(cases.len(), SAMPLE_S, |passes, fenced| {
-            sample(&cases, passes, fenced, |case| {
-                dynamics.forces::<Exact>(&Motion { pose: case.start, twist, acceleration })
-            })
-        });
-        with.take(cases.len(), SAMPLE_S, |passes, fenced| {
-            sample(&cases, passes, fenced, |case| {
-                dynamics.forces_at::<Exact>(&case.kinematic_state, &twist, &acceleration)
-            })
-        });
-    }
-    println!(
-        "{name}: forces {:.0} ns, with the factors of the pose {:.0} ns",
-        alone.latency(),
-        with.latency()
-    );
+/// What the chart needs of a row.
+#[derive(Deserialize)]
+struct Figure {
+    machine: String,
+    method: String,
+    start: String,
+    ns_fenced: f64,
+    error_max_m: f64,
 }
 
 /// The motion base: a line per start, a point per step.
-fn draw(rows: &[Row]) -> Result<(), Failure> {
-    let at = |row: &Row| (row.ns, row.error.max(ROUNDING));
-    let of = |color: usize, found: &dyn Fn(&Row) -> bool| -> Vec<(f64, f64, usize)> {
-        let start = STARTS[color].0;
-        let rows = rows.iter().filter(|row| row.machine == "motion_base" && row.start == start && found(row));
-        rows.map(|row| (at(row).0, at(row).1, color)).collect()
+pub fn draw() -> Result<(), Failure> {
+    let figures = Figures::<Figure>::read(FILE)?;
+    let of = |start: &str, is_found: &dyn Fn(&str) -> bool| -> Vec<(f64, f64)> {
+        let rows = figures.rows.iter().filter(|row| row.machine == "motion_base" && row.start == start);
+        let rows = rows.filter(|row| is_found(&row.method));
+        rows.map(|row| (row.ns_fenced, row.error_max_m.max(ROUNDING))).collect()
     };
     let (mut points, mut lines) = (vec![], vec![]);
-    for color in 0..STARTS.len() {
-        let plain = of(color, &|row| row.method.starts_with("newton "));
-        let line = plain.iter().map(|(ns, error, _)| (*ns, *error)).collect();
-        lines.push(Line { points: line, style: Stroke::Solid, color, width: Width::Hair });
-        let ours = of(color, &|row| row.method == "hexad");
-        let others = of(color, &|row| row.method.contains("angles"));
+    for (color, (start, _)) in STARTS.iter().enumerate() {
+        let plain = of(start, &|method| method.starts_with("newton "));
+        lines.push(Line { points: plain.clone(), style: LineStyle::Solid, color, width: Width::Hair });
+        let ours = of(start, &|method| method == "hexad");
+        let others = of(start, &|method| method.contains("angles"));
         for (marks, mark) in [(plain, Mark::Disc), (others, Mark::Disc), (ours, Mark::Ring)] {
-            points.extend(marks.iter().map(|(ns, error, color)| Point {
-                at: (*ns, *error),
-                mark,
-                color: *color,
-                label: Label::None,
-            }));
+            points.extend(marks.into_iter().map(|at| Point { at, mark, color, label: Label::None }));
         }
     }
     let labels = STARTS.map(|(start, _)| format!("Newton, 1 to {MOST_STEPS} steps, from {start}"));
     let mut legend: Vec<_> = labels
         .iter()
         .enumerate()
-        .map(|(k, label)| (Sample::Line(Stroke::Solid, Width::Hair, k), &**label))
+        .map(|(k, label)| (Sample::Line(LineStyle::Solid, Width::Hair, k), &**label))
         .collect();
     legend.push((Sample::Mark(Mark::Ring, 2), "hexad, factorization included"));
     legend.push((Sample::Mark(Mark::Disc, 2), "alone at the right: updates of Bryan angles"));
-    let chart_of = Scatter {
-        title: "Forward kinematics: error of the pose against time, motion base",
+    let mut charts = vec![Scatter {
         x_label: "time, one thread [ns]",
         y_label: "largest error [m]",
-        x: 50.0..30e3,
-        y: 1e-16..1e-2,
         points,
         lines,
-        legend,
-    };
-    chart_of.write_svg(&chart("stability_speed.svg"))?;
+        ..Scatter::default()
+    }];
+    fit_ranges(&mut charts, true);
+    let title = figures.titled("Forward kinematics: error of the pose against time, motion base");
+    Grid { title: &title, legend, columns: 1, charts }.write_svg(&chart("stability_speed.svg"))?;
     Ok(())
 }

@@ -1,8 +1,8 @@
-//! Assembly modes: all poses found that have the same leg lengths. Off line, by many starts.
+//! Assembly modes: poses with the same leg lengths, found off line from many starts.
 //!
-//! From each start Levenberg's and Marquardt's method goes wherever the lengths fit; what is the same pose counts
-//! once. Nothing proves that none is missing: more starts find
-//! more. The starts are the same in every run.
+//! From each start the method of Levenberg and Marquardt minimises `sum (L_i(pose) - L_i)^2`; equal results count once.
+//! Up to 40 real poses share six lengths (Dietmaier, 1998). Nothing proves that none is missing: more starts find more.
+//! The starts are the same in every run.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 use core::fmt;
@@ -15,93 +15,110 @@ use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
+use crate::plant::random::Random;
 
 /// Bound on the steps from a start; most need ten to twenty.
-const MAX_STEPS: usize = 400;
+const MAX_STEPS_PER_START: usize = 400;
 
-/// Lengths that fit to this share of the radius fit: rounding.
-const CLOSE: f64 = 1e-12;
+/// Largest norm of the residual of a solution, as a share of the radius: rounding.
+const LENGTH_TOLERANCE: f64 = 1e-12;
 
-/// Poses this near to each other (radian, or radius) are one.
-const SAME: f64 = 1e-7;
+/// Distance (radian, or radius) below which two poses are the same.
+const SAME_POSE_DISTANCE: f64 = 1e-7;
 
-/// First damping, as a share of the largest eigenvalue that `J^T J` usually has; then a factor for each step.
-const DAMPING: f64 = 1e-2;
-const RELAXED: f64 = 0.2;
-const TIGHTENED: f64 = 5.0;
+/// First damping as a share of the usual largest eigenvalue of `J^T J`; then its factor after each step that succeeds or fails.
+const FIRST_DAMPING: f64 = 1e-2;
+const DAMPING_DECREASE: f64 = 0.2;
+const DAMPING_INCREASE: f64 = 5.0;
 
-/// Where [`others`] are looked for: further away nobody takes them for the pose itself.
-const TURN: f64 = FRAC_PI_2;
-/// In radii.
-const SHIFT: f64 = 2.0;
-/// A tenth of a second on two processors.
-const STARTS: u64 = 2000;
+/// Largest rotation and shift of the starts of [`other_modes`]: modes further away are not confused with the pose.
+const SEARCH_TURN_RAD: f64 = FRAC_PI_2;
+const SEARCH_SHIFT_RADII: f64 = 2.0;
+/// Starts of [`other_modes`]: a tenth of a second on two processors.
+const START_COUNT: u64 = 2000;
 
-/// Another pose this near (radian, or radius) may be where the platform is in truth.
-const NEARBY: f64 = 0.5;
+/// Distance (radian, or radius) within which another mode may be the platform's true pose.
+const CONFUSABLE_DISTANCE: f64 = 0.5;
 
-/// Where starts are spread.
+/// SearchRegion of the starts of a search.
 #[derive(Clone, Copy, Debug)]
-pub struct Region {
-    /// In the middle.
+pub struct SearchRegion {
+    /// Middle of the region.
     pub center: Pose,
-    /// Largest rotation away from it \[rad\]; pi for all orientations.
+    /// Largest rotation from it \[rad\]; pi for all orientations.
     pub turn: f64,
     /// Largest displacement along each axis \[m\].
     pub shift: f64,
 }
 
-/// The poses with these lengths \[m\] that are found from so many starts, in the order of their finding.
-pub fn modes(machine: &Machine, lengths: &[f64; LEGS], region: &Region, starts: u64) -> Vec<KinematicState> {
-    let ends = (0..starts).into_par_iter().map(|k| settled(machine, lengths, start(region, k)));
+/// The poses with these lengths \[m\] that are found from so many starts, in the order of the starts.
+///
+/// ```
+/// use hexad::analysis::assembly_modes::{SearchRegion, find_modes};
+/// use hexad::model::inverse_geometry::leg_lengths;
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let home = machine.home_pose();
+/// let region = SearchRegion { center: home, turn: 1.0, shift: 0.5 };
+/// let lengths = leg_lengths(&machine, &home);
+/// let modes = find_modes(&machine, &lengths, &region, 100);
+/// assert!(modes.iter().any(|mode| machine.joints.distance(mode.pose(), &home) < 1e-6));
+/// ```
+pub fn find_modes(
+    machine: &Machine,
+    lengths: &[f64; LEGS],
+    region: &SearchRegion,
+    starts: u64,
+) -> Vec<KinematicState> {
+    let ends = (0..starts).into_par_iter().map(|k| solve(machine, lengths, start(region, k)));
     let mut found: Vec<KinematicState> = vec![];
     for kinematic_state in ends.collect::<Vec<_>>().into_iter().flatten() {
         let size = |other: &KinematicState| machine.joints.distance(kinematic_state.pose(), other.pose());
-        if found.iter().all(|other| size(other) > SAME) {
+        if found.iter().all(|other| size(other) > SAME_POSE_DISTANCE) {
             found.push(kinematic_state);
         }
     }
     found
 }
 
-/// A pose that has the lengths of another one.
+/// Another assembly mode of a pose.
 #[derive(Clone, Copy, Debug)]
-pub struct Other {
-    /// Radian and radius together.
+pub struct OtherMode {
+    /// Distance from the pose, see [`Joints::distance`](crate::model::machine::Joints::distance).
     pub distance: f64,
     turn_deg: f64,
     shift_m: f64,
-    /// The way there crosses a singular pose, whatever it is.
-    across: bool,
+    /// Every path between the two crosses a singular pose.
+    beyond_singularity: bool,
 }
 
-impl Other {
-    /// Whether one may be taken for the other.
+impl OtherMode {
+    /// Whether one may be confused with the other.
     pub fn is_nearby(&self) -> bool {
-        self.distance < NEARBY
+        self.distance < CONFUSABLE_DISTANCE
     }
 }
 
-impl fmt::Display for Other {
+impl fmt::Display for OtherMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { turn_deg, shift_m, across, .. } = self;
-        let not = if *across { "" } else { "NOT " };
+        let Self { turn_deg, shift_m, beyond_singularity, .. } = self;
+        let not = if *beyond_singularity { "" } else { "NOT " };
         write!(f, "{turn_deg:.1} deg and {shift_m:.3} m away, {not}across a singular pose")
     }
 }
 
-/// Other poses with the lengths of a pose that are found around it, the nearest first.
-pub fn others(machine: &Machine, here: &KinematicState) -> Vec<Other> {
+/// OtherMode poses with the lengths of a pose that are found around it, the nearest first.
+pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
     let center = *here.pose();
-    let region = Region { center, turn: TURN, shift: SHIFT * machine.joints.radius };
-    let found = modes(machine, &here.lengths(machine), &region, STARTS);
+    let region =
+        SearchRegion { center, turn: SEARCH_TURN_RAD, shift: SEARCH_SHIFT_RADII * machine.joints.radius };
+    let found = find_modes(machine, &here.lengths(machine), &region, START_COUNT);
     let other = |there: &KinematicState| {
         let way = center.displacement_to(there.pose());
-        Other {
+        OtherMode {
             distance: machine.joints.distance(&center, there.pose()),
             turn_deg: way.angular.norm().to_degrees(),
             shift_m: way.linear.norm(),
-            across: there.sensitivity().determinant * here.sensitivity().determinant < 0.0,
+            beyond_singularity: there.sensitivity().determinant * here.sensitivity().determinant < 0.0,
         }
     };
     let mut others: Vec<_> = found.iter().map(other).collect();
@@ -111,30 +128,22 @@ pub fn others(machine: &Machine, here: &KinematicState) -> Vec<Other> {
 }
 
 /// The start with this number.
-fn start(region: &Region, number: u64) -> Pose {
-    let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    // splitmix64, evenly in -1..1
-    let mut unit = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-52) - 1.0
-    };
-    let mut vector = || Vector3::new(unit(), unit(), unit());
+fn start(region: &SearchRegion, number: u64) -> Pose {
+    let mut random = Random::new(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut vector = || Vector3::from_fn(|_, _| 2.0 * random.uniform() - 1.0);
     let turn = vector() * region.turn.min(PI);
     region.center.displaced(&Twist { angular: turn, linear: vector() * region.shift })
 }
 
-/// Where the way from a start ends, if the lengths fit there.
-fn settled(machine: &Machine, lengths: &[f64; LEGS], start: Pose) -> Option<KinematicState> {
+/// The pose with these lengths that is found from a start.
+fn solve(machine: &Machine, lengths: &[f64; LEGS], start: Pose) -> Option<KinematicState> {
     let radius = machine.joints.radius;
     let scale = Vector6::new(1.0, 1.0, 1.0, radius, radius, radius);
     let residual = |pose: &Pose| Vector6::from(*lengths) - Vector6::from(leg_lengths(machine, pose));
     let (mut pose, mut rest) = (start, residual(&start));
-    let mut damping = DAMPING * radius * radius;
-    for _ in 0..MAX_STEPS {
-        if rest.norm() < CLOSE * radius {
+    let mut damping = FIRST_DAMPING * radius * radius;
+    for _ in 0..MAX_STEPS_PER_START {
+        if rest.norm() < LENGTH_TOLERANCE * radius {
             return Some(KinematicState::new(machine, pose));
         }
         let jacobian = leg_wrenches(machine, &pose).transpose() * Matrix6::from_diagonal(&scale);
@@ -143,9 +152,9 @@ fn settled(machine: &Machine, lengths: &[f64; LEGS], start: Pose) -> Option<Kine
         let next = pose.displaced(&Twist::from_vector(&step));
         let left = residual(&next);
         if left.norm() < rest.norm() {
-            (pose, rest, damping) = (next, left, damping * RELAXED);
+            (pose, rest, damping) = (next, left, damping * DAMPING_DECREASE);
         } else {
-            damping *= TIGHTENED;
+            damping *= DAMPING_INCREASE;
         }
     }
     None

@@ -1,6 +1,6 @@
-//! Many poses: inverse dynamics over slices, on all processors.
+//! Inverse dynamics of many motions, on all processors.
 //!
-//! For trajectories, sweeps and Monte Carlo. Motions are independent, so the cost grows linearly, and the
+//! For trajectories, sweeps and Monte Carlo. Motions are independent: the cost grows linearly, and the
 //! result does not depend on the number of processors.
 
 use indicatif::ProgressBar;
@@ -12,10 +12,10 @@ use crate::model::machine::LEGS;
 use crate::model::rigid::Motion;
 
 /// Motions per task: half a millisecond of work, long against the cost of handing it to a thread.
-const CHUNK: usize = 8192;
+const MOTIONS_PER_TASK: usize = 8192;
 
-/// Writes the forces of every motion \[N\] to the same place in `forces`, `None` at singular poses. The
-/// longer slice keeps its rest. The bar advances by motions.
+/// Writes the forces of every motion \[N\] to the same place in `forces`, `None` at singular poses. Elements
+/// beyond the shorter slice are left as they are. The bar advances by motions.
 pub fn forces(
     model: &InverseDynamics,
     fidelity: Fidelity,
@@ -23,10 +23,12 @@ pub fn forces(
     forces: &mut [Option<[f64; LEGS]>],
     bar: &ProgressBar,
 ) {
-    forces.par_chunks_mut(CHUNK).zip(motions.par_chunks(CHUNK)).for_each(|(forces, motions)| {
-        for (force, motion) in forces.iter_mut().zip(motions) {
-            *force = model.forces_of(fidelity, motion);
-        }
-        bar.inc(motions.len() as u64);
-    });
+    forces.par_chunks_mut(MOTIONS_PER_TASK).zip(motions.par_chunks(MOTIONS_PER_TASK)).for_each(
+        |(forces, motions)| {
+            for (force, motion) in forces.iter_mut().zip(motions) {
+                *force = model.forces_of(fidelity, motion);
+            }
+            bar.inc(motions.len() as u64);
+        },
+    );
 }

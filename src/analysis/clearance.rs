@@ -1,6 +1,6 @@
-//! Sets of poses in which nothing is in the way: every leg within its stroke, on home's side of singular poses,
-//! no condition beyond a limit. Proved for a whole cell of poses at once, not looked for at points of it: a singular
-//! surface has no thickness, and passes between any samples.
+//! Clearance of sets of poses: every leg within its stroke, on home's side of singular poses, no condition beyond a limit.
+//! Proved for a whole cell of poses at once, not sampled: a singular surface has no thickness and passes between any
+//! samples.
 //!
 //! The parameters of a pose are three angles, one after the other about the axes `e` that the ones before left, and three
 //! displacements. From the middle of a cell they go at most `h` away. With arms `b` from C, `a = |b|`, moments
@@ -17,8 +17,8 @@
 //! condition = |N| |N^-1| <= min(|N0| + D, sqrt 12) B / (1 - f)       Frobenius norms throughout
 //! ```
 //!
-//! Where that does not do, by Taylor: `f = sum of |N0^-1 dN_k| h_k + B F / 2`, `dN_k` the derivative of N along a parameter
-//! and `F^2` the sum of squares of the second derivatives of the columns along any way through the cell:
+//! Where that bound is too large, by Taylor: `f = sum of |N0^-1 dN_k| h_k + B F / 2`, `dN_k` the derivative of N along a parameter
+//! and `F^2` the sum of squares of the second derivatives of the columns along any path through the cell:
 //!
 //! ```text
 //! |n''| <= (a (t^2 + t'^2) + 3 s^2 / l) / l,  l = L0 - s       |m''| / r <= (a' / r) (t^2 + t'^2 + 2 t s / l + |n''|)
@@ -26,7 +26,7 @@
 //!
 //! Cells that cover a region around home and all pass have the sign of home's determinant everywhere.
 //!
-//! To rounding: 1e-15 of the lengths is not accounted for.
+//! Rounding, 1e-15 of the lengths, is not accounted for. Collisions of legs and joint angles are not part of it.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
@@ -37,63 +37,74 @@ use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, exp, log};
 use crate::model::task::{TaskState, task_coordinates};
 
-/// Frobenius norm of N, no arm shorter than its moment: six directions, and six arms whose mean square is 1.
-const LARGEST_WRENCHES: f64 = 3.464_101_615_137_755;
+/// Largest Frobenius norm of N, as no moment exceeds its arm: six directions, and six arms whose mean square is 1.
+const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_755;
 
-/// The linear part of a change is hardly less than this share of the bound of the whole one. Only time depends on it.
-const LEAST_SHARE: f64 = 0.1;
+/// Smallest usual share of the linear part in the bound of a change. Only the computing time depends on it.
+const MIN_LINEAR_SHARE: f64 = 0.1;
 
-/// A family of growing regions around home, and what its six parameters mean. Angular parameters first.
+/// RegionShape of a family of growing regions around home, and the meaning of its six parameters, angular parameters first.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
+pub enum RegionShape {
     /// Positions within a radius \[m\], the size; any turn from home's orientation about any axis up to `turn` \[rad\], at
     /// most a quarter. The angles turn home's platform.
-    Ball { turn: f64 },
+    Ball {
+        /// \[rad\]
+        turn: f64,
+    },
     /// Offsets of X from home within ranges (low at most 0, high at least 0) times the size.
-    Box { low: [f64; 6], high: [f64; 6] },
+    Box {
+        /// At size 1.
+        low: [f64; 6],
+        /// At size 1.
+        high: [f64; 6],
+    },
 }
 
-/// A box of parameters.
+/// PoseCell of poses: a box of parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell {
+pub struct PoseCell {
+    /// Parameters of the middle.
     pub middle: [f64; 6],
+    /// Half of the width of each.
     pub half: [f64; 6],
 }
 
-/// What is in the way at a pose.
+/// Limit of the workspace that a pose violates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Obstacle {
-    /// A leg, counted from 0, shorter or longer than it can be.
-    Short(usize),
-    Long(usize),
-    /// Beyond a singular pose.
+pub enum WorkspaceLimit {
+    /// A leg, counted from 0, is shorter than its stroke allows.
+    LegTooShort(usize),
+    /// A leg, counted from 0, is longer than its stroke allows.
+    LegTooLong(usize),
+    /// The pose is beyond a singular pose.
     Singular,
-    /// Beyond the limit of the condition.
+    /// The condition exceeds its limit.
     Condition,
 }
 
-/// The machine among its obstacles.
+/// Machine with the limits of its workspace.
 #[derive(Clone, Debug)]
 pub struct Clearance<'a> {
     machine: &'a Machine,
     home: Pose,
     home_determinant: f64,
     largest_condition: f64,
-    /// Of the joints on the platform: from C, and from their mean in radii.
+    /// Lengths of the arms of the joints on the platform: from C, and from their mean in radii.
     arms: [(f64, f64); LEGS],
     /// The joints on the platform and their mean, in platform axes.
     joints: [Vector3<f64>; LEGS],
     mean: Vector3<f64>,
 }
 
-impl Shape {
-    /// The whole family up to a size.
-    pub fn cell(&self, size: f64) -> Cell {
+impl RegionShape {
+    /// The cell that contains the region of a size.
+    pub fn cell(&self, size: f64) -> PoseCell {
         let (low, high) = match *self {
             Self::Ball { turn: t } => ([-t, -t, -t, -size, -size, -size], [t, t, t, size, size, size]),
             Self::Box { low, high } => (low.map(|x| size * x), high.map(|x| size * x)),
         };
-        let mut cell = Cell { middle: [0.0; 6], half: [0.0; 6] };
+        let mut cell = PoseCell { middle: [0.0; 6], half: [0.0; 6] };
         for ((middle, half), (low, high)) in
             cell.middle.iter_mut().zip(&mut cell.half).zip(low.into_iter().zip(high))
         {
@@ -102,14 +113,14 @@ impl Shape {
         cell
     }
 
-    /// The size from which on the family may have poses of this cell; none if it never has.
-    pub fn size(&self, cell: &Cell) -> Option<f64> {
+    /// The smallest size at which the region may contain poses of this cell; `None` if no region does.
+    pub fn size(&self, cell: &PoseCell) -> Option<f64> {
         let nearest = cell.nearest();
         match self {
             Self::Ball { turn } => {
                 let [a, b, c, ..] = cell.middle;
                 let middle = log(&turned([a, b, c])).norm();
-                // A hair for rounding, so that a cell on the edge is not lost.
+                // 1e-12 for rounding, so that a cell on the edge is not left out.
                 let within = middle - cell.turn() <= turn * (1.0 + 1e-12);
                 let [.., x, y, z] = nearest;
                 within.then(|| Vector3::new(x, y, z).norm())
@@ -125,7 +136,7 @@ impl Shape {
         }
     }
 
-    /// Parameters on the edge of the region of size 1, those of the turn included, by six numbers in \[-1, 1\].
+    /// Parameters on the edge of the region of size 1, angles included, from six numbers in \[-1, 1\].
     pub fn edge(&self, numbers: &[f64; 6]) -> [f64; 6] {
         match self {
             Self::Ball { turn } => {
@@ -146,23 +157,23 @@ impl Shape {
         }
     }
 
-    /// The point of another size on the way to an edge.
-    pub fn towards(&self, edge: &[f64; 6], size: f64) -> Cell {
+    /// The point of another size on the ray to a point of the edge.
+    pub fn towards(&self, edge: &[f64; 6], size: f64) -> PoseCell {
         let [a, b, c, x, y, z] = edge.map(|x| size * x);
         let middle = match (self, edge) {
             (Self::Ball { .. }, [a, b, c, ..]) => [*a, *b, *c, x, y, z],
             (Self::Box { .. }, _) => [a, b, c, x, y, z],
         };
-        Cell { middle, half: [0.0; 6] }
+        PoseCell { middle, half: [0.0; 6] }
     }
 }
 
-/// Turned by angles, one after the other.
+/// Rotation by Bryan angles.
 fn turned([a, b, c]: [f64; 3]) -> Matrix3<f64> {
     TaskState::at_rest([a, b, c, 0.0, 0.0, 0.0]).motion().pose.rotation
 }
 
-impl Cell {
+impl PoseCell {
     /// The parameters of this cell that are nearest to home.
     fn nearest(&self) -> [f64; 6] {
         let mut nearest = self.middle;
@@ -196,9 +207,9 @@ impl Cell {
 }
 
 impl<'a> Clearance<'a> {
-    /// Around home, with the largest condition that is allowed.
+    /// The limits of a machine around home, with the largest condition that is allowed.
     pub fn new(machine: &'a Machine, largest_condition: f64) -> Self {
-        let home = TaskState::at_rest(machine.home).motion().pose;
+        let home = machine.home_pose();
         let joints = &machine.joints;
         let platform = joints.triples.unpack_vectors(&joints.platform);
         let mean = platform.iter().sum::<Vector3<f64>>() / LEGS as f64;
@@ -213,71 +224,75 @@ impl<'a> Clearance<'a> {
         }
     }
 
-    /// The leg that is nearest to an end of its stroke at the middle of a cell, and how far it is from it \[m\]. As C
-    /// may go there along that leg and no length changes by more than C goes, this is the largest ball within the
-    /// stroke at this orientation.
-    pub fn margin(&self, shape: &Shape, cell: &Cell) -> (f64, Obstacle) {
+    /// The leg nearest to an end of its stroke at the middle of a cell, and its distance from that end \[m\]. C can
+    /// move by that along the leg, and no length changes by more than C moves: this is the largest ball within the stroke at
+    /// this orientation.
+    pub fn margin(&self, shape: &RegionShape, cell: &PoseCell) -> (f64, WorkspaceLimit) {
         let actuator = &self.machine.actuator;
         let ends = |(leg, length): (usize, f64)| {
             [
-                (length - actuator.min_length, Obstacle::Short(leg)),
-                (actuator.max_length - length, Obstacle::Long(leg)),
+                (length - actuator.min_length, WorkspaceLimit::LegTooShort(leg)),
+                (actuator.max_length - length, WorkspaceLimit::LegTooLong(leg)),
             ]
         };
         let lengths = leg_lengths(self.machine, &self.pose(shape, &cell.middle));
-        let nearer = |a: (f64, Obstacle), b: (f64, Obstacle)| if b.0 < a.0 { b } else { a };
-        lengths.into_iter().enumerate().flat_map(ends).fold((f64::INFINITY, Obstacle::Condition), nearer)
+        let nearer = |a: (f64, WorkspaceLimit), b: (f64, WorkspaceLimit)| if b.0 < a.0 { b } else { a };
+        lengths
+            .into_iter()
+            .enumerate()
+            .flat_map(ends)
+            .fold((f64::INFINITY, WorkspaceLimit::Condition), nearer)
     }
 
-    /// What is in the way at the middle of a cell, with the size there, if the middle is of the family.
-    pub fn obstacle(&self, shape: &Shape, cell: &Cell) -> Option<(f64, Obstacle)> {
-        let size = shape.size(&Cell { half: [0.0; 6], ..*cell })?;
-        self.obstacle_at(&self.pose(shape, &cell.middle)).map(|obstacle| (size, obstacle))
+    /// The limit violated at the middle of a cell, with the size there, if the middle belongs to the family.
+    pub fn violation(&self, shape: &RegionShape, cell: &PoseCell) -> Option<(f64, WorkspaceLimit)> {
+        let size = shape.size(&PoseCell { half: [0.0; 6], ..*cell })?;
+        self.violation_at(&self.pose(shape, &cell.middle)).map(|limit| (size, limit))
     }
 
     /// The pose of parameters.
-    fn pose(&self, shape: &Shape, parameters: &[f64; 6]) -> Pose {
+    fn pose(&self, shape: &RegionShape, parameters: &[f64; 6]) -> Pose {
         let [a, b, c, x, y, z] = *parameters;
         let position = self.home.position + Vector3::new(x, y, z);
         let [alpha, beta, gamma, ..] = self.machine.home;
         let rotation = match shape {
-            Shape::Ball { .. } => turned([a, b, c]) * self.home.rotation,
-            Shape::Box { .. } => turned([alpha + a, beta + b, gamma + c]),
+            RegionShape::Ball { .. } => turned([a, b, c]) * self.home.rotation,
+            RegionShape::Box { .. } => turned([alpha + a, beta + b, gamma + c]),
         };
         Pose { rotation, position }
     }
 
     /// The axes of the three angles, in base axes.
-    fn axes(&self, shape: &Shape, parameters: &[f64; 6]) -> [Vector3<f64>; 3] {
+    fn axes(&self, shape: &RegionShape, parameters: &[f64; 6]) -> [Vector3<f64>; 3] {
         let [a, b, ..] = *parameters;
         let [alpha, beta, ..] = self.machine.home;
-        let (a, b) = if let Shape::Box { .. } = shape { (alpha + a, beta + b) } else { (a, b) };
+        let (a, b) = if let RegionShape::Box { .. } = shape { (alpha + a, beta + b) } else { (a, b) };
         let ((sin_a, cos_a), (sin_b, cos_b)) = (a.sin_cos(), b.sin_cos());
         let second = Vector3::new(0.0, cos_a, sin_a);
         [Vector3::x(), second, Vector3::new(sin_b, -sin_a * cos_b, cos_a * cos_b)]
     }
 
-    /// What is in the way at a pose.
-    pub fn obstacle_at(&self, pose: &Pose) -> Option<Obstacle> {
+    /// The limit that a pose violates.
+    pub fn violation_at(&self, pose: &Pose) -> Option<WorkspaceLimit> {
         let kinematic_state = KinematicState::new(self.machine, *pose);
         let actuator = &self.machine.actuator;
         for (leg, length) in kinematic_state.lengths(self.machine).into_iter().enumerate() {
             if !(length >= actuator.min_length) {
-                return Some(Obstacle::Short(leg));
+                return Some(WorkspaceLimit::LegTooShort(leg));
             }
             if !(length <= actuator.max_length) {
-                return Some(Obstacle::Long(leg));
+                return Some(WorkspaceLimit::LegTooLong(leg));
             }
         }
         let sensitivity = kinematic_state.sensitivity();
         if !(sensitivity.determinant * self.home_determinant > 0.0) {
-            return Some(Obstacle::Singular);
+            return Some(WorkspaceLimit::Singular);
         }
-        (!(sensitivity.condition <= self.largest_condition)).then_some(Obstacle::Condition)
+        (!(sensitivity.condition <= self.largest_condition)).then_some(WorkspaceLimit::Condition)
     }
 
-    /// The least that [`Clearance::margin`] may be anywhere in a cell.
-    pub fn least_margin(&self, shape: &Shape, cell: &Cell) -> f64 {
+    /// Lower bound of [`Clearance::margin`] anywhere in a cell.
+    pub fn least_margin(&self, shape: &RegionShape, cell: &PoseCell) -> f64 {
         let actuator = &self.machine.actuator;
         let pose = self.pose(shape, &cell.middle);
         let wrenches = leg_wrenches(self.machine, &pose);
@@ -303,8 +318,8 @@ impl<'a> Clearance<'a> {
         margins.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether it is proved that no pose of a cell is singular, or of a condition beyond the limit.
-    pub fn is_regular(&self, shape: &Shape, cell: &Cell) -> bool {
+    /// Whether a proof exists that no pose of a cell is singular or has a condition beyond the limit.
+    pub fn is_regular(&self, shape: &RegionShape, cell: &PoseCell) -> bool {
         let kinematic_state = KinematicState::new(self.machine, self.pose(shape, &cell.middle));
         let [ha, hb, hc, hx, hy, hz] = cell.half;
         let (shift, turn) = (Vector3::new(hx, hy, hz).norm(), cell.turn());
@@ -326,21 +341,21 @@ impl<'a> Clearance<'a> {
         let wrenches = scaled_wrenches(self.machine, kinematic_state.pose());
         let norm = wrenches.norm();
         let inverse = kinematic_state.sensitivity().condition / norm;
-        let most = (norm + change).min(LARGEST_WRENCHES) * inverse / self.largest_condition;
-        let does = |share: f64| most <= 1.0 - share;
-        // The second bound takes ten times as long: not where it cannot do.
-        does(inverse * change)
-            || does(inverse * (bent + change * LEAST_SHARE))
+        let most = (norm + change).min(MAX_WRENCH_NORM) * inverse / self.largest_condition;
+        let holds = |share: f64| most <= 1.0 - share;
+        // The second bound takes ten times as long: only where it can succeed.
+        holds(inverse * change)
+            || holds(inverse * (bent + change * MIN_LINEAR_SHARE))
                 && self
                     .linear_change(shape, cell, &kinematic_state, &wrenches)
-                    .is_some_and(|linear| does(linear + inverse * bent))
+                    .is_some_and(|linear| holds(linear + inverse * bent))
     }
 
     /// Sum of `|N0^-1 dN_k| h_k`; none at a singular pose.
     fn linear_change(
         &self,
-        shape: &Shape,
-        cell: &Cell,
+        shape: &RegionShape,
+        cell: &PoseCell,
         kinematic_state: &KinematicState,
         wrenches: &Matrix6<f64>,
     ) -> Option<f64> {

@@ -1,95 +1,101 @@
-//! What each fidelity of the ladder leaves out, in newtons, over a scene; and the cheapest fidelity that will do.
+//! Force error of each fidelity over an envelope or a trajectory, and the cheapest fidelity within a tolerance.
 //!
-//! The error of a fidelity is the difference of its six forces from the exact model's. Its size is judged
-//! against the peak force of the scene. Of an envelope three things are looked at: an even spread over the
-//! inside, the corners, and, because the worst of 18 dimensions is rarely among them, the point where a
-//! climb from the worst of those ends, for each fidelity and leg.
+//! The error of a fidelity is the difference of its six forces from the exact model's, relative to the peak force of the
+//! same motions. An envelope is evaluated at an even spread over the inside, at its corners, and, because the worst point
+//! of 18 dimensions is rarely among them, at the end of a coordinate ascent from the worst of those, for each fidelity and
+//! leg.
 //!
-//! A share is the worst of three: largest error over peak of the even spread, of the corners, and of all
-//! points together, the ends of the climbs among them. Corners raise both error and peak: who samples the
-//! inside alone sees neither, and must find the choice good all the same.
+//! A share is the largest of three: largest error over peak of the even spread, of the corners, and of all points with
+//! the ends of the ascents. Corners raise both error and peak: the choice must hold for the inside alone as well.
 //!
-//! Points outside the actuators' stroke and singular poses are counted and passed over.
+//! The result is sampled, not proved; `TOLERANCE_MARGIN` covers errors between samples. Points outside of the actuators'
+//! stroke and singular poses are counted and passed over.
 
-use super::envelope::{CORNERS, DIMENSIONS, Envelope, Shares};
-use super::fidelity_error::{FIDELITIES, Sample, Tally, largest};
+use super::envelope::{CORNER_COUNT, DIMENSIONS, EnvelopePoint, MotionEnvelope};
+use super::fidelity_error::{ErrorStatistics, FIDELITY_COUNT, FidelitySample, largest};
 use super::reachable_envelope::within_stroke;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::{Exact, Fidelity};
 use crate::model::machine::LEGS;
 
-/// Points of the even spread that are judged. With eight times as many the figures stay within a few per
-/// cent, and with this many a daemon starts without a delay that anybody sees.
-pub const SPREAD: u32 = 1 << 15;
+/// Points of the even spread that are evaluated. Eight times as many change the figures by a few per cent; this many
+/// take a fraction of a second when the daemon starts.
+pub const SPREAD_POINTS: u32 = 1 << 15;
 
-/// What is taken of a tolerance, for what no sample shows: on 200,000 other points of the inside, errors of
-/// up to 1.13 times as large a share were seen where poses next to singular ones are in reach, and 1.02
-/// elsewhere.
-const MARGIN: f64 = 1.05;
+/// Factor on a share before it is compared with a tolerance, for errors between the samples: 200,000 other points of
+/// the inside had up to 1.13 times as large a share where poses next to singular ones are in reach, and 1.02 elsewhere.
+const TOLERANCE_MARGIN: f64 = 1.05;
 
-/// Where most of an envelope is out of reach: points drawn at most.
-const MOST_DRAWN: u32 = 4 * SPREAD;
+/// Most points drawn, where most of an envelope is out of reach.
+const MAX_DRAWN_POINTS: u32 = 4 * SPREAD_POINTS;
 
-/// The climb begins with steps as wide as the envelope and ends with this share of it.
-const LAST_STEP: f64 = 1.0 / 64.0;
+/// Last step of an ascent as a share of the envelope; the first is as wide as the envelope.
+const MIN_CLIMB_STEP: f64 = 1.0 / 64.0;
 
-/// Sweeps over all dimensions with steps of one width, at most; they usually end after two.
-const SWEEPS: u32 = 4;
+/// Most sweeps over all dimensions with steps of one width; two are usual.
+const MAX_SWEEPS_PER_STEP: u32 = 4;
 
-/// What a fidelity costs in accuracy over a scene.
+/// Force error of one fidelity over an envelope or a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Price {
+pub struct FidelityError {
+    /// The fidelity.
     pub fidelity: Fidelity,
-    /// Of the even spread, or of the rows \[N\].
+    /// Mean over the even spread, or over the rows \[N\].
     pub mean: f64,
-    /// Of the same.
+    /// Root mean square over the same \[N\].
     pub rms: f64,
-    /// Of all points \[N\].
+    /// Largest over all points \[N\].
     pub max: f64,
     /// The largest error as a share of the peak force, as the head of this file says.
     pub share: f64,
 }
 
-/// A scene, judged.
+/// Comparison of all fidelities with the exact model, over an envelope or a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Judgement {
-    /// The even spread, or the rows.
-    pub inside: Tally,
-    /// Everything.
-    pub all: Tally,
+pub struct FidelityComparison {
+    /// Statistics of the even spread, or of the rows.
+    pub inside: ErrorStatistics,
+    /// Statistics of all points.
+    pub all: ErrorStatistics,
     /// In the order of [`Fidelity::ALL`].
-    pub prices: [Price; FIDELITIES],
+    pub errors: [FidelityError; FIDELITY_COUNT],
 }
 
-impl Judgement {
-    /// Of an envelope. A bounded number of evaluations: at most some 200,000 points.
-    pub fn of_envelope(model: &InverseDynamics, envelope: &Envelope) -> Self {
-        let (mut inside, mut edge) = (Tally::default(), Tally::default());
-        let mut worst = [[Worst::default(); LEGS]; FIDELITIES];
-        let look = |shares: &Shares, tally: &mut Tally, worst: &mut [[Worst; LEGS]; FIDELITIES]| {
-            let sample = Sample::take(model, &envelope.at(shares));
-            tally.add(&sample);
+impl FidelityComparison {
+    /// Comparison over an envelope, at 200,000 points at most.
+    pub fn of_envelope(model: &InverseDynamics, envelope: &MotionEnvelope) -> Self {
+        let (mut inside, mut edge) = (ErrorStatistics::default(), ErrorStatistics::default());
+        let mut worst = [[WorstPoint::default(); LEGS]; FIDELITY_COUNT];
+        let evaluate = |point: &EnvelopePoint,
+                        statistics: &mut ErrorStatistics,
+                        worst: &mut [[WorstPoint; LEGS]; FIDELITY_COUNT]| {
+            let sample = FidelitySample::take(model, &envelope.at(point));
+            statistics.add(&sample);
             if let Ok(sample) = sample {
                 let errors = sample.errors.as_flattened();
-                worst.as_flattened_mut().iter_mut().zip(errors).for_each(|(worst, e)| worst.note(*e, shares));
+                worst
+                    .as_flattened_mut()
+                    .iter_mut()
+                    .zip(errors)
+                    .for_each(|(worst, e)| worst.update(*e, point));
             }
         };
-        for k in 0..MOST_DRAWN {
-            look(&Envelope::spread(k), &mut inside, &mut worst);
-            if inside.judged >= u64::from(SPREAD) {
+        for k in 0..MAX_DRAWN_POINTS {
+            evaluate(&MotionEnvelope::spread(k), &mut inside, &mut worst);
+            if inside.evaluated >= u64::from(SPREAD_POINTS) {
                 break;
             }
         }
-        for k in 0..CORNERS {
-            look(&envelope.corner(k), &mut edge, &mut worst);
+        for k in 0..CORNER_COUNT {
+            evaluate(&envelope.corner(k), &mut edge, &mut worst);
         }
         let mut all = inside.and(&edge);
         let mut peak = all.peak;
         for (fidelity, (errors, worst)) in Fidelity::ALL.into_iter().zip(all.errors.iter_mut().zip(&worst)) {
             for (leg, start) in worst.iter().enumerate() {
-                let top = climb(model, envelope, fidelity, leg, start);
+                let top = ascend(model, envelope, fidelity, leg, start);
                 errors.max = errors.max.max(top.error);
-                let forces = model.forces::<Exact>(&envelope.at(&top.shares).motion());
+                let forces = model.forces::<Exact>(&envelope.at(&top.point).motion());
                 peak = peak.max(forces.map_or(0.0, |forces| largest(&forces)));
             }
         }
@@ -97,20 +103,21 @@ impl Judgement {
         Self::new(&[inside, edge], all)
     }
 
-    /// Of rows that were looked at one by one.
-    pub fn of_rows(rows: Tally) -> Self {
+    /// Comparison over the rows of a trajectory.
+    pub fn of_rows(rows: ErrorStatistics) -> Self {
         Self::new(&[rows], rows)
     }
 
-    /// The first part is what is called the inside.
-    fn new(parts: &[Tally], all: Tally) -> Self {
+    /// The first part is the inside.
+    fn new(parts: &[ErrorStatistics], all: ErrorStatistics) -> Self {
         let inside = parts.first().copied().unwrap_or_default();
-        let nothing = Price { fidelity: Fidelity::Exact, mean: 0.0, rms: 0.0, max: 0.0, share: 0.0 };
-        let mut prices = [nothing; FIDELITIES];
-        for (number, (price, fidelity)) in prices.iter_mut().zip(Fidelity::ALL).enumerate() {
-            let errors = |tally: &Tally| tally.errors.get(number).copied().unwrap_or_default();
-            let share = |tally: &Tally| share(errors(tally).max, tally.peak);
-            *price = Price {
+        let nothing = FidelityError { fidelity: Fidelity::Exact, mean: 0.0, rms: 0.0, max: 0.0, share: 0.0 };
+        let mut errors = [nothing; FIDELITY_COUNT];
+        for (number, (error, fidelity)) in errors.iter_mut().zip(Fidelity::ALL).enumerate() {
+            let errors =
+                |statistics: &ErrorStatistics| statistics.errors.get(number).copied().unwrap_or_default();
+            let share = |statistics: &ErrorStatistics| share(errors(statistics).max, statistics.peak);
+            *error = FidelityError {
                 fidelity,
                 mean: inside.mean(&errors(&inside)),
                 rms: inside.rms(&errors(&inside)),
@@ -118,57 +125,57 @@ impl Judgement {
                 share: parts.iter().map(share).fold(share(&all), f64::max),
             };
         }
-        Self { inside, all, prices }
+        Self { inside, all, errors }
     }
 
-    /// The fidelities whose largest error is within a tolerance, given as a share of the peak force, less 5 %; the
-    /// cheapest first, by the order of the ladder. That order is the same on every computer and in every
-    /// run, as a measured time is not. The last one is the exact model.
-    pub fn within(&self, tolerance: f64) -> impl Iterator<Item = &Price> {
-        self.prices.iter().filter(move |price| MARGIN * price.share <= tolerance)
+    /// The fidelities whose largest error is within a tolerance, given as a share of the peak force, less 5 %; in the
+    /// order of [`Fidelity::ALL`], which is the same on every computer, as measured times are not. The last one is the
+    /// exact model.
+    pub fn within(&self, tolerance: f64) -> impl Iterator<Item = &FidelityError> {
+        self.errors.iter().filter(move |error| TOLERANCE_MARGIN * error.share <= tolerance)
     }
 
-    /// The first of [`Judgement::within`] that a control loop can run on.
+    /// The cheapest of [`FidelityComparison::within`] that a control law can use.
     pub fn choice(&self, tolerance: f64) -> Fidelity {
         self.within(tolerance)
-            .map(|price| price.fidelity)
+            .map(|error| error.fidelity)
             .find(|fidelity| fidelity.has_inertia())
             .unwrap_or(Fidelity::Exact)
     }
 }
 
-/// Where an error was largest.
+/// Point with the largest error of one fidelity and leg.
 #[derive(Clone, Copy, Debug)]
-struct Worst {
+struct WorstPoint {
     error: f64,
-    shares: Shares,
+    point: EnvelopePoint,
 }
 
-impl Default for Worst {
+impl Default for WorstPoint {
     fn default() -> Self {
-        Self { error: 0.0, shares: Shares::zeros() }
+        Self { error: 0.0, point: EnvelopePoint::zeros() }
     }
 }
 
-impl Worst {
-    fn note(&mut self, error: f64, shares: &Shares) {
+impl WorstPoint {
+    fn update(&mut self, error: f64, point: &EnvelopePoint) {
         if error > self.error {
-            *self = Self { error, shares: *shares };
+            *self = Self { error, point: *point };
         }
     }
 }
 
-/// The largest error of one fidelity and leg at the end of a climb along the axes of the envelope, with steps that are
-/// halved where none leads up.
-fn climb(
+/// Coordinate ascent of the error of one fidelity and leg along the axes of the envelope, with steps that are halved where
+/// none increases it.
+fn ascend(
     model: &InverseDynamics,
-    envelope: &Envelope,
+    envelope: &MotionEnvelope,
     fidelity: Fidelity,
     leg: usize,
-    start: &Worst,
-) -> Worst {
-    let error_at = |shares: &Shares| -> Option<f64> {
-        let state = envelope.at(shares);
+    start: &WorstPoint,
+) -> WorstPoint {
+    let error_at = |point: &EnvelopePoint| -> Option<f64> {
+        let state = envelope.at(point);
         if !within_stroke(model.machine(), &state) {
             return None;
         }
@@ -179,16 +186,16 @@ fn climb(
     };
     let mut best = *start;
     let mut step = 1.0;
-    // Where nothing is wrong, as with the exact model, there is nothing to climb.
-    while best.error > 0.0 && step >= LAST_STEP {
-        for _ in 0..SWEEPS {
+    // The exact model has no error.
+    while best.error > 0.0 && step >= MIN_CLIMB_STEP {
+        for _ in 0..MAX_SWEEPS_PER_STEP {
             let before = best.error;
-            for (axis, way) in (0..DIMENSIONS).flat_map(|axis| [(axis, step), (axis, -step)]) {
-                let mut shares = best.shares;
-                if let Some(share) = shares.get_mut(axis) {
-                    *share = (*share + way).clamp(0.0, 1.0);
+            for (axis, signed_step) in (0..DIMENSIONS).flat_map(|axis| [(axis, step), (axis, -step)]) {
+                let mut point = best.point;
+                if let Some(share) = point.get_mut(axis) {
+                    *share = (*share + signed_step).clamp(0.0, 1.0);
                 }
-                best.note(error_at(&shares).unwrap_or(0.0), &shares);
+                best.update(error_at(&point).unwrap_or(0.0), &point);
             }
             if best.error <= before {
                 break;
@@ -199,7 +206,7 @@ fn climb(
     best
 }
 
-/// Nothing of nothing is nothing: a scene at rest without gravity.
+/// Error over peak force; no error of no force is 0, as at rest without gravity.
 fn share(error: f64, peak: f64) -> f64 {
     if error == 0.0 { 0.0 } else { error / peak }
 }

@@ -1,4 +1,7 @@
-//! The fidelities of the ladder against the exact model, motion by motion.
+//! Force errors of every fidelity against the exact model, motion by motion.
+//!
+//! The error of leg i is `|Gamma_i(fidelity) - Gamma_i(exact)|` \[N\]. Motions outside the stroke and at singular poses are
+//! counted and not evaluated.
 
 use super::reachable_envelope::within_stroke;
 use crate::model::active_forces::InverseDynamics;
@@ -6,37 +9,39 @@ use crate::model::fidelity::Fidelity;
 use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
 
-/// Rungs of the ladder.
-pub const FIDELITIES: usize = Fidelity::ALL.len();
+/// Number of fidelities.
+pub const FIDELITY_COUNT: usize = Fidelity::ALL.len();
 
-/// Forces of all fidelities at one point against the exact ones.
+/// Force errors of all fidelities at one motion.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub struct FidelitySample {
     /// Largest exact force \[N\].
     pub peak: f64,
     /// Error of each fidelity and leg \[N\], in the order of [`Fidelity::ALL`].
-    pub errors: [[f64; LEGS]; FIDELITIES],
+    pub errors: [[f64; LEGS]; FIDELITY_COUNT],
 }
 
-/// Why a point has no sample.
+/// Reason why a motion has no sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Skipped {
+pub enum NotEvaluated {
+    /// A leg is outside of its stroke.
     OutsideStroke,
+    /// The pose is singular.
     Singular,
 }
 
-impl Sample {
-    /// Evaluates every fidelity.
-    pub fn take(model: &InverseDynamics, state: &TaskState) -> Result<Self, Skipped> {
+impl FidelitySample {
+    /// Evaluates every fidelity at a motion.
+    pub fn take(model: &InverseDynamics, state: &TaskState) -> Result<Self, NotEvaluated> {
         if !within_stroke(model.machine(), state) {
-            return Err(Skipped::OutsideStroke);
+            return Err(NotEvaluated::OutsideStroke);
         }
         let motion = state.motion();
         let of = |fidelity| model.forces_of(fidelity, &motion).filter(|f| f.iter().all(|f| f.is_finite()));
-        let exact = of(Fidelity::Exact).ok_or(Skipped::Singular)?;
-        let mut errors = [[0.0; LEGS]; FIDELITIES];
+        let exact = of(Fidelity::Exact).ok_or(NotEvaluated::Singular)?;
+        let mut errors = [[0.0; LEGS]; FIDELITY_COUNT];
         for (errors, fidelity) in errors.iter_mut().zip(Fidelity::ALL) {
-            let forces = of(fidelity).ok_or(Skipped::Singular)?;
+            let forces = of(fidelity).ok_or(NotEvaluated::Singular)?;
             for (error, (force, exact)) in errors.iter_mut().zip(forces.iter().zip(&exact)) {
                 *error = (force - exact).abs();
             }
@@ -45,69 +50,69 @@ impl Sample {
     }
 }
 
-/// Statistics of the errors of one fidelity, over samples and legs.
+/// Sums of the errors of one fidelity, over samples and legs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Errors {
+pub struct ErrorSums {
     sum: f64,
     squares: f64,
     /// Largest \[N\].
     pub max: f64,
 }
 
-/// What has been seen of a scene.
+/// Error statistics of all fidelities over many motions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tally {
-    /// Points with a sample.
-    pub judged: u64,
-    /// Points outside the actuators' stroke.
+pub struct ErrorStatistics {
+    /// Motions with a sample.
+    pub evaluated: u64,
+    /// Motions outside of the actuators' stroke.
     pub outside: u64,
-    /// Poses without a solution.
+    /// Motions at a singular pose.
     pub singular: u64,
     /// Largest exact force \[N\].
     pub peak: f64,
     /// In the order of [`Fidelity::ALL`].
-    pub errors: [Errors; FIDELITIES],
+    pub errors: [ErrorSums; FIDELITY_COUNT],
 }
 
-impl Tally {
-    /// Takes note of one point.
-    pub fn add(&mut self, sample: &Result<Sample, Skipped>) {
+impl ErrorStatistics {
+    /// Adds one motion.
+    pub fn add(&mut self, sample: &Result<FidelitySample, NotEvaluated>) {
         let sample = match sample {
             Ok(sample) => sample,
-            Err(Skipped::OutsideStroke) => return self.outside += 1,
-            Err(Skipped::Singular) => return self.singular += 1,
+            Err(NotEvaluated::OutsideStroke) => return self.outside += 1,
+            Err(NotEvaluated::Singular) => return self.singular += 1,
         };
-        self.judged += 1;
+        self.evaluated += 1;
         self.peak = self.peak.max(sample.peak);
-        for (tally, errors) in self.errors.iter_mut().zip(&sample.errors) {
-            tally.sum += errors.iter().sum::<f64>();
-            tally.squares += errors.iter().map(|error| error * error).sum::<f64>();
-            tally.max = tally.max.max(largest(errors));
+        for (sums, errors) in self.errors.iter_mut().zip(&sample.errors) {
+            sums.sum += errors.iter().sum::<f64>();
+            sums.squares += errors.iter().map(|error| error * error).sum::<f64>();
+            sums.max = sums.max.max(largest(errors));
         }
     }
 
-    /// Mean of a fidelity's errors \[N\]; like `errors`, NaN if nothing was judged.
-    pub fn mean(&self, errors: &Errors) -> f64 {
+    /// Mean of a fidelity's errors \[N\]; like `errors`, NaN without a sample.
+    pub fn mean(&self, errors: &ErrorSums) -> f64 {
         errors.sum / self.values()
     }
 
     /// Root mean square of a fidelity's errors \[N\].
-    pub fn rms(&self, errors: &Errors) -> f64 {
+    pub fn rms(&self, errors: &ErrorSums) -> f64 {
         (errors.squares / self.values()).sqrt()
     }
 
     fn values(&self) -> f64 {
-        (self.judged * LEGS as u64) as f64
+        (self.evaluated * LEGS as u64) as f64
     }
 
-    /// Both together.
+    /// The statistics of both sets of motions together.
     pub(crate) fn and(mut self, other: &Self) -> Self {
-        self.judged += other.judged;
+        self.evaluated += other.evaluated;
         self.outside += other.outside;
         self.singular += other.singular;
         self.peak = self.peak.max(other.peak);
         for (a, b) in self.errors.iter_mut().zip(&other.errors) {
-            *a = Errors { sum: a.sum + b.sum, squares: a.squares + b.squares, max: a.max.max(b.max) };
+            *a = ErrorSums { sum: a.sum + b.sum, squares: a.squares + b.squares, max: a.max.max(b.max) };
         }
         self
     }

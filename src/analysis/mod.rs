@@ -1,8 +1,9 @@
 //! Properties of a machine, a motion or a control loop, computed before the platform moves.
 //!
-//! [`envelope`] and [`reachable_envelope`] say which motions are meant, [`fidelity_error`] and [`fidelity_choice`] which
-//! terms of the model they need; [`pose_quality`], [`clearance`] and [`region_search`] what the workspace offers;
-//! [`assembly_modes`] which other poses have the same leg lengths; [`sampled_loop`] how far a loop is from unstable.
+//! [`envelope`] and [`reachable_envelope`] define the motions of a task, [`fidelity_error`] and [`fidelity_choice`] the
+//! terms of the model that they need; [`pose_quality`], [`clearance`] and [`region_search`] compute the workspace,
+//! [`assembly_modes`] the other poses with the same leg lengths, [`sampled_loop`] the margins of a sampled loop;
+//! [`batch`] evaluates many motions on all processors. May allocate; not for the cycle.
 
 pub mod assembly_modes;
 pub mod batch;

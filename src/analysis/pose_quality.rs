@@ -1,4 +1,4 @@
-//! What a pose is worth: stroke left, condition, the force that an acceleration may ask for, the payload.
+//! PoseQuality of a pose: stroke margin, condition, largest force under given accelerations, payload.
 //!
 //! Around a pose at rest the forces are linear in the acceleration and in an added mass p, a point fixed to the
 //! platform at its centre of mass c:
@@ -16,10 +16,10 @@
 //!
 //! and each of these is attained: a row meets its own direction, and a creeping platform has Coulomb's force either way.
 //! The worst force is the largest `f_i(0)`. The payload is the smallest `p >= 0` at which an `f_i` is the actuator's
-//! limit: f is convex, so Newton's method from beyond the root comes down to it without fail. A closed form by the triangle
+//! limit: f is convex, so Newton's method from beyond the root always converges to it. A closed form by the triangle
 //! inequality would give less than the machine carries.
 //!
-//! What it does not do: velocities add forces that are not in these numbers.
+//! Valid at regular poses at rest: velocities add forces that are not included.
 
 use nalgebra::{Matrix3, Matrix6, RowVector3, Vector3, Vector6};
 
@@ -30,79 +30,94 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
-use crate::model::task::TaskState;
 
-/// Most steps of Newton's method for a payload; five are usual.
-const STEPS: usize = 50;
-/// Steps below this share of the payload are rounding.
-const CLOSE: f64 = 1e-12;
+/// Bound on the steps of Newton's method for a payload; five are usual.
+const MAX_PAYLOAD_STEPS: usize = 50;
+/// Step of Newton's method, as a share of the payload, that ends it: rounding.
+const PAYLOAD_TOLERANCE: f64 = 1e-12;
 
-/// How hard the platform accelerates, in any direction.
+/// Accelerations that the platform must reach, in any direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+pub struct AccelerationDemand {
     /// Largest `|v'|` of C \[m/s^2\].
     pub linear: f64,
     /// Largest `|omega'|` \[rad/s^2\].
     pub angular: f64,
 }
 
-/// A machine whose poses are judged.
+/// Evaluator of the quality of poses of one machine.
+///
+/// ```
+/// use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let [still, agile] = [0.0, 2.0].map(|linear| {
+///     PoseEvaluator::new(&machine, AccelerationDemand { linear, angular: 0.0 }).quality(&machine.home_pose())
+/// });
+/// assert!(still.within_reach() && still.condition > 1.0);
+/// // Acceleration takes force that is then missing for payload.
+/// assert!(agile.worst_force > still.worst_force && agile.payload < still.payload);
+/// ```
 #[derive(Clone, Debug)]
-pub struct Workspace {
+pub struct PoseEvaluator {
     model: InverseDynamics,
     mass: MassMatrix,
-    effort: Effort,
-    /// Of `det N` at home.
+    demand: AccelerationDemand,
+    /// Sign of `det N` at home.
     home_sign: f64,
 }
 
-/// What a pose is worth.
+/// PoseQuality of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Quality {
-    /// From the leg that is nearest to an end of its stroke; negative out of reach \[m\].
+pub struct PoseQuality {
+    /// Smallest distance of a leg from an end of its stroke; negative outside of it \[m\].
     pub stroke_margin: f64,
     /// `det N / radius^3`, positive on home's side of singular poses.
     pub determinant: f64,
     /// As [`crate::model::sensitivity::Sensitivity::condition`].
     pub condition: f64,
-    /// The largest force of any leg under the effort; infinite at a singular pose \[N\].
+    /// The largest force of any leg under the demanded accelerations; infinite at a singular pose \[N\].
     pub worst_force: f64,
     /// The largest point mass at the platform's centre of mass that leaves every force within the actuators'
-    /// limit under the effort; 0 if it is exceeded without, infinite where nothing weighs \[kg\].
+    /// limit under the demanded accelerations; 0 if it is exceeded without payload, infinite without gravity and acceleration \[kg\].
     pub payload: f64,
 }
 
-impl Quality {
-    /// Within the stroke, on home's side.
+impl PoseQuality {
+    /// Whether every leg is within its stroke and the pose on home's side of singular poses.
     pub fn within_reach(&self) -> bool {
         self.stroke_margin >= 0.0 && self.determinant > 0.0
     }
 }
 
-impl Workspace {
+impl PoseEvaluator {
     /// Derives the constants.
-    pub fn new(machine: &Machine, effort: Effort) -> Self {
-        let home = KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose);
+    pub fn new(machine: &Machine, demand: AccelerationDemand) -> Self {
+        let home = KinematicState::new(machine, machine.home_pose());
         Self {
             model: InverseDynamics::new(machine),
             mass: MassMatrix::new(machine),
-            effort,
+            demand,
             home_sign: home.sensitivity().determinant.signum(),
         }
     }
 
-    /// Judges a pose.
-    pub fn quality(&self, pose: &Pose) -> Quality {
+    /// The quality of a pose.
+    pub fn quality(&self, pose: &Pose) -> PoseQuality {
         let machine = self.model.machine();
         let kinematic_state = KinematicState::new(machine, *pose);
         let sensitivity = kinematic_state.sensitivity();
         let legs = self.leg_forces(pose);
-        let worst = |legs: [LegForce; LEGS]| legs.iter().map(|leg| leg.largest(0.0).0).fold(0.0, f64::max);
-        let payload = |legs: [LegForce; LEGS]| {
+        let worst =
+            |legs: [LegForceBound; LEGS]| legs.iter().map(|leg| leg.largest(0.0).0).fold(0.0, f64::max);
+        let payload = |legs: [LegForceBound; LEGS]| {
             legs.iter().map(|leg| leg.payload(machine.actuator.max_force)).fold(f64::INFINITY, f64::min)
         };
-        Quality {
-            stroke_margin: stroke_margin(machine, &kinematic_state),
+        PoseQuality {
+            stroke_margin: kinematic_state
+                .lengths(machine)
+                .map(|length| machine.actuator.margin(length))
+                .into_iter()
+                .fold(f64::INFINITY, f64::min),
             determinant: self.home_sign * sensitivity.determinant,
             condition: sensitivity.condition,
             worst_force: legs.map_or(f64::INFINITY, worst),
@@ -111,7 +126,7 @@ impl Workspace {
     }
 
     /// The forces of every leg, `None` at a singular pose.
-    fn leg_forces(&self, pose: &Pose) -> Option<[LegForce; LEGS]> {
+    fn leg_forces(&self, pose: &Pose) -> Option<[LegForceBound; LEGS]> {
         let machine = self.model.machine();
         let rest = Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() };
         let arm = pose.rotation * machine.platform.center_of_mass;
@@ -131,38 +146,31 @@ impl Workspace {
         let row = |matrix: &Matrix6<f64>, leg: usize, first: usize| -> RowVector3<f64> {
             matrix.fixed_view::<1, 3>(leg, first).into()
         };
-        let mut legs = [LegForce::default(); LEGS];
+        let mut legs = [LegForceBound::default(); LEGS];
         for (i, (leg, (own, added))) in legs.iter_mut().zip(still.iter().zip(&still_mass)).enumerate() {
             let pair = |first| [row(&of_machine, i, first), row(&of_mass, i, first)];
-            *leg = LegForce {
+            *leg = LegForceBound {
                 friction: machine.actuator.coulomb_friction,
                 still: [*own, *added],
-                angular: pair(0).map(|row| row * self.effort.angular),
-                linear: pair(3).map(|row| row * self.effort.linear),
+                angular: pair(0).map(|row| row * self.demand.angular),
+                linear: pair(3).map(|row| row * self.demand.linear),
             };
         }
         Some(legs)
     }
 }
 
-/// How far the leg that is nearest to an end of its stroke is from it \[m\].
-fn stroke_margin(machine: &Machine, kinematic_state: &KinematicState) -> f64 {
-    let actuator = &machine.actuator;
-    let margin = |length: f64| (length - actuator.min_length).min(actuator.max_length - length);
-    kinematic_state.lengths(machine).into_iter().map(margin).fold(f64::INFINITY, f64::min)
-}
-
-/// The force of one leg: of the machine as it is, and of each kilogram added \[N\], \[N/kg\].
+/// Bound on the force of one leg: of the machine without payload, and per kilogram of payload \[N\], \[N/kg\].
 #[derive(Clone, Copy, Debug, Default)]
-struct LegForce {
+struct LegForceBound {
     friction: f64,
     still: [f64; 2],
-    /// At the effort, by direction.
+    /// Under the demanded accelerations, by direction.
     angular: [RowVector3<f64>; 2],
     linear: [RowVector3<f64>; 2],
 }
 
-impl LegForce {
+impl LegForceBound {
     /// f(p) and its slope.
     fn largest(&self, mass: f64) -> (f64, f64) {
         let [still, added] = self.still;
@@ -190,10 +198,10 @@ impl LegForce {
         }
         // f(p) >= p growth - (f(0) - friction) + friction: here it is beyond the limit.
         let mut mass = (limit + bare - 2.0 * self.friction) / growth;
-        for _ in 0..STEPS {
+        for _ in 0..MAX_PAYLOAD_STEPS {
             let (force, slope) = self.largest(mass);
             let step = (force - limit) / slope;
-            if !(step > CLOSE * mass) {
+            if !(step > PAYLOAD_TOLERANCE * mass) {
                 break;
             }
             mass -= step;

@@ -1,17 +1,17 @@
-//! Where sampling makes the loop of one axis unstable: exactly, for held forces, any delay and any mass.
+//! Stability limits of the sampled loop of one axis: exact for held forces, any delay and any mass ratio.
 //!
 //! Computed torque leaves of every axis, linear or angular, a double integrator of the error,
-//! `e'' = -u / m`, with m what the platform weighs over what the model says. Of instant k T the controller
-//! knows e and e', commands
+//! `e'' = -u / m`, with m the mass of the platform over that of the model. At instant k T the controller
+//! has e and e', commands
 //!
 //! ```text
 //! u_k = Kp e_k + Kd e'_k + s_k        s_k+1 = s_k + Ki T e_k
 //! ```
 //!
-//! and the drives hold it for a period from `k T + delay` on. The delay is all that lies between: age of the
-//! measurement, computing, sending, dead time. Neither the reference nor the instant it is taken at appears:
-//! the error is taken where both sides are known, so a delay makes no error, but it stays in the loop. With
-//! `delay = (d + f) T`, `0 <= f < 1`, `h = 1 - f`, a period makes of the state with its commands under way
+//! and the drives hold it for a period from `k T + delay` on. The delay is the sum of the age of the
+//! measurement, computing, sending and dead time. Neither the reference nor its instant appears: the error compares both at
+//! the same instant, so a delay makes no error, but it remains in the loop. With
+//! `delay = (d + f) T`, `0 <= f < 1`, `h = 1 - f`, one period takes the state, with its pending commands, to
 //!
 //! ```text
 //!           e_k+1 = e_k + T e'_k - T^2 / m (h^2 / 2 u_k-d + (1 - h^2) / 2 u_k-d-1)
@@ -31,20 +31,28 @@
 //! Åström and Wittenmark, "Computer-Controlled Systems", chapters 2 and 3 (the same; Jury's criterion).
 //!
 //! Short delays are no simpler: a strong damping term is stable with a quarter of a period and not without.
-//! What this does not say is what drives that lag and legs that give way do, nor cycles without a new measurement,
-//! which carry the last error on by the law. None of this is part of the cycle.
+//! Not covered: drives with a lag, elastic legs, and cycles without a new measurement, which extrapolate the last error.
+//! None of this is part of the cycle.
 
-/// Longest delay that is looked at, in periods: of the loops that are slow enough for more, nobody needs to
-/// know how much more.
-pub const LONGEST_DELAY: usize = 64;
+/// Longest delay that is computed, in periods; a loop that is stable with more counts as stable with this one.
+pub const MAX_DELAY_PERIODS: usize = 64;
 
-/// Coefficients of the polynomial with that delay and an observer.
-const MOST: usize = LONGEST_DELAY + 5;
+/// Coefficients of the polynomial with the longest delay and an observer.
+const MAX_COEFFICIENTS: usize = MAX_DELAY_PERIODS + 5;
 
-/// Halvings of an interval, down to rounding.
-const HALVINGS: u32 = 60;
+/// Halvings of an interval by bisection, down to rounding.
+const BISECTION_STEPS: u32 = 60;
 
-/// The sampled loop of one axis, without units.
+/// Sampled control loop of one axis, without units.
+///
+/// ```
+/// use hexad::analysis::sampled_loop::SampledLoop;
+/// let loop_of = |delay| SampledLoop { wn_t: 0.06, damping_ratio: 1.0, observer: 0.0, delay, mass_ratio: 1.0 };
+/// // One period of delay: Jury's criterion in closed form, with a = (wn T)^2 / 2 and b = 2 zeta wn T.
+/// let (a, b) = (0.5 * 0.06_f64.powi(2), 2.0 * 0.06);
+/// assert!((loop_of(1.0).gain_margin() - (b - 3.0 * a) / (b - a).powi(2)).abs() < 1e-9);
+/// assert!(loop_of(2.0).largest_wn_t() < loop_of(1.0).largest_wn_t());
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledLoop {
     /// Natural frequency times period, `wn T`: `Kp = wn^2`, `Kd = 2 zeta wn`.
@@ -53,22 +61,22 @@ pub struct SampledLoop {
     pub damping_ratio: f64,
     /// `L / wn` of the observer; 0 is without.
     pub observer: f64,
-    /// From the measurement to its force, in periods.
+    /// Delay from the measurement to its force, in periods.
     pub delay: f64,
-    /// Of the platform over that of the model.
+    /// Mass of the platform over that of the model.
     pub mass_ratio: f64,
 }
 
 impl SampledLoop {
-    /// Kp and Kd together with what the observer adds, in units of `wn^2` and `wn`.
+    /// Kp and Kd with the additions of the observer, in units of `wn^2` and `wn`.
     fn observed(&self) -> [f64; 2] {
         let damping = 2.0 * self.damping_ratio;
         [1.0 + self.observer * damping, damping + self.observer]
     }
 
     /// The characteristic polynomial, lowest coefficient first, and its degree; the commands of `after` periods
-    /// are under way, the oldest for a share `f` of a period more.
-    fn characteristic(&self, after: usize, f: f64) -> ([f64; MOST], usize) {
+    /// are pending, the oldest for a share `f` of a period more.
+    fn characteristic(&self, after: usize, f: f64) -> ([f64; MAX_COEFFICIENTS], usize) {
         let h = 1.0 - f;
         let [stiffness, damping] = self.observed();
         let kp = stiffness * self.wn_t * self.wn_t / self.mass_ratio;
@@ -76,7 +84,7 @@ impl SampledLoop {
         let ki = self.observer * self.wn_t * self.wn_t * self.wn_t / self.mass_ratio;
         let [q0, q1, q2] = [0.5 * f * f, 0.5 + h * f, 0.5 * h * h];
         let [n0, n1, n2] = [kp * q0 - kd * f, kp * q1 + kd * (f - h), kp * q2 + kd * h];
-        let mut coefficients = [0.0; MOST];
+        let mut coefficients = [0.0; MAX_COEFFICIENTS];
         let mut add = |lowest: usize, terms: [f64; 4]| {
             for (sum, term) in coefficients.iter_mut().skip(lowest).zip(terms) {
                 *sum += term;
@@ -101,7 +109,7 @@ impl SampledLoop {
         coefficients.get_mut(..=degree).is_some_and(within_unit_circle)
     }
 
-    /// Largest `wn T` that is stable, all else as it is; all that are less are stable too.
+    /// Largest stable `wn T`, other parameters unchanged; all smaller ones are stable too.
     pub fn largest_wn_t(&self) -> f64 {
         // Beyond half of it, delay and hold lag by more than the damping term leads, at any gain; the integral in an
         // observer may move that a little.
@@ -118,24 +126,24 @@ impl SampledLoop {
         boundary(none, |gain| Self { mass_ratio: self.mass_ratio / gain, ..*self }.is_stable())
     }
 
-    /// The factor to which the loop gain may fall, where an observer asks for some: Routh's criterion, for a loop
-    /// that is slow against its period.
+    /// The factor to which the loop gain may fall; an observer needs some gain. Routh's criterion, for a loop that is slow
+    /// against its period.
     pub fn least_gain(&self) -> f64 {
         let [stiffness, damping] = self.observed();
         self.mass_ratio * self.observer / (stiffness * damping)
     }
 
-    /// The longest delay that is stable, in periods; no longer than [`LONGEST_DELAY`]. Shorter ones are too, down
+    /// The longest stable delay, in periods; no longer than [`MAX_DELAY_PERIODS`]. Shorter ones are too, down
     /// to a quarter of a period; below, a strong damping term would need some.
     pub fn longest_delay(&self) -> f64 {
-        boundary(LONGEST_DELAY as f64, |delay| self.wn_t < Self { delay, ..*self }.largest_wn_t())
+        boundary(MAX_DELAY_PERIODS as f64, |delay| self.wn_t < Self { delay, ..*self }.largest_wn_t())
     }
 }
 
-/// Where what holds from 0 on ceases to, at the latest at `high`. Looks from above.
+/// Upper end of the interval from 0, within `high`, in which a condition holds; by bisection.
 pub fn boundary(mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     let mut low = 0.0;
-    for _ in 0..HALVINGS {
+    for _ in 0..BISECTION_STEPS {
         let middle = 0.5 * (low + high);
         if holds(middle) {
             low = middle;

@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
 use super::offline::{progress, task_state};
-use crate::analysis::envelope::{CORNERS, Envelope, Limits};
-use crate::analysis::fidelity_choice::Judgement;
-use crate::analysis::fidelity_error::{FIDELITIES, Sample, Tally};
+use crate::analysis::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
+use crate::analysis::fidelity_choice::FidelityComparison;
+use crate::analysis::fidelity_error::{ErrorStatistics, FIDELITY_COUNT, FidelitySample};
 use crate::config::Config;
 use crate::config::fidelity::envelope;
 use crate::model::active_forces::InverseDynamics;
@@ -49,9 +49,9 @@ pub struct Advice {
     scene: String,
     /// Of an actuator \[N\].
     max_force: f64,
-    judgement: Judgement,
+    comparison: FidelityComparison,
     /// Median time of an evaluation, in the order of [`Fidelity::ALL`] \[ns\].
-    times: [f64; FIDELITIES],
+    times: [f64; FIDELITY_COUNT],
     tolerance: f64,
 }
 
@@ -59,7 +59,7 @@ impl Advice {
     /// Judges the configured envelope, or a trajectory.
     pub fn new(config: &Config, trajectory: Option<&Path>) -> Result<Self, AdviseError> {
         let model = InverseDynamics::new(&config.machine);
-        let (scene, judgement, motions) = match trajectory {
+        let (scene, comparison, motions) = match trajectory {
             Some(path) => judge_trajectory(&model, path)?,
             None => judge_envelope(config, &model),
         };
@@ -67,7 +67,7 @@ impl Advice {
             name: config.name.clone(),
             scene,
             max_force: config.machine.actuator.max_force,
-            judgement,
+            comparison,
             times: time(&model, &motions),
             tolerance: config.deployment.control.fidelity_tolerance,
         })
@@ -79,39 +79,40 @@ impl Advice {
             let times = Fidelity::ALL.into_iter().zip(self.times);
             times.filter(|(timed, _)| *timed == fidelity).map(|(_, time)| time).sum::<f64>()
         };
-        let first = self.judgement.choice(self.tolerance);
-        let allowed = self.judgement.within(self.tolerance).map(|price| price.fidelity);
+        let first = self.comparison.choice(self.tolerance);
+        let allowed = self.comparison.within(self.tolerance).map(|error| error.fidelity);
         allowed.filter(|fidelity| fidelity.has_inertia()).fold(first, |best, fidelity| {
             if time(fidelity) < (1.0 - QUICKER) * time(best) { fidelity } else { best }
         })
     }
 }
 
-fn judge_envelope(config: &Config, model: &InverseDynamics) -> (String, Judgement, Vec<Motion>) {
+fn judge_envelope(config: &Config, model: &InverseDynamics) -> (String, FidelityComparison, Vec<Motion>) {
     let envelope = envelope(config, model);
-    let judgement = Judgement::of_envelope(model, &envelope);
+    let comparison = FidelityComparison::of_envelope(model, &envelope);
     let origin = if config.deployment.envelope.is_some() {
         "its [envelope]"
     } else {
         "an envelope derived from the machine"
     };
-    let points = judgement.all.judged - judgement.inside.judged;
+    let points = comparison.all.evaluated - comparison.inside.evaluated;
     let scene = format!(
-        "{origin}:\n{}{} motions spread over the inside, {points} of {CORNERS} at corners, and a climb from the worst of them",
-        limits(envelope.limits()),
-        judgement.inside.judged
+        "{origin}:\n{}{} motions spread over the inside, {points} of {CORNER_COUNT} at corners, and a climb from the worst of them",
+        limits(envelope.bounds()),
+        comparison.inside.evaluated
     );
-    let within = |k| Some(envelope.at(&Envelope::spread(k))).filter(|s| Sample::take(model, s).is_ok());
+    let within =
+        |k| Some(envelope.at(&MotionEnvelope::spread(k))).filter(|s| FidelitySample::take(model, s).is_ok());
     let drawn = 0..16 * TIMED_MOTIONS as u32;
     let mut motions: Vec<_> = drawn.filter_map(within).take(TIMED_MOTIONS).map(|s| s.motion()).collect();
     if motions.is_empty() {
         motions.push(envelope.at(&envelope.rest()).motion());
     }
-    (scene, judgement, motions)
+    (scene, comparison, motions)
 }
 
 /// The ranges, as motion bases are specified.
-fn limits(limits: &Limits) -> String {
+fn limits(limits: &EnvelopeBounds) -> String {
     let names = ["alpha", "beta", "gamma", "x", "y", "z"];
     let mut text = format!("{:<8}{:>21}{:>18}{:>20}\n", "", "offset from home", "rate", "acceleration");
     let ranges = limits.pose_min.iter().zip(&limits.pose_max);
@@ -135,10 +136,10 @@ fn limits(limits: &Limits) -> String {
 fn judge_trajectory(
     model: &InverseDynamics,
     path: &Path,
-) -> Result<(String, Judgement, Vec<Motion>), AdviseError> {
+) -> Result<(String, FidelityComparison, Vec<Motion>), AdviseError> {
     let table = Table::read(path, &trajectory_columns(), &[])?;
     let rows = table.rows();
-    let (mut tally, start, mut bar) = (Tally::default(), Instant::now(), None::<ProgressBar>);
+    let (mut tally, start, mut bar) = (ErrorStatistics::default(), Instant::now(), None::<ProgressBar>);
     let every = rows.len().div_ceil(TIMED_MOTIONS);
     let mut motions = vec![];
     for (k, row) in rows.iter().enumerate() {
@@ -146,7 +147,7 @@ fn judge_trajectory(
             bar.get_or_insert_with(|| progress(rows.len(), "rows")).set_position(k as u64);
         }
         let state = task_state(row);
-        let sample = Sample::take(model, &state);
+        let sample = FidelitySample::take(model, &state);
         tally.add(&sample);
         if sample.is_ok() && k % every == 0 {
             motions.push(state.motion());
@@ -156,17 +157,17 @@ fn judge_trajectory(
         bar.set_draw_target(ProgressDrawTarget::hidden());
         bar.finish_and_clear();
     }
-    if tally.judged == 0 {
-        let Tally { outside, singular, .. } = tally;
+    if tally.evaluated == 0 {
+        let ErrorStatistics { outside, singular, .. } = tally;
         return Err(AdviseError::NothingJudged { path: path.into(), outside, singular });
     }
-    let scene = format!("the rows of {}:\n{} motions", path.display(), tally.judged);
-    Ok((scene, Judgement::of_rows(tally), motions))
+    let scene = format!("the rows of {}:\n{} motions", path.display(), tally.evaluated);
+    Ok((scene, FidelityComparison::of_rows(tally), motions))
 }
 
 /// Median time of an evaluation of each fidelity \[ns\].
-fn time(model: &InverseDynamics, motions: &[Motion]) -> [f64; FIDELITIES] {
-    let mut rounds = [const { Vec::new() }; FIDELITIES];
+fn time(model: &InverseDynamics, motions: &[Motion]) -> [f64; FIDELITY_COUNT] {
+    let mut rounds = [const { Vec::new() }; FIDELITY_COUNT];
     for _ in 0..ROUNDS {
         for (times, fidelity) in rounds.iter_mut().zip(Fidelity::ALL) {
             let start = Instant::now();
@@ -184,8 +185,8 @@ fn time(model: &InverseDynamics, motions: &[Motion]) -> [f64; FIDELITIES] {
 
 impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, scene, max_force, judgement, times, tolerance } = self;
-        let (inside, all) = (&judgement.inside, &judgement.all);
+        let Self { name, scene, max_force, comparison, times, tolerance } = self;
+        let (inside, all) = (&comparison.inside, &comparison.all);
         writeln!(f, "{name} over {scene}")?;
         for (count, what) in
             [(all.outside, "outside the actuators' stroke"), (all.singular, "at singular poses")]
@@ -204,16 +205,16 @@ impl fmt::Display for Advice {
         writeln!(f, "\n\n{:<14} {:^26} {:>24}", "", "error of a leg's force [N]", "share of the peak [%]")?;
         let numbers = ["mean", "RMS", "max", "mean", "RMS", "max"].map(|what| format!("{what:>8}")).join(" ");
         writeln!(f, "{:<14} {numbers} {:>5}  leaves out", "fidelity", "ns")?;
-        for (price, time) in judgement.prices.iter().zip(times) {
+        for (error, time) in comparison.errors.iter().zip(times) {
             let share = |error: f64| if error == 0.0 { 0.0 } else { 100.0 * error / inside.peak };
-            let [mean, rms, max] = [price.mean, price.rms, price.max].map(significant);
-            let shares = [share(price.mean), share(price.rms), 100.0 * price.share].map(significant);
+            let [mean, rms, max] = [error.mean, error.rms, error.max].map(significant);
+            let shares = [share(error.mean), share(error.rms), 100.0 * error.share].map(significant);
             let [mean_share, rms_share, max_share] = shares;
             writeln!(
                 f,
                 "{:<14} {mean:>8} {rms:>8} {max:>8} {mean_share:>8} {rms_share:>8} {max_share:>8} {time:>5.0}  {}",
-                price.fidelity.name(),
-                price.fidelity.leaves_out()
+                error.fidelity.name(),
+                error.fidelity.left_out_terms()
             )?;
         }
         self.fmt_recommendation(f, &plain_percent(*tolerance))
@@ -224,18 +225,19 @@ impl Advice {
     fn fmt_recommendation(&self, f: &mut fmt::Formatter<'_>, tolerance: &str) -> fmt::Result {
         let choice = self.choice();
         writeln!(f, "\nrecommended: fidelity = \"{}\", at a tolerance of {tolerance}", choice.name())?;
-        let kept: Vec<_> = self.judgement.prices.iter().filter(|price| price.fidelity != choice).collect();
-        for price in &self.judgement.prices {
-            if price.fidelity == choice && choice != Fidelity::Exact {
-                let (what, max, share) = (choice.leaves_out(), significant(price.max), percent(price.share));
+        let kept: Vec<_> = self.comparison.errors.iter().filter(|error| error.fidelity != choice).collect();
+        for error in &self.comparison.errors {
+            if error.fidelity == choice && choice != Fidelity::Exact {
+                let (what, max, share) =
+                    (choice.left_out_terms(), significant(error.max), percent(error.share));
                 writeln!(f, "  leaving out {what} costs at most {max} N, {share}")?;
             }
         }
         let within = |fidelity: Fidelity| {
-            self.judgement.within(self.tolerance).any(|price| price.fidelity == fidelity)
+            self.comparison.within(self.tolerance).any(|error| error.fidelity == fidelity)
         };
-        for price in kept.into_iter().rev().filter(|price| !within(price.fidelity)) {
-            let (what, share) = (price.fidelity.leaves_out(), percent(price.share));
+        for error in kept.into_iter().rev().filter(|error| !within(error.fidelity)) {
+            let (what, share) = (error.fidelity.left_out_terms(), percent(error.share));
             writeln!(f, "  leaving out {what} would cost {share}")?;
         }
         if within(Fidelity::Gravity) {

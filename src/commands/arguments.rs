@@ -10,7 +10,7 @@ use super::workspace::slice::Plane;
 use super::{export, offline};
 use crate::config::{Config, ConfigError};
 use crate::model::fidelity::Fidelity;
-use crate::motion::built_in::Motion;
+use crate::motion::built_in::BuiltInMotion;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
@@ -122,11 +122,11 @@ impl What {
             (Some(path), _) => Score::trajectory(config, path),
             (None, name) => {
                 let motion = match name.unwrap_or(MotionName::Settle) {
-                    MotionName::Settle => Motion::Settle,
-                    MotionName::MinimumJerk => Motion::MinimumJerk,
-                    MotionName::Sines => Motion::Sines,
-                    MotionName::Circle => Motion::Circle,
-                    MotionName::Paper => Motion::Paper,
+                    MotionName::Settle => BuiltInMotion::Settle,
+                    MotionName::MinimumJerk => BuiltInMotion::MinimumJerk,
+                    MotionName::Sines => BuiltInMotion::Sines,
+                    MotionName::Circle => BuiltInMotion::Circle,
+                    MotionName::Paper => BuiltInMotion::Paper,
                 };
                 Score::motion(config, motion, seconds)
             }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::analysis::assembly_modes::{Other, others};
+use crate::analysis::assembly_modes::{OtherMode, other_modes};
 use crate::config::Config;
 use crate::config::control_loops::loops;
 use crate::control::leg_masses::LegMasses;
@@ -25,8 +25,8 @@ pub struct Check<'a> {
     condition: f64,
     /// How far one measurement may be from the next for its pose to be certain \[rad\], \[radius\].
     trusted_step: f64,
-    /// Other poses with the same lengths, the nearest first.
-    others: Vec<Other>,
+    /// OtherMode poses with the same lengths, the nearest first.
+    others: Vec<OtherMode>,
 }
 
 impl<'a> Check<'a> {
@@ -45,7 +45,7 @@ impl<'a> Check<'a> {
         Self {
             config,
             trusted_step: kinematic_state.sensitivity().trusted_step,
-            others: others(machine, &kinematic_state),
+            others: other_modes(machine, &kinematic_state),
             lengths: leg_lengths(machine, &motion.pose),
             forces: inverse_dynamics::<Exact>(machine, &motion),
             joint_angles,
@@ -90,8 +90,8 @@ impl Check<'_> {
             String::new()
         };
         writeln!(f, "control mode {}{observed}", control.mode.name())?;
+        let legs = LegMasses::at_home(machine);
         if control.mode.acts_on_legs() {
-            let legs = LegMasses::at_home(machine);
             let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
             writeln!(
                 f,
@@ -100,7 +100,7 @@ impl Check<'_> {
                 root(legs.stiffest)
             )?;
         }
-        for control_loop in loops(self.config) {
+        for control_loop in loops(self.config, &legs) {
             writeln!(f, "{control_loop}")?;
             if let Some(warning) = control_loop.warning() {
                 writeln!(f, "WARNING: {warning}")?;

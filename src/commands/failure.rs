@@ -8,6 +8,7 @@ use super::offline::OfflineError;
 use super::operate::OperatorError;
 use crate::config::ConfigError;
 use crate::output::files::FileError;
+use crate::output::svg::ChartError;
 
 /// Why a command failed, and its exit code: 1 it ran and went wrong, 2 it could not begin.
 #[derive(Debug)]
@@ -31,6 +32,12 @@ impl From<ConfigError> for Failure {
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
+        Self { code: 1, what: error.to_string() }
+    }
+}
+
+impl From<ChartError> for Failure {
+    fn from(error: ChartError) -> Self {
         Self { code: 1, what: error.to_string() }
     }
 }

@@ -5,8 +5,9 @@ use core::fmt::{self, Write as _};
 use clap::ValueEnum;
 use serde_json::{Value, json};
 
+use crate::control::diagnostic::DiagnosticCode;
 use crate::control::limits::Limit;
-use crate::control::state::{Cause, Request, State};
+use crate::control::state::{Request, State};
 use crate::messages::layout::{Field, Kind, Layout};
 use crate::messages::{MESSAGES, SCHEMA};
 
@@ -55,7 +56,7 @@ fn structs() -> Vec<&'static Layout> {
 fn constants() -> Vec<(&'static str, String, u32)> {
     let states = State::ALL.into_iter().map(|state| ("STATE", format!("{state:?}"), state as u32));
     let requests = Request::ALL.into_iter().map(|it| ("REQUEST", format!("{it:?}"), it as u32));
-    let codes = Cause::ALL.iter().map(|code| ("DIAGNOSTIC", format!("{code:?}"), *code as u32));
+    let codes = DiagnosticCode::ALL.iter().map(|code| ("DIAGNOSTIC", format!("{code:?}"), *code as u32));
     let limits = Limit::ALL.into_iter().map(|limit| ("LIMIT_BIT", format!("{limit:?}"), limit as u32));
     let all = states.chain(requests).chain(codes).chain(limits);
     all.map(|(prefix, name, number)| (prefix, screaming(&name), number)).collect()

@@ -3,7 +3,7 @@
 //! Exit codes: 0 done; 1 the command ran and failed (a fault, a row without solution); 2 it could not begin
 //! (bad command line, configuration, input or environment).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use self::advise::Advice;
 use self::check::Check;
@@ -13,10 +13,12 @@ use self::faults::Faults;
 use self::messages::{Declarations, Language};
 use self::operate::Order;
 use self::workspace::Survey;
+use crate::config::Config;
 use crate::control::state::Request;
 use crate::daemon;
 use crate::model::fidelity::Fidelity;
 use crate::output::files::print;
+use crate::output::machine_drawing;
 use crate::realtime::stop_request::Stop;
 use clap::{Parser, Subcommand, ValueEnum};
 
@@ -163,6 +165,9 @@ enum Command {
     Check {
         #[command(flatten)]
         machine: MachineFile,
+        /// Draw the machine at home (SVG): from above, from the side, in perspective, with numbered joints
+        #[arg(long, value_name = "FILE")]
+        drawing: Option<PathBuf>,
     },
     /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
     Doctor {
@@ -262,7 +267,7 @@ impl Cli {
             Command::Estop { machine, patience } => ask(&machine, Request::Estop, false, &patience),
             Command::Faults => Ok(print(Faults)?),
             Command::Messages { language } => Ok(print(Declarations(language))?),
-            Command::Check { machine } => Ok(print(Check::new(&machine.load()?))?),
+            Command::Check { machine, drawing } => check(&machine.load()?, drawing.as_deref()),
             Command::Doctor { config, cpu, seconds, report, disturb } => {
                 let doctor = Doctor { config, cpu, seconds, report, disturb };
                 doctor::run(&doctor, &stop()?).map_err(Failure::from)
@@ -288,6 +293,14 @@ impl Cli {
             }
         }
     }
+}
+
+/// Prints the figures before it draws: they are of use where no file can be written.
+fn check(config: &Config, drawing: Option<&Path>) -> Result<(), Failure> {
+    print(Check::new(config))?;
+    let Some(path) = drawing else { return Ok(()) };
+    machine_drawing::write_svg(path, &config.name, &config.machine)?;
+    Ok(print(format_args!("drawing of the machine at home: {}\n", path.display()))?)
 }
 
 fn ask(machine: &MachineFile, request: Request, wait: bool, patience: &Patience) -> Result<(), Failure> {

@@ -8,7 +8,7 @@ use nalgebra::Vector6;
 use crate::analysis::batch;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
-use crate::model::forward_kinematics::{Tracked, Tracker};
+use crate::model::forward_kinematics::{Tracker, TrackingResult};
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Twist;
@@ -117,7 +117,7 @@ pub fn forward_kinematics(
         // A row without solution leaves the start of the next one where it was.
         let mut walker = tracker;
         let (tracked, iterations) = walker.find(machine, &six(row, 1));
-        let converged = tracked == Tracked::Found;
+        let converged = tracked == TrackingResult::Found;
         let x = task_coordinates(&walker.pose, &near);
         if converged {
             (tracker, near) = (walker, x);

@@ -8,8 +8,11 @@ use core::time::Duration;
 use std::thread;
 use std::time::Instant;
 
+use nalgebra::Vector3;
+
 use crate::config::Config;
-use crate::control::state::{Cause, Request, State, Trouble};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::state::{Request, State};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage, Subscriber};
 use crate::realtime::stop_request::Stop;
@@ -33,9 +36,9 @@ pub enum OperatorError {
     #[error("{request} was refused: {refusal}", request = .0.name(), refusal = .1)]
     Refused(Request, Refusal),
     #[error("{request} was not completed: the daemon is in {state}: {reason}", request = .0.name(), state = .1.name(), reason = .2)]
-    OtherState(Request, State, Trouble),
+    OtherState(Request, State, Diagnostic),
     #[error("{request} was not completed within {1} s: the daemon is in {state}: {reason}", request = .0.name(), state = .2.name(), reason = .3)]
-    Timeout(Request, f64, State, Trouble),
+    Timeout(Request, f64, State, Diagnostic),
     #[error("interrupted")]
     Interrupted,
 }
@@ -43,20 +46,38 @@ pub enum OperatorError {
 /// Diagnostic of a refused request, with the state that refused it.
 #[derive(Clone, Copy, Debug)]
 pub struct Refusal {
-    request: Trouble,
+    request: Diagnostic,
     state: State,
     /// Diagnostic of the state.
-    current: Trouble,
+    current: Diagnostic,
+    /// From the platform to the setpoint \[m\], \[rad\], if both are known.
+    distance: Option<(f64, f64)>,
+}
+
+impl Refusal {
+    fn new(status: &StatusMessage) -> Self {
+        let norm = |v: [f64; 3]| Vector3::from(v).norm();
+        let distance = (norm(status.position_error_m), norm(status.orientation_error_rad));
+        Self {
+            request: status.request_diagnostic.diagnostic().unwrap_or_default(),
+            state: status.state().unwrap_or_default(),
+            current: status.diagnostic.diagnostic().unwrap_or_default(),
+            distance: (status.error_valid == 1).then_some(distance),
+        }
+    }
 }
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { request, state, current } = self;
-        match (request.cause, state) {
-            (Cause::NotNow, State::Fault) => {
-                write!(f, "not possible in state fault ({}); hexad clear first", current.cause.name())
+        let Self { request, state, current, distance } = self;
+        match (request.code, state, distance) {
+            (DiagnosticCode::InvalidInState, State::Fault, _) => {
+                write!(f, "not possible in state fault ({}); hexad clear first", current.code.name())
             }
-            (Cause::NotNow, _) => write!(f, "not possible in state {}", state.name()),
+            (DiagnosticCode::InvalidInState, ..) => write!(f, "not possible in state {}", state.name()),
+            (DiagnosticCode::SetpointTooFar, _, Some((position, orientation))) => {
+                write!(f, "{request} ({:.3} mm and {:.3} mrad away)", position * 1e3, orientation * 1e3)
+            }
             _ => write!(f, "{request}"),
         }
     }
@@ -107,7 +128,7 @@ impl Operator {
         let mut sent: Option<Instant> = None;
         let mut last_status = Instant::now();
         let mut is_accepted = false;
-        let (mut state, mut reason) = (State::default(), Trouble::default());
+        let (mut state, mut reason) = (State::default(), Diagnostic::default());
         let first = self.commands.next_message();
         loop {
             if !is_accepted && sent.is_none_or(|sent| sent.elapsed() > REPEAT_INTERVAL) {
@@ -125,7 +146,7 @@ impl Operator {
                     None => {}
                 }
             }
-            if stop.requested() {
+            if stop.is_requested() {
                 return Err(OperatorError::Interrupted);
             }
             if last_status.elapsed() > STATUS_TIMEOUT {
@@ -147,17 +168,14 @@ impl Order {
         if !is_answered {
             return Ok(false);
         }
-        let state = status.state().unwrap_or_default();
-        let request = status.request_diagnostic.diagnostic().unwrap_or_default();
+        let refusal = Refusal::new(status);
+        let code = refusal.request.code;
         // Only an operator ends a fault.
-        let may_be_accepted = self.is_patient && may_resolve(request.cause) && state != State::Fault;
-        match request.cause {
-            Cause::None => Ok(true),
+        let may_be_accepted = self.is_patient && may_resolve(code) && refusal.state != State::Fault;
+        match code {
+            DiagnosticCode::None => Ok(true),
             _ if may_be_accepted => Ok(false),
-            _ => {
-                let current = status.diagnostic.diagnostic().unwrap_or_default();
-                Err(OperatorError::Refused(self.request, Refusal { request, state, current }))
-            }
+            _ => Err(OperatorError::Refused(self.request, refusal)),
         }
     }
 
@@ -167,19 +185,19 @@ impl Order {
             (Request::Engage, State::Engaging) => None,
             (Request::Engage, state) => Some(state == State::Active),
             (Request::Stop | Request::Park, State::Stopping) | (Request::Park, State::Parking) => None,
-            (Request::Stop, state) => Some(!state.controls() && state != State::Fault),
+            (Request::Stop, state) => Some(!state.has_control() && state != State::Fault),
             (Request::Park, state) => Some(state == State::Off),
             // A fault stays one, and has no force either.
-            (Request::Off, state) => Some(!state.controls()),
+            (Request::Off, state) => Some(!state.has_control()),
             (Request::Clear, state) => Some(state != State::Fault),
             (Request::Estop, state) => Some(state == State::Fault),
         }
     }
 }
 
-/// Whether the cause of a refusal may disappear without a correction: a source that was lost may be about to return.
-fn may_resolve(cause: Cause) -> bool {
-    !cause.is_fault() || matches!(cause, Cause::SetpointLost | Cause::MeasurementLost)
+/// Whether the reason of a refusal may disappear without a correction: a source that was lost may be about to return.
+fn may_resolve(code: DiagnosticCode) -> bool {
+    !code.is_fault() || matches!(code, DiagnosticCode::SetpointLost | DiagnosticCode::MeasurementLost)
 }
 
 /// Sends the request and waits for its outcome.

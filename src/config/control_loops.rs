@@ -5,7 +5,7 @@ use core::fmt;
 
 use super::Config;
 use super::deployment::GAIN_MARGIN;
-use crate::analysis::sampled_loop::{LONGEST_DELAY, SampledLoop};
+use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
 use crate::control::leg_masses::LegMasses;
 
 /// One loop with the longest delay of the daemon.
@@ -18,15 +18,15 @@ pub struct ControlLoop {
 }
 
 /// Of the pose, or of the stiffest mode of the legs.
-pub fn loops(config: &Config) -> Vec<ControlLoop> {
-    let Config { machine, deployment, .. } = config;
+pub fn loops(config: &Config, leg_masses: &LegMasses) -> Vec<ControlLoop> {
+    let deployment = &config.deployment;
     let control = &deployment.control;
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
     ];
     let each = if control.mode.acts_on_legs() {
-        vec![("legs", position, LegMasses::at_home(machine).stiffest)]
+        vec![("legs", position, leg_masses.stiffest)]
     } else {
         vec![("position", position, 1.0), ("orientation", orientation, 1.0)]
     };
@@ -64,7 +64,7 @@ impl fmt::Display for ControlLoop {
         let Self { name, bandwidth_hz, rate_hz, sampled } = self;
         let (limit, margin, longest) =
             (sampled.largest_wn_t(), sampled.gain_margin(), sampled.longest_delay());
-        let beyond = if longest < 0.99 * LONGEST_DELAY as f64 { "" } else { "more than " };
+        let beyond = if longest < 0.99 * MAX_DELAY_PERIODS as f64 { "" } else { "more than " };
         write!(
             f,
             "{name:<12} bandwidth {bandwidth_hz:>6.2} Hz at {rate_hz:.0} Hz: wn T = {:.3}, with {:.2} periods of delay \

@@ -4,18 +4,18 @@ use tracing::info;
 
 use super::Config;
 use super::deployment::FidelityChoice;
-use crate::analysis::envelope::Envelope;
-use crate::analysis::fidelity_choice::Judgement;
+use crate::analysis::envelope::MotionEnvelope;
+use crate::analysis::fidelity_choice::FidelityComparison;
 use crate::analysis::reachable_envelope;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::output::numbers::{percent, plain_percent};
 
 /// The envelope of a configuration: as given, or as large as the machine can carry.
-pub fn envelope(config: &Config, model: &InverseDynamics) -> Envelope {
+pub fn envelope(config: &Config, model: &InverseDynamics) -> MotionEnvelope {
     match config.deployment.envelope {
-        Some(limits) => Envelope::new(&config.machine.home, limits),
-        None => reachable_envelope::envelope(model),
+        Some(limits) => MotionEnvelope::new(&config.machine.home, limits),
+        None => reachable_envelope::reachable_envelope(model),
     }
 }
 
@@ -28,30 +28,30 @@ pub fn fidelity(config: &Config) -> Fidelity {
             info!(
                 fidelity = fidelity.name(),
                 "fidelity: as configured, leaves out {}",
-                fidelity.leaves_out()
+                fidelity.left_out_terms()
             );
             fidelity
         }
         FidelityChoice::Auto => {
             let model = InverseDynamics::new(&config.machine);
-            let judgement = Judgement::of_envelope(&model, &envelope(config, &model));
-            let fidelity = judgement.choice(tolerance);
-            info!(fidelity = fidelity.name(), "fidelity: {}", reason(&judgement, tolerance));
+            let comparison = FidelityComparison::of_envelope(&model, &envelope(config, &model));
+            let fidelity = comparison.choice(tolerance);
+            info!(fidelity = fidelity.name(), "fidelity: {}", reason(&comparison, tolerance));
             fidelity
         }
     }
 }
 
-/// Why a judgement leads to its choice.
-pub fn reason(judgement: &Judgement, tolerance: f64) -> String {
+/// Why a comparison leads to its choice.
+pub fn reason(comparison: &FidelityComparison, tolerance: f64) -> String {
     use core::fmt::Write as _;
-    let chosen = judgement.choice(tolerance);
+    let chosen = comparison.choice(tolerance);
     let tolerance = plain_percent(tolerance);
     let mut text = String::new();
     // A String takes all.
-    for price in judgement.prices.iter().rev() {
-        let (what, share) = (price.fidelity.leaves_out(), percent(price.share));
-        let _ = match price.fidelity {
+    for error in comparison.errors.iter().rev() {
+        let (what, share) = (error.fidelity.left_out_terms(), percent(error.share));
+        let _ = match error.fidelity {
             fidelity if fidelity == chosen && fidelity == Fidelity::Exact => {
                 write!(text, "nothing may be left out at a tolerance of {tolerance}")
             }

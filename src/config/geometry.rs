@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::machine::{Leg, rounded};
 use super::reader::Reader;
-use crate::model::forward_kinematics::LARGEST_CONDITION;
+use crate::model::forward_kinematics::MAX_CONDITION;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
 use crate::model::machine::{LEGS, Machine};
@@ -132,22 +132,22 @@ fn check_legs(machine: &Machine, legs: &[Leg], pose: &Pose) -> bool {
 /// Refuses a singular home, and tells it from a layout that is singular everywhere.
 fn check_condition(machine: &Machine, legs: &[Leg], pose: &Pose, home: &Reader) {
     let at_home = condition(machine, pose);
-    if at_home <= LARGEST_CONDITION {
+    if at_home <= MAX_CONDITION {
         return;
     }
     // Also where it is no number.
     let best = around(machine, pose).map(|pose| condition(machine, &pose)).fold(f64::INFINITY, f64::min);
     let shown = format!("condition number {} of the legs' wrenches", rounded(at_home));
-    if best <= LARGEST_CONDITION {
+    if best <= MAX_CONDITION {
         let bound = format!(
-            "must be at most {LARGEST_CONDITION}: the legs cannot hold the platform in every direction; poses \
+            "must be at most {MAX_CONDITION}: the legs cannot hold the platform in every direction; poses \
              around it have {} at best",
             rounded(best)
         );
         home.refuse_as("pose", shown, bound);
     } else if let Some(first) = legs.first() {
         let bound = format!(
-            "must be at most {LARGEST_CONDITION} at some pose, and is {} at best around home: joints laid out \
+            "must be at most {MAX_CONDITION} at some pose, and is {} at best around home: joints laid out \
              like this are singular everywhere",
             rounded(best)
         );

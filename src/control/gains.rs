@@ -3,7 +3,7 @@
 //! Computed torque turns every axis into a double integrator `e'' = -Kd e' - Kp e`, with `Kp = wn^2`,
 //! `Kd = 2 zeta wn`. The bound that sampling sets to them is in [`crate::analysis::sampled_loop`].
 
-/// Gains of a second-order error dynamics.
+/// Stiffness and damping of second-order error dynamics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Kp \[1/s^2\].

@@ -1,22 +1,22 @@
-//! What a reference may ask for, and which limits a cycle is at.
+//! Limits of a reference, and the set of limits that a cycle has reached.
 //!
 //! | bit | limit | bound | at the bound |
 //! | --- | --- | --- | --- |
 //! | 0 | force | `actuator.max_force_n` | the force keeps its gravity part and loses the same share of the rest |
 //! | 1 | force rate | `limits.force_rate_n_s` | the change of force loses the same share on every leg |
-//! | 2 | stroke | `actuator.*_length_m` where the setpoint could be stopped | refused |
-//! | 3 | leg rate | `actuator.max_rate_m_s` | refused |
-//! | 4 | envelope | `[envelope]` | refused |
-//! | 5 | velocity | `limits.velocity_*` | refused |
-//! | 6 | acceleration | `limits.acceleration_*` | refused |
-//! | 7 | jerk | `limits.jerk_*` | refused |
+//! | 2 | stroke | `actuator.*_length_m` where the setpoint could be stopped | rejected |
+//! | 3 | leg rate | `actuator.max_rate_m_s` | rejected |
+//! | 4 | envelope | `[envelope]` | rejected |
+//! | 5 | velocity | `limits.velocity_*` | rejected |
+//! | 6 | acceleration | `limits.acceleration_*` | rejected |
+//! | 7 | jerk | `limits.jerk_*` | rejected |
 //! | 8 | following error | `control.following_*` | fault |
-//! | 9 | condition | `limits.condition` where the platform is; where the setpoint could be stopped | stop, fault; refused |
+//! | 9 | condition | `limits.condition` where the platform is; where the setpoint could be stopped | stop, fault; rejected |
 //!
-//! hexad does not bend a setpoint: it follows it or it comes to rest. A refused setpoint is as good as none,
-//! so one wrong message among good ones is ridden through, and a stream of them ends in a stop.
+//! hexad does not modify a setpoint: it follows it or it comes to rest. A rejected setpoint counts as none: the
+//! reference continues over one wrong message among valid ones, and ends in a stop after a stream of them.
 
-/// Numbers of the limits: bits of what a cycle is limited by, or near.
+/// Limit by the number of its bit in a [`LimitSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Limit {
@@ -64,40 +64,47 @@ impl Limit {
     }
 }
 
-/// A set of limits.
+/// Set of limits that a cycle has reached, or nearly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Limiting(pub u32);
+pub struct LimitSet(pub u32);
 
-/// From this share of a bound on a cycle counts as limited by it: the operator hears of it before it bites.
-const NEAR: f64 = 0.9;
+/// Part of a bound from which on its limit is in the set: the operator is warned before the bound is exceeded.
+const WARNING_RATIO: f64 = 0.9;
 
-impl Limiting {
-    /// With one more.
-    pub fn with(self, limit: Limit, is_limiting: bool) -> Self {
-        Self(self.0 | u32::from(is_limiting) << limit as u32)
+impl LimitSet {
+    /// The set with a limit added if it is active.
+    pub fn with(self, limit: Limit, is_active: bool) -> Self {
+        Self(self.0 | u32::from(is_active) << limit as u32)
     }
 
-    /// Adds a limit if a share of its bound is near 1; true if it is not beyond. NaN is beyond.
-    pub fn keeps(&mut self, limit: Limit, share: f64) -> bool {
-        *self = self.with(limit, share > NEAR);
-        share <= 1.0
+    /// Adds a limit if `ratio`, a quantity over its bound, is nearly 1 or more. True if the bound is kept; NaN exceeds
+    /// it.
+    pub fn check(&mut self, limit: Limit, ratio: f64) -> bool {
+        *self = self.with(limit, ratio > WARNING_RATIO);
+        ratio <= 1.0
     }
 
+    /// The limits of both sets.
+    pub fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// Whether a limit is in the set.
     pub fn contains(self, limit: Limit) -> bool {
         self.0 & 1 << limit as u32 != 0
     }
 }
 
-/// Largest magnitudes of a reference.
+/// Largest velocity, acceleration and jerk of a reference, for position and orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     pub position: AxisLimits,
     pub orientation: AxisLimits,
-    /// Of the motions onto the setpoint and home: they use this share of the velocity and acceleration.
-    pub own_share: f64,
+    /// Factor on the limits for the autonomous motions, onto the setpoint and home.
+    pub autonomous_scale: f64,
 }
 
-/// \[m\] or \[rad\], per second.
+/// Largest magnitudes of the derivatives of a position \[m\] or an orientation \[rad\], per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisLimits {
     pub velocity: f64,
@@ -106,12 +113,12 @@ pub struct AxisLimits {
 }
 
 impl AxisLimits {
-    /// A gentler motion of the same kind.
-    pub fn share(&self, share: f64) -> Self {
+    /// All three times a factor.
+    pub fn scaled(&self, scale: f64) -> Self {
         Self {
-            velocity: share * self.velocity,
-            acceleration: share * self.acceleration,
-            jerk: share * self.jerk,
+            velocity: scale * self.velocity,
+            acceleration: scale * self.acceleration,
+            jerk: scale * self.jerk,
         }
     }
 }

@@ -1,16 +1,35 @@
-//! From what is wanted and what is measured to six forces. No allocation, no I/O, no clock, no panic.
+//! Control of the platform: from setpoints and measurements to six forces. No allocation, no I/O, no clock, no panic.
 //!
 //! [`controller::Controller::step`] is a pure function of its state and its input: every run can be
-//! replayed bit for bit. In the order of a cycle: [`doubt`] decides which inputs count, [`supervisor`] which
-//! [`state`] follows and why, [`reference`] what the platform does in it, [`law`] with which acceleration,
-//! and [`limits`] names what must not be exceeded.
+//! replayed bit for bit. Its stages in the order of a cycle:
+//!
+//! | stage | file |
+//! | --- | --- |
+//! | validate inputs | [`input_validation`] |
+//! | locate platform, tracking error | [`localization`], [`tracking_error`] |
+//! | decide state | `assessment`, [`supervisor`] with the states of [`state`] |
+//! | reference | `reference`, with the autonomous motions of [`segment`] |
+//! | control law | [`law`] with its [`gains`] and [`leg_masses`], [`disturbance_observer`] |
+//! | forces | `forces` |
+//! | checks | `force_limits` |
+//!
+//! What the checks of all stages find is a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
 
+mod assessment;
 pub mod controller;
-pub mod doubt;
+pub mod diagnostic;
+pub mod disturbance_observer;
+mod force_limits;
+mod forces;
 pub mod gains;
+pub mod input_validation;
 pub mod law;
 pub mod leg_masses;
 pub mod limits;
-pub mod reference;
+pub mod localization;
+pub mod parameters;
+mod reference;
+pub mod segment;
 pub mod state;
 pub mod supervisor;
+pub mod tracking_error;

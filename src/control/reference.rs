@@ -1,246 +1,173 @@
-//! The motions that the daemon makes by itself: onto the setpoint, to rest, home.
-//!
-//! Each is a base motion displaced by a vector that follows a quintic in time. The quintic joins given
-//! displacement, rate and acceleration at both ends, so acceleration is continuous and jerk bounded.
-//!
-//! | motion | base | displacement |
-//! | --- | --- | --- |
-//! | engaging | the setpoint | from where the platform is, to none |
-//! | stopping | where it began, at rest | from none, along the motion, until at rest |
-//! | parking | home, at rest | from where the platform is, to none |
+//! The reference: the motion that the platform follows in each state, and the way from one to the next.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::Vector3;
 
-use super::limits::{AxisLimits, Limits};
-use crate::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
+use super::controller::Cycle;
+use super::diagnostic::{Diagnostic, DiagnosticCode};
+use super::input_validation::{SetpointInput, SetpointMotion, check_measurable_stroke};
+use super::limits::Limits;
+use super::localization::Located;
+use super::parameters::{Constants, Parameters};
+use super::segment::Segment;
+use super::state::State;
+use super::tracking_error::{Deviation, TrackingError};
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
-/// Shortest motion \[s\]: also where there is nothing to do, a motion takes some cycles.
-const SHORTEST_S: f64 = 0.02;
+/// Least step of a resuming setpoint over the engage tolerance that is worth a segment; a smaller one comes from time
+/// stamps and rounding.
+const MIN_REBASE_RATIO: f64 = 0.05;
 
-/// A displacement `[rotation vector; vector]` of a base motion over time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Segment {
-    /// Coefficients of 1, t, ... t^5.
-    coefficients: [Vector6<f64>; 6],
-    duration_s: f64,
-    start_ns: u64,
+/// Reference of a state.
+#[derive(Clone, Copy, Debug, Default)]
+enum Reference {
+    /// The setpoint; without control, too.
+    #[default]
+    Setpoint,
+    /// The setpoint, with a displacement that decays.
+    OntoSetpoint(Segment),
+    /// A displaced pose at rest.
+    FromPose(Pose, Segment),
 }
 
-impl Segment {
-    /// From a displacement with its derivatives to none, as fast as a share of the limits allows.
-    pub fn vanishing(
-        start_ns: u64,
-        displacement: &Twist,
-        rate: &Twist,
-        acceleration: &Acceleration,
-        limits: &Limits,
-    ) -> Self {
-        let from = [displacement.vector(), rate.vector(), acceleration.vector()];
-        let gentle = |axis: &AxisLimits| axis.share(limits.own_share);
-        let limits = [gentle(&limits.orientation), gentle(&limits.position)];
-        Self::joining(start_ns, longest(&limits, &from, vanishing_s), from, Vector6::zeros())
-    }
-
-    /// From none, with a rate and an acceleration, until at rest: the rate follows a cubic.
-    pub fn to_rest(start_ns: u64, rate: &Twist, acceleration: &Acceleration, limits: &Limits) -> Self {
-        let (v, a) = (rate.vector(), acceleration.vector());
-        let from = [Vector6::zeros(), v, a];
-        let duration_s = longest(&[limits.orientation, limits.position], &from, to_rest_s);
-        let end = (v * 0.5 + a * (duration_s / 12.0)) * duration_s;
-        Self::joining(start_ns, duration_s, from, end)
-    }
-
-    /// The quintic from `[d, d', d'']` to `end` at rest.
-    fn joining(start_ns: u64, t: f64, [d, v, a]: [Vector6<f64>; 3], end: Vector6<f64>) -> Self {
-        let h = end - d;
-        let coefficients = [
-            d,
-            v,
-            a * 0.5,
-            (h * 20.0 - v * (12.0 * t) - a * (3.0 * t * t)) / (2.0 * t.powi(3)),
-            (h * -30.0 + v * (16.0 * t) + a * (3.0 * t * t)) / (2.0 * t.powi(4)),
-            (h * 12.0 - v * (6.0 * t) - a * (t * t)) / (2.0 * t.powi(5)),
-        ];
-        Self { coefficients, duration_s: t, start_ns }
-    }
-
-    /// Whether the end has been reached.
-    pub fn ended(&self, instant_ns: u64) -> bool {
-        self.seconds(instant_ns) >= self.duration_s
-    }
-
-    /// The displacement at the end.
-    pub fn end(&self) -> Vector6<f64> {
-        let t = self.duration_s;
-        let [c0, c1, c2, c3, c4, c5] = &self.coefficients;
-        c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t
-    }
-
-    /// The base motion, displaced. Before the start the quintic is continued: a measurement is a little
-    /// older than the cycle that began the segment.
-    pub fn displace(&self, base: &Motion, instant_ns: u64) -> Motion {
-        let t = self.seconds(instant_ns).min(self.duration_s);
-        let [c0, c1, c2, c3, c4, c5] = &self.coefficients;
-        let d = c0 + (c1 + (c2 + (c3 + (c4 + c5 * t) * t) * t) * t) * t;
-        let v = c1 + (c2 * 2.0 + (c3 * 3.0 + (c4 * 4.0 + c5 * (5.0 * t)) * t) * t) * t;
-        let a = c2 * 2.0 + (c3 * 6.0 + (c4 * 12.0 + c5 * (20.0 * t)) * t) * t;
-        displaced(base, &Twist::from_vector(&d), &Twist::from_vector(&v), &Acceleration::from_vector(&a))
-    }
-
-    fn seconds(&self, instant_ns: u64) -> f64 {
-        instant_ns.wrapping_sub(self.start_ns) as i64 as f64 * 1e-9
-    }
+/// Fourth stage of the cycle: the reference of the present state at any instant.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ReferenceGenerator {
+    reference: Reference,
 }
 
-/// The longer of the durations \[s\] that rotation and translation need.
-fn longest(
-    limits: &[AxisLimits; 2],
-    [d, v, a]: &[Vector6<f64>; 3],
-    duration_s: impl Fn(&AxisLimits, f64, f64, f64) -> f64,
-) -> f64 {
-    let norms = |of: &Vector6<f64>| [of.fixed_rows::<3>(0).norm(), of.fixed_rows::<3>(3).norm()];
-    let ([d_r, d_p], [v_r, v_p], [a_r, a_p]) = (norms(d), norms(v), norms(a));
-    let [orientation, position] = limits;
-    SHORTEST_S.max(duration_s(orientation, d_r, v_r, a_r)).max(duration_s(position, d_p, v_p, a_p))
-}
-
-/// Duration of the quintic from d, v, a to none. Its peaks are at most `1.875 d / T` (velocity),
-/// `5.774 d / T^2 + 6 v / T + a` and `60 d / T^3 + 36 v / T^2 + 9 a / T`. With the second within the
-/// limit A, the third is at most `10.39 A / T`: no cubic equation is left.
-fn vanishing_s(limit: &AxisLimits, d: f64, v: f64, a: f64) -> f64 {
-    // An acceleration near the limit leaves half of it for the rest.
-    let free = (limit.acceleration - a).max(0.5 * limit.acceleration);
-    let by_velocity = 1.875 * d / limit.velocity;
-    let by_acceleration = (3.0 * v + (9.0 * v * v + 5.774 * d * free).sqrt()) / free;
-    by_velocity.max(by_acceleration).max(10.39 * limit.acceleration.max(a) / limit.jerk)
-}
-
-/// Duration of the cubic from v with v' = a to rest. Its peaks are at most `1.5 v / T + a / 3`, or a, and
-/// `6 v / T^2 + 4 a / T`.
-fn to_rest_s(limit: &AxisLimits, _: f64, v: f64, a: f64) -> f64 {
-    let free = (limit.acceleration - a / 3.0).max(0.2 * limit.acceleration);
-    let by_jerk = (2.0 * a + (4.0 * a * a + 6.0 * v * limit.jerk).sqrt()) / limit.jerk;
-    (1.5 * v / free).max(by_jerk)
-}
-
-/// A moving pose displaced by `[dw; dv](t)`: `R = exp(dw) R_b`, `C = C_b + dv`.
-///
-/// `omega = J dw' + exp(dw) omega_b` with the left Jacobian J of SO(3) to the second order in dw. A
-/// displacement along one axis is exact; one of 0.2 rad that turns its axis is exact to a thousandth.
-fn displaced(base: &Motion, d: &Twist, rate: &Twist, acceleration: &Acceleration) -> Motion {
-    let turn = exp(&d.angular);
-    let tilde = d.angular.cross_matrix();
-    let jacobian = Matrix3::identity() + tilde * 0.5 + tilde * tilde / 6.0;
-    let added: Vector3<f64> = jacobian * rate.angular;
-    let carried = turn * base.twist.angular;
-    let bend = rate.angular.cross(&d.angular.cross(&rate.angular)) / 6.0;
-    Motion {
-        pose: Pose { rotation: turn * base.pose.rotation, position: base.pose.position + d.linear },
-        twist: Twist { angular: added + carried, linear: base.twist.linear + rate.linear },
-        acceleration: Acceleration {
-            angular: jacobian * acceleration.angular
-                + bend
-                + added.cross(&carried)
-                + turn * base.acceleration.angular,
-            linear: base.acceleration.linear + acceleration.linear,
-        },
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::task::TaskState;
-
-    const LIMITS: Limits = Limits {
-        position: AxisLimits { velocity: 0.5, acceleration: 5.0, jerk: 100.0 },
-        orientation: AxisLimits { velocity: 1.0, acceleration: 10.0, jerk: 200.0 },
-        own_share: 1.0,
-    };
-
-    fn twist(numbers: [f64; 6]) -> Twist {
-        Twist::from_vector(&numbers.into())
-    }
-
-    fn moving() -> Motion {
-        TaskState {
-            x: Vector6::new(0.1, -0.2, 0.3, 0.01, 0.02, 0.7),
-            xd: Vector6::new(0.3, -0.1, 0.2, 0.1, -0.2, 0.05),
-            xdd: Vector6::new(1.0, -0.5, 0.2, 0.3, 1.0, -0.7),
+impl ReferenceGenerator {
+    /// The reference at an instant; `None` if it depends on a setpoint and there is none.
+    pub fn motion_at(
+        &self,
+        parameters: &Parameters,
+        setpoint: Option<&SetpointMotion>,
+        instant_ns: u64,
+    ) -> Option<Motion> {
+        let setpoint = || Some(setpoint?.motion_at(parameters, instant_ns));
+        match &self.reference {
+            Reference::Setpoint => setpoint(),
+            Reference::OntoSetpoint(segment) => Some(segment.displace(&setpoint()?, instant_ns)),
+            Reference::FromPose(pose, segment) => Some(segment.displace(&at_rest(pose), instant_ns)),
         }
-        .motion()
     }
 
-    /// Derivatives belong to the pose, and limits are kept, at every instant.
-    fn is_smooth(segment: &Segment, base: &Motion, limits: Option<&Limits>) {
-        let h_ns = 100_000;
-        let h = 1e-4;
-        let mut before: Option<Motion> = None;
-        for instant_ns in (segment.start_ns..segment.start_ns + 3_000_000_000).step_by(1_000_000) {
-            let now = segment.displace(base, instant_ns);
-            let later = segment.displace(base, instant_ns + h_ns);
-            let earlier = segment.displace(base, instant_ns - h_ns);
-            if !segment.ended(instant_ns) {
-                let twist = earlier.pose.displacement_to(&later.pose).vector() / (2.0 * h);
-                assert!((twist - now.twist.vector()).norm() < 2e-4, "{twist} {}", now.twist.vector());
-                let acceleration = (later.twist.vector() - earlier.twist.vector()) / (2.0 * h);
-                assert!((acceleration - now.acceleration.vector()).norm() < 0.05, "{acceleration}");
-            }
-            if let Some(limits) = limits {
-                assert!(now.acceleration.linear.norm() <= limits.position.acceleration * 1.001);
-                assert!(now.acceleration.angular.norm() <= limits.orientation.acceleration * 1.001);
-                if let Some(before) = before.replace(now) {
-                    let jerk = (now.acceleration.linear - before.acceleration.linear).norm() / 1e-3;
-                    assert!(jerk <= limits.position.jerk * 1.001, "{jerk}");
-                }
+    /// Whether the autonomous motion of the state has come to its end.
+    pub fn has_arrived(&self, instant_ns: u64) -> bool {
+        match &self.reference {
+            Reference::Setpoint => true,
+            Reference::OntoSetpoint(segment) | Reference::FromPose(_, segment) => {
+                segment.has_ended(instant_ns)
             }
         }
-        let end = segment.start_ns + 4_000_000_000;
-        assert!(segment.ended(end));
     }
 
-    #[test]
-    fn a_displacement_of_a_resting_pose_vanishes_within_the_limits() {
-        let base = TaskState::at_rest([0.1, 0.2, 0.3, 0.0, 0.0, 1.0]).motion();
-        let d = twist([0.1, -0.05, 0.1, 0.02, -0.03, 0.01]);
-        let segment =
-            Segment::vanishing(5_000_000_000, &d, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
-        let first = segment.displace(&base, 5_000_000_000);
-        assert!((base.pose.displacement_to(&first.pose).vector() - d.vector()).norm() < 1e-14);
-        is_smooth(&segment, &base, Some(&LIMITS));
-        let last = segment.displace(&base, 9_000_000_000);
-        assert!((last.pose.rotation - base.pose.rotation).norm() < 1e-12);
-        assert!((last.pose.position - base.pose.position).norm() < 1e-12);
+    /// Whether an autonomous motion stays within the stroke.
+    pub fn check_stroke(
+        &self,
+        constants: &Constants,
+        setpoint: Option<&SetpointMotion>,
+        instant_ns: u64,
+    ) -> Result<(), Diagnostic> {
+        let Some(motion) = self.motion_at(&constants.parameters, setpoint, instant_ns) else { return Ok(()) };
+        let machine = constants.machine();
+        check_measurable_stroke(
+            &machine.actuator,
+            DiagnosticCode::SetpointOutOfReach,
+            &leg_lengths(machine, &motion.pose),
+        )
     }
 
-    #[test]
-    fn a_displacement_of_a_moving_pose_begins_with_the_rate_it_has() {
-        let base = moving();
-        let (d, v) =
-            (twist([0.004, 0.001, -0.002, 0.001, 0.002, 0.0]), twist([0.02, 0.0, 0.01, 0.0, 0.01, 0.0]));
-        let segment = Segment::vanishing(7, &d, &v, &Acceleration::default(), &LIMITS);
-        let added = segment.displace(&base, 7).twist.vector() - base.twist.vector();
-        assert!((added - v.vector()).norm() < 1e-2, "{added}");
+    /// After a gap a setpoint may differ, within its tolerance, from the continuation of the one before. If the step
+    /// would exceed the limit of jerk, a segment leads onto the setpoint. True if the reference has changed.
+    pub fn rebase(&mut self, cycle: &Cycle<'_>, setpoint: &SetpointInput<'_>) -> bool {
+        setpoint.before_gap.as_ref().is_some_and(|before| self.bridge(cycle, setpoint.valid, before))
     }
 
-    #[test]
-    fn a_motion_comes_to_rest_without_a_step_of_acceleration() {
-        let motion = moving();
-        let base = Motion { pose: motion.pose, ..TaskState::at_rest([0.0; 6]).motion() };
-        let segment = Segment::to_rest(5_000_000_000, &motion.twist, &motion.acceleration, &LIMITS);
-        let first = segment.displace(&base, 5_000_000_000);
-        assert!((first.twist.vector() - motion.twist.vector()).norm() < 1e-12);
-        assert!((first.acceleration.vector() - motion.acceleration.vector()).norm() < 1e-12);
-        is_smooth(&segment, &base, Some(&LIMITS));
-        let last = segment.displace(&base, 9_000_000_000);
-        assert!(last.twist.vector().norm() < 1e-12 && last.acceleration.vector().norm() < 1e-9);
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn bridge(
+        &mut self,
+        cycle: &Cycle<'_>,
+        setpoint: Option<&SetpointMotion>,
+        before: &SetpointMotion,
+    ) -> bool {
+        let (parameters, now_ns) = (&cycle.constants.parameters, cycle.release_ns);
+        let present = self.motion_at(parameters, Some(before), now_ns);
+        let next = self.motion_at(parameters, setpoint, now_ns);
+        let (Some(present), Some(next)) = (present, next) else { return false };
+        let Parameters { law, limits, .. } = parameters;
+        let error = TrackingError::new(&present, &next.pose, &next.twist);
+        if error.tolerance_ratio(parameters) < MIN_REBASE_RATIO {
+            return false;
+        }
+        let feedback = law.feedback(&Deviation::from(&error));
+        let command = law.command(&present, &error, &feedback).acceleration;
+        let step = |command: Vector3<f64>, next: Vector3<f64>| (command - next).norm();
+        let period_s = parameters.period_s();
+        let has_jerk = step(command.linear, next.acceleration.linear) > limits.position.jerk * period_s
+            || step(command.angular, next.acceleration.angular) > limits.orientation.jerk * period_s;
+        if has_jerk {
+            // With the full limits, as a stop: a delay is a deviation from the planned path.
+            self.reference = onto_setpoint(parameters, setpoint, &present, now_ns, 1.0);
+        }
+        has_jerk
     }
 
-    #[test]
-    fn nothing_to_do_takes_next_to_no_time() {
-        let segment = Segment::to_rest(9, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
-        assert!(!segment.ended(9) && segment.ended(9 + 20_000_001));
+    /// Begins the reference of the state just entered.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn enter(
+        &mut self,
+        cycle: &Cycle<'_>,
+        next: State,
+        setpoint: Option<&SetpointMotion>,
+        Located { measurement, platform }: &Located<'_>,
+    ) {
+        let Cycle { constants, release_ns, state } = *cycle;
+        let (parameters, limits) = (&constants.parameters, &constants.parameters.limits);
+        let measured = Motion { twist: platform.twist, ..at_rest(&platform.pose) };
+        // Without control the platform stands or coasts; its acceleration is not measured.
+        let present = self.motion_at(parameters, setpoint, release_ns).filter(|_| state.has_control());
+        let present = present.unwrap_or(measured);
+        self.reference = match next {
+            State::Engaging => {
+                let scale = limits.autonomous_scale;
+                onto_setpoint(parameters, setpoint, &measured, measurement.time_ns, scale)
+            }
+            State::Stopping => {
+                let segment = Segment::to_rest(release_ns, &present.twist, &present.acceleration, limits);
+                Reference::FromPose(present.pose, segment)
+            }
+            State::Parking => {
+                let home = *constants.home.pose();
+                let displacement = home.displacement_to(&present.pose);
+                let Motion { twist: rate, acceleration, .. } = present;
+                let segment = Segment::to_base(release_ns, &displacement, &rate, &acceleration, limits);
+                Reference::FromPose(home, segment)
+            }
+            State::Off | State::Standby | State::Active | State::Fault => Reference::Setpoint,
+        };
     }
+}
+
+/// From a motion onto the setpoint, with the limits times a factor.
+fn onto_setpoint(
+    parameters: &Parameters,
+    setpoint: Option<&SetpointMotion>,
+    from: &Motion,
+    instant_ns: u64,
+    scale: f64,
+) -> Reference {
+    let Some(setpoint) = setpoint else { return Reference::Setpoint };
+    let base = setpoint.motion_at(parameters, instant_ns);
+    let displacement = base.pose.displacement_to(&from.pose);
+    let rate = Twist::from_vector(&(from.twist.vector() - base.twist.vector()));
+    let acceleration = Acceleration::from_vector(&(from.acceleration.vector() - base.acceleration.vector()));
+    let limits = Limits { autonomous_scale: scale, ..parameters.limits };
+    Reference::OntoSetpoint(Segment::to_base(instant_ns, &displacement, &rate, &acceleration, &limits))
+}
+
+fn at_rest(pose: &Pose) -> Motion {
+    Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() }
 }

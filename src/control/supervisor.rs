@@ -1,69 +1,108 @@
-//! The state machine: which state follows, as a pure and total function.
+//! The state machine: the next state, as a pure and total function of requests and findings.
 //!
 //! Order of precedence: the emergency stop, a fault that brakes, `off`, a fault that stops, then what the
-//! state itself does. In states without force a fault is only shown: there is nothing to take away.
+//! state itself does. In states without force a fault is only reported: no force is to be disabled.
 
-use super::state::{Cause, Reaction, Request, State};
+use super::controller::Input;
+use super::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
+use super::state::{OperatorRequest, Request, State};
 
-/// What a platform does once it has come to rest.
+/// Goal of a stop: the state that follows once the platform is at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AfterStop {
-    /// Stands, with its brakes closed.
+    /// Forces are disabled; brakes close.
     #[default]
     Standby,
-    /// Goes home.
+    /// Moves to the home pose.
     Park,
-    /// Stands until cleared.
+    /// Forces are disabled until cleared.
     Fault,
 }
 
-/// The state with what belongs to it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+/// State of the controller, with its reason and the goal of a stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mode {
     pub state: State,
-    /// Why it is not active, or will not be for long.
-    pub cause: Cause,
-    /// Meant only while stopping.
+    /// Why it is not active, or soon will not be.
+    pub diagnostic: Diagnostic,
+    /// Used only while stopping.
     pub after: AfterStop,
 }
 
-/// What a cycle found.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// Findings of one cycle that decide the next state.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Findings {
-    /// Is the pose known, from good measurements? If not, why.
-    pub located: Result<(), Cause>,
-    /// May control begin? If not, why.
-    pub engageable: Result<(), Cause>,
-    /// Can the reference be followed on? If not, why. A cause that is no fault ends it in order.
-    pub following: Result<(), Cause>,
+    /// Whether the pose is known, from valid measurements.
+    pub localization: Result<(), Diagnostic>,
+    /// Whether control may begin.
+    pub engagement: Result<(), Diagnostic>,
+    /// Whether the reference can be followed further. A diagnostic that is no fault ends it by a stop.
+    pub tracking: Result<(), Diagnostic>,
     /// The reference of engaging, stopping or parking has come to its end.
-    pub arrived: bool,
+    pub has_arrived: bool,
 }
 
-/// The next state, and why a request was refused if it was. `after_loss` is what follows the stop of a
-/// platform that lost its setpoint.
+/// Third stage of the cycle: the state, and the answer to the last request.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Supervisor {
+    pub mode: Mode,
+    /// Message of the last request carried out or refused.
+    pub answered: (u64, u64),
+    /// Why that one was refused; code `None` if it was not.
+    pub request_diagnostic: Diagnostic,
+}
+
+impl Supervisor {
+    /// The request of an input if it was not answered before: each is carried out once.
+    pub fn new_request(&self, input: &Input) -> Option<OperatorRequest> {
+        input.request.filter(|request| request.message != self.answered)
+    }
+
+    /// Decides the next state. Returns it.
+    pub fn decide(
+        &mut self,
+        request: Option<OperatorRequest>,
+        findings: &Findings,
+        after_loss: AfterStop,
+    ) -> State {
+        let (mode, refusal) = next(self.mode, request.map(|new| new.request), findings, after_loss);
+        self.mode = mode;
+        if let Some(OperatorRequest { message, .. }) = request {
+            (self.answered, self.request_diagnostic) = (message, refusal.unwrap_or_default());
+        }
+        mode.state
+    }
+
+    /// Enters the state fault: no valid force could be computed.
+    pub fn fail(&mut self, diagnostic: Diagnostic) {
+        self.mode = fault(diagnostic);
+    }
+}
+
+/// The next state, and why a request was refused if it was. `after_loss` follows the stop of a platform that lost its
+/// setpoint.
 pub fn next(
     mode: Mode,
     request: Option<Request>,
     findings: &Findings,
     after_loss: AfterStop,
-) -> (Mode, Option<Cause>) {
+) -> (Mode, Option<Diagnostic>) {
     if request == Some(Request::Estop) {
-        return (fault(Cause::EmergencyStop), None);
+        return (fault(DiagnosticCode::EmergencyStop.into()), None);
     }
-    if mode.state.controls() {
-        // Without the pose nothing can be controlled, whatever the reason.
-        if let Err(cause) = findings.located {
-            return (fault(cause), None);
+    if mode.state.has_control() {
+        // Control needs the pose, whatever the reason it is unknown.
+        if let Err(diagnostic) = findings.localization {
+            return (fault(diagnostic), None);
         }
-        if let Err(cause) = findings.following
-            && cause.reaction() == Reaction::Brake
+        if let Err(diagnostic) = findings.tracking
+            && diagnostic.code.reaction() == Reaction::Brake
         {
-            return (fault(cause), None);
+            return (fault(diagnostic), None);
         }
     }
     if request == Some(Request::Off) && mode.state != State::Fault {
-        return (OFF_AS_ASKED, None);
+        return (OFF_BY_REQUEST, None);
     }
     match mode.state {
         State::Off | State::Standby => without_force(mode, request, findings),
@@ -74,46 +113,49 @@ pub fn next(
     }
 }
 
-/// Off because somebody wants it so: it does not become standby by itself.
-const OFF_AS_ASKED: Mode = Mode { state: State::Off, cause: Cause::Asked, after: AfterStop::Standby };
+/// Off by request of an operator: it does not become standby by itself.
+const OFF_BY_REQUEST: Mode = Mode { state: State::Off, diagnostic: REQUESTED, after: AfterStop::Standby };
 
-fn fault(cause: Cause) -> Mode {
-    Mode { state: State::Fault, cause, ..Mode::default() }
+const REQUESTED: Diagnostic =
+    Diagnostic { code: DiagnosticCode::OperatorRequest, value: 0.0, bound: 0.0, index: 0 };
+
+fn fault(diagnostic: Diagnostic) -> Mode {
+    Mode { state: State::Fault, diagnostic, ..Mode::default() }
 }
 
-fn stop(cause: Cause, after: AfterStop) -> Mode {
-    Mode { state: State::Stopping, cause, after }
+fn stop(diagnostic: Diagnostic, after: AfterStop) -> Mode {
+    Mode { state: State::Stopping, diagnostic, after }
 }
 
-fn standby(cause: Cause) -> Mode {
-    Mode { state: State::Standby, cause, ..Mode::default() }
+fn standby(diagnostic: Diagnostic) -> Mode {
+    Mode { state: State::Standby, diagnostic, ..Mode::default() }
 }
 
-fn without_force(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Cause>) {
-    let ready = match findings.located {
-        Ok(()) => standby(findings.engageable.err().unwrap_or(Cause::NotAsked)),
-        Err(cause) => Mode { state: State::Off, cause, ..Mode::default() },
+fn without_force(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Diagnostic>) {
+    let ready = match findings.localization {
+        Ok(()) => standby(findings.engagement.err().unwrap_or(DiagnosticCode::ReadyToEngage.into())),
+        Err(diagnostic) => Mode { state: State::Off, diagnostic, ..Mode::default() },
     };
-    let rest = if mode == OFF_AS_ASKED { mode } else { ready };
+    let rest = if mode == OFF_BY_REQUEST { mode } else { ready };
     match request {
-        Some(Request::Engage) => match findings.located.and(findings.engageable) {
+        Some(Request::Engage) => match findings.localization.and(findings.engagement) {
             Ok(()) => (Mode { state: State::Engaging, ..Mode::default() }, None),
-            Err(cause) => (rest, Some(cause)),
+            Err(diagnostic) => (rest, Some(diagnostic)),
         },
         Some(Request::Clear) => (ready, None),
-        // Home is a way to go without a setpoint.
-        Some(Request::Park) => match findings.located {
-            Ok(()) => (Mode { state: State::Parking, cause: Cause::Asked, ..Mode::default() }, None),
-            Err(cause) => (rest, Some(cause)),
+        // Parking needs no setpoint.
+        Some(Request::Park) => match findings.localization {
+            Ok(()) => (Mode { state: State::Parking, diagnostic: REQUESTED, ..Mode::default() }, None),
+            Err(diagnostic) => (rest, Some(diagnostic)),
         },
         None | Some(Request::Stop | Request::Off | Request::Estop) => (rest, None),
     }
 }
 
-fn in_fault(mode: Mode, request: Option<Request>) -> (Mode, Option<Cause>) {
+fn in_fault(mode: Mode, request: Option<Request>) -> (Mode, Option<Diagnostic>) {
     match request {
         Some(Request::Clear) => (Mode::default(), None),
-        Some(Request::Engage | Request::Park) => (mode, Some(Cause::NotNow)),
+        Some(Request::Engage | Request::Park) => (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Stop | Request::Off | Request::Estop) | None => (mode, None),
     }
 }
@@ -123,55 +165,62 @@ fn following(
     request: Option<Request>,
     findings: &Findings,
     after_loss: AfterStop,
-) -> (Mode, Option<Cause>) {
-    if let Err(cause) = findings.following {
-        let after = match cause {
-            Cause::SetpointLost => after_loss,
-            cause if cause.is_fault() => AfterStop::Fault,
+) -> (Mode, Option<Diagnostic>) {
+    if let Err(diagnostic) = findings.tracking {
+        let after = match diagnostic.code {
+            DiagnosticCode::SetpointLost => after_loss,
+            code if code.is_fault() => AfterStop::Fault,
             _ => AfterStop::Standby,
         };
-        return (stop(cause, after), None);
+        return (stop(diagnostic, after), None);
     }
     match request {
-        Some(Request::Stop) => (stop(Cause::Asked, AfterStop::Standby), None),
-        Some(Request::Park) => (stop(Cause::Asked, AfterStop::Park), None),
-        Some(Request::Clear) => (mode, Some(Cause::NotNow)),
+        Some(Request::Stop) => (stop(REQUESTED, AfterStop::Standby), None),
+        Some(Request::Park) => (stop(REQUESTED, AfterStop::Park), None),
+        Some(Request::Clear) => (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Engage | Request::Off | Request::Estop) | None => {
-            let state = if findings.arrived { State::Active } else { mode.state };
+            let state = if findings.has_arrived { State::Active } else { mode.state };
             (Mode { state, ..mode }, None)
         }
     }
 }
 
-fn stopping(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Cause>) {
+fn stopping(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Diagnostic>) {
     let (mode, refused) = match (request, mode.after) {
-        _ if findings.following.is_err() && mode.after != AfterStop::Fault => {
-            (findings.following.map_or_else(|cause| stop(cause, AfterStop::Fault), |()| mode), None)
+        _ if findings.tracking.is_err() && mode.after != AfterStop::Fault => {
+            (findings.tracking.map_or_else(|diagnostic| stop(diagnostic, AfterStop::Fault), |()| mode), None)
         }
-        (Some(Request::Park), AfterStop::Standby) => (stop(Cause::Asked, AfterStop::Park), None),
-        (Some(Request::Stop), AfterStop::Park) => (stop(Cause::Asked, AfterStop::Standby), None),
-        (Some(Request::Engage | Request::Clear | Request::Park), _) => (mode, Some(Cause::NotNow)),
+        (Some(Request::Park), AfterStop::Standby) => (stop(REQUESTED, AfterStop::Park), None),
+        (Some(Request::Stop), AfterStop::Park) => (stop(REQUESTED, AfterStop::Standby), None),
+        (Some(Request::Engage | Request::Clear | Request::Park), _) => {
+            (mode, Some(DiagnosticCode::InvalidInState.into()))
+        }
         _ => (mode, None),
     };
-    if !findings.arrived {
+    if !findings.has_arrived {
         return (mode, refused);
     }
     let rest = match mode.after {
-        AfterStop::Standby => standby(mode.cause),
-        AfterStop::Park => Mode { state: State::Parking, cause: mode.cause, ..Mode::default() },
-        AfterStop::Fault => fault(mode.cause),
+        AfterStop::Standby => standby(current(mode.diagnostic.code, findings)),
+        AfterStop::Park => Mode { state: State::Parking, after: AfterStop::default(), ..mode },
+        AfterStop::Fault => fault(mode.diagnostic),
     };
     (rest, refused)
 }
 
-fn parking(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Cause>) {
-    if let Err(cause) = findings.following {
-        return (stop(cause, AfterStop::Fault), None);
+fn parking(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Diagnostic>) {
+    if let Err(diagnostic) = findings.tracking {
+        return (stop(diagnostic, AfterStop::Fault), None);
     }
     match request {
-        Some(Request::Stop) => return (stop(Cause::Asked, AfterStop::Standby), None),
-        Some(Request::Engage | Request::Clear) => return (mode, Some(Cause::NotNow)),
+        Some(Request::Stop) => return (stop(REQUESTED, AfterStop::Standby), None),
+        Some(Request::Engage | Request::Clear) => return (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Park | Request::Off | Request::Estop) | None => {}
     }
-    (if findings.arrived { OFF_AS_ASKED } else { mode }, None)
+    (if findings.has_arrived { OFF_BY_REQUEST } else { mode }, None)
+}
+
+/// The diagnostic of a code with the number of this cycle, if the code still prevents control.
+fn current(code: DiagnosticCode, findings: &Findings) -> Diagnostic {
+    findings.engagement.err().filter(|found| found.code == code).unwrap_or(code.into())
 }

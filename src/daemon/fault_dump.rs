@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 use tracing::{info, warn};
 
 use super::cycle::CycleRecord;
-use crate::control::controller::seconds_between;
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::input_validation::seconds_between;
+use crate::control::state::State;
 use crate::messages::layout::{Declared, Layout};
 use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use crate::output::csv_table::Writer;
@@ -32,7 +33,7 @@ pub struct FaultDump {
     folder: Option<PathBuf>,
     home: [f64; 6],
     cycles: VecDeque<CycleRecord>,
-    last: Cause,
+    last: DiagnosticCode,
     /// The fault to write, and how many cycles after it are missing.
     due: Option<(CycleRecord, usize)>,
     file: Option<DumpFile>,
@@ -55,7 +56,7 @@ impl FaultDump {
             folder: folder.map(Path::to_path_buf),
             home,
             cycles: VecDeque::with_capacity(if folder.is_some() { CYCLES_KEPT } else { 0 }),
-            last: Cause::None,
+            last: DiagnosticCode::None,
             due: None,
             file: None,
             files: 0,
@@ -71,13 +72,13 @@ impl FaultDump {
             self.cycles.pop_front();
         }
         self.cycles.push_back(*record);
-        let cause = record.output.cause;
+        let code = record.output.diagnostic.code;
         // A fault is one only if it ends control.
         let ends_control = matches!(record.output.state, State::Stopping | State::Fault);
-        if cause != self.last && cause.is_fault() && ends_control && self.due.is_none() {
+        if code != self.last && code.is_fault() && ends_control && self.due.is_none() {
             self.due = Some((*record, CYCLES_AFTER_FAULT));
         }
-        self.last = cause;
+        self.last = code;
         if let Some((fault, missing)) = &mut self.due {
             *missing = missing.saturating_sub(1);
             if *missing == 0 && self.file.is_none() {
@@ -94,7 +95,7 @@ impl FaultDump {
         if self.files == MAX_FILES {
             warn!("this was fault number {MAX_FILES}: the cycles of later ones are not written");
         }
-        let number = fault.output.cause as u32;
+        let number = fault.output.diagnostic.code as u32;
         let path = folder.join(format!("fault-{number}-cycle-{}.csv", fault.cycle));
         let columns = Columns::new();
         let table = Writer::new(&columns.names());
@@ -152,7 +153,7 @@ impl Columns {
             force: Section::new(
                 &ForceMessage::LAYOUT,
                 "",
-                &["header", "state", "diagnostic_code", "limiting", "checksum", "reserved"],
+                &["header", "state", "diagnostic_code", "active_limits", "checksum", "reserved"],
             ),
         }
     }
@@ -219,11 +220,16 @@ mod tests {
     use super::*;
     use crate::control::controller::{Input, Output};
 
-    fn record(cycle: u64, cause: Cause) -> CycleRecord {
+    fn record(cycle: u64, code: DiagnosticCode) -> CycleRecord {
         CycleRecord {
             cycle,
             input: Input { release_ns: cycle * 1_000_000, ..Input::default() },
-            output: Output { state: State::Stopping, cause, force: [7.5; 6], ..Output::default() },
+            output: Output {
+                state: State::Stopping,
+                diagnostic: code.into(),
+                force: [7.5; 6],
+                ..Output::default()
+            },
             ..CycleRecord::default()
         }
     }
@@ -234,9 +240,9 @@ mod tests {
         let mut dump = FaultDump::new(Some(folder.path()), [0.0; 6]);
         for cycle in 1..=9000 {
             let cause = match cycle {
-                3000..3500 => Cause::OffPath,
-                8950.. => Cause::MeasurementLost,
-                _ => Cause::None,
+                3000..3500 => DiagnosticCode::FollowingError,
+                8950.. => DiagnosticCode::MeasurementLost,
+                _ => DiagnosticCode::None,
             };
             dump.add(&record(cycle, cause));
             dump.step();
@@ -272,7 +278,7 @@ mod tests {
     #[test]
     fn without_a_folder_nothing_is_kept() {
         let mut dump = FaultDump::new(None, [0.0; 6]);
-        dump.add(&record(1, Cause::OffPath));
+        dump.add(&record(1, DiagnosticCode::FollowingError));
         dump.finish();
         assert_eq!(dump.cycles.capacity(), 0);
     }

@@ -11,7 +11,8 @@ use std::thread::Builder;
 use rayon::ThreadPoolBuilder;
 use tracing::warn;
 
-use crate::analysis::assembly_modes::others;
+use crate::analysis::assembly_modes::other_modes;
+use crate::control::localization::PlatformState;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
@@ -28,7 +29,7 @@ impl FirstPose {
 
     /// Begins the search if this is the first cycle with a pose.
     pub fn add(&mut self, record: &CycleRecord) {
-        let Some((pose, _)) = record.output.measured else { return };
+        let Some(PlatformState { pose, .. }) = record.output.platform else { return };
         let Some(machine) = self.0.take() else { return };
         // The daemon does not wait for it to end.
         let search = Builder::new()
@@ -44,7 +45,7 @@ impl FirstPose {
 /// Logs the nearest other pose, if one is nearby.
 fn warn_of_nearby_modes(machine: &Machine, pose: Pose) {
     let Ok(pool) = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build() else { return };
-    let others = pool.install(|| others(machine, &KinematicState::new(machine, pose)));
+    let others = pool.install(|| other_modes(machine, &KinematicState::new(machine, pose)));
     if let Some(nearest) = others.first().filter(|nearest| nearest.is_nearby()) {
         let x = task_coordinates(&pose, &machine.home);
         warn!(

@@ -15,11 +15,11 @@ use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::report::{Fault, TrackingSum};
 use super::statistics::Collector;
-use super::told::Told;
 use crate::control::controller::Output;
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::State;
 use crate::messages::Statistics;
-use crate::realtime::newest::Writer;
+use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
 /// How often the queues are emptied: well before they are full at the highest rate.
@@ -84,7 +84,7 @@ struct Log {
     collector: Collector,
     report: LogReport,
     /// Of the last cycle.
-    state: (State, Cause),
+    state: (State, DiagnosticCode),
     hints: Hints,
 }
 
@@ -97,7 +97,7 @@ impl Log {
             if let Some((position, orientation)) = tracking_error(&record) {
                 self.report.tracking.add(position, orientation);
             }
-            let state = (record.output.state, record.output.cause);
+            let state = (record.output.state, record.output.diagnostic.code);
             if state != self.state {
                 self.log_state(&record);
                 self.state = state;
@@ -114,27 +114,21 @@ impl Log {
     }
 
     fn log_state(&mut self, record: &CycleRecord) {
-        let CycleRecord { cycle, output: Output { state, cause, evidence, .. }, .. } = *record;
+        let CycleRecord { cycle, output: Output { state, diagnostic, .. }, .. } = *record;
+        let code = diagnostic.code;
         match state {
             State::Fault => {
-                warn!(
-                    cycle,
-                    number = cause as u32,
-                    "fault: {}{}; no force until cleared; {}",
-                    cause.name(),
-                    Told(cause, evidence),
-                    cause.remedy()
-                );
+                warn!(cycle, number = code as u32, "fault: {diagnostic}; no force until cleared");
                 let faults = &mut self.report.faults;
                 if faults.len() < MAX_FAULTS {
-                    faults.push(Fault { cycle, number: cause as u32, name: cause.name().into() });
+                    faults.push(Fault { cycle, number: code as u32, name: code.name().into() });
                 }
             }
             State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
-            State::Stopping if cause.is_fault() => {
-                warn!(cycle, number = cause as u32, "stopping: {}{}", cause.name(), Told(cause, evidence))
+            State::Stopping if code.is_fault() => {
+                warn!(cycle, number = code as u32, "stopping: {diagnostic}")
             }
-            _ => info!(cycle, "{}: {}{}", state.name(), cause.name(), Told(cause, evidence)),
+            _ => info!(cycle, "{}: {diagnostic}", state.name()),
         }
     }
 }

@@ -26,7 +26,6 @@ pub mod start;
 mod statistics;
 mod threads;
 pub mod time_histogram;
-pub mod told;
 
 pub use self::parameters::{nanoseconds, parameters, timing};
 

@@ -5,9 +5,9 @@ use core::f64::consts::TAU;
 use nalgebra::Vector6;
 
 use crate::config::deployment::Deployment;
-use crate::control::controller::{Envelope, Parameters};
 use crate::control::gains::Gains;
 use crate::control::law::Law;
+use crate::control::parameters::{Envelope, Parameters};
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
 use crate::realtime::cyclic::Timing;

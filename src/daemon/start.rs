@@ -15,7 +15,7 @@ use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::realtime::cyclic::ReleaseMode;
 use crate::realtime::setup::deadline::Reservation;
-use crate::realtime::setup::idle::ShallowSleep;
+use crate::realtime::setup::idle::PmQosRequest;
 use crate::realtime::setup::{Shortfall, deadline, denormals, idle, memory, scheduling};
 
 /// Cycles computed before the first release, so that code and data are in memory and in the cache.
@@ -30,14 +30,14 @@ pub(super) fn start(
     realtime: &Realtime,
     ready: &mpsc::Receiver<Ready>,
     go: &mpsc::Sender<()>,
-) -> Result<Option<ShallowSleep>, DaemonError> {
+) -> Result<Option<PmQosRequest>, DaemonError> {
     let mut shortfalls = Vec::new();
     for _ in ["io", "real-time"] {
         shortfalls.extend(ready.recv().map_err(|_| DaemonError::Died("io or real-time"))??);
     }
     let mut pm_qos = None;
     if !realtime.is_simulated() {
-        pm_qos = idle::bound_wakeup(realtime.cpu_dma_latency_us)
+        pm_qos = idle::limit_wakeup_latency(realtime.cpu_dma_latency_us)
             .map_err(|shortfall| shortfalls.push(shortfall))
             .ok();
         if realtime.lock_memory {
@@ -57,7 +57,7 @@ pub(super) fn start(
 
 /// Prepares the calling thread for I/O: it allocates while a peer connects.
 pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
-    memory::touch_heap();
+    memory::prefault_heap();
     let scheduled = scheduling::fifo_priority(realtime.io_priority);
     prepare(realtime.io_cpu, scheduled)
 }
@@ -83,8 +83,8 @@ pub(super) fn prepare_simulated(warm_up: impl FnOnce()) -> Vec<Shortfall> {
 }
 
 fn prepare(cpu: Option<usize>, scheduled: Result<(), Shortfall>) -> Vec<Shortfall> {
-    scheduling::sharp_timers();
-    memory::touch_stack();
+    scheduling::set_shortest_timer_slack();
+    memory::prefault_stack();
     let bound = cpu.and_then(|cpu| scheduling::bind_to_cpu(cpu).err());
     scheduled.err().into_iter().chain(bound).collect()
 }

@@ -26,16 +26,16 @@ use super::{DaemonError, REALTIME_THREAD};
 use crate::config::control_loops::{ControlLoop, loops};
 use crate::config::{Config, fidelity};
 use crate::control::controller::{Controller, Input, Output};
-use crate::control::state::Cause;
+use crate::control::diagnostic::DiagnosticCode;
 use crate::messages::Statistics;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, LoopReport, RECORDS};
-use crate::realtime::doorbell::Doorbell;
+use crate::realtime::event::Event;
 use crate::realtime::exchange::exchange;
-use crate::realtime::newest::newest;
-use crate::realtime::process::leave_signals_to_others;
+use crate::realtime::process::block_signals;
 use crate::realtime::setup::memory;
 use crate::realtime::stop_request::Stop;
+use crate::realtime::triple_buffer::triple_buffer;
 
 /// Stack of each thread: several times what they use, and small because locked memory holds all of it. A debug build
 /// keeps every intermediate value there.
@@ -63,19 +63,19 @@ pub(super) fn run(
     faults: Option<&Path>,
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
-    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+    let machine = &config.machine;
+    let parameters = parameters(machine, &config.deployment, fidelity::fidelity(config));
+    for warning in loops(config, &parameters.law.leg_masses).iter().filter_map(ControlLoop::warning) {
         warn!("{warning}");
     }
-    let machine = &config.machine;
-    let controller =
-        Controller::new(machine, parameters(machine, &config.deployment, fidelity::fidelity(config)));
+    let controller = Controller::new(machine, parameters);
     let (realtime_side, io_side) = exchange();
-    let event = io_side.bell.clone();
+    let event = io_side.event.clone();
     let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
     let (record_producer, records) = record_queue.split();
     let mut delay_queue = Box::new(Queue::<u64, DELAYS>::new());
     let (delay_producer, delays) = delay_queue.split();
-    let (statistics_writer, statistics) = newest(Statistics::default());
+    let (statistics_writer, statistics) = triple_buffer(Statistics::default());
     let (flags, files) = (&Flags::default(), &OnceLock::new());
     let (io_ready, ready) = channel();
     let (go, go_ahead) = channel();
@@ -152,7 +152,7 @@ fn run_realtime(
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
     let step = |input: &Input| controller.step(input);
-    let last = Output { cause: Cause::Stopping, ..Output::default() };
+    let last = Output { diagnostic: DiagnosticCode::Stopping.into(), ..Output::default() };
     let timing = timing(&config.deployment);
     Some(cyclic::run(&mut Monotonic, &timing, step, last, links.exchange, links.records, stop))
 }
@@ -186,7 +186,7 @@ fn supervise(config: &Config, flags: &Flags, stop: &Stop) {
     flags.is_ending.store(true, Ordering::Relaxed);
     let began = Instant::now();
     while !flags.may_end.load(Ordering::Relaxed) {
-        if stop.insisted() || began.elapsed() > MAX_STOP_TIME {
+        if stop.is_repeated() || began.elapsed() > MAX_STOP_TIME {
             warn!("the platform did not come to rest: ending all the same");
             return;
         }
@@ -197,13 +197,13 @@ fn supervise(config: &Config, flags: &Flags, stop: &Stop) {
 /// Ends the threads one after the other, so that each receives what the one before it wrote last.
 fn join(
     flags: &Flags,
-    event: &Arc<Doorbell>,
+    event: &Arc<Event>,
     cyclic: ScopedJoinHandle<'_, Option<LoopReport>>,
     io: ScopedJoinHandle<'_, Option<IoReport>>,
     log: ScopedJoinHandle<'_, LogReport>,
 ) -> Result<(LoopReport, IoReport, LogReport), DaemonError> {
     flags.stop_loop.store(true, Ordering::Relaxed);
-    event.ring();
+    event.signal();
     let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
     flags.stop_io.store(true, Ordering::Relaxed);
     let io = io.join().map_err(|_| DaemonError::Died("io"));
@@ -229,7 +229,7 @@ fn spawn<'scope, T: Send + 'scope>(
 ) -> io::Result<ScopedJoinHandle<'scope, T>> {
     let body = || {
         // The main thread waits for them.
-        leave_signals_to_others();
+        block_signals();
         body()
     };
     Builder::new().name(name.into()).stack_size(STACK_BYTES).spawn_scoped(threads, body)

@@ -3,8 +3,7 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
-use crate::control::controller::Asked;
-use crate::control::state::Request;
+use crate::control::state::{OperatorRequest, Request};
 
 message! {
     /// Operator request, one per message.
@@ -25,8 +24,8 @@ impl From<Request> for CommandMessage {
 
 impl CommandMessage {
     /// The request with the message's epoch and sequence number; `None` if no request has its number.
-    pub fn request(&self) -> Option<Asked> {
+    pub fn request(&self) -> Option<OperatorRequest> {
         let request = Request::from_number(self.request)?;
-        Some(Asked { request, message: (self.header.epoch, self.header.sequence) })
+        Some(OperatorRequest { request, message: (self.header.epoch, self.header.sequence) })
     }
 }

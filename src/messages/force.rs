@@ -20,10 +20,10 @@ message! {
         valid: u32,
         /// Number of the `State`.
         state: u32,
-        /// Number of the `Cause` of the state.
+        /// Number of the `DiagnosticCode` of the state.
         diagnostic_code: u32,
-        /// Bits of the `Limit`s that this cycle is at.
-        limiting: u32,
+        /// Bits of the `Limit`s that this cycle has reached, or nearly.
+        active_limits: u32,
         /// Instant for which the forces were computed: the cycle's release, or with external release the time of the
         /// measurement that released it.
         release_ns: u64 ["ns"],
@@ -39,10 +39,10 @@ impl ForceMessage {
     pub fn new(output: &Output, release_ns: u64) -> Self {
         Self {
             force_n: output.force,
-            valid: u32::from(output.state.controls()),
+            valid: u32::from(output.state.has_control()),
             state: output.state as u32,
-            diagnostic_code: output.cause as u32,
-            limiting: output.limiting.0,
+            diagnostic_code: output.diagnostic.code as u32,
+            active_limits: output.active_limits.0,
             release_ns,
             ..Self::default()
         }
@@ -65,21 +65,26 @@ impl ForceMessage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::limits::Limiting;
-    use crate::control::state::{Cause, State};
+    use crate::control::diagnostic::DiagnosticCode;
+    use crate::control::limits::LimitSet;
+    use crate::control::state::State;
 
     #[test]
     fn a_force_is_valid_only_under_control() {
         let force = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        let mut output =
-            Output { cause: Cause::SetpointTooFar, force, limiting: Limiting(6), ..Output::default() };
+        let mut output = Output {
+            diagnostic: DiagnosticCode::SetpointTooFar.into(),
+            force,
+            active_limits: LimitSet(6),
+            ..Output::default()
+        };
         for state in State::ALL {
             output.state = state;
             let message = ForceMessage::new(&output, 91);
-            let numbers = [message.valid, message.state, message.diagnostic_code, message.limiting];
+            let numbers = [message.valid, message.state, message.diagnostic_code, message.active_limits];
             assert_eq!(
                 numbers,
-                [u32::from(state.controls()), state as u32, Cause::SetpointTooFar as u32, 6],
+                [u32::from(state.has_control()), state as u32, DiagnosticCode::SetpointTooFar as u32, 6],
                 "{state:?}"
             );
             assert_eq!((message.force_n, message.release_ns), (force, 91));

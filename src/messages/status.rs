@@ -5,13 +5,14 @@ use iceoryx2::prelude::ZeroCopySend;
 use super::layout::message;
 use super::{IoCounters, LoopCounters, Statistics};
 use crate::control::controller::Output;
-use crate::control::state::{Cause, Evidence, State, Trouble};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::state::State;
 use crate::model::task::task_coordinates;
 
 message! {
     /// Diagnostic: what happened, with the number that was found and its bound.
     DiagnosticRecord = "hexad_diagnostic" {
-        /// Number of the `Cause`.
+        /// Number of the `DiagnosticCode`.
         code: u32,
         /// Leg or axis, from 1; 0 if it concerns neither.
         index: u32,
@@ -28,8 +29,8 @@ message! {
         header: super::Header,
         /// Number of the `State`.
         state: u32,
-        /// Bits of the `Limit`s that this cycle is at.
-        limiting: u32,
+        /// Bits of the `Limit`s that this cycle has reached, or nearly.
+        active_limits: u32,
         /// Why the state is not active, or soon will not be.
         diagnostic: DiagnosticRecord,
         /// Epoch of the last command message that was carried out or refused.
@@ -38,7 +39,7 @@ message! {
         request_sequence: u64,
         /// Why that request was refused; code 0 if it was carried out.
         request_diagnostic: DiagnosticRecord,
-        /// 1 if `x` and `twist` are valid.
+        /// 1 if the fields from `x` to `time_to_singularity_s` are valid.
         pose_valid: u32,
         /// 1 if `position_error_m` and `orientation_error_rad` are valid.
         error_valid: u32,
@@ -58,9 +59,9 @@ message! {
         /// limited.
         wrench_error: [f64; 6] ["N m, N"],
         /// Cycles under control without a new valid measurement.
-        without_measurement: u64,
+        missed_measurements: u64,
         /// Cycles under control without a new valid setpoint.
-        without_setpoint: u64,
+        missed_setpoints: u64,
         /// Counters of the real-time thread.
         counters: LoopCounters,
         /// Counters of the io thread.
@@ -71,14 +72,16 @@ message! {
 }
 
 impl DiagnosticRecord {
-    fn new(code: Cause, Evidence { value, bound, index }: Evidence) -> Self {
-        Self { code: code as u32, index, value, bound }
-    }
-
     /// The diagnostic; `None` if no code has its number.
-    pub fn diagnostic(&self) -> Option<Trouble> {
+    pub fn diagnostic(&self) -> Option<Diagnostic> {
         let Self { code, index, value, bound } = *self;
-        Some(Trouble { cause: Cause::from_number(code)?, evidence: Evidence { value, bound, index } })
+        Some(Diagnostic { code: DiagnosticCode::from_number(code)?, value, bound, index })
+    }
+}
+
+impl From<Diagnostic> for DiagnosticRecord {
+    fn from(Diagnostic { code, value, bound, index }: Diagnostic) -> Self {
+        Self { code: code as u32, index, value, bound }
     }
 }
 
@@ -87,22 +90,22 @@ impl StatusMessage {
     pub fn new(home: &[f64; 6], output: &Output) -> Self {
         let mut message = Self {
             state: output.state as u32,
-            limiting: output.limiting.0,
-            diagnostic: DiagnosticRecord::new(output.cause, output.evidence),
+            active_limits: output.active_limits.0,
+            diagnostic: output.diagnostic.into(),
             request_epoch: output.answered.0,
             request_sequence: output.answered.1,
-            request_diagnostic: DiagnosticRecord::new(output.refused, Evidence::default()),
-            without_measurement: output.without_measurement,
-            without_setpoint: output.without_setpoint,
-            condition: output.condition,
-            time_to_singularity_s: output.singular_in,
+            request_diagnostic: output.request_diagnostic.into(),
+            missed_measurements: output.missed_measurements,
+            missed_setpoints: output.missed_setpoints,
             wrench_error: output.wrench_error.vector().into(),
             ..Self::default()
         };
-        if let Some((pose, twist)) = &output.measured {
+        if let Some(platform) = &output.platform {
             message.pose_valid = 1;
-            message.x = task_coordinates(pose, home);
-            message.twist = twist.vector().into();
+            message.x = task_coordinates(&platform.pose, home);
+            message.twist = platform.twist.vector().into();
+            message.condition = platform.condition;
+            message.time_to_singularity_s = platform.time_to_singularity;
         }
         if let Some(error) = &output.error {
             message.error_valid = 1;
@@ -121,8 +124,9 @@ impl StatusMessage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::law::TrackingError;
-    use crate::control::limits::Limiting;
+    use crate::control::limits::LimitSet;
+    use crate::control::localization::PlatformState;
+    use crate::control::tracking_error::TrackingError;
     use crate::model::rigid::{Twist, Wrench};
     use crate::model::task::TaskState;
     use nalgebra::Vector6;
@@ -138,18 +142,20 @@ mod tests {
         let twist = |first: f64| Twist::from_vector(&Vector6::from(six(first)));
         Output {
             state: State::Active,
-            cause: Cause::SetpointTooFar,
-            evidence: Evidence { value: 1.0, bound: 2.0, index: 3 },
+            diagnostic: Diagnostic { code: DiagnosticCode::SetpointTooFar, value: 1.0, bound: 2.0, index: 3 },
             answered: (4, 5),
-            refused: Cause::NotNow,
+            request_diagnostic: Diagnostic::new(DiagnosticCode::NearSingular, 143.0, 100.0).at(6),
             force: six(10.0),
             wrench_error: Wrench::from_vector(&Vector6::from(six(20.0))),
-            limiting: Limiting(6),
-            without_measurement: 7,
-            without_setpoint: 8,
-            measured: Some((TaskState::at_rest(HOME).motion().pose, twist(30.0))),
-            condition: 50.0,
-            singular_in: 51.0,
+            active_limits: LimitSet(6),
+            missed_measurements: 7,
+            missed_setpoints: 8,
+            platform: Some(PlatformState {
+                pose: TaskState::at_rest(HOME).motion().pose,
+                twist: twist(30.0),
+                condition: 50.0,
+                time_to_singularity: 51.0,
+            }),
             error: Some(TrackingError { pose: twist(60.0), twist: twist(70.0) }),
         }
     }
@@ -157,12 +163,17 @@ mod tests {
     #[test]
     fn a_status_contains_the_numbers_of_the_output() {
         let message = StatusMessage::new(&HOME, &output());
-        assert_eq!([message.state, message.limiting], [State::Active as u32, 6]);
+        assert_eq!([message.state, message.active_limits], [State::Active as u32, 6]);
         let diagnostic = DiagnosticRecord { code: 4, index: 3, value: 1.0, bound: 2.0 };
         assert_eq!(message.diagnostic, diagnostic);
-        assert_eq!(message.request_diagnostic.code, Cause::NotNow as u32);
+        let request_diagnostic = DiagnosticRecord { code: 119, index: 7, value: 143.0, bound: 100.0 };
+        assert_eq!(message.request_diagnostic, request_diagnostic);
+        let records = [message.diagnostic, message.request_diagnostic];
+        let diagnostics = records.map(|record| record.diagnostic());
+        assert_eq!(diagnostics, [output().diagnostic, output().request_diagnostic].map(Some));
+        assert_eq!(DiagnosticRecord { code: 99, ..diagnostic }.diagnostic(), None);
         assert_eq!([message.request_epoch, message.request_sequence], [4, 5]);
-        assert_eq!([message.without_measurement, message.without_setpoint], [7, 8]);
+        assert_eq!([message.missed_measurements, message.missed_setpoints], [7, 8]);
         assert_eq!([message.condition, message.time_to_singularity_s], [50.0, 51.0]);
         assert_eq!([message.wrench_error, message.twist], [six(20.0), six(30.0)]);
         assert_eq!([message.pose_valid, message.error_valid], [1, 1]);

@@ -6,102 +6,86 @@
 //! Gamma_i += reflected L''_i + viscous L'_i + coulomb sign(L'_i)        the drives
 //! ```
 //!
-//! The part of `F_i` along the leg needs no balance, it is leg i's own: only the part across goes into W.
+//! The part of `F_i` along leg i is balanced by that leg's actuator alone: only the transverse part goes into W.
 //!
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
 
-use fearless_simd::{Simd, dispatch, f32x8, f64x8};
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
-use super::balance::{Balance, LaneWrench, wrench_columns};
-use super::fidelity::{Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, Model, NoVelocity, RigidLegs};
+use super::factorization::{Factorization, LaneWrench, wrench_columns};
+use super::fidelity::{
+    Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
+};
 use super::inverse_geometry::LegGeometry;
-use super::kinematic_state::KinematicState;
-use super::lanes::Eight;
 use super::leg::{LegConstants, LegReaction};
-use super::machine::{Actuator, Joints, LEGS, Machine, at_most_256_bits};
+use super::machine::{Actuator, Joints, LEGS, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
-use super::triples::{Constant, Lane, Triples};
+use super::triples::LegLanes;
 
-/// The inverse dynamic model of one machine: its constants, ready for the lanes.
+/// Inverse dynamic model of one machine: from a motion of the platform to the six actuator forces.
+///
+/// ```
+/// use hexad::model::{active_forces::InverseDynamics, fidelity::Exact, inverse_jacobian::leg_wrenches};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let model = InverseDynamics::new(&machine);
+/// let rest = hexad::model::task::TaskState::at_rest(machine.home).motion();
+/// let forces = model.forces::<Exact>(&rest).unwrap();
+/// // At rest the legs carry at least the platform, and the rest of the weight stands on the base joints.
+/// let wrench = leg_wrenches(&machine, &rest.pose) * nalgebra::Vector6::from(forces);
+/// let lifted = -wrench.fixed_rows::<3>(3).dot(&machine.gravity.normalize());
+/// assert!(lifted > machine.platform.mass * machine.gravity.norm());
+/// ```
 #[derive(Clone, Debug)]
 pub struct InverseDynamics {
     machine: Machine,
     joints: Joints,
     legs: LegConstants,
     axes: PrincipalAxes,
-    drives: DriveConstants,
+    /// 1 / smoothing speed of Coulomb friction \[s/m\].
+    inverse_smoothing: f64,
 }
 
-/// What the actuators have to balance: `N (Gamma - along) = wrench`.
+/// Load on the actuators of one motion: `N (Gamma - axial_forces) = wrench`.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskLoad {
     /// N, see [`super::inverse_jacobian::leg_wrenches`].
     pub leg_wrenches: Matrix6<f64>,
-    /// W without what acts along the legs, torque about C first \[N m\], \[N\].
+    /// W without the forces along the legs, torque about C first \[N m\], \[N\].
     pub wrench: Vector6<f64>,
-    /// What acts along each leg, drive included \[N\].
-    pub along: Vector6<f64>,
+    /// Load along each leg, drive included \[N\].
+    pub axial_forces: Vector6<f64>,
 }
 
 impl TaskLoad {
-    /// `W + N along`: everything the actuators have to balance, as a wrench about C \[N m\], \[N\].
+    /// `W + N axial_forces`: the whole load as a wrench about C \[N m\], \[N\].
     pub fn total(&self) -> Vector6<f64> {
-        self.wrench + self.leg_wrenches * self.along
+        self.wrench + self.leg_wrenches * self.axial_forces
     }
 }
 
 impl InverseDynamics {
-    /// Derives the constants. Not for the loop.
+    /// Derives the constants of the model. Not for the cycle: it decomposes the inertia tensor.
     pub fn new(machine: &Machine) -> Self {
         Self {
             joints: machine.joints.with_point(&machine.platform.center_of_mass),
             legs: LegConstants::new(machine),
             axes: PrincipalAxes::new(machine),
-            drives: DriveConstants::new(&machine.actuator),
+            inverse_smoothing: 1.0 / machine.actuator.coulomb_smoothing,
             machine: machine.clone(),
         }
     }
 
-    /// The machine it was made for.
+    /// The machine that this model describes.
     pub fn machine(&self) -> &Machine {
         &self.machine
     }
 
     /// The six actuator forces Gamma \[N\] for a motion of the platform, `None` at a singular pose.
-    pub fn forces<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
-        let lane = dispatch!(self.machine.level, simd => self.balanced::<_, f64x8<_>, M>(simd, motion))?;
-        Some(self.joints.triples.unpack(&lane))
-    }
-
-    /// [`InverseDynamics::forces`] at a pose whose legs and factorization are at hand.
-    pub fn forces_at<M: Model>(
-        &self,
-        kinematic_state: &KinematicState,
-        twist: &Twist,
-        acceleration: &Acceleration,
-    ) -> Option<[f64; LEGS]> {
-        let motion = Motion { pose: kinematic_state.pose, twist: *twist, acceleration: *acceleration };
-        let lane = dispatch!(self.machine.level, simd => {
-            let legs = kinematic_state.legs_with::<_, f64x8<_>>(simd, &self.joints);
-            let balance = Balance::load(simd, &self.joints, &kinematic_state.factors).with_arms(&legs);
-            let (wrench, along) = self.load::<_, _, M>(simd, &motion, &legs);
-            balance.forces(&legs, &wrench, along)
-        })?;
-        Some(self.joints.triples.unpack(&lane))
-    }
-
-    /// [`InverseDynamics::forces`] with lanes of single precision, a fifth faster: errors below 1e-6 of the
-    /// largest force instead of 1e-15, times `1 + d / L` for a base at the distance d from the origin of the
-    /// base frame, where differences of coordinates lose digits.
-    pub fn forces_f32<M: Model>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
-        // Outside of the lanes, so that they find its numbers in memory, ready to be spread: converting
-        // and spreading them one by one takes ten nanoseconds.
-        let motion = &motion.single();
-        let level = at_most_256_bits(self.machine.level);
-        let lane = dispatch!(level, simd => self.balanced::<_, f32x8<_>, M>(simd, motion))?;
+    pub fn forces<M: ModelTerms>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
+        let lane = dispatch!(self.machine.level, simd => self.balanced::<_, M>(simd, motion))?;
         Some(self.joints.triples.unpack(&lane))
     }
 
@@ -118,94 +102,73 @@ impl InverseDynamics {
     }
 
     /// In lanes: sorting them is left to code for any CPU, which loads one number after the other. With
-    /// AVX-512 the compiler would gather them, and a gather has to wait until what it reads is in the cache.
+    /// AVX-512 the compiler would gather them, and a gather waits until its operands are in the cache.
     #[inline(always)]
-    fn balanced<S: Simd, V: Eight<S>, M: Model>(&self, simd: S, motion: &Motion<V::Scalar>) -> Option<Lane> {
-        let legs = LegGeometry::<V>::new(simd, &self.joints, &motion.pose);
-        let balance = Balance::new(simd, &self.joints, &legs);
-        let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
-        balance.forces(&legs, &wrench, along)
+    fn balanced<S: Simd, M: ModelTerms>(&self, simd: S, motion: &Motion) -> Option<LegLanes> {
+        let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
+        let factorization = Factorization::new(simd, &self.joints, &legs);
+        let (wrench, axial) = self.load::<_, M>(simd, motion, &legs);
+        factorization.forces(&legs, &wrench, axial)
     }
 
-    /// The load of a motion, before it is shared among the legs.
-    pub fn load_of<M: Model>(&self, motion: &Motion) -> TaskLoad {
+    /// The load of a motion, before the six forces are solved for.
+    pub fn load_of<M: ModelTerms>(&self, motion: &Motion) -> TaskLoad {
         dispatch!(self.machine.level, simd => {
             let triples = &self.joints.triples;
-            let legs = LegGeometry::<f64x8<_>>::new(simd, &self.joints, &motion.pose);
-            let (wrench, along) = self.load::<_, _, M>(simd, motion, &legs);
+            let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
+            let (wrench, axial) = self.load::<_, M>(simd, motion, &legs);
             TaskLoad {
                 leg_wrenches: wrench_columns(triples, &legs),
                 wrench: wrench.sum().vector(),
-                along: triples.unpack(&along.store()).into(),
+                axial_forces: triples.unpack(&axial.into()).into(),
             }
         })
     }
 
-    /// W, and what acts along the legs.
+    /// W, and the load along the legs.
     #[inline(always)]
-    fn load<S: Simd, V: Eight<S>, M: Model>(
+    fn load<S: Simd, M: ModelTerms>(
         &self,
         simd: S,
-        motion: &Motion<V::Scalar>,
-        legs: &LegGeometry<V>,
-    ) -> (LaneWrench<V::Half>, V) {
+        motion: &Motion,
+        legs: &LegGeometry<S>,
+    ) -> (LaneWrench<S>, f64x8<S>) {
         let machine = &self.machine;
         let velocity = legs.velocity(simd, &motion.twist);
-        // What the fidelity does not see is at rest.
+        // Terms that the fidelity leaves out are those of a platform at rest.
         let twist = if M::VELOCITY { motion.twist } else { Twist::default() };
         let acceleration = if M::ACCELERATION { motion.acceleration } else { Acceleration::default() };
         let map = acceleration_map(&twist, &acceleration);
         let joint_acceleration = legs.joint_acceleration(simd, &acceleration, &map);
-        let reaction =
-            LegReaction::new::<S, M>(simd, machine, &self.legs, legs, &velocity, joint_acceleration);
-        let mut wrench =
-            LaneWrench { torque: legs.arm.cross(reaction.across).folded(), force: reaction.across.folded() };
+        let reaction = LegReaction::new::<M>(simd, machine, &self.legs, legs, &velocity, joint_acceleration);
+        let mut wrench = LaneWrench {
+            torque: legs.arm.cross(reaction.transverse).folded(),
+            force: reaction.transverse.folded(),
+        };
         if !M::ACCELERATION {
-            return (wrench, reaction.along);
+            return (wrench, reaction.axial);
         }
-        wrench.torque = wrench.torque + self.axes.torques::<S, V::Half>(simd, &motion.pose.rotation, &map);
+        wrench.torque = wrench.torque + self.axes.torques(simd, &motion.pose.rotation, &map);
         let mut accel = legs.direction.dot(joint_acceleration);
         if M::VELOCITY {
             accel = legs.accel(&velocity, joint_acceleration);
         }
-        (wrench, reaction.along + self.drives.force(simd, velocity.rate, accel))
-    }
-}
-
-/// The forces of one motion, for those who need no second: a loop keeps an [`InverseDynamics`].
-pub fn inverse_dynamics<M: Model>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
-    InverseDynamics::new(machine).forces::<M>(motion)
-}
-
-/// The drives as lanes.
-#[derive(Clone, Debug)]
-struct DriveConstants {
-    reflected_mass: Constant,
-    viscous_friction: Constant,
-    coulomb_friction: Constant,
-    /// 1 / smoothing speed
-    inverse_smoothing: Constant,
-}
-
-impl DriveConstants {
-    fn new(actuator: &Actuator) -> Self {
-        let all = |value: f64| Triples::uniform(value, [value; 2]);
-        Self {
-            reflected_mass: all(actuator.reflected_mass),
-            viscous_friction: all(actuator.viscous_friction),
-            coulomb_friction: all(actuator.coulomb_friction),
-            inverse_smoothing: all(1.0 / actuator.coulomb_smoothing),
-        }
+        (wrench, reaction.axial + self.drive_force(simd, velocity.rate, accel))
     }
 
     /// `reflected L'' + viscous L' + coulomb sign(L')`, the sign proportional below the smoothing speed.
     #[inline(always)]
-    fn force<S: Simd, V: Eight<S>>(&self, simd: S, rate: V, accel: V) -> V {
-        let constant = |constant: &Constant| V::constant(simd, constant);
-        let one = V::splat(simd, 1.0);
-        let sign = (rate * constant(&self.inverse_smoothing)).max(-one).min(one);
-        let friction =
-            constant(&self.viscous_friction).mul_add(rate, constant(&self.coulomb_friction) * sign);
-        constant(&self.reflected_mass).mul_add(accel, friction)
+    fn drive_force<S: Simd>(&self, simd: S, rate: f64x8<S>, accel: f64x8<S>) -> f64x8<S> {
+        let Actuator { reflected_mass, viscous_friction, coulomb_friction, .. } = self.machine.actuator;
+        let splat = |value: f64| f64x8::splat(simd, value);
+        let one = splat(1.0);
+        let sign = (rate * splat(self.inverse_smoothing)).max(-one).min(one);
+        let friction = splat(viscous_friction).mul_add(rate, splat(coulomb_friction) * sign);
+        splat(reflected_mass).mul_add(accel, friction)
     }
+}
+
+/// The six actuator forces \[N\] of one motion, with constants derived anew; for more than one keep an [`InverseDynamics`].
+pub fn inverse_dynamics<M: ModelTerms>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
+    InverseDynamics::new(machine).forces::<M>(motion)
 }

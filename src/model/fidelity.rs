@@ -1,8 +1,8 @@
-//! The ladder of models: which terms of the dynamics are evaluated, known at compile time.
+//! ModelTerms fidelity: which terms of the dynamics are evaluated, known at compile time.
 //!
 //! All fidelities share one code path; a term that a fidelity leaves out costs nothing. Every fidelity above gravity
 //! keeps the drives (reflected mass, friction), which belong to the actuator and not to a link.
-//! `tests/ladder.rs` computes what each leaves out without it, and finds it to be the difference.
+//! `tests/ladder.rs` computes the terms that each leaves out independently and compares them with the difference.
 //!
 //! | fidelity | leaves out | allowed when |
 //! | --- | --- | --- |
@@ -13,9 +13,9 @@
 //! | [`RigidLegs`] | spin of the legs about their own axes: the paper's model | thin legs, or joints across the legs |
 //! | [`Exact`] | nothing | always |
 
-/// How the legs enter.
+/// How the mass of the legs enters the dynamics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Legs {
+pub enum LegInertia {
     /// Not at all.
     Massless,
     /// As a point mass at B.
@@ -24,9 +24,10 @@ pub enum Legs {
     Links,
 }
 
-/// A fidelity of the ladder.
-pub trait Model {
-    const LEGS: Legs;
+/// Terms of the dynamics that a fidelity evaluates, as constants for the compiler.
+pub trait ModelTerms {
+    /// Mass and inertia of the legs.
+    const LEGS: LegInertia;
     /// Accelerations, and with them the drives.
     const ACCELERATION: bool;
     /// Centrifugal and Coriolis forces.
@@ -41,8 +42,8 @@ macro_rules! fidelity {
         #[derive(Clone, Copy, Debug)]
         pub struct $name;
 
-        impl Model for $name {
-            const LEGS: Legs = Legs::$legs;
+        impl ModelTerms for $name {
+            const LEGS: LegInertia = LegInertia::$legs;
             const ACCELERATION: bool = $acceleration;
             const VELOCITY: bool = $velocity;
             const SPIN: bool = $spin;
@@ -76,14 +77,29 @@ fidelity!(
     Exact, Links, true, true, true
 );
 
-/// A fidelity chosen at run time.
+/// ModelTerms fidelity chosen at run time, from gravity only to all terms.
+///
+/// ```
+/// use hexad::model::{active_forces::InverseDynamics, fidelity::Fidelity, task::TaskState};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// // Without acceleration and velocity the exact model is no more than gravity.
+/// let (model, rest) = (InverseDynamics::new(&machine), TaskState::at_rest(machine.home).motion());
+/// let [gravity, exact] = [Fidelity::Gravity, Fidelity::Exact].map(|fidelity| model.forces_of(fidelity, &rest).unwrap());
+/// assert!(gravity.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-9 * b.abs()));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fidelity {
+    /// [`struct@Gravity`]
     Gravity,
+    /// [`struct@MasslessLegs`]
     MasslessLegs,
+    /// [`struct@LumpedLegs`]
     LumpedLegs,
+    /// [`struct@NoVelocity`]
     NoVelocity,
+    /// [`struct@RigidLegs`]
     RigidLegs,
+    /// [`struct@Exact`]
     Exact,
 }
 
@@ -104,8 +120,8 @@ impl Fidelity {
         }
     }
 
-    /// What it leaves out, in a few words.
-    pub fn leaves_out(self) -> &'static str {
+    /// The terms that it leaves out, in a few words.
+    pub fn left_out_terms(self) -> &'static str {
         match self {
             Self::Gravity => "motion and drives",
             Self::MasslessLegs => "mass of the legs",
@@ -116,8 +132,7 @@ impl Fidelity {
         }
     }
 
-    /// Whether accelerations make forces. Without, a control law has nothing to act through: what it
-    /// commands is an acceleration.
+    /// Whether accelerations make forces. A control law commands an acceleration, so it needs a fidelity that has.
     pub fn has_inertia(self) -> bool {
         self != Self::Gravity
     }

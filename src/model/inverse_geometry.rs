@@ -10,77 +10,64 @@
 //!
 //! Valid for L > 0. No leg angles appear, hence no joint-angle singularity.
 
-use fearless_simd::{Simd, dispatch, f64x8};
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{Eight, Reals};
 use super::lanes3::Lanes3;
 use super::machine::{Joints, LEGS, Machine};
 use super::platform::acceleration_map;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
-use super::triples::{Constant, Lane};
+use super::triples::LegLanes;
 
-/// Geometry of the six legs at one pose.
+/// Geometry of the six legs at one pose, in lanes.
 #[derive(Clone, Copy)]
-pub(super) struct LegGeometry<V> {
+pub(super) struct LegGeometry<S: Simd> {
     /// b, from C to the joint on the platform.
-    pub arm: Lanes3<V>,
+    pub arm: Lanes3<f64x8<S>>,
     /// n, unit vector from base to platform.
-    pub direction: Lanes3<V>,
+    pub direction: Lanes3<f64x8<S>>,
     /// L
-    pub length: V,
+    pub length: f64x8<S>,
     /// 1 / L
-    pub inverse_length: V,
+    pub inverse_length: f64x8<S>,
 }
 
-/// First time derivatives.
+/// First time derivatives of length and direction, in lanes.
 #[derive(Clone, Copy)]
-pub(super) struct LegVelocity<V> {
+pub(super) struct LegVelocity<S: Simd> {
     /// L'
-    pub rate: V,
+    pub rate: f64x8<S>,
     /// n'
-    pub direction: Lanes3<V>,
+    pub direction: Lanes3<f64x8<S>>,
 }
 
-impl<V> LegGeometry<V> {
+impl<S: Simd> LegGeometry<S> {
+    /// With arms from C.
     #[inline(always)]
-    pub fn new<S: Simd>(simd: S, joints: &Joints, pose: &Pose<V::Scalar>) -> Self
-    where
-        V: Eight<S>,
-    {
+    pub fn new(simd: S, joints: &Joints, pose: &Pose) -> Self {
         Self::of(simd, &joints.platform, joints, pose)
     }
 
     /// With arms from the mean of the joints on the platform, wherever C is.
     #[inline(always)]
-    pub fn around_center<S: Simd>(simd: S, joints: &Joints, pose: &Pose) -> Self
-    where
-        V: Eight<S, Scalar = f64>,
-    {
+    pub fn around_center(simd: S, joints: &Joints, pose: &Pose) -> Self {
         let position = pose.position + pose.rotation * joints.center;
         Self::of(simd, &joints.around_center, joints, &Pose { rotation: pose.rotation, position })
     }
 
     #[inline(always)]
-    fn of<S: Simd>(simd: S, platform: &[Constant; 3], joints: &Joints, pose: &Pose<V::Scalar>) -> Self
-    where
-        V: Eight<S>,
-    {
-        let arm =
-            Lanes3::<V>::constant(simd, platform).transformed(&pose.rotation, |value| V::spread(simd, value));
-        let s = Lanes3::spread(simd, &pose.position) + arm - Lanes3::constant(simd, &joints.base);
+    fn of(simd: S, platform: &[LegLanes; 3], joints: &Joints, pose: &Pose) -> Self {
+        let arm = Lanes3::load(simd, platform).transformed(simd, &pose.rotation);
+        let s = Lanes3::splat(simd, &pose.position) + arm - Lanes3::load(simd, &joints.base);
         let length = s.dot(s).sqrt();
-        let inverse_length = V::splat(simd, 1.0) / length;
+        let inverse_length = f64x8::splat(simd, 1.0) / length;
         Self { arm, direction: s * inverse_length, length, inverse_length }
     }
 
+    /// L' and n'.
     #[inline(always)]
-    pub fn velocity<S: Simd>(&self, simd: S, twist: &Twist<V::Scalar>) -> LegVelocity<V>
-    where
-        V: Eight<S>,
-    {
-        let joint =
-            Lanes3::spread(simd, &twist.linear) + Lanes3::spread(simd, &twist.angular).cross(self.arm);
+    pub fn velocity(&self, simd: S, twist: &Twist) -> LegVelocity<S> {
+        let joint = Lanes3::splat(simd, &twist.linear) + Lanes3::splat(simd, &twist.angular).cross(self.arm);
         let rate = self.direction.dot(joint);
         let direction = joint.plus_scaled(-rate, self.direction) * self.inverse_length;
         LegVelocity { rate, direction }
@@ -88,66 +75,71 @@ impl<V> LegGeometry<V> {
 
     /// aB, with `acceleration_map` from [`super::platform::acceleration_map`].
     #[inline(always)]
-    pub fn joint_acceleration<S: Simd>(
+    pub fn joint_acceleration(
         &self,
         simd: S,
-        acceleration: &Acceleration<V::Scalar>,
-        acceleration_map: &Matrix3<V::Scalar>,
-    ) -> Lanes3<V>
-    where
-        V: Eight<S>,
-    {
-        let relative = self.arm.transformed(acceleration_map, |value| V::spread(simd, value));
-        Lanes3::spread(simd, &acceleration.linear) + relative
+        acceleration: &Acceleration,
+        acceleration_map: &Matrix3<f64>,
+    ) -> Lanes3<f64x8<S>> {
+        Lanes3::splat(simd, &acceleration.linear) + self.arm.transformed(simd, acceleration_map)
     }
 
     /// L''
     #[inline(always)]
-    pub fn accel(&self, velocity: &LegVelocity<V>, joint_acceleration: Lanes3<V>) -> V
-    where
-        V: Reals,
-    {
+    pub fn accel(&self, velocity: &LegVelocity<S>, joint_acceleration: Lanes3<f64x8<S>>) -> f64x8<S> {
         let turn = velocity.direction;
         self.length.mul_add(turn.dot(turn), self.direction.dot(joint_acceleration))
     }
 }
 
-/// Lengths of the legs and their time derivatives: \[m\], \[m/s\], \[m/s^2\].
+/// Lengths of the six legs and their time derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LegMotion {
+    /// L \[m\]
     pub length: [f64; LEGS],
+    /// L' \[m/s\]
     pub rate: [f64; LEGS],
+    /// L'' \[m/s^2\]
     pub accel: [f64; LEGS],
 }
 
 /// Lengths, rates and accelerations of the six legs for a motion of the platform.
+///
+/// ```
+/// use hexad::model::{inverse_geometry::{leg_lengths, leg_motion}, task::TaskState};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let state = TaskState { xd: [0.1, 0.2, 0.0, 0.0, 0.3, 0.1].into(), ..TaskState::at_rest(machine.home) };
+/// // A rate is the derivative of the length.
+/// let [before, after] = [-1e-6, 1e-6].map(|dt| leg_lengths(&machine, &state.after(dt).motion().pose)[0]);
+/// assert!(((after - before) / 2e-6 - leg_motion(&machine, &state.motion()).rate[0]).abs() < 1e-8);
+/// ```
 pub fn leg_motion(machine: &Machine, motion: &Motion) -> LegMotion {
-    let unpack = |lane: Lane| machine.joints.triples.unpack(&lane);
+    let unpack = |lane: LegLanes| machine.joints.triples.unpack(&lane);
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, &motion.pose);
+        let legs = LegGeometry::new(simd, &machine.joints, &motion.pose);
         let velocity = legs.velocity(simd, &motion.twist);
         let map = acceleration_map(&motion.twist, &motion.acceleration);
         let accel = legs.accel(&velocity, legs.joint_acceleration(simd, &motion.acceleration, &map));
         LegMotion {
-            length: unpack(legs.length.store()),
-            rate: unpack(velocity.rate.store()),
-            accel: unpack(accel.store()),
+            length: unpack(legs.length.into()),
+            rate: unpack(velocity.rate.into()),
+            accel: unpack(accel.into()),
         }
     })
 }
 
-/// `L_i` \[m\].
+/// Lengths `L_i` of the six legs at a pose \[m\].
 pub fn leg_lengths(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
-        machine.joints.triples.unpack(&legs.length.store())
+        let legs = LegGeometry::new(simd, &machine.joints, pose);
+        machine.joints.triples.unpack(&legs.length.into())
     })
 }
 
-/// `n_i`, unit vectors from base to platform, base axes.
+/// Directions `n_i` of the six legs at a pose: unit vectors from base to platform, base axes.
 pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
+        let legs = LegGeometry::new(simd, &machine.joints, pose);
         machine.joints.triples.unpack_vectors(&legs.direction.store())
     })
 }

@@ -4,20 +4,29 @@
 //! `N = [b x n; n]`, a column per leg, takes leg forces to the wrench on the platform about C:
 //! `W = N Gamma`. The paper orders legs 6..1, this project 1..6.
 
-use fearless_simd::{dispatch, f64x8};
+use fearless_simd::dispatch;
 use nalgebra::Matrix6;
 
-use super::balance::{Balance, wrench_columns};
+use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
-use super::lanes::Eight;
 use super::machine::{LEGS, Machine};
 use super::rigid::{Pose, Twist};
 
-/// N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],
+/// Matrix N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],
 /// force rows below \[1\].
+///
+/// ```
+/// use hexad::model::{inverse_jacobian::{leg_wrenches, twist_from_rates}, rigid::Twist};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let (pose, twist) = (machine.home_pose(), Twist { linear: [0.0, 0.1, 0.2].into(), ..Twist::default() });
+/// // Its transpose takes a twist to leg rates, and twist_from_rates takes them back.
+/// let rates = leg_wrenches(&machine, &pose).tr_mul(&twist.vector());
+/// let found = twist_from_rates(&machine, &pose, &rates.into()).unwrap();
+/// assert!((found.vector() - twist.vector()).amax() < 1e-14);
+/// ```
 pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
+        let legs = LegGeometry::new(simd, &machine.joints, pose);
         wrench_columns(&machine.joints.triples, &legs)
     })
 }
@@ -30,10 +39,10 @@ pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
     singular_values.max() / singular_values.min()
 }
 
-/// N as [`condition`] judges it.
+/// The matrix whose condition is [`condition`]: N with torques about the mean of the joints over the radius.
 pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     let mut scaled = dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::around_center(simd, &machine.joints, pose);
+        let legs = LegGeometry::around_center(simd, &machine.joints, pose);
         wrench_columns(&machine.joints.triples, &legs)
     });
     scaled.fixed_rows_mut::<3>(0).unscale_mut(machine.joints.radius);
@@ -46,8 +55,8 @@ pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
 pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> Option<Twist> {
     let rates = machine.joints.triples.pack(rates);
     dispatch!(machine.level, simd => {
-        let legs = LegGeometry::<f64x8<_>>::new(simd, &machine.joints, pose);
-        let twist = Balance::new(simd, &machine.joints, &legs).twist(&legs, Eight::load(simd, &rates));
-        twist.map(|twist| twist.numbers())
+        let legs = LegGeometry::new(simd, &machine.joints, pose);
+        let twist = Factorization::new(simd, &machine.joints, &legs).twist(&legs, rates.load(simd));
+        twist.map(|twist| twist.first())
     })
 }

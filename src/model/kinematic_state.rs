@@ -1,98 +1,94 @@
-//! The platform at one pose with everything that is worth computing once: its legs and the factorization of
-//! `N`. Forward kinematics ends with one; twist, forces, condition and determinant then cost no second one.
+//! The platform at one pose with its legs and the factorization of `N`, computed once.
+//!
+//! Forward kinematics ends with a kinematic state; twist, condition and determinant then need no second factorization.
+//! Legs have their arms from the mean of the joints on the platform, so that nothing depends on the choice of C.
 
-use fearless_simd::{Simd, dispatch, f64x8};
+use fearless_simd::{Simd, dispatch};
 
-use super::balance::{Balance, Factors};
+use super::factorization::{Factorization, StoredFactorization};
 use super::inverse_geometry::LegGeometry;
-use super::lanes::Eight;
 use super::lanes3::Lanes3;
-use super::machine::{Joints, LEGS, Machine};
+use super::machine::{LEGS, Machine};
 use super::rigid::{Pose, Twist};
 use super::sensitivity::Sensitivity;
-use super::triples::Lane;
+use super::triples::LegLanes;
 
-/// One pose, its legs, its factorization.
+/// Kinematic state of the platform: a pose with its legs, the factorization of N and the sensitivity.
+///
+/// ```
+/// use hexad::model::{inverse_geometry::leg_lengths, kinematic_state::KinematicState};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let home = KinematicState::new(&machine, machine.home_pose());
+/// let mut pairs = home.lengths(&machine).into_iter().zip(leg_lengths(&machine, home.pose()));
+/// assert!(pairs.all(|(a, b)| (a - b).abs() < 1e-14));
+/// assert!(home.sensitivity().condition < 100.0, "legs hold the platform in every direction");
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct KinematicState {
     pub(super) pose: Pose,
     pub(super) legs: StoredLegs,
-    pub(super) factors: Factors,
+    pub(super) factorization: StoredFactorization,
     pub(super) sensitivity: Sensitivity,
 }
 
-/// Legs in memory.
+/// Geometry of the legs in memory.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredLegs {
-    arm: [Lane; 3],
-    direction: [Lane; 3],
-    length: Lane,
-    inverse_length: Lane,
+    arm: [LegLanes; 3],
+    direction: [LegLanes; 3],
+    length: LegLanes,
+    inverse_length: LegLanes,
 }
 
 impl StoredLegs {
     #[inline(always)]
-    pub(super) fn new<S: Simd, V: Eight<S>>(legs: &LegGeometry<V>) -> Self {
+    pub(super) fn new<S: Simd>(legs: &LegGeometry<S>) -> Self {
         Self {
             arm: legs.arm.store(),
             direction: legs.direction.store(),
-            length: legs.length.store(),
-            inverse_length: legs.inverse_length.store(),
+            length: legs.length.into(),
+            inverse_length: legs.inverse_length.into(),
         }
     }
 
     #[inline(always)]
-    pub(super) fn load<S: Simd, V: Eight<S>>(&self, simd: S) -> LegGeometry<V> {
-        let vectors =
-            |[x, y, z]: &[Lane; 3]| Lanes3 { x: V::load(simd, x), y: V::load(simd, y), z: V::load(simd, z) };
+    pub(super) fn load<S: Simd>(&self, simd: S) -> LegGeometry<S> {
         LegGeometry {
-            arm: vectors(&self.arm),
-            direction: vectors(&self.direction),
-            length: V::load(simd, &self.length),
-            inverse_length: V::load(simd, &self.inverse_length),
+            arm: Lanes3::load(simd, &self.arm),
+            direction: Lanes3::load(simd, &self.direction),
+            length: self.length.load(simd),
+            inverse_length: self.inverse_length.load(simd),
         }
     }
 }
 
 impl KinematicState {
-    /// At a known pose.
+    /// The kinematic state at a pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
         let joints = &machine.joints;
         dispatch!(machine.level, simd => {
-            let legs = LegGeometry::<f64x8<_>>::around_center(simd, joints, &pose);
-            let balance = Balance::new(simd, joints, &legs);
+            let legs = LegGeometry::around_center(simd, joints, &pose);
+            let factorization = Factorization::new(simd, joints, &legs);
             Self {
                 pose,
                 legs: StoredLegs::new(&legs),
-                factors: balance.store(),
-                sensitivity: Sensitivity::new(simd, joints, &legs, &balance),
+                factorization: factorization.store(),
+                sensitivity: Sensitivity::new(simd, joints, &legs, &factorization),
             }
         })
     }
 
-    /// The legs with arms from C, and what else the platform has in the padding of `joints`.
-    #[inline(always)]
-    pub(super) fn legs_with<S: Simd, V: Eight<S, Scalar = f64>>(
-        &self,
-        simd: S,
-        joints: &Joints,
-    ) -> LegGeometry<V> {
-        let arm = Lanes3::constant(simd, &joints.platform)
-            .transformed(&self.pose.rotation, |value| V::spread(simd, value));
-        LegGeometry { arm, ..self.legs.load(simd) }
-    }
-
-    /// Where the platform is.
+    /// The pose.
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
 
-    /// `L_i` \[m\].
+    /// Leg lengths `L_i` \[m\].
     pub fn lengths(&self, machine: &Machine) -> [f64; LEGS] {
         machine.joints.triples.unpack(&self.legs.length)
     }
 
-    /// How near to a singular pose.
+    /// Condition, determinant and trusted step at the pose.
     pub fn sensitivity(&self) -> &Sensitivity {
         &self.sensitivity
     }
@@ -102,9 +98,9 @@ impl KinematicState {
         let joints = &machine.joints;
         let rates = joints.triples.pack(rates);
         dispatch!(machine.level, simd => {
-            let legs = self.legs.load::<_, f64x8<_>>(simd);
-            let balance = Balance::load(simd, joints, &self.factors);
-            balance.twist(&legs, Eight::load(simd, &rates)).map(|twist| twist.numbers())
+            let legs = self.legs.load(simd);
+            let factorization = Factorization::load(simd, joints, &self.factorization);
+            factorization.twist(&legs, rates.load(simd)).map(|twist| twist.first())
         })
         .map(|twist| joints.twist_of_origin(&twist, &self.pose.rotation))
     }

@@ -1,14 +1,14 @@
-//! A 3-vector per lane: the vector algebra of the legs.
+//! One 3-vector per lane: the vector algebra of the legs.
 
 use core::ops::{Add, Mul, Sub};
 
-use fearless_simd::Simd;
-use nalgebra::{Matrix3, RealField, Vector3};
+use fearless_simd::{Simd, SimdBase, SimdCombine, SimdSplit, f64x4, f64x8};
+use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{Eight, Four, Reals};
-use super::triples::{Constant, Lane};
+use super::lanes::{LaneArithmetic, Triple};
+use super::triples::LegLanes;
 
-/// A 3-vector per lane.
+/// One 3-vector per lane.
 #[derive(Clone, Copy)]
 pub(super) struct Lanes3<V> {
     pub x: V,
@@ -16,12 +16,14 @@ pub(super) struct Lanes3<V> {
     pub z: V,
 }
 
-impl<V: Reals> Lanes3<V> {
+impl<V: LaneArithmetic> Lanes3<V> {
+    /// `self . b`
     #[inline(always)]
     pub fn dot(self, b: Self) -> V {
         self.x.mul_add(b.x, self.y.mul_add(b.y, self.z * b.z))
     }
 
+    /// `self x b`
     #[inline(always)]
     pub fn cross(self, b: Self) -> Self {
         Self {
@@ -43,123 +45,117 @@ impl<V: Reals> Lanes3<V> {
         self.plus_scaled(-s, b)
     }
 
-    /// `m self`, the same matrix in all lanes; `spread` takes a number there.
+    /// `m self`, the same matrix in all lanes.
     #[inline(always)]
-    pub fn transformed<T: RealField + Copy>(self, m: &Matrix3<T>, spread: impl Fn(T) -> V) -> Self {
-        let column = |x, y, z| Self { x: spread(x), y: spread(y), z: spread(z) };
+    pub fn transformed<S: Simd>(self, simd: S, m: &Matrix3<f64>) -> Self
+    where
+        V: SimdBase<S, Element = f64>,
+    {
+        let column = |x, y, z| Self { x: V::splat(simd, x), y: V::splat(simd, y), z: V::splat(simd, z) };
         (column(m.m13, m.m23, m.m33) * self.z)
             .plus_scaled(self.y, column(m.m12, m.m22, m.m32))
             .plus_scaled(self.x, column(m.m11, m.m21, m.m31))
     }
-}
 
-impl<V> Lanes3<V> {
-    /// A different vector in each lane.
+    /// Turned by Cayley's rotation of `2 u`: `v + k (u x v + u x (u x v))`, `k = 2 / (1 + u.u)`.
     #[inline(always)]
-    pub fn constant<S: Simd>(simd: S, [x, y, z]: &[Constant; 3]) -> Self
-    where
-        V: Eight<S>,
-    {
-        Self { x: V::constant(simd, x), y: V::constant(simd, y), z: V::constant(simd, z) }
+    pub fn turned(self, u: Self, k: V) -> Self {
+        let once = u.cross(self);
+        self.plus_scaled(k, once + u.cross(once))
     }
 
     /// The same vector in all lanes.
     #[inline(always)]
-    pub fn spread<S: Simd>(simd: S, v: &Vector3<V::Scalar>) -> Self
+    pub fn splat<S: Simd>(simd: S, v: &Vector3<f64>) -> Self
     where
-        V: Eight<S>,
+        V: SimdBase<S, Element = f64>,
     {
-        Self { x: V::spread(simd, v.x), y: V::spread(simd, v.y), z: V::spread(simd, v.z) }
+        Self { x: V::splat(simd, v.x), y: V::splat(simd, v.y), z: V::splat(simd, v.z) }
+    }
+}
+
+impl<S: Simd> Lanes3<f64x8<S>> {
+    /// From memory, one vector per leg.
+    #[inline(always)]
+    pub fn load(simd: S, [x, y, z]: &[LegLanes; 3]) -> Self {
+        Self { x: x.load(simd), y: y.load(simd), z: z.load(simd) }
     }
 
-    /// Back to memory.
+    /// To memory.
     #[inline(always)]
-    pub fn store<S: Simd>(self) -> [Lane; 3]
-    where
-        V: Eight<S>,
-    {
-        [self.x.store(), self.y.store(), self.z.store()]
+    pub fn store(self) -> [LegLanes; 3] {
+        [self.x.into(), self.y.into(), self.z.into()]
     }
 
     /// The two triples.
     #[inline(always)]
-    pub fn halves<S: Simd>(self) -> (Lanes3<V::Half>, Lanes3<V::Half>)
-    where
-        V: Eight<S>,
-    {
-        let ((x0, x1), (y0, y1), (z0, z1)) = (self.x.halves(), self.y.halves(), self.z.halves());
+    pub fn split(self) -> (Lanes3<f64x4<S>>, Lanes3<f64x4<S>>) {
+        let ((x0, x1), (y0, y1), (z0, z1)) = (self.x.split(), self.y.split(), self.z.split());
         (Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 })
     }
 
     /// Four lanes with the same sum.
     #[inline(always)]
-    pub fn folded<S: Simd>(self) -> Lanes3<V::Half>
-    where
-        V: Eight<S>,
-    {
-        let (first, second) = self.halves();
+    pub fn folded(self) -> Lanes3<f64x4<S>> {
+        let (first, second) = self.split();
         first + second
     }
 }
 
-impl<F> Lanes3<F> {
+impl<S: Simd> Lanes3<f64x4<S>> {
     /// The next leg's vector in each lane.
     #[inline(always)]
-    pub fn next<S: Simd>(self, simd: S) -> Self
-    where
-        F: Four<S>,
-    {
-        Self { x: self.x.next(simd), y: self.y.next(simd), z: self.z.next(simd) }
+    pub fn next(self) -> Self {
+        Self { x: self.x.next(), y: self.y.next(), z: self.z.next() }
     }
 
-    /// The vector of the leg before in each lane.
+    /// The previous leg's vector in each lane.
     #[inline(always)]
-    pub fn previous<S: Simd>(self, simd: S) -> Self
-    where
-        F: Four<S>,
-    {
-        Self { x: self.x.previous(simd), y: self.y.previous(simd), z: self.z.previous(simd) }
+    pub fn previous(self) -> Self {
+        Self { x: self.x.previous(), y: self.y.previous(), z: self.z.previous() }
+    }
+
+    /// Each leg's vector in all lanes.
+    #[inline(always)]
+    pub fn broadcasts(self) -> [Self; 3] {
+        let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
+            (broadcasts(self.x), broadcasts(self.y), broadcasts(self.z));
+        [Self { x: x0, y: y0, z: z0 }, Self { x: x1, y: y1, z: z1 }, Self { x: x2, y: y2, z: z2 }]
     }
 
     /// The sum of all four lanes, in all lanes.
     #[inline(always)]
-    pub fn total<S: Simd>(self, simd: S) -> Self
-    where
-        F: Four<S>,
-    {
-        Self { x: self.x.total(simd), y: self.y.total(simd), z: self.z.total(simd) }
+    pub fn total(self) -> Self {
+        Self { x: self.x.total(), y: self.y.total(), z: self.z.total() }
     }
 
-    /// Twice, for both triples.
+    /// The same four lanes for both triples.
     #[inline(always)]
-    pub fn doubled<S: Simd, V: Eight<S, Half = F>>(self) -> Lanes3<V>
-    where
-        F: Four<S>,
-    {
-        Lanes3 { x: V::join(self.x, self.x), y: V::join(self.y, self.y), z: V::join(self.z, self.z) }
+    pub fn doubled(self) -> Lanes3<f64x8<S>> {
+        Lanes3 { x: self.x.combine(self.x), y: self.y.combine(self.y), z: self.z.combine(self.z) }
     }
 
     /// The vector in the first lane.
     #[inline(always)]
-    pub fn first<S: Simd>(self) -> Vector3<f64>
-    where
-        F: Four<S>,
-    {
+    pub fn first(self) -> Vector3<f64> {
         Vector3::new(self.x.first(), self.y.first(), self.z.first())
     }
 
     /// Sum over all four lanes, per component.
     #[inline(always)]
-    pub fn sum<S: Simd>(self) -> Vector3<f64>
-    where
-        F: Four<S>,
-    {
-        let sum = |value: F| value.lanes().into_iter().sum();
+    pub fn sum(self) -> Vector3<f64> {
+        let sum = |value: f64x4<S>| value.to_array().into_iter().sum();
         Vector3::new(sum(self.x), sum(self.y), sum(self.z))
     }
 }
 
-impl<V: Reals> Add for Lanes3<V> {
+/// Each leg's number in all lanes.
+#[inline(always)]
+pub(super) fn broadcasts<S: Simd>(v: f64x4<S>) -> [f64x4<S>; 3] {
+    [v.broadcast::<0>(), v.broadcast::<1>(), v.broadcast::<2>()]
+}
+
+impl<V: LaneArithmetic> Add for Lanes3<V> {
     type Output = Self;
     #[inline(always)]
     fn add(self, b: Self) -> Self {
@@ -167,7 +163,7 @@ impl<V: Reals> Add for Lanes3<V> {
     }
 }
 
-impl<V: Reals> Sub for Lanes3<V> {
+impl<V: LaneArithmetic> Sub for Lanes3<V> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, b: Self) -> Self {
@@ -175,7 +171,7 @@ impl<V: Reals> Sub for Lanes3<V> {
     }
 }
 
-impl<V: Reals> Mul<V> for Lanes3<V> {
+impl<V: LaneArithmetic> Mul<V> for Lanes3<V> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, s: V) -> Self {

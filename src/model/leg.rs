@@ -15,8 +15,8 @@
 //! `aB` of the joint, with `proj(w) = w - (w.n) n`, and using `proj(n'') = (proj(aB) - 2 L' n') / L`:
 //!
 //! ```text
-//! across = proj(j aB - mu g) + 2 L' (m2 r / L - j) n' + spin / L       j = Jt / L^2,  mu = (m1 e1 + m2 r) / L
-//! along  = m2 (aB.n + e2 |n'|^2 - g.n)
+//! transverse = proj(j aB - mu g) + 2 L' (m2 r / L - j) n' + spin / L       j = Jt / L^2,  mu = (m1 e1 + m2 r) / L
+//! axial      = m2 (aB.n + e2 |n'|^2 - g.n)
 //! ```
 //!
 //! Spin: the universal joint, with first axis u, forces an angular velocity wx about n on the leg.
@@ -29,20 +29,18 @@
 //!
 //! The paper leaves the spin out: (74)-(82) give the leg no angular velocity about n. That is exact only
 //! for legs without axial inertia; the effect is 1e-5 to 1e-2 of the force, larger near `u || n`, where
-//! the spin itself is singular. `YY_MIN` keeps the arithmetic finite there.
+//! the spin itself is singular; `MIN_UNIVERSAL_SINE_SQUARED` keeps the arithmetic finite there.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f64x8, prelude::*};
 
-use super::fidelity::{Legs, Model};
+use super::fidelity::{LegInertia, ModelTerms};
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
-use super::lanes::Eight;
 use super::lanes3::Lanes3;
 use super::machine::{LEGS, Machine};
-use super::task::TaskState;
-use super::triples::{Constant, Triples};
+use super::triples::{LegLanes, Triples};
 
-/// Smallest `|u x n|^2`: a leg within 1e-6 rad of its universal joint's first axis.
-pub(super) const YY_MIN: f64 = 1e-12;
+/// Smallest `|u x n|^2` that divides: a leg within 1e-6 rad of its universal joint's first axis.
+pub(super) const MIN_UNIVERSAL_SINE_SQUARED: f64 = 1e-12;
 
 /// The constants of the legs as lanes.
 ///
@@ -52,22 +50,20 @@ pub(super) const YY_MIN: f64 = 1e-12;
 #[derive(Clone, Debug)]
 pub(super) struct LegConstants {
     /// `Jt = jt[0] L^2 + jt[1] L + jt[2]`: the transverse inertias are quadratic in L as well.
-    jt: [Constant; 3],
+    jt: [LegLanes; 3],
     /// m2, and `m1 e1 - m2 e2`.
-    rod_mass: Constant,
-    first_moment: Constant,
+    rod_mass: LegLanes,
+    first_moment: LegLanes,
     /// `m2 e2`
-    rod_moment: Constant,
+    rod_moment: LegLanes,
     /// `Ix1 + Ix2`
-    axial_inertia: Constant,
-    /// g in every lane.
-    gravity: [Constant; 3],
+    axial_inertia: LegLanes,
     /// 1 for legs, 0 for padding.
-    legs_only: Constant,
-    /// What of the leg hangs on B in the lumped model; the platform's mass in its padding.
-    lumped_mass: Constant,
+    legs_only: LegLanes,
+    /// Mass of the leg that is concentrated at B in the lumped model; the platform's mass in its padding.
+    lumped_mass: LegLanes,
     /// The padding alone.
-    platform_mass: Constant,
+    platform_mass: LegLanes,
 }
 
 impl LegConstants {
@@ -75,7 +71,7 @@ impl LegConstants {
         let (cylinder, rod) = (&machine.cylinder, &machine.rod);
         let (m1, e1, m2, e2) = (cylinder.mass, cylinder.center_of_mass, rod.mass, rod.center_of_mass);
         let (it1, it2) = (&cylinder.transverse_inertia, &rod.transverse_inertia);
-        let legs = |value: f64, platform: f64| Triples::uniform(value, [platform, 0.0]);
+        let legs = Triples::uniform;
         let linear = m2 * e2 + it1.quadratic * it1.reference_length + it2.quadratic * it2.reference_length;
         let constant = m1 * e1 * e1
             + m2 * e2 * e2
@@ -94,8 +90,6 @@ impl LegConstants {
             first_moment: legs(m1 * e1 - m2 * e2, 0.0),
             rod_moment: legs(m2 * e2, 0.0),
             axial_inertia: legs(cylinder.axial_inertia + rod.axial_inertia, 0.0),
-            gravity: [machine.gravity.x, machine.gravity.y, machine.gravity.z]
-                .map(|g| Triples::uniform(g, [g; 2])),
             legs_only: legs(1.0, 0.0),
             lumped_mass: legs(lumped_mass(machine), mass),
             platform_mass: legs(0.0, mass),
@@ -107,40 +101,39 @@ impl LegConstants {
 /// home: `(m1 e1 + m2 (L - e2)) / L`.
 fn lumped_mass(machine: &Machine) -> f64 {
     let (cylinder, rod) = (&machine.cylinder, &machine.rod);
-    let home = TaskState::at_rest(machine.home).motion().pose;
-    let length = leg_lengths(machine, &home).iter().sum::<f64>() / LEGS as f64;
+    let length = leg_lengths(machine, &machine.home_pose()).iter().sum::<f64>() / LEGS as f64;
     (cylinder.mass * cylinder.center_of_mass + rod.mass * (length - rod.center_of_mass)) / length
 }
 
-/// F per leg \[N\], base axes, in two parts.
-pub(super) struct LegReaction<V> {
-    /// The part normal to the leg.
-    pub across: Lanes3<V>,
-    /// The part along n.
-    pub along: V,
+/// Force F of the platform on each leg \[N\], base axes, in two parts.
+pub(super) struct LegReaction<S: Simd> {
+    /// Normal to the leg.
+    pub transverse: Lanes3<f64x8<S>>,
+    /// Along n.
+    pub axial: f64x8<S>,
 }
 
-impl<V> LegReaction<V> {
+impl<S: Simd> LegReaction<S> {
     /// `joint_acceleration` is aB.
     #[inline(always)]
-    pub fn new<S: Simd, M: Model>(
+    pub fn new<M: ModelTerms>(
         simd: S,
         machine: &Machine,
         constants: &LegConstants,
-        legs: &LegGeometry<V>,
-        velocity: &LegVelocity<V>,
-        joint_acceleration: Lanes3<V>,
-    ) -> Self
-    where
-        V: Eight<S>,
-    {
-        let load = |lane: &Constant| V::constant(simd, lane);
-        let gravity = Lanes3::<V>::constant(simd, &constants.gravity);
-        if M::LEGS != Legs::Links {
+        legs: &LegGeometry<S>,
+        velocity: &LegVelocity<S>,
+        joint_acceleration: Lanes3<f64x8<S>>,
+    ) -> Self {
+        let load = |lanes: &LegLanes| lanes.load(simd);
+        let gravity = Lanes3::splat(simd, &machine.gravity);
+        if M::LEGS != LegInertia::Links {
             // Points at B, the platform's among them: nothing is projected.
             let mass =
-                if M::LEGS == Legs::Lumped { &constants.lumped_mass } else { &constants.platform_mass };
-            return Self { across: (joint_acceleration - gravity) * load(mass), along: V::splat(simd, 0.0) };
+                if M::LEGS == LegInertia::Lumped { &constants.lumped_mass } else { &constants.platform_mass };
+            return Self {
+                transverse: (joint_acceleration - gravity) * load(mass),
+                axial: f64x8::splat(simd, 0.0),
+            };
         }
         let (n, n_rate, length, inverse_length) =
             (legs.direction, velocity.direction, legs.length, legs.inverse_length);
@@ -149,41 +142,41 @@ impl<V> LegReaction<V> {
 
         let j = jt2.mul_add(length, jt1).mul_add(length, jt0) * inverse_length * inverse_length;
         let mu = m2.mul_add(length, load(&constants.first_moment)) * inverse_length;
-        let mut across = (joint_acceleration * j).minus_scaled(mu, gravity);
+        let mut transverse = (joint_acceleration * j).minus_scaled(mu, gravity);
         if M::VELOCITY {
             let m2_r_over_l = m2 - m2_e2 * inverse_length;
             let twice_rate = velocity.rate + velocity.rate;
-            across = across.plus_scaled(twice_rate * (m2_r_over_l - j), n_rate);
+            transverse = transverse.plus_scaled(twice_rate * (m2_r_over_l - j), n_rate);
         }
         if M::SPIN {
             let ix_over_l = load(&constants.axial_inertia) * inverse_length;
-            across = spin(simd, machine, legs, velocity, joint_acceleration, ix_over_l, across);
+            transverse = spin(simd, machine, legs, velocity, joint_acceleration, ix_over_l, transverse);
         }
         // n' and the spin are normal to n already: projecting them too costs nothing.
-        across = across.minus_scaled(across.dot(n) * load(&constants.legs_only), n);
-        let mut along = m2 * (joint_acceleration - gravity).dot(n);
+        transverse = transverse.minus_scaled(transverse.dot(n) * load(&constants.legs_only), n);
+        let mut axial = m2 * (joint_acceleration - gravity).dot(n);
         if M::VELOCITY {
-            along = m2_e2.mul_add(n_rate.dot(n_rate), along);
+            axial = m2_e2.mul_add(n_rate.dot(n_rate), axial);
         }
-        Self { across, along }
+        Self { transverse, axial }
     }
 }
 
 /// `sum + Ix / L ( wx n' x n + (un / yy) wx' k )`
 #[inline(always)]
-fn spin<S: Simd, V: Eight<S>>(
+fn spin<S: Simd>(
     simd: S,
     machine: &Machine,
-    legs: &LegGeometry<V>,
-    velocity: &LegVelocity<V>,
-    joint_acceleration: Lanes3<V>,
-    ix_over_l: V,
-    sum: Lanes3<V>,
-) -> Lanes3<V> {
+    legs: &LegGeometry<S>,
+    velocity: &LegVelocity<S>,
+    joint_acceleration: Lanes3<f64x8<S>>,
+    ix_over_l: f64x8<S>,
+    sum: Lanes3<f64x8<S>>,
+) -> Lanes3<f64x8<S>> {
     let (n, n_rate) = (legs.direction, velocity.direction);
-    let u = Lanes3::<V>::constant(simd, &machine.joints.universal_axis);
+    let u = Lanes3::load(simd, &machine.joints.universal_axis);
     let k = u.cross(n);
-    let inverse_yy = V::splat(simd, 1.0) / k.dot(k).max(V::splat(simd, YY_MIN));
+    let inverse_yy = f64x8::splat(simd, 1.0) / k.dot(k).max(f64x8::splat(simd, MIN_UNIVERSAL_SINE_SQUARED));
     let (un, un_rate, p) = (u.dot(n), u.dot(n_rate), n_rate.dot(k));
     let twice_rate = velocity.rate + velocity.rate;
     let p_rate = (joint_acceleration.dot(k) - twice_rate * p) * legs.inverse_length;

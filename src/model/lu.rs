@@ -11,7 +11,7 @@
 
 use super::machine::LEGS;
 
-/// Coefficients from the diagonal on, then the right-hand side, then what is left over.
+/// Coefficients from the diagonal on, then the right-hand side, then zeros.
 type Row = [f64; LEGS + 1];
 
 /// x of `A x = b`; `None` if a pivot is zero. A is given by rows.

@@ -1,9 +1,9 @@
 //! The machine: every constant the equations need, validated once and immutable afterwards.
 //!
-//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`Constant`]): one array per
+//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`LegLanes`]): one array per
 //! coordinate, so that all six are evaluated by the same instructions.
 //!
-//! What this file does not do: read or judge values. `host::config` does, and names key, value and bound.
+//! This file neither reads nor validates values; `config::machine` does, and reports key, value and bound.
 
 use fearless_simd::Level;
 #[cfg(not(feature = "client"))]
@@ -11,12 +11,20 @@ use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3};
 
 use super::rigid::{Pose, Twist};
-use super::triples::{Constant, Triples};
+use super::task::TaskState;
+use super::triples::{LegLanes, Triples};
 
 /// Number of legs.
 pub const LEGS: usize = 6;
 
-/// A machine as the controller or the plant sees it. SI units throughout.
+/// Constants of one Gough-Stewart platform: geometry, masses, actuators, home. SI units throughout.
+///
+/// ```
+/// use hexad::{config::Config, model::inverse_geometry::leg_lengths};
+/// let machine = Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let lengths = leg_lengths(&machine, &machine.home_pose());
+/// assert!(lengths.iter().all(|length| machine.actuator.contains(*length)));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Machine {
     /// Acceleration of gravity in base axes, g \[m/s^2\].
@@ -29,7 +37,7 @@ pub struct Machine {
     pub cylinder: Link,
     /// Link 2, between the prismatic joint and the spherical joint.
     pub rod: Link,
-    /// What moves link 2 along link 1.
+    /// The prismatic joint between the links, and its drive.
     pub actuator: Actuator,
     /// Task coordinates X of the home pose: Bryan angles \[rad\], position \[m\].
     pub home: [f64; 6],
@@ -39,8 +47,7 @@ pub struct Machine {
 
 /// The instruction set to use on a CPU that has `level`: no lanes beyond 256 bits.
 ///
-/// Measured: 512-bit lanes take as long in throughput and an eighth longer for one evaluation alone (single
-/// precision: a third longer). The 3 x 3 half of the work has no use for them, and while they are at work
+/// Measured: 512-bit lanes take as long in throughput and an eighth longer for one evaluation alone. The 3 x 3 half of the work has no use for them, and while they are at work
 /// the second port for narrower vectors is shut.
 pub fn at_most_256_bits(level: Level) -> Level {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -67,11 +74,11 @@ pub struct Joints {
     /// Which leg is in which lane.
     pub triples: Triples,
     /// `A_i`, joint centres on the base, in base axes \[m\].
-    pub base: [Constant; 3],
+    pub base: [LegLanes; 3],
     /// `CB_i`, joint centres on the platform, in platform axes \[m\].
-    pub platform: [Constant; 3],
+    pub platform: [LegLanes; 3],
     /// `u_i`, first axis of the universal joint, fixed in the base, unit length.
-    pub universal_axis: [Constant; 3],
+    pub universal_axis: [LegLanes; 3],
     /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. Turns
     /// radians into metres wherever a tolerance must not depend on the size of the machine.
     pub radius: f64,
@@ -81,10 +88,17 @@ pub struct Joints {
     /// Mean of the `B_i`, from C, in platform axes \[m\]: the point that does not depend on the choice of C.
     pub(super) center: Vector3<f64>,
     /// The `B_i` from their mean, in platform axes \[m\].
-    pub(super) around_center: [Constant; 3],
+    pub(super) around_center: [LegLanes; 3],
     /// The length `a` of that arm as a share of the radius, and `(1 + a^2) radius`: see `super::kinematic_state`.
-    pub(super) arm_share: Constant,
-    pub(super) arm_curvature: Constant,
+    pub(super) arm_share: LegLanes,
+    pub(super) arm_curvature: LegLanes,
+}
+
+impl Machine {
+    /// Home as a pose.
+    pub fn home_pose(&self) -> Pose {
+        TaskState::at_rest(self.home).motion().pose
+    }
 }
 
 impl Joints {
@@ -107,20 +121,20 @@ impl Joints {
         let radius = mean_square.sqrt();
         Self {
             triples,
-            base: triples.pack_vectors(base).map(Constant::from),
-            platform: triples.pack_vectors(platform).map(Constant::from),
-            universal_axis: triples.pack_vectors(universal_axis).map(Constant::from),
+            base: triples.pack_vectors(base),
+            platform: triples.pack_vectors(platform),
+            universal_axis: triples.pack_vectors(universal_axis),
             radius,
             radius_cubed: radius * radius * radius,
             inverse_radius_cubed: triples.parity() / (radius * radius * radius),
             center,
-            around_center: triples.pack_vectors(&around_center).map(Constant::from),
-            arm_share: triples.pack(&around_center.map(|b| b.norm() / radius)).into(),
-            arm_curvature: triples.pack(&around_center.map(|b| radius + b.norm_squared() / radius)).into(),
+            around_center: triples.pack_vectors(&around_center),
+            arm_share: triples.pack(&around_center.map(|b| b.norm() / radius)),
+            arm_curvature: triples.pack(&around_center.map(|b| radius + b.norm_squared() / radius)),
         }
     }
 
-    /// How far apart two poses are: rotation \[rad\] and shift of the mean of the joints \[radius\] together.
+    /// Distance of two poses: norm of the rotation \[rad\] and of the shift of the mean of the joints \[radius\].
     pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
         let turn = a.displacement_to(b).angular;
         let center = |pose: &Pose| pose.position + pose.rotation * self.center;
@@ -200,4 +214,26 @@ impl Actuator {
     /// The `coulomb_smoothing` of a controller: sign(L') is exact above 0.1 mm/s, slow enough for a
     /// telescope's legs, and one count of a usual encoder at 1 kHz does not make the force chatter.
     pub const COULOMB_SMOOTHING_M_S: f64 = 1e-4;
+
+    /// Length of the stroke \[m\].
+    pub fn stroke(&self) -> f64 {
+        self.max_length - self.min_length
+    }
+
+    /// Whether a leg of this length is within the stroke; false for NaN.
+    pub fn contains(&self, length: f64) -> bool {
+        (self.min_length..=self.max_length).contains(&length)
+    }
+
+    /// Distance of a leg's length from the nearer end of the stroke \[m\]; negative outside of it.
+    ///
+    /// ```
+    /// # let actuator = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine.actuator;
+    /// let middle = 0.5 * (actuator.min_length + actuator.max_length);
+    /// assert!((actuator.margin(middle) - 0.5 * actuator.stroke()).abs() < 1e-15);
+    /// assert!(actuator.margin(actuator.max_length + 0.01) < 0.0);
+    /// ```
+    pub fn margin(&self, length: f64) -> f64 {
+        (length - self.min_length).min(self.max_length - length)
+    }
 }

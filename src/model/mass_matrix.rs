@@ -17,8 +17,7 @@
 //!
 //! What it does not do: links whose inertia varies with the length have their instantaneous value.
 //!
-//! Cost: six evaluations of the load. Not for a loop that only needs forces; it is what the simulated
-//! platform spends its time on.
+//! Cost: six evaluations of the load, most of the time of the simulated platform. Forces need no mass matrix.
 
 use nalgebra::{Cholesky, Matrix6, U6, Vector3, Vector6};
 
@@ -28,7 +27,15 @@ use super::inverse_jacobian::leg_wrenches;
 use super::machine::Machine;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 
-/// M of one machine, as a function of the pose.
+/// Mass matrix M of one machine, as a function of the pose.
+///
+/// ```
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let mass = hexad::model::mass_matrix::MassMatrix::new(&machine).at(&machine.home_pose());
+/// // Kinetic energy is positive and symmetric, and the legs add to the mass of the platform.
+/// assert!((mass - mass.transpose()).amax() < 1e-12 * mass.amax() && mass.cholesky().is_some());
+/// assert!(mass[(5, 5)] > machine.platform.mass);
+/// ```
 #[derive(Clone, Debug)]
 pub struct MassMatrix {
     /// The machine without gravity.

@@ -12,13 +12,13 @@
 //! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
-//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`triples`], `lanes`, `lanes3`, `balance`, `lu`, [`machine`] |
+//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], [`triples`], `lanes`, `lanes3`, `factorization`, `lu` |
 //!
 //! # Errata of the print
 //!
 //! Size: largest error of a force as a share of the largest force of its row, on the states of `tests/data`.
-//! `tests/paper` has the paper's dense matrices as an oracle, measures each of these, and says what of the
-//! print is not known.
+//! `tests/paper` evaluates the paper's dense matrices, measures each of these, and lists the parts of the print that are
+//! not legible.
 //!
 //! | | equation | printed | right | size |
 //! | --- | --- | --- | --- | --- |
@@ -35,7 +35,7 @@
 //! refer to the platform origin C.
 
 pub mod active_forces;
-mod balance;
+mod factorization;
 pub mod fidelity;
 pub mod forward_kinematics;
 pub mod inverse_geometry;

@@ -15,12 +15,11 @@
 //! Against the print: (88), (93) have g with the sign opposite to (74)-(81); (90), (91) put an inertia
 //! about the centre of mass beside moments about C, without the parallel-axis term, which here is `c x f`.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, SimdBase, f64x4};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
-use nalgebra::{Matrix3, RealField, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-use super::lanes::Four;
 use super::lanes3::Lanes3;
 use super::machine::Machine;
 use super::rigid::{Acceleration, Twist};
@@ -43,24 +42,21 @@ impl PrincipalAxes {
 
     /// `p_k x S p_k`, k in lanes; their sum is the torque of the rotation.
     #[inline(always)]
-    pub fn torques<S: Simd, F: Four<S>>(
+    pub fn torques<S: Simd>(
         &self,
         simd: S,
-        rotation: &Matrix3<F::Scalar>,
-        acceleration_map: &Matrix3<F::Scalar>,
-    ) -> Lanes3<F> {
-        let [x, y, z] = self.0.map(|row| F::load(simd, row));
-        let p = Lanes3 { x, y, z }.transformed(rotation, |value| F::spread(simd, value));
-        p.cross(p.transformed(acceleration_map, |value| F::spread(simd, value)))
+        rotation: &Matrix3<f64>,
+        acceleration_map: &Matrix3<f64>,
+    ) -> Lanes3<f64x4<S>> {
+        let [x, y, z] = self.0.map(|row| f64x4::load_array(simd, row));
+        let p = Lanes3 { x, y, z }.transformed(simd, rotation);
+        p.cross(p.transformed(simd, acceleration_map))
     }
 }
 
 /// S, which takes a point of the platform (from C, in base axes) to its acceleration relative to C.
 #[inline(always)]
-pub(super) fn acceleration_map<T: RealField + Copy>(
-    twist: &Twist<T>,
-    acceleration: &Acceleration<T>,
-) -> Matrix3<T> {
+pub(super) fn acceleration_map(twist: &Twist, acceleration: &Acceleration) -> Matrix3<f64> {
     let (w, a) = (&twist.angular, &acceleration.angular);
     let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
     let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);

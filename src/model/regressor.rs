@@ -1,7 +1,7 @@
 //! Regressor form of the inverse dynamics: `Gamma = Y(motion) p`, linear in masses, first moments,
 //! inertias and friction. For identification and adaptation, off the loop.
 //!
-//! Geometry, gravity, the reference lengths of the inertias and the smoothing of sign(L') are known; the
+//! Geometry, gravity, the reference lengths of the inertias and the smoothing of sign(L') are given; the
 //! rest of the machine is the vector p. Column k of Y is the force that parameter k alone would need:
 //!
 //! ```text
@@ -25,17 +25,17 @@
 //! parallel-axis terms are parameters of their own. It is written out plainly, with n'' and without lanes,
 //! and shares no code with them but the geometry of the legs.
 //!
-//! The mass of the cylinder is no parameter: A does not move, so only `m1 e1` and `J1` are ever felt.
+//! The mass of the cylinder is no parameter: A does not move, so only `m1 e1` and `J1` act.
 //!
 //! Identifiable are at most 19 of the 22 parameters (18 if both links have the same reference length,
-//! where q1 and q2 are alike). Whatever the motion, no force tells apart
+//! where q1 and q2 are alike). No motion distinguishes
 //!
 //! - `J1` from `J2` and `Ix1` from `Ix2`: the links turn together; only the sums act;
 //! - `m2` from six points of that mass in the platform at the `B_i`: `m2` can be traded for mass, first
 //!   moment and inertia of the platform.
 //!
-//! [`INDISTINGUISHABLE`] and [`rod_mass_in_platform`] name these directions. Slow motions identify less:
-//! without velocity neither spin nor friction, at rest only what weighs.
+//! [`INDISTINGUISHABLE_PAIRS`] and [`rod_mass_null_direction`] name these directions. Slow motions identify less:
+//! without velocity neither spin nor friction, at rest only the first moments.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -43,15 +43,15 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 
 use super::inverse_geometry::{LegMotion, leg_directions, leg_motion};
 use super::inverse_jacobian::leg_wrenches;
-use super::leg::YY_MIN;
+use super::leg::MIN_UNIVERSAL_SINE_SQUARED;
 use super::machine::{Actuator, Machine};
 use super::platform::acceleration_map;
 use super::rigid::Motion;
 
 /// Number of parameters.
-pub const PARAMETERS: usize = 22;
+pub const PARAMETER_COUNT: usize = 22;
 
-/// p, in this order:
+/// Inertial and friction parameters p of a machine, in this order:
 ///
 /// | index | parameter | unit |
 /// | --- | --- | --- |
@@ -70,16 +70,16 @@ pub const PARAMETERS: usize = 22;
 /// | 19 | drive: reflected mass | kg |
 /// | 20 | viscous friction | N s/m |
 /// | 21 | Coulomb friction | N |
-pub type Parameters = SVector<f64, PARAMETERS>;
+pub type InertialParameters = SVector<f64, PARAMETER_COUNT>;
 
-/// Y, 6 x 22: a row per leg in the order 1..6, a column per parameter, \[N\] per unit of the parameter.
-pub type Regressor = SMatrix<f64, 6, PARAMETERS>;
+/// Regressor matrix Y, 6 x 22: a row per leg in the order 1..6, a column per parameter, \[N\] per unit of the parameter.
+pub type Regressor = SMatrix<f64, 6, PARAMETER_COUNT>;
 
 /// Pairs of parameters whose columns are the same at every motion: J1 and J2, Ix1 and Ix2.
-pub const INDISTINGUISHABLE: [[usize; 2]; 2] = [[11, 16], [12, 17]];
+pub const INDISTINGUISHABLE_PAIRS: [[usize; 2]; 2] = [[11, 16], [12, 17]];
 
-/// p of a machine.
-pub fn parameters_of(machine: &Machine) -> Parameters {
+/// The parameters p of a machine.
+pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
     let (platform, cylinder, rod, actuator) =
         (&machine.platform, &machine.cylinder, &machine.rod, &machine.actuator);
     let moment = platform.center_of_mass * platform.mass;
@@ -111,10 +111,10 @@ pub fn parameters_of(machine: &Machine) -> Parameters {
     ])
 }
 
-/// The direction of p that no motion shows: the rods heavier by 1 kg each, with the same `m2 e2` and `J2`,
+/// Direction of p in the null space of Y at every motion: the rods heavier by 1 kg each, with the same `m2 e2` and `J2`,
 /// the platform lighter by points of 1 kg at the `B_i`.
-pub fn rod_mass_in_platform(machine: &Machine) -> Parameters {
-    let mut direction = Parameters::zeros();
+pub fn rod_mass_null_direction(machine: &Machine) -> InertialParameters {
+    let mut direction = InertialParameters::zeros();
     for b in machine.joints.triples.unpack_vectors(&machine.joints.platform) {
         let inertia = point_inertia(&b);
         let point = [
@@ -135,9 +135,18 @@ pub fn rod_mass_in_platform(machine: &Machine) -> Parameters {
     direction + rod_mass
 }
 
-/// Y at a motion; `None` at a singular pose.
+/// The regressor Y at a motion; `None` at a singular pose.
 ///
-/// `Y parameters_of(machine)` are the forces of [`Exact`](super::fidelity::Exact), to rounding times the
+/// ```
+/// # use hexad::{config::Config, model::{active_forces::inverse_dynamics, fidelity::Exact, regressor::*, task::TaskState}};
+/// # let machine = Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let motion = TaskState { xdd: [0.1, 0.0, 0.2, 1.0, 0.0, 2.0].into(), ..TaskState::at_rest(machine.home) }.motion();
+/// let forces = regressor(&machine, &motion).unwrap() * inertial_parameters(&machine);
+/// let expected = inverse_dynamics::<Exact>(&machine, &motion).unwrap();
+/// assert!((forces - nalgebra::Vector6::from(expected)).amax() < 1e-9 * forces.amax());
+/// ```
+///
+/// `Y inertial_parameters(machine)` are the forces of [`Exact`](super::fidelity::Exact), to rounding times the
 /// condition of N (LU with partial pivoting, see [`super::inverse_jacobian::condition`]). Of `machine`,
 /// only geometry, gravity, reference lengths and smoothing are read.
 pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
@@ -158,7 +167,7 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
         let joint_acceleration = motion.acceleration.linear + map * arm;
         let n_rate = (joint_velocity - n * rate) / length;
         let n_accel = (joint_acceleration - n * accel - n_rate * (2.0 * rate)) / length;
-        let leg = Leg { arm, n: *n, n_rate, n_accel, length, rate, accel };
+        let leg = LegKinematics { arm, n: *n, n_rate, n_accel, length, rate, accel };
         leg.add(&mut wrenches, machine, u);
     }
 
@@ -178,25 +187,25 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
 fn add_platform(wrenches: &mut Regressor, machine: &Machine, motion: &Motion, map: &Matrix3<f64>) {
     let rotation = &motion.pose.rotation;
     let (omega, omega_rate) = (&motion.twist.angular, &motion.acceleration.angular);
-    let felt = motion.acceleration.linear - machine.gravity;
+    let proper_acceleration = motion.acceleration.linear - machine.gravity;
     let mut columns = wrenches.column_iter_mut();
     let mut add = |torque: Vector3<f64>, force: Vector3<f64>| {
         if let Some(mut column) = columns.next() {
             column += stack(&torque, &force);
         }
     };
-    add(Vector3::zeros(), felt);
+    add(Vector3::zeros(), proper_acceleration);
     for axis in rotation.column_iter() {
-        add(axis.cross(&felt), map * axis);
+        add(axis.cross(&proper_acceleration), map * axis);
     }
-    for element in SYMMETRIC {
+    for element in SYMMETRIC_BASIS {
         let inertia = rotation * Matrix3::from(element) * rotation.transpose();
         add(inertia * omega_rate + omega.cross(&(inertia * omega)), Vector3::zeros());
     }
 }
 
 /// The elements xx, yy, zz, xy, xz, yz of a symmetric matrix.
-const SYMMETRIC: [[[f64; 3]; 3]; 6] = [
+const SYMMETRIC_BASIS: [[[f64; 3]; 3]; 6] = [
     [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
     [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]],
     [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
@@ -206,7 +215,7 @@ const SYMMETRIC: [[[f64; 3]; 3]; 6] = [
 ];
 
 /// One leg in motion, base axes.
-struct Leg {
+struct LegKinematics {
     /// b
     arm: Vector3<f64>,
     n: Vector3<f64>,
@@ -217,7 +226,7 @@ struct Leg {
     accel: f64,
 }
 
-impl Leg {
+impl LegKinematics {
     /// Columns 10..18, as wrenches about C.
     fn add(&self, wrenches: &mut Regressor, machine: &Machine, universal_axis: &Vector3<f64>) {
         let Self { arm, n, n_rate, n_accel, length, rate, accel } = self;
@@ -247,7 +256,7 @@ impl Leg {
     fn spin(&self, u: &Vector3<f64>) -> Vector3<f64> {
         let Self { n, n_rate, n_accel, .. } = self;
         let k = u.cross(n);
-        let yy = k.norm_squared().max(YY_MIN);
+        let yy = k.norm_squared().max(MIN_UNIVERSAL_SINE_SQUARED);
         let (un, un_rate) = (u.dot(n), u.dot(n_rate));
         let (p, p_rate) = (n_rate.dot(&k), n_accel.dot(&k));
         let wx = un * p / yy;

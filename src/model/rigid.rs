@@ -2,36 +2,54 @@
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
-use nalgebra::{Matrix3, RealField, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
-/// Where the platform is.
+/// Pose of the platform: orientation and position in the base frame.
+///
+/// ```
+/// use hexad::model::rigid::{Pose, Twist};
+/// use nalgebra::{Matrix3, Vector3};
+/// let start = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
+/// let step = Twist { angular: Vector3::new(0.3, -0.2, 0.1), linear: Vector3::new(0.0, 0.0, 0.5) };
+/// // displacement_to inverts displaced: a rotation vector, never a difference of angles.
+/// let back = start.displacement_to(&start.displaced(&step));
+/// assert!((back.vector() - step.vector()).amax() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose<T: RealField + Copy = f64> {
+pub struct Pose {
     /// R, platform axes expressed in base axes.
-    pub rotation: Matrix3<T>,
+    pub rotation: Matrix3<f64>,
     /// C, the platform origin in base axes \[m\].
-    pub position: Vector3<T>,
+    pub position: Vector3<f64>,
 }
 
-/// How the platform moves.
+/// Twist of the platform: angular velocity, and velocity of the platform origin C.
+///
+/// ```
+/// use hexad::model::rigid::{Twist, Wrench};
+/// // Power is wrench times twist: 2 N m at 3 rad/s, and 5 N against 1 m/s.
+/// let twist = Twist { angular: [3.0, 0.0, 0.0].into(), linear: [0.0, 0.0, -1.0].into() };
+/// let wrench = Wrench { torque: [2.0, 0.0, 0.0].into(), force: [0.0, 0.0, 5.0].into() };
+/// assert_eq!(wrench.vector().dot(&twist.vector()), 1.0);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Twist<T: RealField + Copy = f64> {
+pub struct Twist {
     /// omega, base axes \[rad/s\].
-    pub angular: Vector3<T>,
+    pub angular: Vector3<f64>,
     /// v, velocity of C, base axes \[m/s\].
-    pub linear: Vector3<T>,
+    pub linear: Vector3<f64>,
 }
 
-/// Time derivative of the twist, part by part.
+/// Acceleration of the platform: the time derivative of its twist, part by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Acceleration<T: RealField + Copy = f64> {
+pub struct Acceleration {
     /// omega', base axes \[rad/s^2\].
-    pub angular: Vector3<T>,
+    pub angular: Vector3<f64>,
     /// v', acceleration of C, base axes \[m/s^2\].
-    pub linear: Vector3<T>,
+    pub linear: Vector3<f64>,
 }
 
-/// What acts on the platform.
+/// Wrench on the platform: torque about C, and force.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wrench {
     /// Torque about C, base axes \[N m\].
@@ -40,17 +58,20 @@ pub struct Wrench {
     pub force: Vector3<f64>,
 }
 
-/// Pose, twist and acceleration at one instant.
+/// Motion of the platform at one instant: pose, twist and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Motion<T: RealField + Copy = f64> {
-    pub pose: Pose<T>,
-    pub twist: Twist<T>,
-    pub acceleration: Acceleration<T>,
+pub struct Motion {
+    /// R and C.
+    pub pose: Pose,
+    /// omega and v.
+    pub twist: Twist,
+    /// omega' and v'.
+    pub acceleration: Acceleration,
 }
 
 impl Motion {
-    /// `dt` seconds later (or earlier) if the acceleration stays as it is. The turn is about one axis: what the
-    /// axis itself turns meanwhile, `|omega x omega'| dt^3 / 12`, is left out.
+    /// `dt` seconds later (or earlier) if the acceleration stays as it is. The rotation is about one axis: the
+    /// rotation of the axis itself, `|omega x omega'| dt^3 / 12`, is left out.
     pub fn after(&self, dt: f64) -> Self {
         let (v, a) = (self.twist.vector(), self.acceleration.vector());
         Self {
@@ -59,56 +80,28 @@ impl Motion {
             acceleration: self.acceleration,
         }
     }
+}
 
-    /// Rounded to single precision.
-    pub fn single(&self) -> Motion<f32> {
-        let Self { pose, twist, acceleration } = self;
-        Motion {
-            pose: Pose { rotation: pose.rotation.cast(), position: pose.position.cast() },
-            twist: Twist { angular: twist.angular.cast(), linear: twist.linear.cast() },
-            acceleration: Acceleration {
-                angular: acceleration.angular.cast(),
-                linear: acceleration.linear.cast(),
-            },
+macro_rules! six_numbers {
+    ($name:ident, $first:ident, $second:ident, $doc:literal) => {
+        impl $name {
+            #[doc = $doc]
+            pub fn vector(&self) -> Vector6<f64> {
+                let (a, b) = (&self.$first, &self.$second);
+                Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+            }
+
+            /// Inverse of `vector`.
+            pub fn from_vector(v: &Vector6<f64>) -> Self {
+                Self { $first: v.fixed_rows::<3>(0).into(), $second: v.fixed_rows::<3>(3).into() }
+            }
         }
-    }
+    };
 }
 
-impl Twist {
-    /// `[omega; v]`
-    pub fn vector(&self) -> Vector6<f64> {
-        stack(&self.angular, &self.linear)
-    }
-
-    /// Inverse of [`Twist::vector`].
-    pub fn from_vector(v: &Vector6<f64>) -> Self {
-        Self { angular: v.fixed_rows::<3>(0).into(), linear: v.fixed_rows::<3>(3).into() }
-    }
-}
-
-impl Acceleration {
-    /// `[omega'; v']`
-    pub fn vector(&self) -> Vector6<f64> {
-        stack(&self.angular, &self.linear)
-    }
-
-    /// Inverse of [`Acceleration::vector`].
-    pub fn from_vector(v: &Vector6<f64>) -> Self {
-        Self { angular: v.fixed_rows::<3>(0).into(), linear: v.fixed_rows::<3>(3).into() }
-    }
-}
-
-impl Wrench {
-    /// `[torque; force]`
-    pub fn vector(&self) -> Vector6<f64> {
-        stack(&self.torque, &self.force)
-    }
-
-    /// Inverse of [`Wrench::vector`].
-    pub fn from_vector(v: &Vector6<f64>) -> Self {
-        Self { torque: v.fixed_rows::<3>(0).into(), force: v.fixed_rows::<3>(3).into() }
-    }
-}
+six_numbers!(Twist, angular, linear, "`[omega; v]`");
+six_numbers!(Acceleration, angular, linear, "`[omega'; v']`");
+six_numbers!(Wrench, torque, force, "`[torque; force]`");
 
 impl Pose {
     /// The pose after the displacement `[dw; dv]`: `R <- exp(dw~) R`, `C <- C + dv`, both in base axes.
@@ -172,10 +165,6 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
 /// One step of Newton's iteration for the polar factor: `R (3 I - R^T R) / 2`.
 fn orthonormalized(r: &Matrix3<f64>) -> Matrix3<f64> {
     r * (Matrix3::identity() * 3.0 - r.transpose() * r) * 0.5
-}
-
-fn stack(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
 #[cfg(test)]

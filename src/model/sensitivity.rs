@@ -1,18 +1,25 @@
-//! How near to a singular pose, for the price of a few more lanes after the factorization: condition,
-//! determinant, and how far Newton's method can be trusted.
+//! Sensitivity of a pose, from its factorization: condition, determinant, and the step for which Newton's method is
+//! proved to converge.
+//!
+//! ```text
+//! condition = |N| |N^-1|      determinant = det N / radius^3      trusted_step = h / (|K| |N^-1|),  h = 0.4
+//! ```
+//!
+//! Frobenius norms, torques about the mean of the joints and divided by the radius. Valid at every pose; at a singular one
+//! the condition is not finite and the trusted step is zero or not a number.
 
-use fearless_simd::Simd;
+use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix6, Vector6};
 
-use super::balance::{Balance, broadcast_vectors, wrench_columns};
+use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four, Reals};
+use super::lanes::Triple;
 use super::lu;
 use super::machine::{Joints, LEGS};
 
-/// How a pose answers to errors, torques and angles measured at the radius. All without units.
+/// Sensitivity of a pose to errors of leg lengths, torques and angles measured at the radius. All without units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sensitivity {
     /// Frobenius condition of N: never below the 2-norm condition and at most six times it, at a singular pose
@@ -20,15 +27,15 @@ pub struct Sensitivity {
     pub condition: f64,
     /// `det N / radius^3`: changes its sign where the platform passes a singular pose.
     pub determinant: f64,
-    /// Largest step (radian, or radius) for which Newton's method is known to find the only pose nearby.
+    /// Largest step (radian, or radius) for which Newton's method is proved to find the only pose nearby.
     pub trusted_step: f64,
 }
 
-/// The share of Kantorovich's bound that is used. His theorem: from a start with `h = B K s <= 1/2` (B norm of the
+/// Largest h of a trusted step. Kantorovich's theorem: from a start with `h = B K s <= 1/2` (B norm of the
 /// inverse Jacobian, K Lipschitz constant of the Jacobian, s size of the first step) Newton's method converges
 /// quadratically to a solution, and within the radius `(1 - sqrt(1 - 2 h)) / (B K)` there is no other. K is
 /// taken at the start; that it grows along the step costs less than the fifth that is left.
-const TRUSTED_SHARE: f64 = 0.4;
+const MAX_KANTOROVICH_H: f64 = 0.4;
 
 impl Sensitivity {
     /// Of legs with arms from the mean of the joints, and their factorization.
@@ -37,58 +44,56 @@ impl Sensitivity {
     /// a the length of the arm. With `rho = a / radius` that is a Lipschitz constant
     /// `K_i radius = (1 + rho^2) radius / L + rho`, and the root of the sum of squares for all six.
     #[inline(always)]
-    pub(super) fn new<S: Simd, V: Eight<S>>(
+    pub(super) fn new<S: Simd>(
         simd: S,
         joints: &Joints,
-        legs: &LegGeometry<V>,
-        balance: &Balance<S, V>,
+        legs: &LegGeometry<S>,
+        factorization: &Factorization<S>,
     ) -> Self {
-        let inverse_radius = V::splat(simd, 1.0 / joints.radius);
-        let (share, arm_curvature) =
-            (V::constant(simd, &joints.arm_share), V::constant(simd, &joints.arm_curvature));
+        let inverse_radius = f64x8::splat(simd, 1.0 / joints.radius);
+        let (share, arm_curvature) = (joints.arm_share.load(simd), joints.arm_curvature.load(simd));
         let curvature = arm_curvature.mul_add(legs.inverse_length, share);
         let moment = legs.arm.cross(legs.direction) * inverse_radius;
         let (curvature, wrench) =
-            (sum_legs(curvature * curvature), sum_legs(moment.dot(moment) + V::splat(simd, 1.0)));
-        let inverse = inverse_norm_squared(balance, legs);
+            (sum_legs(curvature * curvature), sum_legs(moment.dot(moment) + f64x8::splat(simd, 1.0)));
+        let inverse = inverse_norm_squared(factorization, legs);
         Self {
             condition: (wrench * inverse).sqrt(),
-            determinant: balance.determinant() * joints.inverse_radius_cubed,
-            trusted_step: TRUSTED_SHARE / (curvature * inverse).sqrt(),
+            determinant: factorization.determinant() * joints.inverse_radius_cubed,
+            trusted_step: MAX_KANTOROVICH_H / (curvature * inverse).sqrt(),
         }
     }
 }
 
 #[inline(always)]
-fn sum_legs<S: Simd, V: Eight<S>>(v: V) -> f64 {
-    let (first, second) = v.halves();
+fn sum_legs<S: Simd>(v: f64x8<S>) -> f64 {
+    let (first, second) = v.split();
     (first + second).legs().into_iter().sum()
 }
 
-/// Square of the Frobenius norm of `N^-1`, torques divided by the radius: what a unit of wrench, in newtons
-/// at the radius, asks of the legs at most. Not finite at a singular pose.
+/// Square of the Frobenius norm of `N^-1`, torques divided by the radius: a bound on the leg forces that balance a unit
+/// wrench, in newtons at the radius. Not finite at a singular pose.
 ///
 /// ```text
 /// rows of B: torque t_j = c_j / dS               force p_j = -sum_i (t_j . m_i) a_i / dA
 /// rows of A: torque     - sum_j X_ij t_j         force a_i / dA - sum_j X_ij p_j
 /// ```
 #[inline(always)]
-fn inverse_norm_squared<S: Simd, V: Eight<S>>(balance: &Balance<S, V>, legs: &LegGeometry<V>) -> f64 {
-    let simd = balance.simd;
-    if !balance.sound {
-        let n = wrench_columns(&balance.joints.triples, legs);
-        return inverse_norm_squared_by_lu(&n, balance.joints.radius);
+fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeometry<S>) -> f64 {
+    let simd = factorization.simd;
+    if !factorization.is_regular {
+        let n = wrench_columns(&factorization.joints.triples, legs);
+        return inverse_norm_squared_by_lu(&n, factorization.joints.radius);
     }
-    let r = V::Half::splat(simd, balance.joints.radius);
-    let [i0, i1, i2] = broadcast_vectors(simd, balance.inverse_a);
-    let [m0, m1, m2] = broadcast_vectors(simd, balance.moment_a);
-    let t = balance.adjugate_s * balance.inverse_d_s;
-    let p =
-        (i0 * t.dot(m0)).plus_scaled(t.dot(m1), i1).plus_scaled(t.dot(m2), i2) * V::Half::splat(simd, -1.0);
-    let [x0, x1, x2] = V::Half::transposed(simd, balance.x);
-    let ([t0, t1, t2], [p0, p1, p2]) = (broadcast_vectors(simd, t), broadcast_vectors(simd, p));
+    let r = f64x4::splat(simd, factorization.joints.radius);
+    let [i0, i1, i2] = factorization.inverse_a.broadcasts();
+    let [m0, m1, m2] = factorization.moment_a.broadcasts();
+    let t = factorization.adjugate_s * factorization.inverse_d_s;
+    let p = (i0 * t.dot(m0)).plus_scaled(t.dot(m1), i1).plus_scaled(t.dot(m2), i2) * f64x4::splat(simd, -1.0);
+    let [x0, x1, x2] = Triple::transposed(factorization.x);
+    let ([t0, t1, t2], [p0, p1, p2]) = (t.broadcasts(), p.broadcasts());
     let torque_a = (t0 * x0).plus_scaled(x1, t1).plus_scaled(x2, t2);
-    let force_a = balance.inverse_a.minus_scaled(x0, p0).minus_scaled(x1, p1).minus_scaled(x2, p2);
+    let force_a = factorization.inverse_a.minus_scaled(x0, p0).minus_scaled(x1, p1).minus_scaled(x2, p2);
     let torques = t.dot(t) + torque_a.dot(torque_a);
     let forces = p.dot(p) + force_a.dot(force_a);
     (torques * r).mul_add(r, forces).legs().into_iter().sum()

@@ -10,18 +10,29 @@ use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 
-/// X, X', X'' at one instant: Bryan angles \[rad\], position \[m\], and their time derivatives.
+/// Motion in task coordinates at one instant: Bryan angles \[rad\], position \[m\], and their time derivatives.
 ///
-/// X' and X'' hold angle rates, not angular velocity.
+/// X' and X'' hold angle rates, not angular velocity:
+///
+/// ```
+/// use hexad::model::task::TaskState;
+/// let state = TaskState { xd: [0.0, 0.0, 2.0, 0.0, 0.0, 0.0].into(), ..TaskState::at_rest([0.0, 0.5, 0.0, 0.0, 0.0, 1.0]) };
+/// // gamma turns about the platform's z axis, which beta has inclined.
+/// let omega = state.motion().twist.angular;
+/// assert!((omega - nalgebra::Vector3::new(2.0 * 0.5_f64.sin(), 0.0, 2.0 * 0.5_f64.cos())).norm() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TaskState {
+    /// X
     pub x: Vector6<f64>,
+    /// X'
     pub xd: Vector6<f64>,
+    /// X''
     pub xdd: Vector6<f64>,
 }
 
 impl TaskState {
-    /// At X without moving.
+    /// The state at X without motion.
     pub fn at_rest(x: [f64; 6]) -> Self {
         Self { x: x.into(), ..Self::default() }
     }
@@ -42,7 +53,7 @@ impl TaskState {
         let [alpha_accel, beta_accel, gamma_accel, ax, ay, az] = self.xdd.into();
         let rx = rotation_x(alpha);
         let rx_ry = rx * rotation_y(beta);
-        // Columns of E, and what turns each of them.
+        // Columns of E, and the angular velocity of each.
         let e1 = Vector3::x();
         let e2: Vector3<f64> = rx.column(1).into();
         let e3: Vector3<f64> = rx_ry.column(2).into();
@@ -70,6 +81,13 @@ impl TaskState {
 
 /// Task coordinates of a pose. Of the two triples of Bryan angles (and their full turns) that give the
 /// same R, the one nearest to `near`, so that a continuous motion has continuous angles.
+///
+/// ```
+/// use hexad::model::task::{TaskState, task_coordinates};
+/// let x = [3.5, 0.2, -4.0, 0.1, 0.2, 1.0];
+/// let back = task_coordinates(&TaskState::at_rest(x).motion().pose, &x);
+/// assert!(back.iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-14));
+/// ```
 ///
 /// Conditioning: alpha and gamma lose `1 / cos(beta)`. At beta = +-90 deg only their sum or difference
 /// is determined; alpha is then taken from `near`.

@@ -1,56 +1,49 @@
 //! Which leg is in which lane, and numbers per lane in memory.
 //!
 //! Eight lanes hold two triples of legs, each with a lane of padding that repeats the triple's first leg, so
-//! that it never divides by zero; nobody reads it:
+//! that it never divides by zero; it is never read:
 //!
 //! ```text
 //! lane   0    1    2    3       4    5    6    7
 //! leg    a    b    c   (a)      d    e    f   (d)         chosen per machine, see Triples::best
 //! ```
 
-use core::borrow::Borrow;
-
+use fearless_simd::{Simd, SimdBase, f64x8};
 use nalgebra::{Matrix3, Vector3};
 
 use super::machine::LEGS;
 
-/// One number per lane in memory.
+/// One number per leg in memory, in the order of the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(align(64))]
-pub struct Lane(pub [f64; 8]);
+pub struct LegLanes(pub [f64; 8]);
 
-/// A constant of the machine, one number per lane, ready for either precision: converting it anew for
-/// each evaluation would cost more than single precision saves.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Constant {
-    pub(super) double: Lane,
-    pub(super) single: [f32; 8],
-}
-
-impl Constant {
+impl LegLanes {
     /// With the first lane of padding set to `value`.
     pub(super) fn with_padding(&self, value: f64) -> Self {
-        let [a, b, c, _, d, e, f, g] = self.double.0;
-        Lane([a, b, c, value, d, e, f, g]).into()
+        let [a, b, c, _, d, e, f, g] = self.0;
+        Self([a, b, c, value, d, e, f, g])
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub(super) fn load<S: Simd>(&self, simd: S) -> f64x8<S> {
+        f64x8::load_array(simd, self.0)
     }
 }
 
-impl From<Lane> for Constant {
-    fn from(double: Lane) -> Self {
-        Self { double, single: double.0.map(|value| value as f32) }
+/// To memory.
+impl<S: Simd> From<f64x8<S>> for LegLanes {
+    #[inline(always)]
+    fn from(lanes: f64x8<S>) -> Self {
+        Self(lanes.to_array())
     }
 }
 
-impl Borrow<Lane> for Constant {
-    fn borrow(&self) -> &Lane {
-        &self.double
-    }
-}
-
-/// Which leg is in which lane: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
+/// Assignment of the six legs to lanes: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Triples {
-    /// Lane of each leg.
+    /// LegLanes of each leg.
     lanes: [usize; LEGS],
 }
 
@@ -69,8 +62,7 @@ impl Triples {
         Self { lanes: [0, 4, 5, 6, 1, 2] },
     ];
 
-    /// The split whose first triple spans the largest volume: of these directions of the legs, the three
-    /// that resist a force best go first.
+    /// The split whose first triple spans the largest volume, given the directions of the legs.
     pub fn best(directions: &[Vector3<f64>; LEGS]) -> Self {
         let volume = |triples: &Self| {
             let [x, y, z] = triples.pack_vectors(directions).map(|lane| lane.0);
@@ -92,7 +84,7 @@ impl Triples {
 
     /// One number per leg to lanes.
     #[inline(always)]
-    pub fn pack(&self, legs: &[f64; LEGS]) -> Lane {
+    pub fn pack(&self, legs: &[f64; LEGS]) -> LegLanes {
         let mut lane = [0.0; 8];
         for (index, value) in self.lanes.iter().zip(legs) {
             if let Some(slot) = lane.get_mut(index % 8) {
@@ -100,30 +92,29 @@ impl Triples {
             }
         }
         let [a, b, c, _, d, e, f, _] = lane;
-        Lane([a, b, c, a, d, e, f, d])
+        LegLanes([a, b, c, a, d, e, f, d])
     }
 
-    /// The same number for every leg, in whatever lane, and others for the padding.
-    pub(super) fn uniform(leg: f64, [first, second]: [f64; 2]) -> Constant {
-        Lane([leg, leg, leg, first, leg, leg, leg, second]).into()
+    /// The same number for every leg, another for the first lane of padding, and 0 for the second.
+    pub(super) fn uniform(leg: f64, padding: f64) -> LegLanes {
+        LegLanes([leg, leg, leg, padding, leg, leg, leg, 0.0])
     }
 
     /// Lanes to one number per leg.
     #[inline(always)]
-    pub fn unpack(&self, lane: &impl Borrow<Lane>) -> [f64; LEGS] {
-        let lane = lane.borrow();
-        // The remainder tells the compiler that there is nothing to check.
+    pub fn unpack(&self, lane: &LegLanes) -> [f64; LEGS] {
+        // With the remainder the compiler leaves out the check of the index.
         self.lanes.map(|index| lane.0.get(index % 8).copied().unwrap_or_default())
     }
 
     /// Six 3-vectors to three lanes: x, y, z.
-    pub fn pack_vectors(&self, legs: &[Vector3<f64>; LEGS]) -> [Lane; 3] {
+    pub fn pack_vectors(&self, legs: &[Vector3<f64>; LEGS]) -> [LegLanes; 3] {
         [self.pack(&legs.map(|v| v.x)), self.pack(&legs.map(|v| v.y)), self.pack(&legs.map(|v| v.z))]
     }
 
     /// Three lanes back to six 3-vectors.
-    pub fn unpack_vectors(&self, [x, y, z]: &[impl Borrow<Lane>; 3]) -> [Vector3<f64>; LEGS] {
-        let (x, y, z) = (self.unpack(x.borrow()), self.unpack(y.borrow()), self.unpack(z.borrow()));
+    pub fn unpack_vectors(&self, [x, y, z]: &[LegLanes; 3]) -> [Vector3<f64>; LEGS] {
+        let (x, y, z) = (self.unpack(x), self.unpack(y), self.unpack(z));
         let mut legs = [Vector3::zeros(); LEGS];
         for (leg, ((x, y), z)) in legs.iter_mut().zip(x.into_iter().zip(y).zip(z)) {
             *leg = Vector3::new(x, y, z);

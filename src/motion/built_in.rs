@@ -2,7 +2,8 @@
 //!
 //! Every motion fades in and out with the minimum-jerk window, so that it begins and ends at rest at
 //! home. Amplitudes follow the machine: its size first, then [`fit`] shrinks the motion until stroke, rate
-//! and force have reserve.
+//! and force have reserve at a thousand samples. Limits of a deployment and singular poses between samples are not
+//! checked here.
 
 use core::f64::consts::TAU;
 #[cfg(not(feature = "client"))]
@@ -10,28 +11,28 @@ use nalgebra::ComplexField as _;
 
 use nalgebra::Vector6;
 
-use super::minimum_jerk::{between, rise, scaled, window};
+use super::minimum_jerk::{rise, scaled_by_profile, straight_move, window};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 
-/// Seconds a motion takes to fade in, and out again.
+/// Time a motion takes to fade in, and out again \[s\].
 const FADE_S: f64 = 1.0;
 
 /// Amplitude in position as a share of the platform's radius before fitting: 0.1 m for a 0.5 m platform.
-const POSITION_SHARE: f64 = 0.2;
+const POSITION_OVER_RADIUS: f64 = 0.2;
 
 /// Amplitude in each angle before fitting \[rad\]: 6 degrees.
-const ANGLE_AMPLITUDE: f64 = 0.105;
+const ANGLE_AMPLITUDE_RAD: f64 = 0.105;
 
 /// Share of stroke, rate and force a fitted motion may use.
 const USABLE_SHARE: f64 = 0.8;
 
-/// A named motion.
+/// Name of a built-in motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
+pub enum BuiltInMotion {
     /// Stand at home.
     Settle,
     /// Minimum-jerk moves along every axis in turn, there and back.
@@ -45,7 +46,7 @@ pub enum Motion {
     Paper,
 }
 
-impl Motion {
+impl BuiltInMotion {
     /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -58,33 +59,44 @@ impl Motion {
     }
 }
 
-/// A motion of a given length and size about the home pose of a machine.
+/// Built-in motion of a given duration and size about the home pose of a machine.
+///
+/// ```
+/// use hexad::motion::built_in::{BuiltInMotion, fit};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let motion = fit(&machine, BuiltInMotion::Sines, 6.0);
+/// let (start, middle) = (motion.at(0.0), motion.at(2.7));
+/// assert_eq!((start.x, start.xd.norm()), (machine.home.into(), 0.0));
+/// assert!((middle.x - start.x).norm() > 0.01 && middle.xd.norm() > 0.01);
+/// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Scene {
-    pub motion: Motion,
+pub struct FittedMotion {
+    /// Its shape.
+    pub motion: BuiltInMotion,
     /// Duration \[s\].
     pub duration: f64,
-    /// Amplitude in position \[m\] and in angle, as a share of the motion's own angles.
+    /// Amplitude in position \[m\].
     pub position_amplitude: f64,
+    /// Amplitude in angle as a share of the motion's nominal angles.
     pub angle_share: f64,
     home: Vector6<f64>,
 }
 
-impl Scene {
+impl FittedMotion {
     /// X, X', X'' at `t` seconds after the start; at rest at home outside \[0, duration\].
     pub fn at(&self, t: f64) -> TaskState {
         let mut state = match self.motion {
-            Motion::Settle => TaskState::default(),
-            Motion::MinimumJerk => self.moves(t),
-            Motion::Sines => self.faded(t, &self.sines(t)),
-            Motion::Circle => self.faded(t, &self.circle(t)),
-            Motion::Paper => self.faded(t, &self.paper(t)),
+            BuiltInMotion::Settle => TaskState::default(),
+            BuiltInMotion::MinimumJerk => self.moves(t),
+            BuiltInMotion::Sines => self.faded(t, &self.sines(t)),
+            BuiltInMotion::Circle => self.faded(t, &self.circle(t)),
+            BuiltInMotion::Paper => self.faded(t, &self.paper(t)),
         };
         state.x += self.home;
         state
     }
 
-    /// The same with a share of its amplitude.
+    /// The same motion with a share of its amplitude.
     pub fn smaller(&self, share: f64) -> Self {
         Self {
             position_amplitude: share * self.position_amplitude,
@@ -95,7 +107,7 @@ impl Scene {
 
     fn faded(&self, t: f64, d: &TaskState) -> TaskState {
         // A motion too short for both fades is all fade.
-        scaled(d, &window(t, self.duration, FADE_S.min(0.5 * self.duration)))
+        scaled_by_profile(d, &window(t, self.duration, FADE_S.min(0.5 * self.duration)))
     }
 
     fn amplitude(&self, angle: f64) -> Vector6<f64> {
@@ -106,7 +118,7 @@ impl Scene {
     fn sines(&self, t: f64) -> TaskState {
         // No two alike, none a multiple of another within the usual ten seconds.
         let omega = Vector6::new(0.47, 0.59, 0.71, 0.53, 0.61, 0.43) * TAU;
-        let amplitude = self.amplitude(ANGLE_AMPLITUDE);
+        let amplitude = self.amplitude(ANGLE_AMPLITUDE_RAD);
         harmonic(&amplitude, &omega, &Vector6::zeros(), t)
     }
 
@@ -130,12 +142,12 @@ impl Scene {
         let each = self.duration / 12.0;
         let number = (t / each).floor().clamp(0.0, 11.0);
         let axis = (number * 0.5).floor() as usize;
-        let away = Vector6::ith(axis.min(5), 1.0).component_mul(&self.amplitude(ANGLE_AMPLITUDE));
+        let away = Vector6::ith(axis.min(5), 1.0).component_mul(&self.amplitude(ANGLE_AMPLITUDE_RAD));
         let s = rise(t - number * each, each);
         if number % 2.0 == 0.0 {
-            between(&Vector6::zeros(), &away, &s)
+            straight_move(&Vector6::zeros(), &away, &s)
         } else {
-            between(&away, &Vector6::zeros(), &s)
+            straight_move(&away, &Vector6::zeros(), &s)
         }
     }
 }
@@ -151,12 +163,12 @@ fn harmonic(amplitude: &Vector6<f64>, omega: &Vector6<f64>, phase: &Vector6<f64>
     }
 }
 
-/// The motion as large as its nominal size, or as large as the machine can carry it with reserve.
-pub fn fit(machine: &Machine, motion: Motion, duration: f64) -> Scene {
-    let sized = |share: f64| Scene {
+/// The motion at its nominal size, or shrunk until stroke, rates and forces keep a reserve of a fifth.
+pub fn fit(machine: &Machine, motion: BuiltInMotion, duration: f64) -> FittedMotion {
+    let sized = |share: f64| FittedMotion {
         motion,
         duration,
-        position_amplitude: share * POSITION_SHARE * machine.joints.radius,
+        position_amplitude: share * POSITION_OVER_RADIUS * machine.joints.radius,
         angle_share: share,
         home: machine.home.into(),
     };
@@ -164,7 +176,7 @@ pub fn fit(machine: &Machine, motion: Motion, duration: f64) -> Scene {
     let model = InverseDynamics::new(machine);
     let mut share = 1.0;
     for _ in 0..40 {
-        if carries(&model, &sized(share)) {
+        if has_reserve(&model, &sized(share)) {
             break;
         }
         share *= 0.8;
@@ -173,14 +185,14 @@ pub fn fit(machine: &Machine, motion: Motion, duration: f64) -> Scene {
 }
 
 /// Whether stroke, rates and forces keep their reserve, on a thousand samples.
-fn carries(model: &InverseDynamics, scene: &Scene) -> bool {
+fn has_reserve(model: &InverseDynamics, fitted: &FittedMotion) -> bool {
     const SAMPLES: u32 = 1000;
     let machine = model.machine();
     let actuator = &machine.actuator;
-    let margin = 0.5 * (1.0 - USABLE_SHARE) * (actuator.max_length - actuator.min_length);
+    let margin = 0.5 * (1.0 - USABLE_SHARE) * actuator.stroke();
     let stroke = (actuator.min_length + margin)..=(actuator.max_length - margin);
     (0..=SAMPLES).all(|k| {
-        let motion = scene.at(scene.duration * f64::from(k) / f64::from(SAMPLES)).motion();
+        let motion = fitted.at(fitted.duration * f64::from(k) / f64::from(SAMPLES)).motion();
         let legs = leg_motion(machine, &motion);
         let force = model.forces::<Exact>(&motion);
         legs.length.iter().all(|length| stroke.contains(length))

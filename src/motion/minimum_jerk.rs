@@ -1,5 +1,7 @@
-//! The minimum-jerk profile `s(u) = 10 u^3 - 15 u^4 + 6 u^5` on \[0, 1\]: from rest to rest without a
-//! step in acceleration.
+//! The minimum-jerk profile `s(u) = 10 u^3 - 15 u^4 + 6 u^5`, `u = t / T` in \[0, 1\]: from rest to rest without a step
+//! in acceleration.
+//!
+//! Source: Flash and Hogan (1985), "The coordination of arm movements". Its jerk has steps at both ends.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -7,28 +9,46 @@ use nalgebra::Vector6;
 
 use crate::model::task::TaskState;
 
-/// Peak of s' for a unit duration: how much faster than its mean a move is in its middle.
+/// Peak of s' for a unit duration: peak velocity of a move over its mean.
 pub const PEAK_RATE: f64 = 1.875;
 
 /// Peaks of the second and third derivative of s for a unit duration: 10 / sqrt 3, and 60 at both ends.
 const PEAK_ACCEL: f64 = 5.773502691896258;
 const PEAK_JERK: f64 = 60.0;
 
-/// The shortest duration of a way that keeps a velocity, an acceleration and a jerk.
-pub fn shortest_duration(way: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
-    let by_rate = PEAK_RATE * way / velocity;
-    by_rate.max((PEAK_ACCEL * way / acceleration).sqrt()).max((PEAK_JERK * way / jerk).cbrt())
+/// Shortest duration \[s\] of a minimum-jerk move of length `distance` within limits of velocity, acceleration and jerk.
+///
+/// ```
+/// use hexad::motion::minimum_jerk::{PEAK_RATE, shortest_duration};
+/// // 0.3 m at 0.1 m/s at most, other limits far: 1.875 times as long as at constant velocity.
+/// let duration = shortest_duration(0.3, [0.1, 1e9, 1e9]);
+/// assert!((duration - PEAK_RATE * 0.3 / 0.1).abs() < 1e-12);
+/// ```
+pub fn shortest_duration(distance: f64, [velocity, acceleration, jerk]: [f64; 3]) -> f64 {
+    let by_rate = PEAK_RATE * distance / velocity;
+    by_rate.max((PEAK_ACCEL * distance / acceleration).sqrt()).max((PEAK_JERK * distance / jerk).cbrt())
 }
 
-/// A scalar and its first two time derivatives.
+/// Value of a profile and its first two time derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Profile {
+    /// s
     pub value: f64,
+    /// s' \[1/s\]
     pub rate: f64,
+    /// s'' \[1/s^2\]
     pub accel: f64,
 }
 
 /// The profile from 0 at `t = 0` to 1 at `t = duration`; constant outside.
+///
+/// ```
+/// use hexad::motion::minimum_jerk::{Profile, rise};
+/// assert_eq!(rise(0.0, 2.0), Profile::default());
+/// assert_eq!(rise(2.0, 2.0), Profile { value: 1.0, ..Profile::default() });
+/// // Symmetric: halfway at half the time, fastest there, and no acceleration.
+/// assert_eq!(rise(1.0, 2.0), Profile { value: 0.5, rate: 1.875 / 2.0, accel: 0.0 });
+/// ```
 pub fn rise(t: f64, duration: f64) -> Profile {
     let u = t / duration;
     if !(u > 0.0) {
@@ -51,13 +71,13 @@ pub fn window(t: f64, end: f64, fade: f64) -> Profile {
 }
 
 /// The straight move in task coordinates along this profile.
-pub fn between(from: &Vector6<f64>, to: &Vector6<f64>, s: &Profile) -> TaskState {
-    let way = to - from;
-    TaskState { x: from + way * s.value, xd: way * s.rate, xdd: way * s.accel }
+pub fn straight_move(from: &Vector6<f64>, to: &Vector6<f64>, s: &Profile) -> TaskState {
+    let change = to - from;
+    TaskState { x: from + change * s.value, xd: change * s.rate, xdd: change * s.accel }
 }
 
 /// `s(t) d(t)` with both derivatives, by the product rule.
-pub fn scaled(d: &TaskState, s: &Profile) -> TaskState {
+pub fn scaled_by_profile(d: &TaskState, s: &Profile) -> TaskState {
     TaskState {
         x: d.x * s.value,
         xd: d.xd * s.value + d.x * s.rate,

@@ -1,6 +1,6 @@
-//! What a platform is asked to do over time: profiles, built-in motions, trajectories. No allocation, no I/O, no clock.
+//! Motions as functions of time: profiles, built-in motions, trajectories. No allocation, no I/O, no clock.
 //!
-//! Not here: limits of a deployment, which [`crate::control`] keeps.
+//! Limits of a deployment are not applied here; [`crate::control`] applies them.
 
 pub mod built_in;
 pub mod minimum_jerk;

@@ -1,68 +1,81 @@
-//! From wherever the platform stands into a scene, and to rest at its end.
+//! Timeline of a played motion: the approach from the present pose, the motion, and standstill at its end.
 //!
 //! ```text
-//! hold at the present pose | minimum-jerk move to the scene's start | settle | scene | settle
+//! hold at the present pose | minimum-jerk move to the motion's start | settle | motion | settle
 //! ```
+//!
+//! The approach is straight in task coordinates; whether its path is free is not checked here.
 
 use nalgebra::Vector6;
 
-use super::minimum_jerk::{PEAK_RATE, between, rise};
+use super::minimum_jerk::{PEAK_RATE, rise, straight_move};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 
-/// Seconds to stand still before the approach, before and after the scene.
+/// Standstill before the approach, before and after the motion \[s\].
 const SETTLE_S: f64 = 0.5;
 
-/// Fastest leg of the approach, as a share of what the actuators can do: nobody is surprised.
+/// Rate of the fastest leg in the approach as a share of the actuators' limit: slow enough to step aside.
 const APPROACH_RATE_SHARE: f64 = 0.2;
 
-/// When what begins, in seconds from the start.
+/// Timeline of one motion: hold, approach, settle, motion, settle.
+///
+/// ```
+/// use hexad::{model::task::TaskState, motion::timeline::Timeline};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let home = TaskState::at_rest(machine.home);
+/// let above = TaskState { x: home.x + nalgebra::Vector6::ith(5, 0.05), ..home };
+/// let timeline = Timeline::new(&machine, &home.x, &above.x, 4.0);
+/// assert_eq!(timeline.at(0.0, |_| above), home);
+/// assert!((timeline.at(timeline.motion_start() - 1e-6, |_| above).x - above.x).amax() < 1e-9);
+/// assert_eq!(timeline.end(), timeline.motion_start() + 4.0 + 0.5);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Timeline {
     from: Vector6<f64>,
     to: Vector6<f64>,
-    approach: f64,
-    scene: f64,
+    approach_s: f64,
+    motion_s: f64,
 }
 
 impl Timeline {
-    /// From rest at `from` into a scene of `scene` seconds that starts at rest at `to`.
-    pub fn new(machine: &Machine, from: &Vector6<f64>, to: &Vector6<f64>, scene: f64) -> Self {
+    /// From rest at `from` into a motion of `motion_s` seconds that starts at rest at `to`.
+    pub fn new(machine: &Machine, from: &Vector6<f64>, to: &Vector6<f64>, motion_s: f64) -> Self {
         let lengths = |x: &Vector6<f64>| {
             Vector6::from(leg_lengths(machine, &TaskState::at_rest((*x).into()).motion().pose))
         };
         let way = (lengths(to) - lengths(from)).amax();
-        let approach = PEAK_RATE * way / (APPROACH_RATE_SHARE * machine.actuator.max_rate);
+        let approach_s = PEAK_RATE * way / (APPROACH_RATE_SHARE * machine.actuator.max_rate);
         // Shorter than this an approach of a fraction of a millimetre would be a jerk.
-        Self { from: *from, to: *to, approach: approach.max(SETTLE_S), scene }
+        Self { from: *from, to: *to, approach_s: approach_s.max(SETTLE_S), motion_s }
     }
 
-    /// With an approach of so many seconds at least.
-    pub fn no_shorter_than(self, seconds: f64) -> Self {
-        Self { approach: self.approach.max(seconds), ..self }
+    /// The same with an approach of at least `seconds`.
+    pub fn with_shortest_approach(self, seconds: f64) -> Self {
+        Self { approach_s: self.approach_s.max(seconds), ..self }
     }
 
-    /// Seconds from the start to the scene's first instant.
-    pub fn scene_begins(&self) -> f64 {
-        2.0 * SETTLE_S + self.approach
+    /// Start of the motion itself \[s\].
+    pub fn motion_start(&self) -> f64 {
+        2.0 * SETTLE_S + self.approach_s
     }
 
-    /// Seconds from the start to the end of everything.
-    pub fn ends(&self) -> f64 {
-        self.scene_begins() + self.scene + SETTLE_S
+    /// End of the last standstill \[s\].
+    pub fn end(&self) -> f64 {
+        self.motion_start() + self.motion_s + SETTLE_S
     }
 
-    /// X, X', X'' at `t`, given the scene as a function of its own time; that function is only asked
-    /// within \[0, duration\].
-    pub fn at(&self, t: f64, scene: impl FnOnce(f64) -> TaskState) -> TaskState {
-        let scene_time = t - self.scene_begins();
-        if scene_time < 0.0 {
-            return between(&self.from, &self.to, &rise(t - SETTLE_S, self.approach));
+    /// X, X', X'' at `t`, given the motion as a function of its own time, which is evaluated only within
+    /// \[0, duration\].
+    pub fn at(&self, t: f64, motion: impl FnOnce(f64) -> TaskState) -> TaskState {
+        let motion_time = t - self.motion_start();
+        if motion_time < 0.0 {
+            return straight_move(&self.from, &self.to, &rise(t - SETTLE_S, self.approach_s));
         }
-        if scene_time <= self.scene {
-            return scene(scene_time);
+        if motion_time <= self.motion_s {
+            return motion(motion_time);
         }
-        TaskState { xd: Vector6::zeros(), xdd: Vector6::zeros(), ..scene(self.scene) }
+        TaskState { xd: Vector6::zeros(), xdd: Vector6::zeros(), ..motion(self.motion_s) }
     }
 }

@@ -7,16 +7,25 @@ use nalgebra::Vector6;
 
 use crate::model::task::TaskState;
 
-/// X, X', X'' at an instant of the trajectory.
+/// Knot of a trajectory: a time with X, X', X''.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Knot {
     /// \[s\]
     pub t: f64,
+    /// X, X', X''.
     pub state: TaskState,
 }
 
-/// The state at `t`, clamped to the knots' range. Knots have strictly increasing times; without any
-/// there is nothing to say.
+/// The state at `t`, clamped to the knots' range; `None` without knots. Their times increase strictly.
+///
+/// ```
+/// use hexad::{model::task::TaskState, motion::trajectory::{Knot, interpolate}};
+/// let knot = |t, z| Knot { t, state: TaskState::at_rest([0.0, 0.0, 0.0, 0.0, 0.0, z]) };
+/// let knots = [knot(0.0, 1.0), knot(2.0, 1.2)];
+/// // From rest to rest: the minimum-jerk move, halfway at half the time.
+/// let middle = interpolate(&knots, 1.0).unwrap();
+/// assert!((middle.x[5] - 1.1).abs() < 1e-15 && (middle.xd[5] - 0.2 * 1.875 / 2.0).abs() < 1e-15);
+/// ```
 pub fn interpolate(knots: &[Knot], t: f64) -> Option<TaskState> {
     let after = knots.partition_point(|knot| knot.t <= t);
     let Some(b) = knots.get(after) else { return knots.last().map(|knot| knot.state) };
@@ -26,7 +35,7 @@ pub fn interpolate(knots: &[Knot], t: f64) -> Option<TaskState> {
 
 /// The quintic from `a` to `b` over `h` seconds, at `t`.
 fn quintic(a: &TaskState, b: &TaskState, t: f64, h: f64) -> TaskState {
-    // c0 + c1 t + c2 t^2 as at a; c3, c4, c5 make up what is missing at b, in units of u = t / h.
+    // c0 + c1 t + c2 t^2 as at a; c3, c4, c5 make up the difference at b, in units of u = t / h.
     let missing = b.x - a.after(h).x;
     let missing_rate = (b.xd - a.after(h).xd) * h;
     let missing_accel = (b.xdd - a.xdd) * (h * h);

@@ -1,25 +1,25 @@
-//! Dead time: what is commanded now acts later, each command for as long as it stood.
+//! Dead time of the drives: each command acts later by a fixed time, for as long as it was commanded.
 
 use heapless::Deque;
 
 use crate::model::machine::LEGS;
 
-/// A force, or none.
-pub type Command = Option<[f64; LEGS]>;
+/// DriveCommand to the drives: six forces \[N\], or none.
+pub type DriveCommand = Option<[f64; LEGS]>;
 
 /// Most changes of the command within a dead time. A loop of 20 kHz makes 200 in the longest, 10 ms, and a
 /// plant that starts and stops between them cuts each into three.
-const DEPTH: usize = 1024;
+const MAX_QUEUED_COMMANDS: usize = 1024;
 
-/// A line of commands as long as the dead time.
+/// Queue of commands as long as the dead time.
 #[derive(Clone, Debug, Default)]
-pub struct Delay {
+pub struct DeadTime {
     /// Oldest first, with the time each stood or has yet to act \[ns\].
-    line: Deque<(Command, u64), DEPTH>,
+    line: Deque<(DriveCommand, u64), MAX_QUEUED_COMMANDS>,
 }
 
-impl Delay {
-    /// Nothing was commanded before the start.
+impl DeadTime {
+    /// A queue without a command in it.
     pub fn new(dead_time_ns: u64) -> Self {
         let mut delay = Self::default();
         if dead_time_ns > 0 {
@@ -28,8 +28,8 @@ impl Delay {
         delay
     }
 
-    /// Lets `duration_ns` of `command` in; what comes out at the other end goes to `act`, piece by piece.
-    pub fn pass(&mut self, duration_ns: u64, command: Command, mut act: impl FnMut(u64, &Command)) {
+    /// Takes in `command` for `duration_ns` and passes the commands that leave the queue meanwhile to `act`, piece by piece.
+    pub fn pass(&mut self, duration_ns: u64, command: DriveCommand, mut act: impl FnMut(u64, &DriveCommand)) {
         if self.line.is_empty() {
             return act(duration_ns, &command);
         }
@@ -48,7 +48,7 @@ impl Delay {
     }
 
     /// A command that still stands makes its piece longer; so does a change that finds no room.
-    fn push(&mut self, command: Command, duration_ns: u64) {
+    fn push(&mut self, command: DriveCommand, duration_ns: u64) {
         let full = self.line.is_full();
         match self.line.back_mut() {
             Some((last, time)) if *last == command || full => *time += duration_ns,

@@ -18,10 +18,21 @@ use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 
-/// Largest element of `N^T M^-1 N` \[1/kg\] that is believed.
-const HIGHEST_MOBILITY: f64 = 1e100;
+/// Largest element of `N^T M^-1 N` \[1/kg\] that counts as valid.
+const MAX_MOBILITY: f64 = 1e100;
 
-/// Forward dynamics of one machine.
+/// Forward dynamics of one machine: actuator forces to acceleration.
+///
+/// ```
+/// use hexad::model::{active_forces::inverse_dynamics, fidelity::Exact, task::TaskState};
+/// use hexad::plant::forward_dynamics::ForwardDynamics;
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// // It inverts the inverse dynamics.
+/// let motion = TaskState { xdd: [0.1, 0.0, 0.2, 1.0, 0.0, 2.0].into(), ..TaskState::at_rest(machine.home) }.motion();
+/// let force = inverse_dynamics::<Exact>(&machine, &motion).unwrap();
+/// let found = ForwardDynamics::new(&machine).acceleration(&motion.pose, &motion.twist, &force).unwrap();
+/// assert!((found.vector() - motion.acceleration.vector()).amax() < 1e-12);
+/// ```
 #[derive(Clone, Debug)]
 pub struct ForwardDynamics {
     model: InverseDynamics,
@@ -34,7 +45,7 @@ impl ForwardDynamics {
         Self { model: InverseDynamics::new(machine), mass: MassMatrix::new(machine) }
     }
 
-    /// The machine it stands for.
+    /// The machine whose dynamics these are.
     pub fn machine(&self) -> &Machine {
         self.model.machine()
     }
@@ -44,12 +55,12 @@ impl ForwardDynamics {
         self.mass.at(pose)
     }
 
-    /// Acceleration under these forces; `None` if M is not positive definite (a pose that is not one).
+    /// Acceleration under six actuator forces \[N\]; `None` if M is not positive definite (a pose that is not one).
     pub fn acceleration(&self, pose: &Pose, twist: &Twist, force: &[f64; LEGS]) -> Option<Acceleration> {
         self.acceleration_under(pose, twist, force, &Wrench::default())
     }
 
-    /// The same with an `external` wrench on the platform.
+    /// Acceleration under six actuator forces and an `external` wrench on the platform.
     pub fn acceleration_under(
         &self,
         pose: &Pose,
@@ -69,7 +80,7 @@ impl ForwardDynamics {
     pub fn smallest_leg_mass(&self, pose: &Pose) -> Option<f64> {
         let mobility = self.mass.leg_mobility(pose)?;
         // The search for eigenvalues squares, and does not end where that overflows.
-        let believed = mobility.iter().all(|element| element.abs() < HIGHEST_MOBILITY);
-        believed.then(|| 1.0 / mobility.symmetric_eigenvalues().max())
+        let is_valid = mobility.iter().all(|element| element.abs() < MAX_MOBILITY);
+        is_valid.then(|| 1.0 / mobility.symmetric_eigenvalues().max())
     }
 }

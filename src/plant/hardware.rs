@@ -1,7 +1,6 @@
-//! The simulated hardware as a controller meets it: commands go in, measured lengths and rates come out, and
-//! between them is everything that [`super::imperfections`] lists.
+//! Simulated hardware: commands in, measured lengths and rates out, all of [`super::imperfections`] in between.
 
-use super::delay::{Command, Delay};
+use super::delay::{DeadTime, DriveCommand};
 use super::imperfections::{DriveErrors, Imperfections, SensorErrors};
 use super::random::Random;
 use super::simulator::Simulator;
@@ -9,13 +8,13 @@ use crate::model::machine::{LEGS, Machine};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 
-/// A machine with its drives and sensors, in simulated time.
+/// Machine with its drives and sensors, in simulated time.
 #[derive(Clone, Debug)]
 pub struct Hardware {
     simulator: Simulator,
     drive: DriveErrors,
     sensor: SensorErrors,
-    delay: Delay,
+    delay: DeadTime,
     random: Random,
 }
 
@@ -34,18 +33,18 @@ impl Hardware {
             simulator: Simulator::imperfect(&built, deceleration, max_step, tolerance, wanted),
             drive: wanted.drive,
             sensor: wanted.sensor,
-            delay: Delay::new(wanted.drive.dead_time_ns),
+            delay: DeadTime::new(wanted.drive.dead_time_ns),
             random,
         }
     }
 
-    /// What is behind the sensors.
+    /// The true state, without the errors of the sensors.
     pub fn simulator(&self) -> &Simulator {
         &self.simulator
     }
 
-    /// Lets `duration_ns` pass under a constant command.
-    pub fn advance(&mut self, duration_ns: u64, command: Command) {
+    /// Advances by `duration_ns` under a constant command.
+    pub fn advance(&mut self, duration_ns: u64, command: DriveCommand) {
         let command = command.map(|force| force.map(|newtons| rounded(newtons, self.drive.force_step)));
         let Self { simulator, delay, .. } = self;
         delay.pass(duration_ns, command, |nanoseconds, command| {
@@ -53,7 +52,7 @@ impl Hardware {
         });
     }
 
-    /// Lengths \[m\] and rates \[m/s\] as the sensors say them now. Each reading has noise of its own.
+    /// Lengths \[m\] and rates \[m/s\] as the sensors measure them now. Each reading draws its own noise.
     pub fn measure(&mut self) -> ([f64; LEGS], [f64; LEGS]) {
         let legs = self.simulator.leg_motion();
         let SensorErrors { length_step, rate_step, length_noise, rate_noise } = self.sensor;

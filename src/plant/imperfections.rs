@@ -1,9 +1,9 @@
-//! What hardware has and a model leaves out. Everything is off by default: the plant is then the model.
+//! Imperfections of hardware beyond the model. All are off by default: the plant is then the model.
 //!
-//! | what | where it acts |
+//! | imperfection | where it acts |
 //! | --- | --- |
-//! | force step, dead time, bandwidth | on the way from the force message to the drive, in this order |
-//! | friction with stiction | on the drive, beyond what `actuator` has |
+//! | force step, dead time, bandwidth | between the force message and the drive, in this order |
+//! | friction with stiction | on the drive, beyond that of `actuator` |
 //! | stiffness, damping, backlash | between drive and rod; reflected mass and friction stay with the drive |
 //! | steps and noise of sensors | on the lengths and rates that are published |
 //! | payload, joints | on the machine, once |
@@ -17,25 +17,29 @@ use nalgebra::Vector3;
 
 use crate::model::machine::{Joints, LEGS, Machine};
 use crate::model::rigid::Wrench;
-use crate::model::task::TaskState;
 
 use super::random::Random;
 
-/// All of it; the default is none of it.
+/// All imperfections of a plant; by default there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Imperfections {
-    /// What random numbers start from.
+    /// Seed of the random numbers.
     pub seed: u64,
+    /// Force step, dead time, bandwidth.
     pub drive: DriveErrors,
+    /// Friction beyond that of the machine.
     pub friction: Friction,
-    /// Legs that give way; `None` if they are rigid.
-    pub leg: Option<Elastic>,
+    /// Elastic legs; `None` if they are rigid.
+    pub leg: Option<ElasticLeg>,
+    /// Noise and resolution.
     pub sensor: SensorErrors,
+    /// Payload and joints that differ from the configuration.
     pub build: BuildErrors,
-    pub external: External,
+    /// Disturbance on the platform.
+    pub external: ExternalWrench,
 }
 
-/// What a drive makes of a commanded force.
+/// Errors of the drives between the commanded and the applied force.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveErrors {
     /// Corner frequency of the first-order lag of the force \[Hz\]; `None` if it follows at once.
@@ -53,47 +57,50 @@ pub struct Friction {
     pub viscous: f64,
     /// \[N\]
     pub coulomb: f64,
-    /// By how much breaking loose takes more than sliding \[N\].
+    /// Excess of the breakaway force over sliding friction \[N\].
     pub stiction: f64,
     /// Speed at which most of the stiction is gone \[m/s\].
     pub stribeck_speed: f64,
 }
 
-/// A leg that is a spring between drive and rod, with play.
+/// ElasticLeg leg: a spring with play between drive and rod.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Elastic {
+pub struct ElasticLeg {
     /// \[N/m\]
     pub stiffness: f64,
     /// \[N s/m\]
     pub damping: f64,
-    /// From one flank to the other \[m\].
+    /// Play from one flank to the other \[m\].
     pub backlash: f64,
 }
 
-/// What sensors make of lengths and rates. Noise is Gaussian and added before the value is rounded to a step.
+/// Errors of the sensors of lengths and rates. Noise is Gaussian and added before the value is rounded to a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorErrors {
-    /// \[m\], \[m/s\]; 0 if the value is not rounded.
+    /// Resolution of lengths \[m\]; 0 if they are not rounded.
     pub length_step: f64,
+    /// Resolution of rates \[m/s\]; 0 if they are not rounded.
     pub rate_step: f64,
-    /// Standard deviations \[m\], \[m/s\].
+    /// Standard deviation of lengths \[m\].
     pub length_noise: f64,
+    /// Standard deviation of rates \[m/s\].
     pub rate_noise: f64,
 }
 
-/// How the machine that was built differs from the one that is configured.
+/// Differences of the machine as built from the machine as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BuildErrors {
-    /// A point mass on the platform \[kg\], and where, platform axes \[m\].
+    /// Point mass on the platform \[kg\].
     pub payload: f64,
+    /// Its place, platform axes \[m\].
     pub payload_at: Vector3<f64>,
     /// Standard deviation of each coordinate of the twelve joint centres \[m\].
     pub joints: f64,
 }
 
-/// What else pushes the platform: `wrench cos(2 pi frequency t)`, t since the plant was started.
+/// ExternalWrench wrench on the platform: `wrench cos(2 pi frequency t)`, t from the start of the plant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct External {
+pub struct ExternalWrench {
     /// About C, base axes.
     pub wrench: Wrench,
     /// \[Hz\]; 0 if it is constant.
@@ -101,7 +108,7 @@ pub struct External {
 }
 
 impl Friction {
-    /// The usual speed for a drive with greased bearings \[m/s\].
+    /// Stribeck speed of a usual drive with greased bearings \[m/s\].
     pub const STRIBECK_SPEED_M_S: f64 = 0.01;
 
     /// The force against `rate`. Its sign is proportional below the speed `smoothing`.
@@ -111,19 +118,19 @@ impl Friction {
         self.viscous * rate + (self.coulomb + self.stiction * (-share * share).exp()) * sign
     }
 
-    /// Force at the end of the range where the sign is proportional, at most \[N\].
+    /// Coulomb friction and stiction together \[N\].
     pub fn dry(&self) -> f64 {
         self.coulomb + self.stiction
     }
 
-    /// Whether there is any.
+    /// Whether there is any friction.
     pub fn any(&self) -> bool {
         self.viscous != 0.0 || self.dry() != 0.0
     }
 }
 
-impl Elastic {
-    /// The force that pushes drive and rod apart when the drive is `pressed` beyond the leg's length \[m\], at
+impl ElasticLeg {
+    /// Force \[N\] that pushes drive and rod apart when the drive is `pressed` beyond the leg's length \[m\], at
     /// this rate \[m/s\]. None within the play.
     pub fn force(&self, pressed: f64, rate: f64) -> f64 {
         let half = 0.5 * self.backlash;
@@ -137,7 +144,7 @@ impl Elastic {
     }
 }
 
-impl External {
+impl ExternalWrench {
     /// The wrench `time` after the start of the plant.
     pub fn at(&self, time: f64) -> Wrench {
         let phase = core::f64::consts::TAU * self.frequency_hz * time;
@@ -153,7 +160,7 @@ impl Default for Friction {
 }
 
 impl BuildErrors {
-    /// The machine as built.
+    /// The machine as built, its joints displaced by random numbers.
     pub fn built(&self, machine: &Machine, random: &mut Random) -> Machine {
         let mut built = machine.clone();
         if self.payload > 0.0 {
@@ -165,7 +172,7 @@ impl BuildErrors {
         built
     }
 
-    /// Two bodies become one: common centre, parallel axes.
+    /// Adds the payload to the platform: common centre of mass, parallel-axis theorem.
     fn load(&self, machine: &mut Machine) {
         let body = &mut machine.platform;
         let arm = self.payload_at - body.center_of_mass;
@@ -184,7 +191,6 @@ impl BuildErrors {
         let base = displaced(joints.triples.unpack_vectors(&joints.base));
         let platform = displaced(joints.triples.unpack_vectors(&joints.platform));
         let axes = joints.triples.unpack_vectors(&joints.universal_axis);
-        let home = TaskState::at_rest(machine.home).motion().pose;
-        machine.joints = Joints::new(&base, &platform, &axes, &home);
+        machine.joints = Joints::new(&base, &platform, &axes, &machine.home_pose());
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Within a step the rotation is `R = exp(theta~) R_0`, so that an ordinary method for vectors applies to
 //! `[theta C omega v]` (Munthe-Kaas): `theta' = omega - theta x omega / 2 + theta x (theta x omega) / 12`,
-//! exact to the order of the method. Drives that move on their own, where legs are elastic, are six more
+//! exact to the order of the method. DriveStates that move on their own, where legs are elastic, are six more
 //! positions and rates of the same step. Where forces are constant over a step, the work they do is exactly
 //! force times change of length.
 
@@ -10,32 +10,37 @@ use nalgebra::{Vector3, Vector6};
 
 use crate::model::rigid::{Acceleration, Pose, Twist};
 
-/// Pose and twist of the platform.
+/// State of the platform as a rigid body: pose and twist.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlantState {
+pub struct BodyState {
+    /// R and C.
     pub pose: Pose,
+    /// omega and v.
     pub twist: Twist,
 }
 
-/// Where the drives of elastic legs are, as lengths of legs without load; not used where legs are rigid.
+/// State of the drives of elastic legs, as lengths of legs without load; not used where legs are rigid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Drives {
+pub struct DriveStates {
     /// \[m\]
     pub length: Vector6<f64>,
     /// \[m/s\]
     pub rate: Vector6<f64>,
 }
 
-/// Everything that moves.
+/// State of the plant: platform and drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WholeState {
-    pub platform: PlantState,
-    pub drives: Drives,
+pub struct PlantState {
+    /// Pose and twist.
+    pub platform: BodyState,
+    /// Lengths and rates.
+    pub drives: DriveStates,
 }
 
-/// What everything accelerates by.
+/// Accelerations of platform and drives.
 #[derive(Clone, Copy, Debug)]
 pub struct Accelerations {
+    /// omega' and v'.
     pub platform: Acceleration,
     /// \[m/s^2\]; zeros where legs are rigid.
     pub drives: Vector6<f64>,
@@ -46,16 +51,16 @@ pub struct Accelerations {
 struct Slope {
     pose: Twist,
     twist: Acceleration,
-    drives: Drives,
+    drives: DriveStates,
 }
 
-/// The state `step` seconds later; `None` where the dynamics are not defined. `accelerations` gets a state and
+/// The state `step` seconds later; `None` where the dynamics are not defined. `accelerations` takes a state and
 /// its time since the start of the step.
 pub fn integrate(
-    start: &WholeState,
+    start: &PlantState,
     step: f64,
-    accelerations: impl Fn(&WholeState, f64) -> Option<Accelerations>,
-) -> Option<WholeState> {
+    accelerations: impl Fn(&PlantState, f64) -> Option<Accelerations>,
+) -> Option<PlantState> {
     // The state at `start` displaced by `theta` and `slope` over `dt`, and the slope there.
     let slope_at = |slope: &Slope, dt: f64| {
         let theta = slope.pose.angular * dt;
@@ -66,10 +71,11 @@ pub fn integrate(
         Some(Slope {
             pose: Twist { angular, linear: twist.linear },
             twist: accelerations.platform,
-            drives: Drives { length: state.drives.rate, rate: accelerations.drives },
+            drives: DriveStates { length: state.drives.rate, rate: accelerations.drives },
         })
     };
-    let rest = Slope { pose: Twist::default(), twist: Acceleration::default(), drives: Drives::default() };
+    let rest =
+        Slope { pose: Twist::default(), twist: Acceleration::default(), drives: DriveStates::default() };
     let k1 = slope_at(&rest, 0.0)?;
     let k2 = slope_at(&k1, 0.5 * step)?;
     let k3 = slope_at(&k2, 0.5 * step)?;
@@ -79,15 +85,15 @@ pub fn integrate(
     let slope = Slope {
         pose: Twist { angular: mean(|k| k.pose.angular), linear: mean(|k| k.pose.linear) },
         twist: Acceleration { angular: mean(|k| k.twist.angular), linear: mean(|k| k.twist.linear) },
-        drives: Drives { length: of_drives(|k| k.drives.length), rate: of_drives(|k| k.drives.rate) },
+        drives: DriveStates { length: of_drives(|k| k.drives.length), rate: of_drives(|k| k.drives.rate) },
     };
     Some(advanced(start, &slope, step))
 }
 
-fn advanced(start: &WholeState, slope: &Slope, dt: f64) -> WholeState {
-    let WholeState { platform, drives } = start;
-    WholeState {
-        platform: PlantState {
+fn advanced(start: &PlantState, slope: &Slope, dt: f64) -> PlantState {
+    let PlantState { platform, drives } = start;
+    PlantState {
+        platform: BodyState {
             pose: platform
                 .pose
                 .displaced(&Twist { angular: slope.pose.angular * dt, linear: slope.pose.linear * dt }),
@@ -96,7 +102,7 @@ fn advanced(start: &WholeState, slope: &Slope, dt: f64) -> WholeState {
                 linear: platform.twist.linear + slope.twist.linear * dt,
             },
         },
-        drives: Drives {
+        drives: DriveStates {
             length: drives.length + slope.drives.length * dt,
             rate: drives.rate + slope.drives.rate * dt,
         },

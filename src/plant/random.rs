@@ -1,8 +1,15 @@
-//! Random numbers with a seed: the same on every machine, bit for bit, as they need no function of a library.
+//! Seeded random numbers, the same on every machine bit for bit: no function of a system library takes part.
 //!
 //! Steele, Lea and Flood (2014), "Fast splittable pseudorandom number generators": SplitMix64.
 
-/// A sequence of random numbers.
+/// Sequence of random numbers.
+///
+/// ```
+/// use hexad::plant::random::Random;
+/// let draw = |seed| Random::new(seed).uniform();
+/// assert_eq!(draw(7), draw(7));
+/// assert!(draw(7) != draw(8) && (0.0..1.0).contains(&draw(7)));
+/// ```
 #[derive(Clone, Debug)]
 pub struct Random {
     state: u64,

@@ -3,10 +3,10 @@
 //! Brakes are open exactly while a valid force is applied. Without one they close: every leg rate falls to
 //! zero in a straight line, all at the same instant, the fastest at the configured deceleration; the
 //! platform follows the legs, whatever its weight. Then it stands. A leg that reaches its end of stroke
-//! closes the brakes for good: on hardware somebody has to come and look.
+//! closes the brakes until the plant is started anew: on hardware an operator would inspect it first.
 //!
-//! Where legs are elastic a brake holds rod and drive alike: the deflection stays as it was, and is there
-//! when the brake opens. A drive whose brake closes pushes no more.
+//! Where legs are elastic a brake holds rod and drive alike: the deflection remains until the brake
+//! opens. A drive whose brake closes exerts no force.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -14,8 +14,8 @@ use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;
 use super::imperfections::Imperfections;
-use super::integrator::{Drives, PlantState, WholeState, integrate};
-use super::terms::{Terms, legs};
+use super::integrator::{BodyState, DriveStates, PlantState, integrate};
+use super::terms::{PlantTerms, legs};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::{LegMotion, leg_lengths};
@@ -24,35 +24,58 @@ use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Twist;
 use crate::model::task::TaskState;
 
-/// Whether the legs may move.
+/// State of the brakes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Brakes {
     /// Forces drive the legs.
     Open,
     /// Leg rates at the instant of closing, time since, time until standstill \[s\].
-    Closing { rates: [f64; LEGS], elapsed: f64, duration: f64 },
+    Closing {
+        /// \[m/s\]
+        rates: [f64; LEGS],
+        /// \[s\]
+        elapsed: f64,
+        /// \[s\]
+        duration: f64,
+    },
     /// The legs stand.
     Closed,
-    /// The legs stand because this leg (0-based) reached an end of its stroke.
-    EndStop { leg: usize },
+    /// The legs stand because one reached an end of its stroke.
+    EndStop {
+        /// Counted from 0.
+        leg: usize,
+    },
 }
 
-/// A platform in simulated time.
+/// Simulated machine: dynamics, drives, brakes and end stops.
+///
+/// ```
+/// use hexad::model::{active_forces::inverse_dynamics, fidelity::Exact, task::TaskState};
+/// use hexad::plant::simulator::{Brakes, Simulator};
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let mut simulator = Simulator::new(&machine, 10.0, 1e-4);
+/// let weight = inverse_dynamics::<Exact>(&machine, &TaskState::at_rest(machine.home).motion()).unwrap();
+/// // The forces of rest hold it at home; without forces the brakes do.
+/// simulator.advance(0.01, Some(&weight));
+/// assert!((simulator.state().pose.position - machine.home_pose().position).norm() < 1e-9);
+/// simulator.advance(0.01, None);
+/// assert_eq!(simulator.brakes(), Brakes::Closed);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Simulator {
     dynamics: ForwardDynamics,
-    terms: Terms,
-    state: WholeState,
+    terms: PlantTerms,
+    state: PlantState,
     brakes: Brakes,
     deceleration: f64,
-    /// What the drives push with \[N\].
+    /// Forces of the drives \[N\].
     push: [f64; LEGS],
     /// Since the start \[s\].
     time: f64,
 }
 
 impl Simulator {
-    /// The machine as it is configured: at rest at home, brakes closed. `deceleration` of the brakes in m/s^2,
+    /// The machine as configured: at rest at home, brakes closed. `deceleration` of the brakes in m/s^2,
     /// `max_step` of the integrator in s.
     ///
     /// Coulomb friction acts within `smoothing / (coulomb / mass)`; where that is too fast for the step,
@@ -62,8 +85,8 @@ impl Simulator {
         Self::imperfect(machine, deceleration, max_step, f64::INFINITY, &Imperfections::default())
     }
 
-    /// The same with drives and legs as hardware has them, positions exact to `tolerance` \[m\]. The rest of the
-    /// imperfections is for [`super::hardware`].
+    /// The same with imperfect drives and elastic legs, positions exact to `tolerance` \[m\]. The other imperfections are
+    /// applied by [`super::hardware`].
     pub fn imperfect(
         machine: &Machine,
         deceleration: f64,
@@ -71,7 +94,7 @@ impl Simulator {
         tolerance: f64,
         wanted: &Imperfections,
     ) -> Self {
-        let terms = Terms::choose(machine, wanted, max_step, tolerance);
+        let terms = PlantTerms::choose(machine, wanted, max_step, tolerance);
         let machine = terms.machine(machine);
         let home = TaskState::at_rest(machine.home).motion();
         let mut length = Vector6::from(leg_lengths(&machine, &home.pose));
@@ -81,9 +104,9 @@ impl Simulator {
         Self {
             dynamics: ForwardDynamics::new(&machine),
             terms,
-            state: WholeState {
-                platform: PlantState { pose: home.pose, twist: Twist::default() },
-                drives: Drives { length, rate: Vector6::zeros() },
+            state: PlantState {
+                platform: BodyState { pose: home.pose, twist: Twist::default() },
+                drives: DriveStates { length, rate: Vector6::zeros() },
             },
             brakes: Brakes::Closed,
             deceleration,
@@ -93,27 +116,26 @@ impl Simulator {
     }
 
     /// Pose and twist.
-    pub fn state(&self) -> &PlantState {
+    pub fn state(&self) -> &BodyState {
         &self.state.platform
     }
 
-    /// Brakes.
+    /// State of the brakes.
     pub fn brakes(&self) -> Brakes {
         self.brakes
     }
 
-    /// The machine simulated, with the friction it was given; without drives where they move on their own.
+    /// The simulated machine, with its friction; without drives where legs are elastic.
     pub fn machine(&self) -> &Machine {
         self.dynamics.machine()
     }
 
     /// The terms that are evaluated.
-    pub fn terms(&self) -> &Terms {
+    pub fn terms(&self) -> &PlantTerms {
         &self.terms
     }
 
-    /// Lengths and rates of the legs, what perfect sensors on the drives would say. The accelerations are not
-    /// filled in.
+    /// Lengths and rates of the legs, as perfect sensors on the drives measure them. Accelerations are zero.
     pub fn leg_motion(&self) -> LegMotion {
         match self.terms.elastic {
             Some(_) => LegMotion {
@@ -125,7 +147,7 @@ impl Simulator {
         }
     }
 
-    /// Lets `duration` seconds pass under constant forces, or without any.
+    /// Advances by `duration` seconds under constant forces, or without any.
     pub fn advance(&mut self, duration: f64, force: Option<&[f64; LEGS]>) {
         if !(duration > 0.0) {
             return;
@@ -152,17 +174,15 @@ impl Simulator {
 
     fn drive(&mut self, force: &[f64; LEGS], step: f64) {
         let Self { dynamics, terms, state, push, time, .. } = &*self;
-        let accelerations = |state: &WholeState, dt: f64| {
+        let accelerations = |state: &PlantState, dt: f64| {
             terms.accelerations(dynamics, state, &terms.push(push, force, dt), time + dt)
         };
         match integrate(state, step, accelerations) {
             Some(state) => (self.state, self.push) = (state, terms.push(push, force, step)),
             None => self.close_brakes(),
         }
-        let actuator = &self.machine().actuator;
-        let stroke = actuator.min_length..=actuator.max_length;
         let lengths = leg_lengths(self.machine(), &self.state().pose);
-        if let Some(leg) = lengths.iter().position(|length| !stroke.contains(length)) {
+        if let Some(leg) = lengths.iter().position(|length| !self.machine().actuator.contains(*length)) {
             self.state.platform.twist = Twist::default();
             self.state.drives.rate.fill(0.0);
             self.brakes = Brakes::EndStop { leg };
@@ -191,13 +211,13 @@ impl Simulator {
         let elapsed = elapsed + step;
         let standing = !(elapsed < duration);
         let twist = if standing { Twist::default() } else { twist_at(elapsed, &pose) };
-        self.carry_drives(PlantState { pose, twist });
+        self.carry_drives(BodyState { pose, twist });
         self.brakes =
             if standing { Brakes::Closed } else { Brakes::Closing { rates: *rates, elapsed, duration } };
     }
 
-    /// The platform moves on; drives keep their distance from the legs.
-    fn carry_drives(&mut self, platform: PlantState) {
+    /// Moves the platform; drives keep their distance from the legs.
+    fn carry_drives(&mut self, platform: BodyState) {
         let before = legs(self.machine(), &self.state);
         self.state.platform = platform;
         let after = legs(self.machine(), &self.state);

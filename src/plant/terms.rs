@@ -1,10 +1,10 @@
-//! Which of the imperfect plant's terms are evaluated, and in what steps.
+//! Choice of the plant's terms beyond the model, and of the integrator's step.
 //!
-//! Two terms have a time scale of their own, the lag of the drives and the spring of the legs. What each can
-//! do at most to a position is known beforehand:
+//! Two terms have a time scale of their own, the lag of the drives and the spring of the legs. The largest effect of each
+//! on a position follows from the machine:
 //!
 //! ```text
-//! lag      F / (m w^2)         the way a leg goes before the force F has come
+//! lag      F / (m w^2)         travel of a leg before the force F is reached
 //! spring   F / k + play / 2    its deflection under the force F
 //! ```
 //!
@@ -13,7 +13,7 @@
 //! `(w h)^4 / 2880` for an exponential (Simpson's rule), `2 pi (w h)^4 / 120` in each period of an oscillation.
 //! The model itself needs no shorter step than the configured one: the default's error is 1e-12 m.
 //!
-//! What it does not do: a step in which a leg meets a flank of its play or turns around in dry friction is of a
+//! Not covered: a step in which a leg meets a flank of its play or turns around in dry friction is of a
 //! lower order than that; its error is damped by the same contact, not bounded here.
 
 #[cfg(not(feature = "client"))]
@@ -21,40 +21,38 @@ use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use super::forward_dynamics::ForwardDynamics;
-use super::imperfections::{Elastic, External, Friction, Imperfections};
-use super::integrator::{Accelerations, WholeState};
+use super::imperfections::{ElasticLeg, ExternalWrench, Friction, Imperfections};
+use super::integrator::{Accelerations, PlantState};
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
 use crate::model::machine::{Actuator, LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion};
-use crate::model::task::TaskState;
 
 /// Longest step times rate, whatever the tolerance: Runge-Kutta is stable to 2.78, and 1 is also accurate.
-const LONGEST: f64 = 1.0;
+const MAX_STEP_TIMES_RATE: f64 = 1.0;
 
-/// What acts on a machine besides its model.
+/// PlantTerms of the plant beyond the model, and the step of the integration.
 #[derive(Clone, Copy, Debug)]
-pub struct Terms {
+pub struct PlantTerms {
     /// Rate of the drives' lag \[rad/s\].
     pub lag: Option<f64>,
     /// The spring, and the mass of the drive behind it \[kg\].
-    pub elastic: Option<(Elastic, f64)>,
+    pub elastic: Option<(ElasticLeg, f64)>,
     /// Step of the integration \[s\].
     pub step: f64,
-    /// Where legs are rigid, what the machine does not have; else all of it.
+    /// Where legs are rigid, the friction that the machine does not have; else all of it.
     friction: Friction,
     /// Speed below which the sign of dry friction is proportional \[m/s\].
     smoothing: f64,
-    external: External,
+    external: ExternalWrench,
 }
 
-impl Terms {
+impl PlantTerms {
     /// Chooses terms and step, at most `longest_step`, for positions exact to `tolerance` \[m\]. A leg is elastic
     /// only where its drive has mass.
     pub fn choose(machine: &Machine, wanted: &Imperfections, longest_step: f64, tolerance: f64) -> Self {
         let actuator = &machine.actuator;
         let least_mass = |machine: &Machine| {
-            let home = TaskState::at_rest(machine.home).motion().pose;
-            ForwardDynamics::new(machine).smallest_leg_mass(&home).unwrap_or(f64::NAN)
+            ForwardDynamics::new(machine).smallest_leg_mass(&machine.home_pose()).unwrap_or(f64::NAN)
         };
         let dry = wanted.friction.dry() + actuator.coulomb_friction;
         let depends = wanted.drive.bandwidth_hz.is_some() || wanted.leg.is_some() || wanted.friction.any();
@@ -62,10 +60,10 @@ impl Terms {
         let drive_mass = actuator.reflected_mass;
         let mut step = longest_step;
         let mut limit = |rate: f64, effect: f64, divisor: f64| {
-            step = step.min((divisor * tolerance / effect).powf(0.25).min(LONGEST) / rate);
+            step = step.min((divisor * tolerance / effect).powf(0.25).min(MAX_STEP_TIMES_RATE) / rate);
         };
 
-        let deflection = |spring: &Elastic| actuator.max_force / spring.stiffness + 0.5 * spring.backlash;
+        let deflection = |spring: &ElasticLeg| actuator.max_force / spring.stiffness + 0.5 * spring.backlash;
         let spring = wanted.leg.filter(|spring| drive_mass > 0.0 && deflection(spring) > tolerance);
         let mut friction = wanted.friction;
         let mut moved = leg_mass;
@@ -84,7 +82,7 @@ impl Terms {
             limit(rate, way(rate), 2880.0);
         }
         if friction.viscous > 0.0 {
-            step = step.min(LONGEST * moved / friction.viscous);
+            step = step.min(MAX_STEP_TIMES_RATE * moved / friction.viscous);
         }
         Self {
             lag,
@@ -105,7 +103,7 @@ impl Terms {
         if self.elastic.is_some() { without_drives(&simulated) } else { simulated }
     }
 
-    /// What a drive pushes with `time` after `command` was given to one that pushed with `before` \[N\].
+    /// Forces of the drives \[N\] a `time` after `command`, from the forces `before` it.
     pub fn push(&self, before: &[f64; LEGS], command: &[f64; LEGS], time: f64) -> [f64; LEGS] {
         let Some(rate) = self.lag else { return *command };
         let share = (-rate * time).exp();
@@ -116,15 +114,15 @@ impl Terms {
         push
     }
 
-    /// Accelerations of a state in which the drives push, `time` after the start of the plant.
+    /// Accelerations of a state under the forces `push` of the drives, `time` after the start of the plant.
     pub fn accelerations(
         &self,
         dynamics: &ForwardDynamics,
-        state: &WholeState,
+        state: &PlantState,
         push: &[f64; LEGS],
         time: f64,
     ) -> Option<Accelerations> {
-        let WholeState { platform, drives } = state;
+        let PlantState { platform, drives } = state;
         let mut force = *push;
         let mut drives_accelerate = Vector6::zeros();
         if let Some((spring, drive_mass)) = self.elastic {
@@ -149,7 +147,7 @@ impl Terms {
 }
 
 /// Lengths and rates of the legs themselves.
-pub(super) fn legs(machine: &Machine, state: &WholeState) -> LegMotion {
+pub(super) fn legs(machine: &Machine, state: &PlantState) -> LegMotion {
     let (pose, twist) = (state.platform.pose, state.platform.twist);
     let motion = Motion { pose, twist, acceleration: Acceleration::default() };
     LegMotion { accel: [0.0; LEGS], ..leg_motion(machine, &motion) }

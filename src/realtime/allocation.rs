@@ -1,7 +1,7 @@
 //! A global allocator that counts the calls of each thread.
 //!
-//! The daemon itself carries it, so "the real-time thread allocates nothing" is measured in the process
-//! that matters and not in a copy. The price is one increment of a thread-local number per call.
+//! The daemon itself uses it: "the real-time thread allocates nothing" is measured in the process in production. Each
+//! call costs one increment of a thread-local number.
 
 use core::alloc::{GlobalAlloc, Layout};
 use core::cell::Cell;
@@ -13,7 +13,7 @@ thread_local! {
     static CALLS: Cell<u64> = const { Cell::new(0) };
 }
 
-/// The system's allocator, counted.
+/// The system's allocator with a count of its calls per thread.
 pub struct CountingAllocator;
 
 /// Calls of this thread to allocate, grow or free, since it began.
@@ -22,7 +22,7 @@ pub fn calls_of_this_thread() -> u64 {
 }
 
 fn count() {
-    // A thread being torn down has no counter any more; nobody asks for its count either.
+    // A thread that ends has no counter any more, and its count is no longer read.
     let _ = CALLS.try_with(|calls| calls.set(calls.get().wrapping_add(1)));
 }
 
@@ -31,7 +31,7 @@ fn count() {
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
-        // SAFETY: the caller's guarantees are those that `System` asks for.
+        // SAFETY: the caller's guarantees are those that `System` requires.
         unsafe { System.alloc(layout) }
     }
 

@@ -1,8 +1,8 @@
 //! CLOCK_MONOTONIC and the grid of releases on it.
 //!
 //! Every process that runs at the same rate shares the grid: its points are the multiples of the period,
-//! plus a phase of the process's own. Plants and setpoint sources tick on the multiples, the daemon half a
-//! period later, so that it finds fresh data without anybody waiting for anybody.
+//! plus a phase of the process's own. Plants and setpoint sources run on the multiples, the daemon half a
+//! period later, so that it finds new data without waiting.
 
 use crate::messages::clock::monotonic_ns;
 
@@ -17,7 +17,7 @@ pub fn sleep_until(instant_ns: u64) {
     {}
 }
 
-/// As the system calls take it.
+/// A time as system calls take it.
 pub(super) fn timespec(instant_ns: u64) -> libc::timespec {
     libc::timespec {
         tv_sec: (instant_ns / 1_000_000_000) as libc::time_t,
@@ -25,7 +25,7 @@ pub(super) fn timespec(instant_ns: u64) -> libc::timespec {
     }
 }
 
-/// What the loop needs of time; a test's own clock makes every delay exact.
+/// Clock of the cyclic loop; in tests a simulated one, which makes every delay exact.
 pub trait Clock {
     /// The present instant \[ns\].
     fn now_ns(&mut self) -> u64;
@@ -47,7 +47,12 @@ impl Clock for Monotonic {
     }
 }
 
-/// Points in time `k * period + phase`.
+/// Release grid: points in time `k * period + phase`.
+///
+/// ```
+/// let grid = hexad::realtime::clock::Grid::new(1000, 500);
+/// assert_eq!([grid.next_after(1499), grid.next_after(1500)], [1500, 2500]);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
     period_ns: u64,
@@ -55,12 +60,12 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// `phase_ns` below `period_ns`, which is not zero.
+    /// The grid with a `phase_ns` below `period_ns`, which is not zero.
     pub fn new(period_ns: u64, phase_ns: u64) -> Self {
         Self { period_ns: period_ns.max(1), phase_ns }
     }
 
-    /// Distance of two points.
+    /// Distance of neighbouring points.
     pub fn period_ns(&self) -> u64 {
         self.period_ns
     }

@@ -1,23 +1,23 @@
-//! What reading the clock costs, and what it would cost as a system call.
+//! Cost of reading the clock, and of the same reading as a system call.
 
 use crate::messages::clock::monotonic_ns;
 
-/// Readings in a row, so that the two that time them do not count.
-const READINGS: u32 = 1_000;
-/// The cheapest of so many rows: the others were interrupted.
-const ROWS: u32 = 20;
+/// Readings per measurement, so that the two that time them do not count.
+const READINGS_PER_ROW: u32 = 1_000;
+/// Measurements, of which the cheapest counts: others were interrupted.
+const ROW_COUNT: u32 = 20;
 
-/// Nanoseconds.
+/// Cost of reading the clock, directly and by system call.
 #[derive(Clone, Copy, Debug)]
 pub struct ClockCost {
-    /// As the loop reads it.
+    /// As the loop reads it \[ns\].
     pub reading_ns: f64,
-    /// By a system call.
+    /// By a system call \[ns\].
     pub system_call_ns: f64,
 }
 
 impl ClockCost {
-    /// Takes some milliseconds.
+    /// Measures both, within some milliseconds.
     pub fn measure() -> Self {
         Self {
             reading_ns: cost_ns(|| _ = core::hint::black_box(monotonic_ns())),
@@ -35,10 +35,10 @@ fn call() {
 fn cost_ns(read: impl Fn()) -> f64 {
     let row = |_| {
         let start_ns = monotonic_ns();
-        (0..READINGS).for_each(|_| read());
+        (0..READINGS_PER_ROW).for_each(|_| read());
         monotonic_ns() - start_ns
     };
-    (0..ROWS).map(row).min().unwrap_or_default() as f64 / f64::from(READINGS)
+    (0..ROW_COUNT).map(row).min().unwrap_or_default() as f64 / f64::from(READINGS_PER_ROW)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 //! | late wake-up | a cycle that was waited for began later after its release than the threshold |
 //! | overrun | a cycle began before its next release and was still computing at it |
 //! | skipped | per grid point, or with external release per message, that no cycle was run for |
-//! | caught up | a cycle was run at once because its release had passed ([`OnOverrun::CatchUp`]) |
+//! | caught up | a cycle was run at once because its release had passed ([`OverrunPolicy::CatchUp`]) |
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,7 +16,7 @@ use heapless::spsc::Producer;
 
 use super::clock::{Clock, Grid};
 use super::exchange::{CycleOutput, RealtimeSide};
-use super::overrun::OnOverrun;
+use super::overrun::OverrunPolicy;
 use super::usage::ThreadUsage;
 use super::waiter::Waiter;
 use crate::messages::LoopCounters;
@@ -36,7 +36,7 @@ pub struct Timing {
     pub max_lead_ns: u64,
     /// External: when no message arrives for this long, a cycle is run without one, so that the loss is noticed.
     pub timeout_ns: u64,
-    pub on_overrun: OnOverrun,
+    pub on_overrun: OverrunPolicy,
     /// A wake-up later than this after its release is a miss.
     pub late_wakeup_ns: u64,
 }
@@ -197,23 +197,24 @@ impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O> Cycles<'_, C, I, O, S
         let mut missed = false;
         loop {
             let timeout_at_ns = done_ns.saturating_add(timeout_ns);
-            let rung = self.side.bell.wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
+            let signalled = self.side.event.wait(&mut self.side.inputs, self.clock, timeout_at_ns, stop);
             if stop.load(Ordering::Relaxed) {
                 break;
             }
             let woke_ns = self.clock.now_ns();
             let handed = self.side.inputs.value();
-            let measured_ns = handed.input.measured_ns().filter(|_| rung);
+            let measured_ns = handed.input.measured_ns().filter(|_| signalled);
             // Those before the first cycle were not missed.
             let skipped = seen.map_or(0, |seen| handed.measurements.saturating_sub(seen + 1));
             seen = Some(handed.measurements);
-            let due_ns = if rung { handed.handed_ns } else { timeout_at_ns };
+            let due_ns = if signalled { handed.handed_ns } else { timeout_at_ns };
             // Without a message, the drive's clock is taken to have gone on as this one did.
             let release_ns =
                 measured_ns.unwrap_or_else(|| begin.release_ns + due_ns.saturating_sub(begin.due_ns));
             let wakeup_ns = woke_ns.saturating_sub(due_ns);
             missed |= skipped > 0;
-            begin = Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited: true, missed, io_late: !rung };
+            begin =
+                Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited: true, missed, io_late: !signalled };
             self.counters.skipped += skipped;
             done_ns = self.run_one(&begin);
             missed = done_ns >= due_ns + self.timing.period_ns;
@@ -226,7 +227,7 @@ impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O> Cycles<'_, C, I, O, S
         let Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited, missed, io_late } = *begin;
         let Timing { period_ns, on_overrun, late_wakeup_ns, .. } = *self.timing;
         let mut input = self.side.inputs.value().input;
-        input.begin_cycle(release_ns, missed && on_overrun == OnOverrun::Fault);
+        input.begin_cycle(release_ns, missed && on_overrun == OverrunPolicy::Fault);
         let output = (self.step)(&input);
 
         let counters = &mut self.counters;

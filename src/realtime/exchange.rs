@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::doorbell::Doorbell;
-use super::newest::{Reader, Writer, newest};
+use super::event::Event;
+use super::triple_buffer::{Reader, Writer, triple_buffer};
 use crate::messages::LoopCounters;
 
 /// Input of a cycle as the io thread writes it.
@@ -32,7 +32,7 @@ pub struct CycleOutput<O> {
 pub struct RealtimeSide<I, O> {
     pub inputs: Reader<CycleInput<I>>,
     pub outputs: Writer<CycleOutput<O>>,
-    pub bell: Arc<Doorbell>,
+    pub event: Arc<Event>,
 }
 
 /// The io thread's ends.
@@ -40,16 +40,16 @@ pub struct IoSide<I, O> {
     pub inputs: Writer<CycleInput<I>>,
     pub outputs: Reader<CycleOutput<O>>,
     /// Signals new inputs, with external release.
-    pub bell: Arc<Doorbell>,
+    pub event: Arc<Event>,
 }
 
 /// Makes both. Allocates; start-up only.
 pub fn exchange<I: Copy + Default, O: Copy + Default>() -> (RealtimeSide<I, O>, IoSide<I, O>) {
-    let (inputs_writer, inputs_reader) = newest(CycleInput::default());
-    let (outputs_writer, outputs_reader) = newest(CycleOutput::default());
-    let bell = Arc::new(Doorbell::default());
+    let (inputs_writer, inputs_reader) = triple_buffer(CycleInput::default());
+    let (outputs_writer, outputs_reader) = triple_buffer(CycleOutput::default());
+    let event = Arc::new(Event::default());
     (
-        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer, bell: bell.clone() },
-        IoSide { inputs: inputs_writer, outputs: outputs_reader, bell },
+        RealtimeSide { inputs: inputs_reader, outputs: outputs_writer, event: event.clone() },
+        IoSide { inputs: inputs_writer, outputs: outputs_reader, event },
     )
 }

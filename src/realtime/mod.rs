@@ -3,22 +3,23 @@
 //! The real-time path is [`cyclic::run`]: after start-up no allocation, no lock, no system call but the
 //! sleep. [`allocation`] counts, so that this is a measurement and not a promise.
 //!
-//! Nothing in it can panic either, and that is shown, not measured: `tests/no_panic` follows every call and
-//! jump from the loop through the machine code of the release build, whatever the instruction set, and finds
-//! time, arithmetic and the sleep at all ends. Where a package kept a check that the compiler could not
-//! prove away, the code here is of another form: [`newest`], [`doorbell`], the record queue of [`cyclic`].
+//! Nothing in it can panic either, which is proved, not measured: `tests/no_panic` follows every call and
+//! jump from the loop through the machine code of the release build, for every instruction set, and finds only
+//! time, arithmetic and the sleep. Where a package kept a check that the compiler could not remove, the code here is of another form: [`triple_buffer`], [`event`], the record queue of [`cyclic`].
 #![allow(unsafe_code, reason = "system calls and the allocator; each block carries its argument")]
 
 pub mod allocation;
 pub mod clock;
 pub mod clock_cost;
 pub mod cyclic;
-pub mod doorbell;
+pub mod event;
 pub mod exchange;
-pub mod newest;
+pub mod futex;
 pub mod overrun;
 pub mod process;
 pub mod setup;
 pub mod stop_request;
+pub mod sync;
+pub mod triple_buffer;
 pub mod usage;
 pub mod waiter;

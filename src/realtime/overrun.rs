@@ -1,20 +1,23 @@
-//! What becomes of the grid points that a thread was not ready for.
+//! Policy for grid points that pass before a thread is ready.
 //!
-//! Every point is either run or counted as skipped, so that cycles + skipped = points passed, exactly.
+//! Every point is either run or counted as skipped: cycles + skipped = points passed, exactly.
 
-/// What follows a cycle that was not done at its next release, or a thread that was held for whole periods.
+/// Policy after a cycle that was not finished at the next release, or after a thread was suspended for whole periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OnOverrun {
-    /// The next point is waited for: fixed period, never a burst.
+pub enum OverrunPolicy {
+    /// Waits for the next point: fixed period, never a burst.
     Skip,
-    /// At most so many of the points passed are run at once; those before them are skipped.
-    CatchUp { most: u64 },
-    /// As `Skip`, and the next cycle is told, which makes it a fault.
+    /// Runs the latest points passed at once and skips those before them.
+    CatchUp {
+        /// Points run at once, at most.
+        most: u64,
+    },
+    /// As `Skip`, and the next cycle reports a fault.
     Fault,
 }
 
-impl OnOverrun {
-    /// How many of the points left `behind` are skipped, the earliest first; the others are run at once.
+impl OverrunPolicy {
+    /// Number of the points `behind` that are skipped, the earliest first; the others are run at once.
     pub fn skipped(self, behind: u64) -> u64 {
         behind.saturating_sub(self.most())
     }

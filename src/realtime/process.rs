@@ -1,13 +1,13 @@
-//! Processes started by this one, and the signals that reach this one.
+//! Child processes, and the signals of this process.
 
-/// Asks a process to stop (SIGTERM).
+/// Sends SIGTERM to a process.
 pub fn terminate(process_id: u32) {
     // SAFETY: plain numbers. The caller holds the child unreaped, so the number is still its own.
     unsafe { libc::kill(process_id as libc::pid_t, libc::SIGTERM) };
 }
 
-/// Has the kernel send SIGTERM to this process when the one that started it dies, even by SIGKILL.
-/// `parent` is its number; false if it is gone already.
+/// Makes the kernel send SIGTERM to this process when its parent dies, even by SIGKILL. `parent` is the parent's
+/// process id; false if it has ended already.
 pub fn stop_with_parent(parent: u32) -> bool {
     // SAFETY: plain numbers; cannot fail with a valid signal.
     unsafe {
@@ -16,9 +16,9 @@ pub fn stop_with_parent(parent: u32) -> bool {
     }
 }
 
-/// Has signals to this process handled by its other threads. Linux may choose any thread that does not
-/// refuse, and a handler calls the system.
-pub fn leave_signals_to_others() {
+/// Blocks all signals in the calling thread: other threads of the process handle them. Linux delivers a signal to any
+/// thread that does not block it, and a handler makes system calls.
+pub fn block_signals() {
     // SAFETY: all-zero is a valid signal set, filled before it is read; a null pointer for the old mask is
     // allowed. Cannot fail with these arguments.
     unsafe {

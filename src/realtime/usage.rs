@@ -1,15 +1,19 @@
-//! What the kernel and the allocator say a thread has used.
+//! Resource usage of a thread, counted by the kernel and the allocator.
 
 use super::allocation::calls_of_this_thread;
 
-/// Counts of one thread.
+/// Resource usage of one thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct ThreadUsage {
     /// Calls to the allocator; counted only where [`super::allocation::CountingAllocator`] is installed.
     pub allocations: u64,
+    /// Page faults without I/O.
     pub minor_faults: u64,
+    /// Page faults with I/O.
     pub major_faults: u64,
+    /// Context switches because the thread waited.
     pub voluntary_switches: u64,
+    /// Context switches because another thread ran.
     pub involuntary_switches: u64,
 }
 
@@ -19,7 +23,7 @@ impl ThreadUsage {
         calls_of_this_thread()
     }
 
-    /// Since the calling thread began. A system call.
+    /// Usage of the calling thread since its start. A system call.
     pub fn of_this_thread() -> Self {
         // SAFETY: all-zero is a valid rusage, a plain struct of integers.
         let mut usage: libc::rusage = unsafe { core::mem::zeroed() };
@@ -34,7 +38,7 @@ impl ThreadUsage {
         }
     }
 
-    /// What was used since `earlier`.
+    /// Usage since `earlier`.
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
             allocations: self.allocations - earlier.allocations,

@@ -1,20 +1,19 @@
-//! Waiting for an instant: asleep, or asleep and for the last moment awake.
+//! Waiting for an instant: by sleep, or by sleep and a spin at the end.
 //!
 //! A sleeping thread wakes some tens of microseconds late. A thread that wakes a lead earlier and spins is
-//! on time within a fraction of a microsecond, for the price of the lead in processor time. The lead
-//! follows the wake-up latency that is seen: up at once, down slowly. It never exceeds its bound, so no
-//! period is ever spun as a whole, and Linux's real-time throttle (950 ms of each second) is never met.
+//! on time within a fraction of a microsecond, at the cost of the lead in processor time. The lead
+//! follows the measured wake-up latency: up at once, down slowly. It never exceeds its bound, so the thread never spins
+//! for a whole period, and Linux's real-time throttle (950 ms of each second) never applies.
 
 use super::clock::Clock;
 
-/// The lead forgets a high latency with this time constant \[cycles\]: about the 99.9th percentile stays
-/// covered.
-const MEMORY: u64 = 1024;
+/// Time constant of the decay of the lead \[cycles\]: about the 99.9th percentile remains covered.
+const LATENCY_MEMORY_CYCLES: u64 = 1024;
 
-/// From the end of a sleep to the first look at the clock, and from a look to the next \[ns\].
-const MARGIN_NS: u64 = 1_000;
+/// Time from the end of a sleep to the first reading of the clock, and between readings \[ns\].
+const WAKE_MARGIN_NS: u64 = 1_000;
 
-/// Waits; knows how long before an instant it has to wake.
+/// Waiter with an adaptive lead.
 #[derive(Clone, Copy, Debug)]
 pub struct Waiter {
     lead_ns: u64,
@@ -43,18 +42,19 @@ impl Waiter {
         now_ns
     }
 
-    /// What is spun at present \[ns\].
+    /// The present lead \[ns\].
     pub fn lead_ns(&self) -> u64 {
         self.lead_ns
     }
 
     fn adapt(&mut self, latency_ns: u64) {
-        let needed_ns = latency_ns + MARGIN_NS;
+        let needed_ns = latency_ns + WAKE_MARGIN_NS;
         if needed_ns > self.max_lead_ns {
-            // No lead within the bound helps against this one; nothing is learned from it.
+            // No lead within the bound covers this latency, so it does not change the lead.
             return;
         }
-        let forgotten_ns = self.lead_ns - self.lead_ns.saturating_sub(needed_ns).div_ceil(MEMORY);
+        let forgotten_ns =
+            self.lead_ns - self.lead_ns.saturating_sub(needed_ns).div_ceil(LATENCY_MEMORY_CYCLES);
         self.lead_ns = forgotten_ns.max(needed_ns);
     }
 }
@@ -63,22 +63,37 @@ impl Waiter {
 mod tests {
     use super::*;
 
-    /// A clock whose sleeps end late by a fixed time and whose every look costs one nanosecond.
+    /// The bound of the leads here.
+    const MAX_LEAD_NS: u64 = 200_000;
+
+    /// A clock whose sleeps end late by a fixed time and whose every look costs one nanosecond. More looks than
+    /// a lead has nanoseconds fail at once.
     struct Late {
         now_ns: u64,
         latency_ns: u64,
         slept_ns: u64,
+        /// Since the last sleep.
+        looks: u64,
+    }
+
+    impl Late {
+        fn new(now_ns: u64) -> Self {
+            Self { now_ns, latency_ns: 50_000, slept_ns: 0, looks: 0 }
+        }
     }
 
     impl Clock for Late {
         fn now_ns(&mut self) -> u64 {
             self.now_ns += 1;
+            self.looks += 1;
+            assert!(self.looks <= MAX_LEAD_NS + 2, "{} looks without a sleep", self.looks);
             self.now_ns
         }
 
         fn sleep_until(&mut self, instant_ns: u64) {
             let end_ns = self.now_ns.max(instant_ns + self.latency_ns);
             self.slept_ns += end_ns - self.now_ns;
+            self.looks = 0;
             self.now_ns = end_ns;
         }
     }
@@ -93,14 +108,14 @@ mod tests {
 
     #[test]
     fn without_a_lead_the_latency_of_the_sleep_is_there() {
-        let mut clock = Late { now_ns: 0, latency_ns: 50_000, slept_ns: 0 };
+        let mut clock = Late::new(0);
         assert!((50_000..50_010).contains(&lateness(&mut Waiter::new(0), &mut clock, 100)));
     }
 
     #[test]
     fn with_a_lead_it_is_hidden_and_the_spin_shrinks_to_what_is_needed() {
-        let mut clock = Late { now_ns: 0, latency_ns: 50_000, slept_ns: 0 };
-        let mut waiter = Waiter::new(200_000);
+        let mut clock = Late::new(0);
+        let mut waiter = Waiter::new(MAX_LEAD_NS);
         assert!(lateness(&mut waiter, &mut clock, 20_000) <= 1);
         assert!((51_000..52_000).contains(&waiter.lead_ns()), "{waiter:?}");
         clock.latency_ns = 90_000;
@@ -113,8 +128,8 @@ mod tests {
 
     #[test]
     fn a_pause_of_the_host_does_not_raise_the_lead_and_no_latency_raises_it_over_its_bound() {
-        let mut clock = Late { now_ns: 0, latency_ns: 50_000, slept_ns: 0 };
-        let mut waiter = Waiter::new(200_000);
+        let mut clock = Late::new(0);
+        let mut waiter = Waiter::new(MAX_LEAD_NS);
         lateness(&mut waiter, &mut clock, 20_000);
         let before_ns = waiter.lead_ns();
         for latency_ns in [7_000_000, 199_000, 250_000] {
@@ -129,8 +144,8 @@ mod tests {
 
     #[test]
     fn an_instant_that_has_passed_is_not_slept_for_and_teaches_nothing() {
-        let mut clock = Late { now_ns: 5_000_000, latency_ns: 50_000, slept_ns: 0 };
-        let mut waiter = Waiter::new(200_000);
+        let mut clock = Late::new(5_000_000);
+        let mut waiter = Waiter::new(MAX_LEAD_NS);
         assert_eq!(waiter.until(&mut clock, 4_000_000), 5_000_001);
         assert_eq!((clock.slept_ns, waiter.lead_ns()), (0, 200_000));
     }

@@ -13,7 +13,7 @@ import os
 
 import numpy as np
 
-from hexad_messages import DIAGNOSTIC_NOT_ASKED, REQUEST_ENGAGE, STATE_ACTIVE
+from hexad_messages import DIAGNOSTIC_READY_TO_ENGAGE, REQUEST_ENGAGE, STATE_ACTIVE
 from hexad import Bus, Command, Measured, Setpoint, Status, use_fifo_priority, monotonic_ns, sleep_until
 from mujoco_machine import COORDINATES, rows_of, write_rows
 
@@ -60,7 +60,7 @@ class Player:
         if status is not None and self.began_ns is None:
             if status.state == STATE_ACTIVE:
                 self.began_ns = now_ns
-            elif self.engage and status.diagnostic.code == DIAGNOSTIC_NOT_ASKED:
+            elif self.engage and status.diagnostic.code == DIAGNOSTIC_READY_TO_ENGAGE:
                 self.commands.publish(now_ns, Command(request=REQUEST_ENGAGE))
         t = 0.0 if self.began_ns is None else (now_ns - self.began_ns) * 1e-9
         if t > self.trajectory.duration + SETTLE_S:

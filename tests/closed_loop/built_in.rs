@@ -5,16 +5,22 @@ use core::iter::repeat_n;
 use hexad::analysis::envelope;
 use hexad::commands::r#move::Score;
 use hexad::config::Config;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 
 use super::common::deployed;
 use super::rig::Rig;
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
-const MOTIONS: [Motion; 5] =
-    [Motion::Settle, Motion::MinimumJerk, Motion::Sines, Motion::Circle, Motion::Paper];
+const MOTIONS: [BuiltInMotion; 5] = [
+    BuiltInMotion::Settle,
+    BuiltInMotion::MinimumJerk,
+    BuiltInMotion::Sines,
+    BuiltInMotion::Circle,
+    BuiltInMotion::Paper,
+];
 
 /// Makes one limit tighter.
 type Tighten = fn(&mut Config);
@@ -22,15 +28,15 @@ type Tighten = fn(&mut Config);
 /// In cycles.
 const LONGEST_ENGAGING: u32 = 20_000;
 
-fn shaped(config: &Config, motion: Motion, seconds: f64) -> Scene {
+fn shaped(config: &Config, motion: BuiltInMotion, seconds: f64) -> FittedMotion {
     match Score::motion(config, motion, seconds) {
-        Ok(Score::Scene(scene)) => scene,
+        Ok(Score::FittedMotion(scene)) => scene,
         other => panic!("{} {motion:?} {seconds} s: {other:?}", config.name),
     }
 }
 
 /// How much smaller it was made.
-fn share(config: &Config, scene: &Scene) -> f64 {
+fn share(config: &Config, scene: &FittedMotion) -> f64 {
     scene.angle_share / fit(&config.machine, scene.motion, scene.duration).angle_share
 }
 
@@ -42,15 +48,15 @@ fn engage(rig: &mut Rig, task: &TaskState) {
 }
 
 /// Plays a scene, its first instant this part of a cycle after a setpoint.
-fn is_accepted(config: &Config, scene: &Scene, phase: f64) -> bool {
+fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
     let mut rig = Rig::new(config, &config.machine);
     engage(&mut rig, &scene.at(0.0));
     let period_s = rig.period_ns as f64 * 1e-9;
     let cycles = (scene.duration / period_s) as u32 + 10;
     (0..cycles).all(|k| {
         let output = rig.cycle(&rig.input(&scene.at((f64::from(k) - phase) * period_s)));
-        let followed = (output.state, output.cause) == (State::Active, Cause::None);
-        followed && output.without_setpoint == 0
+        let followed = (output.state, output.diagnostic.code) == (State::Active, DiagnosticCode::None);
+        followed && output.missed_setpoints == 0
     })
 }
 
@@ -104,7 +110,7 @@ fn keep_each_limit_of_the_deployment() {
         }),
         ("envelope", |c| {
             let [half, any] = [[0.02; 6], [10.0; 6]];
-            let limits = envelope::Limits {
+            let limits = envelope::EnvelopeBounds {
                 pose_min: half.map(|x| -x),
                 pose_max: half,
                 velocity: any,
@@ -122,7 +128,7 @@ fn keep_each_limit_of_the_deployment() {
     for (name, (what, tighten)) in MACHINES.into_iter().flat_map(|name| repeat_n(name, 7).zip(tighten)) {
         let mut config = deployed(name);
         tighten(&mut config);
-        let scene = shaped(&config, Motion::Sines, 8.0);
+        let scene = shaped(&config, BuiltInMotion::Sines, 8.0);
         println!("{name} {what}: {:.3}", share(&config, &scene));
         assert!((0.01..0.99).contains(&share(&config, &scene)), "{name} {what}: {}", share(&config, &scene));
         assert!(is_accepted(&config, &scene, 0.5), "{name} {what}");
@@ -134,8 +140,8 @@ fn keep_each_limit_of_the_deployment() {
 fn that_could_not_be_seen_are_refused_with_the_reason() {
     let mut config = deployed("fried2008");
     config.deployment.limits.reference.position.velocity = 1e-4;
-    let error = Score::motion(&config, Motion::MinimumJerk, 0.5).unwrap_err().to_string();
-    for word in ["0.100 %", "t = 0.", "(velocity)", "times the limit (bound 1.0"] {
+    let error = Score::motion(&config, BuiltInMotion::MinimumJerk, 0.5).unwrap_err().to_string();
+    for word in ["0.100 %", "t = 0.", ": velocity: ", " times the limit in [limits]"] {
         assert!(error.contains(word), "{word:?} must be in {error}");
     }
 }

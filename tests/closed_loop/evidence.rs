@@ -2,8 +2,9 @@
 //! says so before the limit bites.
 
 use hexad::control::controller::{Input, Output};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
-use hexad::control::state::{Cause, State};
+use hexad::control::state::State;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 
@@ -33,9 +34,9 @@ fn ends(change: impl Fn(&mut Input)) -> Output {
     panic!("nothing ends it");
 }
 
-fn assert_evidence(output: &Output, cause: Cause, value: f64, bound: f64, index: u32) {
-    let found = output.evidence;
-    assert_eq!((output.cause, found.index), (cause, index), "{output:?}");
+fn assert_evidence(output: &Output, cause: DiagnosticCode, value: f64, bound: f64, index: u32) {
+    let found = output.diagnostic;
+    assert_eq!((output.diagnostic.code, found.index), (cause, index), "{output:?}");
     let near = |found: f64, wanted: f64| (found - wanted).abs() <= 1e-3 * wanted.abs().max(1e-6);
     assert!(
         near(found.value, value) && near(found.bound, bound),
@@ -54,19 +55,34 @@ fn measurements_are_refused_with_leg_value_and_bound() {
         let output = ends(|input| input.measurement.as_mut().unwrap().length[leg] -= 0.05);
         // One and a half times the greatest rate for a cycle, and a thousandth of the stroke.
         let furthest = 1.5 * actuator.max_rate * 1e-3 + 1e-3 * stroke;
-        assert_evidence(&output, Cause::MeasurementJumped, 0.05, furthest, index);
+        assert_evidence(&output, DiagnosticCode::MeasurementJumped, 0.05, furthest, index);
         let output = ends(|input| input.measurement.as_mut().unwrap().length[leg] = 3.0);
-        assert_evidence(&output, Cause::LengthOutOfStroke, 3.0, actuator.max_length + 0.02 * stroke, index);
+        assert_evidence(
+            &output,
+            DiagnosticCode::LengthOutOfStroke,
+            3.0,
+            actuator.max_length + 0.02 * stroke,
+            index,
+        );
         let output = ends(|input| input.measurement.as_mut().unwrap().length[leg] = 0.5);
-        assert_evidence(&output, Cause::LengthOutOfStroke, 0.5, actuator.min_length - 0.02 * stroke, index);
+        assert_evidence(
+            &output,
+            DiagnosticCode::LengthOutOfStroke,
+            0.5,
+            actuator.min_length - 0.02 * stroke,
+            index,
+        );
         let output = ends(|input| input.measurement.as_mut().unwrap().rate[leg] = 1.0);
-        assert_evidence(&output, Cause::RateJumped, 1.0, 0.05 + 0.02 * actuator.max_rate, index);
+        assert_evidence(&output, DiagnosticCode::RateJumped, 1.0, 0.05 + 0.02 * actuator.max_rate, index);
         // Half the jump of rates that would be seen at once is seen by the lengths that do not follow.
         let output = ends(|input| input.measurement.as_mut().unwrap().rate[leg] = 0.03);
-        assert_eq!((output.cause, output.evidence.index), (Cause::RateInconsistent, index));
-        assert!(output.evidence.value > output.evidence.bound, "{output:?}");
+        assert_eq!(
+            (output.diagnostic.code, output.diagnostic.index),
+            (DiagnosticCode::RateInconsistent, index)
+        );
+        assert!(output.diagnostic.value > output.diagnostic.bound, "{output:?}");
         // Noise, and a share of the little way that the platform has gone meanwhile.
-        assert!((1.0..1.5).contains(&(output.evidence.bound / (3e-4 * stroke))), "{output:?}");
+        assert!((1.0..1.5).contains(&(output.diagnostic.bound / (3e-4 * stroke))), "{output:?}");
     }
     assert!(length.iter().all(|length| (1.2..2.2).contains(length)));
 }
@@ -76,13 +92,13 @@ fn ages_and_stamps_are_told_in_seconds() {
     let (rig, home) = at_rest();
     let last = rig.input(&home);
     let output = ends(|input| input.measurement = last.measurement);
-    assert_evidence(&output, Cause::MeasurementLost, 0.0205, 0.02, 0);
+    assert_evidence(&output, DiagnosticCode::MeasurementLost, 0.0205, 0.02, 0);
     let output = ends(|input| input.setpoint = last.setpoint);
-    assert_evidence(&output, Cause::SetpointEnded, 0.0505, 0.05, 0);
+    assert_evidence(&output, DiagnosticCode::SetpointEnded, 0.0505, 0.05, 0);
     let output = ends(|input| input.measurement.as_mut().unwrap().time_ns += 2_000_500_000);
-    assert_evidence(&output, Cause::MeasurementFromElsewhen, -2.0, 0.02, 0);
+    assert_evidence(&output, DiagnosticCode::MeasurementStampInvalid, -2.0, 0.02, 0);
     let output = ends(|input| input.setpoint.as_mut().unwrap().time_ns -= 999_500_000);
-    assert_evidence(&output, Cause::SetpointFromElsewhen, 1.0, 0.05, 0);
+    assert_evidence(&output, DiagnosticCode::SetpointStampInvalid, 1.0, 0.05, 0);
 }
 
 #[test]
@@ -91,33 +107,33 @@ fn setpoints_are_refused_with_axis_or_leg_and_share_of_the_limit() {
     let task = |change: fn(&mut TaskState)| ends(|input| change(&mut input.setpoint.as_mut().unwrap().task));
     assert_evidence(
         &task(|task| task.xd[3] = 1.1),
-        Cause::SetpointTooFast,
+        DiagnosticCode::SetpointTooFast,
         1.1 / limits.position.velocity,
         1.0,
         0,
     );
     assert_evidence(
         &task(|task| task.xdd[1] = 30.0),
-        Cause::SetpointTooFast,
+        DiagnosticCode::SetpointTooFast,
         30.0 / limits.orientation.acceleration,
         1.0,
         0,
     );
     // 2 m/s^2 in a millisecond: four times the jerk.
-    assert_evidence(&task(|task| task.xdd[5] = 2.0), Cause::SetpointTooFast, 4.0, 1.0, 0);
+    assert_evidence(&task(|task| task.xdd[5] = 2.0), DiagnosticCode::SetpointTooFast, 4.0, 1.0, 0);
     let output = task(|task| task.x[5] += 2.0);
-    assert_eq!(output.cause, Cause::SetpointOutOfReach);
-    assert!(output.evidence.value > output.evidence.bound && (1..=6).contains(&output.evidence.index));
+    assert_eq!(output.diagnostic.code, DiagnosticCode::SetpointOutOfReach);
+    assert!(output.diagnostic.value > output.diagnostic.bound && (1..=6).contains(&output.diagnostic.index));
     let output = task(|task| task.x[4] += 0.005);
-    assert_eq!(output.cause, Cause::SetpointJumped);
-    assert!(output.evidence.value > 10.0 && output.evidence.bound == 1.0, "{output:?}");
+    assert_eq!(output.diagnostic.code, DiagnosticCode::SetpointJumped);
+    assert!(output.diagnostic.value > 10.0 && output.diagnostic.bound == 1.0, "{output:?}");
 }
 
 #[test]
 fn a_setpoint_out_of_the_envelope_is_refused_with_axis_value_and_end() {
     let mut config = deployed("motion_base");
     let range = [0.1, 0.2, 0.3, 0.01, 0.02, 0.03];
-    config.deployment.envelope = Some(hexad::analysis::envelope::Limits {
+    config.deployment.envelope = Some(hexad::analysis::envelope::EnvelopeBounds {
         pose_min: range.map(|x| -x),
         pose_max: range,
         velocity: [1.0; 6],
@@ -131,7 +147,13 @@ fn a_setpoint_out_of_the_envelope_is_refused_with_axis_value_and_end() {
             let output = rig.cycle(&rig.input(&task));
             let bound = config.machine.home[axis] + sign * range;
             assert_eq!(output.state, State::Standby);
-            assert_evidence(&output, Cause::SetpointOutOfEnvelope, task.x[axis], bound, axis as u32 + 1);
+            assert_evidence(
+                &output,
+                DiagnosticCode::SetpointOutOfEnvelope,
+                task.x[axis],
+                bound,
+                axis as u32 + 1,
+            );
         }
     }
 }
@@ -141,7 +163,7 @@ fn a_setpoint_out_of_the_envelope_is_refused_with_axis_value_and_end() {
 fn what_is_near_a_limit_says_so() {
     let mut config = deployed("motion_base");
     let wide = [0.1, 1.0, 1.0, 1.0, 1.0, 1.0];
-    config.deployment.envelope = Some(hexad::analysis::envelope::Limits {
+    config.deployment.envelope = Some(hexad::analysis::envelope::EnvelopeBounds {
         pose_min: wide.map(|x| -x),
         pose_max: wide,
         velocity: [1.0; 6],
@@ -153,7 +175,7 @@ fn what_is_near_a_limit_says_so() {
         let mut rig = Rig::new(&config, &config.machine);
         let home = Vector6::from(config.machine.home);
         let output = rig.cycle(&rig.input(&TaskState { x: home + task, xd: rate, xdd: accel }));
-        output.limiting.contains(limit)
+        output.active_limits.contains(limit)
     };
     let (none, z) = (Vector6::zeros(), Vector6::ith(5, 1.0));
     for (share, near) in [(0.85, false), (0.95, true), (1.2, true)] {

@@ -2,10 +2,12 @@
 //! long as the fidelity has the inertia to do it.
 
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::controller::{Controller, Parameters};
-use hexad::control::state::{Cause, State};
+use hexad::control::controller::Controller;
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::parameters::Parameters;
+use hexad::control::state::State;
 use hexad::model::fidelity::Fidelity;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
 use super::rig::{Rig, parameters, track};
@@ -16,7 +18,7 @@ fn the_loop_tracks_on_every_rung_with_inertia_and_better_on_higher_ones() {
     let mut before = f64::INFINITY;
     for fidelity in Fidelity::ALL.into_iter().filter(|fidelity| fidelity.has_inertia()) {
         config.deployment.control.fidelity = FidelityChoice::Fixed(fidelity);
-        let tracking = track(&config, &config.machine, Motion::Sines, 8.0);
+        let tracking = track(&config, &config.machine, BuiltInMotion::Sines, 8.0);
         let rms = tracking.position.rms();
         println!("{fidelity:?}: RMS {:.2} um, max {:.2} um", rms * 1e6, tracking.position.max * 1e6);
         // The spin is worth less than a nanometre here.
@@ -34,13 +36,17 @@ fn without_inertia_there_is_no_feedback() {
     let mut rig = Rig::new(&config, &config.machine);
     rig.controller =
         Controller::new(&config.machine, Parameters { fidelity: Fidelity::Gravity, ..parameters(&config) });
-    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
     rig.engage(&scene.at(0.0));
     for k in 0..3000 {
         let input = rig.input(&scene.at(1e-3 * f64::from(k)));
         let output = rig.cycle(&input);
         if output.state != State::Active {
-            assert_eq!((output.state, output.cause), (State::Fault, Cause::OffPath), "cycle {k}");
+            assert_eq!(
+                (output.state, output.diagnostic.code),
+                (State::Fault, DiagnosticCode::FollowingError),
+                "cycle {k}"
+            );
             return;
         }
     }

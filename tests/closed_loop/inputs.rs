@@ -1,21 +1,22 @@
 //! Which inputs count: what it takes to begin, and that one wrong message changes nothing.
 
 use hexad::control::controller::{Controller, Input, Output};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::state::{Request, State};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::{deployed, largest};
 use super::rig::{Rig, in_motion, parameters};
 
 /// Asserts a state without force, and why.
-pub fn assert_without_force(output: &Output, state: State, cause: Cause) {
-    assert_eq!((output.state, output.cause), (state, cause));
-    assert!(!state.controls());
+pub fn assert_without_force(output: &Output, state: State, cause: DiagnosticCode) {
+    assert_eq!((output.state, output.diagnostic.code), (state, cause));
+    assert!(!state.has_control());
     assert_eq!(output.force.map(f64::to_bits), [0; 6]);
-    assert!(!output.limiting.contains(Limit::Force) && !output.limiting.contains(Limit::ForceRate));
+    assert!(!output.active_limits.contains(Limit::Force) && !output.active_limits.contains(Limit::ForceRate));
 }
 
 #[test]
@@ -24,28 +25,30 @@ fn without_messages_the_controller_is_off() {
     let mut rig = Rig::new(&config, &config.machine);
     rig.ask(Request::Engage);
     let full = rig.input(&TaskState::at_rest(config.machine.home));
-    let lacks = |cause| move |output: &Output| assert_eq!(output.refused, cause);
+    let lacks = |cause| move |output: &Output| assert_eq!(output.request_diagnostic.code, cause);
     let output = rig.controller.step(&Input { measurement: None, setpoint: None, ..full });
-    assert_without_force(&output, State::Off, Cause::NoMeasurement);
-    lacks(Cause::NoMeasurement)(&output);
+    assert_without_force(&output, State::Off, DiagnosticCode::NoMeasurement);
+    lacks(DiagnosticCode::NoMeasurement)(&output);
     let output = rig.controller.step(&Input { measurement: None, ..full });
-    assert_without_force(&output, State::Off, Cause::NoMeasurement);
+    assert_without_force(&output, State::Off, DiagnosticCode::NoMeasurement);
     rig.ask(Request::Engage);
     let output = Rig::new(&config, &config.machine).controller.step(&Input {
         setpoint: None,
         request: rig.asked,
         ..full
     });
-    assert_without_force(&output, State::Standby, Cause::NoSetpoint);
-    lacks(Cause::NoSetpoint)(&output);
-    assert!(output.measured.is_some() && output.error.is_none(), "it knows the pose all the same");
-    assert!(![Cause::NoMeasurement, Cause::NoSetpoint].iter().any(|cause| cause.is_fault()));
+    assert_without_force(&output, State::Standby, DiagnosticCode::NoSetpoint);
+    lacks(DiagnosticCode::NoSetpoint)(&output);
+    assert!(output.platform.is_some() && output.error.is_none(), "it knows the pose all the same");
+    assert!(
+        ![DiagnosticCode::NoMeasurement, DiagnosticCode::NoSetpoint].iter().any(|cause| cause.is_fault())
+    );
     // The request was answered once, and is not carried out later.
-    assert_without_force(&rig.controller.step(&full), State::Standby, Cause::NotAsked);
+    assert_without_force(&rig.controller.step(&full), State::Standby, DiagnosticCode::ReadyToEngage);
     let output = rig.controller.step(&Input { request: rig.asked, ..full });
     assert_eq!(
-        (output.state, output.refused, output.answered),
-        (State::Engaging, Cause::None, rig.asked.unwrap().message)
+        (output.state, output.request_diagnostic.code, output.answered),
+        (State::Engaging, DiagnosticCode::None, rig.asked.unwrap().message)
     );
 }
 
@@ -78,16 +81,16 @@ fn control_begins_only_near_the_setpoint() {
                     far.release_ns -= age_ns;
                 }
                 let output = rig.controller.step(&far);
-                assert_without_force(&output, State::Standby, Cause::SetpointTooFar);
-                assert_eq!(output.refused, Cause::SetpointTooFar);
-                assert!((output.evidence.value - 1.001).abs() < 1e-6 && output.evidence.bound == 1.0);
+                assert_without_force(&output, State::Standby, DiagnosticCode::SetpointTooFar);
+                assert_eq!(output.request_diagnostic.code, DiagnosticCode::SetpointTooFar);
+                assert!((output.diagnostic.value - 1.001).abs() < 1e-6 && output.diagnostic.bound == 1.0);
                 rig.now_ns += 1_000_000;
             }
             rig.ask(Request::Engage);
             assert_eq!(rig.controller.step(&rig.input(&setpoint(0.999))).state, State::Engaging);
         }
     }
-    assert!(!Cause::SetpointTooFar.is_fault());
+    assert!(!DiagnosticCode::SetpointTooFar.is_fault());
 }
 
 /// Changes of one message, in motion.
@@ -98,15 +101,15 @@ fn wrong(change: impl Fn(&mut Input)) {
     let mut input = good;
     change(&mut input);
     let (output, undisturbed) = (rig.controller.step(&input), twin.step(&good));
-    assert_eq!((output.state, output.cause), (State::Active, Cause::None));
-    let waited = [output.without_measurement, output.without_setpoint];
-    assert_eq!(waited[0] + waited[1], 1 + undisturbed.without_measurement + undisturbed.without_setpoint);
+    assert_eq!((output.state, output.diagnostic.code), (State::Active, DiagnosticCode::None));
+    let waited = [output.missed_measurements, output.missed_setpoints];
+    assert_eq!(waited[0] + waited[1], 1 + undisturbed.missed_measurements + undisturbed.missed_setpoints);
     for (force, should) in output.force.iter().zip(undisturbed.force) {
         // It goes on with what was good a millisecond ago.
         assert!((force - should).abs() < 0.1, "{force} instead of {should}");
     }
     rig.now_ns += 1_000_000;
-    assert_eq!(rig.controller.step(&rig.input(&task.after(1e-3))).without_setpoint, output.without_setpoint);
+    assert_eq!(rig.controller.step(&rig.input(&task.after(1e-3))).missed_setpoints, output.missed_setpoints);
 }
 
 #[test]
@@ -166,14 +169,15 @@ fn a_message_counts_until_it_is_as_old_as_its_timeout() {
             input.setpoint = young.setpoint;
         }
         let output = rig.controller.step(&input);
-        (output.state, output.cause)
+        (output.state, output.diagnostic.code)
     };
-    let lost = [(State::Fault, Cause::MeasurementLost), (State::Stopping, Cause::SetpointLost)];
+    let lost =
+        [(State::Fault, DiagnosticCode::MeasurementLost), (State::Stopping, DiagnosticCode::SetpointLost)];
     for (of_setpoint, timeout_ns) in
         [(false, parameters.measured_timeout_ns), (true, parameters.setpoint_timeout_ns)]
     {
         let at = after(timeout_ns, of_setpoint);
-        assert_eq!(at, (State::Active, Cause::None), "{of_setpoint}");
+        assert_eq!(at, (State::Active, DiagnosticCode::None), "{of_setpoint}");
         assert_eq!(after(timeout_ns + 1, of_setpoint), lost[usize::from(of_setpoint)]);
     }
 }
@@ -200,7 +204,7 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
     let mut config = deployed("fried2008");
     config.deployment.timeouts.measured_s = 0.2;
     let (mut rig, _) = in_motion(&config);
-    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
     let stale = rig.input(&scene.at(1.5)).measurement.unwrap();
     let mut furthest = 0.0_f64;
     for k in 0..=150 {
@@ -212,7 +216,12 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
             furthest = (0..6).fold(0.0, |most, leg| most.max((fresh.length[leg] - stale.length[leg]).abs()));
         }
         let output = rig.cycle(&input);
-        assert_eq!((output.state, output.cause), (State::Active, Cause::None), "{k}: {:?}", output.evidence);
+        assert_eq!(
+            (output.state, output.diagnostic.code),
+            (State::Active, DiagnosticCode::None),
+            "{k}: {:?}",
+            output.diagnostic
+        );
     }
     let kinematic_state = KinematicState::new(&config.machine, rig.simulator.state().pose);
     let trusted = kinematic_state.sensitivity().trusted_step * config.machine.joints.radius;
@@ -224,15 +233,16 @@ fn after_a_pause_of_the_measurements_the_pose_is_found_in_the_same_cycle() {
 fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
     let config = deployed("fried2008");
     let limits = parameters(&config).limits.position;
-    for (away, expected) in
-        [(0.0005, (State::Active, Cause::None)), (0.0035, (State::Fault, Cause::SetpointJumped))]
-    {
+    for (away, expected) in [
+        (0.0005, (State::Active, DiagnosticCode::None)),
+        (0.0035, (State::Fault, DiagnosticCode::SetpointJumped)),
+    ] {
         let (mut rig, _) = in_motion(&config);
-        let scene = fit(&config.machine, Motion::Sines, 8.0);
+        let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
         let last = rig.input(&scene.at(1.5)).setpoint;
         let (mut twist, mut before) = (rig.simulator.state().twist.linear, None);
         let (mut strongest, mut jolt) = (0.0_f64, 0.0_f64);
-        let mut end = (State::Off, Cause::None);
+        let mut end = (State::Off, DiagnosticCode::None);
         for k in 0..400 {
             let mut task = scene.at(1.5 + f64::from(k) * 1e-3);
             task.x[3] += away;
@@ -241,8 +251,8 @@ fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
                 input.setpoint = last;
             }
             let output = rig.cycle(&input);
-            end = (output.state, output.cause);
-            if !output.state.controls() {
+            end = (output.state, output.diagnostic.code);
+            if !output.state.has_control() {
                 break;
             }
             let now = rig.simulator.state().twist.linear;
@@ -266,7 +276,7 @@ fn after_a_gap_another_source_is_taken_over_gently_or_not_at_all() {
 #[test]
 fn a_message_seen_only_after_a_pause_does_not_make_the_next_one_a_jump() {
     let config = deployed("fried2008");
-    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
     let (mut rig, _) = in_motion(&config);
     let [mut seen, mut kept] = [Input::default(); 2];
     for k in 0..6000 {
@@ -278,7 +288,7 @@ fn a_message_seen_only_after_a_pause_does_not_make_the_next_one_a_jump() {
             _ => seen = fresh,
         }
         let output = rig.cycle(&Input { release_ns: fresh.release_ns, ..seen });
-        let state = (output.state, output.cause);
-        assert_eq!(state, (State::Active, Cause::None), "{k}: {:?}", output.evidence);
+        let state = (output.state, output.diagnostic.code);
+        assert_eq!(state, (State::Active, DiagnosticCode::None), "{k}: {:?}", output.diagnostic);
     }
 }

@@ -8,7 +8,7 @@ use hexad::model::fidelity::Gravity;
 use hexad::model::machine::LEGS;
 use hexad::model::rigid::Motion as Moving;
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
 use super::common::{deployed, largest};
@@ -25,7 +25,7 @@ fn unbounded(name: &str) -> Config {
 }
 
 fn has(output: &Output, limit: Limit) -> bool {
-    output.limiting.contains(limit)
+    output.active_limits.contains(limit)
 }
 
 /// How much of `whole` is left in `part`, and what of it is not in its direction, as a share.
@@ -58,7 +58,7 @@ fn beyond_the_limit_all_legs_lose_the_same_share_of_what_is_not_weight() {
         let input = pushed(&rig, &task, push);
         let wanted = strong.controller.clone().step(&input);
         let output = rig.controller.clone().step(&input);
-        assert!(output.state.controls() && !has(&wanted, Limit::Force));
+        assert!(output.state.has_control() && !has(&wanted, Limit::Force));
         assert_eq!(has(&output, Limit::Force), largest(&wanted.force) > limit);
         if !has(&output, Limit::Force) {
             assert_eq!(output.force, wanted.force);
@@ -114,14 +114,14 @@ fn a_hopeless_platform_gets_no_more_than_the_limit() {
         platform.platform.mass *= 5.0;
         platform.platform.center_of_mass.x += config.machine.joints.radius;
         let mut rig = Rig::new(&config, &platform);
-        let scene = fit(&config.machine, Motion::Sines, 4.0);
+        let scene = fit(&config.machine, BuiltInMotion::Sines, 4.0);
         rig.play(&config.machine, &scene, |_, output| {
             assert!(largest(&output.force) <= limit, "{name}: {:?}", output.force);
             if has(output, Limit::Force) {
                 assert!((largest(&output.force) - limit).abs() < 1e-9 * limit);
                 limited += 1;
             }
-            assert!(output.state.controls() || output.force == [0.0; LEGS]);
+            assert!(output.state.has_control() || output.force == [0.0; LEGS]);
         });
     }
     assert!(limited > 100, "{limited}");
@@ -149,8 +149,8 @@ fn noise_gets_no_more_than_the_limit() {
             measurement.rate.iter_mut().for_each(|rate| *rate += 100.0 * size * random());
             let output = rig.cycle(&input);
             assert!(largest(&output.force) <= limit);
-            assert!(output.state.controls() || output.force == [0.0; LEGS]);
-            active += u32::from(output.state.controls());
+            assert!(output.state.has_control() || output.force == [0.0; LEGS]);
+            active += u32::from(output.state.has_control());
         }
     }
     assert!((500..2900).contains(&active), "{active} of 3000 cycles in control");

@@ -2,9 +2,10 @@
 //! and what the observer makes of it.
 
 use hexad::config::Config;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
 use hexad::control::leg_masses::LegMasses;
-use hexad::control::state::{Cause, State};
+use hexad::control::state::State;
 use hexad::model::task::TaskState;
 
 use super::common::deployed;
@@ -42,8 +43,12 @@ fn fast(config: &Config, share: f64) -> Tracking {
         let (desired, actual) = (task.motion().pose, rig.simulator.state().pose);
         tracking.position.add((desired.position - actual.position).norm());
         let output = rig.cycle(&rig.input(&task));
-        assert_eq!((output.state, output.cause), (State::Active, Cause::None), "cycle {cycle}");
-        assert_eq!(output.limiting.0 & 3, 0, "a force is limited in cycle {cycle}");
+        assert_eq!(
+            (output.state, output.diagnostic.code),
+            (State::Active, DiagnosticCode::None),
+            "cycle {cycle}"
+        );
+        assert_eq!(output.active_limits.0 & 3, 0, "a force is limited in cycle {cycle}");
     }
     tracking
 }
@@ -150,7 +155,13 @@ fn the_largest_bandwidth_is_stable_in_every_mode() {
             let mut away = |cycles: u32, push: f64| {
                 for _ in 0..cycles {
                     let output = rig.controller.step(&rig.input(&home));
-                    assert_eq!(output.state, State::Active, "{name} {}: {:?}", mode.name(), output.cause);
+                    assert_eq!(
+                        output.state,
+                        State::Active,
+                        "{name} {}: {:?}",
+                        mode.name(),
+                        output.diagnostic.code
+                    );
                     let answers = |leg: usize| holds[leg] + 2.0 * (output.force[leg] - holds[leg]);
                     let mut force: [f64; 6] = core::array::from_fn(answers);
                     force[0] += push;
@@ -214,9 +225,12 @@ fn a_leg_pushes_for_its_own_error() {
         let (with, without) = (forces(leg, 1e-5), forces(leg, 0.0));
         for other in 0..6 {
             let expected =
-                if other == leg { -1e-5 * law.position.stiffness * law.leg_mass[leg] } else { 0.0 };
+                if other == leg { -1e-5 * law.position.stiffness * law.leg_masses.mass[leg] } else { 0.0 };
             let found = with[other] - without[other];
-            assert!((found - expected).abs() < 1e-6 * law.leg_mass[leg], "{leg} {other}: {found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-6 * law.leg_masses.mass[leg],
+                "{leg} {other}: {found} {expected}"
+            );
         }
     }
 }

@@ -56,7 +56,7 @@ fn overshoot(config: &Config) -> f64 {
         let input = rig.input(&home);
         let output = rig.controller.step(&input);
         assert_eq!(output.state, State::Active, "{cycle}: {output:?}");
-        limited += u32::from(output.limiting.contains(Limit::Force));
+        limited += u32::from(output.active_limits.contains(Limit::Force));
         let loaded = cycle < 300;
         rig.pass(Some(core::array::from_fn(|leg| {
             output.force[leg] - if loaded { weight[0][leg] - weight[1][leg] } else { 0.0 }

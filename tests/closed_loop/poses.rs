@@ -3,7 +3,8 @@
 use core::array;
 
 use hexad::control::controller::Controller;
-use hexad::control::state::{Cause, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::State;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::rigid::Pose;
 use hexad::model::task::TaskState;
@@ -30,10 +31,10 @@ fn a_pose_far_from_home_is_found_in_bounded_steps() {
     let mut fresh = Controller::new(&config.machine, parameters(&config));
     for _ in 0..cycles {
         let output = fresh.step(&input);
-        assert_without_force(&output, State::Off, Cause::FindingPose);
-        assert!(output.measured.is_none());
+        assert_without_force(&output, State::Off, DiagnosticCode::FindingPose);
+        assert!(output.platform.is_none());
     }
-    assert_without_force(&fresh.step(&input), State::Standby, Cause::NotAsked);
+    assert_without_force(&fresh.step(&input), State::Standby, DiagnosticCode::ReadyToEngage);
 }
 
 /// Legs all in one plane determine nothing across it.
@@ -51,9 +52,14 @@ fn singular_poses_have_no_force() {
         let mut controller = Controller::new(&config.machine, parameters(&config));
         for _ in 0..3 {
             let output = controller.step(&input);
-            assert!([Cause::PoseNotFound, Cause::SingularPose].contains(&output.cause), "{:?}", output.cause);
-            assert_without_force(&output, State::Off, output.cause);
-            assert!(output.cause.is_fault());
+            assert!(
+                [DiagnosticCode::PoseNotFound, DiagnosticCode::SingularPose]
+                    .contains(&output.diagnostic.code),
+                "{:?}",
+                output.diagnostic.code
+            );
+            assert_without_force(&output, State::Off, output.diagnostic.code);
+            assert!(output.diagnostic.code.is_fault());
         }
     }
 }
@@ -67,11 +73,15 @@ fn lengths_no_platform_can_have_are_a_fault() {
     let mut causes = Vec::new();
     for _ in 0..1000 {
         let output = rig.controller.step(&input);
-        assert_without_force(&output, State::Off, output.cause);
-        causes.push(output.cause);
+        assert_without_force(&output, State::Off, output.diagnostic.code);
+        causes.push(output.diagnostic.code);
     }
-    assert!(causes.contains(&Cause::PoseNotFound));
-    assert!(causes.iter().all(|cause| [Cause::PoseNotFound, Cause::FindingPose].contains(cause)));
+    assert!(causes.contains(&DiagnosticCode::PoseNotFound));
+    assert!(
+        causes
+            .iter()
+            .all(|cause| [DiagnosticCode::PoseNotFound, DiagnosticCode::FindingPose].contains(cause))
+    );
     // The real lengths are believed as soon as they come, if nobody remembers the others.
     rig.now_ns += 1_000_000_000;
     let good = rig.input(&TaskState::at_rest(config.machine.home));

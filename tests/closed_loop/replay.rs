@@ -1,7 +1,7 @@
 //! The controller is a pure function of its inputs.
 
 use hexad::control::controller::{Controller, Input, Output};
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
 use super::rig::{Rig, parameters};
@@ -16,7 +16,7 @@ fn recorded_inputs_give_the_same_outputs_bit_for_bit() {
     for name in ["fried2008", "motion_base", "tsai2000"] {
         let config = deployed(name);
         let mut rig = Rig::new(&config, &config.machine);
-        let scene = fit(&config.machine, Motion::Sines, 4.0);
+        let scene = fit(&config.machine, BuiltInMotion::Sines, 4.0);
         let mut record: Vec<(Input, Output)> = Vec::new();
         rig.play(&config.machine, &scene, |input, output| record.push((*input, *output)));
         assert!(record.len() > 5000);
@@ -48,7 +48,7 @@ fn a_controller_is_its_state() {
 #[test]
 fn the_clock_may_start_anywhere() {
     let config = deployed("motion_base");
-    let scene = fit(&config.machine, Motion::Circle, 2.0);
+    let scene = fit(&config.machine, BuiltInMotion::Circle, 2.0);
     let mut outputs = [0, u64::MAX / 2].map(|start_ns| {
         let mut rig = Rig::new(&config, &config.machine);
         rig.now_ns = start_ns;

@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 
 use hexad::control::state::State;
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::Motion;
+use hexad::motion::built_in::BuiltInMotion;
 
 use super::common::{Errors, angle_between, deployed};
 use super::rig::{Rig, Tracking, track};
@@ -17,30 +17,30 @@ const SECONDS: f64 = 8.0;
 const BAND: (f64, f64) = (0.8, 1.25);
 
 /// A machine, a motion, RMS and maximum of the position error \[um\], and of the orientation error \[urad\].
-type Expected = (&'static str, Motion, [f64; 2], [f64; 2]);
+type Expected = (&'static str, BuiltInMotion, [f64; 2], [f64; 2]);
 
 /// What is left with equal parameters on both sides: the force is held over a period in which the motion
 /// goes on.
 const EQUAL: [Expected; 12] = [
-    ("fried2008", Motion::MinimumJerk, [1.414, 4.258], [1.484, 4.468]),
-    ("fried2008", Motion::Sines, [1.702, 4.454], [2.386, 5.844]),
-    ("fried2008", Motion::Circle, [1.194, 2.612], [0.0241, 0.0392]),
-    ("fried2008", Motion::Paper, [1.207, 2.674], [1.073, 4.724]),
-    ("motion_base", Motion::MinimumJerk, [2.822, 8.484], [1.491, 4.445]),
-    ("motion_base", Motion::Sines, [1.724, 4.527], [1.235, 2.992]),
-    ("motion_base", Motion::Circle, [2.333, 5.191], [0.0362, 0.0791]),
-    ("motion_base", Motion::Paper, [0.965, 2.150], [0.438, 1.870]),
-    ("tsai2000", Motion::MinimumJerk, [1.755, 5.266], [1.653, 4.448]),
-    ("tsai2000", Motion::Sines, [2.120, 5.457], [3.180, 6.745]),
-    ("tsai2000", Motion::Circle, [1.490, 3.235], [0.281, 0.566]),
-    ("tsai2000", Motion::Paper, [1.542, 3.449], [1.659, 5.440]),
+    ("fried2008", BuiltInMotion::MinimumJerk, [1.414, 4.258], [1.484, 4.468]),
+    ("fried2008", BuiltInMotion::Sines, [1.702, 4.454], [2.386, 5.844]),
+    ("fried2008", BuiltInMotion::Circle, [1.194, 2.612], [0.0241, 0.0392]),
+    ("fried2008", BuiltInMotion::Paper, [1.207, 2.674], [1.073, 4.724]),
+    ("motion_base", BuiltInMotion::MinimumJerk, [2.822, 8.484], [1.491, 4.445]),
+    ("motion_base", BuiltInMotion::Sines, [1.724, 4.527], [1.235, 2.992]),
+    ("motion_base", BuiltInMotion::Circle, [2.333, 5.191], [0.0362, 0.0791]),
+    ("motion_base", BuiltInMotion::Paper, [0.965, 2.150], [0.438, 1.870]),
+    ("tsai2000", BuiltInMotion::MinimumJerk, [1.755, 5.266], [1.653, 4.448]),
+    ("tsai2000", BuiltInMotion::Sines, [2.120, 5.457], [3.180, 6.745]),
+    ("tsai2000", BuiltInMotion::Circle, [1.490, 3.235], [0.281, 0.566]),
+    ("tsai2000", BuiltInMotion::Paper, [1.542, 3.449], [1.659, 5.440]),
 ];
 
 /// A platform that is a fifth heavier than the controller thinks sags by the missing force over Kp.
 const HEAVY: [Expected; 3] = [
-    ("fried2008", Motion::Paper, [170.7, 179.6], [4.861, 10.05]),
-    ("motion_base", Motion::Paper, [253.8, 292.7], [45.69, 62.08]),
-    ("tsai2000", Motion::Paper, [393.9, 471.4], [105.6, 166.3]),
+    ("fried2008", BuiltInMotion::Paper, [170.7, 179.6], [4.861, 10.05]),
+    ("motion_base", BuiltInMotion::Paper, [253.8, 292.7], [45.69, 62.08]),
+    ("tsai2000", BuiltInMotion::Paper, [393.9, 471.4], [105.6, 166.3]),
 ];
 
 fn within(found: &Errors, expected: [f64; 2], what: &str) -> bool {
@@ -78,7 +78,7 @@ fn errors_are_what_sampling_leaves() {
 fn a_platform_at_rest_stays_there() {
     for name in ["fried2008", "motion_base", "tsai2000"] {
         let config = deployed(name);
-        let tracking = track(&config, &config.machine, Motion::Settle, SECONDS);
+        let tracking = track(&config, &config.machine, BuiltInMotion::Settle, SECONDS);
         assert!(tracking.position.max < 1e-11 && tracking.orientation.max < 1e-11, "{name}: {tracking:?}");
     }
 }
@@ -101,7 +101,7 @@ fn the_error_reported_is_the_error_made() {
     let mut platform = config.machine.clone();
     platform.platform.mass *= 1.2;
     let mut rig = Rig::new(&config, &platform);
-    let scene = hexad::motion::built_in::fit(&config.machine, Motion::Sines, 4.0);
+    let scene = hexad::motion::built_in::fit(&config.machine, BuiltInMotion::Sines, 4.0);
     let [mut position, mut orientation] = [Errors::default(); 2];
     let tracking = rig.play(&config.machine, &scene, |_, output| {
         let error = output.error.unwrap().pose;

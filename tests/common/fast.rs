@@ -7,7 +7,7 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 
 /// Seconds that the scene takes at its usual speed.
 const SECONDS: f64 = 8.0;
@@ -19,14 +19,14 @@ const SAMPLES: u32 = 4000;
 /// A scene in quick motion.
 #[derive(Clone, Copy)]
 pub struct Fast {
-    scene: Scene,
+    scene: FittedMotion,
     pub speed: f64,
 }
 
 impl Fast {
     /// The fastest in steps of a twentieth.
     pub fn new(config: &Config) -> Self {
-        let scene = fit(&config.machine, Motion::Sines, SECONDS);
+        let scene = fit(&config.machine, BuiltInMotion::Sines, SECONDS);
         let speeds = (1..200).map(|step| Self { scene, speed: 0.05 * f64::from(step) });
         speeds.take_while(|fast| fast.is_allowed(config)).last().unwrap()
     }

@@ -3,16 +3,19 @@
 
 #![allow(dead_code, reason = "every test uses a part of it")]
 
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::parameters::Parameters;
+
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::motion::timeline::Timeline;
 use hexad::plant::simulator::Simulator;
 
@@ -44,7 +47,7 @@ pub struct Rig {
     pub now_ns: u64,
     pub period_ns: u64,
     /// The newest request.
-    pub asked: Option<Asked>,
+    pub asked: Option<OperatorRequest>,
     /// On the platform now.
     pub force: Option<[f64; LEGS]>,
 }
@@ -74,7 +77,7 @@ impl Rig {
     /// A request, from the next input on.
     pub fn ask(&mut self, request: Request) {
         let number = self.asked.map_or(1, |asked| asked.message.1 + 1);
-        self.asked = Some(Asked { request, message: (START_NS, number) });
+        self.asked = Some(OperatorRequest { request, message: (START_NS, number) });
     }
 
     /// Asks to engage and goes on until active, on a setpoint at rest.
@@ -103,7 +106,7 @@ impl Rig {
     /// One cycle of the controller and one period of the platform.
     pub fn cycle(&mut self, input: &Input) -> Output {
         let output = self.controller.step(input);
-        self.pass(output.state.controls().then_some(output.force));
+        self.pass(output.state.has_control().then_some(output.force));
         output
     }
 
@@ -120,7 +123,7 @@ impl Rig {
     pub fn play(
         &mut self,
         machine: &Machine,
-        scene: &Scene,
+        scene: &FittedMotion,
         mut watch: impl FnMut(&Input, &Output),
     ) -> Tracking {
         let timeline = Timeline::new(machine, &machine.home.into(), &scene.at(0.0).x, scene.duration);
@@ -129,7 +132,7 @@ impl Rig {
         let mut tracking = Tracking::default();
         loop {
             let t = (self.now_ns - start_ns) as f64 * 1e-9;
-            if t > timeline.ends() {
+            if t > timeline.end() {
                 return tracking;
             }
             let task = timeline.at(t, |t| scene.at(t));
@@ -144,14 +147,18 @@ impl Rig {
 }
 
 /// Plays a motion of `seconds` on a platform of its own; every cycle must be in control.
-pub fn track(config: &Config, platform: &Machine, motion: Motion, seconds: f64) -> Tracking {
+pub fn track(config: &Config, platform: &Machine, motion: BuiltInMotion, seconds: f64) -> Tracking {
     let scene = fit(&config.machine, motion, seconds);
     let mut cycles = 0;
     let tracking = Rig::new(config, platform).play(&config.machine, &scene, |_, output| {
-        assert!(output.state.controls() && output.cause == Cause::None, "{:?}", output.cause);
+        assert!(
+            output.state.has_control() && output.diagnostic.code == DiagnosticCode::None,
+            "{:?}",
+            output.diagnostic.code
+        );
         assert!(output.state == State::Active || cycles < LONGEST_ENGAGING);
         cycles += 1;
-        let cut = [Limit::Force, Limit::ForceRate].map(|limit| output.limiting.contains(limit));
+        let cut = [Limit::Force, Limit::ForceRate].map(|limit| output.active_limits.contains(limit));
         assert_eq!(cut, [false; 2], "cycle {cycles}");
     });
     assert!(cycles > LONGEST_ENGAGING);
@@ -161,7 +168,7 @@ pub fn track(config: &Config, platform: &Machine, motion: Motion, seconds: f64) 
 /// A rig in the middle of a motion, and the task at its next cycle.
 pub fn in_motion(config: &Config) -> (Rig, TaskState) {
     let mut rig = Rig::new(config, &config.machine);
-    let scene = fit(&config.machine, Motion::Sines, 8.0);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
     let period_s = rig.period_ns as f64 * 1e-9;
     rig.engage(&scene.at(0.0));
     for k in 0..1500 {

@@ -90,7 +90,10 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
         "[control]\non_setpoint_lost = \"coast\"",
         &["control.on_setpoint_lost = \"coast\": must be one of \"fault\", \"park\""],
     );
-    refused("[limits]\nown_share = 1.1", &["limits.own_share = 1.1: must be greater than 0 and at most 1"]);
+    refused(
+        "[limits]\nautonomous_scale = 1.1",
+        &["limits.autonomous_scale = 1.1: must be greater than 0 and at most 1"],
+    );
     for key in [
         "velocity_m_s",
         "acceleration_m_s2",

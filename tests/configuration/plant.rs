@@ -3,7 +3,7 @@
 use hexad::config::{Config, Violation};
 use hexad::model::rigid::Wrench;
 use hexad::plant::imperfections::{
-    BuildErrors, DriveErrors, Elastic, External, Friction, Imperfections, SensorErrors,
+    BuildErrors, DriveErrors, ElasticLeg, ExternalWrench, Friction, Imperfections, SensorErrors,
 };
 use nalgebra::Vector3;
 
@@ -51,10 +51,10 @@ fn imperfections_arrive_where_they_belong() {
         seed: 7,
         drive: DriveErrors { bandwidth_hz: Some(80.0), force_step: 1.0, dead_time_ns: 1_500_500 },
         friction: Friction { viscous: 2.0, coulomb: 3.0, stiction: 4.0, stribeck_speed: 0.05 },
-        leg: Some(Elastic { stiffness: 5e7, damping: 6.0, backlash: 7e-5 }),
+        leg: Some(ElasticLeg { stiffness: 5e7, damping: 6.0, backlash: 7e-5 }),
         sensor: SensorErrors { length_step: 1e-6, rate_step: 2e-6, length_noise: 3e-6, rate_noise: 4e-6 },
         build: BuildErrors { payload: 8.0, payload_at: Vector3::new(1.0, 2.0, 3.0), joints: 9e-5 },
-        external: External {
+        external: ExternalWrench {
             wrench: Wrench { force: Vector3::new(4.0, 5.0, 6.0), torque: Vector3::new(7.0, 8.0, 9.0) },
             frequency_hz: 10.0,
         },

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 use proptest::prelude::*;
 
 use crate::rig::{FIRST_NS, LATE_NS, PERIOD_NS, Script, perform};
@@ -76,11 +76,11 @@ proptest! {
     fn the_loop_does_what_the_definitions_say(latencies_ns in delays(), burns_ns in delays(), policy in 0..7_u64) {
         let script = Script { latencies_ns, burns_ns };
         let policy = match policy {
-            0 | 1 => OnOverrun::Skip,
-            2 => OnOverrun::Fault,
-            most => OnOverrun::CatchUp { most: most - 2 },
+            0 | 1 => OverrunPolicy::Skip,
+            2 => OverrunPolicy::Fault,
+            most => OverrunPolicy::CatchUp { most: most - 2 },
         };
-        let most = if let OnOverrun::CatchUp { most } = policy { most } else { 0 };
+        let most = if let OverrunPolicy::CatchUp { most } = policy { most } else { 0 };
         let (seen, counters) = perform(&script, policy, 70);
         let found = Walk {
             due_ns: seen.iter().map(|cycle| cycle.due_ns).collect(),
@@ -90,6 +90,6 @@ proptest! {
             skipped: counters.skipped,
             caught_up: counters.caught_up,
         };
-        prop_assert_eq!(found, walk(&script, most as usize, policy == OnOverrun::Fault, 70));
+        prop_assert_eq!(found, walk(&script, most as usize, policy == OverrunPolicy::Fault, 70));
     }
 }

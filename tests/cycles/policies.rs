@@ -1,7 +1,7 @@
 //! Delays of known size at known cycles, and the misses they cause, written down by hand.
 
 use hexad::messages::LoopCounters;
-use hexad::realtime::overrun::OnOverrun::{self, CatchUp, Fault, Skip};
+use hexad::realtime::overrun::OverrunPolicy::{self, CatchUp, Fault, Skip};
 
 use crate::rig::{FIRST_NS, PERIOD_NS, PHASE_NS, Script, Seen, perform};
 
@@ -30,7 +30,7 @@ fn oversleep(nanoseconds: u64) -> Script {
 }
 
 /// Script, policy, points run, counts, which cycles are told of a miss.
-type Case = (Script, OnOverrun, &'static [u64], [u64; 4], &'static [usize]);
+type Case = (Script, OverrunPolicy, &'static [u64], [u64; 4], &'static [usize]);
 
 #[test]
 fn each_delay_causes_exactly_the_misses_it_should() {

@@ -9,10 +9,10 @@ use hexad::control::controller::{Input, Output};
 use hexad::daemon::cycle::CycleRecord;
 use hexad::messages::LoopCounters;
 use hexad::messages::clock::monotonic_ns;
-use hexad::realtime::clock::Monotonic;
+use hexad::realtime::clock::{Clock, sleep_until};
 use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing, run};
 use hexad::realtime::exchange::exchange;
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 use hexad::realtime::setup::scheduling;
 
 const PERIOD_NS: u64 = 500_000;
@@ -27,6 +27,25 @@ fn burns(cycle: u64) -> bool {
     cycle.is_multiple_of(50)
 }
 
+/// CLOCK_MONOTONIC. A sleep for longer than the loop may sleep fails at once.
+#[derive(Default)]
+struct Watched {
+    sleeps: u64,
+}
+
+impl Clock for Watched {
+    fn now_ns(&mut self) -> u64 {
+        monotonic_ns()
+    }
+
+    fn sleep_until(&mut self, instant_ns: u64) {
+        let for_ns = instant_ns.saturating_sub(monotonic_ns());
+        assert!(for_ns <= PERIOD_NS, "the loop sleeps for {for_ns} ns");
+        self.sleeps += 1;
+        sleep_until(instant_ns);
+    }
+}
+
 /// What the test saw of a cycle.
 struct Cycle {
     due_ns: u64,
@@ -35,7 +54,7 @@ struct Cycle {
     told: bool,
 }
 
-fn perform(release: ReleaseMode, on_overrun: OnOverrun) -> (Vec<Cycle>, Vec<CycleRecord>, LoopCounters) {
+fn perform(release: ReleaseMode, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<CycleRecord>, LoopCounters) {
     let (side, _io) = exchange();
     let mut queue = Queue::<CycleRecord, RECORDS>::new();
     let (records_in, mut records) = queue.split();
@@ -60,14 +79,18 @@ fn perform(release: ReleaseMode, on_overrun: OnOverrun) -> (Vec<Cycle>, Vec<Cycl
         stop.store(seen.len() as u64 == CYCLES, Ordering::Relaxed);
         Output::default()
     };
+    let mut clock = Watched::default();
     let report = thread::scope(|threads| {
         let body = || {
             // Without it the test is slower, not wrong.
             let _ = scheduling::fifo_priority(50);
-            run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop)
+            run(&mut clock, &timing, step, Output::default(), side, records_in, &stop)
         };
         threads.spawn(body).join().expect("the loop")
     });
+    assert!(clock.sleeps > CYCLES / 2, "{} sleeps in {CYCLES} cycles", clock.sleeps);
+    let early = seen.iter().filter(|cycle| cycle.began_ns < cycle.due_ns).count();
+    assert_eq!(early, 0, "cycles that began before their release");
     let mut written = vec![];
     written.extend(std::iter::from_fn(|| records.dequeue()));
     (seen, written, report.counters)
@@ -76,7 +99,7 @@ fn perform(release: ReleaseMode, on_overrun: OnOverrun) -> (Vec<Cycle>, Vec<Cycl
 #[test]
 fn burnt_time_is_counted_as_the_test_saw_it() {
     for release in [ReleaseMode::Sleep, ReleaseMode::Hybrid] {
-        for policy in [OnOverrun::Skip, OnOverrun::Fault, OnOverrun::CatchUp { most: 3 }] {
+        for policy in [OverrunPolicy::Skip, OverrunPolicy::Fault, OverrunPolicy::CatchUp { most: 3 }] {
             let (seen, records, counters) = perform(release, policy);
             let case = format!("{release:?} {policy:?}");
             assert_eq!(
@@ -92,7 +115,7 @@ fn burnt_time_is_counted_as_the_test_saw_it() {
                 let late_ns = ended_ns - due_ns;
                 let cycle = i as u64 + 1;
                 let case = format!("{case} cycle {cycle}: ended {late_ns} ns after its release");
-                if burns(cycle) && !matches!(policy, OnOverrun::CatchUp { .. }) {
+                if burns(cycle) && !matches!(policy, OverrunPolicy::CatchUp { .. }) {
                     assert!(records[i].compute_ns >= PERIOD_NS * 5 / 2, "{case}: {:?}", records[i]);
                     // At least the points that had passed when the test looked; more only if the loop or
                     // the sleep after it was held.
@@ -102,7 +125,7 @@ fn burnt_time_is_counted_as_the_test_saw_it() {
                         || records[i + 1].wakeup_ns >= PERIOD_NS
                         || (late_ns + SLACK_NS) / PERIOD_NS > passed;
                     assert!(steps == passed + 1 || held && steps > passed, "{case}: next after {steps}");
-                    assert_eq!(told, policy == OnOverrun::Fault, "{case}");
+                    assert_eq!(told, policy == OverrunPolicy::Fault, "{case}");
                 }
             }
             // A cycle that began in time and ended after its next release; who was late already is not one.

@@ -10,13 +10,16 @@ use hexad::messages::LoopCounters;
 use hexad::realtime::clock::Clock;
 use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing, run};
 use hexad::realtime::exchange::exchange;
-use hexad::realtime::overrun::OnOverrun;
+use hexad::realtime::overrun::OverrunPolicy;
 
 pub const PERIOD_NS: u64 = 1000;
 pub const PHASE_NS: u64 = 500;
 /// The first release after time 0 that is a whole period away.
 pub const FIRST_NS: u64 = PERIOD_NS + PHASE_NS;
 pub const LATE_NS: u64 = 200;
+
+/// Looks at the clock between two of its steps: one before a sleep, one after it, and some to spare.
+const MAX_LOOKS: u32 = 8;
 
 /// How late each sleep ends and how long each cycle takes; beyond the end of a list: 10 and 100.
 #[derive(Clone, Debug, Default)]
@@ -35,26 +38,38 @@ pub struct Seen {
     pub told_of_miss: bool,
 }
 
+/// A clock that only sleeps and cycles move. A loop that spins on it, or sleeps past its release, fails at once.
 struct Scripted<'a> {
     now_ns: &'a Cell<u64>,
     latencies_ns: std::vec::IntoIter<u64>,
+    /// The last look, and how many there were at that instant.
+    last_ns: u64,
+    looks: u32,
 }
 
 impl Clock for Scripted<'_> {
     fn now_ns(&mut self) -> u64 {
-        self.now_ns.get()
+        let now_ns = self.now_ns.get();
+        self.looks = if now_ns == self.last_ns { self.looks + 1 } else { 1 };
+        self.last_ns = now_ns;
+        assert!(self.looks <= MAX_LOOKS, "{now_ns}: the loop spins where it has to sleep");
+        now_ns
     }
 
     fn sleep_until(&mut self, instant_ns: u64) {
+        let now_ns = self.now_ns.get();
+        let may_sleep = now_ns..=now_ns + PERIOD_NS + PHASE_NS;
+        assert!(may_sleep.contains(&instant_ns), "{now_ns}: the loop sleeps until {instant_ns}");
         let late_ns = instant_ns + self.latencies_ns.next().unwrap_or(10);
-        self.now_ns.set(self.now_ns.get().max(late_ns));
+        self.now_ns.set(now_ns.max(late_ns));
     }
 }
 
 /// Runs so many cycles from time 0 on.
-pub fn perform(script: &Script, on_overrun: OnOverrun, cycles: usize) -> (Vec<Seen>, LoopCounters) {
+pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Vec<Seen>, LoopCounters) {
     let now_ns = Cell::new(0);
-    let mut clock = Scripted { now_ns: &now_ns, latencies_ns: script.latencies_ns.clone().into_iter() };
+    let latencies_ns = script.latencies_ns.clone().into_iter();
+    let mut clock = Scripted { now_ns: &now_ns, latencies_ns, last_ns: 0, looks: 0 };
     let mut burns_ns = script.burns_ns.iter();
     let timing = Timing {
         period_ns: PERIOD_NS,

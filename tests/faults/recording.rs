@@ -1,7 +1,9 @@
 //! What happened, and how near to its bounds.
 
-use hexad::control::controller::{Output, Parameters};
-use hexad::control::state::{Cause, State};
+use hexad::control::controller::Output;
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::parameters::Parameters;
+use hexad::control::state::State;
 use hexad::model::machine::LEGS;
 use hexad::model::rigid::{Acceleration, Pose, Twist};
 use hexad::model::task::TaskState;
@@ -43,9 +45,9 @@ impl Recording {
     }
 
     /// State and cause, wherever one of them changes.
-    pub fn path(&self) -> Vec<(State, Cause)> {
+    pub fn path(&self) -> Vec<(State, DiagnosticCode)> {
         let mut path: Vec<_> =
-            self.samples.iter().map(|sample| (sample.output.state, sample.output.cause)).collect();
+            self.samples.iter().map(|sample| (sample.output.state, sample.output.diagnostic.code)).collect();
         path.dedup();
         path
     }
@@ -57,7 +59,7 @@ impl Recording {
         let mut peaks = Peaks::default();
         let mut before: Option<&Sample> = None;
         for sample in &self.samples {
-            let Some(now) = sample.acceleration.filter(|_| sample.output.state.controls()) else {
+            let Some(now) = sample.acceleration.filter(|_| sample.output.state.has_control()) else {
                 before = None;
                 continue;
             };

@@ -3,13 +3,13 @@
 //!
 //! With `HEXAD_CHARTS=FOLDER` each is drawn into a picture.
 
-use hexad::control::law::ControlMode;
-use hexad::control::state::{Cause, Request, State};
-
 use super::pictures::draw;
 use super::rig::Rig;
 use super::situations::{Situation, machine};
 use super::world::{Grip, Source, World};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::law::ControlMode;
+use hexad::control::state::{Request, State};
 
 /// Without a force from the daemon for this long, the drives brake \[cycles\].
 const DRIVES_WAIT: u32 = 50;
@@ -53,25 +53,26 @@ fn begins_again(world: &mut World) {
 }
 
 /// The limits are kept, the states are these, and in the end the platform is where it should be.
-fn assert_smooth(name: &str, title: &str, world: &World, expected: &[(State, Cause)]) {
+fn assert_smooth(name: &str, title: &str, world: &World, expected: &[(State, DiagnosticCode)]) {
     let peaks = world.recording.peaks(&world.parameters, world.machine.actuator.max_force);
     println!("{title}: {peaks:?}");
     draw(name, title, world);
     assert!(peaks.acceleration <= 1.0 && peaks.jerk <= 1.0 && peaks.force < 1.0, "{peaks:?}");
     assert!(peaks.force_rate < 1.0, "never cut: {peaks:?}");
     let path = world.recording.path();
-    let states = path
-        .iter()
-        .filter(|(state, cause)| state.controls() || cause.is_fault() || *cause == Cause::SetpointTooFar);
+    let states = path.iter().filter(|(state, cause)| {
+        state.has_control() || cause.is_fault() || *cause == DiagnosticCode::SetpointTooFar
+    });
     let mut states: Vec<_> = states.copied().collect();
     states.dedup();
     assert_eq!(states, expected);
 }
 
-const ENGAGES: [(State, Cause); 2] = [(State::Engaging, Cause::None), (State::Active, Cause::None)];
+const ENGAGES: [(State, DiagnosticCode); 2] =
+    [(State::Engaging, DiagnosticCode::None), (State::Active, DiagnosticCode::None)];
 
 /// Engages, loses control in these states, and engages again.
-fn twice(between: &[(State, Cause)]) -> Vec<(State, Cause)> {
+fn twice(between: &[(State, DiagnosticCode)]) -> Vec<(State, DiagnosticCode)> {
     [&ENGAGES[..], between, &ENGAGES[..]].concat()
 }
 
@@ -96,12 +97,12 @@ fn engage_in_motion() {
     let way = nalgebra::Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.1);
     world.source = Source::Moves([home - way, home + way], world.rig.now_ns, 4.0);
     // The setpoint passes by at 94 mm/s; the platform stands.
-    let passing = world.until(|output| output.cause == Cause::NotAsked);
+    let passing = world.until(|output| output.diagnostic.code == DiagnosticCode::ReadyToEngage);
     assert!(passing.error.unwrap().twist.linear.norm() > 0.09, "{passing:?}");
     world.ask(Request::Engage);
     world.until(|output| output.state == State::Active);
     world.run(2300);
-    let expected = [&[(State::Standby, Cause::SetpointTooFar)], &ENGAGES[..]].concat();
+    let expected = [&[(State::Standby, DiagnosticCode::SetpointTooFar)], &ENGAGES[..]].concat();
     let title = "engage in motion, the setpoint passes by at 94 mm/s";
     assert_smooth("engage_in_motion", title, &world, &expected);
     assert!((world.x() - home - way).norm() < 1e-5);
@@ -116,11 +117,19 @@ fn engage_with_a_wrong_setpoint_is_refused() {
     world.run(100);
     world.ask(Request::Engage);
     let output = world.run(500);
-    assert_eq!((output.state, output.refused), (State::Standby, Cause::SetpointTooFar));
+    assert_eq!(
+        (output.state, output.request_diagnostic.code),
+        (State::Standby, DiagnosticCode::SetpointTooFar)
+    );
     // Told with the distance: five times the tolerance of 2 mm.
-    assert!((output.evidence.value - 5.0).abs() < 1e-3 && output.evidence.bound == 1.0, "{output:?}");
-    let expected = [(State::Standby, Cause::SetpointTooFar)];
-    assert_smooth("engage_refused", "engage with the setpoint 10 mm away: refused", &world, &expected);
+    assert!((output.diagnostic.value - 5.0).abs() < 1e-3 && output.diagnostic.bound == 1.0, "{output:?}");
+    let expected = [(State::Standby, DiagnosticCode::SetpointTooFar)];
+    assert_smooth(
+        "engage_refused",
+        "engage with the setpoint 10 mm away, five times the tolerance: refused",
+        &world,
+        &expected,
+    );
     assert_eq!(world.recording.time_to_rest(), Some(0.0));
 }
 
@@ -131,7 +140,8 @@ fn setpoint_source_killed_in_motion_and_restarted() {
     world.until(|output| output.state == State::Fault);
     world.run(300);
     begins_again(&mut world);
-    let lost = [(State::Stopping, Cause::SetpointLost), (State::Fault, Cause::SetpointLost)];
+    let lost =
+        [(State::Stopping, DiagnosticCode::SetpointLost), (State::Fault, DiagnosticCode::SetpointLost)];
     let title = "setpoint source killed in motion and restarted";
     assert_smooth("setpoint_source_killed", title, &world, &twice(&lost));
 }
@@ -150,10 +160,10 @@ fn plant_killed_in_motion_and_restarted() {
     world.grip = Grip::Free;
     world.run(100);
     begins_again(&mut world);
-    let lost = [(State::Fault, Cause::MeasurementLost)];
+    let lost = [(State::Fault, DiagnosticCode::MeasurementLost)];
     assert_smooth(
         "plant_killed",
-        "driver killed in motion and restarted; the daemon lets go after 20 ms",
+        "driver killed in motion and restarted; forces are disabled after 20 ms",
         &world,
         &twice(&lost),
     );
@@ -166,7 +176,7 @@ fn daemon_killed_in_motion_and_restarted() {
     world.restart_daemon();
     world.run(100);
     begins_again(&mut world);
-    let expected = twice(&[(State::Standby, Cause::SetpointTooFar)]);
+    let expected = twice(&[(State::Standby, DiagnosticCode::SetpointTooFar)]);
     assert_smooth(
         "daemon_killed",
         "daemon killed in motion and restarted; the drives brake after 50 ms",
@@ -183,7 +193,7 @@ fn situations_are_what_they_say() {
             let mut world = situation.world(mode);
             let output = world.cycle(|_, _| {});
             assert_eq!(output.state, situation.state());
-            assert_eq!(output.force != [0.0; 6], situation.state().controls());
+            assert_eq!(output.force != [0.0; 6], situation.state().has_control());
         }
     }
 }

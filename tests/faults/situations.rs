@@ -2,11 +2,12 @@
 
 use hexad::analysis::envelope;
 use hexad::config::Config;
-use hexad::control::controller::Parameters;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::parameters::Parameters;
+use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
-use hexad::motion::built_in::{Motion, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
 use super::rig::{Rig, parameters};
@@ -47,12 +48,12 @@ impl Situation {
     }
 
     /// Before anything goes wrong.
-    pub fn begins(self) -> (State, Cause) {
+    pub fn begins(self) -> (State, DiagnosticCode) {
         let cause = match self {
-            Self::Standby => Cause::NotAsked,
-            Self::Engaging | Self::AtRest | Self::InMotion => Cause::None,
-            Self::Stopping | Self::Parking => Cause::Asked,
-            Self::Fault => Cause::EmergencyStop,
+            Self::Standby => DiagnosticCode::ReadyToEngage,
+            Self::Engaging | Self::AtRest | Self::InMotion => DiagnosticCode::None,
+            Self::Stopping | Self::Parking => DiagnosticCode::OperatorRequest,
+            Self::Fault => DiagnosticCode::EmergencyStop,
         };
         (self.state(), cause)
     }
@@ -96,7 +97,7 @@ impl Situation {
             }
         }
         let output = world.cycle(|_, _| {});
-        assert_eq!((output.state, output.cause), self.begins());
+        assert_eq!((output.state, output.diagnostic.code), self.begins());
         world.recording.samples.clear();
         world
     }
@@ -109,7 +110,7 @@ pub fn machine(mode: ControlMode) -> (Config, Parameters) {
     config.deployment.control.mode = mode;
     config.deployment.plant.step_s = 1e-3;
     let wide = [0.5, 0.5, GAMMA_RANGE, 1.0, 1.0, 1.0];
-    config.deployment.envelope = Some(envelope::Limits {
+    config.deployment.envelope = Some(envelope::EnvelopeBounds {
         pose_min: wide.map(|x| -x),
         pose_max: wide,
         velocity: [1.0; 6],
@@ -126,7 +127,7 @@ pub const GAMMA_RANGE: f64 = 0.3;
 fn moving(world: &mut World) {
     world.ask(Request::Engage);
     world.until(|output| output.state == State::Active);
-    let scene = fit(&world.machine, Motion::Sines, 8.0);
+    let scene = fit(&world.machine, BuiltInMotion::Sines, 8.0);
     world.source = Source::Plays(scene, world.rig.now_ns);
     world.run(1900);
     let speed = world.rig.simulator.state().twist.linear.norm();

@@ -6,13 +6,13 @@
 use std::fmt::Write;
 use std::sync::LazyLock;
 
-use hexad::control::law::ControlMode;
-use hexad::control::state::Cause::{
-    self, Asked, DeadlineMissed, EmergencyStop, LengthOutOfStroke, MeasurementFromElsewhen,
-    MeasurementJumped, MeasurementLost, MeasurementNotFinite, NotAsked, OffPath, RateInconsistent,
-    RateJumped, SetpointEnded, SetpointFromElsewhen, SetpointJumped, SetpointLost, SetpointNotFinite,
-    SetpointOutOfEnvelope, SetpointOutOfReach, SetpointTooFar, SetpointTooFast,
+use hexad::control::diagnostic::DiagnosticCode::{
+    self, DeadlineMissed, EmergencyStop, FollowingError, LengthOutOfStroke, MeasurementJumped,
+    MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest, RateInconsistent,
+    RateJumped, ReadyToEngage, SetpointEnded, SetpointJumped, SetpointLost, SetpointNotFinite,
+    SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFar, SetpointTooFast,
 };
+use hexad::control::law::ControlMode;
 use hexad::control::state::State;
 use hexad::plant::simulator::Brakes;
 use rayon::prelude::*;
@@ -31,17 +31,17 @@ pub enum Cell {
     /// As if nothing had happened.
     On,
     /// Lets go at once, until cleared.
-    Brake(Cause),
+    Brake(DiagnosticCode),
     /// Stops under control, then lets go, until cleared.
-    Stop(Cause),
+    Stop(DiagnosticCode),
     /// Stops under control, then stands by.
-    End(Cause),
+    End(DiagnosticCode),
     /// Every state under control that is entered, and the first one without force.
-    Path(&'static [(State, Cause)]),
+    Path(&'static [(State, DiagnosticCode)]),
     /// The same, and the platform hits an end stop.
-    Overrun(&'static [(State, Cause)]),
+    Overrun(&'static [(State, DiagnosticCode)]),
     /// Without force all the time; in the end this.
-    Idle(State, Cause),
+    Idle(State, DiagnosticCode),
     /// Nothing in the messages tells it from a platform that stands: it is driven to its end stops. What
     /// guards against it are drives that check their own encoders.
     Unseen,
@@ -51,14 +51,14 @@ use Cell::{Brake, End, Idle, On, Overrun, Path, Stop, Unseen};
 
 impl Cell {
     /// The states that follow, as [`changes`] tells them.
-    fn expected(self, situation: Situation) -> Vec<(State, Cause)> {
+    fn expected(self, situation: Situation) -> Vec<(State, DiagnosticCode)> {
         match self {
             On => match situation {
-                Situation::Standby => vec![(State::Standby, NotAsked)],
-                Situation::Engaging => vec![(State::Active, Cause::None)],
+                Situation::Standby => vec![(State::Standby, ReadyToEngage)],
+                Situation::Engaging => vec![(State::Active, DiagnosticCode::None)],
                 Situation::AtRest | Situation::InMotion => vec![],
-                Situation::Stopping => vec![(State::Standby, Asked)],
-                Situation::Parking => vec![(State::Off, Asked)],
+                Situation::Stopping => vec![(State::Standby, OperatorRequest)],
+                Situation::Parking => vec![(State::Off, OperatorRequest)],
                 Situation::Fault => vec![(State::Fault, EmergencyStop)],
             },
             Brake(cause) => vec![(State::Fault, cause)],
@@ -66,7 +66,7 @@ impl Cell {
             End(cause) => vec![(State::Stopping, cause), (State::Standby, cause)],
             Path(path) | Overrun(path) => path.into(),
             Idle(state, cause) => vec![(state, cause)],
-            Unseen => vec![(State::Active, Cause::None)],
+            Unseen => vec![(State::Active, DiagnosticCode::None)],
         }
     }
 }
@@ -100,27 +100,34 @@ const LOAD: Bounds = Bounds { acceleration: 11.0, jerk: 6.5, rest_s: 0.2 };
 type Row = (&'static str, Disturbance, Bounds, [Cell; 7]);
 
 /// Not finite, from another time, ...: the same in every state.
-const fn unusable_measurement(cause: Cause) -> [Cell; 7] {
+const fn unusable_measurement(cause: DiagnosticCode) -> [Cell; 7] {
     let brake = Brake(cause);
     [Idle(State::Off, cause), brake, brake, brake, brake, brake, On]
 }
 
-const fn unusable_setpoint(cause: Cause) -> [Cell; 7] {
+const fn unusable_setpoint(cause: DiagnosticCode) -> [Cell; 7] {
     [Idle(State::Standby, cause), Stop(cause), Stop(cause), Stop(cause), On, On, On]
 }
 
 /// Of setpoints that are wrong only in motion.
-const fn wrong_in_motion(cause: Cause) -> [Cell; 7] {
+const fn wrong_in_motion(cause: DiagnosticCode) -> [Cell; 7] {
     [On, On, On, Stop(cause), On, On, On]
 }
 
 const EVERYWHERE: [Cell; 7] = [On; 7];
 const TOO_FAR: Cell = Idle(State::Standby, SetpointTooFar);
 const FULL_STOP: Cell = Brake(EmergencyStop);
-const SWITCHED_OFF: Cell = Idle(State::Off, Asked);
-const PARKS: Cell = Path(&[(State::Stopping, Asked), (State::Parking, Asked), (State::Off, Asked)]);
-const OUT_OF_REACH: [(State, Cause); 3] =
-    [(State::Active, Cause::None), (State::Stopping, SetpointOutOfReach), (State::Fault, SetpointOutOfReach)];
+const SWITCHED_OFF: Cell = Idle(State::Off, OperatorRequest);
+const PARKS: Cell = Path(&[
+    (State::Stopping, OperatorRequest),
+    (State::Parking, OperatorRequest),
+    (State::Off, OperatorRequest),
+]);
+const OUT_OF_REACH: [(State, DiagnosticCode); 3] = [
+    (State::Active, DiagnosticCode::None),
+    (State::Stopping, SetpointOutOfReach),
+    (State::Fault, SetpointOutOfReach),
+];
 const LATE_STOP: Cell = Path(&OUT_OF_REACH);
 
 /// A cell in a mode that knows less. Its causes and states are those of the table; where not, it is said here.
@@ -154,9 +161,10 @@ fn in_mode(
             (wider(1.1, 4.1), Overrun(&OUT_OF_REACH[1..]))
         }
         // It still sags, so it moves: seen at last.
-        ("lengths and rates frozen", Engaging) if is_pd => {
-            (wider(1.4, 6.3), Path(&[(State::Active, Cause::None), (State::Fault, RateInconsistent)]))
-        }
+        ("lengths and rates frozen", Engaging) if is_pd => (
+            wider(1.4, 6.3),
+            Path(&[(State::Active, DiagnosticCode::None), (State::Fault, RateInconsistent)]),
+        ),
         // It still sags, and nothing damps that.
         ("lengths and rates frozen" | "rates zero", AtRest) if is_pd => {
             (Bounds { rest_s: f64::INFINITY, ..wider(1.4, 6.3) }, cell)
@@ -188,10 +196,10 @@ const ROWS: &[Row] = &[
     ("rates of the wrong sign", measurements::rates_of_wrong_sign, Bounds { rest_s: 0.7, ..LIE }, [On, Brake(RateInconsistent), Brake(RateInconsistent), Brake(RateJumped), Brake(RateJumped), Brake(RateInconsistent), On]),
     ("rates in mm/s", measurements::rates_in_mm, LIE, [On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
     ("rates zero", measurements::rates_zero, Bounds { rest_s: 0.5, ..LIE }, [On, Brake(RateInconsistent), On, Brake(RateJumped), Brake(RateJumped), Brake(RateInconsistent), On]),
-    ("measurements stamped 1 s ago", measurements::stamps_1_s_old, GENTLE, unusable_measurement(MeasurementFromElsewhen)),
-    ("measurements stamped 1 s ahead", measurements::stamps_1_s_ahead, GENTLE, unusable_measurement(MeasurementFromElsewhen)),
-    ("measurements stamped 0", measurements::stamps_of_nothing, GENTLE, unusable_measurement(MeasurementFromElsewhen)),
-    ("measurements' stamps run backward", measurements::stamps_run_backward, GENTLE, unusable_measurement(MeasurementFromElsewhen)),
+    ("measurements stamped 1 s ago", measurements::stamps_1_s_old, GENTLE, unusable_measurement(MeasurementStampInvalid)),
+    ("measurements stamped 1 s ahead", measurements::stamps_1_s_ahead, GENTLE, unusable_measurement(MeasurementStampInvalid)),
+    ("measurements stamped 0", measurements::stamps_of_nothing, GENTLE, unusable_measurement(MeasurementStampInvalid)),
+    ("measurements' stamps run backward", measurements::stamps_run_backward, GENTLE, unusable_measurement(MeasurementStampInvalid)),
     ("counts of 1 um, noise of 1 mm/s", measurements::noise_of_encoders, Bounds { rest_s: f64::INFINITY, ..GENTLE }, EVERYWHERE),
     ("rates filtered with 5 ms", measurements::filtered_rates, LONG, EVERYWHERE),
     // Setpoints.
@@ -216,30 +224,30 @@ const ROWS: &[Row] = &[
     ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [Idle(State::Standby, SetpointOutOfReach), LATE_STOP, Stop(SetpointOutOfReach), Stop(SetpointOutOfReach), On, On, On]),
     ("beyond the stroke", setpoints::beyond_stroke, GENTLE, unusable_setpoint(SetpointOutOfReach)),
     ("out of the envelope", setpoints::out_of_envelope, GENTLE, unusable_setpoint(SetpointOutOfEnvelope)),
-    ("setpoints stamped 1 s ago", setpoints::stamps_1_s_old, GENTLE, unusable_setpoint(SetpointFromElsewhen)),
-    ("setpoints stamped 1 s ahead", setpoints::stamps_1_s_ahead, GENTLE, unusable_setpoint(SetpointFromElsewhen)),
-    ("setpoints' stamps run backward", setpoints::stamps_run_backward, GENTLE, unusable_setpoint(SetpointFromElsewhen)),
+    ("setpoints stamped 1 s ago", setpoints::stamps_1_s_old, GENTLE, unusable_setpoint(SetpointStampInvalid)),
+    ("setpoints stamped 1 s ahead", setpoints::stamps_1_s_ahead, GENTLE, unusable_setpoint(SetpointStampInvalid)),
+    ("setpoints' stamps run backward", setpoints::stamps_run_backward, GENTLE, unusable_setpoint(SetpointStampInvalid)),
     ("two sources at once", setpoints::second_source, LONG, [TOO_FAR, On, On, On, On, On, On]),
     ("100 Hz, stamps off by 0.2 ms", setpoints::slow_and_jittery, Bounds { rest_s: 1.6, ..COARSE }, EVERYWHERE),
     // The operator.
     ("estop", operator::estop, GENTLE, [FULL_STOP; 7]),
     ("off", operator::off, GENTLE, [SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, On]),
-    ("stop", operator::stop, GENTLE, [On, End(Asked), End(Asked), End(Asked), On, End(Asked), On]),
-    ("park", operator::park, LONG, [Path(&[(State::Parking, Asked), (State::Off, Asked)]), PARKS, PARKS, PARKS, Path(&[(State::Parking, Asked), (State::Off, Asked)]), On, On]),
+    ("stop", operator::stop, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
+    ("park", operator::park, LONG, [Path(&[(State::Parking, OperatorRequest), (State::Off, OperatorRequest)]), PARKS, PARKS, PARKS, Path(&[(State::Parking, OperatorRequest), (State::Off, OperatorRequest)]), On, On]),
     ("clear", operator::clear, LONG, [On, On, On, On, On, On, TOO_FAR]),
-    ("engage", operator::engage, LONG, [Path(&[(State::Engaging, Cause::None), (State::Active, Cause::None)]), On, On, On, On, On, On]),
+    ("engage", operator::engage, LONG, [Path(&[(State::Engaging, DiagnosticCode::None), (State::Active, DiagnosticCode::None)]), On, On, On, On, On, On]),
     ("engage far away", operator::engage_far_away, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), On, On, On, On]),
     // The machine.
-    ("collision", machine::collision, GENTLE, [On, On, On, Brake(RateJumped), Brake(RateJumped), Brake(OffPath), On]),
-    ("the drives brake by themselves", machine::braked, GENTLE, [On, On, On, Brake(OffPath), On, Brake(OffPath), On]),
-    ("a leg without force", machine::leg_without_force, Bounds { rest_s: 0.25, ..GENTLE }, [On, Path(&[(State::Active, Cause::None), (State::Fault, OffPath)]), Brake(OffPath), Brake(OffPath), On, Brake(OffPath), On]),
+    ("collision", machine::collision, GENTLE, [On, On, On, Brake(RateJumped), Brake(RateJumped), Brake(FollowingError), On]),
+    ("the drives brake by themselves", machine::braked, GENTLE, [On, On, On, Brake(FollowingError), On, Brake(FollowingError), On]),
+    ("a leg without force", machine::leg_without_force, Bounds { rest_s: 0.25, ..GENTLE }, [On, Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FollowingError)]), Brake(FollowingError), Brake(FollowingError), On, Brake(FollowingError), On]),
     ("a load of a tenth of the platform", machine::load_of_a_tenth, LONG, EVERYWHERE),
-    ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(OffPath), Brake(OffPath), Brake(OffPath), Brake(OffPath), Brake(OffPath), On]),
+    ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(FollowingError), Brake(FollowingError), Brake(FollowingError), Brake(FollowingError), Brake(FollowingError), On]),
     // The host.
     ("deadline missed", host::deadline_missed, GENTLE, [On, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
     ("daemon held for 1 s", host::held_1_s, GENTLE, [On, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
     ("daemon held for 5 ms", host::held_5_ms, LONG, EVERYWHERE),
-    ("daemon restarted", host::restarted, GENTLE, [On, Idle(State::Standby, NotAsked), Idle(State::Standby, NotAsked), TOO_FAR, TOO_FAR, TOO_FAR, TOO_FAR]),
+    ("daemon restarted", host::restarted, GENTLE, [On, Idle(State::Standby, ReadyToEngage), Idle(State::Standby, ReadyToEngage), TOO_FAR, TOO_FAR, TOO_FAR, TOO_FAR]),
     // Two at once.
     ("setpoints end, then measurements", together::setpoint_ends_then_measurement, GENTLE, [Idle(State::Off, MeasurementLost), End(SetpointEnded), End(SetpointEnded), Path(&[(State::Stopping, SetpointLost), (State::Fault, MeasurementLost)]), Brake(MeasurementLost), Brake(MeasurementLost), On]),
     ("both end", together::both_end, GENTLE, unusable_measurement(MeasurementLost)),
@@ -247,16 +255,16 @@ const ROWS: &[Row] = &[
     ("X jumps and a deadline is missed", together::setpoint_jumps_and_deadline_missed, GENTLE, [TOO_FAR, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
     ("estop without measurements", together::estop_without_measurement, GENTLE, [FULL_STOP; 7]),
     ("off without measurements", together::off_without_measurement, GENTLE, [SWITCHED_OFF, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
-    ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(OffPath), On]),
-    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Path(&[(State::Stopping, SetpointLost), (State::Fault, OffPath)]), On, Brake(OffPath), On]),
-    ("stop every 10 ms", together::stop_every_10_ms, GENTLE, [On, End(Asked), End(Asked), End(Asked), On, End(Asked), On]),
+    ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(FollowingError), On]),
+    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Path(&[(State::Stopping, SetpointLost), (State::Fault, FollowingError)]), On, Brake(FollowingError), On]),
+    ("stop every 10 ms", together::stop_every_10_ms, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
     ("estop, then engage", together::estop_then_engage, GENTLE, [FULL_STOP; 7]),
 ];
 
 /// What a cell came to.
 struct Outcome {
-    changes: Vec<(State, Cause)>,
-    last: (State, Cause),
+    changes: Vec<(State, DiagnosticCode)>,
+    last: (State, DiagnosticCode),
     peaks: Peaks,
     rest_s: Option<f64>,
     world: World,
@@ -284,9 +292,9 @@ fn run(mode: ControlMode, situation: Situation, disturbance: Disturbance) -> Out
 
 /// From a state under control: what follows it, to the first state without force. From one without: the
 /// same once control has begun; if it never does, the end.
-fn changes(path: &[(State, Cause)], situation: Situation) -> Vec<(State, Cause)> {
-    let controls = |(state, _): &(State, Cause)| state.controls();
-    let begin = match situation.state().controls() {
+fn changes(path: &[(State, DiagnosticCode)], situation: Situation) -> Vec<(State, DiagnosticCode)> {
+    let controls = |(state, _): &(State, DiagnosticCode)| state.has_control();
+    let begin = match situation.state().has_control() {
         true => usize::from(path[0] == situation.begins()),
         false => path.iter().position(controls).unwrap_or(path.len() - 1),
     };
@@ -298,7 +306,7 @@ fn changes(path: &[(State, Cause)], situation: Situation) -> Vec<(State, Cause)>
 fn complaints(cell: Cell, bounds: &Bounds, situation: Situation, outcome: &Outcome) -> Vec<String> {
     let mut wrong = Vec::new();
     let expected = cell.expected(situation);
-    let is_idle = matches!(cell, Idle(..)) && !outcome.changes.iter().any(|(state, _)| state.controls());
+    let is_idle = matches!(cell, Idle(..)) && !outcome.changes.iter().any(|(state, _)| state.has_control());
     let found = if is_idle { vec![outcome.last] } else { outcome.changes.clone() };
     if found != expected {
         wrong.push(format!("{found:?} instead of {expected:?}"));
@@ -326,11 +334,11 @@ fn complaints(cell: Cell, bounds: &Bounds, situation: Situation, outcome: &Outco
     }
     for sample in &outcome.world.recording.samples {
         let output = &sample.output;
-        if !output.state.controls() && output.force != [0.0; 6] {
+        if !output.state.has_control() && output.force != [0.0; 6] {
             wrong.push(format!("a force in {:?}", output.state));
         }
-        if output.state == State::Fault && !output.cause.is_fault() {
-            wrong.push(format!("a fault without one: {:?}", output.cause));
+        if output.state == State::Fault && !output.diagnostic.code.is_fault() {
+            wrong.push(format!("a fault without one: {:?}", output.diagnostic.code));
         }
     }
     wrong

@@ -1,14 +1,15 @@
 //! A controller, a platform, a setpoint source, and what may go wrong between them.
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::parameters::Parameters;
 use hexad::control::state::Request;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Gravity;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::{TaskState, task_coordinates};
-use hexad::motion::built_in::Scene;
-use hexad::motion::minimum_jerk::{between, rise};
+use hexad::motion::built_in::FittedMotion;
+use hexad::motion::minimum_jerk::{rise, straight_move};
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector6;
@@ -22,7 +23,7 @@ pub enum Source {
     Silent,
     Still(TaskState),
     /// A scene that began at this instant.
-    Plays(Scene, u64),
+    Plays(FittedMotion, u64),
     /// From rest to rest on a straight line, from this instant on, in so many seconds.
     Moves([Vector6<f64>; 2], u64, f64),
 }
@@ -81,7 +82,7 @@ impl World {
             Source::Plays(scene, start_ns) => Some(scene.at((now_ns - start_ns) as f64 * 1e-9)),
             Source::Moves([from, to], start_ns, seconds) => {
                 let t = (now_ns - start_ns) as f64 * 1e-9;
-                Some(between(from, to, &rise(t, *seconds)))
+                Some(straight_move(from, to, &rise(t, *seconds)))
             }
         }
     }
@@ -107,7 +108,7 @@ impl World {
         }
         let output = self.rig.controller.step(&input);
         self.last = input;
-        let force = output.state.controls().then_some(output.force);
+        let force = output.state.has_control().then_some(output.force);
         let applied = self.applied(force);
         self.rig.pass(applied);
         self.record(now_ns, &output);

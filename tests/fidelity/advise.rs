@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use hexad::analysis::envelope::Limits;
+use hexad::analysis::envelope::EnvelopeBounds;
 use tempfile::TempDir;
 
 use super::common::{Table, data, machine};
@@ -39,8 +39,8 @@ fn with(folder: &TempDir, name: &str, sections: &str) -> PathBuf {
     file
 }
 
-fn section(limits: &Limits) -> String {
-    let Limits { pose_min, pose_max, velocity, acceleration } = limits;
+fn section(limits: &EnvelopeBounds) -> String {
+    let EnvelopeBounds { pose_min, pose_max, velocity, acceleration } = limits;
     format!(
         "[envelope]\npose_min = {pose_min:?}\npose_max = {pose_max:?}\nvelocity = {velocity:?}\n\
          acceleration = {acceleration:?}\n"

@@ -1,8 +1,8 @@
 //! The choice holds where the chooser did not look.
 
-use hexad::analysis::envelope::{CORNERS, Envelope, Shares};
-use hexad::analysis::fidelity_choice::Judgement;
-use hexad::analysis::fidelity_error::{Sample, Tally};
+use hexad::analysis::envelope::{CORNER_COUNT, EnvelopePoint, MotionEnvelope};
+use hexad::analysis::fidelity_choice::FidelityComparison;
+use hexad::analysis::fidelity_error::{ErrorStatistics, FidelitySample};
 use hexad::analysis::reachable_envelope;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
@@ -32,21 +32,21 @@ impl Random {
     }
 }
 
-fn tally(scene: &Scene, mut shares: impl FnMut() -> Shares) -> Tally {
-    let mut tally = Tally::default();
+fn tally(scene: &Scene, mut shares: impl FnMut() -> EnvelopePoint) -> ErrorStatistics {
+    let mut tally = ErrorStatistics::default();
     for _ in 0..DENSE {
-        tally.add(&Sample::take(&scene.model, &scene.envelope.at(&shares())));
+        tally.add(&FidelitySample::take(&scene.model, &scene.envelope.at(&shares())));
     }
     tally
 }
 
 /// Anywhere in the envelope, and at any of its 262,144 corners.
-fn dense(scene: &Scene) -> [Tally; 2] {
+fn dense(scene: &Scene) -> [ErrorStatistics; 2] {
     let mut random = Random(2008);
-    let inside = tally(scene, || Shares::from_fn(|_, _| random.unit()));
+    let inside = tally(scene, || EnvelopePoint::from_fn(|_, _| random.unit()));
     let corners = tally(scene, || {
         let bits = random.next();
-        Shares::from_fn(|k, _| ((bits >> k) & 1) as f64)
+        EnvelopePoint::from_fn(|k, _| ((bits >> k) & 1) as f64)
     });
     [inside, corners]
 }
@@ -55,20 +55,20 @@ fn dense(scene: &Scene) -> [Tally; 2] {
 fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
     let mut choices = vec![];
     for scene in scenes() {
-        let judgement = Judgement::of_envelope(&scene.model, &scene.envelope);
+        let comparison = FidelityComparison::of_envelope(&scene.model, &scene.envelope);
         let [inside, corners] = dense(&scene);
-        assert!(inside.judged > u64::from(DENSE) / 10, "{}: {inside:?}", scene.name);
+        assert!(inside.evaluated > u64::from(DENSE) / 10, "{}: {inside:?}", scene.name);
         // 1e-9 to 1, ten to a decade.
         for step in 0..=90 {
             let tolerance = 10_f64.powf(-0.1 * f64::from(step));
-            let choice = judgement.choice(tolerance);
+            let choice = comparison.choice(tolerance);
             let number = Fidelity::ALL.iter().position(|fidelity| *fidelity == choice).unwrap();
             // In each set against its own peak: whoever looks at one alone must find it so.
             for (what, seen) in [("inside", &inside), ("corners", &corners)] {
                 let share = seen.errors[number].max / seen.peak;
                 let name = &scene.name;
                 assert!(
-                    seen.judged == 0 || share <= 1.1 * tolerance,
+                    seen.evaluated == 0 || share <= 1.1 * tolerance,
                     "{name}, {what}: {choice:?} is off by {share:.3e} for {tolerance:.3e}"
                 );
             }
@@ -84,16 +84,16 @@ fn no_choice_exceeds_its_tolerance_by_more_than_a_tenth() {
 #[test]
 fn the_worst_that_is_reported_exists() {
     for scene in scenes() {
-        let judgement = Judgement::of_envelope(&scene.model, &scene.envelope);
+        let comparison = FidelityComparison::of_envelope(&scene.model, &scene.envelope);
         if ["wide", "moog", "camera"].iter().any(|kind| scene.name.ends_with(kind)) {
             continue;
         }
-        assert_eq!(judgement.all.outside, 0, "{}", scene.name);
+        assert_eq!(comparison.all.outside, 0, "{}", scene.name);
         let [inside, corners] = dense(&scene);
-        for ((price, inside), corners) in judgement.prices.iter().zip(&inside.errors).zip(&corners.errors) {
+        for ((error, inside), corners) in comparison.errors.iter().zip(&inside.errors).zip(&corners.errors) {
             let (seen, name) = (inside.max.max(corners.max), &scene.name);
-            assert!(seen >= 0.95 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.fidelity, price.max);
-            assert!(seen <= 1.05 * price.max, "{name}, {:?}: {} N, seen {seen} N", price.fidelity, price.max);
+            assert!(seen >= 0.95 * error.max, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max);
+            assert!(seen <= 1.05 * error.max, "{name}, {:?}: {} N, seen {seen} N", error.fidelity, error.max);
         }
     }
 }
@@ -102,23 +102,24 @@ fn the_worst_that_is_reported_exists() {
 fn what_is_out_of_reach_is_counted_and_passed_over() {
     let scenes = scenes();
     let moog = scenes.iter().find(|scene| scene.name == "motion_base moog").unwrap();
-    let judgement = Judgement::of_envelope(&moog.model, &moog.envelope);
-    assert!(judgement.all.outside > 1000 && judgement.all.judged > 32_768, "{:?}", judgement.all);
-    let own = Judgement::of_envelope(&scenes[0].model, &scenes[0].envelope);
+    let comparison = FidelityComparison::of_envelope(&moog.model, &moog.envelope);
+    assert!(comparison.all.outside > 1000 && comparison.all.evaluated > 32_768, "{:?}", comparison.all);
+    let own = FidelityComparison::of_envelope(&scenes[0].model, &scenes[0].envelope);
     assert_eq!((own.all.outside, own.all.singular), (0, 0));
-    assert_eq!(own.all.judged, 32_768 + u64::from(CORNERS));
+    assert_eq!(own.all.evaluated, 32_768 + u64::from(CORNER_COUNT));
 }
 
 #[test]
 fn every_machine_has_an_envelope_of_its_own() {
     for name in MACHINES {
         let mut machine = machine(name);
-        let envelope_of = |machine: &Machine| reachable_envelope::envelope(&InverseDynamics::new(machine));
+        let envelope_of =
+            |machine: &Machine| reachable_envelope::reachable_envelope(&InverseDynamics::new(machine));
         let full = envelope_of(&machine);
-        assert!(full.limits().pose_max.iter().all(|x| *x > 0.0), "{name}: {full:?}");
-        assert!(full.limits().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
-        for k in 0..CORNERS {
-            let sample = Sample::take(&InverseDynamics::new(&machine), &full.at(&full.corner(k)));
+        assert!(full.bounds().pose_max.iter().all(|x| *x > 0.0), "{name}: {full:?}");
+        assert!(full.bounds().acceleration.iter().all(|x| *x > 0.0), "{name}: {full:?}");
+        for k in 0..CORNER_COUNT {
+            let sample = FidelitySample::take(&InverseDynamics::new(&machine), &full.at(&full.corner(k)));
             assert!(sample.is_ok_and(|s| s.peak < 0.8 * machine.actuator.max_force), "{name}, corner {k}");
             let rates = leg_motion(&machine, &full.at(&full.corner(k)).motion()).rate;
             // Only the telescope's legs are so slow that this decides.
@@ -129,18 +130,18 @@ fn every_machine_has_an_envelope_of_its_own() {
         }
         // Too weak to hold itself, or without room: it stays at home, and still there is a choice.
         machine.actuator.max_force = 1e-3;
-        assert_eq!(envelope_of(&machine).limits().velocity, [0.0; 6]);
+        assert_eq!(envelope_of(&machine).bounds().velocity, [0.0; 6]);
         let length = leg_lengths(&machine, &full.at(&full.rest()).motion().pose);
         machine.actuator.max_length = length.iter().copied().fold(0.0, f64::max);
         let none = envelope_of(&machine);
-        assert_eq!(none.limits().pose_max, [0.0; 6], "{name}");
-        let judgement = Judgement::of_envelope(&InverseDynamics::new(&machine), &none);
-        assert!(judgement.all.judged > 0, "{name}");
+        assert_eq!(none.bounds().pose_max, [0.0; 6], "{name}");
+        let comparison = FidelityComparison::of_envelope(&InverseDynamics::new(&machine), &none);
+        assert!(comparison.all.evaluated > 0, "{name}");
         assert!(
-            judgement.choice(0.0) as u8 >= Fidelity::NoVelocity as u8,
+            comparison.choice(0.0) as u8 >= Fidelity::NoVelocity as u8,
             "{name}: {:?}",
-            judgement.choice(0.0)
+            comparison.choice(0.0)
         );
-        assert_eq!(none, Envelope::new(&machine.home, *none.limits()));
+        assert_eq!(none, MotionEnvelope::new(&machine.home, *none.bounds()));
     }
 }

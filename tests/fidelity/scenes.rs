@@ -1,18 +1,18 @@
 //! Machines and what they are asked to do.
 
-use hexad::analysis::envelope::{Envelope, Limits};
+use hexad::analysis::envelope::{EnvelopeBounds, MotionEnvelope};
 use hexad::analysis::reachable_envelope;
 use hexad::model::active_forces::InverseDynamics;
 
 use super::common::machine;
 
 /// A motion base of the one-tonne class: Moog 6DOF2000E, at most 22 deg in yaw, upward heave acceleration.
-pub fn moog() -> Limits {
+pub fn moog() -> EnvelopeBounds {
     const G: f64 = 9.81;
     let deg = |degrees: [f64; 3]| degrees.map(f64::to_radians);
     let (low, high) = (deg([-21.0, -22.0, -22.0]), deg([21.0, 22.0, 22.0]));
     let (rate, accel) = (deg([30.0, 30.0, 40.0]), deg([500.0, 500.0, 400.0]));
-    Limits {
+    EnvelopeBounds {
         pose_min: with(low, [-0.241, -0.259, -0.178]),
         pose_max: with(high, [0.259, 0.259, 0.178]),
         velocity: with(rate, [0.5, 0.5, 0.3]),
@@ -21,9 +21,9 @@ pub fn moog() -> Limits {
 }
 
 /// A camera hexapod of a telescope, three tonnes: 0.5 mm/s at the legs, hardly any acceleration.
-pub fn camera() -> Limits {
+pub fn camera() -> EnvelopeBounds {
     let pose_max = with([0.36_f64.to_radians(); 3], [0.0114, 0.0114, 0.0131]);
-    Limits {
+    EnvelopeBounds {
         pose_min: pose_max.map(|x| -x),
         pose_max,
         velocity: with([7e-4; 3], [5e-4; 3]),
@@ -41,7 +41,7 @@ fn with(angles: [f64; 3], positions: [f64; 3]) -> [f64; 6] {
 pub struct Scene {
     pub name: String,
     pub model: InverseDynamics,
-    pub envelope: Envelope,
+    pub envelope: MotionEnvelope,
 }
 
 /// Each machine's own envelope, a fast and a slow one, one that it can only partly reach, and what such
@@ -51,14 +51,14 @@ pub fn scenes() -> Vec<Scene> {
     for name in ["fried2008", "motion_base", "tsai2000", "telescope"] {
         let machine = machine(name);
         let model = InverseDynamics::new(&machine);
-        let own = *reachable_envelope::envelope(&model).limits();
-        let faster = |share: f64| Limits {
+        let own = *reachable_envelope::reachable_envelope(&model).bounds();
+        let faster = |share: f64| EnvelopeBounds {
             velocity: own.velocity.map(|v| v * share),
             acceleration: own.acceleration.map(|a| a * share * share),
             ..own
         };
         let double = |limits: [f64; 6]| limits.map(|x| 2.0 * x);
-        let wide = Limits { pose_min: double(own.pose_min), pose_max: double(own.pose_max), ..own };
+        let wide = EnvelopeBounds { pose_min: double(own.pose_min), pose_max: double(own.pose_max), ..own };
         let mut envelopes = vec![("own", own), ("fast", faster(4.0)), ("slow", faster(0.01)), ("wide", wide)];
         match name {
             "motion_base" => envelopes.push(("moog", moog())),
@@ -68,7 +68,7 @@ pub fn scenes() -> Vec<Scene> {
         scenes.extend(envelopes.into_iter().map(|(kind, limits)| Scene {
             name: format!("{name} {kind}"),
             model: model.clone(),
-            envelope: Envelope::new(&machine.home, limits),
+            envelope: MotionEnvelope::new(&machine.home, limits),
         }));
     }
     scenes

@@ -20,7 +20,7 @@ use hexad::model::fidelity::Exact;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::model::task::{TaskState, task_coordinates};
-use hexad::motion::built_in::{Motion as Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
 use crate::common::{Errors, Table, largest};
@@ -240,7 +240,7 @@ fn ask(
 
 /// As `hexad move --trajectory` reads it.
 fn trajectory(machine: &Machine) -> String {
-    let scene = fit(machine, Scene::Sines, SECONDS);
+    let scene = fit(machine, BuiltInMotion::Sines, SECONDS);
     let names = ["alpha", "beta", "gamma", "x", "y", "z"];
     let header: String =
         ["", "_rate", "_accel"].map(|end| names.map(|name| format!(",{name}{end}")).concat()).concat();

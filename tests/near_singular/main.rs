@@ -59,9 +59,9 @@ impl Compared {
         let (machine, motion) = (scene.model.machine(), &scene.motion);
         let load = scene.model.load_of::<Exact>(motion);
         let n = load.leg_wrenches;
-        let exact = reference::solve(&n, &load.wrench) + load.along;
+        let exact = reference::solve(&n, &load.wrench) + load.axial_forces;
         let ours = scene.model.forces::<Exact>(motion).map(Vector6::from);
-        let lu = n.lu().solve(&load.wrench).map(|x| x + load.along);
+        let lu = n.lu().solve(&load.wrench).map(|x| x + load.axial_forces);
         self.forces.add([ours, lu], &exact);
 
         // Angles count as lengths at the platform's radius.

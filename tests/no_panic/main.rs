@@ -55,7 +55,7 @@ const ALLOWED: &[(&str, Option<&str>)] = &[
     ("clock_gettime", None),
     // The sleeps, until an instant or a message.
     ("clock_nanosleep", None),
-    ("syscall", Some("hexad::realtime::doorbell::futex_wait")),
+    ("syscall", Some("hexad::realtime::futex::wait")),
 ];
 
 /// What the walk has to come by, or it goes astray: both sleeps, the angles of the setpoint, the last resort

@@ -4,7 +4,7 @@ use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::integrator::PlantState;
+use hexad::plant::integrator::BodyState;
 use nalgebra::{Matrix6, Vector6};
 
 use super::common::{Errors, MACHINES, machine, motions};
@@ -34,7 +34,7 @@ fn the_mass_matrix_belongs_to_the_kinetic_energy() {
         let mut errors = Errors::default();
         for Motion { pose, twist, .. } in motions(name) {
             let kinetic = |v: &Vector6<f64>| {
-                energy(&machine, &PlantState { pose, twist: Twist::from_vector(v) }).kinetic
+                energy(&machine, &BodyState { pose, twist: Twist::from_vector(v) }).kinetic
             };
             let mass = dynamics.mass_matrix(&pose);
             let unit = |k| Vector6::ith(k, 1.0);

@@ -1,8 +1,8 @@
-//! Elastic legs: energy, play, the rigid limit, and the step that the tolerance asks for.
+//! ElasticLeg legs: energy, play, the rigid limit, and the step that the tolerance asks for.
 
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::{LEGS, Machine};
-use hexad::plant::imperfections::{Elastic, Friction, Imperfections};
+use hexad::plant::imperfections::{ElasticLeg, Friction, Imperfections};
 use hexad::plant::simulator::{Brakes, Simulator};
 use nalgebra::Vector6;
 
@@ -10,9 +10,9 @@ use super::common::{Legs, largest, machine};
 use super::energy::energy;
 use super::{DECELERATION, DEFAULT_STEP_S, TOLERANCE_M, shaking, simulator, without_drives};
 
-const SPRING: Elastic = Elastic { stiffness: 2e7, damping: 0.0, backlash: 0.0 };
+const SPRING: ElasticLeg = ElasticLeg { stiffness: 2e7, damping: 0.0, backlash: 0.0 };
 
-fn elastic(spring: Elastic) -> Imperfections {
+fn elastic(spring: ElasticLeg) -> Imperfections {
     Imperfections { leg: Some(spring), ..Imperfections::default() }
 }
 
@@ -24,7 +24,7 @@ fn smooth(name: &str) -> Machine {
 }
 
 /// Energy of bodies, drives and springs \[J\].
-fn total(machine: &Machine, simulator: &Simulator, spring: &Elastic) -> f64 {
+fn total(machine: &Machine, simulator: &Simulator, spring: &ElasticLeg) -> f64 {
     let drives = simulator.leg_motion();
     let lengths = leg_lengths(machine, &simulator.state().pose);
     let half = 0.5 * spring.backlash;
@@ -43,7 +43,7 @@ fn springs_keep_energy() {
     for backlash in [0.0, 2e-4] {
         let mut machine = smooth("motion_base");
         machine.gravity.fill(0.0);
-        let spring = Elastic { backlash, ..SPRING };
+        let spring = ElasticLeg { backlash, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         simulator.advance(0.02, Some(&[4000.0, -4000.0, 4000.0, 3000.0, -2000.0, 1000.0]));
         let start = total(&machine, &simulator, &spring);
@@ -68,7 +68,7 @@ fn damping_takes_the_ringing_away() {
     let mut machine = smooth("motion_base");
     machine.gravity.fill(0.0);
     let ringing = |damping| {
-        let spring = Elastic { damping, ..SPRING };
+        let spring = ElasticLeg { damping, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         simulator.advance(0.02, Some(&[4000.0, -4000.0, 4000.0, 3000.0, -2000.0, 1000.0]));
         simulator.advance(0.5, Some(&[0.0; LEGS]));
@@ -84,7 +84,7 @@ fn damping_takes_the_ringing_away() {
 fn a_loaded_leg_is_deflected_and_at_rest() {
     let machine = smooth("motion_base");
     for backlash in [0.0, 1e-4] {
-        let spring = Elastic { backlash, ..SPRING };
+        let spring = ElasticLeg { backlash, ..SPRING };
         let mut simulator = simulator(&machine, &elastic(spring));
         let legs = leg_lengths(&machine, &simulator.state().pose);
         let hold = super::holding(&machine, &simulator.state().pose);
@@ -104,7 +104,7 @@ fn a_loaded_leg_is_deflected_and_at_rest() {
 fn play_separates_drive_and_platform() {
     let mut machine = smooth("motion_base");
     machine.gravity.fill(0.0);
-    let spring = Elastic { backlash: 1e-3, ..SPRING };
+    let spring = ElasticLeg { backlash: 1e-3, ..SPRING };
     let mut simulator = simulator(&machine, &elastic(spring));
     let start = *simulator.state();
     let length = simulator.leg_motion().length;
@@ -141,7 +141,7 @@ fn a_stiff_leg_is_nearly_rigid() {
     };
     let rigid = run(None);
     let [softer, stiffer] = [1e8, 4e8].map(|stiffness| {
-        let spring = Elastic { stiffness, damping: 1e5, ..SPRING };
+        let spring = ElasticLeg { stiffness, damping: 1e5, ..SPRING };
         run(Some(spring)).displacement_to(&rigid).linear.norm()
     });
     let way = super::home(&machine).pose.displacement_to(&rigid).linear.norm();
@@ -154,7 +154,7 @@ fn a_stiff_leg_is_nearly_rigid() {
 #[test]
 fn the_step_keeps_the_tolerance() {
     let machine = smooth("motion_base");
-    let spring = |stiffness, damping| elastic(Elastic { stiffness, damping, backlash: 0.0 });
+    let spring = |stiffness, damping| elastic(ElasticLeg { stiffness, damping, backlash: 0.0 });
     let lag = |hertz| {
         let mut wanted = Imperfections::default();
         wanted.drive.bandwidth_hz = Some(hertz);
@@ -200,7 +200,7 @@ fn the_step_keeps_the_tolerance() {
 fn what_cannot_be_seen_is_left_out() {
     let machine = machine("motion_base");
     let terms = |stiffness, backlash, hertz| {
-        let mut wanted = elastic(Elastic { stiffness, backlash, damping: 0.0 });
+        let mut wanted = elastic(ElasticLeg { stiffness, backlash, damping: 0.0 });
         wanted.drive.bandwidth_hz = Some(hertz);
         let terms = *simulator(&machine, &wanted).terms();
         (terms.elastic.is_some(), terms.lag.is_some(), terms.step < DEFAULT_STEP_S)

@@ -1,7 +1,7 @@
 //! Energy of the machine, body by body: positions, velocities and angular velocities, nothing else.
 
 use hexad::model::machine::{Link, Machine};
-use hexad::plant::integrator::PlantState;
+use hexad::plant::integrator::BodyState;
 use nalgebra::Vector3;
 
 use super::common::Legs;
@@ -23,7 +23,7 @@ impl Energy {
 }
 
 /// Energy of the thirteen bodies.
-pub fn energy(machine: &Machine, state: &PlantState) -> Energy {
+pub fn energy(machine: &Machine, state: &BodyState) -> Energy {
     let (r, c) = (state.pose.rotation, state.pose.position);
     let (omega, v) = (state.twist.angular, state.twist.linear);
     let body = &machine.platform;

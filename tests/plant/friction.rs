@@ -1,7 +1,7 @@
 //! Dry friction: stable at the default step, and it only ever takes energy.
 
 use hexad::model::machine::Machine;
-use hexad::plant::integrator::PlantState;
+use hexad::plant::integrator::BodyState;
 use hexad::plant::simulator::{Brakes, Simulator};
 
 use super::common::machine;
@@ -61,7 +61,7 @@ fn dry_friction_holds() {
         let fastest = super::common::largest(&simulator.leg_motion().rate);
         assert!(fastest < smoothing, "{fastest} of {smoothing}");
     }
-    let PlantState { twist, .. } = *simulator.state();
+    let BodyState { twist, .. } = *simulator.state();
     assert!(twist.vector().norm() > 0.0);
 }
 

@@ -2,13 +2,13 @@
 
 use hexad::model::machine::Machine;
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::integrator::PlantState;
+use hexad::plant::integrator::BodyState;
 
 use super::common::{Errors, angle_between, machine};
 use super::{DEFAULT_STEP_S, home, integrate, shaking};
 
 /// The states after each `hold` of a motion whose forces are constant that long, with steps of `hold / steps`.
-fn motion(machine: &Machine, hold: f64, steps: u32, duration: f64) -> Vec<PlantState> {
+fn motion(machine: &Machine, hold: f64, steps: u32, duration: f64) -> Vec<BodyState> {
     let dynamics = ForwardDynamics::new(machine);
     let mut state = home(machine);
     let holds = (duration / hold).round() as u32;
@@ -23,7 +23,7 @@ fn motion(machine: &Machine, hold: f64, steps: u32, duration: f64) -> Vec<PlantS
 }
 
 /// Metres plus radians plus their rates.
-fn distance(a: &PlantState, b: &PlantState) -> f64 {
+fn distance(a: &BodyState, b: &BodyState) -> f64 {
     (a.pose.position - b.pose.position).norm()
         + angle_between(&a.pose.rotation, &b.pose.rotation)
         + (a.twist.vector() - b.twist.vector()).norm()

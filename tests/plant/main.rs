@@ -24,9 +24,9 @@ use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::hardware::Hardware;
 use hexad::plant::imperfections::{
-    BuildErrors, DriveErrors, Elastic, External, Friction, Imperfections, SensorErrors,
+    BuildErrors, DriveErrors, ElasticLeg, ExternalWrench, Friction, Imperfections, SensorErrors,
 };
-use hexad::plant::integrator::{Accelerations, Drives, PlantState, WholeState};
+use hexad::plant::integrator::{Accelerations, BodyState, DriveStates, PlantState};
 use hexad::plant::simulator::Simulator;
 use nalgebra::{Vector3, Vector6};
 
@@ -53,10 +53,10 @@ fn everything() -> Imperfections {
         seed: 5,
         drive: DriveErrors { bandwidth_hz: Some(80.0), force_step: 5.0, dead_time_ns: 1_500_000 },
         friction: Friction { viscous: 200.0, coulomb: 150.0, stiction: 100.0, ..Friction::default() },
-        leg: Some(Elastic { stiffness: 5e7, damping: 1e4, backlash: 2e-5 }),
+        leg: Some(ElasticLeg { stiffness: 5e7, damping: 1e4, backlash: 2e-5 }),
         sensor: SensorErrors { length_step: 1e-6, rate_step: 1e-4, length_noise: 2e-6, rate_noise: 1e-4 },
         build: BuildErrors { payload: 100.0, payload_at: Vector3::new(0.1, 0.0, 0.5), joints: 1e-4 },
-        external: External {
+        external: ExternalWrench {
             wrench: Wrench { torque: Vector3::new(50.0, 0.0, 0.0), force: Vector3::new(0.0, 100.0, 0.0) },
             frequency_hz: 2.0,
         },
@@ -69,26 +69,26 @@ fn holding(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     inverse_dynamics::<Exact>(machine, &motion).unwrap()
 }
 
-/// Drives that only push.
+/// DriveStates that only push.
 fn without_drives(mut machine: Machine) -> Machine {
     let actuator = &mut machine.actuator;
     (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) = (0.0, 0.0, 0.0);
     machine
 }
 
-fn home(machine: &Machine) -> PlantState {
-    PlantState { pose: TaskState::at_rest(machine.home).motion().pose, twist: Twist::default() }
+fn home(machine: &Machine) -> BodyState {
+    BodyState { pose: TaskState::at_rest(machine.home).motion().pose, twist: Twist::default() }
 }
 
 /// The model's state a step later under constant forces.
 fn integrate(
     dynamics: &ForwardDynamics,
-    start: &PlantState,
+    start: &BodyState,
     force: &[f64; LEGS],
     step: f64,
-) -> Option<PlantState> {
-    let start = WholeState { platform: *start, drives: Drives::default() };
-    let accelerations = |state: &WholeState, _| {
+) -> Option<BodyState> {
+    let start = PlantState { platform: *start, drives: DriveStates::default() };
+    let accelerations = |state: &PlantState, _| {
         let platform = dynamics.acceleration(&state.platform.pose, &state.platform.twist, force)?;
         Some(Accelerations { platform, drives: Vector6::zeros() })
     };
@@ -96,7 +96,7 @@ fn integrate(
 }
 
 /// Lengths and rates of the legs.
-fn legs(machine: &Machine, state: &PlantState) -> ([f64; LEGS], [f64; LEGS]) {
+fn legs(machine: &Machine, state: &BodyState) -> ([f64; LEGS], [f64; LEGS]) {
     let motion = Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() };
     let legs = leg_motion(machine, &motion);
     (legs.length, legs.rate)
@@ -104,7 +104,7 @@ fn legs(machine: &Machine, state: &PlantState) -> ([f64; LEGS], [f64; LEGS]) {
 
 /// Forces that carry the platform and shake it about home: six sines of up to `size` radii and as many
 /// radians, below `hertz`, and a damped spring of that frequency that brings it back.
-fn shaking(machine: &Machine, state: &PlantState, t: f64, size: f64, hertz: f64) -> [f64; LEGS] {
+fn shaking(machine: &Machine, state: &BodyState, t: f64, size: f64, hertz: f64) -> [f64; LEGS] {
     let w = core::f64::consts::TAU * hertz;
     let sine = |k: f64| (w * (0.3 + 0.09 * k) * t).sin() * size;
     let back = state.pose.displacement_to(&home(machine).pose);

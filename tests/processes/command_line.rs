@@ -2,6 +2,7 @@
 
 use std::ffi::OsStr;
 use std::fs::File;
+use std::path::Path;
 use std::process::Stdio;
 
 use crate::support::children::{HANG, hexad, run};
@@ -102,6 +103,25 @@ fn check_shows_a_good_machine() {
         assert!(ended.stdout.contains(words), "{words:?} must be in\n{}", ended.stdout);
     }
     assert_eq!(ended.stdout.matches(" deg\n").count(), 6, "a line for each leg:\n{}", ended.stdout);
+}
+
+#[test]
+fn check_draws_the_machine_or_says_why_not() {
+    let machine = Machine::patient("drawn");
+    let check = |drawing: &Path| {
+        let [check, config, option] = ["check", "--config", "--drawing"].map(AsRef::as_ref);
+        run::<&OsStr>(&machine, &[check, config, machine.file.as_ref(), option, drawing.as_ref()])
+    };
+    let drawing = machine.path("machine.svg");
+    let ended = check(&drawing);
+    assert_eq!((ended.status.code(), ended.stderr.as_str()), (Some(0), ""));
+    let svg = std::fs::read_to_string(&drawing).expect("a drawing");
+    for words in ["from above", "from the side", "in perspective", "x [m]", "y [m]", "z [m]"] {
+        assert!(svg.contains(words), "{words:?} must be in {}", drawing.display());
+    }
+    let ended = check(&machine.path("missing/machine.svg"));
+    assert_eq!(ended.status.code(), Some(1));
+    assert!(ended.stderr.contains("missing/machine.svg"), "{}", ended.stderr);
 }
 
 /// As of `hexad check | head -1`; and what could not be written is no success.

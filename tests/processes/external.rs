@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use hexad::commands::operate::Operator;
 use hexad::config::Config;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::daemon::report::Report;
 use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
@@ -63,7 +64,7 @@ fn a_cycle_per_message_and_silence_is_noticed() {
         .sum();
     println!("daemon held for {} us: {held} messages skipped", (to_ns - from_ns) / 1000);
     let lost: Vec<_> = report.faults.iter().map(|fault| (fault.number, fault.name.as_str())).collect();
-    assert_eq!(lost, [(Cause::MeasurementLost as u32, Cause::MeasurementLost.name())]);
+    assert_eq!(lost, [(DiagnosticCode::MeasurementLost as u32, DiagnosticCode::MeasurementLost.name())]);
     let typical_m = typical_error_m(&recording, lost_ns);
     println!("typically {typical_m:.1e} m from the setpoint");
     assert!((1e-12..50e-6).contains(&typical_m), "{typical_m} m");
@@ -105,7 +106,7 @@ fn every_message_is_counted(recording: &Recording, steps: &[Step]) {
             assert_eq!((step.cycles, step.skipped), (1, 0), "{step:#?}");
             assert_eq!(
                 (step.after.valid, step.after.diagnostic_code),
-                (0, Cause::MeasurementLost as u32),
+                (0, DiagnosticCode::MeasurementLost as u32),
                 "{step:#?}"
             );
             assert!(after_ns - before_ns >= TIMEOUT_NS, "{step:#?}");
@@ -168,7 +169,7 @@ fn lock_step() {
         under_control += usize::from(force.valid == 1);
         took.push(asked.elapsed());
         match (took.len() < CYCLES, force.valid) {
-            (true, 0) if force.diagnostic_code == Cause::NotAsked as u32 => {
+            (true, 0) if force.diagnostic_code == DiagnosticCode::ReadyToEngage as u32 => {
                 operator.send(Request::Engage).expect("to send");
             }
             (false, 0) => break,

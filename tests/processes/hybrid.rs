@@ -108,7 +108,7 @@ fn run(release: &str) -> (Figures, f64) {
 /// Median of release to force seen \[ns\].
 fn poll(machine: &str, cpu: usize) -> u64 {
     let _ = (scheduling::fifo_priority(PRIORITY), scheduling::bind_to_cpu(cpu));
-    scheduling::sharp_timers();
+    scheduling::set_shortest_timer_slack();
     let mut forces =
         Bus::join(machine).and_then(|bus| bus.subscriber::<ForceMessage>(1)).expect("to subscribe");
     let grid = Grid::new(PERIOD_NS, PERIOD_NS / 2);

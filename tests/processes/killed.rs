@@ -1,6 +1,7 @@
 //! SIGKILL in full motion, then a restart and one `engage`, without anybody cleaning up.
 
-use hexad::control::state::{Cause, Request};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::Request;
 use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
 
@@ -23,7 +24,7 @@ fn a_killed_plant_comes_back() {
     let mut trio = Trio::in_motion("killed-plant");
     let from_ns = monotonic_ns();
     trio.plant.kill();
-    trio.loses_force_for(Cause::MeasurementLost);
+    trio.loses_force_for(DiagnosticCode::MeasurementLost);
     trio.daemon.says("fault: measurement lost");
     trio.setpoints.says("the daemon gave up control or is gone");
     let to_ns = monotonic_ns();
@@ -31,7 +32,7 @@ fn a_killed_plant_comes_back() {
     operator::clear_and_engage(&trio.machine);
     trio.moves_after(to_ns);
     let recording = trio.finish();
-    lost_for(Cause::MeasurementLost, &Outage { from_ns, to_ns }, &recording);
+    lost_for(DiagnosticCode::MeasurementLost, &Outage { from_ns, to_ns }, &recording);
 }
 
 #[test]
@@ -40,7 +41,7 @@ fn a_killed_setpoint_source_comes_back() {
     let mut trio = Trio::in_motion("killed-setpoints");
     let from_ns = monotonic_ns();
     trio.setpoints.kill();
-    trio.loses_force_for(Cause::SetpointLost);
+    trio.loses_force_for(DiagnosticCode::SetpointLost);
     trio.daemon.says("stopping: setpoint lost in motion");
     trio.daemon.says("fault: setpoint lost in motion");
     trio.plant.says("no valid force (setpoint lost in motion): brakes closing");
@@ -59,7 +60,7 @@ fn a_killed_setpoint_source_comes_back() {
     trio.moves_after(to_ns);
     let recording = trio.finish();
     let outage = Outage { from_ns, to_ns };
-    lost_for(Cause::SetpointLost, &outage, &recording);
+    lost_for(DiagnosticCode::SetpointLost, &outage, &recording);
     comes_to_rest_and_stays(&outage, &recording);
 }
 
@@ -88,7 +89,7 @@ fn a_killed_daemon_comes_back() {
 }
 
 /// The last cause during the outage was this one, and control came back after it.
-fn lost_for(cause: Cause, outage: &Outage, recording: &Recording) {
+fn lost_for(cause: DiagnosticCode, outage: &Outage, recording: &Recording) {
     let during = |time_ns: u64| (outage.from_ns..outage.to_ns).contains(&time_ns);
     let last =
         recording.forces.iter().rfind(|force| during(force.header.time_ns)).expect("the daemon ran on");

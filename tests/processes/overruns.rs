@@ -6,7 +6,8 @@
 use std::collections::HashSet;
 use std::time::Duration;
 
-use hexad::control::state::{Cause, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::State;
 use hexad::daemon::report::Report;
 use hexad::messages::ForceMessage;
 
@@ -82,7 +83,7 @@ fn in_control(machine: &Machine) {
     let refused = |_: &usize| {
         let ended = operator::ask(machine, "engage", &["--wait"]);
         assert!(
-            ended.status.success() || ended.stderr.contains(Cause::DeadlineMissed.name()),
+            ended.status.success() || ended.stderr.contains(DiagnosticCode::DeadlineMissed.name()),
             "{}",
             ended.stderr
         );
@@ -182,7 +183,7 @@ fn catch_up_runs_at_most_so_many_at_once() {
 fn fault_stops_from_the_cycle_after_a_miss_on_and_from_no_other() {
     let _turn = turns::beside_others();
     let (holds, recording, report) = held("on_overrun = \"fault\"");
-    let missed = Cause::DeadlineMissed;
+    let missed = DiagnosticCode::DeadlineMissed;
     let steps = steps(&recording);
     every_miss_has_its_reason(&steps);
     let stops = |step: &Step| {
@@ -199,7 +200,7 @@ fn fault_stops_from_the_cycle_after_a_miss_on_and_from_no_other() {
     assert!(!stopped.is_empty(), "no step was seen whole");
     for step in steps.iter().filter(|step| step.cycles == 1 && step.before.state == State::Stopping as u32) {
         let then = State::from_number(step.after.state).expect("a state");
-        let asked = step.before.diagnostic_code == Cause::Asked as u32;
+        let asked = step.before.diagnostic_code == DiagnosticCode::OperatorRequest as u32;
         let latched =
             [State::Stopping, State::Fault].contains(&then) && step.after.diagnostic_code == missed as u32;
         assert!(asked || latched, "under control to rest, then a fault: {step:#?}");

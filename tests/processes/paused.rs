@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use hexad::control::state::{Cause, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::State;
 
 use crate::support::machine::{PERIOD_NS, TIMEOUT_NS};
 use crate::support::recorder::Recording;
@@ -69,7 +70,7 @@ fn brakes_held_until_control_was_taken_anew(from_ns: u64, recording: &Recording)
     let first = after[let_go];
     assert_eq!(
         (first.state, first.diagnostic_code),
-        (State::Fault as u32, Cause::MeasurementLost as u32),
+        (State::Fault as u32, DiagnosticCode::MeasurementLost as u32),
         "{first:#?}"
     );
     let again = after[let_go..].iter().any(|force| valid_after(force, from_ns));

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::Duration;
 
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::messages::Bus;
 use hexad::messages::SetpointMessage;
 use hexad::messages::clock::monotonic_ns;
@@ -19,7 +20,7 @@ use crate::support::trio::{Trio, let_pass, start_daemon, start_plant};
 use crate::support::{peer, rules, turns};
 
 /// Limits with which the daemon's own motions take one to three seconds: time to do something during them.
-const SLOW: &str = "[limits]\nacceleration_m_s2 = 0.05\njerk_m_s3 = 0.2\nown_share = 1.0\n";
+const SLOW: &str = "[limits]\nacceleration_m_s2 = 0.05\njerk_m_s3 = 0.2\nautonomous_scale = 1.0\n";
 
 /// Valid forces that may still be sent after a request: of the cycle that runs, of the one after it if its
 /// inputs had been read, and one that waits to be sent.
@@ -40,7 +41,7 @@ fn each_request_does_what_it_says() {
     engage(machine);
     trio.moves_after(monotonic_ns());
     does(machine, "park", &[], &["off"]);
-    trio.daemon.says("off: asked for");
+    trio.daemon.says("off: requested by the operator");
     let at_home = |recording: &Recording| {
         let measured = recording.measured.last().filter(|measured| rules::stands(measured))?;
         ((measured.x[3] - 1.1).abs() < 1e-3).then_some(())
@@ -175,7 +176,7 @@ fn estop_in(machine: &Machine, recorder: &Recorder, state: State, requests: &[&s
     let last = recording.forces.last().expect("forces");
     assert_eq!(
         (last.valid, last.state, last.diagnostic_code),
-        (0, State::Fault as u32, Cause::EmergencyStop as u32)
+        (0, State::Fault as u32, DiagnosticCode::EmergencyStop as u32)
     );
     let faults = recording.forces[first..]
         .iter()
@@ -183,7 +184,7 @@ fn estop_in(machine: &Machine, recorder: &Recorder, state: State, requests: &[&s
         .expect("a fault");
     let before = recording.forces[(first + faults).saturating_sub(1)];
     drop(recording);
-    if let Some(begun) = begun.filter(|_| before.state == state as u32 && state.controls()) {
+    if let Some(begun) = begun.filter(|_| before.state == state as u32 && state.has_control()) {
         let Ended { status, stderr, .. } = begun.ends_within(HANG);
         let told = state == State::Active
             || status.code() == Some(1)

@@ -119,16 +119,20 @@ fn what_the_daemon_would_refuse_is_told_before_it_begins() {
         (
             "velocity",
             limit("velocity_m_s = 0.06"),
-            &["line 7", "(velocity): 1.0", "times the limit (bound 1.0"],
+            &["line 7", ": velocity: ", "the setpoint is 1.0", " times the limit in [limits]"],
         ),
-        ("acceleration", limit("acceleration_m_s2 = 0.12"), &["line 4", "(acceleration): 1.0", "(bound 1.0"]),
-        ("jerk", limit("jerk_m_s3 = 0.5"), &["line 3", "t = 0.0010", "(jerk): 1.7", "(bound 1.0"]),
+        (
+            "acceleration",
+            limit("acceleration_m_s2 = 0.12"),
+            &["line 4", ": acceleration: ", "is 1.0", " times the limit"],
+        ),
+        ("jerk", limit("jerk_m_s3 = 0.5"), &["line 3", "t = 0.0010: jerk: ", "is 1.7", " times the limit"]),
         (
             "envelope",
             envelope.into(),
-            &["line 9", "outside of the envelope, leg or axis 4: 1.14", "(bound 1.14"],
+            &["line 9", "coordinate 1.14", " of axis 4 is outside [envelope], whose bound is 1.14"],
         ),
-        ("reach", String::new(), &["line 10", "beyond the stroke of a leg", " m (bound "]),
+        ("reach", String::new(), &["line 10", "beyond the stroke of a leg", " m of leg ", "whose bound is "]),
     ];
     for (name, sections, words) in cases {
         let machine = Machine::with("beforehand", &sections);

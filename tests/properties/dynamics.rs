@@ -43,9 +43,9 @@ proptest! {
         let load = InverseDynamics::new(&machine).load_of::<Exact>(&motion);
         let rates = Vector6::from(leg_motion(&machine, &motion).rate);
         let gamma = forces(&machine, &motion);
-        let power = (gamma - load.along).dot(&rates);
+        let power = (gamma - load.axial_forces).dot(&rates);
         let expected = load.wrench.dot(&motion.twist.vector());
-        let scale = (gamma - load.along).component_mul(&rates).abs().sum();
+        let scale = (gamma - load.axial_forces).component_mul(&rates).abs().sum();
         prop_assert!((power - expected).abs() < 1e-12 * scale, "{power} {expected}");
         prop_assert_eq!(load.leg_wrenches, leg_wrenches(&machine, &motion.pose));
     }

@@ -1,6 +1,6 @@
 //! Lengths, rates and accelerations of the legs, and the way back to pose and twist.
 
-use hexad::model::forward_kinematics::{Outcome, Tracked, Tracker, refine};
+use hexad::model::forward_kinematics::{Outcome, Tracker, TrackingResult, refine};
 use hexad::model::inverse_geometry::{leg_directions, leg_lengths, leg_motion};
 use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
 use hexad::model::kinematic_state::KinematicState;
@@ -83,7 +83,7 @@ proptest! {
         let lengths = leg_lengths(&machine, &motion.pose);
         let home = TaskState::at_rest(machine.home).motion().pose;
         let mut tracker = Tracker::new(&machine, home);
-        prop_assert_eq!(tracker.find(&machine, &lengths).0, Tracked::Found);
+        prop_assert_eq!(tracker.find(&machine, &lengths).0, TrackingResult::Found);
         let bound = 1e-14 * condition(&machine, &motion.pose) * largest(&lengths).max(1.0);
         prop_assert!((tracker.pose.position - motion.pose.position).norm() < bound);
         prop_assert!(angle_between(&tracker.pose.rotation, &motion.pose.rotation) < bound / machine.joints.radius);

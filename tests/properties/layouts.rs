@@ -3,7 +3,7 @@
 
 use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
 use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::{Tracked, Tracker};
+use hexad::model::forward_kinematics::{Tracker, TrackingResult};
 use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
 use hexad::model::machine::{LEGS, Machine};
@@ -51,7 +51,7 @@ proptest! {
         prop_assert!(condition < 10.0, "{condition}");
 
         let load = InverseDynamics::new(&machine).load_of::<Exact>(&motion);
-        let expected = leg_wrenches(&machine, &motion.pose).lu().solve(&load.wrench).unwrap() + load.along;
+        let expected = leg_wrenches(&machine, &motion.pose).lu().solve(&load.wrench).unwrap() + load.axial_forces;
         let force = inverse_dynamics::<Exact>(&machine, &motion).unwrap();
         prop_assert!(relative(&force, expected.as_slice()) < 1e-11, "{force:?} {expected}");
 
@@ -62,7 +62,7 @@ proptest! {
         let home = TaskState::at_rest(machine.home).motion().pose;
         let mut found = Tracker::new(&machine, home);
         let (tracked, _) = found.find(&machine, &leg_lengths(&machine, &motion.pose));
-        prop_assert_eq!(tracked, Tracked::Found);
+        prop_assert_eq!(tracked, TrackingResult::Found);
         prop_assert!((found.pose.position - motion.pose.position).norm() < 1e-12);
         prop_assert!(angle_between(&found.pose.rotation, &motion.pose.rotation) < 1e-12);
         prop_assert_eq!(Vector6::from(leg_lengths(&machine, &found.pose)).map(f64::is_finite), Vector6::repeat(true));

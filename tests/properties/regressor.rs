@@ -4,7 +4,8 @@ use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::machine::Machine;
 use hexad::model::regressor::{
-    INDISTINGUISHABLE, PARAMETERS, Parameters, Regressor, parameters_of, regressor, rod_mass_in_platform,
+    INDISTINGUISHABLE_PAIRS, InertialParameters, PARAMETER_COUNT, Regressor, inertial_parameters, regressor,
+    rod_mass_null_direction,
 };
 use hexad::model::rigid::Motion;
 use nalgebra::{DMatrix, Matrix3, Vector3, Vector6};
@@ -18,7 +19,7 @@ fn forces(machine: &Machine, motion: &Motion) -> Vector6<f64> {
 }
 
 /// `|Y| |p|`: what is summed up to a force, hence what rounding is a share of.
-fn summed(y: &Regressor, p: &Parameters) -> f64 {
+fn summed(y: &Regressor, p: &InertialParameters) -> f64 {
     (y.abs() * p.abs()).amax()
 }
 
@@ -26,7 +27,7 @@ fn summed(y: &Regressor, p: &Parameters) -> f64 {
 fn the_regressor_gives_the_forces_of_the_vectors() {
     for name in MACHINES {
         let machine = machine(name);
-        let p = parameters_of(&machine);
+        let p = inertial_parameters(&machine);
         let mut errors = Errors::default();
         for motion in motions(name) {
             let expected = forces(&machine, &motion);
@@ -38,7 +39,7 @@ fn the_regressor_gives_the_forces_of_the_vectors() {
 }
 
 /// The machine that has these parameters, on the geometry of another.
-fn with_parameters(mut machine: Machine, p: &Parameters) -> Machine {
+fn with_parameters(mut machine: Machine, p: &InertialParameters) -> Machine {
     let at = |index: usize| p[index];
     let center = Vector3::new(at(1), at(2), at(3)) / at(0);
     let about_c = Matrix3::new(at(4), at(7), at(8), at(7), at(5), at(9), at(8), at(9), at(6));
@@ -85,24 +86,24 @@ proptest! {
             other.transverse_inertia.quadratic = q;
         }
         for machine in [&machine, &other] {
-            let p = parameters_of(machine);
+            let p = inertial_parameters(machine);
             let difference = (y * p - forces(machine, &motion)).amax();
             prop_assert!(difference < 1e-12 * summed(&y, &p), "{difference:e} of {:e}", summed(&y, &p));
         }
         // And p says all there is to say about a machine.
-        let p = parameters_of(&other);
+        let p = inertial_parameters(&other);
         let rebuilt = with_parameters(machine, &p);
-        prop_assert!((parameters_of(&rebuilt) - p).amax() < 1e-12 * p.amax());
+        prop_assert!((inertial_parameters(&rebuilt) - p).amax() < 1e-12 * p.amax());
         prop_assert!((forces(&rebuilt, &motion) - forces(&other, &motion)).amax() < 1e-11 * summed(&y, &p));
     }
 
     #[test]
     fn some_parameters_show_only_in_combination((machine, _, motion) in machine_in_motion()) {
         let y = regressor(&machine, &motion).unwrap();
-        for [a, b] in INDISTINGUISHABLE {
+        for [a, b] in INDISTINGUISHABLE_PAIRS {
             prop_assert_eq!(y.column(a), y.column(b));
         }
-        let hidden = rod_mass_in_platform(&machine);
+        let hidden = rod_mass_null_direction(&machine);
         prop_assert!((y * hidden).amax() < 1e-12 * summed(&y, &hidden));
     }
 }
@@ -121,7 +122,7 @@ proptest! {
             let mut machine = machine.clone();
             let reference = machine.rod.transverse_inertia.reference_length;
             machine.cylinder.transverse_inertia.reference_length = reference + apart;
-            let mut stacked = DMatrix::zeros(6 * at.len(), PARAMETERS);
+            let mut stacked = DMatrix::zeros(6 * at.len(), PARAMETER_COUNT);
             for (i, at) in at.iter().enumerate() {
                 let mut state = state_near_home(&machine, at);
                 state.xd *= 3.0;

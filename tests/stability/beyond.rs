@@ -2,13 +2,14 @@
 //! is not taken for one that is still on the side of home: not until somebody has looked and said so.
 
 use hexad::control::controller::Output;
+use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad::control::limits::Limit;
-use hexad::control::state::{Cause, Evidence, Request, State};
+use hexad::control::state::{Request, State};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::rigid::{Pose, Wrench};
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{Profile, rise};
-use hexad::plant::imperfections::{External, Imperfections};
+use hexad::plant::imperfections::{ExternalWrench, Imperfections};
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector3;
 
@@ -40,7 +41,7 @@ fn there_and_back(t: f64, time_s: f64) -> TaskState {
 }
 
 fn pose_error(output: &Output, truth: &Pose) -> f64 {
-    output.measured.map_or(f64::NAN, |(pose, _)| pose.displacement_to(truth).vector().norm())
+    output.platform.map_or(f64::NAN, |platform| platform.pose.displacement_to(truth).vector().norm())
 }
 
 /// In standby, active, and in a fault; with the default limit of the condition and without one.
@@ -65,14 +66,14 @@ fn a_platform_that_passed_a_singular_pose_is_not_known_until_it_is_cleared() {
                 let output = carried(&mut rig, &task);
                 let truth = task.motion().pose;
                 crossed |= !before(&config.machine, &truth);
-                assert!(output.measured.is_none() || pose_error(&output, &truth) < 1e-6, "{what}");
+                assert!(output.platform.is_none() || pose_error(&output, &truth) < 1e-6, "{what}");
                 if crossed {
-                    assert!(output.measured.is_none(), "{what}: {output:?}");
+                    assert!(output.platform.is_none(), "{what}: {output:?}");
                     assert!(matches!(output.state, State::Off | State::Fault), "{what}: {output:?}");
                 }
                 if crossed && state == State::Standby {
-                    assert_eq!(output.cause, Cause::SingularPose, "{what}");
-                    let Evidence { value, bound, .. } = output.evidence;
+                    assert_eq!(output.diagnostic.code, DiagnosticCode::SingularPose, "{what}");
+                    let Diagnostic { value, bound, .. } = output.diagnostic;
                     assert!(value > bound && bound == condition.min(300.0), "{what}: {value} {bound}");
                 }
             }
@@ -81,11 +82,15 @@ fn a_platform_that_passed_a_singular_pose_is_not_known_until_it_is_cleared() {
             rig.ask(Request::Engage);
             for _ in 0..LOOK {
                 let output = carried(&mut rig, &home);
-                assert!(!output.state.controls() && output.measured.is_none(), "{what}: {output:?}");
+                assert!(!output.state.has_control() && output.platform.is_none(), "{what}: {output:?}");
             }
             rig.ask(Request::Clear);
             let output = (0..3).map(|_| carried(&mut rig, &home)).last().unwrap();
-            assert_eq!((output.state, output.cause), (State::Standby, Cause::NotAsked), "{what}");
+            assert_eq!(
+                (output.state, output.diagnostic.code),
+                (State::Standby, DiagnosticCode::ReadyToEngage),
+                "{what}"
+            );
             assert!(pose_error(&output, &home.motion().pose) < 1e-9, "{what}");
         }
     }
@@ -105,7 +110,7 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
             let home = on_the_way(AT_HOME, &Profile::default());
             rig.engage(&home);
             let plant = &config.deployment.plant;
-            let external = External { wrench, frequency_hz: 0.0 };
+            let external = ExternalWrench { wrench, frequency_hz: 0.0 };
             rig.simulator = Simulator::imperfect(
                 &config.machine,
                 plant.brake_deceleration_m_s2,
@@ -117,8 +122,8 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
             for _ in 0..3000 {
                 last = rig.cycle(&rig.input(&home));
                 assert!(largest(&last.force) <= 20e3);
-                assert!(!last.state.controls() || before(&config.machine, &rig.simulator.state().pose));
-                limited += u32::from(last.limiting.contains(Limit::Force));
+                assert!(!last.state.has_control() || before(&config.machine, &rig.simulator.state().pose));
+                limited += u32::from(last.active_limits.contains(Limit::Force));
             }
             assert!(limited > 10 && last.state == State::Fault, "{torque} {condition}: {last:?}");
         }
@@ -139,18 +144,18 @@ fn the_time_to_a_singular_pose_is_told() {
             task.xd[2] = speed;
             let output = carried(&mut rig, &task);
             let distance = AT_HOME - speed * t;
-            if output.measured.is_none() || k == 0 {
-                continue;
-            }
+            let Some(platform) = output.platform.filter(|_| k > 0) else { continue };
             told += 1;
-            let ratio = output.singular_in * speed / distance;
+            let ratio = platform.time_to_singularity * speed / distance;
             // The determinant is as good as linear at last, and taken from one measurement to the next.
             let near = (ratio - 1.0).abs() < 4.0 * distance + 1e-3 * speed / distance;
             assert!(
-                if speed > 0.0 { near } else { output.singular_in == f64::INFINITY },
+                if speed > 0.0 { near } else { platform.time_to_singularity == f64::INFINITY },
                 "{speed} {distance}: {ratio}"
             );
-            assert!((output.condition * distance / CONDITION - 1.0).abs() < 2.0 * distance * distance + 1e-3);
+            assert!(
+                (platform.condition * distance / CONDITION - 1.0).abs() < 2.0 * distance * distance + 1e-3
+            );
         }
         assert!(f64::from(told) > 0.9e3 * way, "{told}");
     }
@@ -187,8 +192,12 @@ fn further_than_the_steps_of_a_cycle_is_told_with_how_far_they_came() {
             continue;
         }
         out_of_steps += 1;
-        assert_eq!((output.state, output.cause), (State::Fault, Cause::MeasurementJumped), "{k}");
-        let Evidence { value, bound, .. } = output.evidence;
+        assert_eq!(
+            (output.state, output.diagnostic.code),
+            (State::Fault, DiagnosticCode::MeasurementJumped),
+            "{k}"
+        );
+        let Diagnostic { value, bound, .. } = output.diagnostic;
         assert!((value - largest(&ways)).abs() < 1e-12, "{k}: {output:?}");
         // A way that was found is within the bound; what is told of is beyond.
         assert!(0.0 < found && found < bound && bound < value, "{k}: {found}, {output:?}");

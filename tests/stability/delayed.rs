@@ -2,13 +2,16 @@
 
 #![allow(dead_code, reason = "the bench uses a part of it")]
 
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::parameters::Parameters;
+
 use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::gains::Gains;
 use hexad::control::law::{ControlMode, Law};
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
@@ -100,11 +103,11 @@ impl Delayed {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint { time_ns, task }),
             measurement: Some(Measurement { time_ns, length, rate }),
-            request: Some(Asked { request: Request::Engage, message: (START_NS, 1) }),
+            request: Some(OperatorRequest { request: Request::Engage, message: (START_NS, 1) }),
             deadline_missed: false,
         });
         self.hardware.advance(self.age_ns, self.force);
-        self.force = output.state.controls().then_some(output.force);
+        self.force = output.state.has_control().then_some(output.force);
         if let Some(force) = &mut self.force {
             let push = core::mem::take(&mut self.push);
             *force = core::array::from_fn(|leg| force[leg] + push[leg]);
@@ -115,21 +118,21 @@ impl Delayed {
     }
 
     /// So many cycles under control, or until the controller gives up, and why.
-    pub fn run(&mut self, cycles: usize) -> (Vec<Cycle>, Cause) {
+    pub fn run(&mut self, cycles: usize) -> (Vec<Cycle>, DiagnosticCode) {
         let mut seen = vec![];
         let mut before = State::Off;
         while seen.len() < cycles {
             let (cycle, output) = self.cycle();
-            if before.controls() && !output.state.controls() {
-                return (seen, output.cause);
+            if before.has_control() && !output.state.has_control() {
+                return (seen, output.diagnostic.code);
             }
             before = output.state;
-            if before.controls() {
+            if before.has_control() {
                 seen.push(cycle);
             }
-            assert!(self.now_ns < START_NS + 10 * self.period_ns || before.controls(), "{output:?}");
+            assert!(self.now_ns < START_NS + 10 * self.period_ns || before.has_control(), "{output:?}");
         }
-        (seen, Cause::None)
+        (seen, DiagnosticCode::None)
     }
 }
 
@@ -207,7 +210,7 @@ fn settles(config: &Config, setup: &Setup) -> bool {
         let (cycles, cause) = delayed.run(LONG / 4);
         let now = fastest(&cycles);
         // Beyond, the controller believes no more what it measures, and the loop is another.
-        if cause != Cause::None || now > 100.0 * PUSH {
+        if cause != DiagnosticCode::None || now > 100.0 * PUSH {
             return false;
         }
         if now < 1e-3 * PUSH {

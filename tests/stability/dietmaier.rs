@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use hexad::analysis::assembly_modes::{Region, modes};
-use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, Tracked, Tracker};
+use hexad::analysis::assembly_modes::{SearchRegion, find_modes};
+use hexad::model::forward_kinematics::{MAX_CONDITION, Outcome, Tracker, TrackingResult};
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
@@ -50,7 +50,7 @@ fn dietmaier() -> Machine {
 static MODES: LazyLock<Vec<KinematicState>> = LazyLock::new(|| {
     // The first joints are the origins, so C is at the first length from the origin.
     let center = Pose { rotation: Matrix3::identity(), position: Vector3::zeros() };
-    modes(&dietmaier(), &LENGTHS, &Region { center, turn: PI, shift: 1.0 }, STARTS)
+    find_modes(&dietmaier(), &LENGTHS, &SearchRegion { center, turn: PI, shift: 1.0 }, STARTS)
 });
 
 #[test]
@@ -81,9 +81,9 @@ fn small_motions_stay_on_their_mode() {
     for (k, mode) in MODES.iter().enumerate() {
         let sensitivity = mode.sensitivity();
         let size = sensitivity.trusted_step * 3.0;
-        if sensitivity.condition > LARGEST_CONDITION {
+        if sensitivity.condition > MAX_CONDITION {
             let mut tracker = Tracker::new(&dietmaier, *mode.pose());
-            assert_eq!(tracker.find(&dietmaier, &LENGTHS).0, Tracked::NotConverged, "mode {k}");
+            assert_eq!(tracker.find(&dietmaier, &LENGTHS).0, TrackingResult::NotConverged, "mode {k}");
             assert_eq!(tracker.outcome(), Outcome::NearSingular, "mode {k}");
             singular += 1;
             continue;
@@ -95,7 +95,7 @@ fn small_motions_stay_on_their_mode() {
             let shift = Vector3::new(b, -a, a) * dietmaier.joints.radius;
             let there = mode.pose().displaced(&Twist { angular: Vector3::new(a, b, -b), linear: shift });
             let lengths = leg_lengths(&dietmaier, &there);
-            assert_eq!(tracker.find(&dietmaier, &lengths).0, Tracked::Found, "mode {k}");
+            assert_eq!(tracker.find(&dietmaier, &lengths).0, TrackingResult::Found, "mode {k}");
             assert!(dietmaier.joints.distance(&tracker.pose, &there) < 1e-9, "mode {k}, step {step}");
         }
     }

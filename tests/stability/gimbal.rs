@@ -5,7 +5,8 @@ use core::f64::consts::FRAC_PI_2;
 
 use hexad::config::Config;
 use hexad::control::controller::Output;
-use hexad::control::state::{Cause, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::State;
 use hexad::model::rigid::{Motion, Pose};
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::rise;
@@ -111,8 +112,12 @@ fn forces(time_s: f64, d: f64) -> [Vec<[f64; 6]>; 2] {
         rig.engage(&home[which]);
         let cycle = |k: u32| {
             let task = tasks(f64::from(k) * 1e-3, time_s, d, height)[which];
-            let Output { state, cause, force, evidence, .. } = rig.cycle(&rig.input(&task));
-            assert_eq!((state, cause), (State::Active, Cause::None), "{d} rad, cycle {k}: {evidence:?}");
+            let Output { state, diagnostic, force, .. } = rig.cycle(&rig.input(&task));
+            assert_eq!(
+                (state, diagnostic.code),
+                (State::Active, DiagnosticCode::None),
+                "{d} rad, cycle {k}: {diagnostic:?}"
+            );
             force
         };
         (0..(time_s * 1e3) as u32 + 300).map(cycle).collect()

@@ -8,7 +8,7 @@ use hexad::control::limits::Limit;
 use hexad::control::state::State;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{Exact, Fidelity, MasslessLegs, RigidLegs};
-use hexad::model::forward_kinematics::{LARGEST_CONDITION, Outcome, refine};
+use hexad::model::forward_kinematics::{MAX_CONDITION, Outcome, refine};
 use hexad::model::inverse_geometry::{leg_directions, leg_lengths};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
@@ -101,9 +101,10 @@ fn through_the_axis_of_a_joint_forces_are_cut_or_know_nothing_of_it() {
                 *value += Vector6::new(0.0, 0.0, 0.0, along.x, along.y, along.z) * (0.08 * share);
             }
             let output = rig.cycle(&rig.input(&task));
-            assert_eq!(output.state, State::Active, "{fidelity:?} {beside:e}: {:?}", output.cause);
+            assert_eq!(output.state, State::Active, "{fidelity:?} {beside:e}: {:?}", output.diagnostic.code);
             cut += u32::from(
-                output.limiting.contains(Limit::Force) || output.limiting.contains(Limit::ForceRate),
+                output.active_limits.contains(Limit::Force)
+                    || output.active_limits.contains(Limit::ForceRate),
             );
             most = most.max(largest(&output.force));
         }
@@ -197,8 +198,7 @@ fn the_condition_of_nearly_parallel_legs_is_the_inverse_of_their_angle() {
         let mut there = home(&machine);
         there.position.z += step;
         let outcome = refine(&machine, &mut kinematic_state, &leg_lengths(&machine, &there)).outcome;
-        let expected =
-            if small / angle < LARGEST_CONDITION { Outcome::Solved } else { Outcome::NearSingular };
+        let expected = if small / angle < MAX_CONDITION { Outcome::Solved } else { Outcome::NearSingular };
         assert_eq!(outcome, expected, "{angle:e}");
     }
 }

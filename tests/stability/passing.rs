@@ -4,11 +4,12 @@
 
 use hexad::config::Config;
 use hexad::control::controller::Output;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
-use hexad::control::state::{Cause, State};
+use hexad::control::state::State;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
-use hexad::model::forward_kinematics::LARGEST_CONDITION;
+use hexad::model::forward_kinematics::MAX_CONDITION;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::rigid::{Motion, Wrench};
@@ -56,14 +57,14 @@ fn run(config: &Config, time_s: f64, distance: f64) -> Run {
         let task = there_and_back(f64::from(run.cycles) * 1e-3, time_s, distance);
         let output = rig.cycle(&rig.input(&task));
         let pose = rig.simulator.state().pose;
-        if output.state.controls() {
+        if output.state.has_control() {
             assert!(before(machine, &pose), "{time_s} s, {distance:e}: beyond");
             run.condition = run.condition.max(KinematicState::new(machine, pose).sensitivity().condition);
             run.force = run.force.max(largest(&output.force));
             let resting = Motion { pose, ..TaskState::default().motion() };
             run.holding = run.holding.max(largest(&inverse_dynamics::<Exact>(machine, &resting).unwrap()));
         }
-        if output.limiting.contains(Limit::Force) {
+        if output.active_limits.contains(Limit::Force) {
             run.limited.get_or_insert(run.cycles);
         } else {
             assert_eq!(output.wrench_error, Wrench::default());
@@ -106,12 +107,20 @@ fn nearer_than_the_limit_of_condition_is_stopped_before() {
         assert!(run.condition < 100.0, "{what}: {}", run.condition);
         if distance > CONDITION / 100.0 {
             assert_forces(&run, &what);
-            assert_eq!((run.last.state, run.last.cause), (State::Active, Cause::None), "{what}");
+            assert_eq!(
+                (run.last.state, run.last.diagnostic.code),
+                (State::Active, DiagnosticCode::None),
+                "{what}"
+            );
             assert!((run.condition * distance / CONDITION - 1.0).abs() < 0.02, "{what}: {}", run.condition);
             continue;
         }
-        assert_eq!((run.last.state, run.last.cause), (State::Fault, Cause::NearSingular), "{what}");
-        assert!(run.last.evidence.value > run.last.evidence.bound && run.last.evidence.bound == 100.0);
+        assert_eq!(
+            (run.last.state, run.last.diagnostic.code),
+            (State::Fault, DiagnosticCode::NearSingular),
+            "{what}"
+        );
+        assert!(run.last.diagnostic.value > run.last.diagnostic.bound && run.last.diagnostic.bound == 100.0);
         assert!(run.force < hardest && run.limited.is_none(), "{what}: {} N of {hardest} N", run.force);
         // It comes to rest where the last setpoint that was good would have ended: not far from the limit.
         assert!(run.condition > 50.0, "{what}: stopped at a condition of {}", run.condition);
@@ -125,18 +134,22 @@ fn without_a_limit_the_model_ends_before_the_singular_pose() {
     for (distance, time_s, run) in runs(ANY) {
         let what = format!("{distance:e} rad, {time_s} s");
         assert_forces(&run, &what);
-        if distance > CONDITION / LARGEST_CONDITION {
-            assert_eq!((run.last.state, run.last.cause), (State::Active, Cause::None), "{what}");
+        if distance > CONDITION / MAX_CONDITION {
+            assert_eq!(
+                (run.last.state, run.last.diagnostic.code),
+                (State::Active, DiagnosticCode::None),
+                "{what}"
+            );
             assert!((run.holding * distance / HOLDING_N - 1.0).abs() < 0.15, "{what}: {} N", run.holding);
             continue;
         }
         assert_eq!(run.last.state, State::Fault, "{what}");
         assert!(
-            [Cause::NearSingular, Cause::SingularPose].contains(&run.last.cause),
+            [DiagnosticCode::NearSingular, DiagnosticCode::SingularPose].contains(&run.last.diagnostic.code),
             "{what}: {:?}",
             run.last
         );
-        assert!((300.0..1.2 * LARGEST_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
+        assert!((300.0..1.2 * MAX_CONDITION).contains(&run.condition), "{what}: {}", run.condition);
     }
 }
 
@@ -158,7 +171,11 @@ fn saturation_on_the_way_is_told_and_ends_in_a_fault() {
             let run = run(&config, time_s, distance);
             assert!(run.limited.unwrap().abs_diff(more) <= 2, "{what}: {:?}, not {more}", run.limited);
             assert_eq!(run.force, 20e3, "{what}");
-            assert_eq!((run.last.state, run.last.cause), (State::Fault, Cause::OffPath), "{what}");
+            assert_eq!(
+                (run.last.state, run.last.diagnostic.code),
+                (State::Fault, DiagnosticCode::FollowingError),
+                "{what}"
+            );
         }
     }
 }
@@ -176,7 +193,7 @@ fn what_limited_forces_leave_out_is_told_as_a_wrench() {
     for k in 0.. {
         let task = there_and_back(f64::from(k) * 1e-3, 1.5, 0.1);
         let (output, wanted) = (rig.cycle(&rig.input(&task)), strong.cycle(&strong.input(&task)));
-        if output.limiting.contains(Limit::Force) {
+        if output.active_limits.contains(Limit::Force) {
             let more = Vector6::from(output.force) - Vector6::from(wanted.force);
             let wrench = leg_wrenches(&config.machine, &task.motion().pose) * more;
             let apart = (output.wrench_error.vector() - wrench).norm() / wrench.norm();

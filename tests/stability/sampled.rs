@@ -2,7 +2,7 @@
 
 use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::config::Config;
-use hexad::control::state::Cause;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::machine::LEGS;
 use hexad::model::task::TaskState;
@@ -61,7 +61,7 @@ fn at_the_limit_the_spectral_radius_is_one() {
 
 /// The push, run until it has faded or grown by a factor, against what the matrix makes of it, whatever part of the
 /// delay is before the release. Why it ended.
-fn as_predicted(sampled: SampledLoop, factor: f64) -> [Cause; 2] {
+fn as_predicted(sampled: SampledLoop, factor: f64) -> [DiagnosticCode; 2] {
     let config = in_space();
     let period_s = config.deployment.realtime.period_s();
     let transition = Transition::new(&sampled);
@@ -70,7 +70,7 @@ fn as_predicted(sampled: SampledLoop, factor: f64) -> [Cause; 2] {
     [0.0, sampled.delay.min(1.0)].map(|age| {
         let mut delayed = Delayed::new(&config, &Setup { age, ..Setup::of(sampled) });
         let (found, cause) = delayed.run(cycles);
-        assert_eq!((cause, found.len()), (Cause::None, cycles), "{sampled:?}");
+        assert_eq!((cause, found.len()), (DiagnosticCode::None, cycles), "{sampled:?}");
         let mut worst = 0.0_f64;
         for (predicted, found) in predicted.chunks(STRETCH).zip(found.chunks(STRETCH)) {
             let apart = predicted.iter().zip(found).map(|(e, cycle)| cycle.error.add_scalar(-e).amax());
@@ -90,7 +90,7 @@ fn below_the_limit_errors_fade_as_predicted() {
     for delay in DELAYS {
         for (share, damping_ratio) in [(0.2, 0.7), (0.2, 1.0), (0.9, 0.7), (0.9, 1.0)] {
             let sampled = at(share, SampledLoop { delay, damping_ratio, ..LOOP });
-            assert_eq!(as_predicted(sampled, 1e3), [Cause::None; 2]);
+            assert_eq!(as_predicted(sampled, 1e3), [DiagnosticCode::None; 2]);
         }
     }
 }
@@ -103,7 +103,7 @@ fn above_the_limit_errors_grow_as_predicted_until_the_controller_lets_go() {
             let causes = as_predicted(at(share, SampledLoop { delay, ..LOOP }), 30.0);
             println!("{share} of the limit, delay {delay}: {causes:?}");
             assert!(
-                causes.iter().all(|cause| [Cause::OffPath, Cause::RateJumped].contains(cause)),
+                causes.iter().all(|cause| [DiagnosticCode::FollowingError, DiagnosticCode::RateJumped].contains(cause)),
                 "{causes:?}"
             );
         }
@@ -149,9 +149,12 @@ fn a_mass_that_is_wrong_is_stable_and_sags_as_predicted() {
         let (cycles, cause) = Delayed::new(&config, &Setup::of(sampled)).run(2000);
         let stable = sampled.gain_margin() > 1.0;
         assert_eq!(stable, mass_ratio > 0.45);
-        assert_eq!(cause == Cause::None, stable, "{mass_ratio}: {cause:?}");
+        assert_eq!(cause == DiagnosticCode::None, stable, "{mass_ratio}: {cause:?}");
         if !stable {
-            assert!(cause == Cause::RateJumped || cause == Cause::OffPath, "{cause:?}");
+            assert!(
+                cause == DiagnosticCode::RateJumped || cause == DiagnosticCode::FollowingError,
+                "{cause:?}"
+            );
             continue;
         }
         let period_s = config.deployment.realtime.period_s();
@@ -166,7 +169,7 @@ fn a_mass_that_is_wrong_is_stable_and_sags_as_predicted() {
 fn noisy(config: &Config, sampled: SampledLoop, sensor: SensorErrors) -> Vector6<f64> {
     let setup = Setup { sensor, ..Setup::of(sampled) };
     let (cycles, cause) = Delayed::new(config, &setup).run(21_000);
-    assert_eq!(cause, Cause::None);
+    assert_eq!(cause, DiagnosticCode::None);
     let settled = &cycles[1000..];
     let sum: Vector6<f64> = settled.iter().map(|cycle| cycle.error.component_mul(&cycle.error)).sum();
     (sum / settled.len() as f64).map(f64::sqrt)

@@ -2,8 +2,8 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use hexad::analysis::assembly_modes::{Region, modes};
-use hexad::model::forward_kinematics::{Outcome, Tracked, Tracker, refine};
+use hexad::analysis::assembly_modes::{SearchRegion, find_modes};
+use hexad::model::forward_kinematics::{Outcome, Tracker, TrackingResult, refine};
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
@@ -69,7 +69,7 @@ pub fn trial(machine: &Machine, method: Method, x: [f64; 6]) -> End {
     let found = match method {
         Method::Hexad => {
             let mut tracker = Tracker::new(machine, rigid(machine.home));
-            (tracker.find(machine, &lengths).0 == Tracked::Found).then_some(tracker.pose)
+            (tracker.find(machine, &lengths).0 == TrackingResult::Found).then_some(tracker.pose)
         }
         Method::Rival(update) => {
             rivals::solve(machine, update, &machine.home, &lengths).map(|(x, _)| rigid(x))
@@ -86,9 +86,9 @@ pub fn trial(machine: &Machine, method: Method, x: [f64; 6]) -> End {
 /// side of home: what start-up has to ask before it believes one of them.
 pub fn ambiguous(machine: &Machine, x: [f64; 6]) -> bool {
     let center = rigid(machine.home);
-    let region = Region { center, turn: FRAC_PI_2, shift: 2.0 * machine.joints.radius };
+    let region = SearchRegion { center, turn: FRAC_PI_2, shift: 2.0 * machine.joints.radius };
     let home = KinematicState::new(machine, center).sensitivity().determinant;
-    let found = modes(machine, &leg_lengths(machine, &rigid(x)), &region, STARTS);
+    let found = find_modes(machine, &leg_lengths(machine, &rigid(x)), &region, STARTS);
     found.iter().filter(|mode| mode.sensitivity().determinant * home > 0.0).count() > 1
 }
 

@@ -5,10 +5,12 @@ use std::sync::LazyLock;
 
 use hexad::config::Config;
 use hexad::control::controller::{Input, Output};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::localization::PlatformState;
+use hexad::control::state::{Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -21,7 +23,7 @@ static CONFIG: LazyLock<Config> = LazyLock::new(|| {
     config.deployment.control.observer_bandwidth_hz = 0.3;
     config
 });
-static SCENE: LazyLock<Scene> = LazyLock::new(|| fit(&CONFIG.machine, Motion::Sines, 8.0));
+static SCENE: LazyLock<FittedMotion> = LazyLock::new(|| fit(&CONFIG.machine, BuiltInMotion::Sines, 8.0));
 
 /// What is wrong with the inputs for a while.
 #[derive(Clone, Copy, Debug)]
@@ -118,8 +120,8 @@ impl Watched {
             _ => {}
         }
         // Whoever stands, stands where the platform does.
-        if !self.before.state.controls()
-            && let Some((pose, _)) = self.before.measured
+        if !self.before.state.has_control()
+            && let Some(PlatformState { pose, .. }) = self.before.platform
         {
             self.stands_at = TaskState::at_rest(task_coordinates(&pose, &CONFIG.machine.home));
         }
@@ -155,11 +157,13 @@ impl Watched {
     /// What must hold in every cycle.
     fn check(&mut self, request: Option<Request>, now: &Output) {
         let before = self.before;
-        let (had, has) = (before.state.controls(), now.state.controls());
+        let (had, has) = (before.state.has_control(), now.state.has_control());
         self.seen[now.state as usize] = true;
         // Off and estop let go within the cycle, whatever else is wrong.
         match request {
-            Some(Request::Estop) => assert_eq!((now.state, now.cause), (State::Fault, Cause::EmergencyStop)),
+            Some(Request::Estop) => {
+                assert_eq!((now.state, now.diagnostic.code), (State::Fault, DiagnosticCode::EmergencyStop))
+            }
             Some(Request::Off) => assert!(matches!(now.state, State::Off | State::Fault), "{now:?}"),
             _ => {}
         }
@@ -174,7 +178,7 @@ impl Watched {
         }
         // Out of a fault only by clear; under control only by engage or park, after that.
         if now.state == State::Fault {
-            assert!(now.cause.is_fault(), "{now:?}");
+            assert!(now.diagnostic.code.is_fault(), "{now:?}");
             self.cleared = false;
         } else if before.state == State::Fault {
             assert_eq!(request, Some(Request::Clear));
@@ -193,20 +197,23 @@ impl Watched {
         let asked = self.rig.asked.map_or((0, 0), |asked| asked.message);
         assert_eq!(now.answered, asked);
         if request.is_none() {
-            assert_eq!((now.answered, now.refused), (before.answered, before.refused));
+            assert_eq!(
+                (now.answered, now.request_diagnostic.code),
+                (before.answered, before.request_diagnostic.code)
+            );
         }
         // A cause where something is in the way, none where nothing is.
         let free = matches!(now.state, State::Engaging | State::Active);
         let just_cleared = now.state == State::Off && before.state == State::Fault;
-        assert_eq!(now.cause == Cause::None, free || just_cleared, "{now:?}");
+        assert_eq!(now.diagnostic.code == DiagnosticCode::None, free || just_cleared, "{now:?}");
         // Counters only count, and only under control.
         for (then, now) in [
-            (before.without_measurement, now.without_measurement),
-            (before.without_setpoint, now.without_setpoint),
+            (before.missed_measurements, now.missed_measurements),
+            (before.missed_setpoints, now.missed_setpoints),
         ] {
             assert!(now == then || now == then + 1 && had);
         }
-        assert!(has || !now.limiting.contains(Limit::Force));
+        assert!(has || !now.active_limits.contains(Limit::Force));
     }
 }
 
@@ -229,7 +236,7 @@ proptest! {
             let mut rig = watched.rig.clone();
             rig.ask(request);
             let output = rig.controller.step(&Input { request: rig.asked, ..watched.last });
-            prop_assert!(!output.state.controls() && output.force == [0.0; 6]);
+            prop_assert!(!output.state.has_control() && output.force == [0.0; 6]);
         }
     }
 }

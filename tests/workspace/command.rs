@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use hexad::analysis::pose_quality::{Effort, Workspace};
+use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
 use hexad::model::task::TaskState;
 use tempfile::TempDir;
 
@@ -47,7 +47,7 @@ fn maps_tables_and_numbers_are_written() {
         assert!(line.chars().count() <= 120, "{line}");
     }
     let machine = deployed("motion_base").machine;
-    let judged = Workspace::new(&machine, Effort { linear: 2.0, angular: 20.0 });
+    let judged = PoseEvaluator::new(&machine, AccelerationDemand { linear: 2.0, angular: 20.0 });
     for plane in ["x-y", "x-z", "alpha-beta"] {
         let svg = fs::read_to_string(folder.path().join(plane).with_extension("svg")).unwrap();
         for words in ["stroke margin [mm]", "condition", "payload [kg]", "home", "prefers-color-scheme"] {

@@ -1,6 +1,6 @@
 //! Worst forces and payloads, found again by the ordinary inverse dynamics over many directions.
 
-use hexad::analysis::pose_quality::{Effort, Workspace};
+use hexad::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_lengths;
@@ -19,7 +19,7 @@ const POSES: u32 = 4;
 const CREEPING: f64 = 1e-3;
 
 /// The largest force over many directions of both accelerations and of a creeping motion.
-fn by_force(machine: &Machine, pose: Pose, effort: Effort) -> f64 {
+fn by_force(machine: &Machine, pose: Pose, effort: AccelerationDemand) -> f64 {
     let model = InverseDynamics::new(machine);
     let forces = (0..DIRECTIONS).map(|k| {
         let [angular, linear] = directions(k);
@@ -40,9 +40,9 @@ fn dry(name: &str) -> Machine {
 }
 
 /// An acceleration that asks for about a third of the actuators' force.
-fn effort(machine: &Machine) -> Effort {
+fn effort(machine: &Machine) -> AccelerationDemand {
     let linear = machine.actuator.max_force / machine.platform.mass;
-    Effort { linear, angular: linear / machine.joints.radius }
+    AccelerationDemand { linear, angular: linear / machine.joints.radius }
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn no_direction_asks_for_more_and_some_for_nearly_as_much() {
     for name in MACHINES {
         let machine = dry(name);
         let effort = effort(&machine);
-        let workspace = Workspace::new(&machine, effort);
+        let workspace = PoseEvaluator::new(&machine, effort);
         for k in 0..POSES {
             let pose = TaskState::at_rest(beside_home(&machine, k, 0.1)).motion().pose;
             let share = by_force(&machine, pose, effort) / workspace.quality(&pose).worst_force;
@@ -64,22 +64,22 @@ fn a_machine_with_its_payload_is_at_the_actuators_limit() {
     for name in MACHINES {
         let mut machine = dry(name);
         let pose = TaskState::at_rest(beside_home(&machine, 1, 0.1)).motion().pose;
-        let gentle = Effort { linear: 0.5, angular: 0.5 };
-        let bare = Workspace::new(&machine, gentle).quality(&pose);
+        let gentle = AccelerationDemand { linear: 0.5, angular: 0.5 };
+        let bare = PoseEvaluator::new(&machine, gentle).quality(&pose);
         // Whatever the machine: it can carry something.
         machine.actuator.max_force = 2.0 * bare.worst_force;
-        let payload = Workspace::new(&machine, gentle).quality(&pose).payload;
+        let payload = PoseEvaluator::new(&machine, gentle).quality(&pose).payload;
         assert!(payload > 0.0 && payload.is_finite(), "{name}: {payload}");
         let limit = machine.actuator.max_force;
         // At the centre of mass it adds neither a moment of inertia nor an arm.
         machine.platform.mass += payload;
         let share = by_force(&machine, pose, gentle) / limit;
         assert!((0.95..1.0 + 1e-5).contains(&share), "{name}: {share} with {payload} kg");
-        let loaded = Workspace::new(&machine, gentle).quality(&pose);
+        let loaded = PoseEvaluator::new(&machine, gentle).quality(&pose);
         assert!((loaded.worst_force / limit - 1.0).abs() < 1e-9, "{name}: {loaded:?}");
         assert!(loaded.payload < 1e-6 * payload, "{name}: {loaded:?}");
         machine.platform.mass += 0.01 * payload;
-        assert!(Workspace::new(&machine, gentle).quality(&pose).payload == 0.0, "{name}");
+        assert!(PoseEvaluator::new(&machine, gentle).quality(&pose).payload == 0.0, "{name}");
     }
 }
 
@@ -87,12 +87,12 @@ fn a_machine_with_its_payload_is_at_the_actuators_limit() {
 fn what_weighs_nothing_has_no_limit_and_what_is_too_much_carries_nothing() {
     let mut machine = machine("fried2008");
     let home = TaskState::at_rest(machine.home).motion().pose;
-    let hard = Effort { linear: 1e4, angular: 0.0 };
-    let quality = Workspace::new(&machine, hard).quality(&home);
+    let hard = AccelerationDemand { linear: 1e4, angular: 0.0 };
+    let quality = PoseEvaluator::new(&machine, hard).quality(&home);
     assert!(quality.payload == 0.0 && quality.worst_force > machine.actuator.max_force, "{quality:?}");
     machine.gravity = Vector3::zeros();
-    let still = Effort { linear: 0.0, angular: 0.0 };
-    let quality = Workspace::new(&machine, still).quality(&home);
+    let still = AccelerationDemand { linear: 0.0, angular: 0.0 };
+    let quality = PoseEvaluator::new(&machine, still).quality(&home);
     assert_eq!((quality.worst_force, quality.payload), (0.0, f64::INFINITY));
 }
 
@@ -100,7 +100,7 @@ fn what_weighs_nothing_has_no_limit_and_what_is_too_much_carries_nothing() {
 #[test]
 fn reach_ends_with_the_stroke_and_at_singular_poses() {
     let machine = machine("motion_base");
-    let workspace = Workspace::new(&machine, Effort { linear: 1.0, angular: 1.0 });
+    let workspace = PoseEvaluator::new(&machine, AccelerationDemand { linear: 1.0, angular: 1.0 });
     let at = |z: f64| {
         let [alpha, beta, gamma, x, y, _] = machine.home;
         workspace.quality(&TaskState::at_rest([alpha, beta, gamma, x, y, z]).motion().pose)

@@ -8,19 +8,19 @@ mod common;
 mod forces;
 mod regions;
 
-use hexad::analysis::envelope::Envelope;
+use hexad::analysis::envelope::MotionEnvelope;
 use hexad::model::machine::Machine;
 use nalgebra::Vector3;
 
 /// Numbers in -1..1, six of the k-th even point.
 fn numbers(k: u32) -> [f64; 6] {
-    let shares = Envelope::spread(k);
+    let shares = MotionEnvelope::spread(k);
     core::array::from_fn(|axis| 2.0 * shares[axis] - 1.0)
 }
 
 /// Two directions, evenly over both spheres.
 fn directions(k: u32) -> [Vector3<f64>; 2] {
-    let shares = Envelope::spread(k);
+    let shares = MotionEnvelope::spread(k);
     [0, 2].map(|first| {
         let (z, angle) = (2.0 * shares[first] - 1.0, core::f64::consts::TAU * shares[first + 1]);
         let radius = (1.0 - z * z).sqrt();

@@ -1,8 +1,8 @@
 //! Regions that are said to be without obstacle have none, and hardly larger ones have one.
 
-use hexad::analysis::clearance::{Cell, Clearance, Obstacle, Shape};
-use hexad::analysis::reachable_envelope::nominal_box;
-use hexad::analysis::region_search::{Found, largest};
+use hexad::analysis::clearance::{Clearance, PoseCell, RegionShape, WorkspaceLimit};
+use hexad::analysis::reachable_envelope::nominal_bounds;
+use hexad::analysis::region_search::{RegionBounds, largest_region};
 use hexad::config::Config;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::inverse_jacobian::scaled_wrenches;
@@ -18,10 +18,10 @@ use super::{directions, numbers};
 const SAMPLES: u32 = 50_000;
 const TURN: f64 = 0.17;
 
-fn found(config: &Config, shape: &Shape) -> Found {
+fn found(config: &Config, shape: &RegionShape) -> RegionBounds {
     let condition = config.deployment.limits.condition;
     let clearance = Clearance::new(&config.machine, condition);
-    largest(&config.machine, &clearance, shape, &ProgressBar::hidden())
+    largest_region(&config.machine, &clearance, shape, &ProgressBar::hidden())
 }
 
 /// How far from the nearest end of a stroke, and what is said of a pose by singular values and a determinant of LU.
@@ -59,7 +59,7 @@ fn of_ball(machine: &Machine, k: u32, radius: f64, turn: f64) -> Pose {
 
 /// A pose of the box: first all corners, then some inside.
 fn of_box(machine: &Machine, k: u32, size: f64) -> Pose {
-    let high = nominal_box(machine).pose_max;
+    let high = nominal_bounds(machine).pose_max;
     let corner = |axis: usize| if k >> axis & 1 == 0 { -1.0 } else { 1.0 };
     let share = |axis| if k < 64 { corner(axis) } else { numbers(k)[axis] };
     let x = core::array::from_fn(|axis| machine.home[axis] + size * high[axis] * share(axis));
@@ -72,17 +72,17 @@ fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
         let config = deployed(name);
         let machine = &config.machine;
         for turn in [0.0, TURN] {
-            let found = found(&config, &Shape::Ball { turn });
+            let found = found(&config, &RegionShape::Ball { turn });
             println!("{name}, turned {turn}: {found:?}");
             assert!(found.guaranteed > 0.1 * machine.joints.radius, "{name}: {found:?}");
             let bad = (0..SAMPLES).find(|k| !is_fine(&config, &of_ball(machine, *k, found.guaranteed, turn)));
             assert_eq!(bad, None, "{name}: {found:?}");
             // C comes as far along a leg as that leg has stroke left: that is the ball of an orientation.
-            let (size, obstacle) = found.obstacle.unwrap();
+            let (size, obstacle) = found.violation.unwrap();
             let least = (0..SAMPLES).map(|k| margin(machine, &of_ball(machine, 2 * k, 0.0, turn)));
             let least = least.fold(f64::INFINITY, f64::min);
             match obstacle {
-                Obstacle::Short(_) | Obstacle::Long(_) => {
+                WorkspaceLimit::LegTooShort(_) | WorkspaceLimit::LegTooLong(_) => {
                     assert!(
                         size <= least * (1.0 + 1e-9) && size > 0.98 * least,
                         "{name}: {found:?}, {least}"
@@ -91,12 +91,12 @@ fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
                 _ => assert!(size < least, "{name}: {found:?}, {least}"),
             }
         }
-        let high = nominal_box(machine).pose_max;
-        let found = found(&config, &Shape::Box { low: high.map(|x| -x), high });
+        let high = nominal_bounds(machine).pose_max;
+        let found = found(&config, &RegionShape::Box { low: high.map(|x| -x), high });
         println!("{name}, box: {found:?}");
         let fine = |size: f64| (0..SAMPLES).find(|k| !is_fine(&config, &of_box(machine, *k, size)));
         assert_eq!(fine(found.guaranteed), None, "{name}: {found:?}");
-        assert!(fine(1.02 * found.obstacle.unwrap().0).is_some(), "{name}: {found:?}");
+        assert!(fine(1.02 * found.violation.unwrap().0).is_some(), "{name}: {found:?}");
     }
 }
 
@@ -105,15 +105,15 @@ fn balls_and_boxes_have_no_obstacle_and_larger_ones_do() {
 fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
     for name in ["fried2008", "motion_base", "reference"] {
         let config = deployed(name);
-        let high = nominal_box(&config.machine).pose_max;
+        let high = nominal_bounds(&config.machine).pose_max;
         let shapes = [
-            Shape::Ball { turn: 0.0 },
-            Shape::Ball { turn: TURN },
-            Shape::Box { low: high.map(|x| -x), high },
+            RegionShape::Ball { turn: 0.0 },
+            RegionShape::Ball { turn: TURN },
+            RegionShape::Box { low: high.map(|x| -x), high },
         ];
         for shape in shapes {
             let found = found(&config, &shape);
-            let (size, _) = found.obstacle.unwrap();
+            let (size, _) = found.violation.unwrap();
             assert!(
                 found.guaranteed <= size && found.guaranteed > 0.95 * size,
                 "{name}, {shape:?}: {found:?}"
@@ -126,10 +126,10 @@ fn what_is_guaranteed_is_near_to_what_is_in_the_way() {
 #[test]
 fn a_turn_that_home_has_no_room_for_has_no_ball() {
     let config = Config::load(&data("telescope", "toml")).unwrap();
-    let none = found(&config, &Shape::Ball { turn: TURN });
-    let (size, obstacle) = none.obstacle.unwrap();
+    let none = found(&config, &RegionShape::Ball { turn: TURN });
+    let (size, obstacle) = none.violation.unwrap();
     assert!(none.guaranteed == 0.0 && size <= 0.0, "{none:?}");
-    assert!(matches!(obstacle, Obstacle::Short(_) | Obstacle::Long(_)), "{none:?}");
+    assert!(matches!(obstacle, WorkspaceLimit::LegTooShort(_) | WorkspaceLimit::LegTooLong(_)), "{none:?}");
 }
 
 /// Fichter: a quarter turn about the vertical makes this layout singular, whatever its size. A surface without
@@ -143,17 +143,17 @@ fn a_singular_surface_between_samples_is_found() {
     let config = Config::parse(&(text + "\n[limits]\ncondition = 1e6\n"), "turned.toml").unwrap();
     let mut high = [0.0; 6];
     high[2] = 1_f64.to_radians();
-    let found = found(&config, &Shape::Box { low: high.map(|x| -x), high });
-    let (size, obstacle) = found.obstacle.unwrap();
-    assert!(matches!(obstacle, Obstacle::Singular | Obstacle::Condition), "{found:?}");
+    let found = found(&config, &RegionShape::Box { low: high.map(|x| -x), high });
+    let (size, obstacle) = found.violation.unwrap();
+    assert!(matches!(obstacle, WorkspaceLimit::Singular | WorkspaceLimit::Condition), "{found:?}");
     assert!((size - 10.0).abs() < 1e-2, "{found:?}");
     assert!(found.guaranteed > 9.9 && found.guaranteed < 10.0, "{found:?}");
     // The proof itself: poses beyond it would be met by their sign, those of a cell that it cuts by nothing else.
     let clearance = Clearance::new(&config.machine, 1e6);
     let proved = |angle: f64, half: f64| {
-        let mut cell = Cell { middle: [0.0; 6], half: [0.0; 6] };
+        let mut cell = PoseCell { middle: [0.0; 6], half: [0.0; 6] };
         (cell.middle[2], cell.half[2]) = (10_f64.to_radians() + angle, half);
-        clearance.is_regular(&Shape::Box { low: high.map(|x| -x), high }, &cell)
+        clearance.is_regular(&RegionShape::Box { low: high.map(|x| -x), high }, &cell)
     };
     for half in [1e-1, 1e-2, 1e-3, 1e-4] {
         for share in [-0.99, -0.4, 0.1, 0.7, 0.99] {
@@ -164,13 +164,13 @@ fn a_singular_surface_between_samples_is_found() {
 }
 
 /// A pose of a cell by numbers in -1..1, multiplied out without the code under test.
-fn of_cell(machine: &Machine, shape: &Shape, cell: &Cell, numbers: &[f64; 6]) -> Pose {
+fn of_cell(machine: &Machine, shape: &RegionShape, cell: &PoseCell, numbers: &[f64; 6]) -> Pose {
     let p: [f64; 6] = core::array::from_fn(|axis| cell.middle[axis] + cell.half[axis] * numbers[axis]);
     let home = TaskState::at_rest(machine.home).motion().pose;
     let [alpha, beta, gamma, ..] = machine.home;
     let rotation = match shape {
-        Shape::Ball { .. } => rotation(p[0], p[1], p[2]) * home.rotation,
-        Shape::Box { .. } => rotation(alpha + p[0], beta + p[1], gamma + p[2]),
+        RegionShape::Ball { .. } => rotation(p[0], p[1], p[2]) * home.rotation,
+        RegionShape::Box { .. } => rotation(alpha + p[0], beta + p[1], gamma + p[2]),
     };
     Pose { rotation, position: home.position + Vector3::new(p[3], p[4], p[5]) }
 }
@@ -184,12 +184,12 @@ fn no_pose_of_a_cell_is_beyond_its_bounds() {
         let config = deployed(name);
         let machine = &config.machine;
         let radius = machine.joints.radius;
-        let shapes = [Shape::Ball { turn: 1.0 }, Shape::Box { low: [-1.0; 6], high: [1.0; 6] }];
+        let shapes = [RegionShape::Ball { turn: 1.0 }, RegionShape::Box { low: [-1.0; 6], high: [1.0; 6] }];
         for (k, shape) in (0..60).flat_map(|k| shapes.iter().map(move |shape| (k, shape))) {
             let scales = [0.3, 0.3, 0.3, 0.2 * radius, 0.2 * radius, 0.2 * radius];
             let (place, size) = (numbers(k), numbers(k + 1000));
             let share = 0.6_f64.powi(k as i32 % 12);
-            let cell = Cell {
+            let cell = PoseCell {
                 middle: core::array::from_fn(|axis| scales[axis] * place[axis]),
                 half: core::array::from_fn(|axis| share * scales[axis] * size[axis].abs()),
             };

@@ -14,11 +14,12 @@ use self::summary::Summary;
 use super::operate::Operator;
 use crate::config::text::text_of;
 use crate::config::{Config, ConfigError};
-use crate::control::state::{Cause, Request, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::{Request, State};
 use crate::daemon::report::Report;
 use crate::messages::PortError;
-use crate::output::charts::ChartError;
 use crate::output::files::{FileError, print, write_whole};
+use crate::output::svg::ChartError;
 use crate::realtime::stop_request::Stop;
 
 pub mod children;
@@ -88,7 +89,7 @@ pub fn run(demo: &Demo, stop: &Stop) -> Result<(), DemoError> {
     let tracking = recording.tracking();
     let mut report = Report::read(&stage.report)?;
     report.tracking = tracking.tracking();
-    let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config.machine, &recording)?;
+    let pictures = pictures::write_all(&demo.charts, &stage.title, &stage.config, &recording)?;
     print(Summary { title: &stage.title, report: &report })?;
     print(format_args!("pictures         {} in {}\n", pictures.len(), demo.charts.display()))?;
     if let Some(path) = &demo.report {
@@ -204,16 +205,16 @@ fn watch(
     let started = Instant::now();
     let bar = progress(seconds + AROUND_S);
     loop {
-        if stop.requested() {
+        if stop.is_requested() {
             return Err(DemoError::Interrupted);
         }
         recorder.poll();
         if let Some(status) = operator.status() {
             if status.state == State::Fault as u32 {
-                let cause = Cause::from_number(status.diagnostic.code).unwrap_or_default();
-                return Err(DemoError::NotWell(format!("fault: {}; {}", cause.name(), cause.remedy())));
+                let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+                return Err(DemoError::NotWell(format!("fault: {diagnostic}")));
             }
-            if status.diagnostic.code == Cause::NotAsked as u32 {
+            if status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
                 operator.send(Request::Engage)?;
             }
         }

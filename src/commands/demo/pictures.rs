@@ -3,11 +3,14 @@
 use std::path::Path;
 
 use super::recording::{Recording, desired_motion, measured_pose};
+use crate::config::Config;
+use crate::control::input_validation::seconds_between;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::{LEGS, Machine};
-use crate::output::charts::{ChartError, Panel, Series, Stroke, write_svg};
+use crate::model::machine::LEGS;
+use crate::output::charts::{LineStyle, Panel, Series, write_svg};
+use crate::output::svg::ChartError;
 
 /// Values of six coordinates over time.
 type Lines = [Vec<(f64, f64)>; LEGS];
@@ -16,16 +19,16 @@ type Lines = [Vec<(f64, f64)>; LEGS];
 pub fn write_all(
     folder: &Path,
     name: &str,
-    machine: &Machine,
+    config: &Config,
     recording: &Recording,
 ) -> Result<Vec<&'static str>, ChartError> {
-    let signals = Signals::new(machine, recording);
+    let signals = Signals::new(config, recording);
     let mut written = vec![];
     let mut write = |file: &'static str, title: &str, panels: &[Panel]| {
         written.push(file);
         write_svg(&folder.join(file), &format!("{name}: {title}"), "time [s]", panels)
     };
-    let Signals { commanded, measured, tracking } = &signals;
+    let Signals { commanded, measured, tracking, .. } = &signals;
     for (file, title, angular, linear, pair) in [
         (
             "trajectory.svg",
@@ -61,17 +64,27 @@ pub fn write_all(
             "acceleration [m/s²]",
             [&commanded.accel, &measured.accel],
         ),
-        (
-            "forces.svg",
-            "actuator forces, applied and (dashed) by inverse dynamics of the setpoint",
-            "force [N]",
-            [&commanded.force, &measured.force],
-        ),
     ] {
         write(file, title, &[panel(label, &LEG_NAMES, pair, 0..6)])?;
     }
-    let error =
-        |label, lines, color| Panel { y_label: label, series: vec![line("", lines, Stroke::Solid, color)] };
+    let difference = LEG_NAMES.iter().zip(&signals.force_difference).enumerate();
+    write(
+        "forces.svg",
+        "actuator forces, applied and (dashed) by inverse dynamics of the setpoint",
+        &[
+            panel("force [N]", &LEG_NAMES, [&commanded.force, &measured.force], 0..6),
+            Panel {
+                y_label: "applied - commanded [N]",
+                series: difference
+                    .map(|(k, (name, points))| line(name, points, LineStyle::Solid, k))
+                    .collect(),
+            },
+        ],
+    )?;
+    let error = |label, lines, color| Panel {
+        y_label: label,
+        series: vec![line("", lines, LineStyle::Solid, color)],
+    };
     let [position, orientation] = tracking;
     write(
         "tracking_error.svg",
@@ -92,23 +105,28 @@ fn panel<'a>(
     which: core::ops::Range<usize>,
 ) -> Panel<'a> {
     let count = which.len();
-    let rows = || names.iter().zip(measured.iter().zip(commanded)).enumerate().skip(which.start).take(count);
-    let solid = rows().map(|(k, (name, (lines, _)))| line(name, lines, Stroke::Solid, k));
+    let curves = || names.iter().zip(measured.iter().zip(commanded));
+    // Colours count from the first curve of the panel, so that an axis has one colour in all panels.
+    let rows = || curves().skip(which.start).take(count).enumerate();
+    let solid = rows().map(|(k, (name, (lines, _)))| line(name, lines, LineStyle::Solid, k));
     // One word in the legend for all dashed lines.
-    let dashed = rows().enumerate().map(|(place, (k, (_, (_, lines))))| {
-        line(if place + 1 == count { "commanded" } else { "" }, lines, Stroke::Dashed, k)
+    let dashed = rows().map(|(k, (_, (_, lines)))| {
+        line(if k + 1 == count { "commanded" } else { "" }, lines, LineStyle::Dashed, k)
     });
     Panel { y_label, series: solid.chain(dashed).collect() }
 }
 
-fn line<'a>(label: &'a str, points: &'a [(f64, f64)], style: Stroke, color: usize) -> Series<'a> {
+fn line<'a>(label: &'a str, points: &'a [(f64, f64)], style: LineStyle, color: usize) -> Series<'a> {
     Series { label, points, style, color }
 }
 
 /// Every curve of every picture.
+#[derive(Default)]
 struct Signals {
     commanded: Curves,
     measured: Curves,
+    /// Applied minus commanded, at the instants of the applied ones \[N\].
+    force_difference: Lines,
     /// Norms: position \[um\], orientation \[urad\].
     tracking: [Vec<(f64, f64)>; 2],
 }
@@ -126,12 +144,13 @@ struct Curves {
 }
 
 impl Signals {
-    fn new(machine: &Machine, recording: &Recording) -> Self {
+    fn new(config: &Config, recording: &Recording) -> Self {
+        let machine = &config.machine;
+        let period_ns = (1e9 * config.deployment.realtime.period_s()) as u64;
         let start_ns = recording.start_ns();
-        let seconds = |time_ns: u64| (time_ns as f64 - start_ns as f64) * 1e-9;
-        let mut signals =
-            Self { commanded: Curves::default(), measured: Curves::default(), tracking: [vec![], vec![]] };
-        let Self { commanded, measured, tracking } = &mut signals;
+        let seconds = |time_ns: u64| seconds_between(start_ns, time_ns);
+        let mut signals = Self::default();
+        let Self { commanded, measured, force_difference, tracking } = &mut signals;
         let model = InverseDynamics::new(machine);
         for setpoint in &recording.setpoints {
             let t = seconds(setpoint.header.time_ns);
@@ -170,6 +189,12 @@ impl Signals {
         }
         for force in recording.forces.iter().filter(|force| force.valid == 1) {
             push(&mut measured.force, seconds(force.header.time_ns), force.force_n);
+        }
+        for (message, desired) in recording.force_pairs(period_ns) {
+            let commanded = model.forces::<Exact>(&desired.motion()).unwrap_or([f64::NAN; LEGS]);
+            let mut difference = message.force_n;
+            difference.iter_mut().zip(commanded).for_each(|(force, commanded)| *force -= commanded);
+            push(force_difference, seconds(message.header.time_ns), difference);
         }
         for (message, desired) in recording.pairs() {
             let t = seconds(message.header.time_ns);

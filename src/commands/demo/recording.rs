@@ -1,5 +1,7 @@
 //! What went over the topics during a demonstration, and how well it was tracked.
 
+use crate::control::controller::Setpoint;
+use crate::control::input_validation::seconds_between;
 use crate::daemon::report::TrackingSum;
 use crate::messages::{Bus, PortError, Subscriber};
 use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage};
@@ -58,17 +60,14 @@ impl Recording {
 
     /// Measurements with the desired motion at their instant, while setpoints cover it.
     pub fn pairs(&self) -> impl Iterator<Item = (&MeasuredMessage, TaskState)> {
-        let mut newest = 0;
-        self.measured.iter().filter_map(move |measured| {
-            let time_ns = measured.header.time_ns;
-            while self.setpoints.get(newest + 1).is_some_and(|next| next.header.time_ns <= time_ns) {
-                newest += 1;
-            }
-            let setpoint = self.setpoints.get(newest)?;
-            let age_ns = time_ns.checked_sub(setpoint.header.time_ns)?;
-            // A source that paused longer than this was not a source at that instant.
-            (age_ns < 100_000_000).then(|| (measured, task_state(setpoint).after(age_ns as f64 * 1e-9)))
-        })
+        with_desired(&self.setpoints, &self.measured, |message| message.header.time_ns)
+    }
+
+    /// Applied forces with the desired motion that they belong to: that in the middle of the period for which they are
+    /// held.
+    pub fn force_pairs(&self, period_ns: u64) -> impl Iterator<Item = (&ForceMessage, TaskState)> {
+        let middle_ns = move |message: &ForceMessage| message.release_ns.saturating_add(period_ns / 2);
+        with_desired(&self.setpoints, &self.forces, middle_ns).filter(|(force, _)| force.valid == 1)
     }
 
     /// Error between the desired pose and the plant's true one, over the instants in motion; over all if
@@ -85,9 +84,23 @@ impl Recording {
     }
 }
 
-/// X, X', X'' of a message.
-pub fn task_state(message: &SetpointMessage) -> TaskState {
-    TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() }
+/// Messages with the desired motion at an instant of each, while setpoints cover it.
+fn with_desired<'a, T>(
+    setpoints: &'a [SetpointMessage],
+    messages: &'a [T],
+    instant_ns: impl Fn(&T) -> u64 + 'a,
+) -> impl Iterator<Item = (&'a T, TaskState)> {
+    let mut newest = 0;
+    messages.iter().filter_map(move |message| {
+        let time_ns = instant_ns(message);
+        while setpoints.get(newest + 1).is_some_and(|next| next.header.time_ns <= time_ns) {
+            newest += 1;
+        }
+        let setpoint = setpoints.get(newest)?;
+        let age_s = seconds_between(setpoint.header.time_ns, time_ns);
+        // A source that paused longer than this was not a source at that instant.
+        (0.0..0.1).contains(&age_s).then(|| (message, Setpoint::from(setpoint).task.after(age_s)))
+    })
 }
 
 /// The pose a plant says it has.
@@ -97,5 +110,5 @@ pub fn measured_pose(message: &MeasuredMessage) -> Pose {
 
 /// Desired motion of a setpoint.
 pub fn desired_motion(message: &SetpointMessage) -> Motion {
-    task_state(message).motion()
+    Setpoint::from(message).task.motion()
 }

@@ -123,7 +123,7 @@ pub fn measure_all(
         all.push(latency);
     }
     bar.finish_and_clear();
-    Ok((!stop.requested()).then_some(all))
+    Ok((!stop.is_requested()).then_some(all))
 }
 
 fn plans(deployment: &Deployment, seconds: f64) -> Vec<Plan> {
@@ -195,7 +195,7 @@ fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
     let at_start = ThreadUsage::of_this_thread();
     let mut release_ns = grid.next_after(monotonic_ns());
     let end_ns = release_ns + nanoseconds(*seconds);
-    while release_ns < end_ns && !stop.requested() {
+    while release_ns < end_ns && !stop.is_requested() {
         let woke_ns = waiter.until(&mut Monotonic, release_ns);
         let wakeup_ns = woke_ns.saturating_sub(release_ns);
         histogram.record(wakeup_ns);

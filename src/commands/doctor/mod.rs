@@ -23,9 +23,9 @@ use crate::daemon::nanoseconds;
 use crate::daemon::start::prepare_loop;
 use crate::output::files::{FileError, print, write_whole};
 use crate::realtime::clock_cost::ClockCost;
-use crate::realtime::setup::idle::ShallowSleep;
+use crate::realtime::setup::idle::PmQosRequest;
 use crate::realtime::setup::permissions::Permissions;
-use crate::realtime::setup::refusals::Step;
+use crate::realtime::setup::refusals::SetupStep;
 use crate::realtime::setup::{Shortfall, idle, memory};
 use crate::realtime::stop_request::Stop;
 
@@ -49,7 +49,7 @@ pub struct Doctor {
     pub disturb: bool,
 }
 
-/// Why there is no diagnosis, or a bad one.
+/// Explanation there is no diagnosis, or a bad one.
 #[derive(Debug, thiserror::Error)]
 pub enum DoctorError {
     #[error(transparent)]
@@ -153,7 +153,7 @@ fn asked(
     if configured.scheduler == Scheduler::Deadline {
         return Err(DoctorError::Placed);
     }
-    match permissions.against(&Step::Cpu(cpu)) {
+    match permissions.refusal_of(&SetupStep::Cpu(cpu)) {
         Some(shortfall) => Err(DoctorError::Cpu(shortfall)),
         None => Ok(Realtime { cpu: Some(cpu), ..configured.clone() }),
     }
@@ -161,19 +161,19 @@ fn asked(
 
 /// Asks for everything that the daemon asks for, on a thread that then ends. What the process was granted
 /// holds until it ends, or the result is dropped.
-fn prepare(realtime: &Realtime) -> Result<(Refused, Option<ShallowSleep>), DoctorError> {
+fn prepare(realtime: &Realtime) -> Result<(Refused, Option<PmQosRequest>), DoctorError> {
     let probe = thread::scope(|threads| {
         let thread = thread::Builder::new().spawn_scoped(threads, || prepare_loop(realtime, || ()))?;
         thread.join().map_err(|_| io::Error::other("it has died"))
     })?;
-    let shallow_sleep = idle::bound_wakeup(realtime.cpu_dma_latency_us);
+    let shallow_sleep = idle::limit_wakeup_latency(realtime.cpu_dma_latency_us);
     let locked_memory = if realtime.lock_memory { memory::lock_all().err() } else { None };
     let refused =
         Refused { thread: probe, shallow_sleep: shallow_sleep.as_ref().err().cloned(), locked_memory };
     Ok((refused, shallow_sleep.ok()))
 }
 
-/// Why the daemon would not start.
+/// Explanation the daemon would not start.
 fn refusal(realtime: &Realtime, refused: &Refused) -> Option<String> {
     let lacking: Vec<_> = refused.all().map(|shortfall| shortfall.what.as_str()).collect();
     (realtime.require_realtime && !lacking.is_empty()).then(|| {

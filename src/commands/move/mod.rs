@@ -13,20 +13,22 @@ use super::offline::task_state;
 use super::operate::Operator;
 use super::plant::prepare_thread;
 use crate::config::Config;
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::input_validation::seconds_between;
+use crate::control::limits::{AxisLimits, Limits};
+use crate::control::state::{Request, State};
 use crate::daemon::nanoseconds;
 use crate::messages::lockstep::poll_until;
 use crate::output::numbers::percent;
 mod precheck;
 use self::precheck::{Refusal, Rehearsal};
 use crate::analysis::sampled_loop::boundary;
-use crate::control::limits::{AxisLimits, Limits};
-use crate::control::state::{Cause, Request, State};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{MeasuredMessage, SetpointMessage, StatusMessage};
 use crate::messages::{PortError, Publisher, Subscriber};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::motion::built_in::{Motion, Scene, fit};
+use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use crate::motion::minimum_jerk::shortest_duration;
 use crate::motion::timeline::Timeline;
 use crate::motion::trajectory::{Knot, interpolate};
@@ -64,24 +66,24 @@ pub enum SetpointError {
     #[error(transparent)]
     Table(#[from] TableError),
     #[error("{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}", name = .motion.name(), share = percent(LEAST_SHARE))]
-    TooSmall { motion: Motion, seconds: f64, refusal: Refusal },
+    TooSmall { motion: BuiltInMotion, seconds: f64, refusal: Refusal },
 }
 
 /// What to play.
 #[derive(Clone, Debug)]
 pub enum Score {
-    Scene(Scene),
+    FittedMotion(FittedMotion),
     Trajectory(Vec<Knot>),
 }
 
 impl Score {
     /// A built-in motion, as large as the machine can carry and the daemon accepts.
-    pub fn motion(config: &Config, motion: Motion, seconds: f64) -> Result<Self, SetpointError> {
+    pub fn motion(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<Self, SetpointError> {
         let rehearsal = Rehearsal::new(config).with_reserve();
         let largest = fit(&config.machine, motion, seconds);
         let spans = (seconds / SPAN_S).ceil().clamp(1.0, MOST_SPANS) as u32;
-        let refusal = |scene: &Scene| rehearsal.first_refusal(|t| scene.at(t), seconds, spans);
-        let Some(too_large) = refusal(&largest) else { return Ok(Self::Scene(largest)) };
+        let refusal = |scene: &FittedMotion| rehearsal.first_refusal(|t| scene.at(t), seconds, spans);
+        let Some(too_large) = refusal(&largest) else { return Ok(Self::FittedMotion(largest)) };
         let least = largest.smaller(LEAST_SHARE / largest.angle_share);
         if let Some(refusal) = refusal(&least) {
             return Err(SetpointError::TooSmall { motion, seconds, refusal });
@@ -92,7 +94,7 @@ impl Score {
             motion.name(),
             percent(share)
         );
-        Ok(Self::Scene(largest.smaller(share)))
+        Ok(Self::FittedMotion(largest.smaller(share)))
     }
 
     /// A trajectory from a CSV file. It must begin and end at rest, with times that increase, and be what the
@@ -152,7 +154,7 @@ impl Score {
     /// Seconds it takes.
     pub fn duration(&self) -> f64 {
         match self {
-            Self::Scene(scene) => scene.duration,
+            Self::FittedMotion(scene) => scene.duration,
             Self::Trajectory(knots) => knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t),
         }
     }
@@ -160,7 +162,7 @@ impl Score {
     /// X, X', X'' at `t`, within the duration.
     pub fn at(&self, t: f64) -> TaskState {
         match self {
-            Self::Scene(scene) => scene.at(t),
+            Self::FittedMotion(scene) => scene.at(t),
             Self::Trajectory(knots) => {
                 interpolate(knots, knots.first().map_or(0.0, |first| first.t) + t).unwrap_or_default()
             }
@@ -190,7 +192,7 @@ fn run_in_real_time(
     prepare_thread(config);
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
-    while !stop.requested() {
+    while !stop.is_requested() {
         sleep_until(tick_ns);
         match player.cue(tick_ns)? {
             Cue::Silent => {}
@@ -210,7 +212,7 @@ fn run_in_lockstep(
     stop: &Stop,
 ) -> Result<(), PortError> {
     let mut answered = None;
-    while let Some(asked) = poll_until(|| stop.requested(), || measured.receive()) {
+    while let Some(asked) = poll_until(|| stop.is_requested(), || measured.receive()) {
         let time_ns = asked.header.time_ns;
         let answer = match answered {
             Some((same_ns, answer)) if same_ns == time_ns => answer,
@@ -259,7 +261,7 @@ impl<'a> Player<'a> {
     fn cue(&mut self, now_ns: u64) -> Result<Cue, PortError> {
         if let Some(status) = self.operator.status() {
             self.listen(now_ns, &status);
-            if self.engage && status.diagnostic.code == Cause::NotAsked as u32 {
+            if self.engage && status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
                 self.operator.send(Request::Engage)?;
             }
         }
@@ -269,27 +271,27 @@ impl<'a> Player<'a> {
         }
         let Some(timeline) = &self.timeline else { return Ok(Cue::Silent) };
         // Until the daemon takes it, offer the pose at which the platform stands.
-        let t = self.engaged_ns.map_or(0.0, |engaged_ns| now_ns.saturating_sub(engaged_ns) as f64 * 1e-9);
-        Ok(if t > timeline.ends() { Cue::Finished } else { Cue::Play(timeline.at(t, |t| self.score.at(t))) })
+        let t = self.engaged_ns.map_or(0.0, |engaged_ns| seconds_between(engaged_ns, now_ns));
+        Ok(if t > timeline.end() { Cue::Finished } else { Cue::Play(timeline.at(t, |t| self.score.at(t))) })
     }
 
     fn listen(&mut self, now_ns: u64, status: &StatusMessage) {
         let state = State::from_number(status.state).unwrap_or_default();
         // An operator who takes control away keeps it.
-        self.engage &= !state.controls();
+        self.engage &= !state.has_control();
         if state == State::Active && self.timeline.is_some() {
             self.last_active_ns = now_ns;
             if self.engaged_ns.is_none() {
                 info!("the daemon is in control: moving");
                 self.engaged_ns = Some(now_ns);
             }
-        } else if !state.controls() {
+        } else if !state.has_control() {
             // It says so itself: no need to wait.
             self.last_active_ns = 0;
             if self.engaged_ns.is_none() && status.pose_valid == 1 {
                 let (from, to) = (Vector6::from(status.x), self.score.at(0.0).x);
                 let timeline = Timeline::new(self.machine, &from, &to, self.score.duration());
-                self.timeline = Some(timeline.no_shorter_than(gentle_s(self.limits, &from, &to)));
+                self.timeline = Some(timeline.with_shortest_approach(gentle_s(self.limits, &from, &to)));
             }
         }
         // While it engages, what was offered must stand. A platform that moves on somebody else's setpoints
@@ -303,7 +305,7 @@ fn gentle_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
     // No angle turns the platform further than by itself.
     let angle = way.fixed_rows::<3>(0).abs().sum();
     let shortest = |way: f64, limits: &AxisLimits| {
-        let AxisLimits { velocity, acceleration, jerk } = limits.share(APPROACH_SHARE);
+        let AxisLimits { velocity, acceleration, jerk } = limits.scaled(APPROACH_SHARE);
         shortest_duration(way, [velocity, acceleration, jerk])
     };
     shortest(angle, &limits.orientation).max(shortest(way.fixed_rows::<3>(3).norm(), &limits.position))
@@ -331,9 +333,10 @@ mod tests {
             let rehearsal = Rehearsal::new(&config);
             let refused = |share: f64| {
                 let gentle_s = share * gentle_s(&config.deployment.limits.reference, &from, &home);
-                let timeline = Timeline::new(&config.machine, &from, &home, 1.0).no_shorter_than(gentle_s);
+                let timeline =
+                    Timeline::new(&config.machine, &from, &home, 1.0).with_shortest_approach(gentle_s);
                 let at = |t| timeline.at(t, |_| TaskState::at_rest(config.machine.home));
-                rehearsal.first_refusal(at, timeline.scene_begins(), 500)
+                rehearsal.first_refusal(at, timeline.motion_start(), 500)
             };
             assert!(refused(1.0).is_none(), "{tight}: {:?}", refused(1.0));
             assert!(refused(0.25).is_some(), "{tight}");

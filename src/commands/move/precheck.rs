@@ -8,13 +8,12 @@ use nalgebra::Vector6;
 use rayon::prelude::*;
 
 use crate::config::Config;
-use crate::control::controller::{Envelope, Parameters, Setpoint};
-use crate::control::doubt;
-use crate::control::doubt::Aim;
-use crate::control::limits::{Limit, Limiting};
-use crate::control::state::{Cause, Trouble};
+use crate::control::controller::Setpoint;
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::input_validation::{SetpointCheck, SetpointMotion, check_setpoint};
+use crate::control::limits::{Limit, LimitSet};
+use crate::control::parameters::{Envelope, Parameters};
 use crate::daemon;
-use crate::daemon::told::Told;
 use crate::model::fidelity::Fidelity;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
@@ -50,8 +49,8 @@ impl<'a> Rehearsal<'a> {
     /// With a reserve to each limit; standing at home keeps them all the same.
     pub fn with_reserve(mut self) -> Self {
         let Parameters { limits, envelope, condition, .. } = &mut self.parameters;
-        limits.position = limits.position.share(USABLE_SHARE);
-        limits.orientation = limits.orientation.share(USABLE_SHARE);
+        limits.position = limits.position.scaled(USABLE_SHARE);
+        limits.orientation = limits.orientation.scaled(USABLE_SHARE);
         let home = Vector6::from(self.machine.home);
         let nearer = |x: [f64; 6]| home.lerp(&x.into(), USABLE_SHARE).into();
         *envelope = envelope.map(|Envelope { lowest, highest }| Envelope {
@@ -75,13 +74,11 @@ impl<'a> Rehearsal<'a> {
 
     fn refused(&self, t: f64, [before, now]: [TaskState; 2]) -> Option<Refusal> {
         let Self { machine, parameters, home } = self;
-        let aim =
-            |time_ns, task: TaskState| Aim { setpoint: Setpoint { time_ns, task }, motion: task.motion() };
-        let (before, now) = (aim(0, before), aim(parameters.period_ns, now));
-        let mut limiting = Limiting::default();
-        doubt::setpoint(machine, parameters, home, &now, Some(&before), f64::INFINITY, &mut limiting)
-            .err()
-            .map(|trouble| Refusal { t, trouble, limiting })
+        let [before, now] = [(0, before), (parameters.period_ns, now)]
+            .map(|(time_ns, task)| SetpointMotion::new(Setpoint { time_ns, task }));
+        let SetpointCheck { active_limits, result } =
+            check_setpoint(machine, parameters, home, &now, Some(&before), f64::INFINITY);
+        result.err().map(|diagnostic| Refusal { t, diagnostic, active_limits })
     }
 
     /// The first one in the first of many spans that has any.
@@ -101,20 +98,20 @@ impl<'a> Rehearsal<'a> {
 pub struct Refusal {
     /// Of the score \[s\].
     pub t: f64,
-    trouble: Trouble,
-    limiting: Limiting,
+    diagnostic: Diagnostic,
+    active_limits: LimitSet,
 }
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { t, trouble: Trouble { cause, evidence }, limiting } = self;
-        write!(f, "t = {t:.4}: {}", cause.name())?;
+        let Self { t, diagnostic, active_limits } = self;
+        write!(f, "t = {t:.4}: ")?;
         // From the last that is looked at to the first: what is beyond ends the looking.
         let limits = [Limit::Jerk, Limit::LegRate, Limit::Acceleration, Limit::Velocity];
-        let beyond = limits.into_iter().find(|limit| limiting.contains(*limit));
-        if let (Cause::SetpointTooFast, Some(limit)) = (cause, beyond) {
-            write!(f, " ({})", limit.name())?;
+        let beyond = limits.into_iter().find(|limit| active_limits.contains(*limit));
+        if let (DiagnosticCode::SetpointTooFast, Some(limit)) = (diagnostic.code, beyond) {
+            write!(f, "{}: ", limit.name())?;
         }
-        write!(f, "{}; {}", Told(*cause, *evidence), cause.remedy())
+        write!(f, "{diagnostic}")
     }
 }

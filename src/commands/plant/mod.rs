@@ -11,8 +11,10 @@ use tracing::{debug, info, warn};
 
 use self::validation::ForceValidation;
 use crate::config::Config;
-use crate::control::controller::{Measurement, seconds_between};
-use crate::control::state::{Cause, State};
+use crate::control::controller::Measurement;
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::input_validation::seconds_between;
+use crate::control::state::State;
 use crate::daemon::nanoseconds;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::{REPEAT_INTERVAL, poll_until};
@@ -22,7 +24,7 @@ use crate::model::task::task_coordinates;
 use crate::plant::hardware::Hardware;
 use crate::plant::imperfections::Imperfections;
 use crate::plant::simulator::Brakes;
-use crate::plant::terms::Terms;
+use crate::plant::terms::PlantTerms;
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::setup::scheduling;
 use crate::realtime::stop_request::Stop;
@@ -56,7 +58,7 @@ fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortE
     let mut plant = DrivenPlant::new(config, tick_ns);
     let mut validation = ForceValidation::default();
     let mut pending = None;
-    while !stop.requested() {
+    while !stop.is_requested() {
         sleep_until(tick_ns);
         if tick_ns - plant.time_ns > MAX_PAUSE_NS {
             let seconds = seconds_between(plant.time_ns, tick_ns);
@@ -76,7 +78,7 @@ fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortE
         }
         validation.update(forces.rejections());
         plant.advance_to(tick_ns);
-        log_brakes(before, plant.hardware.simulator().brakes(), plant.cause);
+        log_brakes(before, plant.hardware.simulator().brakes(), plant.code);
         measured.publish(tick_ns, plant.measure())?;
         // The newest grid point that is not in the future, or else the next.
         let now_ns = monotonic_ns();
@@ -94,14 +96,14 @@ fn run_in_lockstep(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortEr
     let period_ns = nanoseconds(config.deployment.realtime.period_s());
     let mut plant = DrivenPlant::new(config, 0);
     info!("waiting for the daemon and a setpoint source in each step");
-    while !stop.requested() {
+    while !stop.is_requested() {
         let time_ns = plant.time_ns;
         let response = exchange(&mut measured, &mut forces, time_ns, plant.measure(), stop);
         let Some(force) = response else { break };
         let before = plant.hardware.simulator().brakes();
         plant.apply(&force?);
         plant.advance_to(time_ns + period_ns);
-        log_brakes(before, plant.hardware.simulator().brakes(), plant.cause);
+        log_brakes(before, plant.hardware.simulator().brakes(), plant.code);
     }
     Ok(())
 }
@@ -116,7 +118,7 @@ fn exchange(
 ) -> Option<Result<ForceMessage, PortError>> {
     let mut published: Option<Instant> = None;
     poll_until(
-        || stop.requested(),
+        || stop.is_requested(),
         || {
             if published.is_none_or(|published| published.elapsed() > REPEAT_INTERVAL) {
                 published = Some(Instant::now());
@@ -136,7 +138,7 @@ struct DrivenPlant {
     /// Forces and the instant they expire.
     force: Option<([f64; LEGS], u64)>,
     /// Why the newest message contains no valid force.
-    cause: Cause,
+    code: DiagnosticCode,
     timeout_ns: u64,
 }
 
@@ -147,14 +149,14 @@ impl DrivenPlant {
         log_terms(config, hardware.simulator().terms());
         info!(name = %config.name, "plant at rest at home, brakes closed");
         let timeout_ns = nanoseconds(config.deployment.plant.force_timeout_s);
-        Self { hardware, time_ns, force: None, cause: Cause::None, timeout_ns }
+        Self { hardware, time_ns, force: None, code: DiagnosticCode::None, timeout_ns }
     }
 
     /// Applies a message from the instant it was sent.
     fn apply(&mut self, message: &ForceMessage) {
         self.advance_to(message.header.time_ns);
-        self.cause = Cause::from_number(message.diagnostic_code).unwrap_or_default();
-        let is_under_control = State::from_number(message.state).is_some_and(State::controls);
+        self.code = DiagnosticCode::from_number(message.diagnostic_code).unwrap_or_default();
+        let is_under_control = State::from_number(message.state).is_some_and(State::has_control);
         let is_valid = message.may_be_applied() && is_under_control;
         let expires_ns = message.header.time_ns.saturating_add(self.timeout_ns);
         self.force = is_valid.then_some((message.force_n, expires_ns));
@@ -203,7 +205,7 @@ pub fn hardware(config: &Config) -> Hardware {
 }
 
 /// Logs what is simulated beyond the model, and which of it is left out by the tolerance.
-fn log_terms(config: &Config, terms: &Terms) {
+fn log_terms(config: &Config, terms: &PlantTerms) {
     let plant = &config.deployment.plant;
     if plant.imperfections == (Imperfections { seed: plant.imperfections.seed, ..Imperfections::default() }) {
         return;
@@ -221,13 +223,13 @@ fn log_terms(config: &Config, terms: &Terms) {
     }
 }
 
-fn log_brakes(before: Brakes, now: Brakes, cause: Cause) {
+fn log_brakes(before: Brakes, now: Brakes, code: DiagnosticCode) {
     match (before, now) {
         (Brakes::Open, Brakes::Open) | (Brakes::EndStop { .. }, _) => {}
-        (Brakes::Open, Brakes::Closing { .. } | Brakes::Closed) => match cause {
-            Cause::None => warn!("forces stopped arriving: brakes closing"),
-            cause if cause.is_fault() => warn!("no valid force ({}): brakes closing", cause.name()),
-            cause => info!("no valid force ({}): brakes closing", cause.name()),
+        (Brakes::Open, Brakes::Closing { .. } | Brakes::Closed) => match code {
+            DiagnosticCode::None => warn!("forces stopped arriving: brakes closing"),
+            code if code.is_fault() => warn!("no valid force ({}): brakes closing", code.name()),
+            code => info!("no valid force ({}): brakes closing", code.name()),
         },
         (_, Brakes::Open) => info!("valid force: brakes open"),
         (_, Brakes::EndStop { leg }) => {
@@ -240,7 +242,7 @@ fn log_brakes(before: Brakes, now: Brakes, cause: Cause) {
 /// Best effort: a simulator or a setpoint source below the daemon's priority, so that on a busy host it
 /// is as punctual as hardware.
 pub(super) fn prepare_thread(config: &Config) {
-    scheduling::sharp_timers();
+    scheduling::set_shortest_timer_slack();
     if let Err(shortfall) = scheduling::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {
         debug!("{shortfall}");
     }

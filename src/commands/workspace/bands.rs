@@ -1,6 +1,6 @@
 //! What a picture shows of a pose, and the round numbers at which its colour changes.
 
-use crate::analysis::pose_quality::Quality;
+use crate::analysis::pose_quality::PoseQuality;
 
 /// Most bands of colour.
 pub const BANDS: usize = 10;
@@ -14,7 +14,7 @@ const WIDE: f64 = 8.0;
 pub struct Quantity {
     /// With its unit.
     pub label: &'static str,
-    pub value: fn(&Quality) -> f64,
+    pub value: fn(&PoseQuality) -> f64,
     pub better: Better,
     /// Beyond it there is no colour.
     pub worst: f64,
@@ -30,7 +30,7 @@ pub enum Better {
 
 impl Quantity {
     /// At least 0 where a pose is as good as a threshold.
-    pub fn beyond(&self, quality: &Quality, threshold: f64) -> f64 {
+    pub fn beyond(&self, quality: &PoseQuality, threshold: f64) -> f64 {
         match self.better {
             Better::Higher => (self.value)(quality) - threshold,
             Better::Lower => threshold - (self.value)(quality),
@@ -38,8 +38,8 @@ impl Quantity {
     }
 
     /// Thresholds from the worst to the best, so that something lies beyond each; none where nothing is good enough.
-    pub fn thresholds<'a>(&self, qualities: impl Iterator<Item = &'a Quality> + Clone) -> Vec<f64> {
-        let good = |quality: &&Quality| self.beyond(quality, self.worst) >= 0.0;
+    pub fn thresholds<'a>(&self, qualities: impl Iterator<Item = &'a PoseQuality> + Clone) -> Vec<f64> {
+        let good = |quality: &&PoseQuality| self.beyond(quality, self.worst) >= 0.0;
         let values = qualities.clone().filter(good).map(self.value).filter(|value| value.is_finite());
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         match self.better {

@@ -9,14 +9,13 @@ use plotters::style::text_anchor::HPos;
 use super::bands::{BANDS, Better, Quantity, plain};
 use super::contour::{Corner, outlines};
 use super::slice::Slice;
-use crate::analysis::pose_quality::Quality;
+use crate::analysis::pose_quality::PoseQuality;
 use crate::model::machine::Machine;
-use crate::output::charts::{
-    Area, Axis, ChartError, DASHED_INK, DrawError, GRID, INK, LEGEND_LINE, MARGIN, SAMPLE, TITLE_HEIGHT,
-    UNIT, WIDTH, X_LABELS, Y_LABELS, house_style, rgb, text,
+use crate::output::axis::Axis;
+use crate::output::svg::{
+    Area, ChartError, DASHED_INK, DrawError, GRID, INK, LABEL_SIZE, MARGIN, SAMPLE, TITLE_HEIGHT, UNIT,
+    X_LABELS, Y_LABELS, draw_title, fitted_text, house_style, legend_rows, rgb, text, write_picture,
 };
-use crate::output::files::write_whole;
-use crate::output::scatter::{drawn, width};
 
 /// Height of one map with its title and its axis.
 const CELL_HEIGHT: i32 = 350 * UNIT;
@@ -54,20 +53,24 @@ type Sample = (ShapeStyle, &'static str);
 impl Maps<'_> {
     /// Writes the maps of a slice as one SVG file, complete or not at all.
     pub fn write_svg(&self, path: &Path, slice: &Slice) -> Result<(), ChartError> {
-        let head = TITLE_HEIGHT + LEGEND_LINE;
-        let svg = drawn(head + 2 * CELL_HEIGHT, |root| {
-            let title = format!("{}: workspace, {} through {}", self.name, slice.plane, self.place(slice));
-            root.draw_text(&title, &text(15, HPos::Center), (WIDTH / 2, TITLE_HEIGHT * 3 / 5))?;
-            let lines = self.lines(slice);
-            self.draw_legend(root, slice, &lines)?;
-            let (_, cells) = root.split_vertically(head);
+        let title = format!("{}: workspace, {} through {}", self.name, slice.plane, self.place(slice));
+        let lines = self.lines(slice);
+        let mut samples: Vec<Sample> = lines.iter().map(|(sample, _)| *sample).collect();
+        samples.dedup_by_key(|(_, label)| *label);
+        samples.push((rgb(BEYOND).mix(0.4).stroke_width(100), "beyond a limit"));
+        let labels = samples.iter().map(|(_, label)| *label).chain(["home"]);
+        let (positions, legend_height) = legend_rows(labels);
+        write_picture(path, TITLE_HEIGHT + legend_height + 2 * CELL_HEIGHT, |root| {
+            draw_title(root, &title, 15)?;
+            let (_, rest) = root.split_vertically(TITLE_HEIGHT);
+            draw_legend(&rest, &samples, &positions, slice.through == self.machine.home)?;
+            let (_, cells) = rest.split_vertically(legend_height);
             let cells = cells.split_evenly((2, 2));
             cells
                 .iter()
                 .zip(self.quantities(slice))
                 .try_for_each(|(cell, of)| self.draw_map(cell, slice, &of, &lines))
-        })?;
-        Ok(write_whole(path, svg.as_bytes())?)
+        })
     }
 
     fn quantities(&self, slice: &Slice) -> [Quantity; 4] {
@@ -127,9 +130,9 @@ impl Maps<'_> {
 
     /// What is drawn over the colours, in the units of the axes.
     fn lines(&self, slice: &Slice) -> Vec<(Sample, Vec<(f64, f64)>)> {
-        let edge = |quality: &Quality| [quality.stroke_margin, quality.determinant];
+        let edge = |quality: &PoseQuality| [quality.stroke_margin, quality.determinant];
         let reach = outlines(slice.count, |places| slice.at(places).map(edge));
-        let limit = |quality: &Quality| {
+        let limit = |quality: &PoseQuality| {
             [quality.stroke_margin, quality.determinant, self.largest_condition - quality.condition]
         };
         let limited = outlines(slice.count, |places| slice.at(places).map(limit));
@@ -157,34 +160,6 @@ impl Maps<'_> {
         slice.through == self.machine.home && slice.plane.0.iter().all(|axis| *axis >= 3)
     }
 
-    fn draw_legend(
-        &self,
-        root: &Area,
-        slice: &Slice,
-        lines: &[(Sample, Vec<(f64, f64)>)],
-    ) -> Result<(), DrawError> {
-        let mut samples: Vec<Sample> = lines.iter().map(|(sample, _)| *sample).collect();
-        samples.dedup_by_key(|(_, label)| *label);
-        samples.push((rgb(BEYOND).mix(0.4).stroke_width(100), "beyond a limit"));
-        let y = TITLE_HEIGHT + LEGEND_LINE / 2;
-        let mut left = 2 * MARGIN;
-        for (style, label) in samples {
-            let line = vec![(left, y), (left + SAMPLE, y)];
-            draw_line(root, line, style)?;
-            left = self.draw_label(root, left, y, label)?;
-        }
-        draw_home(root, (left + SAMPLE / 2, y), slice.through == self.machine.home)?;
-        self.draw_label(root, left, y, "home").map(drop)
-    }
-
-    /// Right of a sample; returns where the next one begins.
-    fn draw_label(&self, root: &Area, left: i32, y: i32, label: &str) -> Result<i32, DrawError> {
-        root.draw_text(label, &text(12, HPos::Left), (left + SAMPLE + MARGIN, y))?;
-        Ok(left + SAMPLE + 2 * MARGIN + width(label))
-    }
-}
-
-impl Maps<'_> {
     fn draw_map(
         &self,
         area: &Area,
@@ -195,7 +170,8 @@ impl Maps<'_> {
         let right = BAR + BAR_LABELS + 2 * MARGIN;
         let (width, height) = area.dim_in_pixel();
         let middle = (MARGIN + Y_LABELS + width as i32 - right) / 2;
-        area.draw_text(quantity.label, &text(13, HPos::Center), (middle, TITLE_HEIGHT * 3 / 5))?;
+        let label = fitted_text(&[(quantity.label, width as i32)], 13, HPos::Center);
+        area.draw_text(quantity.label, &label, (middle, TITLE_HEIGHT * 3 / 5))?;
         let room = [
             f64::from(width as i32 - MARGIN - Y_LABELS - right),
             f64::from(height as i32 - TITLE_HEIGHT - X_LABELS - MARGIN),
@@ -210,9 +186,10 @@ impl Maps<'_> {
             .y_label_area_size(Y_LABELS)
             .build_cartesian_2d(x.clone(), y.clone())?;
         let mut mesh = chart.configure_mesh();
-        house_style(&mut mesh);
         let [x_label, y_label] = slice.plane.0.map(axis_label);
-        mesh.x_desc(x.label(&x_label)).y_desc(y.label(&y_label)).draw()?;
+        let [x_label, y_label] = [x.label(&x_label), y.label(&y_label)];
+        house_style(&mut mesh, [(&x_label, width as i32 - Y_LABELS), (&y_label, CELL_HEIGHT - X_LABELS)]);
+        mesh.x_desc(x_label).y_desc(y_label).draw()?;
 
         let thresholds = quantity.thresholds(slice.qualities.iter().filter(|quality| quality.within_reach()));
         let beyond = rgb(BEYOND).mix(0.4).filled();
@@ -241,7 +218,7 @@ impl Maps<'_> {
     /// The part of the reach that is as good as a threshold (all of it for NaN) as one polygon: outlines one after the
     /// other, each from and back to the first, by bridges without width.
     fn part(&self, slice: &Slice, quantity: &Quantity, threshold: f64) -> Vec<(f64, f64)> {
-        let numbers = |quality: &Quality| {
+        let numbers = |quality: &PoseQuality| {
             let [beyond, spare] = match threshold {
                 _ if threshold.is_nan() => [0.0; 2],
                 _ => [quantity.beyond(quality, threshold), quantity.max_force - quality.worst_force],
@@ -280,17 +257,11 @@ fn shown(slice: &Slice, (right, up): (f64, f64)) -> (f64, f64) {
 fn axes(slice: &Slice, room: [f64; 2]) -> [Axis; 2] {
     let [(left, right), (bottom, top)] = slice.ranges;
     let (low, high) = (in_unit(slice, [left, bottom]), in_unit(slice, [right, top]));
-    let mut ends = [(low.0, high.0), (low.1, high.1)];
     let [first, second] = slice.plane.0;
     if (first < 3) == (second < 3) {
-        let per_unit =
-            ends.iter().zip(room).map(|((low, high), room)| (high - low) / room).fold(0.0, f64::max);
-        for ((low, high), room) in ends.iter_mut().zip(room) {
-            let more = 0.5 * (per_unit * room - (*high - *low));
-            (*low, *high) = (*low - more, *high + more);
-        }
+        return Axis::with_equal_scales(&[low, high], 0.0, room, TICKS);
     }
-    ends.map(|(low, high)| Axis::new([low, high].into_iter(), 0.0, TICKS))
+    [(low.0, high.0), (low.1, high.1)].map(|(low, high)| Axis::new([low, high].into_iter(), 0.0, TICKS))
 }
 
 /// The parts of an outline with one cause.
@@ -329,6 +300,25 @@ fn draw_line(area: &Area, line: Vec<(i32, i32)>, style: ShapeStyle) -> Result<()
         area.draw(&PathElement::new(line.clone(), BLACK.stroke_width(32)))?;
     }
     area.draw(&PathElement::new(line, style))
+}
+
+/// The last position is that of the mark of home.
+fn draw_legend(
+    area: &Area,
+    samples: &[Sample],
+    positions: &[(i32, i32)],
+    through_home: bool,
+) -> Result<(), DrawError> {
+    let draw_label = |label: &str, (left, y): (i32, i32)| {
+        area.draw_text(label, &text(LABEL_SIZE, HPos::Left), (left + SAMPLE + MARGIN, y))
+    };
+    for ((style, label), (left, y)) in samples.iter().zip(positions) {
+        draw_line(area, vec![(*left, *y), (left + SAMPLE, *y)], *style)?;
+        draw_label(label, (*left, *y))?;
+    }
+    let Some((left, y)) = positions.last() else { return Ok(()) };
+    draw_home(area, (left + SAMPLE / 2, *y), through_home)?;
+    draw_label("home", (*left, *y))
 }
 
 /// A disc where the slice goes through home, a ring where home lies before or behind it.

@@ -8,17 +8,17 @@ use std::path::{Path, PathBuf};
 use self::map::Maps;
 use self::slice::{Plane, Slice};
 use super::offline::progress;
-use crate::analysis::clearance::{Clearance, Obstacle, Shape};
-use crate::analysis::envelope::Limits;
-use crate::analysis::pose_quality::{Effort, Quality, Workspace};
+use crate::analysis::clearance::{Clearance, RegionShape, WorkspaceLimit};
+use crate::analysis::envelope::EnvelopeBounds;
+use crate::analysis::pose_quality::{AccelerationDemand, PoseEvaluator, PoseQuality};
 use crate::analysis::reachable_envelope;
-use crate::analysis::region_search::{BUDGET, Found, largest};
+use crate::analysis::region_search::{MAX_CELLS, RegionBounds, largest_region};
 use crate::config::Config;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::output::charts::ChartError;
 use crate::output::files::FileError;
 use crate::output::numbers::significant;
+use crate::output::svg::ChartError;
 
 mod bands;
 mod contour;
@@ -58,14 +58,14 @@ pub enum WorkspaceError {
 /// What was found.
 pub struct Survey {
     name: String,
-    effort: Effort,
+    effort: AccelerationDemand,
     largest_condition: f64,
     max_force: f64,
     slices: Vec<Slice>,
     turn_deg: f64,
     /// Positions at home's orientation, positions with any turn, the box.
-    regions: [Found; 3],
-    shape: Limits,
+    regions: [RegionBounds; 3],
+    shape: EnvelopeBounds,
     /// The box is that of `[envelope]`.
     configured: bool,
     written: Vec<PathBuf>,
@@ -78,19 +78,19 @@ impl Survey {
         let largest_condition = deployment.limits.condition;
         let clearance = Clearance::new(machine, largest_condition);
         let through = wish.through.unwrap_or(machine.home);
-        if let Some(obstacle) = clearance.obstacle_at(&TaskState::at_rest(through).motion().pose) {
+        if let Some(obstacle) = clearance.violation_at(&TaskState::at_rest(through).motion().pose) {
             let reason =
                 format!("must be a pose the platform can take: {}", Reason(obstacle, largest_condition));
             return Err(WorkspaceError::Through { x: through, reason });
         }
         let limits = &deployment.limits.reference;
-        let effort = Effort {
+        let effort = AccelerationDemand {
             linear: wish.acceleration_m_s2.unwrap_or(limits.position.acceleration),
             angular: wish.angular_acceleration_rad_s2.unwrap_or(limits.orientation.acceleration),
         };
         let slices = slices(machine, effort, wish, through);
         let configured = deployment.envelope.filter(has_extent);
-        let shape = configured.unwrap_or_else(|| reachable_envelope::nominal_box(machine));
+        let shape = configured.unwrap_or_else(|| reachable_envelope::nominal_bounds(machine));
         let regions = regions(machine, &clearance, wish.turn_deg.to_radians(), &shape);
         let [ball, ..] = &regions;
         let maps = Maps { name, machine, largest_condition, ball: ball.guaranteed };
@@ -110,8 +110,8 @@ impl Survey {
     }
 }
 
-fn slices(machine: &Machine, effort: Effort, wish: &Wish, through: [f64; 6]) -> Vec<Slice> {
-    let workspace = Workspace::new(machine, effort);
+fn slices(machine: &Machine, effort: AccelerationDemand, wish: &Wish, through: [f64; 6]) -> Vec<Slice> {
+    let workspace = PoseEvaluator::new(machine, effort);
     let usual = Plane::usual(&machine.gravity);
     let planes = if wish.planes.is_empty() { &usual[..] } else { &wish.planes };
     let bar = progress(planes.len() * wish.resolution * wish.resolution, "poses");
@@ -121,15 +121,15 @@ fn slices(machine: &Machine, effort: Effort, wish: &Wish, through: [f64; 6]) -> 
     slices
 }
 
-fn regions(machine: &Machine, clearance: &Clearance, turn: f64, shape: &Limits) -> [Found; 3] {
+fn regions(machine: &Machine, clearance: &Clearance, turn: f64, shape: &EnvelopeBounds) -> [RegionBounds; 3] {
     let shapes = [
-        Shape::Ball { turn: 0.0 },
-        Shape::Ball { turn },
-        Shape::Box { low: shape.pose_min, high: shape.pose_max },
+        RegionShape::Ball { turn: 0.0 },
+        RegionShape::Ball { turn },
+        RegionShape::Box { low: shape.pose_min, high: shape.pose_max },
     ];
     // Two searches for a ball, one for a box.
-    let bar = progress(5 * BUDGET as usize, "cells");
-    let regions = shapes.map(|shape| largest(machine, clearance, &shape, &bar));
+    let bar = progress(5 * MAX_CELLS as usize, "cells");
+    let regions = shapes.map(|shape| largest_region(machine, clearance, &shape, &bar));
     bar.finish_and_clear();
     regions
 }
@@ -146,7 +146,7 @@ fn write(maps: &Maps, slices: &[Slice], folder: &Path) -> Result<Vec<PathBuf>, W
     Ok(written)
 }
 
-fn has_extent(limits: &Limits) -> bool {
+fn has_extent(limits: &EnvelopeBounds) -> bool {
     limits.pose_min.iter().chain(&limits.pose_max).any(|x| *x != 0.0)
 }
 
@@ -155,15 +155,15 @@ fn words(x: &[f64; 6]) -> String {
 }
 
 /// What is in the way, in words, with the limit of the condition.
-struct Reason(Obstacle, f64);
+struct Reason(WorkspaceLimit, f64);
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Obstacle::Short(leg) => write!(f, "leg {} is too short", leg + 1),
-            Obstacle::Long(leg) => write!(f, "leg {} is too long", leg + 1),
-            Obstacle::Singular => write!(f, "it is across a singular pose"),
-            Obstacle::Condition => write!(f, "the condition is beyond {}", significant(self.1)),
+            WorkspaceLimit::LegTooShort(leg) => write!(f, "leg {} is too short", leg + 1),
+            WorkspaceLimit::LegTooLong(leg) => write!(f, "leg {} is too long", leg + 1),
+            WorkspaceLimit::Singular => write!(f, "it is across a singular pose"),
+            WorkspaceLimit::Condition => write!(f, "the condition is beyond {}", significant(self.1)),
         }
     }
 }
@@ -212,11 +212,11 @@ impl Survey {
     fn fmt_slice(&self, f: &mut fmt::Formatter<'_>, slice: &Slice) -> fmt::Result {
         let in_reach = slice.qualities.iter().filter(|quality| quality.within_reach());
         let usable = in_reach.clone().filter(|quality| quality.condition <= self.largest_condition);
-        let ends = |value: fn(&Quality) -> f64| {
+        let ends = |value: fn(&PoseQuality) -> f64| {
             let values = usable.clone().map(value);
             values.fold((f64::INFINITY, 0.0), |(low, high), v| (f64::min(low, v), f64::max(high, v)))
         };
-        let range = |value: fn(&Quality) -> f64| {
+        let range = |value: fn(&PoseQuality) -> f64| {
             let (low, high) = ends(value);
             format!("{} to {}", significant(low), significant(high))
         };
@@ -243,7 +243,7 @@ impl Survey {
                 if k < 2 { format!("{} mm", significant(1e3 * size)) } else { significant(size) }
             };
             write!(f, "{name:<45}{:>10}", size(found.guaranteed))?;
-            match found.obstacle {
+            match found.violation {
                 Some((at, obstacle)) if at <= 0.0 => {
                     writeln!(f, "; without going anywhere {}", Reason(obstacle, self.largest_condition))?;
                 }

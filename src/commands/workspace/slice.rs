@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::analysis::pose_quality::{Quality, Workspace};
+use crate::analysis::pose_quality::{PoseEvaluator, PoseQuality};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::output::csv_table::{Writer, coordinates};
@@ -72,13 +72,13 @@ pub struct Slice {
     pub ranges: [(f64, f64); 2],
     /// Poses along each axis.
     pub count: usize,
-    pub qualities: Vec<Quality>,
+    pub qualities: Vec<PoseQuality>,
 }
 
 impl Slice {
     /// The part of a plane with all that is in reach around a pose. The bar advances by poses.
     pub fn new(
-        workspace: &Workspace,
+        workspace: &PoseEvaluator,
         machine: &Machine,
         plane: Plane,
         through: [f64; 6],
@@ -106,11 +106,11 @@ impl Slice {
     }
 
     /// The quality at places along both axes.
-    pub fn at(&self, [right, up]: [usize; 2]) -> Option<&Quality> {
+    pub fn at(&self, [right, up]: [usize; 2]) -> Option<&PoseQuality> {
         if right < self.count { self.qualities.get(up * self.count + right) } else { None }
     }
 
-    fn judge(&mut self, workspace: &Workspace, bar: &ProgressBar) {
+    fn judge(&mut self, workspace: &PoseEvaluator, bar: &ProgressBar) {
         let row = |up: usize| {
             let quality = |right| workspace.quality(&TaskState::at_rest(self.x([right, up])).motion().pose);
             let row: Vec<_> = (0..self.count).map(quality).collect();
@@ -122,7 +122,7 @@ impl Slice {
     }
 
     /// Ranges that grow from the pose on until reach ends within them, then shrink onto it.
-    fn reached(&mut self, workspace: &Workspace, machine: &Machine) -> [(f64, f64); 2] {
+    fn reached(&mut self, workspace: &PoseEvaluator, machine: &Machine) -> [(f64, f64); 2] {
         let stroke = machine.actuator.max_length - machine.actuator.min_length;
         let middles = self.plane.0.map(|axis| self.through.get(axis).copied().unwrap_or_default());
         let firsts = self.plane.0.map(|axis| if axis < 3 { FIRST_ANGLE } else { FIRST_STROKES * stroke });
@@ -177,7 +177,7 @@ impl Slice {
         );
         let mut writer = Writer::new(&columns);
         for (k, quality) in self.qualities.iter().enumerate() {
-            let Quality { stroke_margin, determinant, condition, worst_force, payload } = *quality;
+            let PoseQuality { stroke_margin, determinant, condition, worst_force, payload } = *quality;
             let in_reach = f64::from(u8::from(quality.within_reach()));
             let values = [in_reach, stroke_margin, determinant, condition, worst_force, payload];
             writer.row(self.x([k % self.count, k / self.count]).into_iter().chain(values));

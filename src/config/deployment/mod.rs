@@ -70,7 +70,7 @@ pub struct Deployment {
     /// The simulated hardware.
     pub plant: Plant,
     /// What the platform will be asked to do; `None` if nobody has said.
-    pub envelope: Option<envelope::Limits>,
+    pub envelope: Option<envelope::EnvelopeBounds>,
 }
 
 /// `[control]`: the law's error dynamics, and how near the set point must be to engage.
@@ -288,12 +288,16 @@ fn limits(mut section: Reader, machine: &Machine) -> Limits {
         acceleration: positive("acceleration_rad_s2", 20.0),
         jerk: positive("jerk_rad_s3", 2000.0),
     };
-    let own_share = section.number_or("own_share", 0.2, Bound::UpTo(1.0));
+    let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
     let force_rate_n_s =
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
     let condition = condition(&mut section, machine);
     section.finish();
-    Limits { reference: ReferenceLimits { position, orientation, own_share }, force_rate_n_s, condition }
+    Limits {
+        reference: ReferenceLimits { position, orientation, autonomous_scale },
+        force_rate_n_s,
+        condition,
+    }
 }
 
 /// The default leaves room around a home that is badly conditioned itself; at home it must be kept.
@@ -318,7 +322,7 @@ fn timeouts(mut section: Reader, rate_hz: f64) -> Timeouts {
 }
 
 /// All four keys, or none.
-fn envelope(mut section: Reader) -> Option<envelope::Limits> {
+fn envelope(mut section: Reader) -> Option<envelope::EnvelopeBounds> {
     let pose = |angle: Bound, position: Bound| [angle, angle, angle, position, position, position];
     let keys = [
         ("pose_min", pose(Bound::Within(-HALF_TURN, 0.0), Bound::NotPositive)),
@@ -334,7 +338,7 @@ fn envelope(mut section: Reader) -> Option<envelope::Limits> {
     }
     section.finish();
     let [Some(pose_min), Some(pose_max), Some(velocity), Some(acceleration)] = found else { return None };
-    Some(envelope::Limits { pose_min, pose_max, velocity, acceleration })
+    Some(envelope::EnvelopeBounds { pose_min, pose_max, velocity, acceleration })
 }
 
 /// A peer that sends once a cycle is silent for one period: a timeout must be longer.

@@ -9,9 +9,9 @@ use crate::config::reader::Reader;
 use crate::model::machine::Machine;
 use crate::model::rigid::Wrench;
 use crate::plant::imperfections::{
-    BuildErrors, DriveErrors, Elastic, External, Friction, Imperfections, SensorErrors,
+    BuildErrors, DriveErrors, ElasticLeg, ExternalWrench, Friction, Imperfections, SensorErrors,
 };
-use crate::plant::terms::Terms;
+use crate::plant::terms::PlantTerms;
 
 /// The plant's step \[us\]: below, it cannot keep up; above, its drives are not stable.
 const SHORTEST_STEP_US: f64 = 10.0;
@@ -54,7 +54,8 @@ pub(super) fn read(mut section: Reader, rate_hz: f64, machine: &Machine) -> Plan
             external: external(section.section("external")),
         },
     };
-    let needed_us = 1e6 * Terms::choose(machine, &plant.imperfections, plant.step_s, plant.tolerance_m).step;
+    let needed_us =
+        1e6 * PlantTerms::choose(machine, &plant.imperfections, plant.step_s, plant.tolerance_m).step;
     if needed_us < SHORTEST_STEP_US {
         section.refuse_as(
             "step_us",
@@ -92,7 +93,7 @@ fn friction(mut section: Reader) -> Friction {
     friction
 }
 
-fn leg(mut section: Reader, machine: &Machine) -> Option<Elastic> {
+fn leg(mut section: Reader, machine: &Machine) -> Option<ElasticLeg> {
     let stiffness = finite(section.number_or("stiffness_n_m", f64::INFINITY, Bound::Positive));
     let damping = section.number_or("damping_n_s_m", 0.0, Bound::NotNegative);
     let backlash = section.number_or("backlash_m", 0.0, Bound::NotNegative);
@@ -106,7 +107,7 @@ fn leg(mut section: Reader, machine: &Machine) -> Option<Elastic> {
         section.refuse("backlash_m", "must be 0 without stiffness_n_m: play has flanks");
     }
     section.finish();
-    stiffness.map(|stiffness| Elastic { stiffness, damping, backlash })
+    stiffness.map(|stiffness| ElasticLeg { stiffness, damping, backlash })
 }
 
 fn sensor(mut section: Reader) -> SensorErrors {
@@ -131,8 +132,8 @@ fn build(mut section: Reader) -> BuildErrors {
     build
 }
 
-fn external(mut section: Reader) -> External {
-    let external = External {
+fn external(mut section: Reader) -> ExternalWrench {
+    let external = ExternalWrench {
         wrench: Wrench {
             force: Vector3::from(section.vector_or("force_n", [0.0; 3])),
             torque: Vector3::from(section.vector_or("torque_n_m", [0.0; 3])),

@@ -6,7 +6,7 @@ use crate::analysis::sampled_loop::SampledLoop;
 use crate::config::bound::Bound;
 use crate::config::reader::Reader;
 use crate::realtime::cyclic::ReleaseMode;
-use crate::realtime::overrun::OnOverrun;
+use crate::realtime::overrun::OverrunPolicy;
 
 /// Slowest and fastest loop \[Hz\]. Above, one wake-up costs more than the period leaves.
 const RATE_HZ: Bound = Bound::Within(10.0, 20_000.0);
@@ -39,7 +39,7 @@ pub struct Realtime {
     /// Longest spin before a release, where there is one.
     pub max_lead_s: f64,
     /// What follows a cycle that was not done at its next release.
-    pub on_overrun: OnOverrun,
+    pub on_overrun: OverrunPolicy,
     /// A wake-up later than this after its release time counts as missed.
     pub late_wakeup_s: f64,
     /// Inputs are read this long before the release.
@@ -145,7 +145,9 @@ pub(super) fn read(mut section: Reader) -> Realtime {
             "must not be given with realtime.scheduler = \"deadline\" (Linux places such threads itself)",
         );
     }
-    if realtime.release == ReleaseMode::External && matches!(realtime.on_overrun, OnOverrun::CatchUp { .. }) {
+    if realtime.release == ReleaseMode::External
+        && matches!(realtime.on_overrun, OverrunPolicy::CatchUp { .. })
+    {
         section.refuse(
             "on_overrun",
             "must be one of \"skip\", \"fault\" with realtime.release = \"external\" (only the newest message is kept)",
@@ -157,7 +159,7 @@ pub(super) fn read(mut section: Reader) -> Realtime {
             "must be false with realtime.release = \"lockstep\" (simulated time)",
         );
     }
-    if realtime.release == ReleaseMode::Lockstep && realtime.on_overrun != OnOverrun::Skip {
+    if realtime.release == ReleaseMode::Lockstep && realtime.on_overrun != OverrunPolicy::Skip {
         section.refuse(
             "on_overrun",
             "must be \"skip\" with realtime.release = \"lockstep\" (simulated time waits for the loop)",
@@ -181,11 +183,11 @@ fn within_half_period_s(section: &mut Reader, key: &'static str, default_us: f64
     duration_us / 1e6
 }
 
-fn on_overrun(section: &mut Reader) -> OnOverrun {
+fn on_overrun(section: &mut Reader) -> OverrunPolicy {
     let most = section.integer_or("max_catch_up", 4, 1, MOST_CAUGHT_UP);
-    let catch_up = OnOverrun::CatchUp { most: u64::try_from(most).unwrap_or_default() };
-    let policies = [("skip", OnOverrun::Skip), ("catch_up", catch_up), ("fault", OnOverrun::Fault)];
-    section.choice_or("on_overrun", OnOverrun::Skip, &policies)
+    let catch_up = OverrunPolicy::CatchUp { most: u64::try_from(most).unwrap_or_default() };
+    let policies = [("skip", OverrunPolicy::Skip), ("catch_up", catch_up), ("fault", OverrunPolicy::Fault)];
+    section.choice_or("on_overrun", OverrunPolicy::Skip, &policies)
 }
 
 fn cpu(section: &mut Reader, key: &'static str) -> Option<usize> {

@@ -1,7 +1,7 @@
 //! Inputs of the controller: the newest message of each topic, and the request that is pending.
 
-use crate::control::controller::{Asked, Measurement, Setpoint};
-use crate::control::state::Request;
+use crate::control::controller::{Measurement, Setpoint};
+use crate::control::state::{OperatorRequest, Request};
 use crate::daemon::cycle::CycleInput;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{
@@ -12,7 +12,7 @@ use crate::messages::{
 const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
 
 /// The daemon's own request before it ends; no message has this epoch.
-const STOP_BEFORE_END: Asked = Asked { request: Request::Stop, message: (0, 1) };
+const STOP_BEFORE_END: OperatorRequest = OperatorRequest { request: Request::Stop, message: (0, 1) };
 
 /// Messages kept per topic between two reads. Only the newest counts.
 const DEPTH: usize = 8;
@@ -91,11 +91,11 @@ impl Inputs {
     /// Of the requests that are not yet answered the one of highest precedence counts.
     pub fn receive_requests(&mut self, now_ns: u64, filter: RequestFilter) {
         let RequestFilter { answered, is_ending } = filter;
-        let is_pending = |request: &Asked| request.message != answered;
+        let is_pending = |request: &OperatorRequest| request.message != answered;
         while let Some(message) = self.commands.receive_from_any() {
             let Some(request) = message.request() else { continue };
             let is_too_old = now_ns.abs_diff(message.header.time_ns) > MAX_REQUEST_AGE_NS;
-            if request.request.takes_force() && (is_ending || is_too_old) {
+            if request.request.can_begin_control() && (is_ending || is_too_old) {
                 continue;
             }
             let pending = self.cycle.input.request.filter(is_pending);

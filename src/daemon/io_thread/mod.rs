@@ -17,7 +17,7 @@ use crate::messages::lockstep::poll_until;
 use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, Statistics};
 use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
 use crate::realtime::cyclic::{ReleaseMode, Timing};
-use crate::realtime::newest::Reader;
+use crate::realtime::triple_buffer::Reader;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
 
@@ -148,7 +148,7 @@ impl IoThread<'_> {
             let is_measured = self.inputs.receive(self.request_filter());
             if is_measured {
                 self.hand_over_inputs();
-                self.links.exchange.bell.ring();
+                self.links.exchange.event.signal();
             }
             self.publish_if_new();
             if is_measured || self.published > published {
@@ -181,7 +181,7 @@ impl IoThread<'_> {
             }
             self.inputs.receive_requests(time_ns, self.request_filter());
             self.hand_over_inputs();
-            self.links.exchange.bell.ring();
+            self.links.exchange.event.signal();
             let before = self.published;
             poll_until(&is_stopped, || {
                 self.publish_if_new();
@@ -203,7 +203,7 @@ impl IoThread<'_> {
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
         self.answered = output.answered;
-        if self.links.is_ending.load(Ordering::Relaxed) && !output.state.controls() {
+        if self.links.is_ending.load(Ordering::Relaxed) && !output.state.has_control() {
             self.links.may_end.store(true, Ordering::Relaxed);
         }
         if counters.cycles > self.published {

@@ -3,11 +3,12 @@
 use heapless::spsc::Producer;
 
 use crate::control::controller::Output;
-use crate::control::state::{Cause, State};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::State;
 use crate::daemon::cycle::CycleOutput;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Bus, ForceMessage, IoCounters, PortError, Publisher, Statistics, StatusMessage};
-use crate::realtime::newest::Reader;
+use crate::realtime::triple_buffer::Reader;
 
 /// Publishers of the daemon.
 pub struct Outputs {
@@ -70,7 +71,7 @@ impl Outputs {
     fn publish_force(&mut self, cycle: &CycleOutput, time_ns: u64, delays: &mut Producer<'_, u64>) {
         let message = ForceMessage::new(&cycle.output, cycle.release_ns);
         self.send_failures += u64::from(self.forces.publish(time_ns, message).is_err());
-        if cycle.output.state.controls() {
+        if cycle.output.state.has_control() {
             // Full only if the log thread is held; that loses statistics, not forces.
             let _ = delays.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
         }
@@ -94,8 +95,8 @@ fn status(
 /// The loop finds the same at its next cycle, by the age of its last measurement.
 fn invalidate_if_held(cycle: &mut CycleOutput, now_ns: u64, max_force_age_ns: u64) {
     let output = &mut cycle.output;
-    if now_ns.saturating_sub(cycle.due_ns) > max_force_age_ns && output.state.controls() {
-        (output.state, output.cause, output.force) =
-            (State::Fault, Cause::MeasurementLost, Output::default().force);
+    if now_ns.saturating_sub(cycle.due_ns) > max_force_age_ns && output.state.has_control() {
+        (output.state, output.diagnostic, output.force) =
+            (State::Fault, DiagnosticCode::MeasurementLost.into(), Output::default().force);
     }
 }

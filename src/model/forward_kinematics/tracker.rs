@@ -1,20 +1,32 @@
-//! Following measured lengths.
+//! Forward kinematics of lengths that are more than one trusted step away: a straight path of the lengths in trusted steps.
 
 use nalgebra::Vector6;
 
-use super::{Outcome, Report, refine};
+use super::{NewtonReport, Outcome, refine};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Pose;
 
-/// How much of a trusted step is taken toward lengths that are further away: rounding must not undo it.
-const PART_OF_TRUSTED: f64 = 0.99;
+/// Share of a trusted step taken toward lengths further away: below 1, so that rounding does not exceed it.
+const TRUSTED_STEP_SHARE: f64 = 0.99;
 
 /// Bound on the steps of [`Tracker::find`]: one is some hundredths of the radius, and the steps toward a singular
 /// pose end after about fifty.
-const MOST_STEPS: u32 = 2000;
+const MAX_TRACKING_STEPS: u32 = 2000;
 
-/// Follows measured lengths without leaving the assembly mode it started on.
+/// Follows measured leg lengths without leaving the assembly mode of its start.
+///
+/// ```
+/// use hexad::model::forward_kinematics::{Tracker, TrackingResult};
+/// use hexad::model::inverse_geometry::leg_lengths;
+/// # let machine = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+/// let mut pose = machine.home_pose();
+/// pose.position.x += 0.1;
+/// let mut tracker = Tracker::new(&machine, machine.home_pose());
+/// let (result, _) = tracker.find(&machine, &leg_lengths(&machine, &pose));
+/// assert_eq!(result, TrackingResult::Found);
+/// assert!((tracker.pose.position - pose.position).norm() < 1e-12);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Tracker {
     /// Pose of the last converged step.
@@ -24,24 +36,24 @@ pub struct Tracker {
     outcome: Outcome,
 }
 
-/// What one step of a [`Tracker`] achieved.
+/// Result of one step of a [`Tracker`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tracked {
+pub enum TrackingResult {
     /// The pose belongs to the given lengths.
     Found,
-    /// The lengths are further away than one step: the pose is on its way.
+    /// The lengths are further away than one step: the pose is between the one before and theirs.
     Approaching,
     /// There is no trusted step toward the lengths; the pose is the last good one. [`Tracker::outcome`] says why.
     NotConverged,
 }
 
 impl Tracker {
-    /// Starts at a known pose.
+    /// Starts at a pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
         Self { pose, kinematic_state: KinematicState::new(machine, pose), outcome: Outcome::Solved }
     }
 
-    /// Starts anew at a pose of which all is known.
+    /// Starts anew at a kinematic state.
     pub fn restart(&mut self, kinematic_state: &KinematicState) {
         (self.pose, self.kinematic_state, self.outcome) =
             (*kinematic_state.pose(), *kinematic_state, Outcome::Solved);
@@ -52,43 +64,43 @@ impl Tracker {
         &self.kinematic_state
     }
 
-    /// Of the last step.
+    /// Outcome of the last step.
     pub fn outcome(&self) -> Outcome {
         self.outcome
     }
 
-    /// One trusted step toward the pose with these lengths; also the iterations it took.
-    pub fn advance(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (Tracked, u32) {
+    /// Takes one trusted step toward the pose with these lengths; also returns the iterations.
+    pub fn advance(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (TrackingResult, u32) {
         let mut iterations = 0;
-        let mut tracked = Tracked::Found;
+        let mut tracked = TrackingResult::Found;
         let mut report = self.step(machine, lengths, &mut iterations);
         if report.outcome == Outcome::LeftTrustedRegion {
-            tracked = Tracked::Approaching;
+            tracked = TrackingResult::Approaching;
             let here = Vector6::from(self.kinematic_state.lengths(machine));
-            let part = here + (Vector6::from(*lengths) - here) * (PART_OF_TRUSTED / report.reach);
+            let part = here + (Vector6::from(*lengths) - here) * (TRUSTED_STEP_SHARE / report.step_ratio);
             report = self.step(machine, &part.into(), &mut iterations);
         }
-        (if report.outcome == Outcome::Solved { tracked } else { Tracked::NotConverged }, iterations)
+        (if report.outcome == Outcome::Solved { tracked } else { TrackingResult::NotConverged }, iterations)
     }
 
-    fn step(&mut self, machine: &Machine, lengths: &[f64; LEGS], iterations: &mut u32) -> Report {
+    fn step(&mut self, machine: &Machine, lengths: &[f64; LEGS], iterations: &mut u32) -> NewtonReport {
         let report = refine(machine, &mut self.kinematic_state, lengths);
         *iterations += report.iterations;
         (self.pose, self.outcome) = (*self.kinematic_state.pose(), report.outcome);
         report
     }
 
-    /// Steps until the pose is found: for use off line, where nobody waits. Also the iterations it took.
-    pub fn find(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (Tracked, u32) {
+    /// Steps until the pose is found; also returns the iterations. Not for the cycle: the number of steps is not bounded by its time.
+    pub fn find(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (TrackingResult, u32) {
         let mut iterations = 0;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_TRACKING_STEPS {
             let (tracked, spent) = self.advance(machine, lengths);
             iterations += spent;
-            if tracked != Tracked::Approaching {
+            if tracked != TrackingResult::Approaching {
                 return (tracked, iterations);
             }
         }
         self.outcome = Outcome::NotConverged;
-        (Tracked::NotConverged, iterations)
+        (TrackingResult::NotConverged, iterations)
     }
 }

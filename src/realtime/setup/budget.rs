@@ -3,31 +3,39 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What the cgroup of this process leaves to FIFO threads.
+/// Real-time budget of the cgroup of this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum GroupBudget {
     /// Not limited by group: no such kernel, or the root group.
-    None,
+    Unlimited,
     /// cgroup v1 \[us\] per period; with 0 every FIFO thread is refused.
-    Of { file: PathBuf, budget_us: i64 },
+    Limited {
+        /// The file that sets it.
+        file: PathBuf,
+        /// Per period.
+        budget_us: i64,
+    },
     /// A group of cgroup v2, which has no file for it: a kernel with such budgets gives it none.
-    Unseen { group: PathBuf },
+    Unknown {
+        /// Its folder.
+        group: PathBuf,
+    },
 }
 
 impl GroupBudget {
-    /// Of the cgroup of this process.
+    /// Reads the budget of this process' cgroup.
     pub fn of_this_process() -> Self {
         let [groups, mounts] = ["/proc/self/cgroup", "/proc/self/mountinfo"]
             .map(|path| fs::read_to_string(path).unwrap_or_default());
         if let Some(folder) = folder(&groups, &mounts, Hierarchy::Cpu) {
             let file = folder.join("cpu.rt_runtime_us");
             let budget_us = fs::read_to_string(&file).ok().and_then(|text| text.trim().parse().ok());
-            return budget_us.map_or(Self::None, |budget_us| Self::Of { file, budget_us });
+            return budget_us.map_or(Self::Unlimited, |budget_us| Self::Limited { file, budget_us });
         }
         // The root group alone has no type.
         folder(&groups, &mounts, Hierarchy::Unified)
             .filter(|folder| folder.join("cgroup.type").exists())
-            .map_or(Self::None, |group| Self::Unseen { group })
+            .map_or(Self::Unlimited, |group| Self::Unknown { group })
     }
 }
 

@@ -1,60 +1,64 @@
-//! Sets of processors, in the words of Linux: `0-3,8`.
+//! Sets of processors in the notation of Linux: `0-3,8`.
 
 use core::fmt::{self, Display, Formatter};
 use std::collections::BTreeSet;
 use std::{fs, thread};
 
-/// Some processors, numbered from 0.
+/// Set of processors, numbered from 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cpus(BTreeSet<usize>);
 
 impl Cpus {
-    /// Those in use by the kernel.
+    /// Processors that are online.
     pub fn online() -> Self {
         Self::of_file("/sys/devices/system/cpu/online")
     }
 
-    /// Those that the scheduler leaves alone (boot parameter `isolcpus`).
+    /// Processors that the scheduler does not balance over (boot parameter `isolcpus`).
     pub fn isolated() -> Self {
         Self::of_file("/sys/devices/system/cpu/isolated")
     }
 
-    /// Those that the calling thread may run on now.
+    /// Affinity of the calling thread.
     pub fn of_this_thread() -> Self {
         // SAFETY: all-zero is the empty set.
         let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
-        // SAFETY: 0 means the calling thread; the size is that of `set`. If it fails the set stays empty.
+        // SAFETY: 0 means the calling thread; the size is that of `set`. If it fails the set remains empty.
         unsafe { libc::sched_getaffinity(0, size_of::<libc::cpu_set_t>(), &mut set) };
         // SAFETY: every number is below the size of the set.
         Self((0..libc::CPU_SETSIZE as usize).filter(|cpu| unsafe { libc::CPU_ISSET(*cpu, &set) }).collect())
     }
 
-    /// Those that a thread of this process may ask for: the cpuset of its cgroup. Found out by a thread that
-    /// asks for all and ends.
+    /// Processors that a thread of this process may be bound to: the cpuset of its cgroup. Found by a thread that
+    /// requests all and ends.
     pub fn permitted() -> Self {
-        let asks = || {
+        let request_all = || {
             bind(0..libc::CPU_SETSIZE as usize);
             Self::of_this_thread()
         };
-        thread::Builder::new().spawn(asks).ok().and_then(|thread| thread.join().ok()).unwrap_or_default()
+        thread::Builder::new()
+            .spawn(request_all)
+            .ok()
+            .and_then(|thread| thread.join().ok())
+            .unwrap_or_default()
     }
 
-    /// Whether this one is among them.
+    /// Whether a processor is in the set.
     pub fn contains(&self, cpu: usize) -> bool {
         self.0.contains(&cpu)
     }
 
-    /// These without those.
+    /// The set without `others`.
     pub fn without(&self, others: &Self) -> Self {
         Self(self.0.difference(&others.0).copied().collect())
     }
 
-    /// Their numbers, ascending.
+    /// The processors, ascending.
     pub fn iter(&self) -> impl Iterator<Item = usize> {
         self.0.iter().copied()
     }
 
-    /// Whether there are none.
+    /// Whether the set is empty.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -74,7 +78,7 @@ impl Cpus {
     }
 }
 
-/// Lets the calling thread run on these only; false if Linux refuses.
+/// Binds the calling thread to these processors; false if Linux refuses.
 pub(super) fn bind(cpus: impl Iterator<Item = usize>) -> bool {
     // SAFETY: all-zero is the empty set; CPU_SET ignores numbers beyond its size.
     let set = unsafe {

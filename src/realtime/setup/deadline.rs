@@ -2,34 +2,35 @@
 //!
 //! The kernel's rule (CBS; sched(7), `Documentation/scheduler/sched-deadline.rst`) for a thread that sleeps
 //! to the points of a grid: a wake-up after its deadline begins a new period with the full budget. One
-//! before it, as it comes a little earlier than the last did, does so too, unless the thread has used up
-//! its share of the time since then. That holds where deadline and period are the same. With a shorter
-//! deadline such a wake-up would be held until a whole period after the last one, so that one late cycle
-//! would make all later ones late. So the deadline is the period, and only a thread that has used up its
-//! budget is held, until its deadline. Cycles that it misses then are counted like any others, and what the
-//! kernel says of it by [`times_exhausted`].
+//! shortly before it does so too, unless the thread has used up its share of the time since the last one. That holds where
+//! deadline and period are equal. With a shorter deadline the kernel would delay such a wake-up until a whole period after
+//! the last one, and one late cycle would make all later ones late. So the deadline is the period, and the kernel throttles
+//! only a thread that has used up its budget, until its deadline. Cycles missed then are counted like any others, and the
+//! kernel's signals by [`times_exhausted`].
 
 use core::fmt::{self, Display, Formatter};
 use core::sync::atomic::{AtomicU64, Ordering};
 
-use super::refusals::Step;
+use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
 
-/// Share of a period for the computing of a cycle. Many times what it takes; and with half a period of
-/// spinning before it still below the 95 % that the kernel admits.
-const COMPUTING: f64 = 0.4;
+/// Share of a period reserved for computing: many times the usual time of a cycle, and with half a period of spinning
+/// still below the 95 % that the kernel admits.
+const COMPUTING_SHARE: f64 = 0.4;
 
-/// What is asked for. The period is the cycle's.
+/// Reservation of processor time: a budget in every period of the cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reservation {
+    /// Processor time per period.
     pub budget_ns: u64,
+    /// Period and deadline.
     pub period_ns: u64,
 }
 
 impl Reservation {
-    /// For cycles of this period, each after a spin of at most `spin_ns`.
+    /// The reservation for cycles of a period, each after a spin of at most `spin_ns`.
     pub fn new(period_ns: u64, spin_ns: u64) -> Self {
-        Self { budget_ns: spin_ns + (COMPUTING * period_ns as f64) as u64, period_ns }
+        Self { budget_ns: spin_ns + (COMPUTING_SHARE * period_ns as f64) as u64, period_ns }
     }
 }
 
@@ -40,20 +41,20 @@ impl Display for Reservation {
     }
 }
 
-/// How often the kernel said that a budget was used up, in this process.
-static EXHAUSTED: AtomicU64 = AtomicU64::new(0);
+/// Number of SIGXCPU signals for an exhausted budget, in this process.
+static BUDGET_OVERRUNS: AtomicU64 = AtomicU64::new(0);
 
-/// How often the kernel has said that the budget of a thread of this process was used up. It says so at a
-/// tick of its own that finds the thread running, so this is a lower bound.
+/// Number of times that the kernel signalled an exhausted budget of a thread of this process. It signals at a timer tick
+/// that finds the thread running, so this is a lower bound.
 pub fn times_exhausted() -> u64 {
-    EXHAUSTED.load(Ordering::Relaxed)
+    BUDGET_OVERRUNS.load(Ordering::Relaxed)
 }
 
 extern "C" fn count_exhausted(_: libc::c_int) {
-    EXHAUSTED.fetch_add(1, Ordering::Relaxed);
+    BUDGET_OVERRUNS.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Puts the calling thread under SCHED_DEADLINE. It can start no thread from then on.
+/// Puts the calling thread under SCHED_DEADLINE. It cannot start threads from then on.
 pub fn reserve(reservation: &Reservation) -> Result<(), Shortfall> {
     count_exhaustions();
     let Reservation { budget_ns, period_ns } = *reservation;
@@ -71,17 +72,17 @@ pub fn reserve(reservation: &Reservation) -> Result<(), Shortfall> {
     if unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) } == 0 {
         return Ok(());
     }
-    Err(refusals::of(&Step::Deadline(*reservation)))
+    Err(refusals::of(&SetupStep::Deadline(*reservation)))
 }
 
-/// SIGXCPU is how the kernel says it. Left alone it would end the process.
+/// Counts SIGXCPU, the kernel's signal for an exhausted budget, which would otherwise end the process.
 fn count_exhaustions() {
     // SAFETY: all-zero is a valid sigaction; then handler and flags are set. The handler only adds to an
     // atomic, which is allowed in one. It cannot fail for this signal.
     unsafe {
         let mut action: libc::sigaction = core::mem::zeroed();
         action.sa_sigaction = count_exhausted as extern "C" fn(libc::c_int) as libc::sighandler_t;
-        // Whatever system call it hits goes on.
+        // An interrupted system call continues.
         action.sa_flags = libc::SA_RESTART;
         libc::sigaction(libc::SIGXCPU, &action, core::ptr::null_mut());
     }
@@ -96,9 +97,9 @@ mod tests {
 
     const PERIOD_NS: u64 = 1_000_000;
 
-    /// Of a thread that never sleeps, the budget's share, with as much again for what the kernel notices late:
-    /// it looks at its ticks, some ms apart.
-    const MOST: f64 = 2.0 * 0.1;
+    /// Processor share of a thread that never sleeps: the budget's share, and as much again as the kernel checks only at its
+    /// ticks, some ms apart.
+    const MAX_PROCESSOR_SHARE: f64 = 2.0 * 0.1;
 
     fn in_force() -> libc::sched_attr {
         // SAFETY: all-zero is a valid sched_attr, plain numbers.
@@ -145,7 +146,7 @@ mod tests {
         let Some(share) = reserved(Reservation { budget_ns: 2_000_000, period_ns: 20_000_000 }, spins) else {
             return;
         };
-        assert!(share < MOST, "{share} of a processor, with a tenth reserved");
+        assert!(share < MAX_PROCESSOR_SHARE, "{share} of a processor, with a tenth reserved");
         assert!(times_exhausted() > before);
     }
 

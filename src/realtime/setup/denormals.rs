@@ -1,15 +1,15 @@
 //! Denormal numbers (below 2.2e-308) count as zero: a processor may take a hundred cycles longer for them.
 //!
-//! Rust does not define what a program means whose floating-point environment is not the default: the
+//! Rust does not define the meaning of a program whose floating-point environment is not the default: the
 //! compiler may compute with denormals where it folds constants, and the processor then without. Here that
 //! is the only consequence: every operation is still one of the processor's, and a term differs by less than
 //! 2.3e-308 of a unit that nothing here resolves below 1e-12. No index, length or pointer is computed from
 //! a floating-point number, so none can be wrong by it.
 //!
 //! It holds for the calling thread and those it starts; the daemon does it in the real-time thread alone.
-//! Who repeats its cycles to the last bit has to do it too.
+//! A replay that repeats its cycles to the last bit must do it too.
 
-/// Has the calling thread take denormal inputs and results as zero.
+/// Makes the calling thread treat denormal inputs and results as zero.
 #[cfg(target_arch = "x86_64")]
 pub fn flush() {
     /// Bits of MXCSR: denormals are zero, flush to zero.
@@ -24,7 +24,7 @@ pub fn flush() {
     }
 }
 
-/// Has the calling thread take denormal inputs and results as zero.
+/// Makes the calling thread treat denormal inputs and results as zero.
 #[cfg(target_arch = "aarch64")]
 pub fn flush() {
     /// Bit FZ of FPCR.
@@ -38,7 +38,7 @@ pub fn flush() {
     }
 }
 
-/// On other processors denormals stay what they are.
+/// Other processors keep denormals.
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 pub fn flush() {}
 

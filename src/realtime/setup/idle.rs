@@ -1,24 +1,26 @@
-//! Idle states of processors: the deeper one sleeps, the longer it takes to wake.
+//! PM QoS request for the wake-up latency of processors: deeper idle states take longer to leave.
+//!
+//! `/dev/cpu_dma_latency`, see the kernel's `Documentation/power/pm_qos_interface.rst`.
 
 use std::fs::File;
 use std::io::Write;
 
 use super::permissions::open_cpu_dma_latency;
-use super::refusals::Step;
+use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
 
-/// A request to the kernel; it holds until this is dropped or the process ends, however that comes about.
+/// PM QoS request to the kernel, in force until it is dropped or the process ends.
 #[derive(Debug)]
-pub struct ShallowSleep(#[allow(dead_code, reason = "the request lives as long as the file is open")] File);
+pub struct PmQosRequest(#[allow(dead_code, reason = "the request lives as long as the file is open")] File);
 
-/// Asks that no processor choose an idle state that takes longer than this to wake from.
-pub fn bound_wakeup(latency_us: i32) -> Result<ShallowSleep, Shortfall> {
-    let ask = || {
+/// Requests that no processor enter an idle state with a longer wake-up latency.
+pub fn limit_wakeup_latency(latency_us: i32) -> Result<PmQosRequest, Shortfall> {
+    let request = || {
         let mut file = open_cpu_dma_latency()?;
         // Four bytes are a number in the machine's own order; more would be text.
-        file.write_all(&latency_us.to_ne_bytes()).map(|()| ShallowSleep(file))
+        file.write_all(&latency_us.to_ne_bytes()).map(|()| PmQosRequest(file))
     };
-    ask().map_err(|error| refusals::explained(&Step::ShallowSleep, &error))
+    request().map_err(|error| refusals::explained(&SetupStep::WakeupLatency, &error))
 }
 
 #[cfg(test)]
@@ -27,15 +29,15 @@ mod tests {
     use std::io::Read;
 
     #[test]
-    fn what_is_asked_for_is_in_force_until_dropped() {
-        const ASKED_US: i32 = 123;
-        let mut held = match bound_wakeup(ASKED_US) {
+    fn a_request_is_in_force_until_dropped() {
+        const REQUESTED_US: i32 = 123;
+        let mut held = match limit_wakeup_latency(REQUESTED_US) {
             Ok(held) => held,
             Err(shortfall) => return println!("SKIPPED, as there is {shortfall}"),
         };
-        // The least that any process asks for.
+        // The lowest request of any process.
         let mut in_force = [0; 4];
         held.0.read_exact(&mut in_force).unwrap();
-        assert!(i32::from_ne_bytes(in_force) <= ASKED_US);
+        assert!(i32::from_ne_bytes(in_force) <= REQUESTED_US);
     }
 }

@@ -1,33 +1,32 @@
-//! Stack, heap and locked memory: no page is met for the first time in a cycle.
+//! Stack, heap and locked memory: no cycle meets a page for the first time.
 
 use super::permissions::Permissions;
-use super::refusals::Step;
+use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
 
-/// Stack touched in advance by a real-time thread: more than a cycle uses.
-const STACK_TOUCHED: usize = 128 * 1024;
+/// Stack that a real-time thread prefaults \[bytes\]: more than a cycle uses.
+const PREFAULTED_STACK_BYTES: usize = 128 * 1024;
 
-/// Heap touched in advance by a thread that allocates while a peer connects: many times what it then uses.
-const HEAP_TOUCHED: usize = 1024 * 1024;
+/// Heap that the I/O thread prefaults \[bytes\]: many times its allocations while a peer connects.
+const PREFAULTED_HEAP_BYTES: usize = 1024 * 1024;
 
 /// Keeps every present and future page of the process in memory.
 ///
-/// Not tried with a limit that leaves peers no room: a peer that connected later could not be served.
+/// Refused in advance where the limit leaves no room for peers: a peer that connects later could not be served.
 pub fn lock_all() -> Result<(), Shortfall> {
-    if let Some(shortfall) = Permissions::of_this_process().against(&Step::LockedMemory) {
+    if let Some(shortfall) = Permissions::of_this_process().refusal_of(&SetupStep::LockedMemory) {
         return Err(shortfall);
     }
     // SAFETY: takes flags only; affects where pages live, not what they hold.
     if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) } == 0 {
         return Ok(());
     }
-    Err(refusals::of(&Step::LockedMemory))
+    Err(refusals::of(&SetupStep::LockedMemory))
 }
 
-/// Has the allocator keep what it once had from the kernel: freed memory is not given back, and large blocks
-/// come from the heap instead of mappings of their own. And there is one heap: each further one would
-/// reserve 64 MiB, all of which count as locked; the one thread that must not wait for it never allocates.
-/// For the whole process, before its threads start.
+/// Makes the allocator keep its memory: freed memory is not returned to the kernel, large blocks come from the heap
+/// instead of mappings of their own, and there is one heap, as each further one would reserve 64 MiB of locked memory. The
+/// real-time thread never allocates, so it never waits for the heap. For the whole process, before its threads start.
 #[cfg(target_env = "gnu")]
 pub fn keep_heap() {
     // SAFETY: plain numbers, set under the lock of the allocator. They only decide where blocks come from.
@@ -43,16 +42,15 @@ pub fn keep_heap() {
 #[cfg(not(target_env = "gnu"))]
 pub fn keep_heap() {}
 
-/// Touches heap for the calling thread; after [`keep_heap`] its allocations up to that size meet no page
-/// for the first time.
-pub fn touch_heap() {
-    // Not zero: the kernel's own zero pages would do for that, untouched.
-    drop(core::hint::black_box(vec![1_u8; HEAP_TOUCHED]));
+/// Prefaults heap for the calling thread; after [`keep_heap`] its allocations up to that size cause no page fault.
+pub fn prefault_heap() {
+    // Not zero: for zeros the kernel would map its own zero page.
+    drop(core::hint::black_box(vec![1_u8; PREFAULTED_HEAP_BYTES]));
 }
 
-/// Touches the stack of the calling thread down to what a cycle may need.
+/// Prefaults the stack of the calling thread down to the depth that a cycle may need.
 #[inline(never)]
-pub fn touch_stack() {
-    let pages = [0_u8; STACK_TOUCHED];
+pub fn prefault_stack() {
+    let pages = [0_u8; PREFAULTED_STACK_BYTES];
     core::hint::black_box(&pages);
 }

@@ -1,8 +1,7 @@
-//! What makes a process fit for real time: memory that is there, a scheduling class, a processor of its
-//! own, processors that do not sleep deeply.
+//! Real-time set-up of a process: resident memory, scheduling class, processor affinity, bounded wake-up latency.
 //!
-//! Each step that is refused says why and what cures it ([`Shortfall`]); the caller decides whether to go
-//! on. [`permissions`] knows the same in advance, without a step being taken.
+//! A step that the kernel refuses returns a [`Shortfall`] with reason and remedy; the caller decides whether to
+//! continue. [`permissions`] finds the same in advance, without taking a step.
 
 pub mod budget;
 pub mod cpus;
@@ -14,11 +13,14 @@ pub mod permissions;
 pub mod refusals;
 pub mod scheduling;
 
-/// A step that was refused.
+/// Set-up step that the kernel refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no {what}: {reason}; {remedy}")]
 pub struct Shortfall {
+    /// The step.
     pub what: String,
+    /// Why the kernel refused it.
     pub reason: String,
+    /// What to do.
     pub remedy: String,
 }

@@ -1,4 +1,4 @@
-//! What this process may ask of the kernel, as the kernel itself tells it. Nothing is applied by looking.
+//! Permissions of this process for the real-time set-up, read from the kernel. Reading applies nothing.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -12,16 +12,16 @@ const CAP_IPC_LOCK: u32 = 14;
 const CAP_SYS_NICE: u32 = 23;
 
 /// Inodes of the namespaces that the kernel begins with; see `linux/nsfs.h`.
-const FIRST_USER_NAMESPACE: &str = "user:[4026531837]";
-const FIRST_PROCESS_NAMESPACE: &str = "pid:[4026531836]";
+const INITIAL_USER_NAMESPACE: &str = "user:[4026531837]";
+const INITIAL_PID_NAMESPACE: &str = "pid:[4026531836]";
 
 /// `SECCOMP_MODE_FILTER` in `/proc/self/status`.
-const FILTERED: u64 = 2;
+const SECCOMP_MODE_FILTER: u64 = 2;
 
-/// Where the longest wake-up of idle processors is asked for.
+/// Device for PM QoS requests on the wake-up latency of processors.
 pub const CPU_DMA_LATENCY: &str = "/dev/cpu_dma_latency";
 
-/// Facts about this process, and the calling thread where it says so.
+/// Permissions and limits of this process; those of the calling thread say so.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Permissions {
     /// Whether `CAP_SYS_NICE` is in effect. Never in a user namespace: there the kernel does not honour it.
@@ -38,13 +38,13 @@ pub struct Permissions {
     pub priority_limit: u64,
     /// `RLIMIT_MEMLOCK` without `CAP_IPC_LOCK` \[kB\]; `None` if there is no limit.
     pub locked_limit_kb: Option<u64>,
-    /// What locking all memory would count \[kB\].
+    /// Address space that locking all memory would count \[kB\].
     pub mapped_kb: u64,
-    /// Processors that the calling thread may run on now.
+    /// Affinity of the calling thread.
     pub cpus: Cpus,
-    /// Processors that a thread may ask for.
+    /// Processors that a thread may be bound to.
     pub cpus_permitted: Cpus,
-    /// Processors in use.
+    /// Processors that are online.
     pub cpus_online: Cpus,
     /// Processors among those that the scheduler does not spread threads over.
     pub cpus_isolated: Cpus,
@@ -52,15 +52,15 @@ pub struct Permissions {
     pub group_budget: GroupBudget,
     /// Shortest and longest period of SCHED_DEADLINE \[us\].
     pub deadline_period_us: (u64, u64),
-    /// The error number of opening `/dev/cpu_dma_latency` for writing, which asks for nothing yet.
+    /// The error number of opening `/dev/cpu_dma_latency` for writing, which requests nothing yet.
     pub cpu_dma_latency: Result<(), i32>,
 }
 
 impl Permissions {
-    /// Looks. Allocates, reads files and starts a thread.
+    /// Reads the permissions. Allocates, reads files and starts a thread.
     pub fn of_this_process() -> Self {
         let status = fs::read_to_string("/proc/thread-self/status").unwrap_or_default();
-        let user_namespace = !is_namespace("user", FIRST_USER_NAMESPACE);
+        let user_namespace = !is_namespace("user", INITIAL_USER_NAMESPACE);
         let capabilities = field(&status, "CapEff:", 16);
         let has = |bit: u32| !user_namespace && capabilities >> bit & 1 == 1;
         let limits = fs::read_to_string("/proc/self/limits").unwrap_or_default();
@@ -68,8 +68,8 @@ impl Permissions {
             sys_nice: has(CAP_SYS_NICE),
             ipc_lock: has(CAP_IPC_LOCK),
             user_namespace,
-            container: !is_namespace("pid", FIRST_PROCESS_NAMESPACE),
-            filtered: field(&status, "Seccomp:", 10) == FILTERED,
+            container: !is_namespace("pid", INITIAL_PID_NAMESPACE),
+            filtered: field(&status, "Seccomp:", 10) == SECCOMP_MODE_FILTER,
             priority_limit: limit(&limits, "Max realtime priority").unwrap_or(u64::MAX),
             locked_limit_kb: limit(&limits, "Max locked memory").map(|bytes| bytes / 1024),
             mapped_kb: field(&status, "VmSize:", 10),
@@ -89,7 +89,7 @@ impl Permissions {
     }
 }
 
-/// Opened so, the kernel's own answer can be read from it too.
+/// Opens the device for writing a request and reading the one in force.
 pub(super) fn open_cpu_dma_latency() -> io::Result<File> {
     OpenOptions::new().read(true).write(true).open(CPU_DMA_LATENCY)
 }

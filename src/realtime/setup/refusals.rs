@@ -1,7 +1,6 @@
-//! Why a step is refused, and what cures that.
+//! Reason and remedy of every set-up step that the kernel refuses.
 //!
-//! The reasons are looked for in the order in which the kernel checks them, so that who follows a remedy
-//! gets one step further each time.
+//! Reasons are checked in the order in which the kernel checks them, so that each remedy leads one check further.
 
 use core::fmt::{self, Display, Formatter};
 use std::fs;
@@ -19,7 +18,7 @@ const ROOM_FOR_PEERS_KB: u64 = 16 * 1024;
 
 /// A step of the set-up that the kernel may refuse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum SetupStep {
     /// SCHED_FIFO at this priority.
     Fifo(i32),
     /// SCHED_DEADLINE.
@@ -29,38 +28,38 @@ pub enum Step {
     /// Every page in memory, now and later.
     LockedMemory,
     /// Processors kept out of deep idle states.
-    ShallowSleep,
+    WakeupLatency,
 }
 
-impl Display for Step {
+impl Display for SetupStep {
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
         match self {
             Self::Fifo(priority) => write!(out, "FIFO priority {priority}"),
             Self::Deadline(reservation) => write!(out, "deadline scheduling with {reservation}"),
             Self::Cpu(cpu) => write!(out, "binding to CPU {cpu}"),
             Self::LockedMemory => out.write_str("locked memory"),
-            Self::ShallowSleep => out.write_str("bound on idle states"),
+            Self::WakeupLatency => out.write_str("bound on idle states"),
         }
     }
 }
 
 /// A reason and its remedy.
-type Why = (String, String);
+type Explanation = (String, String);
 
 impl Permissions {
-    /// What stands against a step; `None` if nothing does that can be seen.
-    pub fn against(&self, step: &Step) -> Option<Shortfall> {
+    /// The refusal to expect for a step; `None` if the permissions suffice.
+    pub fn refusal_of(&self, step: &SetupStep) -> Option<Shortfall> {
         let why = match step {
-            Step::Fifo(priority) => self.why_no_fifo(*priority),
-            Step::Deadline(reservation) => self.why_no_deadline(reservation),
-            Step::Cpu(cpu) => self.why_no_cpu(*cpu),
-            Step::LockedMemory => self.why_no_locked_memory(),
-            Step::ShallowSleep => self.why_no_shallow_sleep(),
+            SetupStep::Fifo(priority) => self.why_no_fifo(*priority),
+            SetupStep::Deadline(reservation) => self.why_no_deadline(reservation),
+            SetupStep::Cpu(cpu) => self.why_no_cpu(*cpu),
+            SetupStep::LockedMemory => self.why_no_locked_memory(),
+            SetupStep::WakeupLatency => self.why_no_wakeup_latency(),
         };
         why.map(|why| shortfall(step, why))
     }
 
-    fn why_no_fifo(&self, priority: i32) -> Option<Why> {
+    fn why_no_fifo(&self, priority: i32) -> Option<Explanation> {
         let limit = self.priority_limit;
         if !self.sys_nice && limit < u64::try_from(priority).unwrap_or_default() {
             let reason = format!("{}, and RLIMIT_RTPRIO is {limit}", self.without("CAP_SYS_NICE"));
@@ -72,7 +71,7 @@ impl Permissions {
             return Some((reason, remedy));
         }
         match &self.group_budget {
-            GroupBudget::Of { file, budget_us: 0 } => Some((
+            GroupBudget::Limited { file, budget_us: 0 } => Some((
                 format!("its cgroup has no real-time budget ({} is 0)", file.display()),
                 "write one there, in the groups above it first (echo 950000), or start it in another cgroup"
                     .into(),
@@ -81,7 +80,7 @@ impl Permissions {
         }
     }
 
-    fn why_no_deadline(&self, reservation: &Reservation) -> Option<Why> {
+    fn why_no_deadline(&self, reservation: &Reservation) -> Option<Explanation> {
         let fifo = "or choose realtime.scheduler = \"fifo\"";
         if !self.sys_nice {
             let remedy = if self.user_namespace {
@@ -108,7 +107,7 @@ impl Permissions {
         })
     }
 
-    fn why_no_cpu(&self, cpu: usize) -> Option<Why> {
+    fn why_no_cpu(&self, cpu: usize) -> Option<Explanation> {
         let Self { cpus_online, cpus_permitted, .. } = self;
         if !cpus_online.contains(cpu) {
             return Some((
@@ -124,7 +123,7 @@ impl Permissions {
         })
     }
 
-    fn why_no_locked_memory(&self) -> Option<Why> {
+    fn why_no_locked_memory(&self) -> Option<Explanation> {
         let limit_kb = self.locked_limit_kb.filter(|_| !self.ipc_lock)?;
         let needed_kb = self.mapped_kb + ROOM_FOR_PEERS_KB;
         (limit_kb < needed_kb).then(|| {
@@ -135,7 +134,7 @@ impl Permissions {
         })
     }
 
-    fn why_no_shallow_sleep(&self) -> Option<Why> {
+    fn why_no_wakeup_latency(&self) -> Option<Explanation> {
         Some(match self.cpu_dma_latency.err()? {
             libc::ENOENT => (
                 format!("there is no {CPU_DMA_LATENCY}"),
@@ -149,7 +148,7 @@ impl Permissions {
                 format!("{CPU_DMA_LATENCY} is {}", owner_and_mode()),
                 format!("give this user's group the right to it (chgrp and chmod 660 {CPU_DMA_LATENCY})"),
             ),
-            // The file allows it: what refuses is the list of devices of the cgroup.
+            // The file allows it: the list of devices of the cgroup does not.
             libc::EPERM => (
                 format!("the cgroup does not allow {CPU_DMA_LATENCY}"),
                 format!("allow it (DeviceAllow={CPU_DMA_LATENCY} rw, docker --device={CPU_DMA_LATENCY})"),
@@ -158,7 +157,7 @@ impl Permissions {
         })
     }
 
-    /// The remedy where one of the two suffices. What a container has not been given it cannot give on.
+    /// The remedy where one of the two suffices. A container cannot grant a right that it does not have.
     fn capability_or_limit(&self, capability: &str, unit: &str, container: &str) -> String {
         let first = "the container needs it first";
         match (self.user_namespace, self.container) {
@@ -170,21 +169,21 @@ impl Permissions {
         }
     }
 
-    /// "no CAP_...", and where the one that it seems to have does not count.
+    /// "no CAP_...", in a user namespace "of the host".
     fn without(&self, capability: &str) -> String {
         let whose = if self.user_namespace { " of the host (this is a user namespace)" } else { "" };
         format!("no {capability}{whose}")
     }
 
-    /// For a refusal that `against` does not foresee.
-    fn unforeseen(&self, step: &Step, error: &Error) -> Why {
-        let fifo = matches!(step, Step::Fifo(_));
+    /// Reason and remedy of a refusal that [`Permissions::refusal_of`] does not foresee.
+    fn unforeseen(&self, step: &SetupStep, error: &Error) -> Explanation {
+        let fifo = matches!(step, SetupStep::Fifo(_));
         match (error.raw_os_error(), &self.group_budget) {
             (Some(libc::EPERM), _) if self.filtered => (
                 "a filter of system calls refuses it".into(),
                 "RestrictRealtime=no in the unit; in a container, a seccomp profile that allows it".into(),
             ),
-            (Some(libc::EPERM), GroupBudget::Unseen { group }) if fifo => (
+            (Some(libc::EPERM), GroupBudget::Unknown { group }) if fifo => (
                 format!("cgroup {} has no real-time budget (CONFIG_RT_GROUP_SCHED)", group.display()),
                 "boot with rt_group_sched=0 (Linux 6.16 and newer), or start it in the root cgroup".into(),
             ),
@@ -197,18 +196,18 @@ impl Permissions {
     }
 }
 
-/// The last system call of this thread was refused: why.
-pub(super) fn of(step: &Step) -> Shortfall {
+/// The refusal of a step by the last system call of this thread.
+pub(super) fn of(step: &SetupStep) -> Shortfall {
     explained(step, &Error::last_os_error())
 }
 
-/// This error was the answer to a step: why.
-pub(super) fn explained(step: &Step, error: &Error) -> Shortfall {
+/// The refusal of a step with this error.
+pub(super) fn explained(step: &SetupStep, error: &Error) -> Shortfall {
     let facts = Permissions::of_this_process();
-    facts.against(step).unwrap_or_else(|| shortfall(step, facts.unforeseen(step, error)))
+    facts.refusal_of(step).unwrap_or_else(|| shortfall(step, facts.unforeseen(step, error)))
 }
 
-fn shortfall(step: &Step, (reason, remedy): Why) -> Shortfall {
+fn shortfall(step: &SetupStep, (reason, remedy): Explanation) -> Shortfall {
     Shortfall { what: step.to_string(), reason, remedy }
 }
 
@@ -239,53 +238,53 @@ mod tests {
             cpus_permitted: cpus(),
             cpus_online: cpus(),
             cpus_isolated: Cpus::default(),
-            group_budget: GroupBudget::None,
+            group_budget: GroupBudget::Unlimited,
             deadline_period_us: (100, 4_194_304),
             cpu_dma_latency: Err(libc::ENOENT),
         }
     }
 
-    const DEADLINE: Step = Step::Deadline(Reservation { budget_ns: 400_000, period_ns: 1_000_000 });
+    const DEADLINE: SetupStep = SetupStep::Deadline(Reservation { budget_ns: 400_000, period_ns: 1_000_000 });
 
     #[test]
-    fn a_container_is_told_how_to_start_it() {
+    fn a_container_gets_the_options_to_start_it_with() {
         let facts = contained();
         for (step, reason, remedy) in [
             (
-                Step::Fifo(80),
+                SetupStep::Fifo(80),
                 "no CAP_SYS_NICE, and RLIMIT_RTPRIO is 0",
                 "--cap-add=SYS_NICE or --ulimit rtprio=80",
             ),
             (DEADLINE, "no CAP_SYS_NICE, and no limit replaces it", "--cap-add=SYS_NICE), or choose"),
             (
-                Step::LockedMemory,
+                SetupStep::LockedMemory,
                 "RLIMIT_MEMLOCK is 8192 kB, of 17384 kB",
                 "--cap-add=IPC_LOCK or --ulimit memlock=-1",
             ),
-            (Step::ShallowSleep, "there is no /dev/cpu_dma_latency", "--device=/dev/cpu_dma_latency"),
+            (SetupStep::WakeupLatency, "there is no /dev/cpu_dma_latency", "--device=/dev/cpu_dma_latency"),
         ] {
-            let shortfall = facts.against(&step).unwrap();
+            let shortfall = facts.refusal_of(&step).unwrap();
             assert!(shortfall.reason.contains(reason), "{shortfall}");
             assert!(shortfall.remedy.contains(remedy), "{shortfall}");
         }
     }
 
     #[test]
-    fn what_is_granted_has_nothing_against_it() {
+    fn a_granted_step_is_not_refused() {
         let limits = Permissions { priority_limit: 80, locked_limit_kb: None, ..contained() };
         let capable = Permissions { sys_nice: true, ipc_lock: true, cpu_dma_latency: Ok(()), ..contained() };
         for (facts, step) in [
-            (&limits, Step::Fifo(80)),
-            (&limits, Step::LockedMemory),
-            (&capable, Step::Fifo(80)),
-            (&capable, Step::LockedMemory),
+            (&limits, SetupStep::Fifo(80)),
+            (&limits, SetupStep::LockedMemory),
+            (&capable, SetupStep::Fifo(80)),
+            (&capable, SetupStep::LockedMemory),
             (&capable, DEADLINE),
-            (&capable, Step::Cpu(1)),
-            (&capable, Step::ShallowSleep),
+            (&capable, SetupStep::Cpu(1)),
+            (&capable, SetupStep::WakeupLatency),
         ] {
-            assert_eq!(facts.against(&step), None);
+            assert_eq!(facts.refusal_of(&step), None);
         }
-        let almost = limits.against(&Step::Fifo(81)).unwrap();
+        let almost = limits.refusal_of(&SetupStep::Fifo(81)).unwrap();
         assert!(almost.reason.contains("RLIMIT_RTPRIO is 80"), "{almost}");
         // Isolated processors are none that such a thread has to be free to run on.
         let isolated = Permissions {
@@ -293,18 +292,23 @@ mod tests {
             cpus_isolated: Cpus::parse("1").unwrap(),
             ..capable
         };
-        assert_eq!(isolated.against(&DEADLINE), None);
+        assert_eq!(isolated.refusal_of(&DEADLINE), None);
     }
 
     #[test]
-    fn what_no_fact_foresees_is_told_by_the_error() {
-        let group = GroupBudget::Unseen { group: "/sys/fs/cgroup/a.slice".into() };
+    fn an_unforeseen_refusal_is_explained_by_the_error() {
+        let group = GroupBudget::Unknown { group: "/sys/fs/cgroup/a.slice".into() };
         let grouped = Permissions { group_budget: group, ..contained() };
         let filtered = Permissions { filtered: true, ..grouped.clone() };
         for (facts, step, number, expected) in [
-            (&grouped, Step::Fifo(80), libc::EPERM, "cgroup /sys/fs/cgroup/a.slice has no real-time budget"),
+            (
+                &grouped,
+                SetupStep::Fifo(80),
+                libc::EPERM,
+                "cgroup /sys/fs/cgroup/a.slice has no real-time budget",
+            ),
             (&grouped, DEADLINE, libc::EPERM, "Operation not permitted"),
-            (&filtered, Step::Fifo(80), libc::EPERM, "a filter of system calls"),
+            (&filtered, SetupStep::Fifo(80), libc::EPERM, "a filter of system calls"),
             (&grouped, DEADLINE, libc::EBUSY, "other deadline threads"),
         ] {
             let (reason, _) = facts.unforeseen(&step, &Error::from_raw_os_error(number));

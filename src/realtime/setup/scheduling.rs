@@ -1,7 +1,7 @@
 //! FIFO priority, processor and timers of the calling thread. No other thread is touched.
 
 use super::cpus::bind;
-use super::refusals::Step;
+use super::refusals::SetupStep;
 use super::{Shortfall, refusals};
 
 /// Puts the calling thread under SCHED_FIFO at this priority.
@@ -13,17 +13,17 @@ pub fn fifo_priority(priority: i32) -> Result<(), Shortfall> {
     if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) } == 0 {
         return Ok(());
     }
-    Err(refusals::of(&Step::Fifo(priority)))
+    Err(refusals::of(&SetupStep::Fifo(priority)))
 }
 
 /// Binds the calling thread to one processor.
 pub fn bind_to_cpu(cpu: usize) -> Result<(), Shortfall> {
-    if bind(core::iter::once(cpu)) { Ok(()) } else { Err(refusals::of(&Step::Cpu(cpu))) }
+    if bind(core::iter::once(cpu)) { Ok(()) } else { Err(refusals::of(&SetupStep::Cpu(cpu))) }
 }
 
-/// Asks for timers of the calling thread to fire within a nanosecond instead of the default 50 us. Only
-/// threads without FIFO priority are affected. Cannot fail on Linux.
-pub fn sharp_timers() {
+/// Sets the timer slack of the calling thread to a nanosecond instead of the default 50 us. Affects only
+/// threads without FIFO priority. Cannot fail on Linux.
+pub fn set_shortest_timer_slack() {
     // SAFETY: plain numbers.
     unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_usize, 0_usize, 0_usize, 0_usize) };
 }

@@ -5,7 +5,7 @@ use hexad::config::text::text;
 use hexad::config::{Config, ConfigError, Violation};
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
-use hexad::model::forward_kinematics::{Tracked, Tracker};
+use hexad::model::forward_kinematics::{Tracker, TrackingResult};
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::task::TaskState;
 
@@ -79,7 +79,7 @@ fn check_machine(config: &Config) {
     let stroke = actuator.min_length..=actuator.max_length;
     assert!(lengths.iter().all(|length| stroke.contains(length)), "{lengths:?} at home, of {stroke:?}");
     let (tracked, _) = Tracker::new(machine, home.motion().pose).find(machine, &lengths);
-    assert_eq!(tracked, Tracked::Found, "forward kinematics does not find home");
+    assert_eq!(tracked, TrackingResult::Found, "forward kinematics does not find home");
     check_forces(config, &home);
     let text = Check::new(config).to_string();
     assert!(text.starts_with(&format!("{name}: valid.")), "{text}");

@@ -3,11 +3,14 @@
 
 use std::sync::LazyLock;
 
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::parameters::Parameters;
+
 use hexad::config::Config;
-use hexad::control::controller::{Asked, Controller, Input, Measurement, Output, Parameters, Setpoint};
 use hexad::control::law::ControlMode;
 use hexad::control::limits::Limit;
-use hexad::control::state::{Request, State};
+use hexad::control::localization::PlatformState;
+use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::leg_motion;
@@ -45,7 +48,7 @@ struct Play<'a> {
     now_ns: u64,
     /// Size of the source's motion.
     size: f64,
-    asked: Option<Asked>,
+    asked: Option<OperatorRequest>,
     last: Output,
     controlled: bool,
     cycles: u64,
@@ -105,7 +108,8 @@ impl<'a> Play<'a> {
     fn ask(&mut self, number: u8) {
         let request = Request::from_number(u32::from(number % 8));
         let sequence = self.asked.map_or(1, |asked| asked.message.1 + 1);
-        self.asked = request.map(|request| Asked { request, message: (7, sequence) }).or(self.asked);
+        self.asked =
+            request.map(|request| OperatorRequest { request, message: (7, sequence) }).or(self.asked);
     }
 
     /// One instruction; false at the end.
@@ -154,7 +158,10 @@ impl<'a> Play<'a> {
                 0 => input.setpoint = None,
                 1 => input.measurement = None,
                 2 => input.deadline_missed = true,
-                _ => input.request = Some(Asked { request: Request::ALL[place % 6], message: (bits, bits) }),
+                _ => {
+                    input.request =
+                        Some(OperatorRequest { request: Request::ALL[place % 6], message: (bits, bits) })
+                }
             },
             _ => {
                 // Small changes: what passes the checks by a little.
@@ -184,32 +191,35 @@ impl<'a> Play<'a> {
 
     fn check(&self, output: &Output, request: Option<Request>) {
         let limit = CONFIG.machine.actuator.max_force;
-        let Output { state, cause, force, limiting, .. } = output;
-        if state.controls() {
+        let Output { state, diagnostic, force, active_limits, .. } = output;
+        if state.has_control() {
             assert!(force.iter().all(|force| force.abs() <= limit), "{output:?}");
             let most =
                 self.parameters.force_rate * self.parameters.period_ns as f64 * 1e-9 + ROUNDING * limit;
-            if self.last.state.controls() {
+            if self.last.state.has_control() {
                 let steady =
                     force.iter().zip(&self.last.force).all(|(now, before)| (now - before).abs() <= most);
                 assert!(steady, "{output:?} after {:?}", self.last);
             }
             if force.iter().any(|force| force.abs() == limit) {
-                assert!(limiting.contains(Limit::Force) || limiting.contains(Limit::ForceRate), "{output:?}");
+                assert!(
+                    active_limits.contains(Limit::Force) || active_limits.contains(Limit::ForceRate),
+                    "{output:?}"
+                );
             }
-            assert!(output.measured.is_some() && output.error.is_some(), "{output:?}");
+            assert!(output.platform.is_some() && output.error.is_some(), "{output:?}");
         } else {
             assert_eq!(force.map(f64::to_bits), [0; 6], "{output:?}");
         }
-        if let Some((pose, twist)) = &output.measured {
+        if let Some(PlatformState { pose, twist, .. }) = &output.platform {
             let numbers =
                 pose.position.iter().chain(&pose.rotation).chain(&twist.angular).chain(&twist.linear);
             assert!(numbers.into_iter().all(|number| number.is_finite()), "{output:?}");
         }
-        assert!(*state != State::Fault || cause.is_fault(), "{output:?}");
+        assert!(*state != State::Fault || diagnostic.code.is_fault(), "{output:?}");
         match request {
             Some(Request::Estop) => assert_eq!(*state, State::Fault),
-            Some(Request::Off) => assert!(!state.controls()),
+            Some(Request::Off) => assert!(!state.has_control()),
             _ => {}
         }
         let before = self.last.state;
@@ -221,7 +231,7 @@ impl<'a> Play<'a> {
                     || matches!(before, State::Off | State::Standby) && request == Some(Request::Engage)
             }
             State::Active => matches!(before, State::Engaging | State::Active),
-            State::Stopping => before.controls(),
+            State::Stopping => before.has_control(),
             State::Parking => {
                 matches!(before, State::Parking | State::Stopping)
                     || matches!(before, State::Off | State::Standby) && request == Some(Request::Park)

@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use hexad::control::state::{Cause, Request, State};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
 use hexad::messages::{ForceMessage, MeasuredMessage, Message, SCHEMA};
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
@@ -39,7 +40,7 @@ pub fn stands(measured: &MeasuredMessage) -> bool {
 /// For a daemon that was stopped in order: the platform was at rest before nobody controlled it any more.
 pub fn ends_at_rest(recording: &Recording) {
     let last = recording.forces.last().expect("forces");
-    assert_eq!((last.valid, last.diagnostic_code), (0, Cause::Stopping as u32), "{last:#?}");
+    assert_eq!((last.valid, last.diagnostic_code), (0, DiagnosticCode::Stopping as u32), "{last:#?}");
     let valid = recording.forces.iter().rfind(|force| force.valid == 1).expect("a valid force");
     assert_eq!(State::from_number(valid.state), Some(State::Stopping), "the last valid one: {valid:#?}");
     let until_then = |measured: &&MeasuredMessage| measured.header.time_ns <= valid.header.time_ns;
@@ -81,14 +82,14 @@ fn pairs(forces: &[ForceMessage]) -> impl Iterator<Item = [&ForceMessage; 2]> {
 fn forces_are_zero_unless_valid(forces: &[ForceMessage]) {
     for force in forces {
         let state = State::from_number(force.state).expect("a state");
-        assert_eq!(force.valid, u32::from(state.controls()), "{force:#?}");
-        let cause = Cause::from_number(force.diagnostic_code).expect("a cause");
+        assert_eq!(force.valid, u32::from(state.has_control()), "{force:#?}");
+        let cause = DiagnosticCode::from_number(force.diagnostic_code).expect("a cause");
         match state {
-            State::Engaging | State::Active => assert_eq!(cause, Cause::None, "{force:#?}"),
+            State::Engaging | State::Active => assert_eq!(cause, DiagnosticCode::None, "{force:#?}"),
             State::Fault => assert!(cause.is_fault(), "{force:#?}"),
             // The one cycle after a fault was cleared, too.
             State::Off => {}
-            _ => assert_ne!(cause, Cause::None, "{force:#?}"),
+            _ => assert_ne!(cause, DiagnosticCode::None, "{force:#?}"),
         }
         assert!(force.valid == 1 || force.force_n == [0.0; 6], "{force:#?}");
         assert!(force.force_n.iter().all(|newton| newton.abs() <= MAX_FORCE), "{force:#?}");
@@ -112,7 +113,7 @@ fn nothing_moves_unasked(recording: &Recording) {
         let commands = commands.filter(|command| Request::from_number(command.request).is_some_and(is_it));
         commands.map(|command| command.header.time_ns).find(|time_ns| (from_ns..=until_ns).contains(time_ns))
     };
-    let engaged = |from_ns, until_ns| asked(Request::takes_force, from_ns, until_ns).is_some();
+    let engaged = |from_ns, until_ns| asked(Request::can_begin_control, from_ns, until_ns).is_some();
     for life in recording.forces.chunk_by(|a, b| a.header.epoch == b.header.epoch) {
         let first = &life[0];
         let begins_unasked = first.header.sequence == 1
@@ -126,7 +127,7 @@ fn nothing_moves_unasked(recording: &Recording) {
             if (a.valid == 1 && b.valid == 0) || is_fault == [false, true] {
                 since_ns = a.header.time_ns;
             }
-            if is_fault == [true, false] && b.diagnostic_code != Cause::Stopping as u32 {
+            if is_fault == [true, false] && b.diagnostic_code != DiagnosticCode::Stopping as u32 {
                 let cleared_ns = asked(|request| request == Request::Clear, since_ns, b.header.time_ns);
                 since_ns = cleared_ns.unwrap_or_else(|| panic!("not cleared: {a:#?} and then {b:#?}"));
             }
@@ -176,7 +177,7 @@ fn every_grid_point_is_counted(recording: &Recording) {
     let released: HashMap<_, _> = recording
         .forces
         .iter()
-        .filter(|force| force.diagnostic_code != Cause::Stopping as u32)
+        .filter(|force| force.diagnostic_code != DiagnosticCode::Stopping as u32)
         .map(|force| ((force.header.epoch, force.header.sequence), force.release_ns))
         .collect();
     let mut first = HashMap::new();

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hexad::control::state::Cause;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{ForceMessage, MeasuredMessage};
 
@@ -51,7 +51,7 @@ impl Trio {
     }
 
     /// Waits until no force is valid any more, for this reason.
-    pub fn loses_force_for(&self, cause: Cause) {
+    pub fn loses_force_for(&self, cause: DiagnosticCode) {
         self.recorder.until("the daemon marks its forces as not valid", |recording| {
             recording
                 .forces

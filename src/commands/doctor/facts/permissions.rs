@@ -64,19 +64,19 @@ pub fn locked_memory(permissions: &Permissions, realtime: &Realtime, refused: &R
 pub fn cgroup(permissions: &Permissions, refused: &Refused) -> Fact {
     let name = "cgroup";
     match &permissions.group_budget {
-        GroupBudget::None => Fact::good(name, "does not limit real-time threads"),
-        GroupBudget::Of { file, budget_us: 0 } => Fact::bad(
+        GroupBudget::Unlimited => Fact::good(name, "does not limit real-time threads"),
+        GroupBudget::Limited { file, budget_us: 0 } => Fact::bad(
             name,
             format!("has no budget for real-time threads ({})", file.display()),
             format!("write one there, in the groups above it first: echo 950000 > {}", file.display()),
         ),
-        GroupBudget::Of { file, budget_us } => {
+        GroupBudget::Limited { file, budget_us } => {
             Fact::good(name, format!("{budget_us} us a period for real-time threads ({})", file.display()))
         }
-        GroupBudget::Unseen { group } if refused.thread.is_empty() => {
+        GroupBudget::Unknown { group } if refused.thread.is_empty() => {
             Fact::good(name, format!("{} does not limit real-time threads", group.display()))
         }
-        GroupBudget::Unseen { group } => {
+        GroupBudget::Unknown { group } => {
             Fact::unknown(name, format!("{} does not tell its budget", group.display()), None)
         }
     }
@@ -156,11 +156,11 @@ mod tests {
 
     #[test]
     fn budgets_of_a_group_are_told_apart() {
-        let of = |budget_us| GroupBudget::Of { file: "/c/cpu.rt_runtime_us".into(), budget_us };
-        let unseen = GroupBudget::Unseen { group: "/c/g".into() };
+        let of = |budget_us| GroupBudget::Limited { file: "/c/cpu.rt_runtime_us".into(), budget_us };
+        let unseen = GroupBudget::Unknown { group: "/c/g".into() };
         let refused = Refused { thread: vec![shortfall("FIFO priority 80")], ..Refused::default() };
         for (group_budget, refused, rating) in [
-            (GroupBudget::None, &refused, Rating::Good),
+            (GroupBudget::Unlimited, &refused, Rating::Good),
             (of(0), &refused, Rating::Bad),
             (of(-1), &refused, Rating::Good),
             (of(950_000), &refused, Rating::Good),

@@ -1,15 +1,14 @@
-//! The newest value of one thread for another, wait-free on both sides: a triple buffer.
+//! Triple buffer: hands the newest value of one thread to another, wait-free on both sides.
 //!
-//! Of three slots one belongs to the writer, one to the reader, and one lies between them. Who has written
-//! swaps its slot for the one between; so does who wants to read, if what lies there is fresh. Nobody ever
-//! waits, and nobody touches a slot that is not its own.
+//! Of three slots one belongs to the writer, one to the reader, and one lies between them. After writing, the
+//! writer swaps its slot for the one between; to read, the reader does the same if what lies there is fresh.
+//! Neither ever waits, and neither touches a slot that is not its own. `tests/loom` checks this in every order in
+//! which the two threads can run.
 //!
 //! Packages do the same (`triple_buffer`), but they find a slot by an index that the compiler cannot
 //! bound, so that a panic stays in the loop. Here every number means a slot.
 
-use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU8, Ordering};
-use std::sync::Arc;
+use super::sync::{Arc, AtomicU8, Ordering, UnsafeCell};
 
 /// Bits of the number of a slot.
 const NUMBER: u8 = 0b011;
@@ -46,8 +45,8 @@ struct Slot<T>(UnsafeCell<T>);
 // number is in exactly one place of three (the writer, the reader, between), and only swaps move it.
 unsafe impl<T: Send> Sync for Shared<T> {}
 
-/// Makes both ends; until something is written the reader finds `initial`. Allocates; start-up only.
-pub fn newest<T: Copy>(initial: T) -> (Writer<T>, Reader<T>) {
+/// Returns both ends; until something is written the reader finds `initial`. Allocates; start-up only.
+pub fn triple_buffer<T: Copy>(initial: T) -> (Writer<T>, Reader<T>) {
     let slots = [initial; 3].map(|value| Slot(UnsafeCell::new(value)));
     let shared = Arc::new(Shared { slots, between: AtomicU8::new(1) });
     (Writer { shared: shared.clone(), own: 0 }, Reader { shared, own: 2 })
@@ -106,7 +105,7 @@ mod tests {
 
     #[test]
     fn the_newest_counts_and_stays() {
-        let (mut writer, mut reader) = newest(0);
+        let (mut writer, mut reader) = triple_buffer(0);
         assert_eq!((*reader.read(), *reader.read()), (0, 0));
         writer.write(1);
         assert_eq!((*reader.read(), *reader.read()), (1, 1));
@@ -117,7 +116,7 @@ mod tests {
     #[test]
     fn nothing_is_torn_or_goes_back_between_threads() {
         const LAST: u64 = 2_000_000;
-        let (mut writer, mut reader) = newest([0; 32]);
+        let (mut writer, mut reader) = triple_buffer([0; 32]);
         scope(|threads| {
             threads.spawn(move || (1..=LAST).for_each(|value| writer.write([value; 32])));
             let mut before = 0;

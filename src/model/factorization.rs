@@ -1,4 +1,4 @@
-//! The 6 x 6 balance `N Gamma = W`, `N = [m; n]` with `m_i = b_i x n_i`, and its transpose
+//! Factorization of `N`, for the balance of forces `N Gamma = W`, `N = [m; n]` with `m_i = b_i x n_i`, and its transpose
 //! `N^T [omega; v] = L'`, by block elimination on two triples of legs, A and B.
 //!
 //! ```text
@@ -14,20 +14,20 @@
 //!
 //! Every 3 x 3 inverse is cross products of rotated lanes: two divisions in all, where an LU of the 6 x 6
 //! matrix has six one after the other. The pivoting is done in advance: [`Triples::best`] splits the legs
-//! so that A resists forces best at home. Where a pose comes too near to a singularity of A or of S (both
+//! so that A spans the largest volume at home. Where a pose comes too near to a singularity of A or of S (both
 //! determinants are at hand) LU with partial pivoting takes over: over many poses
 //! no worse than twice that method.
 
-use fearless_simd::Simd;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
+use nalgebra::{Matrix6, Vector6};
 
 use super::inverse_geometry::LegGeometry;
-use super::lanes::{Eight, Four};
-use super::lanes3::Lanes3;
+use super::lanes::Triple;
+use super::lanes3::{Lanes3, broadcasts};
 use super::lu;
 use super::machine::{Joints, LEGS};
 use super::rigid::{Twist, Wrench};
-use super::triples::{Lane, Triples};
+use super::triples::{LegLanes, Triples};
 
 /// Smallest `|dA|`, the volume spanned by the three unit vectors of A, for which the blocks are used.
 ///
@@ -35,82 +35,82 @@ use super::triples::{Lane, Triples};
 /// condition, over that of LU with partial pivoting, forces / twist: 28 / 28 with 0.03 (and dS 1e-2),
 /// 4.2 / 3.4 with 0.1, 4.2 / 2.6 with 0.15, **1.3 / 1.5 with 0.2**, the same with 0.25; RMS 0.7 to 1.0. The
 /// ten machines of `tests/data` have 0.22 to 0.98 in their vectors.
-const LEAST_DA: f64 = 0.2;
+const MIN_DET_A: f64 = 0.2;
 
-/// Smallest `|dS| / radius^3`. Given a sound A the blocks lose nothing as S becomes singular (each lane is
+/// Smallest `|dS| / radius^3`. Given a is_regular A the blocks lose nothing as S becomes singular (each lane is
 /// Cramer's rule, forward stable), but two singular values may become small together, where cross products
 /// cancel. Measured as above: 1.5 with 1e-2 and with 1e-3, 2.3 with 1e-4. Vectors of `tests/data`: 1.2 to 5.
-const LEAST_DS: f64 = 1e-3;
+const MIN_RELATIVE_DET_S: f64 = 1e-3;
 
 /// `N^-1` and `N^-T` at one pose.
-pub(super) struct Balance<'a, S: Simd, V: Eight<S>> {
+pub(super) struct Factorization<'a, S: Simd> {
     pub simd: S,
     pub joints: &'a Joints,
     /// m of A.
-    pub moment_a: Lanes3<V::Half>,
+    pub moment_a: Lanes3<f64x4<S>>,
     /// a / dA
-    pub inverse_a: Lanes3<V::Half>,
+    pub inverse_a: Lanes3<f64x4<S>>,
     /// X: a vector for each i over the lanes j.
-    pub x: [V::Half; 3],
+    pub x: [f64x4<S>; 3],
     /// c
-    pub adjugate_s: Lanes3<V::Half>,
+    pub adjugate_s: Lanes3<f64x4<S>>,
     /// 1 / dS, in each lane as that leg computes it.
-    pub inverse_d_s: V::Half,
+    pub inverse_d_s: f64x4<S>,
     /// dA, dS, as the first leg of each computes it.
     pub determinants: [f64; 2],
     /// Both determinants are large enough.
-    pub sound: bool,
+    pub is_regular: bool,
 }
 
-/// A [`Balance`] in memory, both triples' halves in one lane.
+/// A [`Factorization`] in memory, the halves of both triples in one lane.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Factors {
+pub(super) struct StoredFactorization {
     /// m of A, c.
-    moment_adjugate: [Lane; 3],
+    moment_adjugate: [LegLanes; 3],
     /// a / dA, X.
-    inverse_x: [Lane; 3],
+    inverse_x: [LegLanes; 3],
     /// 1 / dS, twice.
-    inverse_d_s: Lane,
+    inverse_d_s: LegLanes,
     determinants: [f64; 2],
-    sound: bool,
+    is_regular: bool,
 }
 
-/// A wrench about C as the sum of what is in four lanes.
-pub(super) struct LaneWrench<F> {
-    pub torque: Lanes3<F>,
-    pub force: Lanes3<F>,
+/// A wrench about C as the sum of four lanes.
+pub(super) struct LaneWrench<S: Simd> {
+    pub torque: Lanes3<f64x4<S>>,
+    pub force: Lanes3<f64x4<S>>,
 }
 
-impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
+impl<'a, S: Simd> Factorization<'a, S> {
     /// Factorizes. At a singular pose the factors are not finite.
     #[inline(always)]
-    pub fn new(simd: S, joints: &'a Joints, legs: &LegGeometry<V>) -> Self {
+    pub fn new(simd: S, joints: &'a Joints, legs: &LegGeometry<S>) -> Self {
         let moment = legs.arm.cross(legs.direction);
-        let ((n_a, n_b), (moment_a, m_b)) = (legs.direction.halves(), moment.halves());
-        let one = V::Half::splat(simd, 1.0);
+        let ((n_a, n_b), (moment_a, m_b)) = (legs.direction.split(), moment.split());
+        let one = f64x4::splat(simd, 1.0);
 
-        let a = adjugate(simd, n_a);
+        let a = adjugate(n_a);
         let d_a = n_a.dot(a);
         let inverse_a = a * (one / d_a);
-        let [i0, i1, i2] = broadcast_vectors(simd, inverse_a);
+        let [i0, i1, i2] = inverse_a.broadcasts();
         let x = [i0.dot(n_b), i1.dot(n_b), i2.dot(n_b)];
         let [x0, x1, x2] = x;
-        let [m0, m1, m2] = broadcast_vectors(simd, moment_a);
+        let [m0, m1, m2] = moment_a.broadcasts();
         let s = m_b.minus_scaled(x0, m0).minus_scaled(x1, m1).minus_scaled(x2, m2);
-        let c = adjugate(simd, s);
+        let c = adjugate(s);
         let d_s = s.dot(c);
         let inverse_d_s = one / d_s;
 
         let ([d_a, ..], [d_s, ..]) = (d_a.legs(), d_s.legs());
-        let sound = d_a.abs() >= LEAST_DA && d_s.abs() >= LEAST_DS * joints.radius_cubed;
+        let is_regular = d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * joints.radius_cubed;
         let determinants = [d_a, d_s];
-        Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, sound }
+        Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, is_regular }
     }
 
     /// From memory.
     #[inline(always)]
-    pub fn load(simd: S, joints: &'a Joints, factors: &Factors) -> Self {
-        let load = |lane: &Lane| V::load(simd, lane).halves();
+    pub fn load(simd: S, joints: &'a Joints, factors: &StoredFactorization) -> Self {
+        let load = |lane: &LegLanes| lane.load(simd).split();
         let [(m_x, c_x), (m_y, c_y), (m_z, c_z)] = factors.moment_adjugate.each_ref().map(load);
         let [(i_x, x_0), (i_y, x_1), (i_z, x_2)] = factors.inverse_x.each_ref().map(load);
         Self {
@@ -122,29 +122,22 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
             adjugate_s: Lanes3 { x: c_x, y: c_y, z: c_z },
             inverse_d_s: load(&factors.inverse_d_s).0,
             determinants: factors.determinants,
-            sound: factors.sound,
+            is_regular: factors.is_regular,
         }
     }
 
     /// To memory.
     #[inline(always)]
-    pub fn store(&self) -> Factors {
+    pub fn store(&self) -> StoredFactorization {
         let (m, i, c, [x_0, x_1, x_2]) = (self.moment_a, self.inverse_a, self.adjugate_s, self.x);
-        let store = |first: V::Half, second: V::Half| V::join(first, second).store();
-        Factors {
+        let store = |first: f64x4<S>, second: f64x4<S>| LegLanes::from(first.combine(second));
+        StoredFactorization {
             moment_adjugate: [store(m.x, c.x), store(m.y, c.y), store(m.z, c.z)],
             inverse_x: [store(i.x, x_0), store(i.y, x_1), store(i.z, x_2)],
             inverse_d_s: store(self.inverse_d_s, self.inverse_d_s),
             determinants: self.determinants,
-            sound: self.sound,
+            is_regular: self.is_regular,
         }
-    }
-
-    /// With the moments of other arms, from another point of the platform: X and S do not depend on it.
-    #[inline(always)]
-    pub fn with_arms(self, legs: &LegGeometry<V>) -> Self {
-        let ((arm, _), (direction, _)) = (legs.arm.halves(), legs.direction.halves());
-        Self { moment_a: arm.cross(direction), ..self }
     }
 
     /// `det N`, columns in the order of the lanes.
@@ -154,87 +147,78 @@ impl<'a, S: Simd, V: Eight<S>> Balance<'a, S, V> {
         -d_a * d_s
     }
 
-    /// `Gamma + along` with `N Gamma = W`, still in lanes; `None` at a singular pose.
+    /// `Gamma + axial` with `N Gamma = W`, still in lanes; `None` at a singular pose.
     #[inline(always)]
-    pub fn forces(&self, legs: &LegGeometry<V>, wrench: &LaneWrench<V::Half>, along: V) -> Option<Lane> {
+    pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, axial: f64x8<S>) -> Option<LegLanes> {
         let simd = self.simd;
         let triples = &self.joints.triples;
-        if !self.sound {
+        if !self.is_regular {
             let n = wrench_columns(triples, legs);
-            let forces = forces_by_lu(&n, &wrench.sum(), &triples.unpack(&along.store()))?;
+            let forces = forces_by_lu(&n, &wrench.sum(), &triples.unpack(&axial.into()))?;
             return Some(triples.pack(&forces));
         }
-        let force = wrench.force.total(simd);
+        let force = wrench.force.total();
         let g = self.inverse_a.dot(force);
-        // The lane of padding is nobody's force.
-        let g_of_legs = g * V::Half::load(simd, [1.0, 1.0, 1.0, 0.0]);
+        // The lane of padding is no leg's force.
+        let g_of_legs = g * f64x4::load_array(simd, [1.0, 1.0, 1.0, 0.0]);
         let torque = wrench.torque.minus_scaled(g_of_legs, self.moment_a);
-        let gamma_b = self.adjugate_s.dot(torque.total(simd)) * self.inverse_d_s;
-        let [g0, g1, g2] = broadcasts(simd, gamma_b);
-        let [x0, x1, x2] = V::Half::transposed(simd, self.x);
+        let gamma_b = self.adjugate_s.dot(torque.total()) * self.inverse_d_s;
+        let [g0, g1, g2] = broadcasts(gamma_b);
+        let [x0, x1, x2] = Triple::transposed(self.x);
         let gamma_a = g - g0 * x0 - g1 * x1 - g2 * x2;
-        Some((V::join(gamma_a, gamma_b) + along).store())
+        Some((gamma_a.combine(gamma_b) + axial).into())
     }
 
     /// `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
     #[inline(always)]
-    pub fn twist(&self, legs: &LegGeometry<V>, rates: V) -> Option<LaneTwist<V::Half>> {
+    pub fn twist(&self, legs: &LegGeometry<S>, rates: f64x8<S>) -> Option<LaneTwist<S>> {
         let simd = self.simd;
-        if !self.sound {
+        if !self.is_regular {
             let triples = &self.joints.triples;
             let n = wrench_columns(triples, legs);
-            return twist_by_lu(&n, &triples.unpack(&rates.store())).map(
+            return twist_by_lu(&n, &triples.unpack(&rates.into())).map(
                 #[inline(always)]
-                |twist| LaneTwist::spread(simd, &twist),
+                |twist| LaneTwist::splat(simd, &twist),
             );
         }
-        // The lane of padding is nobody's rate.
-        let of_legs = V::Half::load(simd, [1.0, 1.0, 1.0, 0.0]);
-        let (r_a, r_b) = rates.halves();
-        let [r0, r1, r2] = broadcasts(simd, r_a);
+        // The lane of padding is no leg's rate.
+        let of_legs = f64x4::load_array(simd, [1.0, 1.0, 1.0, 0.0]);
+        let (r_a, r_b) = rates.split();
+        let [r0, r1, r2] = broadcasts(r_a);
         let [x0, x1, x2] = self.x;
         // One dS for all three: near a singular pose the lanes' own differ by rounding times the condition,
         // and the sum, where large terms cancel, would lose the condition a second time.
-        let inverse_d_s = self.inverse_d_s.broadcast::<0>(simd);
+        let inverse_d_s = self.inverse_d_s.broadcast::<0>();
         let rest = (r_b - r0 * x0 - r1 * x1 - r2 * x2) * of_legs;
-        let angular = (self.adjugate_s * rest).total(simd) * inverse_d_s;
+        let angular = (self.adjugate_s * rest).total() * inverse_d_s;
         let rest = (r_a - self.moment_a.dot(angular)) * of_legs;
-        Some(LaneTwist { angular, linear: (self.inverse_a * rest).total(simd) })
+        Some(LaneTwist { angular, linear: (self.inverse_a * rest).total() })
     }
 }
 
 /// A twist, each number of it in all lanes.
 #[derive(Clone, Copy)]
-pub(super) struct LaneTwist<F> {
-    pub angular: Lanes3<F>,
-    pub linear: Lanes3<F>,
+pub(super) struct LaneTwist<S: Simd> {
+    pub angular: Lanes3<f64x4<S>>,
+    pub linear: Lanes3<f64x4<S>>,
 }
 
-impl<F> LaneTwist<F> {
+impl<S: Simd> LaneTwist<S> {
     #[inline(always)]
-    fn spread<S: Simd>(simd: S, twist: &Twist) -> Self
-    where
-        F: Four<S>,
-    {
-        Self { angular: splat(simd, &twist.angular), linear: splat(simd, &twist.linear) }
+    fn splat(simd: S, twist: &Twist) -> Self {
+        Self { angular: Lanes3::splat(simd, &twist.angular), linear: Lanes3::splat(simd, &twist.linear) }
     }
 
-    /// As numbers.
+    /// The twist itself.
     #[inline(always)]
-    pub fn numbers<S: Simd>(&self) -> Twist
-    where
-        F: Four<S>,
-    {
+    pub fn first(&self) -> Twist {
         Twist { angular: self.angular.first(), linear: self.linear.first() }
     }
 }
 
-impl<F> LaneWrench<F> {
+impl<S: Simd> LaneWrench<S> {
     /// The wrench itself.
-    pub fn sum<S: Simd>(&self) -> Wrench
-    where
-        F: Four<S>,
-    {
+    pub fn sum(&self) -> Wrench {
         Wrench { torque: self.torque.sum(), force: self.force.sum() }
     }
 }
@@ -242,9 +226,9 @@ impl<F> LaneWrench<F> {
 /// By LU with partial pivoting.
 #[cold]
 #[inline(never)]
-fn forces_by_lu(n: &Matrix6<f64>, wrench: &Wrench, along: &[f64; LEGS]) -> Option<[f64; LEGS]> {
+fn forces_by_lu(n: &Matrix6<f64>, wrench: &Wrench, axial: &[f64; LEGS]) -> Option<[f64; LEGS]> {
     let balancing = lu::solve(&n.transpose().into(), &wrench.vector().into())?;
-    Some((Vector6::from(balancing) + Vector6::from(*along)).into())
+    Some((Vector6::from(balancing) + Vector6::from(*axial)).into())
 }
 
 /// By LU with partial pivoting.
@@ -255,38 +239,19 @@ fn twist_by_lu(n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
     lu::solve(&(*n).into(), rates).map(|twist| Twist::from_vector(&twist.into()))
 }
 
-/// N, columns in the order of people.
+/// N, columns in the order of the legs.
 #[inline(always)]
-pub(super) fn wrench_columns<S: Simd, V: Eight<S>>(triples: &Triples, legs: &LegGeometry<V>) -> Matrix6<f64> {
+pub(super) fn wrench_columns<S: Simd>(triples: &Triples, legs: &LegGeometry<S>) -> Matrix6<f64> {
     let rows = [legs.arm.cross(legs.direction).store(), legs.direction.store()];
     let mut n = Matrix6::zeros();
-    for (mut row, lane) in n.row_iter_mut().zip(rows.iter().flatten()) {
-        row.copy_from_slice(&triples.unpack(lane));
+    for (mut row, lanes) in n.row_iter_mut().zip(rows.iter().flatten()) {
+        row.copy_from_slice(&triples.unpack(lanes));
     }
     n
 }
 
 /// `v_i+1 x v_i+2` in each lane i.
 #[inline(always)]
-fn adjugate<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> Lanes3<F> {
-    v.next(simd).cross(v.previous(simd))
-}
-
-/// Each leg's number in all lanes.
-#[inline(always)]
-fn broadcasts<S: Simd, F: Four<S>>(simd: S, v: F) -> [F; 3] {
-    [v.broadcast::<0>(simd), v.broadcast::<1>(simd), v.broadcast::<2>(simd)]
-}
-
-/// Each leg's vector in all lanes.
-#[inline(always)]
-pub(super) fn broadcast_vectors<S: Simd, F: Four<S>>(simd: S, v: Lanes3<F>) -> [Lanes3<F>; 3] {
-    let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
-        (broadcasts(simd, v.x), broadcasts(simd, v.y), broadcasts(simd, v.z));
-    [Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 }, Lanes3 { x: x2, y: y2, z: z2 }]
-}
-
-#[inline(always)]
-fn splat<S: Simd, F: Four<S>>(simd: S, v: &Vector3<f64>) -> Lanes3<F> {
-    Lanes3 { x: F::splat(simd, v.x), y: F::splat(simd, v.y), z: F::splat(simd, v.z) }
+fn adjugate<S: Simd>(v: Lanes3<f64x4<S>>) -> Lanes3<f64x4<S>> {
+    v.next().cross(v.previous())
 }

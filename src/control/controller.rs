@@ -1,0 +1,194 @@
+//! One cycle of control: from the newest setpoint and measurement to six forces, or the diagnostic why there are none.
+//!
+//! [`Controller::step`] shows the stages in order. Each is a function of its arguments and of the memory of its own
+//! struct; none changes the memory of another. A cycle does a bounded amount of work.
+
+use super::assessment::assess;
+use super::diagnostic::{Diagnostic, DiagnosticCode};
+use super::disturbance_observer::{Continuity, DisturbanceObserver};
+use super::force_limits::{ForceLimiter, LimitedForces};
+use super::forces::forces;
+use super::input_validation::{MeasurementValidator, SetpointValidator};
+use super::limits::LimitSet;
+use super::localization::{Localization, PlatformState};
+use super::parameters::{Constants, Parameters};
+use super::reference::ReferenceGenerator;
+use super::state::{OperatorRequest, Request, State};
+use super::supervisor::Supervisor;
+use super::tracking_error::{ErrorSample, ErrorTracker, TrackingError};
+use crate::model::machine::{LEGS, Machine};
+use crate::model::rigid::Wrench;
+use crate::model::task::TaskState;
+
+/// Task coordinates, with their derivatives, that the platform shall have at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Setpoint {
+    pub time_ns: u64,
+    pub task: TaskState,
+}
+
+/// Lengths \[m\] and rates \[m/s\] of the legs at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Measurement {
+    pub time_ns: u64,
+    pub length: [f64; LEGS],
+    pub rate: [f64; LEGS],
+}
+
+/// Inputs of one cycle: with the controller's own state they determine its output.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Input {
+    /// The instant of release of this cycle, on the grid.
+    pub release_ns: u64,
+    /// The newest setpoint; `None` if none ever arrived.
+    pub setpoint: Option<Setpoint>,
+    /// The newest measurement; `None` if none ever arrived.
+    pub measurement: Option<Measurement>,
+    /// The newest request; `None` if none ever arrived. Each is carried out once.
+    pub request: Option<OperatorRequest>,
+    /// Whether cycles were missed since the last one, and the deployment makes that a fault.
+    pub deadline_missed: bool,
+}
+
+/// Result of one cycle: forces, state, and the numbers that explain them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Output {
+    pub state: State,
+    /// Why the state is not active, or soon will not be; code `None` while engaging and active.
+    pub diagnostic: Diagnostic,
+    /// The message of the last request carried out or refused.
+    pub answered: (u64, u64),
+    /// Why that request was refused; code `None` if it was not.
+    pub request_diagnostic: Diagnostic,
+    /// Forces \[N\]; zero unless the state has control.
+    pub force: [f64; LEGS],
+    /// Wrench of the forces minus that of the commanded ones, about C: not zero where forces are limited.
+    pub wrench_error: Wrench,
+    /// The limits that this cycle has reached, or nearly.
+    pub active_limits: LimitSet,
+    /// Cycles under control without a new valid measurement, since start.
+    pub missed_measurements: u64,
+    /// Cycles under control without a new valid setpoint, since start.
+    pub missed_setpoints: u64,
+    /// The measured state of the platform; `None` if the pose is unknown.
+    pub platform: Option<PlatformState>,
+    /// Reference minus measured under control; else setpoint minus measured, if both are known.
+    pub error: Option<TrackingError>,
+}
+
+/// What every stage of one cycle may depend on.
+#[derive(Clone, Copy)]
+pub(super) struct Cycle<'a> {
+    pub constants: &'a Constants,
+    pub release_ns: u64,
+    /// At the beginning of the cycle.
+    pub state: State,
+}
+
+/// Controller of one machine: the constants and the memory of each stage.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    constants: Constants,
+    measurements: MeasurementValidator,
+    setpoints: SetpointValidator,
+    localization: Localization,
+    errors: ErrorTracker,
+    supervisor: Supervisor,
+    reference: ReferenceGenerator,
+    observer: DisturbanceObserver,
+    limiter: ForceLimiter,
+}
+
+impl Controller {
+    /// Waits at the home pose for a first measurement.
+    pub fn new(machine: &Machine, parameters: Parameters) -> Self {
+        let constants = Constants::new(machine, parameters);
+        Self {
+            localization: Localization::new(&constants),
+            constants,
+            measurements: MeasurementValidator::default(),
+            setpoints: SetpointValidator::default(),
+            errors: ErrorTracker::default(),
+            supervisor: Supervisor::default(),
+            reference: ReferenceGenerator::default(),
+            observer: DisturbanceObserver::default(),
+            limiter: ForceLimiter::default(),
+        }
+    }
+
+    /// One cycle. Depends on nothing but the state of the controller and `input`.
+    pub fn step(&mut self, input: &Input) -> Output {
+        let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
+        let Self { errors, observer, limiter, .. } = self;
+        let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
+        let parameters = &constants.parameters;
+
+        // Validate inputs.
+        let measurement = measurements.validate(&cycle, input.measurement.as_ref());
+        let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref());
+        let is_rebased = reference.rebase(&cycle, &setpoint);
+
+        // Locate platform.
+        let located = measurement.and_then(|measurement| localization.locate(&cycle, measurement));
+        let mut sample = errors.update(&cycle, reference, &setpoint, located.as_ref().ok());
+
+        // Decide state.
+        let request = supervisor.new_request(input);
+        let (findings, assessed_limits) = assess(
+            &cycle,
+            input,
+            &setpoint,
+            located.as_ref().err().map_or(Ok(()), |diagnostic| Err(*diagnostic)),
+            localization,
+            reference,
+            sample.as_ref(),
+        );
+        let next = supervisor.decide(request, &findings, parameters.after_loss);
+        if request.is_some_and(|new| new.request == Request::Clear) {
+            localization.clear(&constants.home);
+        }
+
+        // Reference.
+        if let Some(located) = located.as_ref().ok().filter(|_| next != cycle.state) {
+            reference.enter(&cycle, next, setpoint.valid, located);
+            sample = errors.restart(&cycle, next, reference, &setpoint, located);
+        }
+
+        // Control law, forces, checks.
+        let continuity = match cycle.state {
+            state if !state.has_control() => Continuity::Started,
+            state if is_rebased || next != state || limiter.is_limited => Continuity::Interrupted,
+            _ => Continuity::Continuous,
+        };
+        let mut actuate = || {
+            let ErrorSample { error, deviation, .. } = sample.as_ref().ok_or(DiagnosticCode::SetpointLost)?;
+            // The force is held for one period from about the release on.
+            let middle_of_hold_ns = cycle.release_ns.saturating_add(parameters.period_ns / 2);
+            let desired = reference.motion_at(parameters, setpoint.valid, middle_of_hold_ns);
+            let desired = desired.ok_or(DiagnosticCode::SetpointLost)?;
+            let acceleration = observer.update(&parameters.law, deviation, parameters.period_s(), continuity);
+            let motion = parameters.law.commanded_motion(desired, error, &acceleration);
+            let force = forces(constants, &motion, &acceleration)?;
+            limiter.limit(&cycle, &force, &motion)
+        };
+        let limited = if next.has_control() { actuate() } else { Ok(LimitedForces::default()) };
+        let LimitedForces { force, wrench_error, active_limits } = limited.unwrap_or_else(|diagnostic| {
+            supervisor.fail(diagnostic);
+            LimitedForces::default()
+        });
+        let platform = located.ok().map(|located| located.platform);
+        Output {
+            state: supervisor.mode.state,
+            diagnostic: supervisor.mode.diagnostic,
+            answered: supervisor.answered,
+            request_diagnostic: supervisor.request_diagnostic,
+            force,
+            wrench_error,
+            active_limits: setpoint.active_limits.union(assessed_limits).union(active_limits),
+            missed_measurements: measurements.missed,
+            missed_setpoints: setpoints.missed,
+            platform,
+            error: sample.map(|sample| sample.error),
+        }
+    }
+}

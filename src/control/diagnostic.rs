@@ -1,0 +1,300 @@
+//! Diagnostics: why the platform is not under control, with the number that a check found and its bound.
+//!
+//! The check that fails makes the [`Diagnostic`]; state machine, status message and command line pass it on
+//! unchanged. Its `Display` is for people and is never called in the cycle.
+
+use core::fmt;
+
+/// How the controller responds to a fault while the platform is under control.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reaction {
+    /// Not a fault.
+    None,
+    /// Decelerates to rest under control; then forces are disabled.
+    Stop,
+    /// Disables the forces at once; brakes close. Control cannot be trusted.
+    Brake,
+}
+
+/// What the number of a diagnostic is, and what bounds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Comparison {
+    /// The code has no number.
+    None,
+    /// A quantity in `unit`, one-sided: `relation` is "exceeds", two-sided: "is outside".
+    Absolute { quantity: &'static str, unit: &'static str, relation: &'static str, bound: &'static str },
+    /// A quantity as a multiple of its bound.
+    Ratio { quantity: &'static str, bound: &'static str },
+}
+
+const fn absolute(
+    quantity: &'static str,
+    unit: &'static str,
+    relation: &'static str,
+    bound: &'static str,
+) -> Comparison {
+    Comparison::Absolute { quantity, unit, relation, bound }
+}
+
+const fn ratio(quantity: &'static str, bound: &'static str) -> Comparison {
+    Comparison::Ratio { quantity, bound }
+}
+
+const NO_NUMBER: Comparison = Comparison::None;
+
+/// Remedy of a code that asks nothing of the operator.
+const NO_REMEDY: &str = "nothing";
+
+/// Leg lengths and the stroke.
+const STROKE: Comparison = absolute(
+    "leg length",
+    "m",
+    "is outside",
+    "the stroke (actuator.min_length_m to actuator.max_length_m), whose bound is",
+);
+
+macro_rules! reaction {
+    (None) => {
+        "no change"
+    };
+    (Stop) => {
+        "controlled stop, then fault"
+    };
+    (Brake) => {
+        "forces disabled: fault"
+    };
+}
+
+macro_rules! codes {
+    ($($(#[$doc:meta])* $variant:ident = $number:literal, $reaction:ident, $comparison:expr, $name:literal, $remedy:literal;)*) => {
+        /// Number of a diagnostic: why the platform is not under control, or soon will not be. Below 100: no fault.
+        ///
+        /// | number | meaning | reaction | remedy |
+        /// | --- | --- | --- | --- |
+        $(#[doc = concat!("| ", $number, " | ", $name, " | ", reaction!($reaction), " | ", $remedy, " |")])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[repr(u32)]
+        pub enum DiagnosticCode { $($(#[$doc])* $variant = $number,)* }
+
+        impl DiagnosticCode {
+            /// Every code, in the order of their numbers.
+            pub const ALL: &[Self] = &[$(Self::$variant),*];
+
+            /// What happened, in words.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+
+            /// What the operator does about it.
+            pub fn remedy(self) -> &'static str {
+                match self { $(Self::$variant => $remedy,)* }
+            }
+
+            /// The quantity that was compared, and the source of its bound.
+            pub fn comparison(self) -> Comparison {
+                match self { $(Self::$variant => $comparison,)* }
+            }
+
+            /// How the controller responds. A chain of comparisons and no `match`: the cycle calls this, and in a
+            /// jump table the unused numbers would be traps in its machine code.
+            pub fn reaction(self) -> Reaction {
+                $(if self == Self::$variant {
+                    return Reaction::$reaction;
+                })*
+                Reaction::Brake
+            }
+        }
+    };
+}
+
+codes! {
+    /// Nothing prevents control.
+    #[default]
+    None = 0, None, NO_NUMBER, "none", "nothing";
+    /// No measurement has arrived yet.
+    NoMeasurement = 1, None, NO_NUMBER, "no measurement", "start the driver or the plant";
+    /// No setpoint has arrived yet.
+    NoSetpoint = 2, None, NO_NUMBER, "no setpoint", "start a setpoint source, then engage";
+    /// Forward kinematics approaches the measured lengths, a bounded step per cycle.
+    FindingPose = 3, None, NO_NUMBER, "finding the pose", "wait";
+    /// The setpoint differs from the platform by more than `control.engage_*`, in pose or in velocity.
+    SetpointTooFar = 4, None, ratio("the difference between setpoint and platform", "the tolerance control.engage_*"), "setpoint too far from the platform", "start the setpoints where the platform stands";
+    /// The setpoint source ended while its setpoint was at rest.
+    SetpointEnded = 5, None, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint source ended at rest", "start a setpoint source, then engage";
+    /// The daemon is ending.
+    Stopping = 6, None, NO_NUMBER, "daemon stopping", "nothing";
+    /// Control may begin; the controller waits for the request `engage`.
+    ReadyToEngage = 7, None, NO_NUMBER, "ready to engage", "engage";
+    /// An operator requested this state.
+    OperatorRequest = 8, None, NO_NUMBER, "requested by the operator", "nothing";
+    /// The request cannot be carried out in this state.
+    InvalidInState = 9, None, NO_NUMBER, "not possible in this state", "see the table of states";
+    /// Setpoints stopped arriving while the setpoint was in motion.
+    SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
+    /// Measurements stopped arriving.
+    MeasurementLost = 101, Brake, absolute("age", "s", "exceeds", "timeouts.measured_ms"), "measurement lost", "find out why the driver ended";
+    /// A setpoint contained a number that is not finite.
+    SetpointNotFinite = 102, Stop, NO_NUMBER, "setpoint not finite", "correct the setpoint source";
+    /// A measurement contained a number that is not finite.
+    MeasurementNotFinite = 103, Brake, NO_NUMBER, "measurement not finite", "check the encoders and the driver";
+    /// Forward kinematics did not converge on the measured lengths.
+    PoseNotFound = 104, Brake, NO_NUMBER, "pose not found from lengths", "compare the lengths with the machine file";
+    /// The measured lengths changed by more than the actuators can move.
+    MeasurementJumped = 105, Brake, absolute("change of length", "m", "exceeds", "the change plausible at actuator.max_rate_m_s,"), "measured lengths jumped", "check the encoders and the driver";
+    /// The pose is singular: no forces balance the load. Or the platform may have crossed a singularity: its assembly
+    /// mode is uncertain.
+    SingularPose = 106, Brake, absolute("condition", "", "exceeds", "the bound beyond which the assembly mode is uncertain,"), "singular pose, or assembly mode uncertain", "move the platform by hand to the side of the home pose, then clear";
+    /// A force was not finite.
+    ForceNotFinite = 107, Brake, NO_NUMBER, "force not finite", "report it: it is a fault of hexad";
+    /// The platform deviated from its reference by more than `control.following_*`.
+    FollowingError = 108, Brake, ratio("the following error", "the limit control.following_*"), "following error too large", "check for a collision, a payload, a drive without force";
+    /// Cycles were missed, and `realtime.on_overrun` is `fault`.
+    DeadlineMissed = 109, Stop, NO_NUMBER, "deadline missed", "see the worst cycles in the status; hexad doctor";
+    /// An operator's emergency stop.
+    EmergencyStop = 110, Brake, NO_NUMBER, "emergency stop", "clear when it is safe";
+    /// A setpoint beyond the stroke of a leg, or too fast to come to rest within it.
+    SetpointOutOfReach = 111, Stop, STROKE, "setpoint beyond the stroke of a leg, or without room to stop", "correct the trajectory";
+    /// A setpoint that does not continue the one before it: X, X' and X'' are inconsistent.
+    SetpointJumped = 112, Stop, ratio("the deviation from the continuation of the setpoint before", "the tolerance"), "setpoint jumped", "send X, X' and X'' of one smooth motion";
+    /// A measured length beyond the stroke of the leg.
+    LengthOutOfStroke = 113, Brake, STROKE, "measured length beyond the stroke", "check the encoders, compare with the machine file";
+    /// A measured rate that is not the derivative of the lengths.
+    RateInconsistent = 114, Brake, absolute("difference between length and integrated rate", "m", "exceeds", "the tolerance"), "measured rate inconsistent with the lengths", "check the units and signs of the driver";
+    /// A setpoint faster than `[limits]` or the legs allow.
+    SetpointTooFast = 115, Stop, ratio("the setpoint", "the limit in [limits], or actuator.max_rate_m_s"), "setpoint beyond a limit of velocity, acceleration or jerk", "correct the trajectory, or [limits]";
+    /// A setpoint outside of `[envelope]`.
+    SetpointOutOfEnvelope = 116, Stop, absolute("coordinate", "rad or m", "is outside", "[envelope], whose bound is"), "setpoint outside of the envelope", "correct the trajectory, or [envelope]";
+    /// A setpoint whose time stamp is too old, in the future, or not after that of the setpoint before.
+    SetpointStampInvalid = 117, Stop, absolute("age", "s", "is outside", "the range of timeouts.setpoint_ms around now,"), "setpoint with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
+    /// A measurement whose time stamp is too old, in the future, or before that of the measurement before.
+    MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range of timeouts.measured_ms around now,"), "measurement with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
+    /// The pose is so near a singular one that `limits.condition` is exceeded, or a setpoint could only be stopped
+    /// where it would be.
+    NearSingular = 119, Stop, absolute("condition", "", "exceeds", "limits.condition"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
+    /// The measured rates changed faster than actuators can.
+    RateJumped = 120, Brake, absolute("change of rate", "m/s", "exceeds", "the plausible change,"), "measured rates jumped", "check for a collision; check the encoders and the driver";
+}
+
+impl DiagnosticCode {
+    /// Whether it ends control for good, until cleared.
+    pub fn is_fault(self) -> bool {
+        self as u32 >= 100
+    }
+
+    /// Reads the number of a message.
+    pub fn from_number(number: u32) -> Option<Self> {
+        Self::ALL.iter().copied().find(|code| *code as u32 == number)
+    }
+}
+
+/// Result of a check: what happened, the number that was found and its bound.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Diagnostic {
+    pub code: DiagnosticCode,
+    /// In the unit of [`DiagnosticCode::comparison`]; 0 if there is no number, as `bound`.
+    pub value: f64,
+    pub bound: f64,
+    /// Leg or axis, from 1; 0 if the code concerns neither.
+    pub index: u32,
+}
+
+impl Diagnostic {
+    /// With the number found and its bound.
+    pub fn new(code: DiagnosticCode, value: f64, bound: f64) -> Self {
+        Self { code, value, bound, index: 0 }
+    }
+
+    /// Of a leg or an axis, counted from 0.
+    pub fn at(self, index: usize) -> Self {
+        Self { index: index as u32 + 1, ..self }
+    }
+}
+
+impl From<DiagnosticCode> for Diagnostic {
+    fn from(code: DiagnosticCode) -> Self {
+        Self { code, ..Self::default() }
+    }
+}
+
+/// A sentence: what happened, the number with its unit and bound, leg or axis, and what to do.
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { code, value, bound, index } = self;
+        write!(f, "{}", code.name())?;
+        if *value != 0.0 || *bound != 0.0 {
+            let part = if *code == DiagnosticCode::SetpointOutOfEnvelope { "axis" } else { "leg" };
+            let place = |f: &mut fmt::Formatter<'_>| match index {
+                0 => Ok(()),
+                _ => write!(f, " of {part} {index}"),
+            };
+            let (value, bound) = (Rounded(*value), Rounded(*bound));
+            match code.comparison() {
+                Comparison::None => {}
+                Comparison::Absolute { quantity, unit, relation, bound: source } => {
+                    let space = if unit.is_empty() { "" } else { " " };
+                    write!(f, ": {quantity} {value}{space}{unit}")?;
+                    place(f)?;
+                    write!(f, " {relation} {source} {bound}{space}{unit}")?;
+                }
+                Comparison::Ratio { quantity, bound: source } => {
+                    write!(f, ": {quantity}")?;
+                    place(f)?;
+                    write!(f, " is {value} times {source}")?;
+                }
+            }
+        }
+        if code.remedy() == NO_REMEDY { Ok(()) } else { write!(f, "; {}", code.remedy()) }
+    }
+}
+
+/// A number to six significant digits, without trailing zeros.
+struct Rounded(f64);
+
+impl fmt::Display for Rounded {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(value) = self;
+        let mut scale = 1.0;
+        while value.abs() * scale < 1e5 && scale < 1e9 {
+            scale *= 10.0;
+        }
+        let scaled = value * scale;
+        if !(scaled.abs() < 1e15) {
+            return write!(f, "{value}");
+        }
+        let half = if scaled < 0.0 { -0.5 } else { 0.5 };
+        write!(f, "{}", (scaled + half) as i64 as f64 / scale)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_diagnostic_is_a_sentence_with_value_bound_and_remedy() {
+        let near_singular = Diagnostic::new(DiagnosticCode::NearSingular, 143.21, 100.0).to_string();
+        assert!(near_singular.contains("condition 143.21 exceeds limits.condition 100;"), "{near_singular}");
+        let stroke = Diagnostic::new(DiagnosticCode::LengthOutOfStroke, 0.5, 1.076).at(2).to_string();
+        assert!(stroke.contains("leg length 0.5 m of leg 3 is outside the stroke"), "{stroke}");
+        assert!(stroke.contains(" 1.076 m; check the encoders"), "{stroke}");
+        let envelope = Diagnostic::new(DiagnosticCode::SetpointOutOfEnvelope, -0.31, -0.3).at(3).to_string();
+        assert!(envelope.contains("coordinate -0.31 rad or m of axis 4"), "{envelope}");
+        let fast = Diagnostic::new(DiagnosticCode::SetpointTooFast, 4.0, 1.0).to_string();
+        assert!(fast.contains("the setpoint is 4 times the limit in [limits]"), "{fast}");
+        let lost = Diagnostic::new(DiagnosticCode::NearSingular, f64::INFINITY, 1e-7).to_string();
+        assert!(lost.contains("condition inf exceeds limits.condition 0.0000001;"), "{lost}");
+        assert_eq!(
+            Diagnostic::from(DiagnosticCode::NoMeasurement).to_string(),
+            "no measurement; start the driver or the plant"
+        );
+        assert_eq!(Diagnostic::default().to_string(), "none");
+    }
+
+    #[test]
+    fn every_fault_has_a_number_from_100_on_and_a_reaction() {
+        for code in DiagnosticCode::ALL {
+            assert_eq!(code.is_fault(), code.reaction() != Reaction::None, "{code:?}");
+            assert_eq!(DiagnosticCode::from_number(*code as u32), Some(*code));
+        }
+    }
+}

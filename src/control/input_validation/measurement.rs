@@ -1,0 +1,178 @@
+//! Validation of measurements: stroke, change of lengths and rates, and rates that are those of the lengths.
+
+use super::{LastValid, check_measurable_stroke, check_time_stamp, seconds_between, stroke};
+use crate::control::controller::{Cycle, Measurement};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::model::machine::{Actuator, LEGS};
+
+/// Plausible rate of a leg over its largest: an external force may move it faster.
+const LEG_RATE_FACTOR: f64 = 1.5;
+
+/// Change of length that is always plausible, as a ratio of the stroke: noise.
+const LENGTH_NOISE_RATIO: f64 = 1e-3;
+
+/// Tolerance of lengths against integrated rates, as a ratio of the travel: rates are filtered, late, and not
+/// quite to scale. A wrong sign leaves twice the travel, a wrong unit a thousand times.
+const RESIDUAL_PER_TRAVEL: f64 = 0.3;
+
+/// The constant part of that tolerance, as a ratio of the stroke: noise and delay of the rates. Small, as with a
+/// wrong sign the error of the loop doubles within milliseconds.
+const RESIDUAL_NOISE_RATIO: f64 = 3e-4;
+
+/// Time constant of residual and travel \[s\]: long against the delay of a filter, short against a motion.
+const RESIDUAL_TIME_CONSTANT_S: f64 = 0.03;
+
+/// Acceleration that no drive gives a leg \[m/s^2\], five times gravity: an impact. If ten times the limit of
+/// acceleration is more, that counts.
+const MAX_LEG_ACCELERATION_M_S2: f64 = 50.0;
+const ACCELERATION_LIMIT_FACTOR: f64 = 10.0;
+
+/// Change of a rate that is always plausible, as a ratio of the largest rate: noise.
+const RATE_NOISE_RATIO: f64 = 0.02;
+
+/// Difference between each leg's change of length and the integral of its rate, with the travel. Both decay.
+#[derive(Clone, Copy, Debug, Default)]
+struct RateConsistency {
+    residual: [f64; LEGS],
+    travel: [f64; LEGS],
+}
+
+impl RateConsistency {
+    /// After the step from one measurement to the next.
+    fn updated(&self, now: &Measurement, before: &Measurement) -> Self {
+        let dt = seconds_between(before.time_ns, now.time_ns);
+        let decay = 1.0 - dt / RESIDUAL_TIME_CONSTANT_S;
+        if !(decay > 0.0) {
+            return Self::default();
+        }
+        let mut next = *self;
+        let rates = now.rate.iter().zip(&before.rate);
+        let lengths = now.length.iter().zip(&before.length);
+        for ((residual, travel), ((now, before), (rate, rate_before))) in
+            next.residual.iter_mut().zip(&mut next.travel).zip(lengths.zip(rates))
+        {
+            let change = now - before;
+            *residual = *residual * decay + change - 0.5 * (rate + rate_before) * dt;
+            *travel = *travel * decay + change.abs();
+        }
+        next
+    }
+
+    fn check(&self, actuator: &Actuator) -> Result<(), Diagnostic> {
+        for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
+            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * stroke(actuator);
+            if residual.abs() > bound {
+                let code = DiagnosticCode::RateInconsistent;
+                return Err(Diagnostic::new(code, residual.abs(), bound).at(leg));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// First stage of the cycle: validates each new measurement and keeps the last valid one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::control) struct MeasurementValidator {
+    last: LastValid<Measurement>,
+    consistency: RateConsistency,
+    /// Cycles under control without a new valid measurement.
+    pub missed: u64,
+}
+
+impl MeasurementValidator {
+    /// The last valid measurement if it is young enough, and under control was so when the cycle began.
+    pub fn validate(
+        &mut self,
+        cycle: &Cycle<'_>,
+        newest: Option<&Measurement>,
+    ) -> Result<&Measurement, Diagnostic> {
+        let continuity = self.check_input_continuity(cycle);
+        let new = newest.filter(|newest| self.last.newest.as_ref() != Some(newest));
+        let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
+        self.missed += u64::from(cycle.state.has_control() && !is_accepted);
+        continuity?;
+        let Some(valid) = &self.last.valid else {
+            return Err(self.last.rejection_or(DiagnosticCode::NoMeasurement));
+        };
+        self.check_age(cycle, valid)?;
+        Ok(valid)
+    }
+
+    /// After a pause of the loop the inputs may be fresh again, but meanwhile the drives had no force and the brakes
+    /// closed: control does not continue.
+    fn check_input_continuity(&self, cycle: &Cycle<'_>) -> Result<(), Diagnostic> {
+        let last = self.last.valid.as_ref().filter(|_| cycle.state.has_control());
+        last.map_or(Ok(()), |last| self.check_age(cycle, last))
+    }
+
+    fn check_age(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Result<(), Diagnostic> {
+        let timeout_ns = cycle.constants.parameters.measured_timeout_ns;
+        check_time_stamp(DiagnosticCode::MeasurementLost, measurement.time_ns, cycle.release_ns, timeout_ns)
+            .map_err(|lost| self.last.rejection_or(lost))
+    }
+
+    /// Validates a new measurement and records it. It must continue the last valid one if that is young or the
+    /// platform is under control.
+    fn accept(&mut self, cycle: &Cycle<'_>, new: &Measurement) -> Result<(), Diagnostic> {
+        let (parameters, now_ns) = (&cycle.constants.parameters, cycle.release_ns);
+        let timeout_ns = parameters.measured_timeout_ns;
+        let has_control = cycle.state.has_control();
+        let window_s = self.last.plausibility_window_s(now_ns, parameters.period_ns);
+        let is_binding = |valid: &&Measurement| has_control || now_ns.abs_diff(valid.time_ns) <= timeout_ns;
+        let before = self.last.valid.as_ref().filter(is_binding);
+        let result =
+            check_time_stamp(DiagnosticCode::MeasurementStampInvalid, new.time_ns, now_ns, timeout_ns)
+                .and_then(|()| self.check(cycle, new, before, window_s));
+        if let Ok(consistency) = &result {
+            self.consistency = *consistency;
+        }
+        let result = result.map(drop);
+        self.last.record(*new, result, now_ns, has_control);
+        result
+    }
+
+    /// Whether the legs can be where a measurement says after `before`; the consistency of the rates up to it.
+    fn check(
+        &self,
+        cycle: &Cycle<'_>,
+        now: &Measurement,
+        before: Option<&Measurement>,
+        window_s: f64,
+    ) -> Result<RateConsistency, Diagnostic> {
+        let actuator = &cycle.constants.machine().actuator;
+        if now.length.iter().chain(&now.rate).any(|value| !value.is_finite()) {
+            return Err(DiagnosticCode::MeasurementNotFinite.into());
+        }
+        check_measurable_stroke(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
+        let Some(before) = before else { return Ok(RateConsistency::default()) };
+        let dt = seconds_between(before.time_ns, now.time_ns);
+        if dt < 0.0 {
+            return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
+        }
+        let noise = LENGTH_NOISE_RATIO * stroke(actuator);
+        let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
+        check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
+        let limit = cycle.constants.parameters.limits.position.acceleration;
+        let acceleration = MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limit);
+        let bound = acceleration * dt.min(window_s) + RATE_NOISE_RATIO * actuator.max_rate;
+        check_change(DiagnosticCode::RateJumped, &now.rate, &before.rate, bound)?;
+        let consistency = self.consistency.updated(now, before);
+        consistency.check(actuator)?;
+        Ok(consistency)
+    }
+}
+
+fn check_change(
+    code: DiagnosticCode,
+    now: &[f64; LEGS],
+    before: &[f64; LEGS],
+    bound: f64,
+) -> Result<(), Diagnostic> {
+    for (leg, (now, before)) in now.iter().zip(before).enumerate() {
+        let change = (now - before).abs();
+        if change > bound {
+            return Err(Diagnostic::new(code, change, bound).at(leg));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,116 @@
+//! Validation of the inputs: whether a measurement or a setpoint is plausible.
+//!
+//! A rejected input changes nothing: the last valid one stays and its age keeps counting, so invalid data never
+//! restarts a watchdog. When the timeout is exceeded, the diagnostic is that of the rejection.
+
+mod measurement;
+mod setpoint;
+
+pub(super) use measurement::MeasurementValidator;
+pub use setpoint::{SetpointCheck, SetpointMotion, check_setpoint};
+pub(super) use setpoint::{SetpointInput, SetpointValidator};
+
+use super::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::model::machine::{Actuator, LEGS};
+
+/// Tolerance at the ends of the stroke, as a ratio of the stroke: encoders have offsets, end stops have springs.
+const STROKE_TOLERANCE_RATIO: f64 = 0.02;
+
+/// The change that is plausible grows with the time since the last valid input, up to this many intervals of the
+/// messages: rejected ones must not widen it further. Two, as one message may get lost.
+const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
+
+/// The last valid input, and why the one after it was rejected.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LastValid<T> {
+    pub valid: Option<T>,
+    /// The last input, valid or not: each is validated once.
+    pub newest: Option<T>,
+    /// Release of the cycle that validated it.
+    newest_ns: u64,
+    rejection: Option<Diagnostic>,
+}
+
+impl<T> Default for LastValid<T> {
+    fn default() -> Self {
+        Self { valid: None, newest: None, newest_ns: 0, rejection: None }
+    }
+}
+
+impl<T: Copy> LastValid<T> {
+    /// Longest time since the last valid input \[s\] over which a change counts as plausible: unbounded, as long as
+    /// no input was rejected since.
+    pub fn plausibility_window_s(&self, now_ns: u64, period_ns: u64) -> f64 {
+        if self.rejection.is_none() {
+            return f64::INFINITY;
+        }
+        let interval_ns = now_ns.saturating_sub(self.newest_ns).max(period_ns);
+        MAX_PLAUSIBLE_INTERVALS * (interval_ns as f64 * 1e-9)
+    }
+
+    /// Records an input with the result of its validation. With `keep_first` the first of several rejections stays:
+    /// the later inputs may only be far from one that was valid long before.
+    pub fn record(&mut self, input: T, result: Result<(), Diagnostic>, now_ns: u64, keep_first: bool) {
+        (self.newest, self.newest_ns) = (Some(input), now_ns);
+        match result {
+            Ok(()) => (self.valid, self.rejection) = (Some(input), None),
+            Err(diagnostic) => self.rejection = self.rejection.filter(|_| keep_first).or(Some(diagnostic)),
+        }
+    }
+
+    /// The last rejection, or `otherwise` if nothing was rejected since the last valid input.
+    pub fn rejection_or(&self, otherwise: impl Into<Diagnostic>) -> Diagnostic {
+        self.rejection.unwrap_or_else(|| otherwise.into())
+    }
+}
+
+/// Whether a time stamp is at most `timeout_ns` before or after now.
+fn check_time_stamp(
+    code: DiagnosticCode,
+    time_ns: u64,
+    now_ns: u64,
+    timeout_ns: u64,
+) -> Result<(), Diagnostic> {
+    if now_ns.abs_diff(time_ns) <= timeout_ns {
+        return Ok(());
+    }
+    Err(Diagnostic::new(code, seconds_between(time_ns, now_ns), timeout_ns as f64 * 1e-9))
+}
+
+/// Whether all lengths are within the stroke and the tolerance of a measurement.
+pub(super) fn check_measurable_stroke(
+    actuator: &Actuator,
+    code: DiagnosticCode,
+    length: &[f64; LEGS],
+) -> Result<(), Diagnostic> {
+    check_stroke(actuator, STROKE_TOLERANCE_RATIO * stroke(actuator), code, length)
+}
+
+/// Whether all lengths are within the stroke and `tolerance` \[m\].
+fn check_stroke(
+    actuator: &Actuator,
+    tolerance: f64,
+    code: DiagnosticCode,
+    length: &[f64; LEGS],
+) -> Result<(), Diagnostic> {
+    for (leg, length) in length.iter().enumerate() {
+        for (bound, excess) in [
+            (actuator.min_length - tolerance, actuator.min_length - tolerance - length),
+            (actuator.max_length + tolerance, length - actuator.max_length - tolerance),
+        ] {
+            if excess > 0.0 || excess.is_nan() {
+                return Err(Diagnostic::new(code, *length, bound).at(leg));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn stroke(actuator: &Actuator) -> f64 {
+    actuator.max_length - actuator.min_length
+}
+
+/// `to - from` in seconds, either sign.
+pub fn seconds_between(from_ns: u64, to_ns: u64) -> f64 {
+    to_ns.wrapping_sub(from_ns) as i64 as f64 * 1e-9
+}

@@ -1,0 +1,186 @@
+//! Pose and twist of the platform from a valid measurement, by forward kinematics along its motion since home.
+//!
+//! Other poses have the same leg lengths (assembly modes). Home is on the right side of every singularity, and the
+//! pose is followed from there without a gap. If the platform may have crossed a singularity, its assembly mode is
+//! uncertain: forces are disabled until an operator has inspected the platform and sent `clear`.
+
+use super::controller::{Cycle, Measurement};
+use super::diagnostic::{Diagnostic, DiagnosticCode};
+use super::input_validation::seconds_between;
+use super::limits::{Limit, LimitSet};
+use super::parameters::{Constants, Parameters};
+use crate::model::forward_kinematics::{Outcome, Tracker, TrackingResult};
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::LEGS;
+use crate::model::rigid::{Pose, Twist};
+use crate::model::sensitivity::Sensitivity;
+
+/// Bound on the trusted steps of forward kinematics in one cycle under control. One is far more than a cycle's
+/// motion; after a pause of the measurements it may take some.
+const MAX_NEWTON_STEPS_PER_CYCLE: u32 = 8;
+
+/// From this condition on (or from `limits.condition`, if that is less) the assembly mode is uncertain after a motion
+/// longer than a trusted step. Such poses are within a hundredth of the radius or of a radian of a singularity: no
+/// platform crosses that between two measurements.
+const MAX_CERTAIN_CONDITION: f64 = 300.0;
+
+/// Pose and twist of the platform at the instant of a measurement, and how near they are to a singularity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlatformState {
+    pub pose: Pose,
+    pub twist: Twist,
+    /// Of the pose, see [`crate::model::sensitivity`].
+    pub condition: f64,
+    /// Time to a singular pose if the motion continues \[s\]; infinite if it leads to none.
+    pub time_to_singularity: f64,
+}
+
+/// A measurement with the state of the platform it stands for.
+pub(super) struct Located<'a> {
+    pub measurement: &'a Measurement,
+    pub platform: PlatformState,
+}
+
+/// Rate at which the determinant approaches zero, from one measurement to the next.
+#[derive(Clone, Copy, Debug)]
+struct SingularityApproach {
+    /// Of the last measurement.
+    time_ns: u64,
+    determinant: f64,
+    time_to_singularity: f64,
+}
+
+/// Second stage of the cycle: follows the pose of the platform.
+#[derive(Clone, Debug)]
+pub(super) struct Localization {
+    tracker: Tracker,
+    /// Whether the pose was followed from home on without a gap.
+    is_known: bool,
+    approach: Option<SingularityApproach>,
+    /// Why the assembly mode is uncertain, until cleared.
+    assembly_mode_fault: Option<Diagnostic>,
+}
+
+impl Localization {
+    /// Starts at the home pose.
+    pub fn new(constants: &Constants) -> Self {
+        Self {
+            tracker: Tracker::new(constants.machine(), *constants.home.pose()),
+            is_known: false,
+            approach: None,
+            assembly_mode_fault: None,
+        }
+    }
+
+    /// The platform at the instant of a measurement, by a bounded number of steps of forward kinematics.
+    pub fn locate<'a>(
+        &mut self,
+        cycle: &Cycle<'_>,
+        measurement: &'a Measurement,
+    ) -> Result<Located<'a>, Diagnostic> {
+        self.assembly_mode_fault.map_or(Ok(()), Err)?;
+        let Cycle { constants, state, .. } = *cycle;
+        let (machine, parameters) = (constants.machine(), &constants.parameters);
+        let start = self.tracker.pose;
+        let start_length = self.tracker.kinematic_state().lengths(machine);
+        let mut tracked = self.tracker.advance(machine, &measurement.length).0;
+        for _ in 1..if state.has_control() { MAX_NEWTON_STEPS_PER_CYCLE } else { 1 } {
+            if tracked == TrackingResult::Approaching {
+                tracked = self.tracker.advance(machine, &measurement.length).0;
+            }
+        }
+        let is_uncertain = self.is_known
+            && match tracked {
+                TrackingResult::NotConverged => self.tracker.outcome() == Outcome::NearSingular,
+                _ => self.is_assembly_mode_uncertain(constants, &start),
+            };
+        if is_uncertain {
+            return Err(self.fail_assembly_mode(parameters));
+        }
+        match tracked {
+            TrackingResult::Found => self.is_known = true,
+            TrackingResult::Approaching if state.has_control() => {
+                return Err(self.jump(constants, &start_length, &measurement.length));
+            }
+            TrackingResult::Approaching => return Err(DiagnosticCode::FindingPose.into()),
+            TrackingResult::NotConverged => {
+                self.is_known = false;
+                self.restart(&constants.home);
+                return Err(DiagnosticCode::PoseNotFound.into());
+            }
+        }
+        let (pose, kinematic_state) = (self.tracker.pose, self.tracker.kinematic_state());
+        let twist = kinematic_state.twist(machine, &measurement.rate).ok_or(DiagnosticCode::SingularPose)?;
+        let Sensitivity { condition, determinant, .. } = *kinematic_state.sensitivity();
+        let time_to_singularity = self.time_to_singularity(measurement.time_ns, determinant);
+        let platform = PlatformState { pose, twist, condition, time_to_singularity };
+        Ok(Located { measurement, platform })
+    }
+
+    /// Ends an assembly mode fault: an operator has inspected the platform.
+    pub fn clear(&mut self, home: &KinematicState) {
+        if self.assembly_mode_fault.take().is_some() {
+            self.restart(home);
+        }
+    }
+
+    /// Whether the pose is far enough from singular ones.
+    pub fn check_condition(&self, bound: f64) -> (LimitSet, Result<(), Diagnostic>) {
+        let condition = self.tracker.kinematic_state().sensitivity().condition;
+        let mut active = LimitSet::default();
+        let is_kept = active.check(Limit::Condition, condition / bound);
+        let result = || Diagnostic::new(DiagnosticCode::NearSingular, condition, bound);
+        (active, if is_kept { Ok(()) } else { Err(result()) })
+    }
+
+    /// Starts again at home, the one pose of which the assembly mode is known.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn restart(&mut self, home: &KinematicState) {
+        self.tracker.restart(home);
+    }
+
+    /// Beyond a singularity are poses with the same lengths as before it, and forward kinematics cannot distinguish
+    /// them. The assembly mode is uncertain if, near one, the platform moves so far in one measurement that the next
+    /// may come from there.
+    fn is_assembly_mode_uncertain(&self, constants: &Constants, start: &Pose) -> bool {
+        let kinematic_state = self.tracker.kinematic_state();
+        let Sensitivity { condition, trusted_step, .. } = *kinematic_state.sensitivity();
+        condition > max_certain_condition(&constants.parameters)
+            && constants.machine().joints.distance(start, kinematic_state.pose()) > trusted_step
+    }
+
+    fn fail_assembly_mode(&mut self, parameters: &Parameters) -> Diagnostic {
+        self.is_known = false;
+        let condition = self.tracker.kinematic_state().sensitivity().condition;
+        let bound = max_certain_condition(parameters);
+        *self.assembly_mode_fault.insert(Diagnostic::new(DiagnosticCode::SingularPose, condition, bound))
+    }
+
+    /// The lengths are further away than the steps of a cycle. All legs have moved by the same part of their way.
+    fn jump(&self, constants: &Constants, start: &[f64; LEGS], measured: &[f64; LEGS]) -> Diagnostic {
+        let largest_change =
+            |to: &[f64; LEGS]| to.iter().zip(start).map(|(to, start)| (to - start).abs()).fold(0.0, f64::max);
+        let reached = largest_change(&self.tracker.kinematic_state().lengths(constants.machine()));
+        Diagnostic::new(DiagnosticCode::MeasurementJumped, largest_change(measured), reached)
+    }
+
+    /// By linear extrapolation of the determinant: near a singular pose it is linear in time.
+    fn time_to_singularity(&mut self, time_ns: u64, determinant: f64) -> f64 {
+        let time_to_singularity = match self.approach {
+            Some(last) if last.time_ns == time_ns => return last.time_to_singularity,
+            Some(last) => {
+                let dt = seconds_between(last.time_ns, time_ns);
+                determinant * dt / (last.determinant - determinant)
+            }
+            None => f64::INFINITY,
+        };
+        let time_to_singularity = if time_to_singularity > 0.0 { time_to_singularity } else { f64::INFINITY };
+        self.approach = Some(SingularityApproach { time_ns, determinant, time_to_singularity });
+        time_to_singularity
+    }
+}
+
+fn max_certain_condition(parameters: &Parameters) -> f64 {
+    parameters.condition.min(MAX_CERTAIN_CONDITION)
+}

@@ -1,0 +1,80 @@
+//! Parameters of a controller, and all that stays constant while it runs.
+
+use super::law::Law;
+use super::limits::Limits;
+use super::supervisor::AfterStop;
+use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Fidelity;
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
+
+/// Parameters that a deployment chooses for a controller. Times are in nanoseconds, like the clock.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameters {
+    pub period_ns: u64,
+    pub law: Law,
+    /// Which terms of the dynamics are evaluated. Inertia must be one of them: the law commands an
+    /// acceleration, and without inertia there would be no feedback.
+    pub fidelity: Fidelity,
+    /// Of every reference.
+    pub limits: Limits,
+    /// Where setpoints may be; `None` is without bounds.
+    pub envelope: Option<Envelope>,
+    /// Largest condition of the pose, see [`crate::model::sensitivity`].
+    pub condition: f64,
+    /// Largest change of a force \[N/s\].
+    pub force_rate: f64,
+    /// What follows the stop of a platform that lost its setpoint.
+    pub after_loss: AfterStop,
+    /// Largest position error at which control may begin \[m\].
+    pub engage_position: f64,
+    /// Largest orientation error at which control may begin \[rad\].
+    pub engage_orientation: f64,
+    /// Largest position error while active \[m\].
+    pub following_position: f64,
+    /// Largest orientation error while active \[rad\].
+    pub following_orientation: f64,
+    /// Age from which on a setpoint counts as lost.
+    pub setpoint_timeout_ns: u64,
+    /// Age from which on a measurement counts as lost.
+    pub measured_timeout_ns: u64,
+}
+
+impl Parameters {
+    /// The period \[s\].
+    pub(super) fn period_s(&self) -> f64 {
+        self.period_ns as f64 * 1e-9
+    }
+
+    /// Longest extrapolation of a setpoint \[s\]: until the first cycle that finds it too old.
+    pub(super) fn max_extrapolation_s(&self) -> f64 {
+        self.setpoint_timeout_ns.saturating_add(self.period_ns) as f64 * 1e-9
+    }
+}
+
+/// Range of the setpoint: lowest and highest X.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Envelope {
+    pub lowest: [f64; 6],
+    pub highest: [f64; 6],
+}
+
+/// Machine model, parameters and home pose: constant while the controller runs.
+#[derive(Clone, Debug)]
+pub(super) struct Constants {
+    pub dynamics: InverseDynamics,
+    pub parameters: Parameters,
+    pub home: KinematicState,
+}
+
+impl Constants {
+    pub fn new(machine: &Machine, parameters: Parameters) -> Self {
+        let home = KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose);
+        Self { dynamics: InverseDynamics::new(machine), parameters, home }
+    }
+
+    pub fn machine(&self) -> &Machine {
+        self.dynamics.machine()
+    }
+}

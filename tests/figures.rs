@@ -1,0 +1,6 @@
+//! Drawing of the benches' charts: numbers of the axes, ranges, fronts.
+
+#![allow(dead_code, clippy::unwrap_used, reason = "a part of the benches, of which only its tests are run")]
+
+#[path = "../benches/shared/scatter.rs"]
+mod scatter;
