@@ -23,23 +23,3 @@ pub fn bound_wakeup(latency_us: i32) -> Result<ShallowSleep, Shortfall> {
     };
     ask().map_err(|error| refusals::explained(&Step::ShallowSleep, &error))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::Read;
-    use std::println;
-
-    #[test]
-    fn what_is_asked_for_is_in_force_until_dropped() {
-        const ASKED_US: i32 = 123;
-        let mut held = match bound_wakeup(ASKED_US) {
-            Ok(held) => held,
-            Err(shortfall) => return println!("SKIPPED, as there is {shortfall}"),
-        };
-        // The least that any process asks for.
-        let mut in_force = [0; 4];
-        held.0.read_exact(&mut in_force).unwrap();
-        assert!(i32::from_ne_bytes(in_force) <= ASKED_US);
-    }
-}
