@@ -5,8 +5,11 @@
 //!
 //! ```sh
 //! rustup target add thumbv7em-none-eabihf
-//! cargo build --release --manifest-path tests/bare_metal/Cargo.toml --target thumbv7em-none-eabihf
+//! cargo build --manifest-path tests/bare_metal/Cargo.toml --target thumbv7em-none-eabihf
 //! ```
+//!
+//! Not with `--release`: what is linked is the same, and without lanes and floating point of 64 bits in hardware the
+//! optimizer takes minutes.
 #![no_std]
 #![no_main]
 

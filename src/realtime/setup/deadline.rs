@@ -87,6 +87,7 @@ fn count_exhaustions() {
         libc::sigaction(libc::SIGXCPU, &action, core::ptr::null_mut());
     }
 }
+<<<<<<< main
 
 #[cfg(test)]
 mod tests {
@@ -171,3 +172,5 @@ mod tests {
         assert!(median_ns < PERIOD_NS / 2, "{median_ns} ns late");
     }
 }
+=======
+>>>>>>> b9bd6cd721a65c4e71f24e298b72281bcbe1c4a3

@@ -22,6 +22,7 @@ pub fn limit_wakeup_latency(latency_us: i32) -> Result<PmQosRequest, Shortfall> 
     };
     request().map_err(|error| refusals::explained(&SetupStep::WakeupLatency, &error))
 }
+<<<<<<< main
 
 #[cfg(test)]
 mod tests {
@@ -41,3 +42,5 @@ mod tests {
         assert!(i32::from_ne_bytes(in_force) <= REQUESTED_US);
     }
 }
+=======
+>>>>>>> b9bd6cd721a65c4e71f24e298b72281bcbe1c4a3
