@@ -13,7 +13,7 @@
 //! | forces | `forces` |
 //! | checks | `force_limits` |
 //!
-//! What the checks of all stages find is a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
+//! The checks of all stages return a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
 //! [`sampled`], which is no part of the cycle, computes the gains that a sampled loop can carry.
 
 mod assessment;
