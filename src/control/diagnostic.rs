@@ -72,6 +72,7 @@ macro_rules! codes {
         /// | number | meaning | reaction | remedy |
         /// | --- | --- | --- | --- |
         $(#[doc = concat!("| ", $number, " | ", $name, " | ", reaction!($reaction), " | ", $remedy, " |")])*
+        #[allow(rustdoc::broken_intra_doc_links, reason = "remedies name sections of the configuration: [limits]")]
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
         #[repr(u32)]
         pub enum DiagnosticCode { $($(#[$doc])* $variant = $number,)* }

@@ -179,7 +179,7 @@ pub struct StatusMessage {
     pub refused: u32,
     /// Bits of the [`crate::control::limits::Limit`]s that this cycle is at.
     pub limiting: u32,
-    /// The number behind `fault` and its bound, in the [`crate::control::diagnostic::DiagnosticCode::unit`] of the fault.
+    /// The number behind `fault` and its bound, in the unit of [`crate::control::diagnostic::DiagnosticCode::comparison`].
     pub fault_value: f64,
     pub fault_bound: f64,
     /// Leg or axis of the fault, from 1; 0 if it is of neither.
