@@ -4,10 +4,11 @@ use std::fs::File;
 use std::io::Read;
 use std::thread;
 
-use hexad::realtime::clock::{Grid, monotonic_ns, sleep_until};
+use hexad::messages::clock::monotonic_ns;
+use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::Shortfall;
 use hexad::realtime::setup::deadline::{Reservation, reserve, times_exhausted};
-use hexad::realtime::setup::idle::bound_wakeup;
+use hexad::realtime::setup::idle::limit_wakeup_latency;
 
 use super::common::not_run::lacking;
 
@@ -97,7 +98,7 @@ fn a_thread_that_sleeps_to_its_grid_is_not_held() {
 #[test]
 fn a_bound_on_idle_states_is_in_force_until_dropped() {
     const ASKED_US: i32 = 123;
-    let Some(_held) = granted(bound_wakeup(ASKED_US)) else { return };
+    let Some(_held) = granted(limit_wakeup_latency(ASKED_US)) else { return };
     // The least that any process asks for.
     let mut in_force = [0; 4];
     File::open("/dev/cpu_dma_latency")
