@@ -63,12 +63,7 @@ pub(super) fn run(
     faults: Option<&Path>,
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
-    let machine = &config.machine;
-    let parameters = parameters(machine, &config.deployment, fidelity::fidelity(config));
-    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
-        warn!("{warning}");
-    }
-    let controller = Controller::new(machine, parameters);
+    let controller = controller(config);
     let (realtime_side, io_side) = exchange();
     let event = io_side.event.clone();
     let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
@@ -77,8 +72,7 @@ pub(super) fn run(
     let (delay_producer, delays) = delay_queue.split();
     let (statistics_writer, statistics) = triple_buffer(Statistics::default());
     let (flags, files) = (&Flags::default(), &OnceLock::new());
-    let (io_ready, ready) = channel();
-    let (go, go_ahead) = channel();
+    let ((io_ready, ready), (go, go_ahead)) = (channel(), channel());
     memory::keep_heap();
 
     let log_links = LogLinks {
@@ -86,8 +80,8 @@ pub(super) fn run(
         delays,
         statistics: statistics_writer,
         files,
-        dump: FaultDump::new(faults, machine.home),
-        first_pose: FirstPose::of(machine),
+        dump: FaultDump::new(faults, config.machine.home),
+        first_pose: FirstPose::of(&config.machine),
     };
     let realtime_links = RealtimeLinks {
         exchange: realtime_side,
@@ -123,6 +117,15 @@ pub(super) fn run(
         let counts_csv = mem::take(&mut log.counts_csv);
         Ok((Report::new(config, &cyclic, &io, log), counts_csv))
     })
+}
+
+/// Controller of a configuration. Logs which of its loops are close to unstable.
+fn controller(config: &Config) -> Controller {
+    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+        warn!("{warning}");
+    }
+    let fidelity = fidelity::fidelity(config);
+    Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
 }
 
 /// Links of the real-time thread to the other threads.

@@ -33,7 +33,7 @@ pub const LABEL_SIZE: i32 = 12;
 const AXIS_TITLE_SIZE: i32 = 13;
 
 /// Colours of lines and marks: six legs, seven states. They have a contrast of at least 3:1 on white as well as on a
-/// dark page, because not every viewer tells the image which of the two it lies on. They differ in lightness too, for
+/// dark page, because not every viewer passes the preferred colour scheme to the image. They differ in lightness too, for
 /// colour-blind readers.
 pub const PALETTE: [u32; 7] = [0x0A6FD6, 0xB98A00, 0x008573, 0xC8430F, 0x4897E0, 0xC77BA8, 0x8957E5];
 /// Colour of text and axes.

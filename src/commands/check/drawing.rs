@@ -34,7 +34,7 @@ const AXES_LENGTH: f64 = (26 * UNIT) as f64;
 /// Point of an area \[drawing units\].
 type Pixel = Vector2<f64>;
 /// Six joints.
-type Joints = [Vector3<f64>; LEGS];
+type JointCentres = [Vector3<f64>; LEGS];
 
 /// Writes the drawing as one SVG file, complete or not at all.
 pub fn write_svg(path: &Path, name: &str, machine: &Machine) -> Result<(), ChartError> {
@@ -53,8 +53,8 @@ pub fn write_svg(path: &Path, name: &str, machine: &Machine) -> Result<(), Chart
     })
 }
 
-/// Joints on the base and on the platform at home, in base axes \[m\].
-fn joints(machine: &Machine) -> [Joints; 2] {
+/// JointCentres on the base and on the platform at home, in base axes \[m\].
+fn joints(machine: &Machine) -> [JointCentres; 2] {
     let pose = TaskState::at_rest(machine.home).motion().pose;
     let joints = &machine.joints;
     let [base, platform] = [&joints.base, &joints.platform].map(|lanes| joints.triples.unpack_vectors(lanes));
@@ -89,7 +89,7 @@ impl View {
         Self { title: "from the side", ..Self::above([first, up, -second]) }
     }
 
-    fn perspective(axes: [Vector3<f64>; 3], joints: &[Joints; 2]) -> Self {
+    fn perspective(axes: [Vector3<f64>; 3], joints: &[JointCentres; 2]) -> Self {
         let all = || joints.iter().flatten();
         let center = all().sum::<Vector3<f64>>() / (2 * LEGS) as f64;
         let extent = all().map(|joint| (joint - center).norm()).fold(0.0, f64::max);
@@ -117,7 +117,7 @@ impl View {
         self.eye_distance.is_infinite().then(|| [right, up].map(title))
     }
 
-    fn draw(&self, area: &Area, joints: &[Joints; 2]) -> Result<(), DrawError> {
+    fn draw(&self, area: &Area, joints: &[JointCentres; 2]) -> Result<(), DrawError> {
         let points: Vec<_> = joints.iter().flatten().map(|joint| self.project(joint)).collect();
         let (width, height) = area.dim_in_pixel();
         let room = [

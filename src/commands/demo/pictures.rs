@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use nalgebra::Vector6;
+
 use super::recording::{Recording, desired_motion, measured_pose};
 use crate::config::Config;
 use crate::control::input_validation::seconds_between;
@@ -28,7 +30,7 @@ pub fn write_all(
         written.push(file);
         write_svg(&folder.join(file), &format!("{name}: {title}"), "time [s]", panels)
     };
-    let Signals { commanded, measured, tracking, .. } = &signals;
+    let Signals { commanded, measured, .. } = &signals;
     for (file, title, angular, linear, pair) in [
         (
             "trajectory.svg",
@@ -67,7 +69,16 @@ pub fn write_all(
     ] {
         write(file, title, &[panel(label, &LEG_NAMES, pair, 0..6)])?;
     }
-    let difference = LEG_NAMES.iter().zip(&signals.force_difference).enumerate();
+    write_forces_and_errors(&signals, &mut write)?;
+    Ok(written)
+}
+
+/// Writes the forces with the difference of applied and commanded ones, and the tracking error.
+fn write_forces_and_errors(
+    Signals { commanded, measured, force_difference, tracking }: &Signals,
+    write: &mut impl FnMut(&'static str, &str, &[Panel]) -> Result<(), ChartError>,
+) -> Result<(), ChartError> {
+    let difference = LEG_NAMES.iter().zip(force_difference).enumerate();
     write(
         "forces.svg",
         "actuator forces, applied and (dashed) by inverse dynamics of the setpoint",
@@ -90,8 +101,7 @@ pub fn write_all(
         "tracking_error.svg",
         "desired minus true pose",
         &[error("position [µm]", position, 0), error("orientation [µrad]", orientation, 1)],
-    )?;
-    Ok(written)
+    )
 }
 
 const POSE_AXES: [&str; 6] = ["alpha", "beta", "gamma", "x", "y", "z"];
@@ -176,12 +186,8 @@ impl Signals {
         // Nobody measures accelerations: differences of the rates, over two samples.
         for (before, after) in in_range.clone().zip(in_range.skip(2)) {
             let (t0, t1) = (seconds(before.header.time_ns), seconds(after.header.time_ns));
-            let difference = |a: [f64; 6], b: [f64; 6]| {
-                let mut quotient = [0.0; 6];
-                for (q, (a, b)) in quotient.iter_mut().zip(a.iter().zip(b)) {
-                    *q = (b - a) / (t1 - t0);
-                }
-                quotient
+            let difference = |a: [f64; 6], b: [f64; 6]| -> [f64; 6] {
+                ((Vector6::from(b) - Vector6::from(a)) / (t1 - t0)).into()
             };
             let t = 0.5 * (t0 + t1);
             push(&mut measured.acceleration, t, degrees(difference(before.twist, after.twist)));

@@ -10,7 +10,7 @@ use clap::Args;
 use tracing::info;
 
 use self::playback::{Playback, PlaybackStep};
-use self::precheck::Refusal;
+use self::precheck::SetpointRefusal;
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
 use super::arguments::{MachineFile, duration};
 use super::failure::{CommandError, Failure};
@@ -79,7 +79,7 @@ pub enum SetpointError {
     #[error(transparent)]
     Table(#[from] TableError),
     #[error("{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}", name = .motion.name(), share = percent(MIN_AMPLITUDE_SHARE))]
-    TooSmall { motion: BuiltInMotion, seconds: f64, refusal: Refusal },
+    TooSmall { motion: BuiltInMotion, seconds: f64, refusal: SetpointRefusal },
 }
 
 impl CommandError for SetpointError {}

@@ -65,7 +65,7 @@ impl<'a> Precheck<'a> {
 
     /// The first setpoint after `from` and not after `to` that the daemon would refuse after the setpoint of the cycle
     /// before. Both ends of the span are checked, where jerk is greatest.
-    pub fn refusal(&self, at: impl Fn(f64) -> TaskState, [from, to]: [f64; 2]) -> Option<Refusal> {
+    pub fn refusal(&self, at: impl Fn(f64) -> TaskState, [from, to]: [f64; 2]) -> Option<SetpointRefusal> {
         let period_s = self.parameters.period_ns as f64 * 1e-9;
         let first = (from + period_s).min(to);
         let steps = ((to - first) / period_s).ceil().clamp(1.0, MAX_STEPS_PER_SPAN);
@@ -73,13 +73,13 @@ impl<'a> Precheck<'a> {
         (0..=steps as u32).find_map(|k| self.refused(t(k), [at(t(k) - period_s), at(t(k))]))
     }
 
-    fn refused(&self, t: f64, [before, now]: [TaskState; 2]) -> Option<Refusal> {
+    fn refused(&self, t: f64, [before, now]: [TaskState; 2]) -> Option<SetpointRefusal> {
         let Self { machine, parameters, home } = self;
         let [before, now] = [(0, before), (parameters.period_ns, now)]
             .map(|(time_ns, task)| SetpointMotion::new(Setpoint { time_ns, task }));
         let SetpointCheck { active_limits, result } =
             check_setpoint(machine, parameters, home, &now, Some(&before), f64::INFINITY);
-        result.err().map(|diagnostic| Refusal { t, diagnostic, active_limits })
+        result.err().map(|diagnostic| SetpointRefusal { t, diagnostic, active_limits })
     }
 
     /// The first refusal within `seconds`, searched in equal spans.
@@ -88,22 +88,22 @@ impl<'a> Precheck<'a> {
         at: impl Fn(f64) -> TaskState + Sync,
         seconds: f64,
         spans: u32,
-    ) -> Option<Refusal> {
+    ) -> Option<SetpointRefusal> {
         let end = |k: u32| seconds * f64::from(k) / f64::from(spans);
         (0..spans).into_par_iter().find_map_first(|k| self.refusal(&at, [end(k), end(k + 1)]))
     }
 }
 
-/// Refusal of a setpoint: its time, the reason, and the limits that it exceeds.
+/// SetpointRefusal of a setpoint: its time, the reason, and the limits that it exceeds.
 #[derive(Clone, Copy, Debug)]
-pub struct Refusal {
+pub struct SetpointRefusal {
     /// Time since the start of the trajectory \[s\].
     pub t: f64,
     diagnostic: Diagnostic,
     active_limits: LimitSet,
 }
 
-impl fmt::Display for Refusal {
+impl fmt::Display for SetpointRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { t, diagnostic, active_limits } = self;
         write!(f, "t = {t:.4}: ")?;
