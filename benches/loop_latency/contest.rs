@@ -9,7 +9,7 @@ use hexad::commands::operate::Operator;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
 use hexad::daemon::report::Report;
-use hexad::messages::ports::Bus;
+use hexad::messages::Bus;
 
 use super::Failure;
 use super::distribution::Distribution;
@@ -77,10 +77,10 @@ impl Watch {
                     if status.state == State::Active as u32 {
                         break;
                     }
-                    let cause = DiagnosticCode::from_number(status.fault).unwrap_or_default();
+                    let cause = DiagnosticCode::from_number(status.diagnostic.code).unwrap_or_default();
                     why = cause.name();
                     if cause == DiagnosticCode::ReadyToEngage {
-                        operator.ask(Request::Engage)?;
+                        operator.send(Request::Engage)?;
                     }
                 }
                 for daemon in daemons.iter_mut() {

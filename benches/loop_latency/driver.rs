@@ -8,8 +8,8 @@ use std::sync::{Arc, mpsc};
 use std::thread::{JoinHandle, spawn};
 
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::{Bus, PortError, Source};
-use hexad::messages::structs::{MeasuredMessage, SetpointMessage};
+use hexad::messages::{Bus, PortError, Publisher};
+use hexad::messages::{MeasuredMessage, SetpointMessage};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::machine::Machine;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
@@ -63,14 +63,14 @@ impl Drop for Driver {
     }
 }
 
-type Ports = (Source<SetpointMessage>, Source<MeasuredMessage>);
+type Ports = (Publisher<SetpointMessage>, Publisher<MeasuredMessage>);
 
 fn prepare(machines: usize, cpu: usize) -> Result<Vec<Ports>, String> {
     scheduling::bind_to_cpu(cpu).map_err(|shortfall| shortfall.to_string())?;
     scheduling::fifo_priority(DRIVER_PRIORITY).map_err(|shortfall| shortfall.to_string())?;
     let ports = |number| -> Result<Ports, PortError> {
         let bus = Bus::join(&Rig::machine_name(number))?;
-        Ok((bus.source()?, bus.source()?))
+        Ok((bus.publisher()?, bus.publisher()?))
     };
     (0..machines).map(ports).collect::<Result<_, _>>().map_err(|error| error.to_string())
 }

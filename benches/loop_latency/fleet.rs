@@ -20,7 +20,7 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::realtime::clock::Monotonic;
 use hexad::realtime::cyclic;
-use hexad::realtime::cyclic::{RECORDS, Release, Timing};
+use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 use hexad::realtime::setup::{memory, scheduling};
@@ -120,7 +120,9 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
     let timing = Timing {
         period_ns,
         phase_ns: period_ns / 2,
-        release: Release::Grid { max_lead_ns: 0 },
+        release: ReleaseMode::Sleep,
+        max_lead_ns: 0,
+        timeout_ns: 0,
         on_overrun: OverrunPolicy::Skip,
         late_wakeup_ns: period_ns / 2,
     };

@@ -10,9 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread::{JoinHandle, spawn};
 
+use hexad::messages::Bus;
+use hexad::messages::ForceMessage;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::{Bus, Sink};
-use hexad::messages::structs::ForceMessage;
 use hexad::realtime::setup::scheduling;
 
 use super::Failure;
@@ -47,7 +47,7 @@ impl Subscriber {
                 };
                 let _ = ready.send(Ok(()));
                 while !stop.load(Ordering::Relaxed) {
-                    if let Some(force) = forces.newest().filter(|force| force.valid == 1) {
+                    if let Some(force) = forces.receive_latest().filter(|force| force.valid == 1) {
                         seen.add(monotonic_ns().saturating_sub(force.release_ns), 1);
                     }
                 }
@@ -67,7 +67,7 @@ impl Subscriber {
     }
 }
 
-fn prepare(cpu: usize) -> Result<Sink<ForceMessage>, String> {
+fn prepare(cpu: usize) -> Result<hexad::messages::Subscriber<ForceMessage>, String> {
     scheduling::bind_to_cpu(cpu).map_err(|shortfall| shortfall.to_string())?;
     let thread = fs::read_link("/proc/thread-self").map_err(|error| error.to_string())?;
     let number = thread.file_name().unwrap_or_default();
@@ -77,7 +77,7 @@ fn prepare(cpu: usize) -> Result<Sink<ForceMessage>, String> {
         return Err(format!("renice: {}", String::from_utf8_lossy(&reniced.stderr)));
     }
     let bus = Bus::join(&Rig::machine_name(0)).map_err(|error| error.to_string())?;
-    bus.sink(1).map_err(|error| error.to_string())
+    bus.subscriber(1).map_err(|error| error.to_string())
 }
 
 impl Drop for Subscriber {

@@ -5,7 +5,7 @@ use core::error::Error;
 use super::operate::OperatorError;
 use crate::config::ConfigError;
 use crate::daemon::DaemonError;
-use crate::messages::ports::PortError;
+use crate::messages::PortError;
 use crate::output::files::FileError;
 use crate::output::svg::ChartError;
 
@@ -57,6 +57,6 @@ impl CommandError for FileError {
 
 impl CommandError for OperatorError {
     fn has_begun(&self) -> bool {
-        !matches!(self, Self::Port(_) | Self::Silent(_))
+        !matches!(self, Self::Port(_) | Self::NoStatus(_))
     }
 }

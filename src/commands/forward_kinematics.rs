@@ -12,7 +12,8 @@ use crate::model::forward_kinematics::{Tracker, TrackingResult};
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Twist;
 use crate::model::task::{TaskState, task_coordinates};
-use crate::output::csv_table::{CsvWriter, NumberTable, coordinates, legs, length_columns, six};
+use crate::output::csv_table::{NumberTable, coordinates, legs, length_columns, six};
+use crate::output::csv_writer::CsvWriter;
 
 #[derive(Debug, Args)]
 pub struct ForwardKinematicsArguments {

@@ -12,7 +12,8 @@ use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::{LEGS, Machine};
-use crate::output::csv_table::{CsvWriter, NumberTable, legs};
+use crate::output::csv_table::{NumberTable, legs};
+use crate::output::csv_writer::CsvWriter;
 
 #[derive(Debug, Args)]
 pub struct InverseDynamicsArguments {

@@ -15,7 +15,9 @@ use self::failure::Failure;
 use self::faults::FaultTables;
 use self::forward_kinematics::ForwardKinematicsArguments;
 use self::inverse_dynamics::InverseDynamicsArguments;
+use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
+use self::operate::Order;
 use self::run::RunArguments;
 use self::workspace::WorkspaceArguments;
 use crate::control::state::Request;
@@ -32,6 +34,7 @@ mod failure;
 pub mod faults;
 pub mod forward_kinematics;
 pub mod inverse_dynamics;
+pub mod messages;
 pub mod r#move;
 mod offline_tables;
 pub mod operate;
@@ -72,6 +75,8 @@ enum CommandArguments {
     Estop(RequestArguments),
     /// Show what the numbers of states, faults and limits mean, and what to do
     Faults,
+    /// Print the declarations of the messages for a driver in another language
+    Messages(MessagesArguments),
     /// Validate a machine file and show the machine at home
     Check(CheckArguments),
     /// Show what this host offers to a hard real-time loop, and which rates its wake-ups allow
@@ -104,6 +109,7 @@ impl CommandLine {
             Is::Off(arguments) => send(&arguments, Request::Off, false),
             Is::Estop(arguments) => send(&arguments, Request::Estop, false),
             Is::Faults => Ok(print(FaultTables)?),
+            Is::Messages(arguments) => arguments.execute(),
             Is::Check(arguments) => arguments.execute(),
             Is::Doctor(arguments) => arguments.execute(),
             Is::Advise(arguments) => arguments.execute(),
@@ -118,6 +124,7 @@ impl CommandLine {
 /// Sends an operator's request and prints the state that it led to.
 fn send(arguments: &RequestArguments, request: Request, waits: bool) -> Result<(), Failure> {
     let (config, stop) = (arguments.machine.load()?, Stop::on_signals()?);
-    let state = operate::run(&config, request, waits, arguments.timeout(), &stop)?;
+    let order = Order { request, is_patient: waits, timeout: arguments.timeout() };
+    let state = operate::run(&config, &order, &stop)?;
     Ok(print(format_args!("{}\n", state.name()))?)
 }

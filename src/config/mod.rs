@@ -10,9 +10,9 @@ use std::{fmt, io, path::Path};
 
 use thiserror::Error;
 use toml::de::DeTable;
-use tracing::warn;
+use tracing::{info, warn};
 
-use crate::messages::ports::{Bus, PortError, Time};
+use crate::messages::{Bus, PortError};
 use crate::model::machine::Machine;
 
 use self::deployment::Deployment;
@@ -104,15 +104,18 @@ impl Config {
 
     /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.
     pub fn join(&self) -> Result<Bus, PortError> {
-        let time = self.deployment.realtime.time();
-        if time == Time::Simulated {
+        if let Some(location) = Bus::fallback_location() {
+            info!("{location}");
+        }
+        if self.deployment.realtime.is_simulated() {
             warn!(
                 "TIME IS SIMULATED (realtime.release = \"lockstep\"): no hardware receives messages, topics are \
                  hexad-simulated/{}/...",
                 self.name
             );
+            return Bus::join_simulated(&self.name);
         }
-        Bus::join_in(&self.name, time)
+        Bus::join(&self.name)
     }
 }
 

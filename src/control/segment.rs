@@ -13,6 +13,7 @@
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
+use super::input_validation::seconds_between;
 use super::limits::{AxisLimits, Limits};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
 
@@ -90,7 +91,7 @@ impl Segment {
     }
 
     fn seconds(&self, instant_ns: u64) -> f64 {
-        instant_ns.wrapping_sub(self.start_ns) as i64 as f64 * 1e-9
+        seconds_between(self.start_ns, instant_ns)
     }
 }
 

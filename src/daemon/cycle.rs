@@ -13,6 +13,8 @@ pub type CycleInput = exchange::CycleInput<Input>;
 pub type CycleOutput = exchange::CycleOutput<Output>;
 /// The io thread's ends of the exchange with the real-time thread.
 pub type IoSide = exchange::IoSide<Input, Output>;
+/// The real-time thread's ends of the exchange with the io thread.
+pub type RealtimeSide = exchange::RealtimeSide<Input, Output>;
 
 impl CyclicInput for Input {
     fn begin_cycle(&mut self, release_ns: u64, deadline_missed: bool) {

@@ -1,32 +1,34 @@
-//! The last cycles before a fault, kept in memory and written to a file when one comes.
+//! Fault dumps: the last cycles before a fault, kept in memory and written to a CSV file when it occurs.
 //!
-//! The file is made in steps, so that the log thread stays ahead of the loop.
+//! A row is the timing of a cycle and the numbers of its messages. The file is made in steps, so that the log thread stays
+//! ahead of the loop.
 
-use super::cycle::CycleRecord;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use tracing::{info, warn};
 
-use crate::control::controller::Output;
+use super::cycle::CycleRecord;
 use crate::control::diagnostic::DiagnosticCode;
+use crate::control::input_validation::seconds_between;
 use crate::control::state::State;
-use crate::model::task::task_coordinates;
-use crate::output::csv_table::{CsvWriter, coordinates, legs};
+use crate::messages::layout::{Declared, Layout};
+use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use crate::output::csv_writer::CsvWriter;
 
 /// Cycles kept: two seconds at 1 kHz, 100 ms at 20 kHz. The cause of a fault is rarely older than its timeouts.
-const KEPT: usize = 2000;
+const CYCLES_KEPT: usize = 2000;
 
-/// Cycles after the fault that are written too: what the daemon did about it.
-const AFTER: usize = 200;
+/// Cycles after the fault that are written too: the response of the daemon.
+const CYCLES_AFTER_FAULT: usize = 200;
 
 /// Rows written per step: a fraction of a millisecond.
-const ROWS: usize = 100;
+const ROWS_PER_STEP: usize = 100;
 
-/// Files of one run. A machine that faults more often has told enough, and disks are finite.
-const MOST_FILES: u32 = 100;
+/// Most files of one run: disks are finite.
+const MAX_FILES: u32 = 100;
 
-/// Keeps cycles and writes them.
+/// Recorder of the cycles around each fault.
 pub struct FaultDump {
     folder: Option<PathBuf>,
     home: [f64; 6],
@@ -34,50 +36,52 @@ pub struct FaultDump {
     last: DiagnosticCode,
     /// The fault to write, and how many cycles after it are missing.
     due: Option<(CycleRecord, usize)>,
-    writing: Option<Writing>,
+    file: Option<DumpFile>,
     files: u32,
 }
 
-struct Writing {
+/// A file in the making.
+struct DumpFile {
     path: PathBuf,
     fault: CycleRecord,
     cycles: VecDeque<CycleRecord>,
+    columns: Columns,
     table: CsvWriter,
 }
 
 impl FaultDump {
-    /// Allocates what it will ever need but for the files. Without a folder it does nothing.
+    /// Allocates all memory but that of the files. Without a folder it does nothing.
     pub fn new(folder: Option<&Path>, home: [f64; 6]) -> Self {
         Self {
             folder: folder.map(Path::to_path_buf),
             home,
-            cycles: VecDeque::with_capacity(if folder.is_some() { KEPT } else { 0 }),
+            cycles: VecDeque::with_capacity(if folder.is_some() { CYCLES_KEPT } else { 0 }),
             last: DiagnosticCode::None,
             due: None,
-            writing: None,
+            file: None,
             files: 0,
         }
     }
 
-    /// Takes a cycle in.
+    /// Adds a cycle.
     pub fn add(&mut self, record: &CycleRecord) {
         if self.folder.is_none() {
             return;
         }
-        if self.cycles.len() == KEPT {
+        if self.cycles.len() == CYCLES_KEPT {
             self.cycles.pop_front();
         }
         self.cycles.push_back(*record);
-        let cause = record.output.diagnostic.code;
-        // Without force there is no fault, only something missing.
-        let takes_force_away = matches!(record.output.state, State::Stopping | State::Fault);
-        if cause != self.last && cause.is_fault() && takes_force_away && self.due.is_none() {
-            self.due = Some((*record, AFTER));
+        let code = record.output.diagnostic.code;
+        // A fault is one only if it ends control.
+        let ends_control = matches!(record.output.state, State::Stopping | State::Fault);
+        if code != self.last && code.is_fault() && ends_control && self.due.is_none() {
+            self.due = Some((*record, CYCLES_AFTER_FAULT));
         }
-        self.last = cause;
+        self.last = code;
         if let Some((fault, missing)) = &mut self.due {
             *missing = missing.saturating_sub(1);
-            if *missing == 0 && self.writing.is_none() {
+            if *missing == 0 && self.file.is_none() {
                 let fault = *fault;
                 self.begin(fault);
             }
@@ -86,123 +90,143 @@ impl FaultDump {
 
     fn begin(&mut self, fault: CycleRecord) {
         self.due = None;
-        let Some(folder) = self.folder.as_ref().filter(|_| self.files < MOST_FILES) else { return };
+        let Some(folder) = self.folder.as_ref().filter(|_| self.files < MAX_FILES) else { return };
         self.files += 1;
-        if self.files == MOST_FILES {
-            warn!("this was fault number {MOST_FILES}: the cycles of later ones are not written");
+        if self.files == MAX_FILES {
+            warn!("this was fault number {MAX_FILES}: the cycles of later ones are not written");
         }
         let number = fault.output.diagnostic.code as u32;
         let path = folder.join(format!("fault-{number}-cycle-{}.csv", fault.cycle));
-        let table = CsvWriter::new(&columns());
-        self.writing = Some(Writing { path, fault, cycles: self.cycles.clone(), table });
+        let columns = Columns::new();
+        let table = CsvWriter::new(&columns.names());
+        self.file = Some(DumpFile { path, fault, cycles: self.cycles.clone(), columns, table });
     }
 
     /// Writes some rows.
     pub fn step(&mut self) {
-        let Some(writing) = &mut self.writing else { return };
-        let Writing { path, fault, cycles, table } = writing;
-        for cycle in cycles.drain(..ROWS.min(cycles.len())) {
-            table.row(row(&cycle, fault, &self.home));
+        let Some(DumpFile { path, fault, cycles, columns, table }) = &mut self.file else { return };
+        for cycle in cycles.drain(..ROWS_PER_STEP.min(cycles.len())) {
+            table.row(columns.row(&cycle, fault, &self.home));
         }
         if cycles.is_empty() {
             match table.save(path) {
                 Ok(()) => info!("the cycles around the fault are in {}", path.display()),
                 Err(error) => warn!("the cycles around the fault are lost: {error}"),
             }
-            self.writing = None;
+            self.file = None;
         }
     }
 
     /// Writes what is due, at the end of the run.
     pub fn finish(&mut self) {
-        while self.writing.is_some() {
+        while self.file.is_some() {
             self.step();
         }
         if let Some((fault, _)) = self.due.take() {
             self.begin(fault);
         }
-        while self.writing.is_some() {
+        while self.file.is_some() {
             self.step();
         }
     }
 }
 
-fn columns() -> Vec<String> {
-    let named = |prefix: &str, suffix: &str| -> Vec<String> {
-        coordinates(suffix).into_iter().map(|name| format!("{prefix}_{name}")).collect()
-    };
-    let words = |words: &[&str]| words.iter().map(|word| (*word).into()).collect::<Vec<String>>();
-    [
-        words(&["cycle", "t", "state", "fault", "fault_value", "fault_bound", "fault_index", "limiting"]),
-        words(&["wakeup_ns", "compute_ns", "setpoint_age", "measured_age"]),
-        named("setpoint", ""),
-        named("setpoint", "_rate"),
-        named("setpoint", "_accel"),
-        legs("length"),
-        legs("length_rate"),
-        named("measured", ""),
-        words(&["omega_x", "omega_y", "omega_z", "x_rate", "y_rate", "z_rate"]),
-        words(&["error_rotation_x", "error_rotation_y", "error_rotation_z", "error_x", "error_y", "error_z"]),
-        legs("force"),
-        words(&[
-            "more_torque_x",
-            "more_torque_y",
-            "more_torque_z",
-            "more_force_x",
-            "more_force_y",
-            "more_force_z",
-        ]),
-    ]
-    .concat()
+/// Columns about the timing of a cycle; `t` counts from the fault \[s\].
+const TIMING: [&str; 6] = ["cycle", "t", "wakeup_ns", "compute_ns", "setpoint_age_s", "measured_age_s"];
+
+/// Columns of a dump: the timing, then the fields of the messages.
+struct Columns {
+    setpoint: Section,
+    measured: Section,
+    status: Section,
+    force: Section,
 }
 
-/// One cycle; `t` counts from the fault. What was not there is NaN.
-fn row(record: &CycleRecord, fault: &CycleRecord, home: &[f64; 6]) -> Vec<f64> {
-    let CycleRecord { cycle, wakeup_ns, compute_ns, input, output, .. } = record;
-    let Output { state, diagnostic, force, wrench_error, active_limits, platform, error, .. } = output;
-    let since = |from_ns: u64, to_ns: u64| to_ns.wrapping_sub(from_ns) as i64 as f64 * 1e-9;
-    let age = |time_ns: Option<u64>| time_ns.map_or(f64::NAN, |time_ns| since(time_ns, input.release_ns));
-    let absent = [f64::NAN; 6];
-    let (setpoint, measurement) = (&input.setpoint, &input.measurement);
-    let task = setpoint.map_or([absent; 3], |it| [it.task.x.into(), it.task.xd.into(), it.task.xdd.into()]);
-    let legs = measurement.map_or([absent; 2], |it| [it.length, it.rate]);
-    let (pose, twist) = platform.map_or((absent, absent), |platform| {
-        (task_coordinates(&platform.pose, home), platform.twist.vector().into())
-    });
-    let wrench_error = wrench_error.vector().into();
-    let error = error.map_or(absent, |error| error.pose.vector().into());
-    let mut row = vec![
-        *cycle as f64,
-        since(fault.input.release_ns, input.release_ns),
-        f64::from(*state as u32),
-        f64::from(diagnostic.code as u32),
-        diagnostic.value,
-        diagnostic.bound,
-        f64::from(diagnostic.index),
-        f64::from(active_limits.0),
-        *wakeup_ns as f64,
-        *compute_ns as f64,
-        age(setpoint.map(|it| it.time_ns)),
-        age(measurement.map(|it| it.time_ns)),
-    ];
-    for six in task.iter().chain(&legs).chain([&pose, &twist, &error, force, &wrench_error]) {
-        row.extend(six);
+impl Columns {
+    /// Leaves out what is the same in every cycle, not known per cycle, or twice in the messages.
+    fn new() -> Self {
+        let input = ["header", "reserved", "pose_valid", "x", "twist"];
+        Self {
+            setpoint: Section::new(&SetpointMessage::LAYOUT, "setpoint_", &["header"]),
+            measured: Section::new(&MeasuredMessage::LAYOUT, "measured_", &input),
+            status: Section::new(&StatusMessage::LAYOUT, "", &["header", "counters", "io", "statistics"]),
+            force: Section::new(
+                &ForceMessage::LAYOUT,
+                "",
+                &["header", "state", "diagnostic_code", "active_limits", "checksum", "reserved"],
+            ),
+        }
     }
-    row
+
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<_> = TIMING.map(String::from).into();
+        for section in [&self.setpoint, &self.measured, &self.status, &self.force] {
+            names.extend_from_slice(&section.names);
+        }
+        names
+    }
+
+    /// One cycle. Inputs that had not arrived are NaN.
+    fn row(&self, record: &CycleRecord, fault: &CycleRecord, home: &[f64; 6]) -> Vec<f64> {
+        let CycleRecord { cycle, wakeup_ns, compute_ns, input, output, .. } = record;
+        let (setpoint, measurement) = (&input.setpoint, &input.measurement);
+        let age = |time_ns: Option<u64>| {
+            time_ns.map_or(f64::NAN, |time_ns| seconds_between(time_ns, input.release_ns))
+        };
+        let mut row = vec![
+            *cycle as f64,
+            seconds_between(fault.input.release_ns, input.release_ns),
+            *wakeup_ns as f64,
+            *compute_ns as f64,
+            age(setpoint.map(|it| it.time_ns)),
+            age(measurement.map(|it| it.time_ns)),
+        ];
+        let setpoint = setpoint.map(|it| SetpointMessage::from(&it.task).numbers());
+        let measured = measurement.map(|it| MeasuredMessage::from(&it).numbers());
+        self.setpoint.append(&mut row, setpoint.as_deref());
+        self.measured.append(&mut row, measured.as_deref());
+        self.status.append(&mut row, Some(&StatusMessage::new(home, output).numbers()));
+        self.force.append(&mut row, Some(&ForceMessage::new(output, input.release_ns).numbers()));
+        row
+    }
+}
+
+/// Columns from one message.
+struct Section {
+    names: Vec<String>,
+    /// Which numbers of the message they are.
+    places: Vec<usize>,
+}
+
+impl Section {
+    fn new(layout: &Layout, prefix: &str, excluded: &[&str]) -> Self {
+        let is_of = |name: &str, field: &str| {
+            name.strip_prefix(field).is_some_and(|rest| rest.is_empty() || rest.starts_with('_'))
+        };
+        let columns = layout.columns("").into_iter().enumerate();
+        let kept = columns.filter(|(_, name)| !excluded.iter().any(|field| is_of(name, field)));
+        let (places, names) = kept.map(|(place, name)| (place, format!("{prefix}{name}"))).unzip();
+        Self { names, places }
+    }
+
+    fn append(&self, row: &mut Vec<f64>, numbers: Option<&[f64]>) {
+        let number = |place: &usize| numbers.and_then(|numbers| numbers.get(*place).copied());
+        row.extend(self.places.iter().map(|place| number(place).unwrap_or(f64::NAN)));
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::controller::Input;
+    use crate::control::controller::{Input, Output};
 
-    fn record(cycle: u64, cause: DiagnosticCode) -> CycleRecord {
+    fn record(cycle: u64, code: DiagnosticCode) -> CycleRecord {
         CycleRecord {
             cycle,
             input: Input { release_ns: cycle * 1_000_000, ..Input::default() },
             output: Output {
                 state: State::Stopping,
-                diagnostic: cause.into(),
+                diagnostic: code.into(),
                 force: [7.5; 6],
                 ..Output::default()
             },
@@ -230,7 +254,7 @@ mod tests {
             let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
             let columns: Vec<_> = text.lines().next().unwrap().split(',').collect();
             let place = |name: &str| columns.iter().position(|column| *column == name).unwrap();
-            let [cycle, t, cause, force] = ["cycle", "t", "fault", "force_6"].map(place);
+            let [cycle, t, cause, force] = ["cycle", "t", "diagnostic_code", "force_n_6"].map(place);
             let rows: Vec<Vec<f64>> = text
                 .lines()
                 .skip(1)

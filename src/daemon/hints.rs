@@ -1,4 +1,4 @@
-//! Why a cycle may have been slow, asked of the kernel from outside the real-time thread.
+//! Hints why a cycle was slow, read from the kernel outside the real-time thread.
 
 use std::fs::File;
 use std::io;
@@ -16,7 +16,7 @@ const PROCESSOR: usize = 36;
 const STEAL: usize = 8;
 
 /// Holds the processors' lines of `/proc/stat` of a host with 128 of them.
-const BUFFER: usize = 16 * 1024;
+const BUFFER_BYTES: usize = 16 * 1024;
 
 /// The kernel's files about one thread, open, so that reading them allocates nothing.
 #[derive(Debug)]
@@ -47,7 +47,7 @@ impl ThreadFiles {
 
     /// The present counts. What cannot be read counts as zero.
     pub fn read(&self) -> Hints {
-        let mut buffer = [0; BUFFER];
+        let mut buffer = [0; BUFFER_BYTES];
         let status = text(&self.status, &mut buffer);
         let involuntary_switches =
             status.lines().find_map(|line| line.strip_prefix("nonvoluntary_ctxt_switches:"));
@@ -62,7 +62,7 @@ impl ThreadFiles {
 }
 
 impl Hints {
-    /// What was added since `earlier`. Another processor may have been stolen from less.
+    /// Increase since `earlier`; zero where a count is smaller, as the steal of another processor may be.
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
             involuntary_switches: self.involuntary_switches.saturating_sub(earlier.involuntary_switches),

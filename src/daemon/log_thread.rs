@@ -1,6 +1,5 @@
-//! The log thread: turns the records of the other two threads into statistics and into words.
+//! The log thread: turns the records of the other two threads into statistics, log lines and fault dumps.
 
-use super::cycle::{CycleRecord, tracking_error};
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::sync::OnceLock;
@@ -10,15 +9,16 @@ use std::time::Instant;
 use heapless::spsc::Consumer;
 use tracing::{info, warn};
 
+use super::cycle::{CycleRecord, tracking_error};
 use super::fault_dump::FaultDump;
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
+use super::report::{Fault, TrackingSum};
 use super::statistics::Collector;
 use crate::control::controller::Output;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::State;
-use crate::daemon::report::{Fault, TrackingSum};
-use crate::messages::statistics::Statistics;
+use crate::messages::Statistics;
 use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
@@ -28,14 +28,14 @@ const PERIOD: Duration = Duration::from_millis(20);
 /// Length of a window of the statistics.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// Faults kept for the report; a machine that faults more often has told enough.
+/// Faults kept for the report; more would not help to find their cause.
 const MAX_FAULTS: usize = 1000;
 
-/// What the log thread reads and where it tells.
-pub struct Sides<'a> {
+/// Links of the log thread to the other threads.
+pub struct LogLinks<'a> {
     pub records: Consumer<'a, CycleRecord>,
     /// Release to force sent \[ns\], from the io thread.
-    pub sent: Consumer<'a, u64>,
+    pub delays: Consumer<'a, u64>,
     /// For the status message.
     pub statistics: Writer<Statistics>,
     /// Of the real-time thread, once it has begun.
@@ -55,66 +55,80 @@ pub struct LogReport {
 }
 
 /// Runs until `stop` and until the queues are empty.
-pub fn run(mut sides: Sides<'_>, stop: &AtomicBool) -> LogReport {
-    let mut collector = Collector::default();
-    let mut report = LogReport { faults: Vec::with_capacity(MAX_FAULTS), ..LogReport::default() };
-    let mut last = (State::Off, DiagnosticCode::None);
-    let mut hints = Hints::default();
-    let mut window_began = Instant::now();
+pub fn run(mut links: LogLinks<'_>, stop: &AtomicBool) -> LogReport {
     let at_start = ThreadUsage::of_this_thread();
+    let mut log = Log::default();
+    log.report.faults.reserve(MAX_FAULTS);
+    let mut window_began = Instant::now();
     loop {
         let stopping = stop.load(Ordering::Relaxed);
-        while let Some(record) = sides.records.dequeue() {
-            collector.add(&record);
-            sides.dump.add(&record);
-            sides.first_pose.add(&record);
-            if let Some((position, orientation)) = tracking_error(&record) {
-                report.tracking.add(position, orientation);
-            }
-            let now = (record.output.state, record.output.diagnostic.code);
-            if now != last {
-                tell(&record, &mut report.faults);
-                last = now;
-            }
-        }
-        while let Some(end_to_end_ns) = sides.sent.dequeue() {
-            collector.add_sent(end_to_end_ns);
-        }
-        if let Some(files) = sides.files.get() {
-            let now = files.read();
-            collector.hint(&now.since(&hints));
-            hints = now;
-        }
+        log.empty_queues(&mut links);
         if window_began.elapsed() >= WINDOW {
             window_began = Instant::now();
-            sides.statistics.write(collector.end_window());
+            links.statistics.write(log.collector.end_window());
         }
-        sides.dump.step();
+        links.dump.step();
         if stopping {
-            sides.dump.finish();
-            report.statistics = collector.statistics();
-            report.usage = ThreadUsage::of_this_thread().since(&at_start);
-            report.counts_csv = collector.counts_csv();
-            return report;
+            links.dump.finish();
+            let usage = ThreadUsage::of_this_thread().since(&at_start);
+            let (statistics, counts_csv) = (log.collector.statistics(), log.collector.counts_csv());
+            return LogReport { statistics, counts_csv, usage, ..log.report };
         }
         thread::sleep(PERIOD);
     }
 }
 
-fn tell(record: &CycleRecord, faults: &mut Vec<Fault>) {
-    let CycleRecord { cycle, output: Output { state, diagnostic, .. }, .. } = *record;
-    let code = diagnostic.code;
-    match state {
-        State::Fault => {
-            warn!(cycle, number = code as u32, "fault: {diagnostic}; no force until cleared");
-            if faults.len() < MAX_FAULTS {
-                faults.push(Fault { cycle, number: code as u32, name: code.name().into() });
+/// What the log thread has collected so far.
+#[derive(Default)]
+struct Log {
+    collector: Collector,
+    report: LogReport,
+    /// Of the last cycle.
+    state: (State, DiagnosticCode),
+    hints: Hints,
+}
+
+impl Log {
+    fn empty_queues(&mut self, links: &mut LogLinks<'_>) {
+        while let Some(record) = links.records.dequeue() {
+            self.collector.add(&record);
+            links.dump.add(&record);
+            links.first_pose.add(&record);
+            if let Some((position, orientation)) = tracking_error(&record) {
+                self.report.tracking.add(position, orientation);
+            }
+            let state = (record.output.state, record.output.diagnostic.code);
+            if state != self.state {
+                self.log_state(&record);
+                self.state = state;
             }
         }
-        State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
-        State::Stopping if code.is_fault() => {
-            warn!(cycle, number = code as u32, "stopping: {diagnostic}")
+        while let Some(delay_ns) = links.delays.dequeue() {
+            self.collector.add_delay(delay_ns);
         }
-        _ => info!(cycle, "{}: {diagnostic}", state.name()),
+        if let Some(files) = links.files.get() {
+            let hints = files.read();
+            self.collector.add_hints(&hints.since(&self.hints));
+            self.hints = hints;
+        }
+    }
+
+    fn log_state(&mut self, record: &CycleRecord) {
+        let CycleRecord { cycle, output: Output { state, diagnostic, .. }, .. } = *record;
+        let code = diagnostic.code;
+        match state {
+            State::Fault => {
+                warn!(cycle, number = code as u32, "fault: {diagnostic}; no force until cleared");
+                let faults = &mut self.report.faults;
+                if faults.len() < MAX_FAULTS {
+                    faults.push(Fault { cycle, number: code as u32, name: code.name().into() });
+                }
+            }
+            State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
+            State::Stopping if code.is_fault() => {
+                warn!(cycle, number = code as u32, "stopping: {diagnostic}")
+            }
+            _ => info!(cycle, "{}: {diagnostic}", state.name()),
+        }
     }
 }

@@ -3,12 +3,18 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use tracing::warn;
 
-use crate::messages::statistics::{Times, WorstCycle};
+use super::io_thread::IoReport;
+use super::log_thread::LogReport;
+use crate::config::Config;
+use crate::messages::{Statistics, Times, WorstCycle};
 use crate::output::files::{FileError, write_whole};
+use crate::realtime::cyclic::LoopReport;
+use crate::realtime::setup::deadline;
 use crate::realtime::usage::ThreadUsage;
 
-/// Everything a run says about itself.
+/// Report of a run: timing, tracking, resources and faults.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
     pub cycles: u64,
@@ -26,13 +32,14 @@ pub struct Report {
     pub worst_cycles: Vec<WorstCycle>,
     pub tracking: Tracking,
     pub rt_thread: ThreadUsage,
-    /// It allocates only while a peer comes or goes.
+    /// It allocates only while a peer connects or disappears.
     pub io_thread: ThreadUsage,
-    /// It allocates only to tell of a change of state.
+    /// It allocates only to log a change of state.
     pub log_thread: ThreadUsage,
     pub faults: Vec<Fault>,
 }
 
+/// Numbers of missed deadlines, by kind.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct DeadlineMisses {
     pub late_wakeup: u64,
@@ -51,7 +58,7 @@ pub struct Tracking {
     pub orientation_max_rad: f64,
 }
 
-/// Control was lost for a reason that is a fault.
+/// Fault that ended control.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Fault {
     pub cycle: u64,
@@ -60,6 +67,33 @@ pub struct Fault {
 }
 
 impl Report {
+    /// Combines the reports of the three threads; logs a warning for each loss of data.
+    pub(super) fn new(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Self {
+        warn_of_losses(cyclic, io);
+        let counters = &cyclic.counters;
+        let Statistics { total, worst, .. } = log.statistics;
+        Self {
+            cycles: counters.cycles,
+            rate_hz: config.deployment.realtime.rate_hz,
+            deadline_misses: DeadlineMisses {
+                late_wakeup: counters.late_wakeups,
+                overrun: counters.overruns,
+                skipped: counters.skipped,
+                caught_up: counters.caught_up,
+            },
+            wakeup_ns: total.wakeup_ns,
+            compute_ns: total.compute_ns,
+            measured_age_ns: total.measured_age_ns,
+            end_to_end_ns: total.end_to_end_ns,
+            worst_cycles: worst.into_iter().filter(|cycle| cycle.cycle > 0).collect(),
+            tracking: log.tracking.tracking(),
+            rt_thread: cyclic.usage,
+            io_thread: io.usage,
+            log_thread: log.usage,
+            faults: log.faults,
+        }
+    }
+
     /// Writes JSON.
     pub fn write(&self, path: &Path) -> Result<(), FileError> {
         let json = serde_json::to_vec_pretty(self).map_err(|e| FileError::on(path)(e.into()))?;
@@ -73,7 +107,26 @@ impl Report {
     }
 }
 
-/// Accumulates tracking errors.
+fn warn_of_losses(cyclic: &LoopReport, io: &IoReport) {
+    for (count, what) in [
+        (
+            deadline::times_exhausted(),
+            "times, at least, the budget of SCHED_DEADLINE was used up: the loop was held",
+        ),
+        (cyclic.counters.records_lost, "cycle records lost: the log thread was too slow"),
+        (io.send_failures, "messages could not be sent"),
+        (io.rejected.schema, "messages rejected: another schema; build all participants alike"),
+        (io.rejected.older_publisher, "messages rejected: an older publisher; were there two at once?"),
+        (io.rejected.repeated, "messages rejected: received before, or unreadable"),
+        (io.rejected.damaged, "messages rejected: wrong checksum, or a publisher that begins in the future"),
+    ] {
+        if count > 0 {
+            warn!(count, "{what}");
+        }
+    }
+}
+
+/// Sums and maxima of tracking errors.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TrackingSum {
     count: u64,
@@ -93,12 +146,12 @@ impl TrackingSum {
         self.orientation_max = self.orientation_max.max(orientation);
     }
 
-    /// How many pairs.
+    /// Number of pairs.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// RMS and maxima; zero where nothing was added.
+    /// RMS and maxima; zero if nothing was added.
     pub fn tracking(&self) -> Tracking {
         let count = self.count.max(1) as f64;
         Tracking {

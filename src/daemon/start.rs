@@ -1,19 +1,19 @@
 //! Real-time set-up of the daemon: each thread prepares itself, the main thread what the process shares.
 //!
-//! What is refused is told with its reason and remedy. With `realtime.require_realtime` it is a refusal to
-//! start, and names all of it.
+//! A step that the system refuses is logged with its reason and remedy. With `realtime.require_realtime` the daemon then
+//! does not start, and its error lists all of them.
 
 use std::sync::mpsc;
 
 use tracing::warn;
 
 use super::{DaemonError, nanoseconds};
-use crate::config::deployment::{Realtime, ReleaseMode, Scheduler};
+use crate::config::deployment::{Realtime, Scheduler};
 use crate::control::controller::{Controller, Input, Measurement, Setpoint};
-use crate::messages::ports::Time;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
+use crate::realtime::cyclic::ReleaseMode;
 use crate::realtime::setup::deadline::Reservation;
 use crate::realtime::setup::idle::PmQosRequest;
 use crate::realtime::setup::{Shortfall, deadline, denormals, idle, memory, scheduling};
@@ -21,11 +21,11 @@ use crate::realtime::setup::{Shortfall, deadline, denormals, idle, memory, sched
 /// Cycles computed before the first release, so that code and data are in memory and in the cache.
 const WARM_UP_CYCLES: u32 = 1000;
 
-/// What a thread has to say before the loop may begin: what it lacks, or why it cannot run.
+/// Result of preparing a thread: the shortfalls it found, or why it cannot run.
 pub(super) type Ready = Result<Vec<Shortfall>, DaemonError>;
 
-/// Collects what the threads and the process lack, says it, and lets the loop begin if that is
-/// acceptable. Processors sleep lightly for as long as the result lives.
+/// Collects and logs the shortfalls of threads and process, and starts the loop if they are acceptable. Idle states of the
+/// processors are limited for as long as the result lives.
 pub(super) fn start(
     realtime: &Realtime,
     ready: &mpsc::Receiver<Ready>,
@@ -35,9 +35,9 @@ pub(super) fn start(
     for _ in ["io", "real-time"] {
         shortfalls.extend(ready.recv().map_err(|_| DaemonError::Died("io or real-time"))??);
     }
-    let mut shallow_sleep = None;
-    if realtime.time() == Time::Real {
-        shallow_sleep = idle::limit_wakeup_latency(realtime.cpu_dma_latency_us)
+    let mut pm_qos = None;
+    if !realtime.is_simulated() {
+        pm_qos = idle::limit_wakeup_latency(realtime.cpu_dma_latency_us)
             .map_err(|shortfall| shortfalls.push(shortfall))
             .ok();
         if realtime.lock_memory {
@@ -52,7 +52,7 @@ pub(super) fn start(
         return Err(DaemonError::NotRealtime(shortfalls));
     }
     go.send(()).map_err(|_| DaemonError::Died("real-time"))?;
-    Ok(shallow_sleep)
+    Ok(pm_qos)
 }
 
 /// Prepares the calling thread for I/O: it allocates while a peer connects.
@@ -74,8 +74,8 @@ pub(crate) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<S
     prepare(realtime.cpu, scheduled)
 }
 
-/// Prepares the calling thread for the loop in simulated time: the same numbers, but nothing is urgent, and who waits
-/// for others must not keep the processor from them.
+/// Prepares the calling thread for the loop in simulated time: the same numbers at ordinary priority, because a thread that
+/// waits for other processes must not keep the processor from them.
 pub(super) fn prepare_simulated(warm_up: impl FnOnce()) -> Vec<Shortfall> {
     denormals::flush();
     warm_up();
@@ -89,7 +89,7 @@ fn prepare(cpu: Option<usize>, scheduled: Result<(), Shortfall>) -> Vec<Shortfal
     scheduled.err().into_iter().chain(bound).collect()
 }
 
-/// What `realtime.scheduler = "deadline"` reserves.
+/// Reservation of `realtime.scheduler = "deadline"`.
 ///
 /// With `release = "external"` the period is the one that the drives are expected to have. Messages that
 /// come sooner begin a new one with the full budget, unless the share of the last is used up; cycles of
@@ -99,7 +99,7 @@ pub fn reservation(realtime: &Realtime) -> Reservation {
     Reservation::new(nanoseconds(realtime.period_s()), nanoseconds(spin_s))
 }
 
-/// Runs a controller that nobody listens to, at rest at home.
+/// Runs a controller whose outputs are discarded, at rest at home.
 pub(super) fn warm_up(mut controller: Controller, machine: &Machine) {
     let task = TaskState::at_rest(machine.home);
     let length = leg_lengths(machine, &task.motion().pose);

@@ -2,10 +2,9 @@
 //! Nothing here allocates once it is made.
 
 use super::cycle::{CycleRecord, measured_age_ns};
-use crate::daemon::time_histogram::TimeHistogram;
-use crate::messages::statistics::{LoopTimes, Statistics, WORST, WorstCycle};
-
 use super::hints::Hints;
+use super::time_histogram::TimeHistogram;
+use crate::messages::{LoopTimes, Statistics, WORST_CYCLES, WorstCycle};
 
 /// The histograms of one span.
 #[derive(Debug, Default)]
@@ -32,19 +31,19 @@ impl Span {
     }
 }
 
-/// Collects what happens to cycles.
+/// Timing statistics of the cycles.
 #[derive(Debug, Default)]
 pub struct Collector {
     window: Span,
     total: Span,
-    worst: [WorstCycle; WORST],
-    /// The last cycle that has its hints.
+    worst: [WorstCycle; WORST_CYCLES],
+    /// The last cycle for which hints were added.
     hinted: u64,
     last: u64,
 }
 
 impl Collector {
-    /// Takes one cycle in.
+    /// Adds a cycle.
     pub fn add(&mut self, record: &CycleRecord) {
         for span in [&mut self.window, &mut self.total] {
             span.wakeup.record(record.wakeup_ns);
@@ -64,15 +63,15 @@ impl Collector {
         });
     }
 
-    /// Takes in how long after its release a force was sent.
-    pub fn add_sent(&mut self, end_to_end_ns: u64) {
+    /// Adds the delay from a release to its force sent.
+    pub fn add_delay(&mut self, end_to_end_ns: u64) {
         for span in [&mut self.window, &mut self.total] {
             span.end_to_end.record(end_to_end_ns);
         }
     }
 
-    /// Says what happened around the cycles added since the last call.
-    pub fn hint(&mut self, hints: &Hints) {
+    /// Adds the hints for the cycles added since the last call.
+    pub fn add_hints(&mut self, hints: &Hints) {
         let clipped = |count: u64| u32::try_from(count).unwrap_or(u32::MAX);
         for cycle in self.worst.iter_mut().filter(|cycle| cycle.cycle > self.hinted) {
             cycle.involuntary_switches = clipped(hints.involuntary_switches);
@@ -82,14 +81,14 @@ impl Collector {
         self.hinted = self.last;
     }
 
-    /// Ends the window and returns everything.
+    /// Ends the window and returns the statistics so far.
     pub fn end_window(&mut self) -> Statistics {
         let statistics = self.statistics();
         self.window.clear();
         statistics
     }
 
-    /// Everything.
+    /// The statistics so far.
     pub fn statistics(&self) -> Statistics {
         Statistics { window: self.window.times(), total: self.total.times(), worst: self.worst }
     }
@@ -131,13 +130,13 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_are_the_worst_and_carry_the_hints_of_their_own_time() {
+    fn the_worst_cycles_carry_the_hints_of_their_own_time() {
         let mut collector = Collector::default();
         (1..=20).for_each(|cycle| collector.add(&record(cycle, 100 + cycle)));
-        collector.hint(&Hints { steal_ms: 20, ..Hints::default() });
+        collector.add_hints(&Hints { steal_ms: 20, ..Hints::default() });
         collector.add(&record(21, 5000));
         collector.add(&record(22, 1));
-        collector.hint(&Hints { involuntary_switches: 3, ..Hints::default() });
+        collector.add_hints(&Hints { involuntary_switches: 3, ..Hints::default() });
         let worst = collector.statistics().worst;
         assert_eq!(worst.map(|cycle| cycle.cycle), [21, 20, 19, 18, 17, 16, 15, 14]);
         assert_eq!(worst.map(|cycle| cycle.steal_ms), [0, 20, 20, 20, 20, 20, 20, 20]);
@@ -148,7 +147,7 @@ mod tests {
     fn a_window_ends_and_the_total_goes_on() {
         let mut collector = Collector::default();
         collector.add(&record(1, 10));
-        collector.add_sent(33);
+        collector.add_delay(33);
         let first = collector.end_window();
         assert_eq!((first.window.wakeup_ns.max, first.window.end_to_end_ns.count), (10, 1));
         collector.add(&record(2, 4));

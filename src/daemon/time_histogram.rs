@@ -2,7 +2,7 @@
 
 use hdrhistogram::Histogram;
 
-use crate::messages::statistics::Times;
+use crate::messages::Times;
 
 /// Times above this are counted as this \[ns\].
 const LONGEST_NS: u64 = 60_000_000_000;

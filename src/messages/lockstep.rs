@@ -2,43 +2,43 @@
 //!
 //! ```text
 //! plant            measured, time_ns = t                    the clock
-//! setpoint source  answers with a setpoint of time_ns = t; before it, if it wants, with a request
+//! setpoint source  responds with a setpoint of time_ns = t, after a request if there is one
 //! daemon           has both: one cycle; status, then force, release_ns = time_ns = t
-//! plant            has the force: lets a period pass, t + period
+//! plant            has the force: simulates a period, t + period
 //! ```
 //!
-//! Nobody goes on without the others, so nothing depends on how fast anybody is: same inputs, same bytes. At
-//! first no one may be there to hear a message: a plant without an answer says it again, and the source
-//! answers again, both with the same content. The daemon carries on without setpoints once the source has
-//! left.
+//! Each participant waits for the others, so the result does not depend on how fast any of them is: same inputs, same
+//! bytes. At first a participant may not be connected: a plant that receives no response repeats its message, and the
+//! source repeats its response, both with the same content. When the source has left, the daemon continues without
+//! setpoints.
 
 use core::time::Duration;
 use std::thread;
 use std::time::Instant;
 
-/// How long to look without a sleep: longer than a step of a fast plant takes, short for a person.
-const AWAKE: Duration = Duration::from_millis(2);
+/// Time of polling without a sleep: longer than a step of a fast plant takes, short for a person.
+const BUSY_POLL_TIME: Duration = Duration::from_millis(2);
 
-/// Pause between two looks after that.
-const POLL: Duration = Duration::from_micros(100);
+/// Sleep between two polls after that.
+const POLL_INTERVAL: Duration = Duration::from_micros(100);
 
-/// A plant says it again after this long without an answer.
-pub const REPEAT: Duration = Duration::from_millis(100);
+/// A plant repeats its message after this long without a response.
+pub const REPEAT_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Looks for something until it is there, or until `stop`. Others on this processor come first.
-pub fn look_until<T>(stop: impl Fn() -> bool, mut look: impl FnMut() -> Option<T>) -> Option<T> {
+/// Polls until a value is there, or until `stop`. Other threads of this processor run in between.
+pub fn poll_until<T>(stop: impl Fn() -> bool, mut poll: impl FnMut() -> Option<T>) -> Option<T> {
     let began = Instant::now();
     loop {
-        if let Some(found) = look() {
+        if let Some(found) = poll() {
             return Some(found);
         }
         if stop() {
             return None;
         }
-        if began.elapsed() < AWAKE {
+        if began.elapsed() < BUSY_POLL_TIME {
             thread::yield_now();
         } else {
-            thread::sleep(POLL);
+            thread::sleep(POLL_INTERVAL);
         }
     }
 }

@@ -1,7 +1,91 @@
-//! Messages on the topics `hexad/<name>/...`, and the ports that publish and receive them: all that a driver needs.
+//! Messages on the topics `hexad/<name>/...` and the ports that publish and receive them: all that a driver needs.
+//!
+//! A message is a `#[repr(C)]` struct of plain numbers in SI units and radians. Each begins with a [`Header`]. iceoryx2
+//! compares only name, size and alignment of a type, so the header carries a schema version; a subscriber rejects
+//! messages of another one.
+//!
+//! # In other languages
+//!
+//! `hexad messages --language c|python|json` prints the declarations of all structs. Numbers of 4 bytes come in pairs, so
+//! that no compiler leaves gaps.
+//!
+//! | | |
+//! | --- | --- |
+//! | iceoryx2 | 0.9.3 exactly, publish-subscribe, IPC service, no user header |
+//! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status` |
+//! | type name | `hexad_<last part>` |
+//! | settings | open or create with `max_publishers` 4, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: the first participant sets them for all |
+//! | location | iceoryx2's defaults. If its root path belongs to another user: that path and `-<user ID>`, and the prefix `iox2_<user ID>_` |
+//! | user | all participants of a machine run as one user |
+//! | signals | the daemon's node installs no handlers (`SignalHandlingMode::Disabled`) |
+//!
+//! A publisher fills in the header and numbers its messages from 1. A subscriber accepts a message of its schema that is
+//! intact and follows all before in the order of (epoch, sequence): the last message of a publisher that died may still
+//! arrive.
+//!
+//! # In simulated time
+//!
+//! With `realtime.release = "lockstep"` the topics are `hexad-simulated/<name>/...`. All times are those of the plant, which
+//! may begin at any instant; the epoch of `force` is the time of its first message. In each step the plant publishes
+//! `measured` of an instant; the setpoint source responds with `setpoint` of that `time_ns`, after a `command` if there is
+//! one; the daemon publishes `status`, then `force`, with that instant as `time_ns` and `release_ns`; the plant simulates one
+//! period. A plant that receives no response repeats its message, and a source repeats its response: a participant may not
+//! be connected yet. When the setpoint source has left, the daemon continues without setpoints.
 
+use iceoryx2::prelude::ZeroCopySend;
+
+mod bus;
 pub mod clock;
+mod command;
+mod force;
+mod header;
+pub mod layout;
 pub mod lockstep;
-pub mod ports;
-pub mod statistics;
-pub mod structs;
+mod measured;
+mod publisher;
+mod setpoint;
+mod statistics;
+mod status;
+mod subscriber;
+
+pub use self::bus::{Bus, PortError};
+pub use self::command::CommandMessage;
+pub use self::force::ForceMessage;
+pub use self::header::{Header, SCHEMA};
+pub use self::measured::MeasuredMessage;
+pub use self::publisher::Publisher;
+pub use self::setpoint::SetpointMessage;
+pub use self::statistics::{
+    IoCounters, LoopCounters, LoopTimes, RejectionCounts, Statistics, Times, WORST_CYCLES, WorstCycle,
+};
+pub use self::status::{DiagnosticRecord, StatusMessage};
+pub use self::subscriber::Subscriber;
+
+use self::layout::{Declared, Layout};
+
+/// Layouts of all messages.
+pub const MESSAGES: [&Layout; 5] = [
+    &SetpointMessage::LAYOUT,
+    &MeasuredMessage::LAYOUT,
+    &CommandMessage::LAYOUT,
+    &ForceMessage::LAYOUT,
+    &StatusMessage::LAYOUT,
+];
+
+/// A struct that is published on a topic of its own.
+pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
+    /// Last part of the topic's name.
+    const TOPIC: &'static str;
+
+    fn header(&self) -> &Header;
+
+    fn header_mut(&mut self) -> &mut Header;
+
+    /// Fills in the checksum, if the message has one.
+    fn seal(&mut self) {}
+
+    /// Whether the checksum, if there is one, is that of the content.
+    fn is_intact(&self) -> bool {
+        true
+    }
+}

@@ -1,74 +1,127 @@
-//! Timing of the loop as the status message carries it: `#[repr(C)]`, plain numbers.
+//! Timing and counters of the loop, parts of the status message.
 
 use iceoryx2::prelude::ZeroCopySend;
 
+use super::layout::message;
+
 /// Entries of the list of worst cycles.
-pub const WORST: usize = 8;
+pub const WORST_CYCLES: usize = 8;
 
-/// Distribution of a time \[ns\], from a histogram of three digits. All zero where nothing was recorded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-#[type_name("hexad_times")]
-#[repr(C)]
-pub struct Times {
-    pub count: u64,
-    pub min: u64,
-    pub mean: u64,
-    pub p50: u64,
-    pub p90: u64,
-    pub p99: u64,
-    pub p999: u64,
-    pub p9999: u64,
-    pub max: u64,
+message! {
+    /// Distribution of a time, from a histogram of three digits. All zero where nothing was recorded.
+    Times = "hexad_times" {
+        /// Number of values.
+        count: u64,
+        min: u64 ["ns"],
+        mean: u64 ["ns"],
+        p50: u64 ["ns"],
+        p90: u64 ["ns"],
+        p99: u64 ["ns"],
+        p999: u64 ["ns"],
+        p9999: u64 ["ns"],
+        max: u64 ["ns"],
+    }
 }
 
-/// The times of one span.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("hexad_loop_times")]
-#[repr(C)]
-pub struct LoopTimes {
-    /// Release to the first instruction of the cycle.
-    pub wakeup_ns: Times,
-    /// First instruction of the cycle to its output.
-    pub compute_ns: Times,
-    /// Age of the measurement at the release.
-    pub measured_age_ns: Times,
-    /// Release to the force sent.
-    pub end_to_end_ns: Times,
+message! {
+    /// Distributions of the times of the cycles in one span.
+    LoopTimes = "hexad_loop_times" {
+        /// Release to the first instruction of the cycle.
+        wakeup_ns: Times,
+        /// First instruction of the cycle to its output.
+        compute_ns: Times,
+        /// Age of the measurement at the release.
+        measured_age_ns: Times,
+        /// Release to the force message sent.
+        end_to_end_ns: Times,
+    }
 }
 
-/// One of the worst cycles since start, by wake-up and compute together, and what else happened in the
-/// 20 ms around it: hints, gathered outside the real-time thread.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-#[type_name("hexad_worst_cycle")]
-#[repr(C)]
-pub struct WorstCycle {
-    /// Number of the cycle, from 1; 0 where the list ends.
-    pub cycle: u64,
-    /// CLOCK_MONOTONIC instant at which it was due \[ns\].
-    pub due_ns: u64,
-    pub wakeup_ns: u64,
-    pub compute_ns: u64,
-    /// 1 if it ran on inputs that it had seen before.
-    pub io_late: u32,
-    /// Times the kernel took the processor from the real-time thread.
-    pub involuntary_switches: u32,
-    /// Page faults of the real-time thread.
-    pub page_faults: u32,
-    /// Time the host took from the processor \[ms\], to the 10 ms that Linux counts in.
-    pub steal_ms: u32,
+message! {
+    /// One of the worst cycles since start, ranked by wake-up and compute time together. The last four fields say what
+    /// happened in the 20 ms around it, observed from outside the real-time thread.
+    WorstCycle = "hexad_worst_cycle" {
+        /// Number of the cycle, from 1; 0 beyond the end of the list.
+        cycle: u64,
+        /// CLOCK_MONOTONIC instant at which it was due.
+        due_ns: u64 ["ns"],
+        wakeup_ns: u64 ["ns"],
+        compute_ns: u64 ["ns"],
+        /// 1 if it used the inputs of the cycle before.
+        io_late: u32,
+        /// Times the kernel took the processor from the real-time thread.
+        involuntary_switches: u32,
+        /// Page faults of the real-time thread.
+        page_faults: u32,
+        /// Time the host took from the processor, in the 10 ms steps that Linux counts.
+        steal_ms: u32 ["ms"],
+    }
 }
 
-/// Statistics, renewed every second.
-#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-#[type_name("hexad_statistics")]
-#[repr(C)]
-pub struct Statistics {
-    /// The last whole second.
-    pub window: LoopTimes,
-    /// Since start.
-    pub total: LoopTimes,
-    /// Since start, the worst first.
-    pub worst: [WorstCycle; WORST],
+message! {
+    /// Statistics of the loop, renewed every second.
+    Statistics = "hexad_statistics" {
+        /// The last complete second.
+        window: LoopTimes,
+        /// Since start.
+        total: LoopTimes,
+        /// Since start, the worst first.
+        worst: [WorstCycle; WORST_CYCLES],
+    }
+}
+
+message! {
+    /// Totals of the cyclic loop since start.
+    LoopCounters = "hexad_loop_counters" {
+        cycles: u64,
+        /// Cycles that woke later than the configured threshold.
+        late_wakeups: u64,
+        /// Cycles still computing at their next release.
+        overruns: u64,
+        /// Release instants for which no cycle was run.
+        skipped: u64,
+        /// Cycles run at once because their release had passed.
+        caught_up: u64,
+        /// Cycle records lost because the queue to the log thread was full.
+        records_lost: u64,
+        /// Calls of the real-time thread to the allocator since its first cycle: zero, or something is wrong.
+        allocations: u64,
+    }
+}
+
+message! {
+    /// Messages that a subscriber rejected, by reason.
+    RejectionCounts = "hexad_rejection_counts" {
+        /// Of another schema.
+        schema: u64,
+        /// Of an older life of the publisher: its last ones, or of one that still publishes beside a newer one.
+        older_publisher: u64,
+        /// Received before, or unreadable.
+        repeated: u64,
+        /// With a wrong checksum, or of a publisher that begins in the future.
+        damaged: u64,
+    }
+}
+
+impl core::ops::Add for RejectionCounts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            schema: self.schema + other.schema,
+            older_publisher: self.older_publisher + other.older_publisher,
+            repeated: self.repeated + other.repeated,
+            damaged: self.damaged + other.damaged,
+        }
+    }
+}
+
+message! {
+    /// Totals of the daemon's io thread since start.
+    IoCounters = "hexad_io_counters" {
+        /// Calls of the io thread to the allocator: a peer connected or disappeared.
+        allocations: u64,
+        /// Messages rejected on all topics that the daemon subscribes to.
+        rejected: RejectionCounts,
+    }
 }

@@ -4,6 +4,7 @@ pub mod axis;
 pub mod charts;
 pub mod csv_rows;
 pub mod csv_table;
+pub mod csv_writer;
 pub mod excerpt;
 pub mod files;
 pub mod numbers;

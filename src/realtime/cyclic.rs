@@ -13,51 +13,69 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
+use serde::{Deserialize, Serialize};
 
 use super::clock::{Clock, Grid};
 use super::exchange::{CycleOutput, RealtimeSide};
 use super::overrun::OverrunPolicy;
 use super::usage::ThreadUsage;
 use super::waiter::Waiter;
+use crate::messages::LoopCounters;
 
 /// Length of the queue of records to the log thread: 50 ms at 20 kHz, twice the log's own period.
 pub const RECORDS: usize = 1024;
 
-/// When to run and what to call late.
+/// When cycles are released and which are late.
 #[derive(Clone, Copy, Debug)]
 pub struct Timing {
     /// With external release: the expected distance of two messages.
     pub period_ns: u64,
     /// Offset of the grid from the multiples of the period.
     pub phase_ns: u64,
-    pub release: Release,
+    pub release: ReleaseMode,
+    /// Hybrid: longest spin before a release.
+    pub max_lead_ns: u64,
+    /// External: when no message arrives for this long, a cycle is run without one, so that the loss is noticed.
+    pub timeout_ns: u64,
     pub on_overrun: OverrunPolicy,
     /// A wake-up later than this after its release is a miss.
     pub late_wakeup_ns: u64,
 }
 
-/// What begins a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Release {
-    /// A point of the grid. The last `max_lead_ns` at most are spun; 0 sleeps.
-    Grid { max_lead_ns: u64 },
-    /// A measured message, signalled by the io thread. When none comes for `timeout_ns`, a cycle is run all
-    /// the same, so that the loss is noticed. In simulated time there is no such end.
-    External { timeout_ns: u64 },
+impl Timing {
+    /// Longest spin before a release \[ns\]; 0 unless the release is hybrid.
+    pub fn spin_ns(&self) -> u64 {
+        if self.release == ReleaseMode::Hybrid { self.max_lead_ns } else { 0 }
+    }
 }
 
-/// Totals since start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counters {
-    pub cycles: u64,
-    pub late_wakeups: u64,
-    pub overruns: u64,
-    pub skipped: u64,
-    pub caught_up: u64,
-    /// Records that found the queue to the log full.
-    pub records_lost: u64,
-    /// Calls of the real-time thread to the allocator. Zero, or something is wrong.
-    pub allocations: u64,
+/// Release mode: what begins a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReleaseMode {
+    /// A point of the grid, for which the thread sleeps.
+    Sleep,
+    /// A point of the grid, for which the thread sleeps and then spins.
+    Hybrid,
+    /// A measured message, signalled by the I/O thread.
+    External,
+    /// A measured message and the setpoint of its instant, in simulated time, which stands still without messages.
+    Lockstep,
+}
+
+impl ReleaseMode {
+    /// All modes.
+    pub const ALL: [Self; 4] = [Self::Sleep, Self::Hybrid, Self::External, Self::Lockstep];
+
+    /// Name in the configuration.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sleep => "sleep",
+            Self::Hybrid => "hybrid",
+            Self::External => "external",
+            Self::Lockstep => "lockstep",
+        }
+    }
 }
 
 /// Input of a cycle, as far as the loop needs to know it.
@@ -87,7 +105,7 @@ pub struct CycleRecord<I, O> {
 /// What the loop used and counted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LoopReport {
-    pub counters: Counters,
+    pub counters: LoopCounters,
     /// From the first release to the last cycle's end.
     pub usage: ThreadUsage,
 }
@@ -106,7 +124,7 @@ pub fn run<I: CyclicInput, O: Copy>(
     stop: &AtomicBool,
 ) -> LoopReport {
     let at_start = ThreadUsage::of_this_thread();
-    let counters = Counters::default();
+    let counters = LoopCounters::default();
     let mut cycles =
         Cycles { clock, timing, step, side, records, counters, allocations: at_start.allocations };
     let Begin { due_ns, release_ns, .. } = run_cycles(&mut cycles, stop);
@@ -123,8 +141,11 @@ fn run_cycles<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O>(
     stop: &AtomicBool,
 ) -> Begin {
     match cycles.timing.release {
-        Release::Grid { max_lead_ns } => cycles.run_on_grid(Waiter::new(max_lead_ns), stop),
-        Release::External { timeout_ns } => cycles.run_on_messages(timeout_ns, stop),
+        ReleaseMode::Sleep | ReleaseMode::Hybrid => {
+            cycles.run_on_grid(Waiter::new(cycles.timing.spin_ns()), stop)
+        }
+        ReleaseMode::External => cycles.run_on_messages(cycles.timing.timeout_ns, stop),
+        ReleaseMode::Lockstep => cycles.run_on_messages(u64::MAX, stop),
     }
 }
 
@@ -150,7 +171,7 @@ struct Cycles<'a, C, I, O, S> {
     step: S,
     side: RealtimeSide<I, O>,
     records: Producer<'a, CycleRecord<I, O>>,
-    counters: Counters,
+    counters: LoopCounters,
     /// Of this thread, before the first cycle.
     allocations: u64,
 }

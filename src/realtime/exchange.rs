@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::cyclic::Counters;
 use super::event::Event;
 use super::triple_buffer::{Reader, Writer, triple_buffer};
+use crate::messages::LoopCounters;
 
 /// Input of a cycle as the io thread writes it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,7 +25,7 @@ pub struct CycleOutput<O> {
     /// Instant for which it was computed \[ns\]: `due_ns`, or where measurements release cycles the measurement's.
     pub release_ns: u64,
     pub output: O,
-    pub counters: Counters,
+    pub counters: LoopCounters,
 }
 
 /// The real-time thread's ends.

@@ -5,17 +5,21 @@
 //!
 //! ```sh
 //! rustup target add thumbv7em-none-eabihf
-//! cargo build --release --manifest-path tests/bare_metal/Cargo.toml --target thumbv7em-none-eabihf
+//! cargo build --manifest-path tests/bare_metal/Cargo.toml --target thumbv7em-none-eabihf
 //! ```
+//!
+//! Not with `--release`: what is linked is the same, and without lanes and floating point of 64 bits in hardware the
+//! optimizer takes minutes.
 #![no_std]
 #![no_main]
 
 use core::hint::black_box;
 use core::panic::PanicInfo;
 
-use hexad::control::controller::{Controller, Input, Output, Parameters};
+use hexad::control::controller::{Controller, Input, Output};
+use hexad::control::parameters::Parameters;
 use hexad::model::machine::{LEGS, Machine};
-use hexad::motion::built_in::{Motion, Scene, fit};
+use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::plant::simulator::Simulator;
 
 /// Where the processor would begin. A function whose address is used is linked with all that it calls.
@@ -24,8 +28,8 @@ extern "C" fn _start() -> ! {
     black_box(Controller::new as fn(&Machine, Parameters) -> Controller);
     black_box(Controller::step as fn(&mut Controller, &Input) -> Output);
     black_box(Simulator::advance as fn(&mut Simulator, f64, Option<&[f64; LEGS]>));
-    black_box(fit as fn(&Machine, Motion, f64) -> Scene);
-    black_box(Scene::at as fn(&Scene, f64) -> _);
+    black_box(fit as fn(&Machine, BuiltInMotion, f64) -> FittedMotion);
+    black_box(FittedMotion::at as fn(&FittedMotion, f64) -> _);
     stop()
 }
 

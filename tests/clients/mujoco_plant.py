@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 
-from hexad import Bus, Force, Measured, be_punctual, monotonic_ns, sleep_until
+from hexad import Bus, Force, Measured, use_fifo_priority, monotonic_ns, sleep_until
 from mujoco_machine import COORDINATES, LEGS, Machine, write_rows
 
 # Without an answer a measurement is said again: nobody may have been there [ns].
@@ -42,14 +42,14 @@ def drive(machine, measured, force, steps, rows):
 def run_in_real_time(machine, bus, period_ns, rows):
     forces, source = bus.subscriber(Force), bus.publisher(Measured)
     steps = round(period_ns * 1e-9 / machine.model.opt.timestep)
-    be_punctual()
+    use_fifo_priority()
     tick_ns = (monotonic_ns() // period_ns + 1) * period_ns
     force = None
     while True:
         sleep_until(tick_ns)
         measured = measurement(machine)
         source.publish(tick_ns, measured)
-        force = forces.newest() or force
+        force = forces.receive_latest() or force
         now_ns = monotonic_ns()
         drive(machine, measured, force if force and force.may_be_applied(now_ns) else None, steps, rows)
         tick_ns += period_ns
@@ -63,7 +63,7 @@ def run_in_lockstep(machine, bus, period_ns, rows):
         measured = measurement(machine)
         source.publish(time_ns, measured)
         said_ns = monotonic_ns()
-        while (force := forces.newest()) is None or force.release_ns != time_ns:
+        while (force := forces.receive_latest()) is None or force.release_ns != time_ns:
             if monotonic_ns() - said_ns > REPEAT_NS:
                 source.publish(time_ns, measured)
                 said_ns = monotonic_ns()

@@ -13,8 +13,8 @@ import os
 
 import numpy as np
 
-from hexad import ACTIVE, ENGAGE, READY_TO_ENGAGE
-from hexad import Bus, Command, Measured, Setpoint, Status, be_punctual, monotonic_ns, sleep_until
+from hexad_messages import DIAGNOSTIC_READY_TO_ENGAGE, REQUEST_ENGAGE, STATE_ACTIVE
+from hexad import Bus, Command, Measured, Setpoint, Status, use_fifo_priority, monotonic_ns, sleep_until
 from mujoco_machine import COORDINATES, rows_of, write_rows
 
 # How long to stand at the end [s]: the platform is a little behind.
@@ -48,7 +48,7 @@ class Trajectory:
 
 
 class Player:
-    """What to say at an instant."""
+    """The setpoint of each instant."""
 
     def __init__(self, bus, trajectory, engage):
         self.statuses, self.commands = bus.subscriber(Status), bus.publisher(Command)
@@ -56,12 +56,12 @@ class Player:
 
     def setpoint(self, now_ns):
         """The setpoint of this instant; None at the end."""
-        status = self.statuses.newest()
+        status = self.statuses.receive_latest()
         if status is not None and self.began_ns is None:
-            if status.state == ACTIVE:
+            if status.state == STATE_ACTIVE:
                 self.began_ns = now_ns
-            elif self.engage and status.fault == READY_TO_ENGAGE:
-                self.commands.publish(now_ns, Command(request=ENGAGE))
+            elif self.engage and status.diagnostic.code == DIAGNOSTIC_READY_TO_ENGAGE:
+                self.commands.publish(now_ns, Command(request=REQUEST_ENGAGE))
         t = 0.0 if self.began_ns is None else (now_ns - self.began_ns) * 1e-9
         if t > self.trajectory.duration + SETTLE_S:
             return None
@@ -71,7 +71,7 @@ class Player:
 
 def run_in_real_time(bus, player, period_ns, rows):
     setpoints = bus.publisher(Setpoint)
-    be_punctual()
+    use_fifo_priority()
     tick_ns = (monotonic_ns() // period_ns + 1) * period_ns
     while (setpoint := player.setpoint(tick_ns)) is not None:
         setpoints.publish(tick_ns, setpoint)

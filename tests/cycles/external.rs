@@ -10,7 +10,7 @@ use hexad::control::controller::{Input, Measurement, Output};
 use hexad::daemon::cycle::{CycleInput, CycleRecord, IoSide};
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::Monotonic;
-use hexad::realtime::cyclic::{LoopReport, RECORDS, Release, Timing, run};
+use hexad::realtime::cyclic::{LoopReport, RECORDS, ReleaseMode, Timing, run};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 
@@ -51,7 +51,9 @@ impl Loop {
         let timing = Timing {
             period_ns: DRIVE_PERIOD_NS,
             phase_ns: 0,
-            release: Release::External { timeout_ns: TIMEOUT_NS },
+            release: ReleaseMode::External,
+            max_lead_ns: 0,
+            timeout_ns: TIMEOUT_NS,
             on_overrun: OverrunPolicy::Fault,
             late_wakeup_ns: TIMEOUT_NS / 2,
         };

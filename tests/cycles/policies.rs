@@ -1,9 +1,9 @@
 //! Delays of known size at known cycles, and the misses they cause, written down by hand.
 
-use hexad::realtime::cyclic::Counters;
+use hexad::messages::LoopCounters;
 use hexad::realtime::overrun::OverrunPolicy::{self, CatchUp, Fault, Skip};
 
-use crate::rig::{FIRST_NS, PERIOD_NS, PHASE_NS, Script, Seen, perform};
+use super::rig::{FIRST_NS, PERIOD_NS, PHASE_NS, Script, Seen, perform};
 
 /// Grid points of the cycles that were run, from 0.
 fn points(seen: &[Seen]) -> Vec<u64> {
@@ -15,8 +15,8 @@ fn told(seen: &[Seen]) -> Vec<usize> {
 }
 
 /// Late wake-ups, overruns, skipped, caught up.
-fn counts(counters: &Counters) -> [u64; 4] {
-    let Counters { late_wakeups, overruns, skipped, caught_up, .. } = *counters;
+fn counts(counters: &LoopCounters) -> [u64; 4] {
+    let LoopCounters { late_wakeups, overruns, skipped, caught_up, .. } = *counters;
     [late_wakeups, overruns, skipped, caught_up]
 }
 

@@ -7,9 +7,10 @@ use std::thread;
 use heapless::spsc::Queue;
 use hexad::control::controller::{Input, Output};
 use hexad::daemon::cycle::CycleRecord;
+use hexad::messages::LoopCounters;
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::{Clock, sleep_until};
-use hexad::realtime::cyclic::{Counters, RECORDS, Release, Timing, run};
+use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing, run};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 use hexad::realtime::setup::scheduling;
@@ -53,12 +54,20 @@ struct Cycle {
     told: bool,
 }
 
-fn perform(release: Release, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<CycleRecord>, Counters) {
+fn perform(release: ReleaseMode, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<CycleRecord>, LoopCounters) {
     let (side, _io) = exchange();
     let mut queue = Queue::<CycleRecord, RECORDS>::new();
     let (records_in, mut records) = queue.split();
     let stop = AtomicBool::new(false);
-    let timing = Timing { period_ns: PERIOD_NS, phase_ns: 0, release, on_overrun, late_wakeup_ns: 100_000 };
+    let timing = Timing {
+        period_ns: PERIOD_NS,
+        phase_ns: 0,
+        release,
+        max_lead_ns: 100_000,
+        timeout_ns: 0,
+        on_overrun,
+        late_wakeup_ns: 100_000,
+    };
     let mut seen = Vec::with_capacity(CYCLES as usize);
     let step = |input: &Input| {
         let began_ns = monotonic_ns();
@@ -89,7 +98,7 @@ fn perform(release: Release, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<Cycl
 
 #[test]
 fn burnt_time_is_counted_as_the_test_saw_it() {
-    for release in [Release::Grid { max_lead_ns: 0 }, Release::Grid { max_lead_ns: 100_000 }] {
+    for release in [ReleaseMode::Sleep, ReleaseMode::Hybrid] {
         for policy in [OverrunPolicy::Skip, OverrunPolicy::Fault, OverrunPolicy::CatchUp { most: 3 }] {
             let (seen, records, counters) = perform(release, policy);
             let case = format!("{release:?} {policy:?}");
@@ -135,7 +144,12 @@ fn burnt_time_is_counted_as_the_test_saw_it() {
 
 /// Points passed between two cycles were skipped, each counted once, and always in phase. What is skipped
 /// before the first cycle and after the last one comes on top.
-fn every_point_is_accounted_for(seen: &[Cycle], records: &[CycleRecord], counters: &Counters, case: &str) {
+fn every_point_is_accounted_for(
+    seen: &[Cycle],
+    records: &[CycleRecord],
+    counters: &LoopCounters,
+    case: &str,
+) {
     assert!(seen.iter().all(|cycle| cycle.due_ns % PERIOD_NS == 0), "{case}: out of phase");
     let inside: u64 = seen.windows(2).map(|pair| (pair[1].due_ns - pair[0].due_ns) / PERIOD_NS - 1).sum();
     let last = &records[records.len() - 1];

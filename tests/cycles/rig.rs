@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use heapless::spsc::Queue;
 use hexad::control::controller::{Input, Output};
 use hexad::daemon::cycle::CycleRecord;
+use hexad::messages::LoopCounters;
 use hexad::realtime::clock::Clock;
-use hexad::realtime::cyclic::{Counters, RECORDS, Release, Timing, run};
+use hexad::realtime::cyclic::{RECORDS, ReleaseMode, Timing, run};
 use hexad::realtime::exchange::exchange;
 use hexad::realtime::overrun::OverrunPolicy;
 
@@ -65,7 +66,7 @@ impl Clock for Scripted<'_> {
 }
 
 /// Runs so many cycles from time 0 on.
-pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Vec<Seen>, Counters) {
+pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Vec<Seen>, LoopCounters) {
     let now_ns = Cell::new(0);
     let latencies_ns = script.latencies_ns.clone().into_iter();
     let mut clock = Scripted { now_ns: &now_ns, latencies_ns, last_ns: 0, looks: 0 };
@@ -73,7 +74,9 @@ pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Ve
     let timing = Timing {
         period_ns: PERIOD_NS,
         phase_ns: PHASE_NS,
-        release: Release::Grid { max_lead_ns: 0 },
+        release: ReleaseMode::Sleep,
+        max_lead_ns: 0,
+        timeout_ns: 0,
         on_overrun,
         late_wakeup_ns: LATE_NS,
     };

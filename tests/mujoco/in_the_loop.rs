@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
-use hexad::messages::ports::{Bus, Sink, Source, Time};
-use hexad::messages::structs::{ForceMessage, MeasuredMessage};
+use hexad::messages::{Bus, Publisher, Subscriber};
+use hexad::messages::{ForceMessage, MeasuredMessage};
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::machine::{LEGS, Machine};
@@ -97,7 +97,7 @@ impl Stage {
         assert!(named.contains(&name), "the name must have been replaced");
         fs::write(folder.join("machine.toml"), format!("{named}\n{sections}")).unwrap();
         let config = Config::load(&folder.join("machine.toml")).unwrap();
-        let lockstep = config.deployment.realtime.time() == Time::Simulated;
+        let lockstep = config.deployment.realtime.is_simulated();
         let stage = Self { name, folder, config, lockstep };
         fs::write(stage.path("motion.csv"), trajectory(&stage.config.machine)).unwrap();
         stage
@@ -162,9 +162,9 @@ impl Stage {
     /// The same with our own plant, in lock-step.
     fn with_ours(&self) -> Run {
         let daemon = self.daemon();
-        let bus = Bus::join_in(&self.name, Time::Simulated).unwrap();
-        let mut measured = bus.source::<MeasuredMessage>().unwrap();
-        let mut forces = bus.sink::<ForceMessage>(8).unwrap();
+        let bus = Bus::join_simulated(&self.name).unwrap();
+        let mut measured = bus.publisher::<MeasuredMessage>().unwrap();
+        let mut forces = bus.subscriber::<ForceMessage>(8).unwrap();
         let mut source = self.source();
         let mut hardware = hardware(&self.config);
         let mut periods = vec![];
@@ -219,8 +219,8 @@ impl Stage {
 
 /// Publishes a measurement until it is answered.
 fn ask(
-    measured: &mut Source<MeasuredMessage>,
-    forces: &mut Sink<ForceMessage>,
+    measured: &mut Publisher<MeasuredMessage>,
+    forces: &mut Subscriber<ForceMessage>,
     time_ns: u64,
     message: MeasuredMessage,
 ) -> ForceMessage {
@@ -229,7 +229,7 @@ fn ask(
         measured.publish(time_ns, message).unwrap();
         let said = Instant::now();
         while said.elapsed() < Duration::from_millis(100) {
-            match forces.newest() {
+            match forces.receive_latest() {
                 Some(force) if force.release_ns == time_ns => return force,
                 _ => std::thread::yield_now(),
             }

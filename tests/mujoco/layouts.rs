@@ -1,80 +1,99 @@
-//! The structs of `tests/clients/hexad.py` are those of `src/messages/structs.rs`. That they have the names of the
-//! documentation shows when they connect.
+//! The declarations that `hexad messages` prints are those of the Rust structs, as the compilers of Rust and C and
+//! Python's ctypes see them. That they also have the documented type names shows when they connect.
 
 use std::mem::{align_of, offset_of, size_of};
+use std::process::Command;
 
-use super::python;
-use hexad::messages::statistics::{LoopTimes, Statistics, Times, WorstCycle};
-use hexad::messages::structs::{
-    CommandMessage, ForceMessage, Header, MeasuredMessage, Message, SCHEMA, SetpointMessage, StatusMessage,
-};
+use crate::{file, python};
+use hexad::messages::layout::{Declared, Kind, Layout};
+use hexad::messages::{ForceMessage, Header, MESSAGES, SCHEMA, StatusMessage};
 
-/// A line for the struct and one for each of its fields: a field that is not listed here does not compile.
-macro_rules! layout {
-    ($type:ident, $name:expr, $($field:ident)*) => {{
-        let $type { $($field: _,)* } = $type::default();
-        let mut lines = format!("{} {} {}\n", $name, size_of::<$type>(), align_of::<$type>());
-        $(lines += &format!("  {} {}\n", stringify!($field), offset_of!($type, $field));)*
-        lines
-    }};
+/// A line for each struct and one for each of its fields.
+fn lines(layout: &Layout, seen: &mut Vec<&'static str>) -> String {
+    let mut lines = format!("{} {} {}\n", layout.type_name, layout.size, layout.align);
+    let mut nested = String::new();
+    for field in layout.fields {
+        lines += &format!("  {} {}\n", field.name, field.offset);
+        if let Kind::Struct(inner) = field.kind
+            && !seen.contains(&inner.type_name)
+        {
+            seen.push(inner.type_name);
+            nested += &self::lines(inner, seen);
+        }
+    }
+    lines + &nested
+}
+
+fn all_lines() -> String {
+    let mut seen = vec![];
+    MESSAGES.iter().map(|layout| lines(layout, &mut seen)).collect()
 }
 
 const PRINT: &str = "
-import ctypes, hexad
-print(hexad.SCHEMA)
-for name in ['Header', 'Setpoint', 'Measured', 'Force', 'Command', 'Status',
-             'Statistics', 'LoopTimes', 'Times', 'WorstCycle']:
-    struct = getattr(hexad, name)
-    print(getattr(struct, 'topic', name), ctypes.sizeof(struct), ctypes.alignment(struct))
-    for field, *_ in struct._fields_:
-        print(' ', field, getattr(struct, field).offset)
+import ctypes, hexad_messages
+print(hexad_messages.SCHEMA)
+seen = []
+def show(struct):
+    print(struct.type_name(), ctypes.sizeof(struct), ctypes.alignment(struct))
+    nested = []
+    for name, kind in struct._fields_:
+        print(' ', name, getattr(struct, name).offset)
+        inner = getattr(kind, '_type_', kind)
+        nested += [inner] if hasattr(inner, '_fields_') else []
+    for inner in nested:
+        if inner not in seen:
+            seen.append(inner)
+            show(inner)
+for name in ['Setpoint', 'Measured', 'Command', 'Force', 'Status']:
+    message = getattr(hexad_messages, name)
+    assert message.type_name() == 'hexad_' + message.topic
+    show(message)
 ";
 
 #[test]
-fn python_declares_the_documented_structs() {
-    if python::is_lacking() {
-        return;
-    }
-    let ours = [
-        format!("{SCHEMA}\n"),
-        layout!(Header, "Header", schema reserved epoch sequence time_ns),
-        layout!(SetpointMessage, SetpointMessage::TOPIC, header x x_rate x_accel),
-        layout!(MeasuredMessage, MeasuredMessage::TOPIC,
-            header length_m length_rate_m_s pose_valid reserved x twist),
-        layout!(ForceMessage, ForceMessage::TOPIC,
-            header force_n valid state fault limiting release_ns checksum reserved),
-        layout!(CommandMessage, CommandMessage::TOPIC, header request reserved),
-        layout!(StatusMessage, StatusMessage::TOPIC,
-            header state fault refused limiting fault_value fault_bound fault_index reserved
-            answered_epoch answered_sequence pose_valid error_valid x twist condition singular_in_s
-            position_error_m orientation_error_rad wrench_error
-            cycles late_wakeups overruns skipped caught_up allocations io_allocations
-            without_measurement without_setpoint
-            rejected_schema rejected_older_source rejected_repeated statistics),
-        layout!(Statistics, "Statistics", window total worst),
-        layout!(LoopTimes, "LoopTimes", wakeup_ns compute_ns measured_age_ns end_to_end_ns),
-        layout!(Times, "Times", count min mean p50 p90 p99 p999 p9999 max),
-        layout!(WorstCycle, "WorstCycle",
-            cycle due_ns wakeup_ns compute_ns io_late involuntary_switches page_faults steal_ms),
-    ]
-    .concat();
-    assert_eq!(python::printed(PRINT), ours);
+fn python_sees_the_layouts_of_rust() {
+    assert_eq!(python::printed(PRINT), format!("{SCHEMA}\n{}", all_lines()));
 }
 
+/// The header asserts every size and offset itself.
 #[test]
-fn the_documented_sizes_are_right() {
-    let size = [
-        format!("{} {}", SetpointMessage::TOPIC, size_of::<SetpointMessage>()),
-        format!("{} {}", MeasuredMessage::TOPIC, size_of::<MeasuredMessage>()),
-        format!("{} {}", CommandMessage::TOPIC, size_of::<CommandMessage>()),
-        format!("{} {}", ForceMessage::TOPIC, size_of::<ForceMessage>()),
-        format!("{} {}", StatusMessage::TOPIC, size_of::<StatusMessage>()),
-    ]
-    .join(", ");
+fn a_c_compiler_sees_the_layouts_of_rust() {
+    let header = python::declared("c");
+    let accepts = |name: &str, text: &str| {
+        let path = file(name);
+        std::fs::write(&path, text).unwrap();
+        let compiler = Command::new("cc")
+            .args(["-std=c11", "-Wall", "-Werror", "-fsyntax-only", "-x", "c"])
+            .arg(&path)
+            .output();
+        compiler.expect("NOT RUN: a C compiler, cc").status.success()
+    };
+    assert!(accepts("messages.h", &header));
+    // One assertion for size and alignment of each struct and one for each field, and they can fail.
+    let asserted = header.matches("static_assert(").count();
+    let ours = all_lines();
+    let fields = ours.lines().filter(|line| line.starts_with(' ')).count();
+    let structs = ours.lines().count() - fields;
     assert!(
-        include_str!("../../src/messages/structs.rs").contains(&format!("| size in bytes | {size} |")),
-        "{size}"
+        structs > 10 && fields > 80 && asserted == 2 * structs + fields,
+        "{asserted} assertions for:\n{ours}"
     );
+    assert!(!accepts("wrong.h", &header.replace("uint32_t limiting", "uint64_t limiting")));
+}
+
+/// The list of fields says what the compiler does, here where a mistake would be seen least.
+#[test]
+fn the_list_of_fields_is_that_of_the_structs() {
+    let header = Header::LAYOUT;
+    assert_eq!((header.size, header.align), (size_of::<Header>(), align_of::<Header>()));
+    let field = |layout: &Layout, name: &str| *layout.fields.iter().find(|field| field.name == name).unwrap();
+    assert_eq!(field(&ForceMessage::LAYOUT, "checksum").offset, offset_of!(ForceMessage, checksum));
+    assert_eq!(field(&StatusMessage::LAYOUT, "statistics").offset, offset_of!(StatusMessage, statistics));
+    let columns = StatusMessage::LAYOUT.columns("");
+    assert_eq!(columns.len(), StatusMessage::default().numbers().len());
+    for name in ["header_sequence", "diagnostic_value", "x_6", "statistics_worst_8_steal_ms"] {
+        assert!(columns.iter().any(|column| column == name), "{name}: {columns:?}");
+    }
 }
 
 /// A force of simulated time 1 s, good but for one thing at a time.

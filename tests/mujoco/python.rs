@@ -43,8 +43,28 @@ fn clients() -> PathBuf {
 fn python() -> Command {
     let mut command = Command::new(environment().as_ref().unwrap().join("bin/python"));
     // No __pycache__ between the sources.
-    command.arg("-B");
+    command.arg("-B").env("PYTHONPATH", declarations());
     command
+}
+
+/// A folder with `hexad_messages.py`, as a user of the clients generates it.
+fn declarations() -> &'static Path {
+    static READY: OnceLock<PathBuf> = OnceLock::new();
+    READY.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("declarations");
+        fs::create_dir_all(&folder).unwrap();
+        // Whole at once: another process may import it at this moment.
+        let part = folder.join(format!("{}.part", std::process::id()));
+        fs::write(&part, declared("python")).unwrap();
+        fs::rename(&part, folder.join("hexad_messages.py")).unwrap();
+        folder
+    })
+}
+
+/// What `hexad messages` prints.
+pub fn declared(language: &str) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
+    output(command.args(["messages", "--language", language])).unwrap()
 }
 
 /// Whether there is no such Python here; the calling test is then not run.

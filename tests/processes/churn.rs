@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 
 use hexad::control::state::State;
 use hexad::daemon::report::Report;
-use hexad::messages::ports::{Bus, Sink};
-use hexad::messages::statistics::LoopTimes;
-use hexad::messages::structs::StatusMessage;
+use hexad::messages::LoopTimes;
+use hexad::messages::StatusMessage;
+use hexad::messages::{Bus, Subscriber};
 
 use crate::common::not_run::lacking;
 use crate::support::children::HANG;
@@ -72,7 +72,7 @@ fn the_real_time_thread_does_not_notice_peers_that_die() {
         assert!(round < ROUNDS, "in each of {ROUNDS} rounds");
     }
     among_constant_peers_nothing_is_used(&calm);
-    let seen = disturbed.last.io_allocations - disturbed.first.io_allocations;
+    let seen = disturbed.last.io.allocations - disturbed.first.io.allocations;
     assert!(seen >= kills.into(), "{kills} peers were killed, and the io thread allocated {seen} times");
     for observed in [calm, disturbed] {
         observed.ends();
@@ -88,7 +88,7 @@ fn median(values: &[u64]) -> u64 {
 /// One daemon and what its status said.
 struct Observed {
     controlled: Controlled,
-    statuses: Sink<StatusMessage>,
+    statuses: Subscriber<StatusMessage>,
     first: StatusMessage,
     last: StatusMessage,
     window: LoopTimes,
@@ -103,7 +103,7 @@ impl Observed {
     fn start(machine: Machine) -> Self {
         let controlled = Controlled::start(machine);
         let bus = Bus::join(&controlled.machine.name).expect("to join");
-        let statuses = bus.sink(1).expect("to subscribe");
+        let statuses = bus.subscriber(1).expect("to subscribe");
         let nothing = StatusMessage::default();
         let mut observed = Self {
             controlled,
@@ -126,7 +126,7 @@ impl Observed {
     }
 
     fn look(&mut self) {
-        let Some(status) = self.statuses.newest() else { return };
+        let Some(status) = self.statuses.receive_latest() else { return };
         self.last = status;
         if status.statistics.window != self.window {
             self.window = status.statistics.window;
@@ -162,7 +162,11 @@ impl Observed {
 /// for the first time, by the log thread neither.
 fn among_constant_peers_nothing_is_used(calm: &Observed) {
     let (first, last) = (&calm.first, &calm.last);
-    assert!(last.cycles > first.cycles && last.state == State::Active as u32, "{last:#?}");
-    assert_eq!((last.allocations, last.io_allocations), (0, first.io_allocations), "real-time and io thread");
+    assert!(last.counters.cycles > first.counters.cycles && last.state == State::Active as u32, "{last:#?}");
+    assert_eq!(
+        (last.counters.allocations, last.io.allocations),
+        (0, first.io.allocations),
+        "real-time and io thread"
+    );
     assert_eq!(calm.faults_now(), calm.faults, "page faults of the io and of the log thread");
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use hexad::daemon::report::Report;
-use hexad::messages::statistics::Times;
+use hexad::messages::Times;
 use serde_json::{Map, Value};
 
 use crate::common::not_run::not_run;

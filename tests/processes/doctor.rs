@@ -9,7 +9,7 @@ use std::time::Duration;
 use hexad::commands::doctor::Diagnosis;
 use hexad::commands::doctor::facts::{Assessment, Fact};
 use hexad::commands::doctor::verdict::Feasibility;
-use hexad::config::deployment::ReleaseMode;
+use hexad::realtime::cyclic::ReleaseMode;
 
 use crate::support::children::{Ended, HANG, Hexad, run};
 use crate::support::machine::Machine;

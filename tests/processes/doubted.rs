@@ -5,8 +5,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hexad::config::Config;
-use hexad::messages::ports::Bus;
-use hexad::messages::structs::Message;
+use hexad::messages::Bus;
+use hexad::messages::Message;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::task::TaskState;
@@ -27,16 +27,19 @@ const LONG_NS: u64 = 10_000_000_000;
 
 /// What is wrong, and what the plant says about it.
 const WRONG: [(Change, &str); 9] = [
-    (|message| message.checksum ^= 1, "with a wrong checksum, or of a source that begins in the future"),
-    (|message| message.force_n[3] += 1e-9, "with a wrong checksum, or of a source that begins in the future"),
+    (|message| message.checksum ^= 1, "with a wrong checksum, or of a publisher that begins in the future"),
+    (
+        |message| message.force_n[3] += 1e-9,
+        "with a wrong checksum, or of a publisher that begins in the future",
+    ),
     // A damaged number of the source must not outrank those of good messages.
     (
         |message| message.header.epoch = u64::MAX,
-        "with a wrong checksum, or of a source that begins in the future",
+        "with a wrong checksum, or of a publisher that begins in the future",
     ),
     (
         |message| resealed(message, |message| message.header.epoch = u64::MAX),
-        "with a wrong checksum, or of a source that begins in the future",
+        "with a wrong checksum, or of a publisher that begins in the future",
     ),
     (
         |message| resealed(message, |message| message.header.schema -= 1),
@@ -47,11 +50,11 @@ const WRONG: [(Change, &str); 9] = [
         "older than plant.force_timeout_ms",
     ),
     (|message| resealed(message, |message| message.header.time_ns += LONG_NS), "from the future"),
-    (|message| resealed(message, |message| message.header.sequence = 1), "seen before, or unreadable"),
+    (|message| resealed(message, |message| message.header.sequence = 1), "received before, or unreadable"),
     (|message| resealed(message, |message| message.header.epoch -= 1), "of an older daemon"),
 ];
 
-fn resealed(message: &mut hexad::messages::structs::ForceMessage, change: Change) {
+fn resealed(message: &mut hexad::messages::ForceMessage, change: Change) {
     change(message);
     message.seal();
 }
@@ -67,11 +70,7 @@ fn a_driver_goes_by_good_messages_only() {
     send_until(&mut forger, |_| {}, &plant, OPEN, 1);
     for (number, (wrong, words)) in (1..).zip(WRONG) {
         send_until(&mut forger, wrong, &plant, CLOSING, number);
-        assert!(
-            plant.words().contains(&format!("not believed: a force {words}")),
-            "{words}: {}",
-            plant.words()
-        );
+        assert!(plant.words().contains(&format!("rejected: a force {words}")), "{words}: {}", plant.words());
         send_until(&mut forger, |_| {}, &plant, OPEN, number + 1);
     }
     // One among good ones does no harm.
@@ -82,8 +81,8 @@ fn a_driver_goes_by_good_messages_only() {
     let words = plant.stops_on("TERM", HANG).stderr;
     assert_eq!(words.matches(CLOSING).count(), WRONG.len(), "{words}");
     for (_, reason) in WRONG {
-        assert!(words.contains(&format!("not believed in all: forces {reason}")), "{reason}: {words}");
-        assert_eq!(words.matches(&format!("not believed: a force {reason}")).count(), 1, "{reason}: {words}");
+        assert!(words.contains(&format!("rejected in total: forces {reason}")), "{reason}: {words}");
+        assert_eq!(words.matches(&format!("rejected: a force {reason}")).count(), 1, "{reason}: {words}");
     }
 }
 

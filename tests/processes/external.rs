@@ -9,9 +9,9 @@ use hexad::config::Config;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
 use hexad::daemon::report::Report;
+use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::Bus;
-use hexad::messages::structs::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use hexad::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use hexad::plant::simulator::Simulator;
 use hexad::realtime::setup::scheduling;
 
@@ -105,7 +105,7 @@ fn every_message_is_counted(recording: &Recording, steps: &[Step]) {
             silent += 1;
             assert_eq!((step.cycles, step.skipped), (1, 0), "{step:#?}");
             assert_eq!(
-                (step.after.valid, step.after.fault),
+                (step.after.valid, step.after.diagnostic_code),
                 (0, DiagnosticCode::MeasurementLost as u32),
                 "{step:#?}"
             );
@@ -141,9 +141,9 @@ fn lock_step() {
     let plant = &config.deployment.plant;
     let mut simulator = Simulator::new(&config.machine, plant.brake_deceleration_m_s2, plant.step_s);
     let bus = Bus::join(&machine.name).expect("to join");
-    let mut measured = bus.source::<MeasuredMessage>().expect("to publish");
-    let mut setpoints = bus.source::<SetpointMessage>().expect("to publish");
-    let mut forces = bus.sink::<ForceMessage>(8).expect("to subscribe");
+    let mut measured = bus.publisher::<MeasuredMessage>().expect("to publish");
+    let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
+    let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
     let mut operator = Operator::new(&bus).expect("to ask");
     let mut took = vec![];
     let mut under_control = 0;
@@ -159,7 +159,7 @@ fn lock_step() {
         setpoints.publish(time_ns, peer::setpoint(time_ns)).expect("to send");
         measured.publish(time_ns, message).expect("to send");
         let force = loop {
-            match forces.newest().filter(|force| force.release_ns == time_ns) {
+            match forces.receive_latest().filter(|force| force.release_ns == time_ns) {
                 Some(force) => break force,
                 None => std::hint::spin_loop(),
             }
@@ -169,11 +169,11 @@ fn lock_step() {
         under_control += usize::from(force.valid == 1);
         took.push(asked.elapsed());
         match (took.len() < CYCLES, force.valid) {
-            (true, 0) if force.fault == DiagnosticCode::ReadyToEngage as u32 => {
-                operator.ask(Request::Engage).expect("to send");
+            (true, 0) if force.diagnostic_code == DiagnosticCode::ReadyToEngage as u32 => {
+                operator.send(Request::Engage).expect("to send");
             }
             (false, 0) => break,
-            (false, _) => operator.ask(Request::Stop).expect("to send"),
+            (false, _) => operator.send(Request::Stop).expect("to send"),
             _ => {}
         }
     }

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use hexad::config::Config;
 use hexad::daemon::report::Report;
+use hexad::messages::Bus;
+use hexad::messages::ForceMessage;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::Bus;
-use hexad::messages::structs::ForceMessage;
 use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;
 
@@ -109,7 +109,8 @@ fn run(release: &str) -> (Figures, f64) {
 fn poll(machine: &str, cpu: usize) -> u64 {
     let _ = (scheduling::fifo_priority(PRIORITY), scheduling::bind_to_cpu(cpu));
     scheduling::set_shortest_timer_slack();
-    let mut forces = Bus::join(machine).and_then(|bus| bus.sink::<ForceMessage>(1)).expect("to subscribe");
+    let mut forces =
+        Bus::join(machine).and_then(|bus| bus.subscriber::<ForceMessage>(1)).expect("to subscribe");
     let grid = Grid::new(PERIOD_NS, PERIOD_NS / 2);
     let mut seen = vec![];
     let mut release_ns = grid.next_after(monotonic_ns());
@@ -119,7 +120,7 @@ fn poll(machine: &str, cpu: usize) -> u64 {
         sleep_until(release_ns - LOOK_NS);
         let give_up_ns = release_ns + PERIOD_NS - LOOK_NS;
         while monotonic_ns() < give_up_ns {
-            if let Some(force) = forces.newest().filter(|force| force.release_ns == release_ns) {
+            if let Some(force) = forces.receive_latest().filter(|force| force.release_ns == release_ns) {
                 seen.push(monotonic_ns() - force.release_ns);
                 break;
             }

@@ -2,8 +2,8 @@
 
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::Request;
+use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::structs::MeasuredMessage;
 
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::PERIOD_NS;
@@ -93,7 +93,7 @@ fn lost_for(cause: DiagnosticCode, outage: &Outage, recording: &Recording) {
     let during = |time_ns: u64| (outage.from_ns..outage.to_ns).contains(&time_ns);
     let last =
         recording.forces.iter().rfind(|force| during(force.header.time_ns)).expect("the daemon ran on");
-    assert_eq!((last.valid, last.fault), (0, cause as u32), "{last:#?}");
+    assert_eq!((last.valid, last.diagnostic_code), (0, cause as u32), "{last:#?}");
     assert!(recording.forces.iter().any(|force| valid_after(force, outage.to_ns)));
 }
 

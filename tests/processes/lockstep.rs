@@ -9,8 +9,8 @@ use std::{env, thread};
 use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
-use hexad::messages::ports::{Bus, Time};
-use hexad::messages::structs::{ForceMessage, Header, MeasuredMessage};
+use hexad::messages::Bus;
+use hexad::messages::{ForceMessage, Header, MeasuredMessage};
 use hexad::realtime::setup::scheduling;
 
 use crate::support::children::{HANG, Hexad, hexad};
@@ -68,12 +68,12 @@ impl Build {
         let run = move || {
             self.cpu.map_or(Ok(()), scheduling::bind_to_cpu).expect("the processor");
             let machine = Machine::with("lock-step-ours", LOCKSTEP);
-            let bus = Bus::join_in(&machine.name, Time::Simulated).expect("to join");
-            let mut measured = bus.source::<MeasuredMessage>().expect("to publish");
-            let mut forces = bus.sink::<ForceMessage>(8).expect("to subscribe");
+            let bus = Bus::join_simulated(&machine.name).expect("to join");
+            let mut measured = bus.publisher::<MeasuredMessage>().expect("to publish");
+            let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
             let mut hardware = hardware(&Config::load(&machine.file).expect("the machine file"));
             let driver = Bus::join(&machine.name).expect("to join");
-            let mut driver = driver.sink::<ForceMessage>(1).expect("to subscribe");
+            let mut driver = driver.subscriber::<ForceMessage>(1).expect("to subscribe");
             let (daemon, source) = self.start_both(&machine);
             let mut said: Vec<ForceMessage> = vec![];
             let mut began = Instant::now();
@@ -105,7 +105,7 @@ impl Build {
                 began = if said.len() == 1 { Instant::now() } else { began };
             }
             let took = began.elapsed();
-            assert_eq!(driver.newest(), None, "a driver of the same machine");
+            assert_eq!(driver.receive_latest(), None, "a driver of the same machine");
             assert_eq!(source.ends_within(HANG).status.code(), Some(0));
             let ended = daemon.stops_on("TERM", HANG);
             assert!(ended.stderr.contains("TIME IS SIMULATED"), "{}", ended.stderr);
@@ -118,7 +118,7 @@ impl Build {
     /// them.
     fn forces_overheard(self) -> Vec<ForceMessage> {
         let machine = Machine::with("lock-step-theirs", LOCKSTEP);
-        let recorder = Recorder::start_in(&machine.name, Time::Simulated);
+        let recorder = Recorder::start_simulated(&machine.name);
         let plant = self.start(&machine, &["plant"]);
         let (daemon, source) = self.start_both(&machine);
         assert_eq!(source.ends_within(10 * HANG).status.code(), Some(0));
@@ -131,8 +131,17 @@ impl Build {
 
 /// As it is in memory. A field that is not here does not compile.
 fn bytes(force: &ForceMessage) -> Vec<u8> {
-    let ForceMessage { header, force_n, valid, state, fault, limiting, release_ns, checksum, reserved } =
-        force;
+    let ForceMessage {
+        header,
+        force_n,
+        valid,
+        state,
+        diagnostic_code,
+        active_limits,
+        release_ns,
+        checksum,
+        reserved,
+    } = force;
     let Header { schema, reserved: zero, epoch, sequence, time_ns } = header;
     let words = |words: &[u32]| words.iter().flat_map(|word| word.to_ne_bytes()).collect::<Vec<_>>();
     let longs = |longs: &[u64]| longs.iter().flat_map(|long| long.to_ne_bytes()).collect::<Vec<_>>();
@@ -140,7 +149,7 @@ fn bytes(force: &ForceMessage) -> Vec<u8> {
         words(&[*schema, *zero]),
         longs(&[*epoch, *sequence, *time_ns]),
         longs(&force_n.map(f64::to_bits)),
-        words(&[*valid, *state, *fault, *limiting]),
+        words(&[*valid, *state, *diagnostic_code, *active_limits]),
         longs(&[*release_ns]),
         words(&[*checksum, *reserved]),
     ]

@@ -9,7 +9,7 @@ use std::time::Duration;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::State;
 use hexad::daemon::report::Report;
-use hexad::messages::structs::ForceMessage;
+use hexad::messages::ForceMessage;
 
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS, TIMEOUT_NS};
@@ -188,7 +188,7 @@ fn fault_stops_from_the_cycle_after_a_miss_on_and_from_no_other() {
     every_miss_has_its_reason(&steps);
     let stops = |step: &Step| {
         let now = State::from_number(step.after.state).expect("a state");
-        now == State::Stopping && step.after.fault == missed as u32
+        now == State::Stopping && step.after.diagnostic_code == missed as u32
     };
     let followed = [State::Engaging as u32, State::Active as u32];
     let mut stopped = HashSet::new();
@@ -200,8 +200,9 @@ fn fault_stops_from_the_cycle_after_a_miss_on_and_from_no_other() {
     assert!(!stopped.is_empty(), "no step was seen whole");
     for step in steps.iter().filter(|step| step.cycles == 1 && step.before.state == State::Stopping as u32) {
         let then = State::from_number(step.after.state).expect("a state");
-        let asked = step.before.fault == DiagnosticCode::OperatorRequest as u32;
-        let latched = [State::Stopping, State::Fault].contains(&then) && step.after.fault == missed as u32;
+        let asked = step.before.diagnostic_code == DiagnosticCode::OperatorRequest as u32;
+        let latched =
+            [State::Stopping, State::Fault].contains(&then) && step.after.diagnostic_code == missed as u32;
         assert!(asked || latched, "under control to rest, then a fault: {step:#?}");
     }
     assert!(report.faults.len() >= HOLDS - 1, "one for each hold: {:#?}", report.faults);

@@ -27,14 +27,17 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
     trio.plant.says("forces stopped arriving: brakes closing");
     trio.recorder.until("skipped cycles are counted", |recording| {
         let status = recording.statuses.last()?;
-        (status.skipped >= before.skipped + LEAST_SKIPPED).then_some(())
+        (status.counters.skipped >= before.counters.skipped + LEAST_SKIPPED).then_some(())
     });
     operator::clear_and_engage(&trio.machine);
     let (_, recovered_ns) = let_pass(Duration::from_millis(500));
     trio.moves_after(recovered_ns);
     let recording = trio.finish();
     let after = recording.statuses.last().expect("a status");
-    println!("daemon stopped for {PAUSE:?} at 1 kHz: {} skipped", after.skipped - before.skipped);
+    println!(
+        "daemon stopped for {PAUSE:?} at 1 kHz: {} skipped",
+        after.counters.skipped - before.counters.skipped
+    );
     brakes_held_until_control_was_taken_anew(from_ns, &recording);
 }
 
@@ -52,7 +55,10 @@ fn a_paused_plant_recovers() {
     trio.moves_after(recovered_ns);
     let recording = trio.finish();
     let after = recording.statuses.last().expect("a status");
-    println!("plant stopped for {PAUSE:?}: {} cycles of the daemon skipped", after.skipped - before.skipped);
+    println!(
+        "plant stopped for {PAUSE:?}: {} cycles of the daemon skipped",
+        after.counters.skipped - before.counters.skipped
+    );
     brakes_held_until_control_was_taken_anew(from_ns, &recording);
 }
 
@@ -63,7 +69,7 @@ fn brakes_held_until_control_was_taken_anew(from_ns: u64, recording: &Recording)
     let let_go = after.iter().position(|force| force.valid == 0).expect("the daemon let go of the platform");
     let first = after[let_go];
     assert_eq!(
-        (first.state, first.fault),
+        (first.state, first.diagnostic_code),
         (State::Fault as u32, DiagnosticCode::MeasurementLost as u32),
         "{first:#?}"
     );

@@ -6,7 +6,7 @@ use std::{fs, thread};
 
 use hexad::config::Config;
 use hexad::control::state::State;
-use hexad::messages::structs::StatusMessage;
+use hexad::messages::StatusMessage;
 use hexad::model::machine::LEGS;
 use hexad::plant::simulator::Simulator;
 use hexad::realtime::clock::{Grid, sleep_until};

@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
+use hexad::messages::Bus;
+use hexad::messages::SetpointMessage;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::Bus;
-use hexad::messages::structs::SetpointMessage;
 
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::{Machine, PATIENT};
@@ -175,11 +175,13 @@ fn estop_in(machine: &Machine, recorder: &Recorder, state: State, requests: &[&s
     assert!(valid <= IN_FLIGHT, "{valid} valid forces after the request");
     let last = recording.forces.last().expect("forces");
     assert_eq!(
-        (last.valid, last.state, last.fault),
+        (last.valid, last.state, last.diagnostic_code),
         (0, State::Fault as u32, DiagnosticCode::EmergencyStop as u32)
     );
-    let faults =
-        recording.forces[first..].iter().position(|force| force.fault == last.fault).expect("a fault");
+    let faults = recording.forces[first..]
+        .iter()
+        .position(|force| force.diagnostic_code == last.diagnostic_code)
+        .expect("a fault");
     let before = recording.forces[(first + faults).saturating_sub(1)];
     drop(recording);
     if let Some(begun) = begun.filter(|_| before.state == state as u32 && state.has_control()) {
@@ -199,19 +201,19 @@ fn of_two_setpoint_sources_the_newer_counts_and_the_other_is_counted() {
     let machine = Machine::patient("two-sources");
     let recorder = Recorder::start(&machine.name);
     let Controlled { peer: older, daemon, plant, machine } = Controlled::start(machine);
-    let counted = || recorder.so_far().statuses.last().expect("a status").rejected_older_source;
+    let counted = || recorder.so_far().statuses.last().expect("a status").io.rejected.older_publisher;
     let before = counted();
     let_pass(Duration::from_millis(200));
     assert_eq!(counted(), before, "one source");
     let newer = peer::start(&machine);
     let enough = |recording: &Recording| {
-        recording.statuses.last().filter(|status| status.rejected_older_source > before + 200).copied()
+        recording.statuses.last().filter(|status| status.io.rejected.older_publisher > before + 200).copied()
     };
     let status = recorder.until("the setpoints of the older source are counted", enough);
     assert_eq!(State::from_number(status.state), Some(State::Active), "both say the same: {status:#?}");
     drop((older, newer));
     let words = daemon.stops_on("TERM", HANG).stderr;
-    assert!(words.contains("messages passed over: an older source; were there two at once?"), "{words}");
+    assert!(words.contains("messages rejected: an older publisher; were there two at once?"), "{words}");
     plant.stops_on("TERM", HANG);
     rules::hold(&recorder.finish());
 }
@@ -229,7 +231,7 @@ impl Offered {
             let (stop, name) = (stop.clone(), machine.name.clone());
             spawn(move || {
                 let bus = Bus::join(&name).expect("to join");
-                let mut setpoints = bus.source::<SetpointMessage>().expect("to publish");
+                let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
                 let mut message = SetpointMessage::default();
                 message.x[3] = 1.1 + away_m;
                 while !stop.load(Ordering::Relaxed) {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::fs;
 
-use hexad::messages::structs::{MeasuredMessage, SetpointMessage};
+use hexad::messages::{MeasuredMessage, SetpointMessage};
 use hexad::motion::minimum_jerk::rise;
 
 use crate::support::children::{HANG, Hexad, run};

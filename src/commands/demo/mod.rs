@@ -20,7 +20,7 @@ use crate::config::{Config, ConfigError};
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::{Request, State};
 use crate::daemon::report::Report;
-use crate::messages::ports::PortError;
+use crate::messages::PortError;
 use crate::motion::built_in::BuiltInMotion;
 use crate::output::files::{FileError, print, write_whole};
 use crate::output::svg::ChartError;
@@ -242,11 +242,11 @@ fn watch(
         recorder.poll();
         if let Some(status) = operator.status() {
             if status.state == State::Fault as u32 {
-                let cause = DiagnosticCode::from_number(status.fault).unwrap_or_default();
-                return Err(DemoError::Failed(format!("fault: {}; {}", cause.name(), cause.remedy())));
+                let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+                return Err(DemoError::Failed(format!("fault: {diagnostic}")));
             }
-            if status.fault == DiagnosticCode::ReadyToEngage as u32 {
-                operator.ask(Request::Engage)?;
+            if status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
+                operator.send(Request::Engage)?;
             }
         }
         for process in processes.iter_mut() {

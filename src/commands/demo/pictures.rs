@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::recording::{Recording, desired_motion, measured_pose};
 use crate::config::Config;
+use crate::control::input_validation::seconds_between;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
@@ -147,7 +148,7 @@ impl Signals {
         let machine = &config.machine;
         let period_ns = (1e9 * config.deployment.realtime.period_s()) as u64;
         let start_ns = recording.start_ns();
-        let seconds = |time_ns: u64| (time_ns as f64 - start_ns as f64) * 1e-9;
+        let seconds = |time_ns: u64| seconds_between(start_ns, time_ns);
         let mut signals = Self::default();
         let Self { commanded, measured, force_difference, tracking } = &mut signals;
         let model = InverseDynamics::new(machine);

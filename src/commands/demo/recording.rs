@@ -1,8 +1,10 @@
 //! Recording of the topics during a demonstration, and its tracking error.
 
+use crate::control::controller::Setpoint;
+use crate::control::input_validation::seconds_between;
 use crate::daemon::report::TrackingSum;
-use crate::messages::ports::{Bus, PortError, Sink};
-use crate::messages::structs::{ForceMessage, MeasuredMessage, SetpointMessage};
+use crate::messages::{Bus, PortError, Subscriber};
+use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage};
 use crate::model::rigid::{Motion, Pose};
 use crate::model::task::TaskState;
 
@@ -11,9 +13,9 @@ const TOPIC_DEPTH: usize = usize::MAX;
 
 /// Subscriber to setpoints, measurements and forces, which keeps every message.
 pub struct TopicRecorder {
-    setpoints: Sink<SetpointMessage>,
-    measured: Sink<MeasuredMessage>,
-    forces: Sink<ForceMessage>,
+    setpoints: Subscriber<SetpointMessage>,
+    measured: Subscriber<MeasuredMessage>,
+    forces: Subscriber<ForceMessage>,
     recording: Recording,
 }
 
@@ -29,9 +31,9 @@ impl TopicRecorder {
     /// Subscribes to the topics of a machine.
     pub fn new(bus: &Bus) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.sink(TOPIC_DEPTH)?,
-            measured: bus.sink(TOPIC_DEPTH)?,
-            forces: bus.sink(TOPIC_DEPTH)?,
+            setpoints: bus.subscriber(TOPIC_DEPTH)?,
+            measured: bus.subscriber(TOPIC_DEPTH)?,
+            forces: bus.subscriber(TOPIC_DEPTH)?,
             recording: Recording::default(),
         })
     }
@@ -95,15 +97,10 @@ fn with_desired<'a, T>(
             newest += 1;
         }
         let setpoint = setpoints.get(newest)?;
-        let age_ns = time_ns.checked_sub(setpoint.header.time_ns)?;
+        let age_s = seconds_between(setpoint.header.time_ns, time_ns);
         // A source that paused longer than this was not a source at that instant.
-        (age_ns < 100_000_000).then(|| (message, task_state(setpoint).after(age_ns as f64 * 1e-9)))
+        (0.0..0.1).contains(&age_s).then(|| (message, Setpoint::from(setpoint).task.after(age_s)))
     })
-}
-
-/// X, X', X'' of a message.
-pub fn task_state(message: &SetpointMessage) -> TaskState {
-    TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() }
 }
 
 /// True pose of the plant in a message.
@@ -113,5 +110,5 @@ pub fn measured_pose(message: &MeasuredMessage) -> Pose {
 
 /// Desired motion of a setpoint message.
 pub fn desired_motion(message: &SetpointMessage) -> Motion {
-    task_state(message).motion()
+    Setpoint::from(message).task.motion()
 }

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::daemon::report::Report;
-use crate::messages::statistics::{Times, WorstCycle};
+use crate::messages::{Times, WorstCycle};
 use crate::output::text_table::{Left, Right, text_table};
 
 /// Tracking, timing and faults of a run; displays as text.

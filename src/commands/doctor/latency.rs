@@ -13,14 +13,14 @@ use serde::{Deserialize, Serialize};
 
 use super::files::HostFiles;
 use crate::commands::progress::time_bar;
-use crate::config::deployment::{Deployment, Realtime, ReleaseMode};
+use crate::config::deployment::{Deployment, Realtime};
 use crate::daemon::start::prepare_loop;
 use crate::daemon::time_histogram::TimeHistogram;
 use crate::daemon::{nanoseconds, timing};
+use crate::messages::Times;
 use crate::messages::clock::monotonic_ns;
-use crate::messages::statistics::Times;
 use crate::realtime::clock::{Grid, Monotonic};
-use crate::realtime::cyclic::{Release, Timing};
+use crate::realtime::cyclic::{ReleaseMode, Timing};
 use crate::realtime::stop_request::Stop;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
@@ -165,8 +165,8 @@ fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
         histogram.record(monotonic_ns());
         histogram.clear();
     });
-    let Timing { period_ns, phase_ns, release, late_wakeup_ns, .. } = timing(deployment);
-    let max_lead_ns = if let Release::Grid { max_lead_ns } = release { max_lead_ns } else { 0 };
+    let Timing { period_ns, phase_ns, late_wakeup_ns, .. } = timing(deployment);
+    let max_lead_ns = timing(deployment).spin_ns();
     let (grid, mut waiter) = (Grid::new(period_ns, phase_ns), Waiter::new(max_lead_ns));
     let (mut late_wakeups, mut missed) = (0, 0);
     let at_start = ThreadUsage::of_this_thread();

@@ -177,8 +177,8 @@ mod tests {
     use super::*;
     use crate::commands::arguments::DEFAULT_CONFIG;
     use crate::config::Config;
-    use crate::config::deployment::ReleaseMode;
-    use crate::messages::statistics::Times;
+    use crate::messages::Times;
+    use crate::realtime::cyclic::ReleaseMode;
     use crate::realtime::usage::ThreadUsage;
 
     const RARE: u64 = 123_456_789;

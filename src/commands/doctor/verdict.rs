@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::latency::Latency;
 use super::text::microseconds;
-use crate::messages::statistics::Times;
+use crate::messages::Times;
 
 /// Bound of the 99.9th percentile of a good rate, as a share of the period; the rest is for reading, computing and
 /// sending.
@@ -141,7 +141,7 @@ fn milliseconds(time_ns: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::deployment::ReleaseMode;
+    use crate::realtime::cyclic::ReleaseMode;
     use crate::realtime::usage::ThreadUsage;
 
     const MAX_HOLD_NS: u64 = 20_000_000;

@@ -19,9 +19,9 @@ use super::plant::prepare_thread;
 use crate::config::Config;
 use crate::daemon::nanoseconds;
 use crate::messages::clock::monotonic_ns;
-use crate::messages::lockstep::look_until;
-use crate::messages::ports::{PortError, Sink, Source, Time};
-use crate::messages::structs::{MeasuredMessage, SetpointMessage};
+use crate::messages::lockstep::poll_until;
+use crate::messages::{MeasuredMessage, SetpointMessage};
+use crate::messages::{PortError, Publisher, Subscriber};
 use crate::model::task::TaskState;
 use crate::motion::built_in::BuiltInMotion;
 use crate::output::csv_table::TableError;
@@ -87,12 +87,12 @@ impl CommandError for SetpointError {}
 /// Plays the trajectory once, or until `stop`. With `engage` it also requests control, once.
 fn run(config: &Config, trajectory: &Trajectory, engage: bool, stop: &Stop) -> Result<(), SetpointError> {
     let bus = config.join()?;
-    let setpoints = bus.source()?;
+    let setpoints = bus.publisher()?;
     let playback = Playback::new(config, trajectory, Operator::new(&bus)?, engage);
     info!(name = %config.name, seconds = trajectory.duration(), "waiting until the daemon knows the pose of the platform");
-    match bus.time() {
-        Time::Real => run_in_real_time(config, playback, setpoints, stop)?,
-        Time::Simulated => run_in_lockstep(config, bus.sink(8)?, playback, setpoints, stop)?,
+    match bus.is_simulated() {
+        false => run_in_real_time(config, playback, setpoints, stop)?,
+        true => run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?,
     }
     Ok(())
 }
@@ -100,7 +100,7 @@ fn run(config: &Config, trajectory: &Trajectory, engage: bool, stop: &Stop) -> R
 fn run_in_real_time(
     config: &Config,
     mut playback: Playback,
-    mut setpoints: Source<SetpointMessage>,
+    mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
 ) -> Result<(), PortError> {
     prepare_thread(config);
@@ -110,7 +110,7 @@ fn run_in_real_time(
         sleep_until(tick_ns);
         match playback.step(tick_ns)? {
             PlaybackStep::Silent => {}
-            PlaybackStep::Setpoint(state) => setpoints.publish(tick_ns, message(&state))?,
+            PlaybackStep::Setpoint(state) => setpoints.publish(tick_ns, SetpointMessage::from(&state))?,
             PlaybackStep::Finished => break,
         }
         tick_ns = grid.next_after(tick_ns.max(monotonic_ns()));
@@ -121,19 +121,19 @@ fn run_in_real_time(
 /// Publishes a setpoint for each measurement, as the daemon waits for it; home, where the playback has none yet.
 fn run_in_lockstep(
     config: &Config,
-    mut measured: Sink<MeasuredMessage>,
+    mut measured: Subscriber<MeasuredMessage>,
     mut playback: Playback,
-    mut setpoints: Source<SetpointMessage>,
+    mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
 ) -> Result<(), PortError> {
     let mut last = None;
-    while let Some(measurement) = look_until(|| stop.is_requested(), || measured.receive()) {
+    while let Some(measurement) = poll_until(|| stop.is_requested(), || measured.receive()) {
         let time_ns = measurement.header.time_ns;
         let setpoint = match last {
             Some((last_ns, setpoint)) if last_ns == time_ns => setpoint,
             _ => match playback.step(time_ns)? {
-                PlaybackStep::Silent => message(&TaskState::at_rest(config.machine.home)),
-                PlaybackStep::Setpoint(state) => message(&state),
+                PlaybackStep::Silent => SetpointMessage::from(&TaskState::at_rest(config.machine.home)),
+                PlaybackStep::Setpoint(state) => SetpointMessage::from(&state),
                 PlaybackStep::Finished => break,
             },
         };
@@ -141,13 +141,4 @@ fn run_in_lockstep(
         last = Some((time_ns, setpoint));
     }
     Ok(())
-}
-
-fn message(state: &TaskState) -> SetpointMessage {
-    SetpointMessage {
-        x: state.x.into(),
-        x_rate: state.xd.into(),
-        x_accel: state.xdd.into(),
-        ..SetpointMessage::default()
-    }
 }

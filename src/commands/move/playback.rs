@@ -9,8 +9,8 @@ use crate::config::Config;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::limits::{AxisLimits, Limits};
 use crate::control::state::{Request, State};
-use crate::messages::ports::PortError;
-use crate::messages::structs::StatusMessage;
+use crate::messages::PortError;
+use crate::messages::StatusMessage;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::motion::minimum_jerk::shortest_duration;
@@ -65,8 +65,8 @@ impl<'a> Playback<'a> {
     pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, PortError> {
         if let Some(status) = self.operator.status() {
             self.update(now_ns, &status);
-            if self.engage && status.fault == DiagnosticCode::ReadyToEngage as u32 {
-                self.operator.ask(Request::Engage)?;
+            if self.engage && status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
+                self.operator.send(Request::Engage)?;
             }
         }
         if self.engaged_ns.is_some() && now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {

@@ -1,23 +1,24 @@
 //! `hexad plant`: the simulated platform as a process of its own, in real time or in lock-step.
 //!
-//! In real time it ticks on the multiples of the period. At each tick it lets the time since the last one pass, with
-//! every force applied from the instant its message was sent, as a drive would; then it publishes lengths
-//! and rates. A force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if it
-//! can be believed (`doubt`).
+//! In real time its ticks are the multiples of the period. At each tick it simulates the time since the last one, with
+//! every force applied from the instant its message was sent, as a drive would; then it publishes lengths and rates. A
+//! force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if its message is valid
+//! ([`validation`]).
 
 use std::time::Instant;
 
 use tracing::{debug, info, warn};
 
-use self::doubt::Doubt;
+use self::validation::ForceValidation;
 use crate::config::Config;
+use crate::control::controller::Measurement;
 use crate::control::diagnostic::DiagnosticCode;
+use crate::control::input_validation::seconds_between;
 use crate::control::state::State;
 use crate::daemon::nanoseconds;
 use crate::messages::clock::monotonic_ns;
-use crate::messages::lockstep::{REPEAT, look_until};
-use crate::messages::ports::{Bus, PortError, Time};
-use crate::messages::structs::{ForceMessage, MeasuredMessage};
+use crate::messages::lockstep::{REPEAT_INTERVAL, poll_until};
+use crate::messages::{Bus, ForceMessage, MeasuredMessage, PortError, Publisher, Subscriber};
 use crate::model::machine::LEGS;
 use crate::model::task::task_coordinates;
 use crate::plant::hardware::Hardware;
@@ -28,158 +29,166 @@ use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::setup::scheduling;
 use crate::realtime::stop_request::Stop;
 
-mod doubt;
+mod validation;
 
 /// Forces kept between two ticks: 12.8 ms at 20 kHz, so that a late plant still applies each in its turn.
 const FORCE_DEPTH: usize = 256;
 
-/// After a longer pause (the process was stopped) simulated time goes on from now: nobody waits for a
-/// second of simulation.
-const LONGEST_PAUSE_NS: u64 = 1_000_000_000;
+/// After a longer pause (the process was stopped) simulated time continues from now, instead of a second of simulation
+/// that all participants would wait for.
+const MAX_PAUSE_NS: u64 = 1_000_000_000;
 
-/// Runs until `stop`.
+/// Runs the plant until `stop`.
 pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
     let bus = config.join()?;
-    match bus.time() {
-        Time::Real => run_in_real_time(config, &bus, stop),
-        Time::Simulated => run_in_lockstep(config, &bus, stop),
+    if bus.is_simulated() {
+        run_in_lockstep(config, &bus, stop)
+    } else {
+        run_in_real_time(config, &bus, stop)
     }
 }
 
 fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
-    let mut forces = bus.sink::<ForceMessage>(FORCE_DEPTH)?;
-    let mut measured = bus.source::<MeasuredMessage>()?;
+    let mut forces = bus.subscriber::<ForceMessage>(FORCE_DEPTH)?;
+    let mut measured = bus.publisher()?;
     prepare_thread(config);
 
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
-    let mut driven = Driven::new(config, tick_ns);
-    let mut doubt = Doubt::default();
+    let mut plant = DrivenPlant::new(config, tick_ns);
+    let mut validation = ForceValidation::default();
     let mut pending = None;
     while !stop.is_requested() {
         sleep_until(tick_ns);
-        if tick_ns - driven.time_ns > LONGEST_PAUSE_NS {
-            warn!(seconds = (tick_ns - driven.time_ns) as f64 * 1e-9, "was paused; time goes on from now");
-            driven.time_ns = tick_ns;
+        if tick_ns - plant.time_ns > MAX_PAUSE_NS {
+            let seconds = seconds_between(plant.time_ns, tick_ns);
+            warn!(seconds, "was paused; simulated time continues from now");
+            plant.time_ns = tick_ns;
         }
-        let before = driven.hardware.simulator().brakes();
+        let before = plant.hardware.simulator().brakes();
         // A force sent after this tick waits for the next one.
         while let Some(message) = pending.take().or_else(|| forces.receive()) {
             if (tick_ns + 1..=monotonic_ns()).contains(&message.header.time_ns) {
                 pending = Some(message);
                 break;
             }
-            if doubt.believes(&message, tick_ns, driven.timeout_ns) {
-                driven.receive(&message);
+            if validation.accepts(&message, tick_ns, plant.timeout_ns) {
+                plant.apply(&message);
             }
         }
-        doubt.hear(forces.rejected());
-        driven.advance_to(tick_ns);
-        tell(before, driven.hardware.simulator().brakes(), driven.cause);
-        measured.publish(tick_ns, measured_message(&mut driven.hardware))?;
+        validation.update(forces.rejections());
+        plant.advance_to(tick_ns);
+        log_brakes(before, plant.hardware.simulator().brakes(), plant.code);
+        measured.publish(tick_ns, plant.measure())?;
         // The newest grid point that is not in the future, or else the next.
         let now_ns = monotonic_ns();
         tick_ns = grid.next_after(tick_ns.max(now_ns.saturating_sub(grid.period_ns())));
     }
-    doubt.tell_all();
+    validation.log_totals();
     Ok(())
 }
 
-/// In simulated time, which begins at zero: a force is there at the instant of the measurement that it answers. What
-/// the answer needs is the port's to judge; it cannot be old.
+/// In simulated time, which begins at zero: a force acts from the instant of the measurement that it responds to. The
+/// port validates the response; it cannot be old.
 fn run_in_lockstep(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
-    let mut forces = bus.sink::<ForceMessage>(FORCE_DEPTH)?;
-    let mut measured = bus.source::<MeasuredMessage>()?;
+    let mut forces = bus.subscriber(FORCE_DEPTH)?;
+    let mut measured = bus.publisher()?;
     let period_ns = nanoseconds(config.deployment.realtime.period_s());
-    let mut driven = Driven::new(config, 0);
+    let mut plant = DrivenPlant::new(config, 0);
     info!("waiting for the daemon and a setpoint source in each step");
     while !stop.is_requested() {
-        let time_ns = driven.time_ns;
-        let message = measured_message(&mut driven.hardware);
-        measured.publish(time_ns, message)?;
-        let mut said = Instant::now();
-        let answer = look_until(
-            || stop.is_requested(),
-            || {
-                if said.elapsed() > REPEAT {
-                    said = Instant::now();
-                    if let Err(failed) = measured.publish(time_ns, message) {
-                        return Some(Err(failed));
-                    }
-                }
-                forces.newest().filter(|force| force.release_ns == time_ns).map(Ok)
-            },
-        );
-        let Some(force) = answer else { break };
-        let before = driven.hardware.simulator().brakes();
-        driven.receive(&force?);
-        driven.advance_to(time_ns + period_ns);
-        tell(before, driven.hardware.simulator().brakes(), driven.cause);
+        let time_ns = plant.time_ns;
+        let response = exchange(&mut measured, &mut forces, time_ns, plant.measure(), stop);
+        let Some(force) = response else { break };
+        let before = plant.hardware.simulator().brakes();
+        plant.apply(&force?);
+        plant.advance_to(time_ns + period_ns);
+        log_brakes(before, plant.hardware.simulator().brakes(), plant.code);
     }
     Ok(())
 }
 
-/// A simulator and the force on it.
-struct Driven {
+/// Publishes a measurement, repeatedly, until the force of its instant arrives, or until `stop`.
+fn exchange(
+    measured: &mut Publisher<MeasuredMessage>,
+    forces: &mut Subscriber<ForceMessage>,
+    time_ns: u64,
+    message: MeasuredMessage,
+    stop: &Stop,
+) -> Option<Result<ForceMessage, PortError>> {
+    let mut published: Option<Instant> = None;
+    poll_until(
+        || stop.is_requested(),
+        || {
+            if published.is_none_or(|published| published.elapsed() > REPEAT_INTERVAL) {
+                published = Some(Instant::now());
+                if let Err(error) = measured.publish(time_ns, message) {
+                    return Some(Err(error));
+                }
+            }
+            forces.receive_latest().filter(|force| force.release_ns == time_ns).map(Ok)
+        },
+    )
+}
+
+/// Simulated hardware and the force that acts on it.
+struct DrivenPlant {
     hardware: Hardware,
     time_ns: u64,
     /// Forces and the instant they expire.
     force: Option<([f64; LEGS], u64)>,
-    /// What the newest message says about why there is no force.
-    cause: DiagnosticCode,
+    /// Why the newest message contains no valid force.
+    code: DiagnosticCode,
     timeout_ns: u64,
 }
 
-impl Driven {
+impl DrivenPlant {
     /// At rest at home, brakes closed.
     fn new(config: &Config, time_ns: u64) -> Self {
         let hardware = hardware(config);
-        say_terms(config, hardware.simulator().terms());
+        log_terms(config, hardware.simulator().terms());
         info!(name = %config.name, "plant at rest at home, brakes closed");
         let timeout_ns = nanoseconds(config.deployment.plant.force_timeout_s);
-        Self { hardware, time_ns, force: None, cause: DiagnosticCode::None, timeout_ns }
+        Self { hardware, time_ns, force: None, code: DiagnosticCode::None, timeout_ns }
     }
 
     /// Applies a message from the instant it was sent.
-    fn receive(&mut self, message: &ForceMessage) {
+    fn apply(&mut self, message: &ForceMessage) {
         self.advance_to(message.header.time_ns);
-        self.cause = DiagnosticCode::from_number(message.fault).unwrap_or_default();
+        self.code = DiagnosticCode::from_number(message.diagnostic_code).unwrap_or_default();
         let is_under_control = State::from_number(message.state).is_some_and(State::has_control);
-        let is_finite = message.force_n.iter().all(|force| force.is_finite());
-        let usable = message.valid == 1 && is_under_control && is_finite;
-        self.force =
-            usable.then_some((message.force_n, message.header.time_ns.saturating_add(self.timeout_ns)));
+        let is_valid = message.may_be_applied() && is_under_control;
+        let expires_ns = message.header.time_ns.saturating_add(self.timeout_ns);
+        self.force = is_valid.then_some((message.force_n, expires_ns));
     }
 
     fn advance_to(&mut self, time_ns: u64) {
         if let Some((force, expires_ns)) = self.force {
-            self.pass(time_ns.min(expires_ns), Some(&force));
+            self.simulate_until(time_ns.min(expires_ns), Some(&force));
             if time_ns > expires_ns {
                 self.force = None;
             }
         }
-        self.pass(time_ns, None);
+        self.simulate_until(time_ns, None);
     }
 
-    fn pass(&mut self, time_ns: u64, force: Option<&[f64; LEGS]>) {
+    fn simulate_until(&mut self, time_ns: u64, force: Option<&[f64; LEGS]>) {
         if time_ns > self.time_ns {
             self.hardware.advance(time_ns - self.time_ns, force.copied());
             self.time_ns = time_ns;
         }
     }
-}
 
-fn measured_message(hardware: &mut Hardware) -> MeasuredMessage {
-    let (length_m, length_rate_m_s) = hardware.measure();
-    let simulator = hardware.simulator();
-    let state = simulator.state();
-    MeasuredMessage {
-        length_m,
-        length_rate_m_s,
-        pose_valid: 1,
-        x: task_coordinates(&state.pose, &simulator.machine().home),
-        twist: state.twist.vector().into(),
-        ..MeasuredMessage::default()
+    fn measure(&mut self) -> MeasuredMessage {
+        let (length, rate) = self.hardware.measure();
+        let simulator = self.hardware.simulator();
+        let state = simulator.state();
+        MeasuredMessage {
+            pose_valid: 1,
+            x: task_coordinates(&state.pose, &simulator.machine().home),
+            twist: state.twist.vector().into(),
+            ..MeasuredMessage::from(&Measurement { time_ns: self.time_ns, length, rate })
+        }
     }
 }
 
@@ -195,8 +204,8 @@ pub fn hardware(config: &Config) -> Hardware {
     )
 }
 
-/// What is simulated beyond the model, and what of it the tolerance leaves out.
-fn say_terms(config: &Config, terms: &PlantTerms) {
+/// Logs what is simulated beyond the model, and which of it is left out by the tolerance.
+fn log_terms(config: &Config, terms: &PlantTerms) {
     let plant = &config.deployment.plant;
     if plant.imperfections == (Imperfections { seed: plant.imperfections.seed, ..Imperfections::default() }) {
         return;
@@ -214,13 +223,13 @@ fn say_terms(config: &Config, terms: &PlantTerms) {
     }
 }
 
-fn tell(before: Brakes, now: Brakes, cause: DiagnosticCode) {
+fn log_brakes(before: Brakes, now: Brakes, code: DiagnosticCode) {
     match (before, now) {
         (Brakes::Open, Brakes::Open) | (Brakes::EndStop { .. }, _) => {}
-        (Brakes::Open, Brakes::Closing { .. } | Brakes::Closed) => match cause {
+        (Brakes::Open, Brakes::Closing { .. } | Brakes::Closed) => match code {
             DiagnosticCode::None => warn!("forces stopped arriving: brakes closing"),
-            cause if cause.is_fault() => warn!("no valid force ({}): brakes closing", cause.name()),
-            cause => info!("no valid force ({}): brakes closing", cause.name()),
+            code if code.is_fault() => warn!("no valid force ({}): brakes closing", code.name()),
+            code => info!("no valid force ({}): brakes closing", code.name()),
         },
         (_, Brakes::Open) => info!("valid force: brakes open"),
         (_, Brakes::EndStop { leg }) => {

@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use crate::analysis::pose_quality::{PoseEvaluator, PoseQuality};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::output::csv_table::{CsvWriter, coordinates};
+use crate::output::csv_table::coordinates;
+use crate::output::csv_writer::CsvWriter;
 use crate::output::files::FileError;
 
 /// Poses along each axis during the search for the range.

@@ -7,7 +7,7 @@
 pub use self::control::{Control, FidelityChoice, GAIN_MARGIN};
 pub use self::limits::DeploymentLimits;
 pub use self::plant::Plant;
-pub use self::realtime::{Realtime, ReleaseMode, Scheduler};
+pub use self::realtime::{Realtime, Scheduler};
 use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::SectionReader;

@@ -100,7 +100,7 @@ fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
     if stiffness.is_some() && machine.actuator.reflected_mass == 0.0 {
         section.reject(
             "stiffness_n_m",
-            "must not be given with actuator.reflected_mass_kg = 0: a drive behind a spring has a mass",
+            "must not be given with actuator.reflected_mass_kg = 0: a drive behind a spring has mass",
         );
     }
     if stiffness.is_none() && backlash > 0.0 {

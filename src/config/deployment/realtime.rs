@@ -2,12 +2,10 @@
 
 use core::f64::consts::TAU;
 
-use serde::{Deserialize, Serialize};
-
 use crate::analysis::sampled_loop::SampledLoop;
 use crate::config::bound::Bound;
 use crate::config::reader::SectionReader;
-use crate::messages::ports::Time;
+use crate::realtime::cyclic::ReleaseMode;
 use crate::realtime::overrun::OverrunPolicy;
 
 /// Bounds of the rate \[Hz\]. Above, one wake-up takes longer than the period leaves.
@@ -64,35 +62,6 @@ pub struct Realtime {
     pub require_realtime: bool,
 }
 
-/// Release mode of the cycle, `realtime.release`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ReleaseMode {
-    /// The thread sleeps until each point of the time grid.
-    Sleep,
-    /// The thread sleeps until shortly before each point of the time grid, and spins for the rest.
-    Hybrid,
-    /// A measured message begins the cycle.
-    External,
-    /// A measured message and the setpoint of its instant begin the cycle, in simulated time.
-    Lockstep,
-}
-
-impl ReleaseMode {
-    /// All modes.
-    pub const ALL: [Self; 4] = [Self::Sleep, Self::Hybrid, Self::External, Self::Lockstep];
-
-    /// Name in the configuration.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sleep => "sleep",
-            Self::Hybrid => "hybrid",
-            Self::External => "external",
-            Self::Lockstep => "lockstep",
-        }
-    }
-}
-
 /// Scheduling class of the real-time thread, `realtime.scheduler`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scheduler {
@@ -108,9 +77,9 @@ impl Realtime {
         1.0 / self.rate_hz
     }
 
-    /// Time base of the participants: real or simulated.
-    pub fn time(&self) -> Time {
-        if self.release == ReleaseMode::Lockstep { Time::Simulated } else { Time::Real }
+    /// Whether all times are those of the plant.
+    pub fn is_simulated(&self) -> bool {
+        self.release == ReleaseMode::Lockstep
     }
 
     /// Longest time from a measurement to its force, in periods, of a loop that misses nothing and whose driver

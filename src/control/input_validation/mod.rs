@@ -111,6 +111,6 @@ fn stroke(actuator: &Actuator) -> f64 {
 }
 
 /// `to - from` in seconds, either sign.
-pub(super) fn seconds_between(from_ns: u64, to_ns: u64) -> f64 {
+pub fn seconds_between(from_ns: u64, to_ns: u64) -> f64 {
     to_ns.wrapping_sub(from_ns) as i64 as f64 * 1e-9
 }

@@ -10,9 +10,8 @@ use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::Machine;
-use hexad::output::csv_table::{
-    CsvWriter, NumberTable, TableError, legs, length_columns, trajectory_columns,
-};
+use hexad::output::csv_table::{NumberTable, TableError, legs, length_columns, trajectory_columns};
+use hexad::output::csv_writer::CsvWriter;
 
 use super::{line_number, lines};
 

@@ -4,8 +4,8 @@ use std::cell::Cell;
 
 use hexad::control::state::State;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::{Bus, Source};
-use hexad::messages::structs::{ForceMessage, Header, Message};
+use hexad::messages::{Bus, Publisher};
+use hexad::messages::{ForceMessage, Header, Message};
 use iceoryx2::prelude::ZeroCopySend;
 
 /// What is done to a message after it was sealed.
@@ -37,14 +37,14 @@ impl Message for Forged {
 
 /// Who sends them.
 pub struct Forger {
-    source: Source<Forged>,
+    source: Publisher<Forged>,
     force_n: [f64; 6],
 }
 
 impl Forger {
     /// Sends these forces as those of an active daemon.
     pub fn new(bus: &Bus, force_n: [f64; 6]) -> Self {
-        Self { source: bus.source().expect("to publish"), force_n }
+        Self { source: bus.publisher().expect("to publish"), force_n }
     }
 
     /// Sends one, changed.

@@ -4,9 +4,9 @@
 use std::env;
 use std::process::{self, Command, Stdio};
 
+use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::Bus;
-use hexad::messages::structs::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
+use hexad::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::process as child;
 use hexad::realtime::setup::scheduling;
@@ -91,17 +91,17 @@ fn takes_part() {
     // So that a busy machine does not make it late.
     let _ = scheduling::fifo_priority(1);
     let bus = Bus::join(machine).expect("to join");
-    let mut setpoints = bus.source::<SetpointMessage>().expect("to publish");
+    let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
     // Present without a word: the plant measures.
-    let _measured = bus.source::<MeasuredMessage>().expect("to publish");
-    let mut forces = bus.sink::<ForceMessage>(8).expect("to subscribe");
-    let mut statuses = bus.sink::<StatusMessage>(8).expect("to subscribe");
+    let _measured = bus.publisher::<MeasuredMessage>().expect("to publish");
+    let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
+    let mut statuses = bus.subscriber::<StatusMessage>(8).expect("to subscribe");
     let grid = Grid::new(PERIOD_NS, 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
     for tick in 0_u64.. {
         sleep_until(tick_ns);
         setpoints.publish(tick_ns, setpoint(tick_ns)).expect("to send");
-        let _ = (forces.newest(), statuses.newest());
+        let _ = (forces.receive_latest(), statuses.receive_latest());
         if tick == 0 {
             eprintln!("here");
         }

@@ -6,8 +6,8 @@ use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::ports::{Bus, Rejected, Sink, Time};
-use hexad::messages::structs::{
+use hexad::messages::{Bus, PortError, RejectionCounts, Subscriber};
+use hexad::messages::{
     CommandMessage, ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage,
 };
 use hexad::realtime::setup::scheduling;
@@ -31,7 +31,7 @@ pub struct Recording {
     /// Of every operator.
     pub commands: Vec<CommandMessage>,
     /// Forces that were said and are not here.
-    pub passed_over: Rejected,
+    pub passed_over: RejectionCounts,
 }
 
 /// Listens in a thread of its own, which owns the ports.
@@ -44,11 +44,15 @@ pub struct Recorder {
 impl Recorder {
     /// Returns when every port is open.
     pub fn start(machine: &str) -> Self {
-        Self::start_in(machine, Time::Real)
+        Self::start_with(machine, Bus::join)
     }
 
-    /// In a time.
-    pub fn start_in(machine: &str, time: Time) -> Self {
+    /// In simulated time.
+    pub fn start_simulated(machine: &str) -> Self {
+        Self::start_with(machine, Bus::join_simulated)
+    }
+
+    fn start_with(machine: &str, join: fn(&str) -> Result<Bus, PortError>) -> Self {
         let recording = Arc::new(Mutex::new(Recording::default()));
         let stop = Arc::new(AtomicBool::new(false));
         let (ready, opened) = mpsc::channel();
@@ -57,7 +61,7 @@ impl Recorder {
             spawn(move || {
                 // So that a busy machine does not keep it from listening for a quarter of a second.
                 let _ = scheduling::fifo_priority(1);
-                let bus = Bus::join_in(&machine, time).expect("to join");
+                let bus = join(&machine).expect("to join");
                 let mut listen = Listener::new(&bus);
                 ready.send(()).expect("the test waits");
                 while !stop.load(Ordering::Relaxed) {
@@ -119,11 +123,11 @@ impl Drop for Recorder {
 }
 
 struct Listener {
-    setpoints: Sink<SetpointMessage>,
-    measured: Sink<MeasuredMessage>,
-    forces: Sink<ForceMessage>,
-    statuses: Sink<StatusMessage>,
-    commands: Sink<CommandMessage>,
+    setpoints: Subscriber<SetpointMessage>,
+    measured: Subscriber<MeasuredMessage>,
+    forces: Subscriber<ForceMessage>,
+    statuses: Subscriber<StatusMessage>,
+    commands: Subscriber<CommandMessage>,
 }
 
 impl Listener {
@@ -144,7 +148,7 @@ impl Listener {
         recording.measured.extend(std::iter::from_fn(|| self.measured.receive()));
         recording.setpoints.extend(std::iter::from_fn(|| self.setpoints.receive()));
         recording.commands.extend(std::iter::from_fn(|| self.commands.receive_from_any()));
-        recording.passed_over = self.forces.rejected();
+        recording.passed_over = self.forces.rejections();
     }
 }
 
@@ -152,6 +156,6 @@ fn forget<T: Message>(messages: &mut Vec<T>, until_ns: u64) {
     messages.retain(|message| message.header().time_ns >= until_ns);
 }
 
-fn sink<T: Message>(bus: &Bus) -> Sink<T> {
-    bus.sink(usize::MAX).expect("to subscribe")
+fn sink<T: Message>(bus: &Bus) -> Subscriber<T> {
+    bus.subscriber(usize::MAX).expect("to subscribe")
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
-use hexad::messages::structs::{ForceMessage, MeasuredMessage, Message, SCHEMA};
+use hexad::messages::{ForceMessage, MeasuredMessage, Message, SCHEMA};
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
 use super::recorder::Recording;
@@ -40,7 +40,7 @@ pub fn stands(measured: &MeasuredMessage) -> bool {
 /// For a daemon that was stopped in order: the platform was at rest before nobody controlled it any more.
 pub fn ends_at_rest(recording: &Recording) {
     let last = recording.forces.last().expect("forces");
-    assert_eq!((last.valid, last.fault), (0, DiagnosticCode::Stopping as u32), "{last:#?}");
+    assert_eq!((last.valid, last.diagnostic_code), (0, DiagnosticCode::Stopping as u32), "{last:#?}");
     let valid = recording.forces.iter().rfind(|force| force.valid == 1).expect("a valid force");
     assert_eq!(State::from_number(valid.state), Some(State::Stopping), "the last valid one: {valid:#?}");
     let until_then = |measured: &&MeasuredMessage| measured.header.time_ns <= valid.header.time_ns;
@@ -55,7 +55,7 @@ pub fn ends_at_rest(recording: &Recording) {
 
 /// A driver can check each by itself, and within a life everything goes forward.
 fn forces_are_whole_and_in_order(recording: &Recording) {
-    let hexad::messages::ports::Rejected { schema, repeated, damaged, .. } = recording.passed_over;
+    let hexad::messages::RejectionCounts { schema, repeated, damaged, .. } = recording.passed_over;
     assert_eq!((schema, repeated, damaged), (0, 0, 0), "forces passed over: {:?}", recording.passed_over);
     for force in &recording.forces {
         assert_eq!(force.checksum, force.computed_checksum(), "{force:#?}");
@@ -83,7 +83,7 @@ fn forces_are_zero_unless_valid(forces: &[ForceMessage]) {
     for force in forces {
         let state = State::from_number(force.state).expect("a state");
         assert_eq!(force.valid, u32::from(state.has_control()), "{force:#?}");
-        let cause = DiagnosticCode::from_number(force.fault).expect("a cause");
+        let cause = DiagnosticCode::from_number(force.diagnostic_code).expect("a cause");
         match state {
             State::Engaging | State::Active => assert_eq!(cause, DiagnosticCode::None, "{force:#?}"),
             State::Fault => assert!(cause.is_fault(), "{force:#?}"),
@@ -127,7 +127,7 @@ fn nothing_moves_unasked(recording: &Recording) {
             if (a.valid == 1 && b.valid == 0) || is_fault == [false, true] {
                 since_ns = a.header.time_ns;
             }
-            if is_fault == [true, false] && b.fault != DiagnosticCode::Stopping as u32 {
+            if is_fault == [true, false] && b.diagnostic_code != DiagnosticCode::Stopping as u32 {
                 let cleared_ns = asked(|request| request == Request::Clear, since_ns, b.header.time_ns);
                 since_ns = cleared_ns.unwrap_or_else(|| panic!("not cleared: {a:#?} and then {b:#?}"));
             }
@@ -177,13 +177,13 @@ fn every_grid_point_is_counted(recording: &Recording) {
     let released: HashMap<_, _> = recording
         .forces
         .iter()
-        .filter(|force| force.fault != DiagnosticCode::Stopping as u32)
+        .filter(|force| force.diagnostic_code != DiagnosticCode::Stopping as u32)
         .map(|force| ((force.header.epoch, force.header.sequence), force.release_ns))
         .collect();
     let mut first = HashMap::new();
     for status in &recording.statuses {
         let Some(release_ns) = released.get(&(status.header.epoch, status.header.sequence)) else { continue };
-        let counted = status.cycles + status.skipped;
+        let counted = status.counters.cycles + status.counters.skipped;
         let (release_0, counted_0) = *first.entry(status.header.epoch).or_insert((*release_ns, counted));
         assert_eq!(
             (release_ns - release_0) / PERIOD_NS,

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use hexad::control::diagnostic::DiagnosticCode;
-use hexad::messages::structs::ForceMessage;
+use hexad::messages::ForceMessage;
 
 use super::recorder::Recording;
 
@@ -24,11 +24,11 @@ pub struct Step {
 
 /// All of one life of the daemon, in order.
 pub fn steps(recording: &Recording) -> Vec<Step> {
-    let order = |header: &hexad::messages::structs::Header| (header.epoch, header.sequence);
+    let order = |header: &hexad::messages::Header| (header.epoch, header.sequence);
     let released: HashMap<_, _> = recording
         .forces
         .iter()
-        .filter(|force| force.release_ns != 0 && force.fault != DiagnosticCode::Stopping as u32)
+        .filter(|force| force.release_ns != 0 && force.diagnostic_code != DiagnosticCode::Stopping as u32)
         .map(|force| (order(&force.header), *force))
         .collect();
     let published =
@@ -39,12 +39,12 @@ pub fn steps(recording: &Recording) -> Vec<Step> {
         Step {
             before: **before,
             after: **after,
-            number: b.cycles,
-            cycles: b.cycles - a.cycles,
-            skipped: b.skipped - a.skipped,
-            late: b.late_wakeups - a.late_wakeups,
-            overruns: b.overruns - a.overruns,
-            caught_up: b.caught_up - a.caught_up,
+            number: b.counters.cycles,
+            cycles: b.counters.cycles - a.counters.cycles,
+            skipped: b.counters.skipped - a.counters.skipped,
+            late: b.counters.late_wakeups - a.counters.late_wakeups,
+            overruns: b.counters.overruns - a.counters.overruns,
+            caught_up: b.counters.caught_up - a.counters.caught_up,
         }
     });
     steps.collect()

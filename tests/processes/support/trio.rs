@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::structs::{ForceMessage, MeasuredMessage};
+use hexad::messages::{ForceMessage, MeasuredMessage};
 
 use super::children::{HANG, Hexad};
 use super::machine::Machine;
@@ -53,7 +53,11 @@ impl Trio {
     /// Waits until no force is valid any more, for this reason.
     pub fn loses_force_for(&self, cause: DiagnosticCode) {
         self.recorder.until("the daemon marks its forces as not valid", |recording| {
-            recording.forces.last().filter(|force| force.valid == 0 && force.fault == cause as u32).copied()
+            recording
+                .forces
+                .last()
+                .filter(|force| force.valid == 0 && force.diagnostic_code == cause as u32)
+                .copied()
         });
     }
 

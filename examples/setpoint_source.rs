@@ -1,0 +1,63 @@
+//! A minimal setpoint source: engages, raises the platform by some millimetres and lowers it again.
+//!
+//!     cargo run --example setpoint_source --no-default-features --features client -- fried2008 10
+//!
+//! Until the daemon is in control it offers the pose in which the platform stands. Each setpoint is X, X' and X'' of one
+//! smooth motion: the daemon refuses what its limits or the machine do not allow.
+
+use std::env;
+use std::thread::sleep;
+use std::time::Duration;
+
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
+use hexad::messages::clock::monotonic_ns;
+use hexad::messages::{Bus, CommandMessage, PortError, SetpointMessage, StatusMessage};
+use hexad::model::task::TaskState;
+use hexad::motion::minimum_jerk::{straight_move, window};
+use nalgebra::Vector6;
+
+const PERIOD: Duration = Duration::from_millis(1);
+
+/// Duration of the motion, and of its way up and its way down \[s\].
+const DURATION_S: f64 = 6.0;
+const RISE_S: f64 = 2.0;
+
+fn main() -> Result<(), PortError> {
+    let mut arguments = env::args().skip(1);
+    let machine = arguments.next().unwrap_or("fried2008".into());
+    let height_mm = arguments.next().and_then(|text| text.parse().ok()).unwrap_or(10.0);
+    let bus = Bus::join(&machine)?;
+    let mut statuses = bus.subscriber::<StatusMessage>(8)?;
+    let mut commands = bus.publisher::<CommandMessage>()?;
+    let mut setpoints = bus.publisher::<SetpointMessage>()?;
+    let (mut start, mut began_ns) = (None, None);
+    loop {
+        sleep(PERIOD);
+        let now_ns = monotonic_ns();
+        if let Some(status) = statuses.receive_latest() {
+            let state = status.state().unwrap_or_default();
+            match state {
+                State::Active => began_ns = began_ns.or(Some(now_ns)),
+                State::Off | State::Standby if status.pose_valid == 1 => {
+                    start = Some(Vector6::from(status.x))
+                }
+                _ => {}
+            }
+            if began_ns.is_none() && status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
+                commands.publish(now_ns, Request::Engage.into())?;
+            } else if began_ns.is_some() && !state.has_control() {
+                println!("control ended: {}", state.name());
+                return Ok(());
+            }
+        }
+        let Some(start) = start else { continue };
+        let top = start + Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, height_mm * 1e-3);
+        let t = began_ns.map_or(0.0, |began_ns| now_ns.saturating_sub(began_ns) as f64 * 1e-9);
+        if t > DURATION_S + 1.0 {
+            return Ok(());
+        }
+        let task: TaskState = straight_move(&start, &top, &window(t, DURATION_S, RISE_S));
+        setpoints.publish(now_ns, (&task).into())?;
+    }
+}

@@ -1,0 +1,115 @@
+//! Inputs of the controller: the newest message of each topic, and the request that is pending.
+
+use crate::control::controller::{Measurement, Setpoint};
+use crate::control::state::{OperatorRequest, Request};
+use crate::daemon::cycle::CycleInput;
+use crate::messages::clock::monotonic_ns;
+use crate::messages::{
+    Bus, CommandMessage, MeasuredMessage, PortError, RejectionCounts, SetpointMessage, Subscriber,
+};
+
+/// A request for force that is older than this is not carried out: its sender has long stopped waiting \[ns\].
+const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
+
+/// The daemon's own request before it ends; no message has this epoch.
+const STOP_BEFORE_END: OperatorRequest = OperatorRequest { request: Request::Stop, message: (0, 1) };
+
+/// Messages kept per topic between two reads. Only the newest counts.
+const DEPTH: usize = 8;
+
+/// Subscribers of the daemon, and the input that their messages make.
+pub struct Inputs {
+    setpoints: Subscriber<SetpointMessage>,
+    measured: Subscriber<MeasuredMessage>,
+    commands: Subscriber<CommandMessage>,
+    cycle: CycleInput,
+}
+
+/// Which requests are accepted.
+#[derive(Clone, Copy)]
+pub struct RequestFilter {
+    /// The last request that the controller has carried out or refused.
+    pub answered: (u64, u64),
+    /// The daemon is to end: no request may start control, and the platform is to come to rest.
+    pub is_ending: bool,
+}
+
+impl Inputs {
+    /// Opens the subscribers.
+    pub fn open(bus: &Bus) -> Result<Self, PortError> {
+        Ok(Self {
+            setpoints: bus.subscriber(DEPTH)?,
+            measured: bus.subscriber(DEPTH)?,
+            commands: bus.subscriber(usize::MAX)?,
+            cycle: CycleInput::default(),
+        })
+    }
+
+    /// The input for the next cycle, handed over now.
+    pub fn cycle_input(&mut self) -> CycleInput {
+        self.cycle.handed_ns = monotonic_ns();
+        self.cycle
+    }
+
+    /// Receives the newest message of each topic; true if a measurement is among them.
+    pub fn receive(&mut self, filter: RequestFilter) -> bool {
+        self.receive_requests(monotonic_ns(), filter);
+        self.receive_setpoint();
+        let measured = self.measured.receive_latest();
+        if let Some(message) = &measured {
+            self.cycle.input.measurement = Some(message.into());
+            self.cycle.measurements = self.measured.received_count();
+        }
+        measured.is_some()
+    }
+
+    /// The next measurement, in order.
+    pub fn receive_next_measurement(&mut self) -> Option<Measurement> {
+        self.measured.receive().map(|message| (&message).into())
+    }
+
+    /// Makes a measurement the one of the next cycle.
+    pub fn set_measurement(&mut self, measurement: Measurement) {
+        self.cycle.input.measurement = Some(measurement);
+        self.cycle.measurements += 1;
+    }
+
+    /// Whether the setpoint of an instant has arrived, or none will because the source has left.
+    pub fn has_setpoint_of(&mut self, time_ns: u64) -> bool {
+        // In this order: the source sends its last message before it leaves.
+        let has_left = self.setpoints.received_count() > 0 && self.setpoints.publisher_count() == 0;
+        self.receive_setpoint();
+        has_left || self.cycle.input.setpoint.is_some_and(|setpoint| setpoint.time_ns == time_ns)
+    }
+
+    fn receive_setpoint(&mut self) {
+        if let Some(message) = self.setpoints.receive_latest() {
+            self.cycle.input.setpoint = Some(Setpoint::from(&message));
+        }
+    }
+
+    /// Of the requests that are not yet answered the one of highest precedence counts.
+    pub fn receive_requests(&mut self, now_ns: u64, filter: RequestFilter) {
+        let RequestFilter { answered, is_ending } = filter;
+        let is_pending = |request: &OperatorRequest| request.message != answered;
+        while let Some(message) = self.commands.receive_from_any() {
+            let Some(request) = message.request() else { continue };
+            let is_too_old = now_ns.abs_diff(message.header.time_ns) > MAX_REQUEST_AGE_NS;
+            if request.request.can_begin_control() && (is_ending || is_too_old) {
+                continue;
+            }
+            let pending = self.cycle.input.request.filter(is_pending);
+            if pending.is_none_or(|pending| pending.request <= request.request) {
+                self.cycle.input.request = Some(request);
+            }
+        }
+        if is_ending && self.cycle.input.request.filter(is_pending).is_none() {
+            self.cycle.input.request = Some(STOP_BEFORE_END);
+        }
+    }
+
+    /// Messages rejected on all topics.
+    pub fn rejections(&self) -> RejectionCounts {
+        self.setpoints.rejections() + self.measured.rejections() + self.commands.rejections()
+    }
+}

@@ -1,0 +1,246 @@
+//! The io thread: owner of every port of the daemon, in phase with the cycle.
+//!
+//! It reads the newest messages a lead before the release and publishes when the output of the cycle appears; with
+//! external release it waits for measured messages and signals the real-time thread; in lock-step it waits for all
+//! participants. When a peer connects or disappears, the port calls here allocate and block for a moment; the real-time
+//! thread continues with data whose age it knows.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use heapless::spsc::Producer;
+
+use self::inputs::{Inputs, RequestFilter};
+use self::outputs::{OutputSettings, Outputs};
+use super::cycle::{CycleOutput, IoSide};
+use crate::messages::clock::monotonic_ns;
+use crate::messages::lockstep::poll_until;
+use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, Statistics};
+use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
+use crate::realtime::cyclic::{ReleaseMode, Timing};
+use crate::realtime::triple_buffer::Reader;
+use crate::realtime::usage::ThreadUsage;
+use crate::realtime::waiter::Waiter;
+
+mod inputs;
+mod outputs;
+
+/// Pause between two polls for something that does not arrive at once \[ns\].
+const POLL_INTERVAL_NS: u64 = 10_000;
+
+/// Before that it polls without a pause for this long \[ns\], or an eighth of the period if that is less: an output
+/// arrives one wake-up latency after the release, and a pause costs as much again.
+const BUSY_POLL_TIME_NS: u64 = 50_000;
+
+/// Length of the queue of delays to the log thread, as of the cycle records.
+pub const DELAYS: usize = 1024;
+
+/// Ports of the daemon.
+pub struct Ports {
+    inputs: Inputs,
+    outputs: Outputs,
+}
+
+/// Links of the io thread to the other threads.
+pub struct IoLinks<'a> {
+    pub exchange: IoSide,
+    /// Release to force sent \[ns\], to the log thread.
+    pub delays: Producer<'a, u64>,
+    /// From the log thread.
+    pub statistics: Reader<Statistics>,
+    /// Set when the daemon is to end: the platform comes to rest.
+    pub is_ending: &'a AtomicBool,
+    /// Set here when the daemon is to end and the platform is not under control.
+    pub may_end: &'a AtomicBool,
+}
+
+/// Settings of the io thread.
+#[derive(Clone, Copy)]
+pub struct IoSettings {
+    pub timing: Timing,
+    /// Inputs are read this long before the release \[ns\].
+    pub lead_ns: u64,
+    /// Forces computed longer ago than this are not valid any more \[ns\].
+    pub max_force_age_ns: u64,
+    pub home: [f64; 6],
+}
+
+/// Totals of the io thread over a run.
+#[derive(Debug, Default)]
+pub struct IoReport {
+    /// Messages that could not be sent.
+    pub send_failures: u64,
+    pub rejected: RejectionCounts,
+    /// From the first cycle on. It allocates only while a peer connects or disappears.
+    pub usage: ThreadUsage,
+}
+
+impl Ports {
+    /// Opens all. They belong to the thread that calls this.
+    pub fn open(bus: &Bus) -> Result<Self, PortError> {
+        Ok(Self { inputs: Inputs::open(bus)?, outputs: Outputs::open(bus)? })
+    }
+}
+
+/// Runs until `stop`, then publishes the last output.
+pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &AtomicBool) -> IoReport {
+    let at_start = ThreadUsage::of_this_thread();
+    let Ports { inputs, outputs } = ports;
+    let allocations_at_start = at_start.allocations;
+    let mut io =
+        IoThread { settings, inputs, outputs, links, published: 0, answered: (0, 0), allocations_at_start };
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    match settings.timing.release {
+        ReleaseMode::Lockstep => io.run_in_lockstep(is_stopped),
+        ReleaseMode::Sleep | ReleaseMode::Hybrid => io.run_in_phase(is_stopped),
+        ReleaseMode::External => io.run_on_messages(is_stopped),
+    }
+    io.publish();
+    IoReport {
+        send_failures: io.outputs.send_failures(),
+        rejected: io.inputs.rejections(),
+        usage: ThreadUsage::of_this_thread().since(&at_start),
+    }
+}
+
+struct IoThread<'a> {
+    settings: &'a IoSettings,
+    inputs: Inputs,
+    outputs: Outputs,
+    links: IoLinks<'a>,
+    /// Number of the cycle that was published last.
+    published: u64,
+    /// The last request that the controller has carried out or refused.
+    answered: (u64, u64),
+    /// Of this thread, before the first cycle.
+    allocations_at_start: u64,
+}
+
+impl IoThread<'_> {
+    fn run_in_phase(&mut self, is_stopped: impl Fn() -> bool) {
+        let IoSettings { timing, lead_ns, .. } = *self.settings;
+        let Timing { period_ns, phase_ns, .. } = timing;
+        let grid = Grid::new(period_ns, phase_ns);
+        let mut waiter = Waiter::new(timing.spin_ns());
+        while !is_stopped() {
+            let release_ns = grid.next_after(monotonic_ns() + lead_ns);
+            waiter.until(&mut Monotonic, release_ns - lead_ns);
+            self.inputs.receive(self.request_filter());
+            self.hand_over_inputs();
+            if timing.spin_ns() == 0 {
+                sleep_until(release_ns);
+            }
+            let give_up_ns = release_ns + period_ns - lead_ns;
+            let mut polling = Polling::new(monotonic_ns().max(release_ns), period_ns);
+            while self.publish_if_new() < release_ns && monotonic_ns() + POLL_INTERVAL_NS < give_up_ns {
+                if is_stopped() {
+                    return;
+                }
+                polling.pause();
+            }
+        }
+    }
+
+    fn run_on_messages(&mut self, is_stopped: impl Fn() -> bool) {
+        let period_ns = self.settings.timing.period_ns;
+        let mut polling = Polling::new(monotonic_ns(), period_ns);
+        while !is_stopped() {
+            let published = self.published;
+            let is_measured = self.inputs.receive(self.request_filter());
+            if is_measured {
+                self.hand_over_inputs();
+                self.links.exchange.event.signal();
+            }
+            self.publish_if_new();
+            if is_measured || self.published > published {
+                polling = Polling::new(monotonic_ns(), period_ns);
+            }
+            polling.pause();
+        }
+    }
+
+    /// Runs a cycle for each measurement, once the setpoint of its instant has arrived, and publishes its output before
+    /// it receives the next. A request that was sent before that setpoint counts in the same cycle.
+    fn run_in_lockstep(&mut self, is_stopped: impl Fn() -> bool) {
+        let mut answered_ns = None;
+        let next_measurement = |io: &mut Self| {
+            // Whether the daemon may end is updated while all wait, too.
+            io.publish_if_new();
+            io.inputs.receive_next_measurement()
+        };
+        while let Some(measurement) = poll_until(&is_stopped, || next_measurement(self)) {
+            let time_ns = measurement.time_ns;
+            // A plant that receives no response at once repeats its message.
+            if answered_ns == Some(time_ns) {
+                continue;
+            }
+            answered_ns = Some(time_ns);
+            self.inputs.set_measurement(measurement);
+            let setpoint = poll_until(&is_stopped, || self.inputs.has_setpoint_of(time_ns).then_some(()));
+            if setpoint.is_none() {
+                return;
+            }
+            self.inputs.receive_requests(time_ns, self.request_filter());
+            self.hand_over_inputs();
+            self.links.exchange.event.signal();
+            let before = self.published;
+            poll_until(&is_stopped, || {
+                self.publish_if_new();
+                (self.published > before).then_some(())
+            });
+        }
+    }
+
+    fn request_filter(&self) -> RequestFilter {
+        let is_ending = self.links.is_ending.load(Ordering::Relaxed);
+        RequestFilter { answered: self.answered, is_ending }
+    }
+
+    fn hand_over_inputs(&mut self) {
+        self.links.exchange.inputs.write(self.inputs.cycle_input());
+    }
+
+    /// Publishes the newest output unless it was published before; returns when it was due \[ns\].
+    fn publish_if_new(&mut self) -> u64 {
+        let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
+        self.answered = output.answered;
+        if self.links.is_ending.load(Ordering::Relaxed) && !output.state.has_control() {
+            self.links.may_end.store(true, Ordering::Relaxed);
+        }
+        if counters.cycles > self.published {
+            self.published = counters.cycles;
+            self.publish();
+        }
+        due_ns
+    }
+
+    fn publish(&mut self) {
+        let IoSettings { home, max_force_age_ns, .. } = *self.settings;
+        let counters = IoCounters {
+            allocations: ThreadUsage::allocations_of_this_thread() - self.allocations_at_start,
+            rejected: self.inputs.rejections(),
+        };
+        let IoLinks { exchange, statistics, delays, .. } = &mut self.links;
+        let settings = OutputSettings { home, max_force_age_ns };
+        self.outputs.publish(&settings, *exchange.outputs.value(), counters, statistics, delays);
+    }
+}
+
+/// Polling without a pause at first, then with sleeps.
+struct Polling {
+    busy_until_ns: u64,
+}
+
+impl Polling {
+    fn new(now_ns: u64, period_ns: u64) -> Self {
+        Self { busy_until_ns: now_ns + BUSY_POLL_TIME_NS.min(period_ns / 8) }
+    }
+
+    fn pause(&mut self) {
+        let now_ns = Monotonic.now_ns();
+        if now_ns < self.busy_until_ns {
+            core::hint::spin_loop();
+        } else {
+            sleep_until(now_ns + POLL_INTERVAL_NS);
+        }
+    }
+}

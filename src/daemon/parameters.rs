@@ -1,0 +1,69 @@
+//! Deployment to parameters of the controller and of the cyclic loop.
+
+use core::f64::consts::TAU;
+
+use nalgebra::Vector6;
+
+use crate::config::deployment::Deployment;
+use crate::control::gains::Gains;
+use crate::control::law::Law;
+use crate::control::parameters::{Envelope, Parameters};
+use crate::model::fidelity::Fidelity;
+use crate::model::machine::Machine;
+use crate::realtime::cyclic::Timing;
+
+/// Parameters of the controller; `fidelity` is the one that the deployment's choice resolves to.
+pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity) -> Parameters {
+    let Deployment { control, timeouts, limits, .. } = deployment;
+    let envelope = deployment.envelope.map(|limits| {
+        let home = Vector6::from(machine.home);
+        let from_home = |offsets: [f64; 6]| (home + Vector6::from(offsets)).into();
+        Envelope { lowest: from_home(limits.pose_min), highest: from_home(limits.pose_max) }
+    });
+    Parameters {
+        period_ns: nanoseconds(deployment.realtime.period_s()),
+        law: Law::new(
+            machine,
+            control.mode,
+            [
+                Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
+                Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+            ],
+            control.leg_masses,
+            TAU * control.observer_bandwidth_hz,
+            &limits.reference,
+        ),
+        fidelity,
+        engage_position: control.engage_position_m,
+        engage_orientation: control.engage_orientation_rad,
+        following_position: control.following_position_m,
+        following_orientation: control.following_orientation_rad,
+        setpoint_timeout_ns: nanoseconds(timeouts.setpoint_s),
+        measured_timeout_ns: nanoseconds(timeouts.measured_s),
+        limits: limits.reference,
+        force_rate: limits.force_rate_n_s,
+        condition: limits.condition,
+        envelope,
+        after_loss: control.on_setpoint_lost,
+    }
+}
+
+/// Release of the cyclic loop. The grid is half a period away from the multiples of the period, at which plants measure.
+pub fn timing(deployment: &Deployment) -> Timing {
+    let Deployment { realtime, timeouts, .. } = deployment;
+    let period_ns = nanoseconds(realtime.period_s());
+    Timing {
+        period_ns,
+        phase_ns: period_ns / 2,
+        release: realtime.release,
+        max_lead_ns: nanoseconds(realtime.max_lead_s),
+        timeout_ns: nanoseconds(timeouts.measured_s),
+        on_overrun: realtime.on_overrun,
+        late_wakeup_ns: nanoseconds(realtime.late_wakeup_s),
+    }
+}
+
+/// Seconds to nanoseconds, for durations that the configuration has bounded.
+pub fn nanoseconds(seconds: f64) -> u64 {
+    (seconds * 1e9).round() as u64
+}

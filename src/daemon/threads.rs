@@ -1,0 +1,236 @@
+//! The three threads of the daemon: start, supervision, end.
+
+use core::mem;
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::io;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, OnceLock};
+use std::thread::{self, Builder, Scope, ScopedJoinHandle, scope};
+use std::time::{Duration, Instant};
+
+use heapless::spsc::{Producer, Queue};
+use sd_notify::NotifyState;
+use tracing::{info, warn};
+
+use super::cycle::{CycleRecord, RealtimeSide};
+use super::fault_dump::FaultDump;
+use super::first_pose::FirstPose;
+use super::hints::ThreadFiles;
+use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
+use super::log_thread::{self, LogLinks, LogReport};
+use super::parameters::{nanoseconds, parameters, timing};
+use super::report::Report;
+use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
+use super::{DaemonError, REALTIME_THREAD};
+use crate::config::control_loops::{ControlLoop, loops};
+use crate::config::{Config, fidelity};
+use crate::control::controller::{Controller, Input, Output};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::messages::Statistics;
+use crate::realtime::clock::Monotonic;
+use crate::realtime::cyclic::{self, LoopReport, RECORDS};
+use crate::realtime::event::Event;
+use crate::realtime::exchange::exchange;
+use crate::realtime::process::block_signals;
+use crate::realtime::setup::memory;
+use crate::realtime::stop_request::Stop;
+use crate::realtime::triple_buffer::triple_buffer;
+
+/// Stack of each thread: several times what they use, and small because locked memory holds all of it. A debug build
+/// keeps every intermediate value there.
+pub(super) const STACK_BYTES: usize = if cfg!(debug_assertions) { 8 << 20 } else { 512 * 1024 };
+
+/// Longest wait for the platform to come to rest before the daemon ends: below the stop timeout of a service manager.
+const MAX_STOP_TIME: Duration = Duration::from_secs(10);
+const REST_POLL_INTERVAL: Duration = Duration::from_millis(2);
+
+/// Flags between the threads.
+#[derive(Default)]
+struct Flags {
+    stop_loop: AtomicBool,
+    stop_io: AtomicBool,
+    stop_log: AtomicBool,
+    /// The daemon is to end: the platform comes to rest.
+    is_ending: AtomicBool,
+    /// The daemon is to end and the platform is not under control.
+    may_end: AtomicBool,
+}
+
+/// Runs the threads until `stop`; the report, and the histograms as CSV.
+pub(super) fn run(
+    config: &Config,
+    faults: Option<&Path>,
+    stop: &Stop,
+) -> Result<(Report, String), DaemonError> {
+    let machine = &config.machine;
+    let parameters = parameters(machine, &config.deployment, fidelity::fidelity(config));
+    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+        warn!("{warning}");
+    }
+    let controller = Controller::new(machine, parameters);
+    let (realtime_side, io_side) = exchange();
+    let event = io_side.event.clone();
+    let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
+    let (record_producer, records) = record_queue.split();
+    let mut delay_queue = Box::new(Queue::<u64, DELAYS>::new());
+    let (delay_producer, delays) = delay_queue.split();
+    let (statistics_writer, statistics) = triple_buffer(Statistics::default());
+    let (flags, files) = (&Flags::default(), &OnceLock::new());
+    let (io_ready, ready) = channel();
+    let (go, go_ahead) = channel();
+    memory::keep_heap();
+
+    let log_links = LogLinks {
+        records,
+        delays,
+        statistics: statistics_writer,
+        files,
+        dump: FaultDump::new(faults, machine.home),
+        first_pose: FirstPose::of(machine),
+    };
+    let realtime_links = RealtimeLinks {
+        exchange: realtime_side,
+        records: record_producer,
+        files,
+        ready: io_ready.clone(),
+        go_ahead,
+    };
+    let io_links = IoLinks {
+        exchange: io_side,
+        delays: delay_producer,
+        statistics,
+        is_ending: &flags.is_ending,
+        may_end: &flags.may_end,
+    };
+    scope(|threads| {
+        // Also when a thread cannot be started the others must end.
+        let _stop_all = StopOnDrop(flags);
+        let log = spawn(threads, "hexad-log", || log_thread::run(log_links, &flags.stop_log))?;
+        let cyclic = spawn(threads, REALTIME_THREAD, || {
+            run_realtime(config, controller, realtime_links, &flags.stop_loop)
+        })?;
+        let io = spawn(threads, "hexad-io", move || run_io(config, io_links, &io_ready, &flags.stop_io))?;
+
+        let started = start(&config.deployment.realtime, &ready, &go);
+        if started.is_ok() {
+            supervise(config, flags, stop);
+        }
+        drop(go);
+        let reports = join(flags, &event, cyclic, io, log);
+        let _pm_qos = started?;
+        let (cyclic, io, mut log) = reports?;
+        let counts_csv = mem::take(&mut log.counts_csv);
+        Ok((Report::new(config, &cyclic, &io, log), counts_csv))
+    })
+}
+
+/// Links of the real-time thread to the other threads.
+struct RealtimeLinks<'a> {
+    exchange: RealtimeSide,
+    records: Producer<'a, CycleRecord>,
+    /// Receives the kernel's files about this thread.
+    files: &'a OnceLock<ThreadFiles>,
+    ready: Sender<Ready>,
+    go_ahead: Receiver<()>,
+}
+
+/// Body of the real-time thread; `None` if the daemon did not start.
+fn run_realtime(
+    config: &Config,
+    mut controller: Controller,
+    links: RealtimeLinks<'_>,
+    stop: &AtomicBool,
+) -> Option<LoopReport> {
+    let realtime = &config.deployment.realtime;
+    let warm_up = || warm_up(controller.clone(), &config.machine);
+    let shortfalls =
+        if realtime.is_simulated() { prepare_simulated(warm_up) } else { prepare_loop(realtime, warm_up) };
+    let _ = links.ready.send(Ok(shortfalls));
+    // Without them the worst cycles carry no hints.
+    let _ = ThreadFiles::of_this_thread().map(|found| links.files.set(found));
+    // No cycle begins before the main thread has accepted what all threads lack.
+    links.go_ahead.recv().ok()?;
+    let step = |input: &Input| controller.step(input);
+    let last = Output { diagnostic: DiagnosticCode::Stopping.into(), ..Output::default() };
+    let timing = timing(&config.deployment);
+    Some(cyclic::run(&mut Monotonic, &timing, step, last, links.exchange, links.records, stop))
+}
+
+/// Body of the io thread; `None` if its ports could not be opened.
+fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &AtomicBool) -> Option<IoReport> {
+    let Config { machine, deployment, .. } = config;
+    let realtime = &deployment.realtime;
+    // Ports belong to the thread that opens them.
+    let ports = config.join().and_then(|bus| Ports::open(&bus));
+    let (ports, opened) = ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
+    let shortfalls = opened.map(|()| if realtime.is_simulated() { vec![] } else { prepare_io(realtime) });
+    // There is no receiver only if the other thread failed first.
+    let _ = ready.send(shortfalls.map_err(DaemonError::from));
+    let settings = IoSettings {
+        timing: timing(deployment),
+        lead_ns: nanoseconds(realtime.io_lead_s),
+        max_force_age_ns: nanoseconds(deployment.timeouts.measured_s),
+        home: machine.home,
+    };
+    Some(io_thread::run(&settings, ports?, links, stop))
+}
+
+/// Waits for `stop`, and then until the platform is at rest.
+fn supervise(config: &Config, flags: &Flags, stop: &Stop) {
+    let _ = sd_notify::notify(&[NotifyState::Ready]);
+    info!(name = %config.name, rate_hz = config.deployment.realtime.rate_hz, "running");
+    stop.wait();
+    let _ = sd_notify::notify(&[NotifyState::Stopping]);
+    info!("stopping");
+    flags.is_ending.store(true, Ordering::Relaxed);
+    let began = Instant::now();
+    while !flags.may_end.load(Ordering::Relaxed) {
+        if stop.is_repeated() || began.elapsed() > MAX_STOP_TIME {
+            warn!("the platform did not come to rest: ending all the same");
+            return;
+        }
+        thread::sleep(REST_POLL_INTERVAL);
+    }
+}
+
+/// Ends the threads one after the other, so that each receives what the one before it wrote last.
+fn join(
+    flags: &Flags,
+    event: &Arc<Event>,
+    cyclic: ScopedJoinHandle<'_, Option<LoopReport>>,
+    io: ScopedJoinHandle<'_, Option<IoReport>>,
+    log: ScopedJoinHandle<'_, LogReport>,
+) -> Result<(LoopReport, IoReport, LogReport), DaemonError> {
+    flags.stop_loop.store(true, Ordering::Relaxed);
+    event.signal();
+    let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
+    flags.stop_io.store(true, Ordering::Relaxed);
+    let io = io.join().map_err(|_| DaemonError::Died("io"));
+    flags.stop_log.store(true, Ordering::Relaxed);
+    let log = log.join().map_err(|_| DaemonError::Died("log"));
+    Ok((cyclic?.unwrap_or_default(), io?.unwrap_or_default(), log?))
+}
+
+/// Stops every thread when dropped.
+struct StopOnDrop<'a>(&'a Flags);
+
+impl Drop for StopOnDrop<'_> {
+    fn drop(&mut self) {
+        let Flags { stop_loop, stop_io, stop_log, .. } = self.0;
+        [stop_loop, stop_io, stop_log].into_iter().for_each(|flag| flag.store(true, Ordering::Relaxed));
+    }
+}
+
+fn spawn<'scope, T: Send + 'scope>(
+    threads: &'scope Scope<'scope, '_>,
+    name: &str,
+    body: impl FnOnce() -> T + Send + 'scope,
+) -> io::Result<ScopedJoinHandle<'scope, T>> {
+    let body = || {
+        // The main thread waits for them.
+        block_signals();
+        body()
+    };
+    Builder::new().name(name.into()).stack_size(STACK_BYTES).spawn_scoped(threads, body)
+}

@@ -1,0 +1,104 @@
+//! The force message.
+
+use core::mem::offset_of;
+
+use iceoryx2::prelude::ZeroCopySend;
+
+use super::layout::{Declared as _, message};
+use super::{Message as _, SCHEMA};
+use crate::control::controller::Output;
+
+message! {
+    /// Actuator forces of one cycle. A driver brakes at a message that is not `valid`, and when its own watchdog has seen no
+    /// applicable message for too long. A message is applicable only if schema and checksum are right, the sequence
+    /// number increases and `time_ns` is neither in the future nor too old.
+    ForceMessage = "hexad_force" on "force" sealed by checksum {
+        header: super::Header,
+        /// Gamma; positive pushes the platform away from the base. Zero unless valid.
+        force_n: [f64; 6] ["N"],
+        /// 1 if the forces may be applied, else 0.
+        valid: u32,
+        /// Number of the `State`.
+        state: u32,
+        /// Number of the `DiagnosticCode` of the state.
+        diagnostic_code: u32,
+        /// Bits of the `Limit`s that this cycle has reached, or nearly.
+        active_limits: u32,
+        /// Instant for which the forces were computed: the cycle's release, or with external release the time of the
+        /// measurement that released it.
+        release_ns: u64 ["ns"],
+        /// CRC-32 (of zlib, PNG, Ethernet) of the bytes before it.
+        checksum: u32,
+        /// Zero.
+        reserved: u32,
+    }
+}
+
+impl ForceMessage {
+    /// Forces of a cycle that was computed for an instant \[ns\]; valid in the states under control.
+    pub fn new(output: &Output, release_ns: u64) -> Self {
+        Self {
+            force_n: output.force,
+            valid: u32::from(output.state.has_control()),
+            state: output.state as u32,
+            diagnostic_code: output.diagnostic.code as u32,
+            active_limits: output.active_limits.0,
+            release_ns,
+            ..Self::default()
+        }
+    }
+
+    /// Whether a driver may apply the forces, provided that the message is recent and newer than the one before.
+    pub fn may_be_applied(&self) -> bool {
+        self.header.schema == SCHEMA
+            && self.is_intact()
+            && self.valid == 1
+            && self.force_n.iter().all(|force| force.is_finite())
+    }
+
+    /// CRC-32 of the fields before `checksum`.
+    pub fn computed_checksum(&self) -> u32 {
+        self.checksum_before(offset_of!(Self, checksum))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::diagnostic::DiagnosticCode;
+    use crate::control::limits::LimitSet;
+    use crate::control::state::State;
+
+    #[test]
+    fn a_force_is_valid_only_under_control() {
+        let force = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let mut output = Output {
+            diagnostic: DiagnosticCode::SetpointTooFar.into(),
+            force,
+            active_limits: LimitSet(6),
+            ..Output::default()
+        };
+        for state in State::ALL {
+            output.state = state;
+            let message = ForceMessage::new(&output, 91);
+            let numbers = [message.valid, message.state, message.diagnostic_code, message.active_limits];
+            assert_eq!(
+                numbers,
+                [u32::from(state.has_control()), state as u32, DiagnosticCode::SetpointTooFar as u32, 6],
+                "{state:?}"
+            );
+            assert_eq!((message.force_n, message.release_ns), (force, 91));
+        }
+    }
+
+    #[test]
+    fn the_checksum_covers_the_bytes_before_it_and_no_other() {
+        let mut message = ForceMessage::default();
+        let zeros = crc32fast::hash(&[0; offset_of!(ForceMessage, checksum)]);
+        assert_eq!(message.computed_checksum(), zeros);
+        (message.checksum, message.reserved) = (7, 8);
+        assert_eq!(message.computed_checksum(), zeros);
+        message.release_ns = 1;
+        assert_ne!(message.computed_checksum(), zeros);
+    }
+}

@@ -1,0 +1,205 @@
+//! The one list of the fields of each message: `message!` declares a struct and describes it.
+//!
+//! From the description follow the declarations in other languages (`hexad messages`), the columns of CSV files, the
+//! checksum and the tests of the layout. A field is declared in no other place.
+
+/// Memory layout of a struct in the shared memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    /// Name under which iceoryx2 identifies the type: `hexad_` and the rest in snake case.
+    pub type_name: &'static str,
+    /// Last part of the topic's name; `None` for a struct that is part of a message.
+    pub topic: Option<&'static str>,
+    pub size: usize,
+    pub align: usize,
+    pub fields: &'static [Field],
+    pub doc: &'static str,
+}
+
+/// One field of a [`Layout`].
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    pub name: &'static str,
+    pub kind: Kind,
+    /// Number of elements of an array; `None` for a single value.
+    pub count: Option<usize>,
+    /// Bytes before it in the struct.
+    pub offset: usize,
+    /// Empty for a number without unit.
+    pub unit: &'static str,
+    pub doc: &'static str,
+}
+
+/// Type of a field or of the elements of an array.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    U32,
+    U64,
+    F64,
+    Struct(&'static Layout),
+}
+
+/// A type that a message may contain: a number, an array, a struct declared by `message!`.
+pub trait FieldType {
+    const KIND: Kind;
+    const COUNT: Option<usize> = None;
+
+    /// Calls `visit` with each number in order, as a float and as the bytes in memory.
+    fn visit(&self, visit: &mut dyn FnMut(f64, &[u8]));
+}
+
+/// A struct declared by `message!`.
+pub trait Declared: FieldType {
+    const LAYOUT: Layout;
+
+    /// All numbers of the struct, in the order of [`Layout::columns`].
+    fn numbers(&self) -> Vec<f64> {
+        let mut numbers = Vec::new();
+        self.visit(&mut |number, _| numbers.push(number));
+        numbers
+    }
+
+    /// CRC-32 (of zlib, PNG, Ethernet) of the bytes before an offset.
+    fn checksum_before(&self, offset: usize) -> u32 {
+        let mut crc = crc32fast::Hasher::new();
+        let mut at = 0;
+        self.visit(&mut |_, bytes| {
+            if at < offset {
+                crc.update(bytes);
+            }
+            at += bytes.len();
+        });
+        crc.finalize()
+    }
+}
+
+impl Layout {
+    /// Names of all numbers, nested names joined by `_`, elements of arrays counted from 1.
+    pub fn columns(&self, prefix: &str) -> Vec<String> {
+        let mut columns = Vec::new();
+        for field in self.fields {
+            let name = format!("{prefix}{}", field.name);
+            let names = match field.count {
+                None => vec![name],
+                Some(count) => (1..=count).map(|k| format!("{name}_{k}")).collect(),
+            };
+            for name in names {
+                match field.kind {
+                    Kind::Struct(nested) => columns.extend(nested.columns(&format!("{name}_"))),
+                    Kind::U32 | Kind::U64 | Kind::F64 => columns.push(name),
+                }
+            }
+        }
+        columns
+    }
+}
+
+macro_rules! number {
+    ($type:ty, $kind:ident) => {
+        impl FieldType for $type {
+            const KIND: Kind = Kind::$kind;
+
+            fn visit(&self, visit: &mut dyn FnMut(f64, &[u8])) {
+                visit(*self as f64, &self.to_ne_bytes());
+            }
+        }
+    };
+}
+
+number!(u32, U32);
+number!(u64, U64);
+number!(f64, F64);
+
+impl<T: FieldType, const N: usize> FieldType for [T; N] {
+    const KIND: Kind = T::KIND;
+    const COUNT: Option<usize> = Some(N);
+
+    fn visit(&self, visit: &mut dyn FnMut(f64, &[u8])) {
+        self.iter().for_each(|element| element.visit(visit));
+    }
+}
+
+/// Declares a `#[repr(C)]` struct: its fields with type, unit and meaning.
+///
+/// `on "topic"` makes it a [`Message`](super::Message), whose first field is the header; `sealed by` names the field
+/// for the checksum of the fields before it. A struct with gaps between its fields does not compile.
+macro_rules! message {
+    (
+        $(#[doc = $doc:literal])*
+        $name:ident = $type_name:tt $(on $topic:literal $(sealed by $checksum:ident)?)? {
+            $($(#[doc = $field_doc:literal])* $field:ident: $type:ty $([$unit:literal])?,)*
+        }
+    ) => {
+        $(#[doc = $doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+        #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+        #[type_name($type_name)]
+        #[repr(C)]
+        pub struct $name {
+            $($(#[doc = $field_doc])* $(#[doc = concat!(" \\[", $unit, "\\]")])? pub $field: $type,)*
+        }
+
+        const _: () = assert!(size_of::<$name>() == 0 $(+ size_of::<$type>())*, "a gap between fields");
+
+        impl $crate::messages::layout::FieldType for $name {
+            const KIND: $crate::messages::layout::Kind = $crate::messages::layout::Kind::Struct(
+                &<Self as $crate::messages::layout::Declared>::LAYOUT,
+            );
+
+            fn visit(&self, visit: &mut dyn FnMut(f64, &[u8])) {
+                $($crate::messages::layout::FieldType::visit(&self.$field, visit);)*
+            }
+        }
+
+        impl $crate::messages::layout::Declared for $name {
+            const LAYOUT: $crate::messages::layout::Layout = $crate::messages::layout::Layout {
+                type_name: $type_name,
+                topic: {
+                    let topic: &[&'static str] = &[$($topic)?];
+                    topic.first().copied()
+                },
+                size: size_of::<Self>(),
+                align: align_of::<Self>(),
+                fields: &[$($crate::messages::layout::Field {
+                    name: stringify!($field),
+                    kind: <$type as $crate::messages::layout::FieldType>::KIND,
+                    count: <$type as $crate::messages::layout::FieldType>::COUNT,
+                    offset: core::mem::offset_of!($name, $field),
+                    unit: concat!($($unit)?),
+                    doc: concat!($($field_doc),*),
+                },)*],
+                doc: concat!($($doc),*),
+            };
+        }
+
+        $(impl $crate::messages::Message for $name {
+            const TOPIC: &'static str = $topic;
+
+            fn header(&self) -> &$crate::messages::Header {
+                &self.header
+            }
+
+            fn header_mut(&mut self) -> &mut $crate::messages::Header {
+                &mut self.header
+            }
+
+            $crate::messages::layout::seal!($name $($checksum)?);
+        })?
+    };
+}
+
+/// The part of a [`Message`](super::Message) that concerns its checksum.
+macro_rules! seal {
+    ($name:ident) => {};
+    ($name:ident $checksum:ident) => {
+        fn seal(&mut self) {
+            self.$checksum = self.computed_checksum();
+        }
+
+        fn is_intact(&self) -> bool {
+            self.$checksum == self.computed_checksum()
+        }
+    };
+}
+
+pub(super) use {message, seal};

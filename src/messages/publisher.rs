@@ -1,0 +1,49 @@
+//! Publishing one topic.
+
+use iceoryx2::port::publisher::Publisher as Port;
+use iceoryx2::prelude::ipc;
+
+use super::bus::{PortError, port_error};
+use super::{Header, Message, SCHEMA};
+
+/// Publisher of one topic, which numbers its messages.
+pub struct Publisher<T: Message> {
+    port: Port<ipc::Service, T, ()>,
+    epoch: Option<u64>,
+    sequence: u64,
+}
+
+impl<T: Message> Publisher<T> {
+    pub(super) fn new(port: Port<ipc::Service, T, ()>, epoch: u64) -> Self {
+        Self { port, epoch: Some(epoch), sequence: 0 }
+    }
+
+    /// The same publisher with the time of its first message as the epoch: in simulated time its messages are then the
+    /// same in each run.
+    pub fn with_reproducible_epoch(self) -> Self {
+        Self { epoch: None, ..self }
+    }
+
+    /// Epoch and sequence number of the next message.
+    pub fn next_message(&self) -> (u64, u64) {
+        (self.epoch.unwrap_or_default(), self.sequence + 1)
+    }
+
+    /// Fills in the header and sends. `time_ns` is the instant at which the content holds.
+    pub fn publish(&mut self, time_ns: u64, mut message: T) -> Result<(), PortError> {
+        self.sequence += 1;
+        let epoch = *self.epoch.get_or_insert(time_ns);
+        *message.header_mut() =
+            Header { schema: SCHEMA, reserved: 0, epoch, sequence: self.sequence, time_ns };
+        message.seal();
+        let sample = self
+            .port
+            .loan_uninit()
+            .map_err(|cause| port_error(format!("cannot loan {}", T::TOPIC))(cause))?;
+        sample
+            .write_payload(message)
+            .send()
+            .map(|_| ())
+            .map_err(|cause| port_error(format!("cannot send {}", T::TOPIC))(cause))
+    }
+}
