@@ -10,8 +10,8 @@ use hexad::model::fidelity::Fidelity;
 use hexad::model::task::TaskState;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // The masses of the paper's Table 1; geometry and trajectory are stand-ins.
-    let path = env::args_os().nth(1).map_or("config/fried2008.toml".into(), PathBuf::from);
+    // A motion base of one tonne, z up.
+    let path = env::args_os().nth(1).map_or("config/motion_base.toml".into(), PathBuf::from);
     let machine = Config::load(&path)?.machine;
     let model = InverseDynamics::new(&machine);
 

@@ -30,7 +30,7 @@ const TOLERANCE_MARGIN: f64 = 1.05;
 const MAX_DRAWN_POINTS: u32 = 4 * SPREAD_POINTS;
 
 /// Last step of an ascent as a share of the envelope; the first is as wide as the envelope.
-const MIN_CLIMB_STEP: f64 = 1.0 / 64.0;
+const MIN_ASCENT_STEP: f64 = 1.0 / 64.0;
 
 /// Most sweeps over all dimensions with steps of one width; two are usual.
 const MAX_SWEEPS_PER_STEP: u32 = 4;
@@ -187,7 +187,7 @@ fn ascend(
     let mut best = *start;
     let mut step = 1.0;
     // The exact model has no error.
-    while best.error > 0.0 && step >= MIN_CLIMB_STEP {
+    while best.error > 0.0 && step >= MIN_ASCENT_STEP {
         for _ in 0..MAX_SWEEPS_PER_STEP {
             let before = best.error;
             for (axis, signed_step) in (0..DIMENSIONS).flat_map(|axis| [(axis, step), (axis, -step)]) {
