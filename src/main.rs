@@ -5,8 +5,8 @@ use std::io::{self, IsTerminal};
 use std::process::ExitCode;
 
 use clap::Parser;
-use hexad::commands::Cli;
-use hexad::commands::demo::children::PARENT;
+use hexad::commands::CommandLine;
+use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::realtime::allocation::CountingAllocator;
 use hexad::realtime::process::stop_with_parent;
 use tracing::level_filters::LevelFilter;
@@ -22,15 +22,15 @@ fn main() -> ExitCode {
         .with_ansi(io::stderr().is_terminal())
         .with_writer(io::stderr)
         .init();
-    let parent = env::var(PARENT).ok().and_then(|number| number.parse().ok());
+    let parent = env::var(PARENT_VARIABLE).ok().and_then(|number| number.parse().ok());
     if parent.is_some_and(|parent| !stop_with_parent(parent)) {
         return ExitCode::SUCCESS;
     }
-    match Cli::parse().run() {
+    match CommandLine::parse().execute() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("hexad: {}", failure.what);
-            ExitCode::from(failure.code)
+            eprintln!("hexad: {}", failure.message);
+            ExitCode::from(failure.exit_code)
         }
     }
 }

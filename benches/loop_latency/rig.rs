@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use hexad::commands::demo::children::PARENT;
+use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::config::Config;
 use hexad::realtime::process::terminate;
 use tempfile::TempDir;
@@ -95,7 +95,7 @@ impl Process {
         let name = Path::new(command.get_program()).display().to_string();
         let errors = rig.path(&format!("stderr-{}", fs::read_dir(rig.folder.path())?.count()));
         let child = command
-            .env(PARENT, std::process::id().to_string())
+            .env(PARENT_VARIABLE, std::process::id().to_string())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(fs::File::create(&errors)?)

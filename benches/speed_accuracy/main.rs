@@ -13,6 +13,8 @@
 //! ```
 
 mod chart;
+#[path = "../../tests/common/mod.rs"]
+mod common;
 mod methods;
 mod paper;
 mod peers;

@@ -14,12 +14,12 @@ use hexad::config::Config;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
-use hexad::output::csv_table::{Table, legs, six, trajectory_columns};
+use hexad::output::csv_table::{NumberTable, legs, six, trajectory_columns};
 
+use super::Failure;
+use super::common::data;
 use super::methods::Forces;
-use super::paper::State;
-use super::paper::common::data;
-use super::{Failure, paper};
+use super::paper::{self, State};
 
 /// The machines whose scenes are evaluated.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];
@@ -70,7 +70,7 @@ impl Scene {
         let paper_machine = paper::Machine::load(name);
         let mut columns = trajectory_columns();
         columns.extend(legs("force"));
-        let table = Table::read(&data(name, "csv"), &columns, &[])?;
+        let table = NumberTable::read(&data(name, "csv"), &columns, &[])?;
         let slower = if pace == Pace::Slow { SLOWER } else { 1.0 };
         let (mut states, mut motions, mut reference) = (vec![], vec![], vec![]);
         for row in table.rows() {
@@ -105,7 +105,7 @@ impl Scene {
             columns.extend(["x", "y", "z"].map(|axis| format!("{stem}_{axis}")));
         }
         columns.extend(legs("force"));
-        let table = Table::read(inputs, &columns, &[])?;
+        let table = NumberTable::read(inputs, &columns, &[])?;
         let mut motions = vec![];
         for row in table.rows() {
             let three = |at: usize| {

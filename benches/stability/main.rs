@@ -16,19 +16,15 @@
 #[path = "../../tests/common/mod.rs"]
 mod common;
 mod cycles;
-#[path = "../../tests/stability/delayed.rs"]
-mod delayed;
 mod maps;
-#[path = "../../tests/stability/rivals.rs"]
-mod rivals;
 mod sampled;
 #[path = "../shared/mod.rs"]
 mod shared;
 mod speed;
 #[path = "../speed_accuracy/timing.rs"]
 mod timing;
-#[path = "../../tests/stability/trials.rs"]
-mod trials;
+
+use common::stability::{delayed, rivals, trials};
 
 use shared::{Failure, cells, chart, write_csv};
 

@@ -40,7 +40,7 @@ const START_COUNT: u64 = 2000;
 /// Distance (radian, or radius) within which another mode may be the platform's true pose.
 const CONFUSABLE_DISTANCE: f64 = 0.5;
 
-/// SearchRegion of the starts of a search.
+/// Region of the starts of a search.
 #[derive(Clone, Copy, Debug)]
 pub struct SearchRegion {
     /// Middle of the region.
@@ -106,7 +106,7 @@ impl fmt::Display for OtherMode {
     }
 }
 
-/// OtherMode poses with the lengths of a pose that are found around it, the nearest first.
+/// The other assembly modes of a pose that are found around it, the nearest first.
 pub fn other_modes(machine: &Machine, here: &KinematicState) -> Vec<OtherMode> {
     let center = *here.pose();
     let region =

@@ -1,7 +1,7 @@
 //! Properties of a machine, a motion or a control loop, computed before the platform moves.
 //!
 //! [`envelope`] and [`reachable_envelope`] define the motions of a task, [`fidelity_error`] and [`fidelity_choice`] the
-//! terms of the model that they need; [`pose_quality`], [`clearance`] and [`region_search`] compute the workspace,
+//! terms of the model that they need; [`pose_quality`], [`region_shape`], [`clearance`] and [`region_search`] compute the workspace,
 //! [`assembly_modes`] the other poses with the same leg lengths, [`sampled_loop`] the margins of a sampled loop;
 //! [`batch`] evaluates many motions on all processors. May allocate; not for the cycle.
 
@@ -14,4 +14,5 @@ pub mod fidelity_error;
 pub mod pose_quality;
 pub mod reachable_envelope;
 pub mod region_search;
+pub mod region_shape;
 pub mod sampled_loop;

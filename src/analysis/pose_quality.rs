@@ -1,4 +1,4 @@
-//! PoseQuality of a pose: stroke margin, condition, largest force under given accelerations, payload.
+//! Quality of a pose: stroke margin, condition, largest force under given accelerations, payload.
 //!
 //! Around a pose at rest the forces are linear in the acceleration and in an added mass p, a point fixed to the
 //! platform at its centre of mass c:
@@ -66,7 +66,7 @@ pub struct PoseEvaluator {
     home_sign: f64,
 }
 
-/// PoseQuality of a pose.
+/// Quality of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseQuality {
     /// Smallest distance of a leg from an end of its stroke; negative outside of it \[m\].

@@ -12,8 +12,9 @@ use std::collections::BinaryHeap;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
-use crate::analysis::clearance::{Clearance, PoseCell, RegionShape, WorkspaceLimit};
+use crate::analysis::clearance::{Clearance, WorkspaceLimit};
 use crate::analysis::envelope::MotionEnvelope;
+use crate::analysis::region_shape::{PoseCell, RegionShape};
 use crate::model::machine::Machine;
 
 /// Gap between the proved size and the nearest violation that ends the search, as a share of the latter.

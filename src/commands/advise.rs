@@ -1,14 +1,14 @@
-//! `hexad advise`: what every fidelity of the ladder of models costs over a scene, in newtons and in time, and
-//! which one will do.
+//! `hexad advise`: error and time of each model fidelity over an envelope or a trajectory, and which one suffices.
 
 use core::fmt;
 use core::hint::black_box;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressDrawTarget};
-
-use super::offline::{progress, task_state};
+use super::arguments::MachineFile;
+use super::failure::{CommandError, Failure};
+use super::offline_tables::{read_trajectory, task_state};
+use super::progress::item_bar;
 use crate::analysis::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::analysis::fidelity_choice::FidelityComparison;
 use crate::analysis::fidelity_error::{ErrorStatistics, FIDELITY_COUNT, FidelitySample};
@@ -17,37 +17,52 @@ use crate::config::fidelity::envelope;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::rigid::Motion;
-use crate::output::csv_table::{Table, TableError, trajectory_columns};
-use crate::output::numbers::{percent, plain_percent, significant};
+use crate::output::csv_table::TableError;
+use crate::output::files::print;
+use crate::output::numbers::{AXES, axis_unit, percent, plain_percent, significant};
+use crate::output::text_table::{Left, Right, text_table};
 
-/// Motions of the scene that are timed: enough to be different ones, few enough to stay in the cache.
+/// Motions that are timed: enough to be different ones, few enough to stay in the cache.
 const TIMED_MOTIONS: usize = 256;
 
-/// Batches timed per fidelity, one fidelity after the other, so that what disturbs the computer disturbs all.
-const ROUNDS: usize = 101;
+/// Batches timed per fidelity, one fidelity after the other, so that a disturbance of the computer affects all.
+const TIMING_ROUNDS: usize = 101;
 
-/// Shorter than this a command needs no bar.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Least share of time that a fidelity with more terms must save to be recommended instead; less is noise.
+const MIN_TIME_SAVED: f64 = 0.1;
 
-/// A fidelity further up the ladder is taken for the cheaper one only if it is quicker by more than this share:
-/// less is noise.
-const QUICKER: f64 = 0.1;
+#[derive(Debug, clap::Args)]
+pub struct AdviseArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    /// A CSV file with t, X, X', X'', instead of the envelope
+    #[arg(long, value_name = "FILE")]
+    trajectory: Option<PathBuf>,
+}
 
-/// Why there is no advice.
+impl AdviseArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        Ok(print(Advice::new(&self.machine.load()?, self.trajectory.as_deref())?)?)
+    }
+}
+
+/// Error that prevents advice.
 #[derive(Debug, thiserror::Error)]
 pub enum AdviseError {
     #[error(transparent)]
     Table(#[from] TableError),
-    #[error("{}: no row can be judged, {outside} outside the actuators' stroke, {singular} singular", path.display())]
-    NothingJudged { path: PathBuf, outside: u64, singular: u64 },
+    #[error("{}: no row can be evaluated: {outside} are outside the actuators' stroke, {singular} at singular poses; correct the trajectory", path.display())]
+    NothingEvaluated { path: PathBuf, outside: u64, singular: u64 },
 }
 
-/// A scene, judged and timed.
+impl CommandError for AdviseError {}
+
+/// Errors and times of all fidelities over a set of motions; displays as a table with a recommendation.
 pub struct Advice {
     name: String,
-    /// What was looked at, in lines.
+    /// The set of motions, in lines of text.
     scene: String,
-    /// Of an actuator \[N\].
+    /// Largest force of an actuator \[N\].
     max_force: f64,
     comparison: FidelityComparison,
     /// Median time of an evaluation, in the order of [`Fidelity::ALL`] \[ns\].
@@ -56,7 +71,7 @@ pub struct Advice {
 }
 
 impl Advice {
-    /// Judges the configured envelope, or a trajectory.
+    /// Evaluates the configured envelope, or a trajectory.
     pub fn new(config: &Config, trajectory: Option<&Path>) -> Result<Self, AdviseError> {
         let model = InverseDynamics::new(&config.machine);
         let (scene, comparison, motions) = match trajectory {
@@ -73,7 +88,7 @@ impl Advice {
         })
     }
 
-    /// The fidelity that takes the least time of those within the tolerance on which a loop can run.
+    /// The fastest fidelity within the tolerance that a control loop can use.
     fn choice(&self) -> Fidelity {
         let time = |fidelity: Fidelity| {
             let times = Fidelity::ALL.into_iter().zip(self.times);
@@ -82,7 +97,7 @@ impl Advice {
         let first = self.comparison.choice(self.tolerance);
         let allowed = self.comparison.within(self.tolerance).map(|error| error.fidelity);
         allowed.filter(|fidelity| fidelity.has_inertia()).fold(first, |best, fidelity| {
-            if time(fidelity) < (1.0 - QUICKER) * time(best) { fidelity } else { best }
+            if time(fidelity) < (1.0 - MIN_TIME_SAVED) * time(best) { fidelity } else { best }
         })
     }
 }
@@ -111,41 +126,37 @@ fn judge_envelope(config: &Config, model: &InverseDynamics) -> (String, Fidelity
     (scene, comparison, motions)
 }
 
-/// The ranges, as motion bases are specified.
+/// The ranges of an envelope as a table.
 fn limits(limits: &EnvelopeBounds) -> String {
-    let names = ["alpha", "beta", "gamma", "x", "y", "z"];
-    let mut text = format!("{:<8}{:>21}{:>18}{:>20}\n", "", "offset from home", "rate", "acceleration");
     let ranges = limits.pose_min.iter().zip(&limits.pose_max);
     let motion = limits.velocity.iter().zip(&limits.acceleration);
-    for (axis, (name, ((low, high), (velocity, acceleration)))) in
-        names.into_iter().zip(ranges.zip(motion)).enumerate()
-    {
-        let (scale, unit) = if axis < 3 { (1.0_f64.to_degrees(), "deg") } else { (1e3, "mm") };
-        let [low, high, velocity, acceleration] =
-            [low, high, velocity, acceleration].map(|x| significant(x * scale));
-        text += &format!(
-            "{name:<8}{:>21}{:>18}{:>20}\n",
-            format!("{low} to {high} {unit}"),
-            format!("{velocity} {unit}/s"),
-            format!("{acceleration} {unit}/s2"),
-        );
-    }
-    text
+    let rows = AXES.into_iter().zip(ranges.zip(motion)).enumerate().map(
+        |(axis, (name, ((low, high), (velocity, acceleration))))| {
+            let (scale, unit) = axis_unit(axis);
+            let [low, high, velocity, acceleration] =
+                [low, high, velocity, acceleration].map(|x| significant(x * scale));
+            [
+                name.into(),
+                format!("{low} to {high} {unit}"),
+                format!("{velocity} {unit}/s"),
+                format!("{acceleration} {unit}/s2"),
+            ]
+        },
+    );
+    text_table(2, &[("", Left), ("offset from home", Right), ("rate", Right), ("acceleration", Right)], rows)
 }
 
 fn judge_trajectory(
     model: &InverseDynamics,
     path: &Path,
 ) -> Result<(String, FidelityComparison, Vec<Motion>), AdviseError> {
-    let table = Table::read(path, &trajectory_columns(), &[])?;
+    let table = read_trajectory(path)?;
     let rows = table.rows();
-    let (mut tally, start, mut bar) = (ErrorStatistics::default(), Instant::now(), None::<ProgressBar>);
+    let (mut tally, bar) = (ErrorStatistics::default(), item_bar(rows.len(), "rows"));
     let every = rows.len().div_ceil(TIMED_MOTIONS);
     let mut motions = vec![];
     for (k, row) in rows.iter().enumerate() {
-        if k % 1024 == 0 && start.elapsed() > PATIENCE {
-            bar.get_or_insert_with(|| progress(rows.len(), "rows")).set_position(k as u64);
-        }
+        bar.inc(1);
         let state = task_state(row);
         let sample = FidelitySample::take(model, &state);
         tally.add(&sample);
@@ -153,13 +164,10 @@ fn judge_trajectory(
             motions.push(state.motion());
         }
     }
-    if let Some(bar) = bar {
-        bar.set_draw_target(ProgressDrawTarget::hidden());
-        bar.finish_and_clear();
-    }
+    bar.finish_and_clear();
     if tally.evaluated == 0 {
         let ErrorStatistics { outside, singular, .. } = tally;
-        return Err(AdviseError::NothingJudged { path: path.into(), outside, singular });
+        return Err(AdviseError::NothingEvaluated { path: path.into(), outside, singular });
     }
     let scene = format!("the rows of {}:\n{} motions", path.display(), tally.evaluated);
     Ok((scene, FidelityComparison::of_rows(tally), motions))
@@ -168,7 +176,7 @@ fn judge_trajectory(
 /// Median time of an evaluation of each fidelity \[ns\].
 fn time(model: &InverseDynamics, motions: &[Motion]) -> [f64; FIDELITY_COUNT] {
     let mut rounds = [const { Vec::new() }; FIDELITY_COUNT];
-    for _ in 0..ROUNDS {
+    for _ in 0..TIMING_ROUNDS {
         for (times, fidelity) in rounds.iter_mut().zip(Fidelity::ALL) {
             let start = Instant::now();
             for motion in motions {
@@ -202,21 +210,21 @@ impl fmt::Display for Advice {
         if inside.peak < all.peak {
             write!(f, "; {} N among the motions inside", significant(inside.peak))?;
         }
-        writeln!(f, "\n\n{:<14} {:^26} {:>24}", "", "error of a leg's force [N]", "share of the peak [%]")?;
-        let numbers = ["mean", "RMS", "max", "mean", "RMS", "max"].map(|what| format!("{what:>8}")).join(" ");
-        writeln!(f, "{:<14} {numbers} {:>5}  leaves out", "fidelity", "ns")?;
-        for (error, time) in comparison.errors.iter().zip(times) {
+        let header = ["mean", "RMS", "max", "mean %", "RMS %", "max %", "ns"];
+        let [mean, rms, max, mean_share, rms_share, max_share, ns] = header.map(|name| (name, Right));
+        let columns =
+            [("fidelity", Left), mean, rms, max, mean_share, rms_share, max_share, ns, ("leaves out", Left)];
+        let rows = comparison.errors.iter().zip(times).map(|(error, time)| {
             let share = |error: f64| if error == 0.0 { 0.0 } else { 100.0 * error / inside.peak };
             let [mean, rms, max] = [error.mean, error.rms, error.max].map(significant);
             let shares = [share(error.mean), share(error.rms), 100.0 * error.share].map(significant);
             let [mean_share, rms_share, max_share] = shares;
-            writeln!(
-                f,
-                "{:<14} {mean:>8} {rms:>8} {max:>8} {mean_share:>8} {rms_share:>8} {max_share:>8} {time:>5.0}  {}",
-                error.fidelity.name(),
-                error.fidelity.left_out_terms()
-            )?;
-        }
+            let (name, left_out_terms) =
+                (error.fidelity.name().into(), error.fidelity.left_out_terms().into());
+            [name, mean, rms, max, mean_share, rms_share, max_share, format!("{time:.0}"), left_out_terms]
+        });
+        writeln!(f, "\n\nerror of a leg's force [N], and as a share of the peak force [%]:")?;
+        write!(f, "{}", text_table(1, &columns, rows))?;
         self.fmt_recommendation(f, &plain_percent(*tolerance))
     }
 }

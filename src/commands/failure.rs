@@ -1,87 +1,62 @@
-//! Why a command failed.
+//! Failure of a command, and its exit code.
 
-use super::advise::AdviseError;
-use super::demo::DemoError;
-use super::doctor::DoctorError;
-use super::r#move::SetpointError;
-use super::offline::OfflineError;
+use core::error::Error;
+
 use super::operate::OperatorError;
 use crate::config::ConfigError;
+use crate::daemon::DaemonError;
+use crate::messages::PortError;
 use crate::output::files::FileError;
 use crate::output::svg::ChartError;
 
-/// Why a command failed, and its exit code: 1 it ran and went wrong, 2 it could not begin.
+/// Error that ends a command, with the exit code of the process: 1 if the command ran and failed, 2 if it could not
+/// begin.
 #[derive(Debug)]
 pub struct Failure {
-    pub code: u8,
-    pub what: String,
+    pub exit_code: u8,
+    pub message: String,
 }
 
 impl Failure {
-    /// For everything that is found before the work.
-    pub fn could_not_begin(error: impl core::error::Error) -> Self {
-        Self { code: 2, what: error.to_string() }
+    /// Failure of a command that could not begin.
+    pub fn before_start(error: impl Error) -> Self {
+        Self { exit_code: 2, message: error.to_string() }
     }
 }
 
-impl From<ConfigError> for Failure {
-    fn from(error: ConfigError) -> Self {
-        Self::could_not_begin(error)
+/// Error that can end a command.
+pub trait CommandError: Error {
+    /// Whether the command had begun its work.
+    fn has_begun(&self) -> bool {
+        false
     }
 }
 
-impl From<FileError> for Failure {
-    fn from(error: FileError) -> Self {
-        Self { code: 1, what: error.to_string() }
+impl<E: CommandError> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Self { exit_code: if error.has_begun() { 1 } else { 2 }, message: error.to_string() }
     }
 }
 
-impl From<ChartError> for Failure {
-    fn from(error: ChartError) -> Self {
-        Self { code: 1, what: error.to_string() }
+impl CommandError for ConfigError {}
+impl CommandError for DaemonError {}
+impl CommandError for PortError {}
+impl CommandError for ctrlc::Error {}
+
+impl CommandError for ChartError {
+    fn has_begun(&self) -> bool {
+        true
     }
 }
 
-impl From<OperatorError> for Failure {
-    fn from(error: OperatorError) -> Self {
-        let code = if matches!(error, OperatorError::Port(_) | OperatorError::NoStatus(_)) { 2 } else { 1 };
-        Self { code, what: error.to_string() }
+impl CommandError for FileError {
+    fn has_begun(&self) -> bool {
+        true
     }
 }
 
-impl From<SetpointError> for Failure {
-    fn from(error: SetpointError) -> Self {
-        Self::could_not_begin(error)
-    }
-}
-
-impl From<AdviseError> for Failure {
-    fn from(error: AdviseError) -> Self {
-        Self::could_not_begin(error)
-    }
-}
-
-impl From<OfflineError> for Failure {
-    fn from(error: OfflineError) -> Self {
-        let code = if matches!(error, OfflineError::Unsolved { .. }) { 1 } else { 2 };
-        Self { code, what: error.to_string() }
-    }
-}
-
-impl From<DoctorError> for Failure {
-    fn from(error: DoctorError) -> Self {
-        let ran = matches!(error, DoctorError::Impossible(_) | DoctorError::Interrupted);
-        Self { code: if ran { 1 } else { 2 }, what: error.to_string() }
-    }
-}
-
-impl From<DemoError> for Failure {
-    fn from(error: DemoError) -> Self {
-        let code = if matches!(error, DemoError::Config(_) | DemoError::File(_) | DemoError::Port(_)) {
-            2
-        } else {
-            1
-        };
-        Self { code, what: error.to_string() }
+impl CommandError for OperatorError {
+    fn has_begun(&self) -> bool {
+        !matches!(self, Self::Port(_) | Self::NoStatus(_))
     }
 }

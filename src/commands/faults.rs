@@ -1,34 +1,36 @@
-//! `hexad faults`: the table of causes, from the one place where they are defined; and their numbers in words.
+//! `hexad faults`: the numbers of states, faults and limits in words, from the place that defines them.
 
 use core::fmt;
 
 use crate::control::diagnostic::{DiagnosticCode, Reaction};
 use crate::control::limits::Limit;
 use crate::control::state::State;
+use crate::output::text_table::{Left, Right, paragraph, stdout_width, text_table};
 
-/// Displays as tables of states, causes and limits, by number.
-pub struct Faults;
+/// Tables of states, faults and limits, by number.
+pub struct FaultTables;
 
-impl fmt::Display for Faults {
+impl fmt::Display for FaultTables {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "state     force")?;
-        for state in State::ALL {
+        let states = State::ALL.map(|state| {
             let force = if state.has_control() { "valid" } else { "not valid: brake" };
-            writeln!(f, "{} {:<9}{force}", state as u32, state.name())?;
-        }
+            [(state as u32).to_string(), state.name().into(), force.into()]
+        });
+        write!(f, "{}", text_table(2, &[("state", Right), ("", Left), ("force", Left)], states))?;
         writeln!(f, "\nfault (below 100: none; the platform waits)")?;
         for code in DiagnosticCode::ALL.iter().filter(|code| **code != DiagnosticCode::None) {
             let reaction = match code.reaction() {
                 Reaction::None => "To do: ",
                 Reaction::Stop => "The platform is brought to rest; fault until cleared. To do: ",
-                Reaction::Brake => "The platform is let go at once; fault until cleared. To do: ",
+                Reaction::Brake => {
+                    "Forces are disabled and the brakes close at once; fault until cleared. To do: "
+                }
             };
-            writeln!(f, "{:>3} {}\n    {reaction}{}", *code as u32, code.name(), code.remedy())?;
+            let text = paragraph("    ", &format!("{reaction}{}", code.remedy()), stdout_width());
+            write!(f, "{:>3} {}\n{text}", *code as u32, code.name())?;
         }
-        writeln!(f, "\nbit of `limiting`")?;
-        for limit in Limit::ALL {
-            writeln!(f, "{:>3} {}", limit as u32, limit.name())?;
-        }
-        Ok(())
+        writeln!(f, "\nbits of `limiting`")?;
+        let limits = Limit::ALL.map(|limit| [(limit as u32).to_string(), limit.name().into()]);
+        write!(f, "{}", text_table(2, &[("bit", Right), ("limit", Left)], limits))
     }
 }

@@ -2,14 +2,29 @@
 
 use core::fmt::{self, Write as _};
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
+use super::failure::Failure;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::limits::Limit;
 use crate::control::state::{Request, State};
 use crate::messages::layout::{Field, Kind, Layout};
 use crate::messages::{MESSAGES, SCHEMA};
+use crate::output::files::print;
+
+#[derive(Debug, Args)]
+pub struct MessagesArguments {
+    /// The language of the declarations
+    #[arg(long, value_enum)]
+    language: Language,
+}
+
+impl MessagesArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        Ok(print(Declarations(self.language))?)
+    }
+}
 
 /// Language of the declarations.
 #[derive(Clone, Copy, Debug, ValueEnum)]

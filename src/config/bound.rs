@@ -1,28 +1,28 @@
-//! What a number must be, and the words for it.
+//! Bounds of the numbers in a configuration.
 
 use core::fmt;
 
 use toml::de::DeValue;
 
-use crate::output::numbers::{LARGEST, SMALLEST};
+use crate::output::numbers::{MAX_MAGNITUDE, MIN_POSITIVE_VALUE};
 
-/// What a number must be, besides finite.
+/// Bound of a number that must be finite.
 #[derive(Clone, Copy)]
 pub(super) enum Bound {
     Finite,
-    /// At least [`SMALLEST`].
+    /// At least [`MIN_POSITIVE_VALUE`].
     Positive,
     NotNegative,
     NotPositive,
-    /// At least [`SMALLEST`] and up to the limit.
+    /// At least [`MIN_POSITIVE_VALUE`] and up to the limit.
     UpTo(f64),
     /// Both ends included.
     Within(f64, f64),
 }
 
 impl Bound {
-    /// What is wrong with a value, if anything; `None` is a value that is no number.
-    pub fn refusal(self, value: Option<f64>) -> Option<String> {
+    /// Requirement that a value violates, if any; `None` is a value that is no number.
+    pub fn violation(self, value: Option<f64>) -> Option<String> {
         let Some(x) = value else {
             return Some(match self {
                 Self::Finite => format!("must be {self}"),
@@ -31,17 +31,19 @@ impl Bound {
         };
         let admits = match self {
             Self::Finite => true,
-            Self::Positive => x >= SMALLEST,
+            Self::Positive => x >= MIN_POSITIVE_VALUE,
             Self::NotNegative => x >= 0.0,
             Self::NotPositive => x <= 0.0,
-            Self::UpTo(high) => x >= SMALLEST && x <= high,
+            Self::UpTo(high) => x >= MIN_POSITIVE_VALUE && x <= high,
             Self::Within(low, high) => (low..=high).contains(&x),
         };
-        match (x.abs() <= LARGEST, admits) {
+        match (x.abs() <= MAX_MAGNITUDE, admits) {
             (true, true) => None,
-            (true, false) if x > 0.0 && x < SMALLEST => Some(format!("must be at least {SMALLEST:e}")),
+            (true, false) if x > 0.0 && x < MIN_POSITIVE_VALUE => {
+                Some(format!("must be at least {MIN_POSITIVE_VALUE:e}"))
+            }
             (true, false) => Some(format!("must be {self}")),
-            (false, _) => Some(format!("must be a finite number, at most {LARGEST:e} in magnitude")),
+            (false, _) => Some(format!("must be a finite number, at most {MAX_MAGNITUDE:e} in magnitude")),
         }
     }
 }
@@ -59,7 +61,7 @@ impl fmt::Display for Bound {
     }
 }
 
-/// A float, or an integer that 128 bits hold.
+/// Number of a value: a float, or an integer of at most 128 bits.
 pub(super) fn number(value: &DeValue) -> Option<f64> {
     match value {
         DeValue::Integer(x) => i128::from_str_radix(x.as_str(), x.radix()).ok().map(|x| x as f64),
@@ -68,7 +70,7 @@ pub(super) fn number(value: &DeValue) -> Option<f64> {
     }
 }
 
-/// An integer that 32 bits hold.
+/// Integer of a value, of at most 32 bits.
 pub(super) fn integer(value: &DeValue) -> Option<i32> {
     value.as_integer().and_then(|x| i32::from_str_radix(x.as_str(), x.radix()).ok())
 }

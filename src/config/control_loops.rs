@@ -1,4 +1,4 @@
-//! The control loops of a deployment, and how far each is from unstable.
+//! Control loops of a deployment, and the stability margin of each.
 
 use core::f64::consts::TAU;
 use core::fmt;
@@ -6,9 +6,8 @@ use core::fmt;
 use super::Config;
 use super::deployment::GAIN_MARGIN;
 use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
-use crate::control::leg_masses::LegMasses;
 
-/// One loop with the longest delay of the daemon.
+/// Control loop with the longest delay that the daemon may have.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlLoop {
     pub name: &'static str,
@@ -17,8 +16,8 @@ pub struct ControlLoop {
     pub sampled: SampledLoop,
 }
 
-/// Of the pose, or of the stiffest mode of the legs.
-pub fn loops(config: &Config, leg_masses: &LegMasses) -> Vec<ControlLoop> {
+/// The loops of position and orientation, or that of the stiffest mode of the legs.
+pub fn loops(config: &Config) -> Vec<ControlLoop> {
     let deployment = &config.deployment;
     let control = &deployment.control;
     let [position, orientation] = [
@@ -26,7 +25,7 @@ pub fn loops(config: &Config, leg_masses: &LegMasses) -> Vec<ControlLoop> {
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
     ];
     let each = if control.mode.acts_on_legs() {
-        vec![("legs", position, leg_masses.stiffest)]
+        vec![("legs", position, control.leg_masses.stiffest)]
     } else {
         vec![("position", position, 1.0), ("orientation", orientation, 1.0)]
     };
@@ -44,7 +43,7 @@ pub fn loops(config: &Config, leg_masses: &LegMasses) -> Vec<ControlLoop> {
 }
 
 impl ControlLoop {
-    /// What somebody should know before a platform moves by it.
+    /// Warning where the gain margin is less than usual.
     pub fn warning(&self) -> Option<String> {
         let Self { name, sampled, .. } = self;
         let (margin, delay) = (sampled.gain_margin(), sampled.delay);
@@ -58,7 +57,7 @@ impl ControlLoop {
     }
 }
 
-/// The loop, what it carries with its delay, and how much delay it would carry.
+/// The loop, its margin with its delay, and the delay at which it would be unstable.
 impl fmt::Display for ControlLoop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, bandwidth_hz, rate_hz, sampled } = self;

@@ -1,4 +1,4 @@
-//! `control.fidelity`: which fidelity of the ladder the loop runs on, decided once at start-up.
+//! Fidelity of the dynamic model that the loop uses, `control.fidelity`; decided once at start-up.
 
 use tracing::info;
 
@@ -11,7 +11,7 @@ use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::output::numbers::{percent, plain_percent};
 
-/// The envelope of a configuration: as given, or as large as the machine can carry.
+/// Envelope of a configuration: as given, or as large as the machine can carry.
 pub fn envelope(config: &Config, model: &InverseDynamics) -> MotionEnvelope {
     match config.deployment.envelope {
         Some(limits) => MotionEnvelope::new(&config.machine.home, limits),
@@ -19,7 +19,7 @@ pub fn envelope(config: &Config, model: &InverseDynamics) -> MotionEnvelope {
     }
 }
 
-/// The fidelity that the configuration names, or the cheapest that its envelope allows; says why.
+/// The configured fidelity, or the cheapest that the envelope allows; logs the reason.
 pub fn fidelity(config: &Config) -> Fidelity {
     let tolerance = config.deployment.control.fidelity_tolerance;
     match config.deployment.control.fidelity {
@@ -42,7 +42,7 @@ pub fn fidelity(config: &Config) -> Fidelity {
     }
 }
 
-/// Why a comparison leads to its choice.
+/// Reason for the choice of a fidelity, with the errors of those that were rejected.
 pub fn reason(comparison: &FidelityComparison, tolerance: f64) -> String {
     use core::fmt::Write as _;
     let chosen = comparison.choice(tolerance);
@@ -61,7 +61,7 @@ pub fn reason(comparison: &FidelityComparison, tolerance: f64) -> String {
                     "leaving out {what} costs at most {share} of the peak force, tolerance {tolerance}"
                 )
             }
-            // Above the choice there is nothing to decide.
+            // Fidelities with more terms than the chosen one need no reason.
             _ if text.is_empty() => Ok(()),
             fidelity if !fidelity.has_inertia() => Ok(()),
             _ => write!(text, "; {what} would cost {share}"),

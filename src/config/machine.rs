@@ -1,4 +1,4 @@
-//! The sections that describe the machine, and what the laws of mechanics ask of them.
+//! The sections that describe the machine, and the checks that follow from mechanics.
 //!
 //! `name` and `gravity_m_s2` at the top, `[platform]`, `[cylinder]`, `[rod]`, `[actuator]`, `[home]` and
 //! six `[[leg]]`. What follows from the geometry as a whole is checked in [`super::geometry`].
@@ -8,33 +8,33 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::bound::Bound;
 use super::geometry;
-use super::reader::Reader;
+use super::reader::SectionReader;
 use crate::model::machine::{
     Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia, at_most_256_bits,
 };
 use crate::model::task::TaskState;
 
-/// Strongest gravity \[m/s^2\]: ten times the Earth's is a slip of the unit, not a site.
-const STRONGEST_GRAVITY: f64 = 100.0;
+/// Largest gravity \[m/s^2\]: ten times the Earth's is a wrong unit, not a site.
+const MAX_GRAVITY_M_S2: f64 = 100.0;
 
 /// Relative tolerance of the triangle inequalities: a flat plate and a thin disc meet them with equality,
 /// and the digits of a file round them to either side.
 const INERTIA_TOLERANCE: f64 = 1e-9;
 
-/// One `[[leg]]`, its reader still open for the checks that need all six.
-pub(super) struct Leg<'t> {
-    pub reader: Reader<'t>,
+/// Section `[[leg]]`, its reader still open for the checks that need all six.
+pub(super) struct LegSection<'t> {
+    pub reader: SectionReader<'t>,
     pub base: Vector3<f64>,
     pub platform: Vector3<f64>,
     /// Unit length.
     pub universal_axis: Vector3<f64>,
 }
 
-/// Reads and checks the machine. Where something was refused it holds NaN.
-pub(super) fn read(root: &mut Reader) -> Machine {
+/// Reads and checks the machine. Rejected values are NaN.
+pub(super) fn read(root: &mut SectionReader) -> Machine {
     let gravity = Vector3::from(root.vector("gravity_m_s2"));
-    if gravity.norm() > STRONGEST_GRAVITY {
-        root.refuse("gravity_m_s2", format!("must be at most {STRONGEST_GRAVITY} long"));
+    if gravity.norm() > MAX_GRAVITY_M_S2 {
+        root.reject("gravity_m_s2", format!("must be at most {MAX_GRAVITY_M_S2} long"));
     }
     let platform = platform(root.section("platform"));
     let actuator = actuator(root.section("actuator"));
@@ -42,8 +42,8 @@ pub(super) fn read(root: &mut Reader) -> Machine {
     let rod = link(root.section("rod"), &actuator);
     let mut home = root.section("home");
     let home_pose = home.vector("pose");
-    let legs: Vec<Leg> = root.rows("leg", LEGS).into_iter().map(leg).collect();
-    let of_leg = |member: fn(&Leg) -> Vector3<f64>| -> [Vector3<f64>; LEGS] {
+    let legs: Vec<LegSection> = root.rows("leg", LEGS).into_iter().map(leg).collect();
+    let of_leg = |member: fn(&LegSection) -> Vector3<f64>| -> [Vector3<f64>; LEGS] {
         core::array::from_fn(|i| legs.get(i).map_or(Vector3::repeat(f64::NAN), member))
     };
     let joints = Joints::new(
@@ -60,7 +60,7 @@ pub(super) fn read(root: &mut Reader) -> Machine {
     machine
 }
 
-fn platform(mut section: Reader) -> Platform {
+fn platform(mut section: SectionReader) -> Platform {
     let mass = section.number("mass_kg", Bound::Positive);
     let center_of_mass = Vector3::from(section.vector("center_of_mass_m"));
     let mut tensor = section.section("inertia_kg_m2");
@@ -75,21 +75,21 @@ fn platform(mut section: Reader) -> Platform {
     Platform { mass, center_of_mass, inertia }
 }
 
-/// A body of positive masses has `0 < I1 <= I2 <= I3 <= I1 + I2`.
-fn check_inertia(section: &Reader, inertia: &Matrix3<f64>) {
+/// Checks an inertia tensor: a body of positive masses has `0 < I1 <= I2 <= I3 <= I1 + I2`.
+fn check_inertia(section: &SectionReader, inertia: &Matrix3<f64>) {
     let mut principal: [f64; 3] = inertia.symmetric_eigenvalues().into();
     principal.sort_by(f64::total_cmp);
     let [least, middle, greatest] = principal;
     let tolerance = INERTIA_TOLERANCE * greatest.abs();
     let shown = format!("principal moments {:?}", principal.map(rounded));
     if least <= tolerance {
-        section.refuse_as("inertia_kg_m2", shown, "must all be greater than 0");
+        section.reject_as("inertia_kg_m2", shown, "must all be greater than 0");
     } else if greatest > least + middle + tolerance {
-        section.refuse_as("inertia_kg_m2", shown, "the greatest must be at most the sum of the others");
+        section.reject_as("inertia_kg_m2", shown, "the greatest must be at most the sum of the others");
     }
 }
 
-fn actuator(mut section: Reader) -> Actuator {
+fn actuator(mut section: SectionReader) -> Actuator {
     let actuator = Actuator {
         min_length: section.number("min_length_m", Bound::Positive),
         max_length: section.number("max_length_m", Bound::Positive),
@@ -102,13 +102,13 @@ fn actuator(mut section: Reader) -> Actuator {
     };
     if actuator.max_length <= actuator.min_length {
         let bound = format!("must be greater than {} (actuator.min_length_m)", actuator.min_length);
-        section.refuse("max_length_m", bound);
+        section.reject("max_length_m", bound);
     }
     section.finish();
     actuator
 }
 
-fn link(mut section: Reader, actuator: &Actuator) -> Link {
+fn link(mut section: SectionReader, actuator: &Actuator) -> Link {
     let link = Link {
         mass: section.number("mass_kg", Bound::Positive),
         center_of_mass: section.number("center_of_mass_m", Bound::NotNegative),
@@ -119,7 +119,7 @@ fn link(mut section: Reader, actuator: &Actuator) -> Link {
     let least = least_over_stroke(&link.transverse_inertia, actuator);
     let bound = 0.5 * link.axial_inertia;
     if least < bound - INERTIA_TOLERANCE * bound {
-        section.refuse_as(
+        section.reject_as(
             "transverse_inertia_kg_m2",
             format!("{} at its least over the stroke", rounded(least)),
             format!("must be at least {} (half of axial_inertia_kg_m2)", rounded(bound)),
@@ -129,7 +129,7 @@ fn link(mut section: Reader, actuator: &Actuator) -> Link {
     link
 }
 
-fn transverse_inertia(section: &mut Reader) -> TransverseInertia {
+fn transverse_inertia(section: &mut SectionReader) -> TransverseInertia {
     const KEY: &str = "transverse_inertia_kg_m2";
     if !section.is_table(KEY) {
         let constant = section.number(KEY, Bound::NotNegative);
@@ -145,7 +145,7 @@ fn transverse_inertia(section: &mut Reader) -> TransverseInertia {
     inertia
 }
 
-/// Smallest transverse inertia a leg within its stroke can have; NaN if a value it depends on is refused.
+/// Least transverse inertia of a link over the stroke; NaN if a value that it depends on was rejected.
 fn least_over_stroke(inertia: &TransverseInertia, actuator: &Actuator) -> f64 {
     let TransverseInertia { constant, quadratic, reference_length } = *inertia;
     let (shortest, longest) = (actuator.min_length, actuator.max_length);
@@ -162,19 +162,19 @@ fn least_over_stroke(inertia: &TransverseInertia, actuator: &Actuator) -> f64 {
     if a.is_finite() { a.min(b).min(c) } else { f64::NAN }
 }
 
-fn leg(mut reader: Reader) -> Leg {
+fn leg(mut reader: SectionReader) -> LegSection {
     let base = Vector3::from(reader.vector("base_m"));
     let platform = Vector3::from(reader.vector("platform_m"));
     let axis = Vector3::from(reader.vector_or("universal_axis", [0.0, 1.0, 0.0]));
     // Scaled before it is squared, which would leave no digits of a short one.
     let universal_axis = axis.unscale(axis.amax()).normalize();
     if axis.amax() == 0.0 {
-        reader.refuse("universal_axis", "must not be zero: it is a direction");
+        reader.reject("universal_axis", "must not be zero: it is a direction");
     }
-    Leg { reader, base, platform, universal_axis }
+    LegSection { reader, base, platform, universal_axis }
 }
 
-/// Six significant digits, enough for a message.
+/// A number rounded to six significant digits, enough for an error text.
 pub(super) fn rounded(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }

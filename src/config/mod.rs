@@ -1,8 +1,8 @@
 //! Configuration: a TOML file to a validated [`Machine`] and a [`Deployment`].
 //!
-//! A file describes one machine and, where the defaults do not fit, how it is deployed. Nothing is taken on trust: a file loads only if every key is
-//! known, every value is within its bound and the machine can exist, and everything that is wrong is
-//! reported in one go, each [`Violation`] with its line, key, value and bound.
+//! A file describes one machine and, where the defaults do not fit, how it is deployed. It loads only if every key is
+//! known, every value is within its bound and the machine can exist. All errors are reported at once, each
+//! [`Violation`] with its line, key, value and bound.
 //!
 //! `config/reference.toml` has every key with its meaning, unit, default and bound.
 
@@ -10,53 +10,54 @@ use std::{fmt, io, path::Path};
 
 use thiserror::Error;
 use toml::de::DeTable;
+use tracing::{info, warn};
 
+use crate::messages::{Bus, PortError};
 use crate::model::machine::Machine;
 
 use self::deployment::Deployment;
-use self::reader::{Reader, Report};
+use self::reader::{SectionReader, ViolationLog};
 
 mod bound;
 pub mod control_loops;
 pub mod deployment;
 pub mod fidelity;
 mod geometry;
-mod join;
 mod machine;
 mod reader;
 mod syntax;
 pub mod text;
 
-/// Violations shown of one file; a file with more is something else.
+/// Largest number of violations shown of one file; a file with more is no configuration.
 const MAX_VIOLATIONS: usize = 100;
 
-/// Longest `name`; iceoryx2 allows 255 characters in the name of a service, which adds some of its own.
-const LONGEST_NAME: usize = 64;
+/// Largest length of `name`; iceoryx2 allows 255 characters in the name of a service, which contains more than this.
+const MAX_NAME_LENGTH: usize = 64;
 
-/// What a configuration file says.
+/// Validated configuration file.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// Part of the names of the topics: letters, digits, `_` and `-`.
     pub name: String,
-    /// What the machine is.
+    /// Model of the machine.
     pub machine: Machine,
-    /// How it is run.
+    /// Settings with which the machine is run.
     pub deployment: Deployment,
 }
 
-/// Why there is no configuration.
+/// Error of loading a configuration.
 #[derive(Debug, Error)]
 pub enum ConfigError {
-    /// The file could not be read.
+    /// The file cannot be read.
     #[error("{place}: could not be read: {cause}")]
     Unreadable {
         /// The file, as it appears in the message.
         place: String,
-        /// What the operating system said.
+        /// Error of the operating system.
         cause: io::Error,
     },
-    /// The file was read and is wrong; displayed with a line per violation.
-    #[error("{}", Listed(place, violations))]
+    /// The content of the file is invalid; displayed with a line per violation.
+    #[error("{}", ViolationList(place, violations))]
     Invalid {
         /// The file, as it appears in the message.
         place: String,
@@ -65,40 +66,56 @@ pub enum ConfigError {
     },
 }
 
-/// One thing that is wrong. Displays as `platform.mass_kg = -3: must be greater than 0`.
+/// Violation of a rule of the configuration. Displays as `platform.mass_kg = -3: must be greater than 0`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
-    /// Counts from 1. For a key that is missing, the line of the section it is missing from.
+    /// Line, from 1. For a missing key, the line of the section that lacks it.
     pub line: usize,
-    /// Full name; legs and components count from 1, as in `leg[3].base_m[1]`.
+    /// Full name of the key; legs and components count from 1, as in `leg[3].base_m[1]`.
     pub key: String,
-    /// As written in the file, or what was derived from it; `None` where there is none to show.
+    /// Value as written in the file, or derived from it; `None` where there is none to show.
     pub value: Option<String>,
-    /// What the value must be.
+    /// Bound that the value violates.
     pub bound: String,
 }
 
 impl Config {
     /// Reads and validates a file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let (text, place) = text::text_of(path)?;
+        let (text, place) = text::read_file(path)?;
         Self::parse(&text, &place)
     }
 
-    /// Validates a text; `place` is what messages call it.
+    /// Validates a text; error texts name it `place`.
     pub fn parse(text: &str, place: &str) -> Result<Self, ConfigError> {
-        let (text, syntax_errors) = syntax::readable(text);
+        let (text, syntax_errors) = syntax::without_broken_lines(text);
         let (table, _) = DeTable::parse_recoverable(&text);
-        let report = Report::new(&text, syntax_errors);
-        let mut root = Reader::root(&report, table.get_ref());
-        let name = root.name("name", LONGEST_NAME);
+        let log = ViolationLog::new(&text, syntax_errors);
+        let mut root = SectionReader::root(&log, table.get_ref());
+        let name = root.name("name", MAX_NAME_LENGTH);
         let machine = machine::read(&mut root);
         let deployment = deployment::read(&mut root, &machine);
         root.finish();
-        match report.into_violations() {
+        match log.into_violations() {
             violations if violations.is_empty() => Ok(Self { name, machine, deployment }),
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }
+    }
+
+    /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.
+    pub fn join(&self) -> Result<Bus, PortError> {
+        if let Some(location) = Bus::fallback_location() {
+            info!("{location}");
+        }
+        if self.deployment.realtime.is_simulated() {
+            warn!(
+                "TIME IS SIMULATED (realtime.release = \"lockstep\"): no hardware receives messages, topics are \
+                 hexad-simulated/{}/...",
+                self.name
+            );
+            return Bus::join_simulated(&self.name);
+        }
+        Bus::join(&self.name)
     }
 }
 
@@ -111,10 +128,10 @@ impl fmt::Display for Violation {
     }
 }
 
-/// `place:line: violation`, a line each: the form editors and terminals turn into links.
-struct Listed<'a>(&'a str, &'a [Violation]);
+/// Violations as lines of `place:line: violation`, which editors and terminals turn into links.
+struct ViolationList<'a>(&'a str, &'a [Violation]);
 
-impl fmt::Display for Listed<'_> {
+impl fmt::Display for ViolationList<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, violation) in self.1.iter().enumerate() {
             let separator = if i == 0 { "" } else { "\n" };

@@ -1,9 +1,8 @@
-//! Reads the keys of a table one by one and takes note of everything that is wrong.
+//! SectionReader of the keys of a section, which logs every violation.
 //!
-//! A method that finds its key missing, of the wrong type or out of bounds reports that and returns NaN
-//! (or the default, where the type has no NaN). So a caller never stops at the first mistake: it goes on
-//! with NaN, and a check that compares several values must be written so that NaN passes, because the
-//! cause has been reported already.
+//! A method whose key is missing, of the wrong type or out of bounds logs a violation and returns NaN (or the default,
+//! where the type has no NaN). So a caller never stops at the first error: it goes on with NaN, and a check that
+//! compares several values must be written so that NaN passes, because the cause has been logged already.
 
 use core::cell::RefCell;
 use core::fmt;
@@ -15,38 +14,39 @@ use super::bound::{Bound, integer, number};
 use super::{MAX_VIOLATIONS, Violation};
 use crate::output::excerpt::excerpt;
 
-/// The text and the violations found in it so far, shared by the readers of all its tables.
-pub(super) struct Report<'t> {
+/// Log of the violations in a text, shared by the readers of all its sections.
+pub(super) struct ViolationLog<'t> {
     text: &'t str,
-    /// Where its lines end.
+    /// Offsets of the ends of its lines.
     ends: Vec<usize>,
-    /// Lines were blanked, so a key that is missing may be on one of them: nothing is called missing.
+    /// Whether lines were blanked: a key that is missing may be on one of them, so no key counts as missing.
     incomplete: bool,
     violations: RefCell<Vec<Violation>>,
 }
 
-/// Reads one table.
-pub(super) struct Reader<'t> {
-    report: &'t Report<'t>,
-    /// Name of the table, empty at the root.
+/// SectionReader of one section.
+pub(super) struct SectionReader<'t> {
+    log: &'t ViolationLog<'t>,
+    /// Name of the section, empty at the root.
     path: String,
     line: usize,
-    /// `None`: not there, which is reported key by key and only where a key has no default.
+    /// The section; `None` if it is missing, which is a violation only for keys without a default.
     table: Option<&'t DeTable<'t>>,
-    /// What should be a table is not, which has been reported: its keys are not missing.
-    silent: bool,
-    /// Keys asked for, and defaults as shown in messages. All others are unknown.
-    asked: Vec<(&'static str, Option<String>)>,
+    /// Whether the value is no table, which has been logged: its keys do not count as missing.
+    is_malformed: bool,
+    /// Known keys, and their defaults as shown in error texts. All others are violations.
+    known: Vec<(&'static str, Option<String>)>,
 }
 
-impl<'t> Report<'t> {
+impl<'t> ViolationLog<'t> {
+    /// Log for a text whose syntax errors are known.
     pub fn new(text: &'t str, syntax_errors: Vec<Violation>) -> Self {
         let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(i, _)| i).collect();
         let incomplete = !syntax_errors.is_empty();
         Self { text, ends, incomplete, violations: RefCell::new(syntax_errors) }
     }
 
-    /// In the order of the lines; at the end, how many there are more than are shown.
+    /// The violations in the order of the lines; the last entry counts those beyond the largest number shown.
     pub fn into_violations(self) -> Vec<Violation> {
         let mut violations = self.violations.into_inner();
         violations.sort_by_key(|violation| violation.line);
@@ -64,7 +64,7 @@ impl<'t> Report<'t> {
         1 + self.ends.partition_point(|end| *end < offset)
     }
 
-    /// A value as written, on one line; `None` for what a header opens.
+    /// A value as written, on one line; `None` for a section that a header opens.
     fn shown(&self, value: &Spanned<DeValue>) -> Option<String> {
         let span = value.span();
         let by_header = match value.get_ref() {
@@ -76,80 +76,80 @@ impl<'t> Report<'t> {
     }
 }
 
-impl<'t> Reader<'t> {
-    /// Reads the top level of a file.
-    pub fn root(report: &'t Report<'t>, table: &'t DeTable<'t>) -> Self {
-        Self { report, path: String::new(), line: 1, table: Some(table), silent: false, asked: Vec::new() }
+impl<'t> SectionReader<'t> {
+    /// SectionReader of the top level of a file.
+    pub fn root(log: &'t ViolationLog<'t>, table: &'t DeTable<'t>) -> Self {
+        Self { log, path: String::new(), line: 1, table: Some(table), is_malformed: false, known: Vec::new() }
     }
 
-    /// A number that must be there.
+    /// A required number.
     pub fn number(&mut self, key: &'static str, bound: Bound) -> f64 {
         self.required(key, bound).map_or(f64::NAN, |value| self.checked(self.key(key), value, bound))
     }
 
-    /// A number that need not be there.
+    /// A number with a default.
     pub fn number_or(&mut self, key: &'static str, default: f64, bound: Bound) -> f64 {
         let found = self.find(key, Some(default.to_string()));
         found.map_or(default, |value| self.checked(self.key(key), value, bound))
     }
 
-    /// An integer in `[low, high]`, or `None`.
+    /// An optional integer in `[low, high]`.
     pub fn integer(&mut self, key: &'static str, low: i32, high: i32) -> Option<i32> {
         self.find(key, None).and_then(|value| self.checked_integer(key, value, low, high))
     }
 
-    /// An integer in `[low, high]` that need not be there.
+    /// An integer in `[low, high]` with a default.
     pub fn integer_or(&mut self, key: &'static str, default: i32, low: i32, high: i32) -> i32 {
         let found = self.find(key, Some(default.to_string()));
         found.and_then(|value| self.checked_integer(key, value, low, high)).unwrap_or(default)
     }
 
-    /// `true` or `false`; need not be there.
+    /// `true` or `false`, with a default.
     pub fn flag_or(&mut self, key: &'static str, default: bool) -> bool {
         let Some(value) = self.find(key, Some(default.to_string())) else { return default };
         let flag = value.get_ref().as_bool();
         if flag.is_none() {
-            self.refuse(key, "must be true or false");
+            self.reject(key, "must be true or false");
         }
         flag.unwrap_or(default)
     }
 
-    /// One of a few names; need not be there.
+    /// One of several names, with a default.
     pub fn choice_or<T: Copy>(&mut self, key: &'static str, default: T, options: &[(&str, T)]) -> T {
         let Some(value) = self.find(key, None) else { return default };
         let name = value.get_ref().as_str();
         let chosen = options.iter().find(|(option, _)| name == Some(option));
         if chosen.is_none() {
             let names: Vec<_> = options.iter().map(|(option, _)| format!("\"{option}\"")).collect();
-            self.refuse(key, format!("must be one of {}", names.join(", ")));
+            self.reject(key, format!("must be one of {}", names.join(", ")));
         }
         chosen.map_or(default, |(_, choice)| *choice)
     }
 
-    /// A name of letters, digits, `_` and `-`.
+    /// A required name of letters, digits, `_` and `-`.
     pub fn name(&mut self, key: &'static str, longest: usize) -> String {
         let bound = format!("a name of 1 to {longest} characters, each one of A-Z a-z 0-9 _ -");
         let name = self.required(key, &bound).map(|value| value.get_ref().as_str().unwrap_or_default());
         let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if name.is_some_and(|name| name.is_empty() || name.len() > longest || !name.chars().all(plain)) {
-            self.refuse(key, format!("must be {bound}"));
+            self.reject(key, format!("must be {bound}"));
         }
         name.unwrap_or_default().into()
     }
 
-    /// `N` finite numbers that must be there.
+    /// `N` required finite numbers.
     pub fn vector<const N: usize>(&mut self, key: &'static str) -> [f64; N] {
         let found = self.required(key, format!("an array of {N} numbers"));
         found.map_or([f64::NAN; N], |value| self.components(key, value, &[Bound::Finite; N]))
     }
 
-    /// `N` finite numbers that need not be there.
+    /// `N` finite numbers with a default.
     pub fn vector_or<const N: usize>(&mut self, key: &'static str, default: [f64; N]) -> [f64; N] {
         let found = self.find(key, Some(format!("{default:?}")));
         found.map_or(default, |value| self.components(key, value, &[Bound::Finite; N]))
     }
 
-    /// `N` numbers, each with a bound of its own, or `None`.
+    /// `N` optional numbers, each with its bound.
     pub fn vector_within<const N: usize>(
         &mut self,
         key: &'static str,
@@ -163,67 +163,67 @@ impl<'t> Reader<'t> {
         self.value(key).is_some_and(|value| value.get_ref().is_table())
     }
 
-    /// A table.
+    /// SectionReader of a subsection.
     pub fn section(&mut self, key: &'static str) -> Self {
         let found = self.find(key, None);
         self.child(self.key(key), found)
     }
 
-    /// `count` tables, each under a header of its own. Returns as many as there are, but
-    /// no more than can be complained about.
+    /// Readers of `count` sections with the same header. Returns as many as there are, but no more than violations can be
+    /// shown.
     pub fn rows(&mut self, key: &'static str, count: usize) -> Vec<Self> {
         let bound = format!("{count} sections headed [[{key}]]");
         let Some(value) = self.required(key, &bound) else { return Vec::new() };
         let Some(rows) = value.get_ref().as_array() else {
-            self.refuse(key, format!("must be {bound}"));
+            self.reject(key, format!("must be {bound}"));
             return Vec::new();
         };
-        if rows.len() > count || rows.len() < count && !self.report.incomplete {
-            self.refuse_as(key, format!("{} sections", rows.len()), format!("must be {bound}"));
+        if rows.len() > count || rows.len() < count && !self.log.incomplete {
+            self.reject_as(key, format!("{} sections", rows.len()), format!("must be {bound}"));
         }
         let row = |(i, row)| self.child(format!("{}[{}]", self.key(key), i + 1), Some(row));
         rows.iter().take(MAX_VIOLATIONS).enumerate().map(row).collect()
     }
 
-    /// Reports the value of `key`, as written or by default.
-    pub fn refuse(&self, key: &str, bound: impl Into<String>) {
+    /// Logs a violation by the value of `key`, as written or by default.
+    pub fn reject(&self, key: &str, bound: impl Into<String>) {
         let value = match self.value(key) {
-            Some(value) => self.report.shown(value),
+            Some(value) => self.log.shown(value),
             None => self.default_of(key).map(|default| format!("{default} (default)")),
         };
         self.add(self.line_of(key), self.key(key), value, bound.into());
     }
 
-    /// Reports `value`, derived from the value of `key`.
-    pub fn refuse_as(&self, key: &str, value: impl Into<String>, bound: impl Into<String>) {
+    /// Logs a violation by `value`, which is derived from the value of `key`.
+    pub fn reject_as(&self, key: &str, value: impl Into<String>, bound: impl Into<String>) {
         self.add(self.line_of(key), self.key(key), Some(value.into()), bound.into());
     }
 
-    /// Reports the table as a whole.
-    pub fn refuse_table(&self, value: impl Into<String>, bound: impl Into<String>) {
+    /// Logs a violation by the section as a whole.
+    pub fn reject_section(&self, value: impl Into<String>, bound: impl Into<String>) {
         self.add(self.line, self.path.clone(), Some(value.into()), bound.into());
     }
 
-    /// Reports the keys that nobody asked for. Call it when all have been read.
+    /// Logs a violation for each unknown key. To be called when all known keys have been read.
     pub fn finish(self) {
-        let known: Vec<&str> = self.asked.iter().map(|(key, _)| *key).collect();
+        let known: Vec<&str> = self.known.iter().map(|(key, _)| *key).collect();
         for (key, value) in self.table.into_iter().flatten() {
             if !known.contains(&key.get_ref().as_ref()) {
                 let bound = format!("unknown key, must be one of: {}", known.join(", "));
-                let line = self.report.line(key.span().start);
-                self.add(line, self.key(&excerpt(key.get_ref())), self.report.shown(value), bound);
+                let line = self.log.line(key.span().start);
+                self.add(line, self.key(&excerpt(key.get_ref())), self.log.shown(value), bound);
             }
         }
     }
 
     fn child(&self, path: String, value: Option<&'t Spanned<DeValue<'t>>>) -> Self {
-        let line = value.map_or(self.line, |value| self.report.line(value.span().start));
+        let line = value.map_or(self.line, |value| self.log.line(value.span().start));
         let table = value.and_then(|value| value.get_ref().as_table());
-        let silent = self.silent || value.is_some() && table.is_none();
+        let is_malformed = self.is_malformed || value.is_some() && table.is_none();
         if let (Some(value), None) = (value, table) {
-            self.add(line, path.clone(), self.report.shown(value), "must be a table".into());
+            self.add(line, path.clone(), self.log.shown(value), "must be a table".into());
         }
-        Self { report: self.report, path, line, table, silent, asked: Vec::new() }
+        Self { log: self.log, path, line, table, is_malformed, known: Vec::new() }
     }
 
     fn value(&self, key: &str) -> Option<&'t Spanned<DeValue<'t>>> {
@@ -231,13 +231,13 @@ impl<'t> Reader<'t> {
     }
 
     fn find(&mut self, key: &'static str, default: Option<String>) -> Option<&'t Spanned<DeValue<'t>>> {
-        self.asked.push((key, default));
+        self.known.push((key, default));
         self.value(key)
     }
 
     fn required(&mut self, key: &'static str, bound: impl fmt::Display) -> Option<&'t Spanned<DeValue<'t>>> {
         let found = self.find(key, None);
-        if found.is_none() && !self.silent && !self.report.incomplete {
+        if found.is_none() && !self.is_malformed && !self.log.incomplete {
             self.add(self.line, self.key(key), None, format!("missing, must be {bound}"));
         }
         found
@@ -245,15 +245,15 @@ impl<'t> Reader<'t> {
 
     fn checked(&self, path: String, value: &Spanned<DeValue>, bound: Bound) -> f64 {
         let x = number(value.get_ref());
-        let Some(refusal) = bound.refusal(x) else { return x.unwrap_or(f64::NAN) };
-        self.add(self.report.line(value.span().start), path, self.report.shown(value), refusal);
+        let Some(violation) = bound.violation(x) else { return x.unwrap_or(f64::NAN) };
+        self.add(self.log.line(value.span().start), path, self.log.shown(value), violation);
         f64::NAN
     }
 
     fn checked_integer(&self, key: &str, value: &Spanned<DeValue>, low: i32, high: i32) -> Option<i32> {
         let x = integer(value.get_ref()).filter(|x| (low..=high).contains(x));
         if x.is_none() {
-            self.refuse(key, format!("must be an integer in [{low}, {high}]"));
+            self.reject(key, format!("must be an integer in [{low}, {high}]"));
         }
         x
     }
@@ -272,7 +272,7 @@ impl<'t> Reader<'t> {
                     *slot = self.checked(format!("{}[{}]", self.key(key), i + 1), item, *bound);
                 }
             }
-            _ => self.refuse(key, format!("must be an array of {N} numbers")),
+            _ => self.reject(key, format!("must be an array of {N} numbers")),
         }
         vector
     }
@@ -282,14 +282,14 @@ impl<'t> Reader<'t> {
     }
 
     fn line_of(&self, key: &str) -> usize {
-        self.value(key).map_or(self.line, |value| self.report.line(value.span().start))
+        self.value(key).map_or(self.line, |value| self.log.line(value.span().start))
     }
 
     fn default_of(&self, key: &str) -> Option<&String> {
-        self.asked.iter().find(|(asked, _)| *asked == key)?.1.as_ref()
+        self.known.iter().find(|(known, _)| *known == key)?.1.as_ref()
     }
 
     fn add(&self, line: usize, key: String, value: Option<String>, bound: String) {
-        self.report.violations.borrow_mut().push(Violation { line, key, value, bound });
+        self.log.violations.borrow_mut().push(Violation { line, key, value, bound });
     }
 }

@@ -76,7 +76,7 @@ pub struct Output {
     pub error: Option<TrackingError>,
 }
 
-/// What every stage of one cycle may depend on.
+/// Context of one cycle, which every stage may depend on.
 #[derive(Clone, Copy)]
 pub(super) struct Cycle<'a> {
     pub constants: &'a Constants,

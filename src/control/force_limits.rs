@@ -1,4 +1,4 @@
-//! Limits of the forces: what the actuators can push with, and how fast a force may change.
+//! Limits of the forces: their magnitude by the actuators, and their rate of change.
 
 use nalgebra::Vector6;
 

@@ -91,10 +91,10 @@ impl Law {
         machine: &Machine,
         mode: ControlMode,
         [position, orientation]: [Gains; 2],
+        leg_masses: LegMasses,
         observer: f64,
         limits: &Limits,
     ) -> Self {
-        let leg_masses = LegMasses::at_home(machine);
         let [angular, linear] = [&limits.orientation, &limits.position]
             .map(|limits| OBSERVER_SATURATION_RATIO * limits.acceleration);
         let mut saturation = Vector6::repeat(linear);

@@ -2,8 +2,8 @@
 //!
 //! | bit | limit | bound | at the bound |
 //! | --- | --- | --- | --- |
-//! | 0 | force | `actuator.max_force_n` | the force keeps its gravity part and loses the same share of the rest |
-//! | 1 | force rate | `limits.force_rate_n_s` | the change of force loses the same share on every leg |
+//! | 0 | force | `actuator.max_force_n` | the force keeps its gravity part and the rest is reduced by the same factor |
+//! | 1 | force rate | `limits.force_rate_n_s` | the change of force is reduced by the same factor on every leg |
 //! | 2 | stroke | `actuator.*_length_m` where the setpoint could be stopped | rejected |
 //! | 3 | leg rate | `actuator.max_rate_m_s` | rejected |
 //! | 4 | envelope | `[envelope]` | rejected |

@@ -13,7 +13,7 @@
 //! | forces | `forces` |
 //! | checks | `force_limits` |
 //!
-//! What the checks of all stages find is a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
+//! The checks of all stages return a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
 
 mod assessment;
 pub mod controller;

@@ -25,7 +25,7 @@ pub struct Parameters {
     pub condition: f64,
     /// Largest change of a force \[N/s\].
     pub force_rate: f64,
-    /// What follows the stop of a platform that lost its setpoint.
+    /// Goal of the stop of a platform that lost its setpoint.
     pub after_loss: AfterStop,
     /// Largest position error at which control may begin \[m\].
     pub engage_position: f64,

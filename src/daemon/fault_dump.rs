@@ -14,7 +14,7 @@ use crate::control::input_validation::seconds_between;
 use crate::control::state::State;
 use crate::messages::layout::{Declared, Layout};
 use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
-use crate::output::csv_table::Writer;
+use crate::output::csv_writer::CsvWriter;
 
 /// Cycles kept: two seconds at 1 kHz, 100 ms at 20 kHz. The cause of a fault is rarely older than its timeouts.
 const CYCLES_KEPT: usize = 2000;
@@ -46,7 +46,7 @@ struct DumpFile {
     fault: CycleRecord,
     cycles: VecDeque<CycleRecord>,
     columns: Columns,
-    table: Writer,
+    table: CsvWriter,
 }
 
 impl FaultDump {
@@ -98,7 +98,7 @@ impl FaultDump {
         let number = fault.output.diagnostic.code as u32;
         let path = folder.join(format!("fault-{number}-cycle-{}.csv", fault.cycle));
         let columns = Columns::new();
-        let table = Writer::new(&columns.names());
+        let table = CsvWriter::new(&columns.names());
         self.file = Some(DumpFile { path, fault, cycles: self.cycles.clone(), columns, table });
     }
 

@@ -29,6 +29,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
                 Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
                 Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
             ],
+            control.leg_masses,
             TAU * control.observer_bandwidth_hz,
             &limits.reference,
         ),

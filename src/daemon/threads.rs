@@ -65,7 +65,7 @@ pub(super) fn run(
 ) -> Result<(Report, String), DaemonError> {
     let machine = &config.machine;
     let parameters = parameters(machine, &config.deployment, fidelity::fidelity(config));
-    for warning in loops(config, &parameters.law.leg_masses).iter().filter_map(ControlLoop::warning) {
+    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
         warn!("{warning}");
     }
     let controller = Controller::new(machine, parameters);

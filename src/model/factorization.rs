@@ -209,6 +209,13 @@ impl<S: Simd> LaneTwist<S> {
         Self { angular: Lanes3::splat(simd, &twist.angular), linear: Lanes3::splat(simd, &twist.linear) }
     }
 
+    /// `|omega|^2 + |v|^2 linear_weight`
+    #[inline(always)]
+    pub fn size_squared(&self, linear_weight: f64x4<S>) -> f64 {
+        let linear = self.linear.dot(self.linear);
+        linear.mul_add(linear_weight, self.angular.dot(self.angular)).first()
+    }
+
     /// The twist itself.
     #[inline(always)]
     pub fn first(&self) -> Twist {

@@ -1,4 +1,4 @@
-//! ModelTerms fidelity: which terms of the dynamics are evaluated, known at compile time.
+//! Model fidelity: which terms of the dynamics are evaluated, known at compile time.
 //!
 //! All fidelities share one code path; a term that a fidelity leaves out costs nothing. Every fidelity above gravity
 //! keeps the drives (reflected mass, friction), which belong to the actuator and not to a link.
@@ -77,7 +77,7 @@ fidelity!(
     Exact, Links, true, true, true
 );
 
-/// ModelTerms fidelity chosen at run time, from gravity only to all terms.
+/// Model fidelity chosen at run time, from gravity only to all terms.
 ///
 /// ```
 /// use hexad::model::{active_forces::InverseDynamics, fidelity::Fidelity, task::TaskState};

@@ -1,7 +1,7 @@
 //! Pose, twist, acceleration and wrench of the mobile platform: distinct types for distinct things.
 
 #[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
+use nalgebra::{ComplexField as _, RealField as _};
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Pose of the platform: orientation and position in the base frame.

@@ -30,19 +30,20 @@ const ANGLE_AMPLITUDE_RAD: f64 = 0.105;
 /// Share of stroke, rate and force a fitted motion may use.
 const USABLE_SHARE: f64 = 0.8;
 
-/// Name of a built-in motion.
+/// A named motion.
+#[cfg_attr(feature = "daemon", derive(clap::ValueEnum))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BuiltInMotion {
-    /// Stand at home.
+    /// Rest at home
     Settle,
-    /// Minimum-jerk moves along every axis in turn, there and back.
+    /// Minimum-jerk moves along every axis in turn, there and back
     MinimumJerk,
-    /// A sine on every axis, each with its own frequency.
+    /// A sine of its own frequency on every axis
     Sines,
-    /// A circle in the plane of the second and third axis, constant orientation.
+    /// A circle at constant orientation, in the plane of the second and third axis
     Circle,
-    /// Like the paper's section 8: a spatial curve at the constant orientation 15, 10, 5 degrees. The
-    /// paper's own curve is only in a figure; this one is a stand-in.
+    /// A spatial curve at the constant orientation 15, 10, 5 degrees, like the paper's section 8
+    // The paper's own curve is only in a figure; this one replaces it.
     Paper,
 }
 

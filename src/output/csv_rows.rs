@@ -9,32 +9,34 @@ use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
 /// Longest row; a trajectory's have about 400 bytes. A quote that is not closed swallows no more than this.
 pub const MAX_ROW_BYTES: usize = 64 << 10;
 
-/// Reads row after row.
-pub struct Rows<R> {
-    reader: Reader<Rationed<Chain<R, &'static [u8]>>>,
-    left: Rc<Cell<usize>>,
+/// Reader of CSV text, row by row.
+pub struct CsvRows<R> {
+    reader: Reader<Limited<Chain<R, &'static [u8]>>>,
+    /// Bytes that the present row may still take.
+    remaining: Rc<Cell<usize>>,
     record: ByteRecord,
 }
 
-impl<R: Read> Rows<R> {
-    pub fn of(source: R) -> Self {
-        let left = Rc::default();
+impl<R: Read> CsvRows<R> {
+    /// Reader of a source whose first line is line 1.
+    pub fn new(source: R) -> Self {
+        let remaining = Rc::default();
         // The last line shall end like all others, so that all are counted alike.
-        let source = Rationed { source: source.chain(&b"\n"[..]), left: Rc::clone(&left) };
-        // The carriage return of a Windows file is left to who trims blanks: as an end of its own, it would
+        let source = Limited { source: source.chain(&b"\n"[..]), remaining: Rc::clone(&remaining) };
+        // The carriage return of a Windows file is trimmed as a blank later: as a terminator of its own it would
         // be counted as a line of the row before.
         let ends = Terminator::Any(b'\n');
         let mut builder = ReaderBuilder::new();
         let reader = builder.has_headers(false).flexible(true).terminator(ends).from_reader(source);
-        Self { reader, left, record: ByteRecord::new() }
+        Self { reader, remaining, record: ByteRecord::new() }
     }
 
-    /// The next row that is not blank, with its line; or what is wrong, after which there is no other.
-    pub fn next(&mut self) -> Result<Option<(u64, &ByteRecord)>, String> {
+    /// The next row that is not blank, with its line; or an error, after which there is no other row.
+    pub fn next_row(&mut self) -> Result<Option<(u64, &ByteRecord)>, String> {
         loop {
             let above = self.reader.position().line();
-            // One more, to see whether there is more.
-            self.left.set(MAX_ROW_BYTES + 1);
+            // One more, to see whether the row goes on.
+            self.remaining.set(MAX_ROW_BYTES + 1);
             let found = self.reader.read_byte_record(&mut self.record);
             if !found.map_err(|error| format!("line {above}: {error}"))? {
                 return Ok(None);
@@ -50,18 +52,18 @@ impl<R: Read> Rows<R> {
     }
 }
 
-/// A source that fails when nothing is left of what may be read.
-struct Rationed<R> {
+/// Source that fails once a limited number of bytes has been read.
+struct Limited<R> {
     source: R,
-    left: Rc<Cell<usize>>,
+    remaining: Rc<Cell<usize>>,
 }
 
-impl<R: Read> Read for Rationed<R> {
+impl<R: Read> Read for Limited<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let allowed = buffer.len().min(self.left.get());
+        let allowed = buffer.len().min(self.remaining.get());
         let read = self.source.read(buffer.get_mut(..allowed).unwrap_or_default())?;
-        self.left.set(self.left.get() - read);
-        if self.left.get() == 0 {
+        self.remaining.set(self.remaining.get() - read);
+        if self.remaining.get() == 0 {
             let bound = format!("a row longer than {MAX_ROW_BYTES} bytes: must be at most that long");
             return Err(io::Error::other(bound));
         }

@@ -1,52 +1,49 @@
-//! CSV tables of numbers: columns by name in, shortest digits that read back the same out.
+//! CSV tables of numbers, read with their columns by name.
 //!
-//! Everything wrong with a file is reported at once (up to a limit), each with line, column, value and
-//! bound.
+//! All errors of a file are reported at once (up to a limit), each with line, column, value and bound.
 
-use core::fmt::Write as _;
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::csv_rows::Rows;
+use super::csv_rows::CsvRows;
 use super::excerpt::excerpt;
-use super::files::{FileError, write_whole};
-use super::numbers::LARGEST;
+use super::files::FileError;
+use super::numbers::{AXES, MAX_MAGNITUDE};
 
-/// Complaints shown for one file; a file with more has one mistake many times.
-const MAX_COMPLAINTS: usize = 20;
+/// Errors shown of one file; a file with more has one mistake many times.
+const MAX_ERRORS_SHOWN: usize = 20;
 
 /// Most rows: 2.8 hours at 1 kHz, and 1.8 GB in memory with the columns of a trajectory.
 const MAX_ROWS: usize = 10_000_000;
 
-/// Why a table could not be read.
+/// Error of reading a table: the file, or its content.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
     #[error(transparent)]
     File(#[from] FileError),
-    #[error("{}", .complaints.join("\n"))]
-    Content { complaints: Vec<String> },
+    #[error("{}", .0.join("\n"))]
+    Content(Vec<String>),
 }
 
-/// Numbers by row and column.
+/// Table of numbers, read from CSV.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct NumberTable {
     rows: Vec<Vec<f64>>,
-    /// Where each is in the file.
+    /// Line of the file that each row begins in.
     lines: Vec<u64>,
 }
 
-impl Table {
-    /// Reads a CSV file, see [`Table::from_reader`].
+impl NumberTable {
+    /// Reads a CSV file, see [`NumberTable::from_reader`].
     pub fn read(path: &Path, required: &[String], optional: &[String]) -> Result<Self, TableError> {
         let file = File::open(path).map_err(FileError::on(path))?;
         Self::from_reader(file, path, required, optional)
     }
 
-    /// Reads the named columns of CSV text, in this order, whatever the order in the text. Other columns
-    /// are passed over. Every number must be finite and at most 1e12 in magnitude. Messages call the text
-    /// `path`.
+    /// Reads the named columns of CSV text, in this order, whatever the order in the text, and ignores other columns.
+    /// Every number must be finite and at most 1e12 in magnitude. Error texts name the source `path`.
     ///
     /// `optional` columns come after the required ones if the text has all of them.
     pub fn from_reader(
@@ -55,39 +52,39 @@ impl Table {
         required: &[String],
         optional: &[String],
     ) -> Result<Self, TableError> {
-        let mut complaints = Complaints::about(path);
+        let mut errors = TableErrors::new(path);
         let mut table = Self::default();
-        if let Err(what) = table.fill(&mut Rows::of(source), required, optional, &mut complaints) {
-            complaints.add(what);
+        if let Err(error) = table.fill(&mut CsvRows::new(source), required, optional, &mut errors) {
+            errors.add(error);
         }
-        if table.rows.is_empty() && complaints.list.is_empty() {
-            complaints.add("no rows: must have at least one".into());
+        if table.rows.is_empty() && errors.list.is_empty() {
+            errors.add("no rows: must have at least one".into());
         }
-        complaints.verdict().map(|()| table)
+        errors.into_result().map(|()| table)
     }
 
-    /// Reads header and rows; an error is what makes it impossible to read on.
+    /// Reads header and rows; returns an error after which reading cannot go on.
     fn fill(
         &mut self,
-        source: &mut Rows<impl Read>,
+        source: &mut CsvRows<impl Read>,
         required: &[String],
         optional: &[String],
-        complaints: &mut Complaints,
+        errors: &mut TableErrors,
     ) -> Result<(), String> {
         let names = |record: &csv::ByteRecord| record.iter().map(|name| cell(name).trim().into()).collect();
         let (line, header): (_, Vec<String>) =
-            source.next()?.map_or((1, vec![]), |(line, record)| (line, names(record)));
-        let columns = complaints.columns(line, &header, required, optional);
-        if !complaints.list.is_empty() {
+            source.next_row()?.map_or((1, vec![]), |(line, record)| (line, names(record)));
+        let columns = errors.columns(line, &header, required, optional);
+        if !errors.list.is_empty() {
             return Ok(());
         }
         let mut read = 0;
-        while let Some((line, record)) = source.next()? {
+        while let Some((line, record)) = source.next_row()? {
             if read == MAX_ROWS {
                 return Err(format!("line {line}: a row after {MAX_ROWS}: must be at most those"));
             }
             read += 1;
-            if let Some(row) = complaints.row(record, line, header.len(), &columns) {
+            if let Some(row) = errors.row(record, line, header.len(), &columns) {
                 self.rows.push(row);
                 self.lines.push(line);
             }
@@ -95,7 +92,7 @@ impl Table {
         Ok(())
     }
 
-    /// The rows, each with the columns asked for.
+    /// The rows, each with the requested columns.
     pub fn rows(&self) -> &[Vec<f64>] {
         &self.rows
     }
@@ -106,35 +103,39 @@ impl Table {
     }
 }
 
-/// What a field says. What is no text is replaced by what is neither a name nor a number.
+/// Text of a field. Bytes that are not UTF-8 become a character that is part of no name and no number.
 fn cell(field: &[u8]) -> Cow<'_, str> {
     String::from_utf8_lossy(field)
 }
 
-/// Collects what is wrong with one file.
-pub(crate) struct Complaints {
+/// Errors found in the content of one file.
+pub(crate) struct TableErrors {
     path: PathBuf,
     list: Vec<String>,
+    /// Errors beyond those in the list.
     more: usize,
 }
 
-impl Complaints {
-    pub fn about(path: &Path) -> Self {
+impl TableErrors {
+    pub fn new(path: &Path) -> Self {
         Self { path: path.into(), list: vec![], more: 0 }
     }
 
-    /// Place, value and bound, without the file.
-    pub fn add(&mut self, what: String) {
-        if self.list.len() < MAX_COMPLAINTS {
-            self.list.push(format!("{}: {what}", self.path.display()));
+    /// Adds an error: place, value and bound, without the file.
+    pub fn add(&mut self, error: String) {
+        if self.list.len() < MAX_ERRORS_SHOWN {
+            self.list.push(format!("{}: {error}", self.path.display()));
         } else {
             self.more += 1;
         }
     }
 
-    /// An error if there were any.
-    pub fn verdict(self) -> Result<(), TableError> {
-        if self.list.is_empty() { Ok(()) } else { Err(self.into()) }
+    /// All errors as one, if there are any.
+    pub fn into_result(mut self) -> Result<(), TableError> {
+        if self.more > 0 {
+            self.list.push(format!("{}: and {} more", self.path.display(), self.more));
+        }
+        if self.list.is_empty() { Ok(()) } else { Err(TableError::Content(self.list)) }
     }
 
     /// Index and name of every column to be read.
@@ -184,9 +185,9 @@ impl Complaints {
         for (index, name) in columns {
             let text = cell(record.get(*index).unwrap_or_default());
             match text.trim().parse::<f64>() {
-                Ok(value) if value.abs() <= LARGEST => row.push(value),
+                Ok(value) if value.abs() <= MAX_MAGNITUDE => row.push(value),
                 Ok(value) => {
-                    let finite = value.is_finite().then(|| format!("at most {LARGEST:e} in magnitude"));
+                    let finite = value.is_finite().then(|| format!("at most {MAX_MAGNITUDE:e} in magnitude"));
                     let bound = finite.unwrap_or("finite".into());
                     self.add(format!("line {line}: {name} = {}: must be {bound}", excerpt(&text)));
                 }
@@ -197,65 +198,17 @@ impl Complaints {
     }
 }
 
-impl From<Complaints> for TableError {
-    fn from(mut complaints: Complaints) -> Self {
-        if complaints.more > 0 {
-            let more = complaints.more;
-            complaints.list.push(format!("{}: and {more} more", complaints.path.display()));
-        }
-        Self::Content { complaints: complaints.list }
-    }
-}
-
-/// Text of a CSV file in the making.
-#[derive(Debug, Default)]
-pub struct Writer {
-    text: String,
-}
-
-impl Writer {
-    /// Starts with the header.
-    pub fn new(columns: &[String]) -> Self {
-        let mut text = columns.join(",");
-        text.push('\n');
-        Self { text }
-    }
-
-    /// Adds a row. Numbers get the shortest digits that read back the same.
-    pub fn row(&mut self, values: impl IntoIterator<Item = f64>) {
-        let start = self.text.len();
-        for value in values {
-            if self.text.len() > start {
-                self.text.push(',');
-            }
-            // Debug is the shortest round trip, with an exponent where that is shorter. A String takes all.
-            let _ = write!(self.text, "{value:?}");
-        }
-        self.text.push('\n');
-    }
-
-    /// What has been written so far.
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-
-    /// Writes the file, whole or not at all.
-    pub fn save(&self, path: &Path) -> Result<(), FileError> {
-        write_whole(path, self.text.as_bytes())
-    }
-}
-
-/// `stem_1 ... stem_6`.
+/// Names of six columns, `stem_1 ... stem_6`.
 pub fn legs(stem: &str) -> Vec<String> {
     (1..=6).map(|leg| format!("{stem}_{leg}")).collect()
 }
 
-/// `alpha<suffix> ... z<suffix>`.
+/// Names of the columns of X or a derivative, `alpha<suffix> ... z<suffix>`.
 pub fn coordinates(suffix: &str) -> Vec<String> {
-    ["alpha", "beta", "gamma", "x", "y", "z"].iter().map(|name| format!("{name}{suffix}")).collect()
+    AXES.iter().map(|name| format!("{name}{suffix}")).collect()
 }
 
-/// `t`, X, X', X'': the columns of a trajectory.
+/// Names of the columns of a trajectory: `t`, X, X', X''.
 pub fn trajectory_columns() -> Vec<String> {
     let mut columns = vec!["t".into()];
     for suffix in ["", "_rate", "_accel"] {
@@ -264,7 +217,7 @@ pub fn trajectory_columns() -> Vec<String> {
     columns
 }
 
-/// `t` and lengths: the columns that forward kinematics needs.
+/// Names of the columns that forward kinematics needs: `t` and lengths.
 pub fn length_columns() -> Vec<String> {
     let mut columns = vec!["t".into()];
     columns.extend(legs("length"));
@@ -283,14 +236,14 @@ mod tests {
     use super::*;
     use crate::output::csv_rows::MAX_ROW_BYTES;
 
-    /// What is said about text with the columns t and x.
+    /// Error text for CSV with the columns t and x.
     fn refusal(source: impl Read) -> String {
         let columns = ["t".into(), "x".into()];
-        Table::from_reader(source, Path::new("x.csv"), &columns, &[]).unwrap_err().to_string()
+        NumberTable::from_reader(source, Path::new("x.csv"), &columns, &[]).unwrap_err().to_string()
     }
 
     #[test]
-    fn what_has_no_end_is_refused() {
+    fn endless_text_is_refused() {
         for byte in *b"1\",\n\0" {
             let bound = "x.csv: line 1: a row longer than 65536 bytes: must be at most that long";
             assert_eq!(refusal(repeat(byte)), bound);
@@ -306,15 +259,16 @@ mod tests {
     fn a_long_row_is_read_to_its_bound() {
         let columns = ["t".into(), "x".into()];
         let rows = |notes: usize| format!("t,x,notes\n1,2,{}\n", "n".repeat(notes));
-        let read = |text: String| Table::from_reader(text.as_bytes(), Path::new("x.csv"), &columns, &[]);
+        let read =
+            |text: String| NumberTable::from_reader(text.as_bytes(), Path::new("x.csv"), &columns, &[]);
         assert_eq!(read(rows(MAX_ROW_BYTES - 5)).unwrap().rows(), [[1.0, 2.0]]);
         assert!(read(rows(2 * MAX_ROW_BYTES)).is_err());
     }
 
     #[test]
     fn rows_without_end_are_refused() {
-        struct Rows;
-        impl Read for Rows {
+        struct EndlessRows;
+        impl Read for EndlessRows {
             fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
                 for (i, byte) in buffer.iter_mut().enumerate() {
                     *byte = if i % 2 == 0 { b'1' } else { b'\n' };
@@ -322,10 +276,10 @@ mod tests {
                 Ok(buffer.len() & !1)
             }
         }
-        let message = refusal(b"t,x\n".chain(Rows));
+        let message = refusal(b"t,x\n".chain(EndlessRows));
         assert!(message.starts_with("x.csv: line 2: 1 fields: must be 2, as in the header\n"), "{message}");
         assert!(
-            message.ends_with(&format!("\nx.csv: and {} more", MAX_ROWS + 1 - MAX_COMPLAINTS)),
+            message.ends_with(&format!("\nx.csv: and {} more", MAX_ROWS + 1 - MAX_ERRORS_SHOWN)),
             "{message}"
         );
     }
@@ -342,19 +296,20 @@ mod tests {
     }
 
     #[test]
-    fn the_header_knows_its_line() {
+    fn errors_of_the_header_name_its_line() {
         for text in ["\nt,y\n", "\r\nt,y\r\n", "\nt,y"] {
             assert_eq!(refusal(text.as_bytes()), "x.csv: line 2: missing columns x");
         }
     }
 
     #[test]
-    fn a_row_knows_its_line() {
+    fn each_row_has_its_line() {
         let columns = ["t".into(), "x".into()];
         for end in ["\n", "\r\n"] {
             let text = "t,x\n1,2\n\n3,\"4\n\"\n5,\"6\"\n\n\n7,8".replace('\n', end);
             for text in [text.clone(), text + end] {
-                let table = Table::from_reader(text.as_bytes(), Path::new("x.csv"), &columns, &[]).unwrap();
+                let table =
+                    NumberTable::from_reader(text.as_bytes(), Path::new("x.csv"), &columns, &[]).unwrap();
                 assert_eq!(table.lines(), [2, 4, 6, 9], "{text:?}");
                 assert_eq!(table.rows(), [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [7.0, 8.0]]);
             }

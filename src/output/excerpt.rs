@@ -1,15 +1,15 @@
-//! Pieces of a file as messages show them.
+//! Excerpts of a file for error texts.
 
 /// Characters shown; enough to find the place.
-const LONGEST: usize = 60;
+const MAX_SHOWN: usize = 60;
 
-/// On one line, without what a terminal would obey, cut where it is long.
+/// An excerpt on one line, with control characters escaped, cut where it is long.
 pub fn excerpt(text: &str) -> String {
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut shown = String::new();
     for (i, c) in words.chars().enumerate() {
         match c {
-            _ if i == LONGEST => return shown + "...",
+            _ if i == MAX_SHOWN => return shown + "...",
             c if c.is_control() => shown.extend(c.escape_default()),
             c => shown.push(c),
         }
@@ -22,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_file_says_stays_on_one_line_and_commands_no_terminal() {
+    fn an_excerpt_is_one_line_without_control_characters() {
         assert_eq!(excerpt(" [1,\n\t2]\r\n"), "[1, 2]");
         assert_eq!(excerpt("\u{1b}[2J\0\u{9b}"), "\\u{1b}[2J\\u{0}\\u{9b}");
         assert_eq!(excerpt(&"ä".repeat(60)), "ä".repeat(60));

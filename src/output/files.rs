@@ -1,11 +1,13 @@
-//! Files that are either complete or not there.
+//! Files that are written completely or not at all, and standard output.
 
 use core::fmt;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Could not read or write a file: which, and why.
+use serde::Serialize;
+
+/// Error of reading or writing a file, with the path of the file.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {cause}", path.display())]
 pub struct FileError {
@@ -14,14 +16,14 @@ pub struct FileError {
 }
 
 impl FileError {
-    /// Names the file an operation failed on.
+    /// Converter of an I/O error that names the file.
     pub fn on(path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
         let path = path.to_path_buf();
         move |cause| Self { path, cause }
     }
 }
 
-/// Writes to standard output. Who reads it may have read enough: that is no failure.
+/// Writes to standard output. A reader that closes its end early, such as `head`, is no error.
 pub fn print(text: impl fmt::Display) -> Result<(), FileError> {
     let mut out = io::stdout().lock();
     match write!(out, "{text}").and_then(|()| out.flush()) {
@@ -32,14 +34,77 @@ pub fn print(text: impl fmt::Display) -> Result<(), FileError> {
     }
 }
 
-/// Writes a whole file through a temporary one beside it, so that an interruption leaves the old content
-/// or none, never half of the new.
+/// Writes a file durably: a crash or a power failure at any instant leaves the old content or the new.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    replace(path, |file| file.write_all(content)).map_err(FileError::on(path))
+}
+
+/// Writes a value as JSON with [`write_whole`].
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), FileError> {
+    let json = serde_json::to_vec_pretty(value).map_err(|error| FileError::on(path)(error.into()))?;
+    write_whole(path, &json)
+}
+
+/// Writes a temporary file in the same folder, renames it, and makes both the content and the new name durable.
+fn replace(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let mut temporary = path.as_os_str().to_os_string();
     temporary.push(".part");
     let temporary = PathBuf::from(temporary);
-    fs::write(&temporary, content)
+    let mut file = File::create(&temporary)?;
+    write(&mut file)
+        .and_then(|()| file.sync_all())
         .and_then(|()| fs::rename(&temporary, path))
-        .inspect_err(|_| drop(fs::remove_file(&temporary)))
-        .map_err(FileError::on(path))
+        .inspect_err(|_| drop(fs::remove_file(&temporary)))?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    File::open(folder)?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tempfile::TempDir;
+
+    fn names(folder: &TempDir) -> Vec<PathBuf> {
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
+    }
+
+    #[test]
+    fn a_file_is_replaced_as_a_whole() {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("report.json");
+        for content in ["a long old content", "new"] {
+            write_whole(&path, content.as_bytes()).unwrap();
+            assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(&folder).len()), (content, 1));
+        }
+        assert!(write_whole(Path::new("no-such-folder/report.json"), b"new").is_err());
+    }
+
+    #[test]
+    fn a_failed_write_keeps_the_old_file_and_leaves_no_temporary_one() {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("report.json");
+        write_whole(&path, b"old").unwrap();
+        let error = replace(&path, |file| {
+            file.write_all(b"half of the n")?;
+            // A full disk.
+            File::options().write(true).open("/dev/full")?.write_all(b"ew")
+        });
+        assert_eq!(error.unwrap_err().kind(), io::ErrorKind::StorageFull);
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(&folder)), ("old", vec![path]));
+        // Neither does a target that cannot be replaced.
+        let occupied = folder.path().join("folder");
+        fs::create_dir_all(occupied.join("inside")).unwrap();
+        let error = write_whole(&occupied, b"new").unwrap_err();
+        assert!(error.to_string().starts_with(&format!("{}: ", occupied.display())), "{error}");
+        assert_eq!(names(&folder).len(), 2);
+    }
+
+    /// The folder is one in which not even root can create a file.
+    #[test]
+    fn a_folder_without_write_access_keeps_its_files() {
+        let old = fs::read("/proc/version").unwrap();
+        assert!(write_whole(Path::new("/proc/version"), b"new").is_err());
+        assert_eq!(fs::read("/proc/version").unwrap(), old);
+        assert!(!Path::new("/proc/version.part").exists());
+    }
 }

@@ -1,11 +1,12 @@
-//! What is written for people and other programs: charts, CSV tables, files.
+//! Everything written for people and other programs: charts, tables, CSV and JSON files.
 
 pub mod axis;
 pub mod charts;
 pub mod csv_rows;
 pub mod csv_table;
+pub mod csv_writer;
 pub mod excerpt;
 pub mod files;
-pub mod machine_drawing;
 pub mod numbers;
 pub mod svg;
+pub mod text_table;

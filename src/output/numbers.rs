@@ -1,13 +1,22 @@
-//! Numbers as people read and write them.
+//! Bounds of the numbers in files, and numbers as text.
 
-/// No quantity is larger in SI units, and the products of four such still do not overflow.
-pub const LARGEST: f64 = 1e12;
+/// Largest magnitude of a number in a file. No quantity is larger in SI units, and the products of four such do not
+/// overflow.
+pub const MAX_MAGNITUDE: f64 = 1e12;
 
-/// No quantity that must be positive is smaller in SI units: the inertia of a milligram within a millimetre
-/// is 1e-12 kg m^2. The products of four such, and their inverses, are still numbers.
-pub const SMALLEST: f64 = 1e-12;
+/// Smallest value of a quantity that must be positive. None is smaller in SI units: the inertia of a milligram within
+/// a millimetre is 1e-12 kg m^2. The products of four such, and their inverses, are normal numbers.
+pub const MIN_POSITIVE_VALUE: f64 = 1e-12;
 
-/// Three significant digits; plain where that is short.
+/// Names of the six task coordinates.
+pub const AXES: [&str; 6] = ["alpha", "beta", "gamma", "x", "y", "z"];
+
+/// Factor from SI to the unit in which people read a task coordinate, and the name of that unit.
+pub fn axis_unit(axis: usize) -> (f64, &'static str) {
+    if axis < 3 { (1.0_f64.to_degrees(), "deg") } else { (1e3, "mm") }
+}
+
+/// A number with three significant digits, with an exponent only where it is very large or small.
 pub fn significant(x: f64) -> String {
     let magnitude = x.abs();
     match magnitude {
@@ -22,12 +31,12 @@ pub fn significant(x: f64) -> String {
     }
 }
 
-/// A share in per cent.
+/// A share in per cent, with three significant digits.
 pub fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share))
 }
 
-/// A share that somebody has chosen, in per cent, without digits nobody wrote.
+/// A configured share in per cent, with the digits that were configured and no others.
 pub fn plain_percent(share: f64) -> String {
     let percent = 100.0 * share;
     format!("{} %", format!("{percent:.6e}").parse().unwrap_or(percent))

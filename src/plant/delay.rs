@@ -4,7 +4,7 @@ use heapless::Deque;
 
 use crate::model::machine::LEGS;
 
-/// DriveCommand to the drives: six forces \[N\], or none.
+/// Command to the drives: six forces \[N\], or none.
 pub type DriveCommand = Option<[f64; LEGS]>;
 
 /// Most changes of the command within a dead time. A loop of 20 kHz makes 200 in the longest, 10 ms, and a

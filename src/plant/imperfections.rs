@@ -63,7 +63,7 @@ pub struct Friction {
     pub stribeck_speed: f64,
 }
 
-/// ElasticLeg leg: a spring with play between drive and rod.
+/// Elastic leg: a spring with play between drive and rod.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElasticLeg {
     /// \[N/m\]
@@ -98,7 +98,7 @@ pub struct BuildErrors {
     pub joints: f64,
 }
 
-/// ExternalWrench wrench on the platform: `wrench cos(2 pi frequency t)`, t from the start of the plant.
+/// External wrench on the platform: `wrench cos(2 pi frequency t)`, t from the start of the plant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExternalWrench {
     /// About C, base axes.

@@ -2,7 +2,7 @@
 //!
 //! Within a step the rotation is `R = exp(theta~) R_0`, so that an ordinary method for vectors applies to
 //! `[theta C omega v]` (Munthe-Kaas): `theta' = omega - theta x omega / 2 + theta x (theta x omega) / 12`,
-//! exact to the order of the method. DriveStates that move on their own, where legs are elastic, are six more
+//! exact to the order of the method. Drives that move on their own, where legs are elastic, are six more
 //! positions and rates of the same step. Where forces are constant over a step, the work they do is exactly
 //! force times change of length.
 

@@ -30,7 +30,7 @@ use crate::model::rigid::{Acceleration, Motion};
 /// Longest step times rate, whatever the tolerance: Runge-Kutta is stable to 2.78, and 1 is also accurate.
 const MAX_STEP_TIMES_RATE: f64 = 1.0;
 
-/// PlantTerms of the plant beyond the model, and the step of the integration.
+/// Terms of the plant beyond the model, and the step of the integration.
 #[derive(Clone, Copy, Debug)]
 pub struct PlantTerms {
     /// Rate of the drives' lag \[rad/s\].

@@ -13,6 +13,7 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
+use serde::{Deserialize, Serialize};
 
 use super::clock::{Clock, Grid};
 use super::exchange::{CycleOutput, RealtimeSide};
@@ -48,17 +49,33 @@ impl Timing {
     }
 }
 
-/// What begins a cycle: `realtime.release`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Release mode: what begins a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ReleaseMode {
     /// A point of the grid, for which the thread sleeps.
     Sleep,
     /// A point of the grid, for which the thread sleeps and then spins.
     Hybrid,
-    /// A measured message, signalled by the io thread.
+    /// A measured message, signalled by the I/O thread.
     External,
     /// A measured message and the setpoint of its instant, in simulated time, which stands still without messages.
     Lockstep,
+}
+
+impl ReleaseMode {
+    /// All modes.
+    pub const ALL: [Self; 4] = [Self::Sleep, Self::Hybrid, Self::External, Self::Lockstep];
+
+    /// Name in the configuration.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sleep => "sleep",
+            Self::Hybrid => "hybrid",
+            Self::External => "external",
+            Self::Lockstep => "lockstep",
+        }
+    }
 }
 
 /// Input of a cycle, as far as the loop needs to know it.

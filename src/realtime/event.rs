@@ -54,22 +54,40 @@ mod tests {
     use crate::messages::clock::monotonic_ns;
     use crate::realtime::clock::Monotonic;
     use crate::realtime::triple_buffer::triple_buffer;
-    use std::thread::scope;
+    use std::thread::{scope, sleep, spawn};
+    use std::time::Duration;
 
-    /// Longer than a host takes a processor away \[ns\].
-    const PATIENCE_NS: u64 = 5_000_000_000;
+    /// Much longer than a host takes a processor away \[ns\].
+    const PATIENCE_NS: u64 = 2_000_000_000;
+
+    /// Runs a test on a thread that is left behind if a wait in it does not end.
+    fn bounded(test: fn()) {
+        let limit_ns = monotonic_ns() + 10 * PATIENCE_NS;
+        let running = spawn(test);
+        while !running.is_finished() {
+            assert!(monotonic_ns() < limit_ns, "a wait does not end");
+            sleep(Duration::from_millis(1));
+        }
+        running.join().unwrap();
+    }
 
     #[test]
     fn without_a_signal_the_wait_ends_at_its_instant() {
-        let (_writer, mut inputs) = triple_buffer(0);
-        let instant_ns = monotonic_ns() + 5_000_000;
-        let signalled =
-            Event::default().wait(&mut inputs, &mut Monotonic, instant_ns, &AtomicBool::new(false));
-        assert!(!signalled && monotonic_ns() >= instant_ns);
+        bounded(|| {
+            let (_writer, mut inputs) = triple_buffer(0);
+            let instant_ns = monotonic_ns() + 5_000_000;
+            let stop = AtomicBool::new(false);
+            let signalled = Event::default().wait(&mut inputs, &mut Monotonic, instant_ns, &stop);
+            assert!(!signalled && monotonic_ns() >= instant_ns);
+        });
     }
 
     #[test]
     fn no_signal_is_missed() {
+        bounded(answer_every_signal);
+    }
+
+    fn answer_every_signal() {
         let (event, answer) = (Event::default(), Event::default());
         let (mut writer, mut inputs) = triple_buffer(0);
         let (mut echo, mut echoed) = triple_buffer(0);
@@ -88,8 +106,9 @@ mod tests {
             for round in 1..10_000 {
                 writer.write(round);
                 event.signal();
-                let answered = answer.wait(&mut echoed, &mut Monotonic, limit(), &stop);
-                assert!(answered, "round {round} has no answer");
+                let limit_ns = limit();
+                let is_answered = answer.wait(&mut echoed, &mut Monotonic, limit_ns, &stop);
+                assert!(is_answered && monotonic_ns() < limit_ns, "a signal of round {round} was missed");
                 assert_eq!(*echoed.value(), round);
             }
             stop.store(true, Ordering::Relaxed);

@@ -66,8 +66,13 @@ mod tests {
     /// The bound of the leads here.
     const MAX_LEAD_NS: u64 = 200_000;
 
-    /// A clock whose sleeps end late by a fixed time and whose every look costs one nanosecond. More looks than
-    /// a lead has nanoseconds fail at once.
+    /// What a look at the clock costs, and with it a turn of the spin.
+    const LOOK_NS: u64 = 100;
+
+    const PERIOD_NS: u64 = 1_000_000;
+
+    /// A clock whose sleeps end late by a fixed time. More looks than fit into a lead, and sleeps for more than a
+    /// period, fail at once.
     struct Late {
         now_ns: u64,
         latency_ns: u64,
@@ -84,13 +89,14 @@ mod tests {
 
     impl Clock for Late {
         fn now_ns(&mut self) -> u64 {
-            self.now_ns += 1;
+            self.now_ns += LOOK_NS;
             self.looks += 1;
-            assert!(self.looks <= MAX_LEAD_NS + 2, "{} looks without a sleep", self.looks);
+            assert!(self.looks <= MAX_LEAD_NS / LOOK_NS + 2, "{} looks without a sleep", self.looks);
             self.now_ns
         }
 
         fn sleep_until(&mut self, instant_ns: u64) {
+            assert!(instant_ns <= self.now_ns + PERIOD_NS, "{}: asleep until {instant_ns}", self.now_ns);
             let end_ns = self.now_ns.max(instant_ns + self.latency_ns);
             self.slept_ns += end_ns - self.now_ns;
             self.looks = 0;
@@ -100,7 +106,7 @@ mod tests {
 
     fn lateness(waiter: &mut Waiter, clock: &mut Late, cycles: u64) -> u64 {
         let wait = |k| {
-            let instant_ns = 1_000_000 * (clock.now_ns / 1_000_000 + 1) + k % 2;
+            let instant_ns = PERIOD_NS * (clock.now_ns / PERIOD_NS + 1) + k % 2;
             waiter.until(clock, instant_ns) - instant_ns
         };
         (0..cycles).map(wait).max().unwrap()
@@ -109,20 +115,22 @@ mod tests {
     #[test]
     fn without_a_lead_the_latency_of_the_sleep_is_there() {
         let mut clock = Late::new(0);
-        assert!((50_000..50_010).contains(&lateness(&mut Waiter::new(0), &mut clock, 100)));
+        assert!((50_000..=50_000 + LOOK_NS).contains(&lateness(&mut Waiter::new(0), &mut clock, 100)));
     }
 
     #[test]
     fn with_a_lead_it_is_hidden_and_the_spin_shrinks_to_what_is_needed() {
         let mut clock = Late::new(0);
         let mut waiter = Waiter::new(MAX_LEAD_NS);
-        assert!(lateness(&mut waiter, &mut clock, 20_000) <= 1);
+        assert!(lateness(&mut waiter, &mut clock, 20_000) <= LOOK_NS);
         assert!((51_000..52_000).contains(&waiter.lead_ns()), "{waiter:?}");
         clock.latency_ns = 90_000;
         assert!(lateness(&mut waiter, &mut clock, 1) > 30_000, "the first one cannot be known");
-        assert!(lateness(&mut waiter, &mut clock, 100) <= 1);
+        assert!(lateness(&mut waiter, &mut clock, 100) <= LOOK_NS);
         clock.latency_ns = 10_000;
-        assert!(lateness(&mut waiter, &mut clock, 10_000) <= 1);
+        assert!(lateness(&mut waiter, &mut clock, 1) <= LOOK_NS);
+        assert!(waiter.lead_ns() > 90_000, "down slowly: {waiter:?}");
+        assert!(lateness(&mut waiter, &mut clock, 10_000) <= LOOK_NS);
         assert!((11_000..12_000).contains(&waiter.lead_ns()), "{waiter:?}");
     }
 
@@ -137,7 +145,7 @@ mod tests {
             lateness(&mut waiter, &mut clock, 1);
             assert_eq!(waiter.lead_ns(), before_ns);
         }
-        clock.latency_ns = 198_999;
+        clock.latency_ns = 199_000 - LOOK_NS;
         lateness(&mut waiter, &mut clock, 10);
         assert_eq!(waiter.lead_ns(), 200_000);
     }
@@ -146,7 +154,7 @@ mod tests {
     fn an_instant_that_has_passed_is_not_slept_for_and_teaches_nothing() {
         let mut clock = Late::new(5_000_000);
         let mut waiter = Waiter::new(MAX_LEAD_NS);
-        assert_eq!(waiter.until(&mut clock, 4_000_000), 5_000_001);
+        assert_eq!(waiter.until(&mut clock, 4_000_000), 5_000_000 + LOOK_NS);
         assert_eq!((clock.slept_ns, waiter.lead_ns()), (0, 200_000));
     }
 }

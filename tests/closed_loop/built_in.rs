@@ -3,7 +3,7 @@
 use core::iter::repeat_n;
 
 use hexad::analysis::envelope;
-use hexad::commands::r#move::Score;
+use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
@@ -11,7 +11,7 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 
 use super::common::deployed;
-use super::rig::Rig;
+use super::common::rig::Rig;
 
 const MACHINES: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
 const MOTIONS: [BuiltInMotion; 5] = [
@@ -29,8 +29,8 @@ type Tighten = fn(&mut Config);
 const LONGEST_ENGAGING: u32 = 20_000;
 
 fn shaped(config: &Config, motion: BuiltInMotion, seconds: f64) -> FittedMotion {
-    match Score::motion(config, motion, seconds) {
-        Ok(Score::FittedMotion(scene)) => scene,
+    match Trajectory::built_in(config, motion, seconds) {
+        Ok(Trajectory::BuiltIn(scene)) => scene,
         other => panic!("{} {motion:?} {seconds} s: {other:?}", config.name),
     }
 }
@@ -140,7 +140,7 @@ fn keep_each_limit_of_the_deployment() {
 fn that_could_not_be_seen_are_refused_with_the_reason() {
     let mut config = deployed("fried2008");
     config.deployment.limits.reference.position.velocity = 1e-4;
-    let error = Score::motion(&config, BuiltInMotion::MinimumJerk, 0.5).unwrap_err().to_string();
+    let error = Trajectory::built_in(&config, BuiltInMotion::MinimumJerk, 0.5).unwrap_err().to_string();
     for word in ["0.100 %", "t = 0.", ": velocity: ", " times the limit in [limits]"] {
         assert!(error.contains(word), "{word:?} must be in {error}");
     }

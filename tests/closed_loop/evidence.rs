@@ -2,14 +2,14 @@
 //! says so before the limit bites.
 
 use hexad::control::controller::{Input, Output};
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad::control::limits::Limit;
 use hexad::control::state::State;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 
 use super::common::deployed;
-use super::rig::{Rig, parameters};
+use super::common::rig::{Rig, parameters};
 
 /// Active, at rest at home.
 fn at_rest() -> (Rig, TaskState) {
@@ -188,4 +188,24 @@ fn what_is_near_a_limit_says_so() {
         assert_eq!(says(Limit::Envelope, Vector6::x() * (share * 0.1), none, none), near, "envelope {share}");
     }
     assert!(!says(Limit::Stroke, none, none, none) && says(Limit::Stroke, z * 0.42, none, none));
+}
+
+#[test]
+fn a_diagnostic_is_a_sentence_with_value_bound_and_remedy() {
+    let near_singular = Diagnostic::new(DiagnosticCode::NearSingular, 143.21, 100.0).to_string();
+    assert!(near_singular.contains("condition 143.21 exceeds limits.condition 100;"), "{near_singular}");
+    let stroke = Diagnostic::new(DiagnosticCode::LengthOutOfStroke, 0.5, 1.076).at(2).to_string();
+    assert!(stroke.contains("leg length 0.5 m of leg 3 is outside the stroke"), "{stroke}");
+    assert!(stroke.contains(" 1.076 m; check the encoders"), "{stroke}");
+    let envelope = Diagnostic::new(DiagnosticCode::SetpointOutOfEnvelope, -0.31, -0.3).at(3).to_string();
+    assert!(envelope.contains("coordinate -0.31 rad or m of axis 4"), "{envelope}");
+    let fast = Diagnostic::new(DiagnosticCode::SetpointTooFast, 4.0, 1.0).to_string();
+    assert!(fast.contains("the setpoint is 4 times the limit in [limits]"), "{fast}");
+    let lost = Diagnostic::new(DiagnosticCode::NearSingular, f64::INFINITY, 1e-7).to_string();
+    assert!(lost.contains("condition inf exceeds limits.condition 0.0000001;"), "{lost}");
+    assert_eq!(
+        Diagnostic::from(DiagnosticCode::NoMeasurement).to_string(),
+        "no measurement; start the driver or the plant"
+    );
+    assert_eq!(Diagnostic::default().to_string(), "none");
 }

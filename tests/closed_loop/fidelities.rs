@@ -10,7 +10,7 @@ use hexad::model::fidelity::Fidelity;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
-use super::rig::{Rig, parameters, track};
+use super::common::rig::{Rig, parameters, track};
 
 #[test]
 fn the_loop_tracks_on_every_rung_with_inertia_and_better_on_higher_ones() {

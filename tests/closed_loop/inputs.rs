@@ -8,8 +8,8 @@ use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
+use super::common::rig::{Rig, in_motion, parameters};
 use super::common::{deployed, largest};
-use super::rig::{Rig, in_motion, parameters};
 
 /// Asserts a state without force, and why.
 pub fn assert_without_force(output: &Output, state: State, cause: DiagnosticCode) {

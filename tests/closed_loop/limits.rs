@@ -11,8 +11,8 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
+use super::common::rig::{Rig, in_motion};
 use super::common::{deployed, largest};
-use super::rig::{Rig, in_motion};
 
 /// Without a bound on what a setpoint may ask for.
 fn unbounded(name: &str) -> Config {

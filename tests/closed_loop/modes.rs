@@ -10,7 +10,7 @@ use hexad::model::task::TaskState;
 
 use super::common::deployed;
 use super::common::fast::Fast;
-use super::rig::{Rig, Tracking, parameters};
+use super::common::rig::{Rig, Tracking, parameters};
 
 /// Expected errors may be off by a fifth either way.
 const BAND: (f64, f64) = (0.8, 1.25);

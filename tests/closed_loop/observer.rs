@@ -8,7 +8,7 @@ use hexad::model::fidelity::Gravity;
 use hexad::model::task::TaskState;
 
 use super::common::deployed;
-use super::rig::{Rig, parameters};
+use super::common::rig::{Rig, parameters};
 
 fn with_observer(hertz: f64) -> Config {
     let mut config = deployed("motion_base");

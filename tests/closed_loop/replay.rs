@@ -4,7 +4,7 @@ use hexad::control::controller::{Controller, Input, Output};
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
-use super::rig::{Rig, parameters};
+use super::common::rig::{Rig, parameters};
 
 /// All bits of an output: `Debug` of a float reads back the same, signed zeros included.
 fn bits(output: &Output) -> String {
@@ -36,7 +36,7 @@ fn recorded_inputs_give_the_same_outputs_bit_for_bit() {
 #[test]
 fn a_controller_is_its_state() {
     let config = deployed("fried2008");
-    let (mut rig, task) = super::rig::in_motion(&config);
+    let (mut rig, task) = super::common::rig::in_motion(&config);
     let mut copy = rig.controller.clone();
     for _ in 0..100 {
         let input = rig.input(&task.after(0.0));

@@ -7,8 +7,8 @@ use hexad::control::state::State;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::BuiltInMotion;
 
+use super::common::rig::{Rig, Tracking, track};
 use super::common::{Errors, angle_between, deployed};
-use super::rig::{Rig, Tracking, track};
 
 /// Length of every motion, approach and settling not counted \[s\].
 const SECONDS: f64 = 8.0;

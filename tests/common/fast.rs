@@ -1,7 +1,5 @@
 //! The fast scene of a machine: its sines, played as fast as the limits of setpoints and drives allow with reserve.
 
-#![allow(dead_code, reason = "every test uses a part of it")]
-
 use hexad::config::Config;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;

@@ -1,8 +1,21 @@
 //! What several tests share: the machines, tables of numbers, statistics of errors.
 
-#![allow(dead_code, reason = "every test uses a part of it")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    clippy::std_instead_of_core,
+    reason = "helpers of tests and benches, each of which uses a part"
+)]
 
 pub mod fast;
+pub mod not_run;
+pub mod paper;
+pub mod rig;
+pub mod stability;
+pub mod stalls;
 
 use std::path::{Path, PathBuf};
 

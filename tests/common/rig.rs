@@ -1,8 +1,6 @@
 //! The loop without threads: measurement and setpoint at k T, release at k T + T / 2, force on the platform
 //! from 100 us after the release on.
 
-#![allow(dead_code, reason = "every test uses a part of it")]
-
 use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
 use hexad::control::parameters::Parameters;
 
@@ -19,7 +17,7 @@ use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::motion::timeline::Timeline;
 use hexad::plant::simulator::Simulator;
 
-use super::common::{Errors, angle_between};
+use super::{Errors, angle_between};
 
 /// What reading, computing and sending take, about as on a common computer.
 const FORCE_DELAY_NS: u64 = 100_000;

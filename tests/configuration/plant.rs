@@ -35,8 +35,8 @@ length_noise_m = 3e-6
 rate_noise_m_s = 4e-6
 [plant.build]
 payload_kg = 8
-payload_at_m = [1, 2, 3]
-joint_m = 9e-5
+payload_position_m = [1, 2, 3]
+joint_error_m = 9e-5
 [plant.external]
 force_n = [4, 5, 6]
 torque_n_m = [7, 8, 9]
@@ -77,7 +77,7 @@ fn imperfections_are_refused_with_key_value_and_bound() {
     refused("coulomb_n = 3", "coulomb_n = -3", &["plant.friction.coulomb_n = -3: must be at least 0"]);
     refused("s = 0.05", "s = 0", &["plant.friction.stribeck_speed_m_s = 0: must be greater than 0"]);
     refused("= 2e-6", "= -2e-6", &["plant.sensor.rate_step_m_s = -2e-6: must be at least 0"]);
-    refused("[1, 2, 3]", "3", &["plant.build.payload_at_m = 3: must be an array of 3 numbers"]);
+    refused("[1, 2, 3]", "3", &["plant.build.payload_position_m = 3: must be an array of 3 numbers"]);
     refused(
         "[7, 8, 9]",
         "[7, 8, inf]",
@@ -91,7 +91,9 @@ fn imperfections_are_refused_with_key_value_and_bound() {
     refused(
         "stiffness_n_m = 5e7\n",
         "",
-        &["plant.leg.backlash_m = 7e-5: must be 0 without stiffness_n_m: play has flanks"],
+        &[
+            "plant.leg.backlash_m = 7e-5: must be 0 without stiffness_n_m: the flanks of a backlash are springs",
+        ],
     );
     // Too fast to be simulated in real time.
     refused(

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use hexad::realtime::overrun::OverrunPolicy;
 use proptest::prelude::*;
 
-use crate::rig::{FIRST_NS, LATE_NS, PERIOD_NS, Script, perform};
+use super::rig::{FIRST_NS, LATE_NS, PERIOD_NS, Script, perform};
 
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Walk {

@@ -3,7 +3,7 @@
 use hexad::messages::LoopCounters;
 use hexad::realtime::overrun::OverrunPolicy::{self, CatchUp, Fault, Skip};
 
-use crate::rig::{FIRST_NS, PERIOD_NS, PHASE_NS, Script, Seen, perform};
+use super::rig::{FIRST_NS, PERIOD_NS, PHASE_NS, Script, Seen, perform};
 
 /// Grid points of the cycles that were run, from 0.
 fn points(seen: &[Seen]) -> Vec<u64> {

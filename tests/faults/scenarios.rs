@@ -3,8 +3,8 @@
 //!
 //! With `HEXAD_CHARTS=FOLDER` each is drawn into a picture.
 
+use super::common::rig::Rig;
 use super::pictures::draw;
-use super::rig::Rig;
 use super::situations::{Situation, machine};
 use super::world::{Grip, Source, World};
 use hexad::control::diagnostic::DiagnosticCode;

@@ -10,7 +10,7 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
-use super::rig::{Rig, parameters};
+use super::common::rig::{Rig, parameters};
 use super::world::{Source, World};
 
 /// In the order of the columns of the table.

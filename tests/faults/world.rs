@@ -14,8 +14,8 @@ use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector6;
 
+use super::common::rig::Rig;
 use super::recording::{Recording, Sample};
-use super::rig::Rig;
 
 /// Where setpoints come from.
 #[derive(Clone)]

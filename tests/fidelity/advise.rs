@@ -66,7 +66,7 @@ fn without_times(text: &str) -> String {
             .iter()
             .any(|fidelity| line.starts_with(fidelity));
         let words: Vec<_> = line.split_whitespace().collect();
-        let kept = if cut { words[..7].join(" ") + &words[8..].join(" ") } else { line.to_string() };
+        let kept = if cut { words[..7].join(" ") + &words[8..].join(" ") } else { words.join(" ") };
         writeln!(stripped, "{kept}").unwrap();
     }
     stripped
@@ -176,7 +176,8 @@ fn rows_out_of_reach_are_passed_over_and_nothing_but_them_is_refused() {
     let message = String::from_utf8(none.stderr).unwrap();
     assert_eq!(none.status.code(), Some(2), "{message}");
     assert!(
-        message.contains("no row can be judged, 200 outside the actuators' stroke, 0 singular"),
+        message
+            .contains("no row can be evaluated: 200 are outside the actuators' stroke, 0 at singular poses"),
         "{message}"
     );
     let absent = advise(&config, Some(Path::new("absent.csv")));

@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::{panicking, sleep};
 use std::time::{Duration, Instant};
 
-use hexad::commands::demo::children::PARENT;
+use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
 use hexad::messages::{Bus, Publisher, Subscriber};
@@ -23,9 +23,9 @@ use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use nalgebra::Vector6;
 
+use super::common::stalls::Watchdog;
+use super::{DEPLOYED, file, python};
 use crate::common::{Errors, Table, largest};
-use crate::stalls::Watchdog;
-use crate::{DEPLOYED, file, python};
 
 const PERIOD_NS: u64 = 1_000_000;
 const PERIOD_S: f64 = 1e-3;
@@ -110,7 +110,7 @@ impl Stage {
     fn daemon(&self) -> Process {
         let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
         command.args(["run", "--config"]).arg(self.path("machine.toml"));
-        command.env(PARENT, process::id().to_string()).env_remove("HEXAD_LOG");
+        command.env(PARENT_VARIABLE, process::id().to_string()).env_remove("HEXAD_LOG");
         let daemon = Process::start(command, self.path("daemon.txt"));
         daemon.says("running");
         daemon
@@ -327,6 +327,9 @@ impl Run {
 /// Daemon and plant have the same parameters, so what is off is what a period makes of a force, in both engines alike.
 #[test]
 fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
+    if python::is_lacking() {
+        return;
+    }
     let _turn = turn();
     for machine in DEPLOYED {
         let [mujoco, ours] = ["mujoco", "ours"].map(|who| Stage::new(machine, who, LOCKSTEP));
@@ -356,6 +359,9 @@ fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
 /// typical error counts. Where it held somebody for longer than a driver waits, it is tried again.
 #[test]
 fn a_platform_in_mujoco_moves_in_real_time() {
+    if python::is_lacking() {
+        return;
+    }
     let _turn = turn();
     for attempt in 1.. {
         let host = Watchdog::start();

@@ -1,12 +1,13 @@
 //! A Python of our own with MuJoCo and iceoryx2 in it.
 //!
-//! Where it cannot be had, the tests fail and say why. Rust's test harness knows no "not run" that a test could
-//! decide on, and a comparison that did not take place must not count as passed.
+//! Where it cannot be had, the tests are not run and say why.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
+
+use super::common::not_run::lacking;
 
 /// The engine. Pinned: what it makes of a model may change.
 const MUJOCO: &str = "mujoco==4.0.0";
@@ -40,7 +41,7 @@ fn clients() -> PathBuf {
 }
 
 fn python() -> Command {
-    let mut command = Command::new(environment().join("bin/python"));
+    let mut command = Command::new(environment().as_ref().unwrap().join("bin/python"));
     // No __pycache__ between the sources.
     command.arg("-B").env("PYTHONPATH", declarations());
     command
@@ -66,9 +67,14 @@ pub fn declared(language: &str) -> String {
     output(command.args(["messages", "--language", language])).unwrap()
 }
 
-/// The virtual environment, set up by whoever comes first.
-fn environment() -> &'static Path {
-    static READY: OnceLock<PathBuf> = OnceLock::new();
+/// Whether there is no such Python here; the calling test is then not run.
+pub fn is_lacking() -> bool {
+    environment().as_ref().inspect_err(|why| lacking(why)).is_err()
+}
+
+/// The virtual environment, set up by whoever comes first, or why there is none.
+fn environment() -> &'static Result<PathBuf, String> {
+    static READY: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     READY.get_or_init(|| {
         let packages = [MUJOCO.to_owned(), iceoryx2()];
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(packages.join("-").replace("==", "-"));
@@ -78,16 +84,12 @@ fn environment() -> &'static Path {
         lock.lock().unwrap();
         let complete = folder.join("complete");
         if !complete.exists() {
-            if let Err(why) = set_up(&folder, &packages) {
-                panic!(
-                    "\n\nNOT RUN: no Python with {packages:?}.\n{why}\n\
-                     Needed: python3 with the module venv (apt-get install python3-venv) and PyPI, once.\n\
-                     Without: cargo test --release -- --skip mujoco\n\n"
-                );
-            }
+            set_up(&folder, &packages).map_err(|why| {
+                format!("a Python with {packages:?}; apt-get install python3-venv, and PyPI, once\n{why}")
+            })?;
             fs::write(complete, "").unwrap();
         }
-        folder
+        Ok(folder)
     })
 }
 

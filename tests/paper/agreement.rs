@@ -3,9 +3,9 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::common::MACHINES;
-use super::dense::Dense;
-use super::form::{EXACT, Form, PAPER};
-use super::kinematics::{Leg, State, joint, legs, platform};
+use super::common::paper::dense::Dense;
+use super::common::paper::form::{EXACT, Form, PAPER};
+use super::common::paper::kinematics::{Leg, State, joint, legs, platform};
 use super::vectors::{Case, ROUNDING, exact, load, no_spin};
 
 #[test]

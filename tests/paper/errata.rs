@@ -4,10 +4,10 @@
 use nalgebra::{Vector3, Vector6};
 
 use super::common::Errors;
-use super::force::forces;
-use super::form::{EXACT, Form, PAPER, Rates};
-use super::kinematics::{Leg, State, joint, legs, platform};
-use super::machine::Machine;
+use super::common::paper::force::forces;
+use super::common::paper::form::{EXACT, Form, PAPER, Rates};
+use super::common::paper::kinematics::{Leg, State, joint, legs, platform};
+use super::common::paper::machine::Machine;
 use super::vectors::{Case, ROUNDING, Row, errors, exact, load, no_spin};
 
 /// An effect must be within this share of what is stated: more fails, and so does less.

@@ -12,12 +12,12 @@
 
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
-use super::dense::Dense;
+use super::common::paper::dense::Dense;
+use super::common::paper::force::forces;
+use super::common::paper::form::{Form, LastTerm, PAPER};
+use super::common::paper::kinematics::{Leg, State, angular_acceleration, joint, legs, platform, tilde_x};
+use super::common::paper::machine::Machine;
 use super::errata::{assert_printed_fails, assert_worth, every_leg};
-use super::force::forces;
-use super::form::{Form, LastTerm, PAPER};
-use super::kinematics::{Leg, State, angular_acceleration, joint, legs, platform, tilde_x};
-use super::machine::Machine;
 use super::vectors::{ROUNDING, errors, load, no_spin};
 
 const RIGHT: LastTerm = LastTerm { sign: 1.0, power: 2 };

@@ -9,11 +9,11 @@
 //! power balances again. The vectors hold the paper's reading, so the oracle without them agrees.
 
 use super::common::Errors;
+use super::common::paper::force::{energy, forces, leg_rates};
+use super::common::paper::form::{EXACT, Form, Inertia, PAPER};
+use super::common::paper::kinematics::{Leg, State, joint, legs, platform};
+use super::common::paper::machine::{Drive, Machine};
 use super::errata::assert_worth;
-use super::force::{energy, forces, leg_rates};
-use super::form::{EXACT, Form, Inertia, PAPER};
-use super::kinematics::{Leg, State, joint, legs, platform};
-use super::machine::{Drive, Machine};
 use super::vectors::{Case, ROUNDING, errors, exact, load};
 
 /// Differences of the energy, not the equations, limit how well power balances.

@@ -2,11 +2,11 @@
 
 use nalgebra::Vector6;
 
+use super::common::paper::force::forces;
+use super::common::paper::form::Form;
+use super::common::paper::kinematics::State;
+use super::common::paper::machine::Machine;
 use super::common::{Errors, Table, data};
-use super::force::forces;
-use super::form::Form;
-use super::kinematics::State;
-use super::machine::Machine;
 
 /// Bound on an error that is rounding only, as a share of the largest force of its row: fifty times what is
 /// measured (2e-15), because sine and cosine differ from one mathematics library to another.

@@ -1,4 +1,4 @@
-//! ElasticLeg legs: energy, play, the rigid limit, and the step that the tolerance asks for.
+//! Elastic legs: energy, play, the rigid limit, and the step that the tolerance asks for.
 
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::{LEGS, Machine};

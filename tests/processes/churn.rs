@@ -14,6 +14,7 @@ use hexad::messages::LoopTimes;
 use hexad::messages::StatusMessage;
 use hexad::messages::{Bus, Subscriber};
 
+use crate::common::not_run::lacking;
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::peer::Controlled;
@@ -41,7 +42,7 @@ fn the_real_time_thread_does_not_notice_peers_that_die() {
         ["calm", "disturbed"].map(|name| Machine::with(name, &format!("{RATE}{PATIENT}")));
     let (mut calm, mut disturbed) = (Observed::start(calm), Observed::start(disturbed));
     if calm.controlled.daemon.words().contains("no locked memory") {
-        println!("SKIPPED the_real_time_thread_does_not_notice_peers_that_die: no locked memory");
+        lacking("locked memory");
         return;
     }
     let mut kills = 0;

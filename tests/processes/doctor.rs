@@ -7,9 +7,9 @@
 use std::time::Duration;
 
 use hexad::commands::doctor::Diagnosis;
-use hexad::commands::doctor::facts::{Fact, Rating};
-use hexad::commands::doctor::latency::Waiting;
-use hexad::commands::doctor::verdict::Judgement;
+use hexad::commands::doctor::facts::{Assessment, Fact};
+use hexad::commands::doctor::verdict::Feasibility;
+use hexad::realtime::cyclic::ReleaseMode;
 
 use crate::support::children::{Ended, HANG, Hexad, run};
 use crate::support::machine::Machine;
@@ -45,7 +45,7 @@ fn text_and_json_and_exit_code_agree() {
     let machine = Machine::patient("doctor");
     let Ended { status, stdout, stderr } = doctor(&machine, &[]);
     let diagnosis = diagnosis(&machine);
-    let possible = diagnosis.verdict != Judgement::Impossible;
+    let possible = diagnosis.verdict != Feasibility::Impossible;
     assert_eq!(status.code(), Some(if possible { 0 } else { 1 }), "{stdout}\n{stderr}");
     let complaint = "hexad: 1000 Hz by sleep is not possible on this host\n";
     assert_eq!(stderr, if possible { "" } else { complaint });
@@ -53,14 +53,17 @@ fn text_and_json_and_exit_code_agree() {
     let text = unwrapped(&stdout);
     assert!(text.starts_with("fried2008: 1000 Hz by sleep, on any CPU"), "{stdout}");
     assert!(diagnosis.facts.len() > 10, "{:#?}", diagnosis.facts);
-    for Fact { name, rating, found, remedy } in &diagnosis.facts {
+    for Fact { name, assessment, found, remedy } in &diagnosis.facts {
         assert!(
             text.contains(&unwrapped(&format!("{name} {found}"))),
             "{name}: {found} must be in\n{stdout}"
         );
         let remedy_shown = remedy.as_ref().is_none_or(|remedy| text.contains(&format!("-> {remedy}")));
         assert!(remedy_shown, "{remedy:?} must be in\n{stdout}");
-        assert!(remedy.is_some() || [Rating::Good, Rating::Unknown].contains(rating), "{name} has no remedy");
+        assert!(
+            remedy.is_some() || [Assessment::Good, Assessment::Unknown].contains(assessment),
+            "{name} has no remedy"
+        );
     }
     assert_eq!(diagnosis.rates.len(), 10);
     for rate in &diagnosis.rates {
@@ -70,9 +73,9 @@ fn text_and_json_and_exit_code_agree() {
         assert!(ordered.is_sorted(), "{times:?}");
         assert!(times.count > 0);
         assert_eq!(latency.thread.allocations, 0, "{latency:?}");
-        assert!(!rate.why.is_empty());
-        for why in &rate.why {
-            assert!(text.contains(why.as_str()), "{why} must be in\n{stdout}");
+        assert!(!rate.reasons.is_empty());
+        for reason in &rate.reasons {
+            assert!(text.contains(reason.as_str()), "{reason} must be in\n{stdout}");
         }
     }
     let word = serde_json::to_value(diagnosis.verdict).expect("a word");
@@ -91,22 +94,23 @@ fn what_is_configured_is_what_is_judged() {
     );
     let ended = doctor(&machine, &["--config", machine.file.to_str().expect("a plain name")]);
     let diagnosis = diagnosis(&machine);
-    assert_eq!((diagnosis.rate_hz, diagnosis.release, diagnosis.cpu), (500.0, Waiting::Hybrid, Some(0)));
+    assert_eq!((diagnosis.rate_hz, diagnosis.release, diagnosis.cpu), (500.0, ReleaseMode::Hybrid, Some(0)));
     assert_eq!(diagnosis.rates.len(), 12, "{}", ended.stdout);
     for rate in &diagnosis.rates {
         let latency = &rate.latency;
         let half_ns = (0.5e9 / latency.rate_hz) as u64;
         assert_eq!(latency.late_wakeup_ns, half_ns.min(700_000));
-        assert_eq!(latency.lead_ns > 0, latency.release == Waiting::Hybrid);
+        assert_eq!(latency.lead_ns > 0, latency.release == ReleaseMode::Hybrid);
         assert!(latency.lead_ns <= half_ns.min(300_000));
     }
     let releases = |rate_hz, release| {
-        let rate = diagnosis.rates.iter().find(|rate| rate.latency.is(rate_hz, release)).expect("measured");
+        let rate =
+            diagnosis.rates.iter().find(|rate| rate.latency.is_of(rate_hz, release)).expect("measured");
         rate.latency.wakeup_ns.count + rate.latency.missed
     };
     // It has 4 of the 15 parts of that second, the others one each.
-    assert_eq!(releases(500.0, Waiting::Hybrid), 134, "{}", ended.stdout);
-    assert_eq!(releases(500.0, Waiting::Sleep), 34, "{}", ended.stdout);
+    assert_eq!(releases(500.0, ReleaseMode::Hybrid), 134, "{}", ended.stdout);
+    assert_eq!(releases(500.0, ReleaseMode::Sleep), 34, "{}", ended.stdout);
 }
 
 #[test]
@@ -151,7 +155,7 @@ fn a_signal_ends_it() {
 #[test]
 fn nobody_is_told_what_is_lacking() {
     let nobody = [NO_LIMITS_RAISED, AS_NOBODY];
-    if cannot("nobody_is_told_what_is_lacking", &nobody) {
+    if cannot(&nobody) {
         return;
     }
     let _turn = turns::alone();
@@ -168,13 +172,13 @@ fn nobody_is_told_what_is_lacking() {
         ("locked memory", "no locked memory: no CAP_IPC_LOCK, and RLIMIT_MEMLOCK is 64 kB", "LimitMEMLOCK="),
     ] {
         let fact = fact(&diagnosis, name);
-        assert_eq!(fact.rating, Rating::Bad, "{fact:?}");
+        assert_eq!(fact.assessment, Assessment::Bad, "{fact:?}");
         assert!(fact.found.starts_with(found), "{fact:?}");
         assert!(fact.remedy.as_ref().is_some_and(|words| words.contains(remedy)), "{fact:?}");
     }
     for rate in &diagnosis.rates {
-        assert_eq!(rate.verdict, Judgement::Impossible);
+        assert_eq!(rate.verdict, Feasibility::Impossible);
         let why = "the daemon would not start: realtime.require_realtime, and no FIFO priority 80, no ";
-        assert!(rate.why[0].starts_with(why), "{rate:?}");
+        assert!(rate.reasons[0].starts_with(why), "{rate:?}");
     }
 }

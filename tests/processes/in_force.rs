@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::trio::start_daemon;
@@ -63,7 +64,7 @@ fn granted(test: &str, settings: &str) -> Option<(Hexad, Machine)> {
     daemon.says("running");
     let words = daemon.words();
     if words.contains("WARN no ") {
-        println!("SKIPPED {test}: {words}");
+        lacking(&words);
         return None;
     }
     Some((daemon, machine))

@@ -8,6 +8,7 @@ use std::{env, fs};
 
 use hexad::daemon::report::Report;
 
+use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::recorder::Recorder;
@@ -30,7 +31,7 @@ fn the_real_time_thread_uses_nothing_it_did_not_have() {
     let daemon = start_daemon(&machine);
     daemon.says("running");
     if daemon.words().contains("no locked memory") {
-        println!("SKIPPED the_real_time_thread_uses_nothing_it_did_not_have: {}", daemon.words());
+        lacking(&daemon.words());
         return;
     }
     let start = Instant::now();

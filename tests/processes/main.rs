@@ -16,6 +16,8 @@
 )]
 #![allow(clippy::std_instead_of_core, reason = "tests of processes have an operating system")]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod support;
 
 mod churn;

@@ -1,10 +1,12 @@
 //! What Linux refuses is told with the reason that holds and the remedy for it; with `require_realtime` it is
 //! a refusal to start. Each case is a real refusal by the kernel.
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
 use std::{fs, process};
 
+use crate::common::not_run::{lacking, not_run};
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::nobody::{AS_NOBODY, NO_LIMITS_RAISED, OWN_PLACES, cannot, wrapped};
@@ -105,7 +107,7 @@ fn a_processor_that_is_not_there() {
 fn a_processor_outside_the_cpuset() {
     let Some(group) = Group::new("a_processor_outside_the_cpuset", "cpuset", "cpuset.cpus") else { return };
     if available_parallelism().is_ok_and(|count| count.get() == 1) {
-        println!("SKIPPED a_processor_outside_the_cpuset: this machine has one processor");
+        not_run("this machine has one processor");
         return;
     }
     group.set("cpuset.cpus", "0");
@@ -121,7 +123,7 @@ fn a_processor_outside_the_cpuset() {
 #[test]
 fn sched_deadline_on_some_processors_only() {
     if available_parallelism().is_ok_and(|count| count.get() == 1) {
-        println!("SKIPPED sched_deadline_on_some_processors_only: this machine has one processor");
+        not_run("this machine has one processor");
         return;
     }
     let deadline = "scheduler = \"deadline\"";
@@ -152,7 +154,7 @@ fn sched_deadline_at_20_khz() {
 /// With these keys of `[realtime]` and behind these wrappers the daemon does not start, for these reasons
 /// and no other.
 fn refuses(test: &str, settings: &str, wrappers: &[&[&str]], reasons: &[&str]) {
-    if cannot(test, &[&["chrt", "-f", "1"]]) || cannot(test, wrappers) {
+    if cannot(&[&["chrt", "-f", "1"]]) || cannot(wrappers) {
         return;
     }
     let _turn = turns::beside_others();
@@ -182,14 +184,16 @@ impl Group {
         let group = match fs::create_dir(&path) {
             Ok(()) => Self(path),
             Err(error) => {
-                println!("SKIPPED {test}: {}: {error}", path.display());
+                let why = format!("{}: {error}", path.display());
+                let say = if error.kind() == ErrorKind::PermissionDenied { lacking } else { not_run };
+                say(&why);
                 return None;
             }
         };
         if group.0.join(file).exists() {
             return Some(group);
         }
-        println!("SKIPPED {test}: this kernel has no {file}");
+        not_run(&format!("this kernel has no {file}"));
         None
     }
 

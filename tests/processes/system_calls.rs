@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use hexad::daemon::report::Report;
 
+use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS};
 use crate::support::peer::Controlled;
@@ -28,9 +29,7 @@ const LEAST_CYCLES: u64 = 1000;
 #[test]
 fn the_loop_calls_the_system_for_its_sleep_only() {
     if let Err(error) = Command::new("strace").arg("--version").output() {
-        println!(
-            "NOT RUN the_loop_calls_the_system_for_its_sleep_only: strace: {error}; apt-get install strace"
-        );
+        lacking(&format!("strace: {error}; apt-get install strace"));
         return;
     }
     let _turn = turns::beside_others();

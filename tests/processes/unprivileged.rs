@@ -10,7 +10,7 @@ use crate::support::turns;
 #[test]
 fn nobody_is_told_what_is_lacking_and_served() {
     let nobody = [OWN_PLACES, NO_LIMITS_RAISED, AS_NOBODY];
-    if cannot("nobody_is_told_what_is_lacking_and_served", &nobody) {
+    if cannot(&nobody) {
         return;
     }
     let _turn = turns::alone();
@@ -26,7 +26,7 @@ fn nobody_is_told_what_is_lacking_and_served() {
 #[test]
 fn nobody_is_served_beside_root() {
     let nobody = [NO_LIMITS_RAISED, AS_NOBODY];
-    if cannot("nobody_is_served_beside_root", &nobody) {
+    if cannot(&nobody) {
         return;
     }
     let _turn = turns::alone();

@@ -14,8 +14,8 @@ use hexad::plant::simulator::Simulator;
 use nalgebra::Vector3;
 
 use super::common::largest;
+use super::common::rig::Rig;
 use super::fichter::{ANY, AT_HOME, CONDITION, at, before, motion_base, on_the_way};
-use super::rig::Rig;
 
 /// From home to as far beyond \[s\]: peak speeds from 2.3 to 0.028 rad/s.
 const TIMES_S: [f64; 4] = [0.5, 2.0, 10.0, 40.0];

@@ -31,7 +31,10 @@ fn another_pose_nearby_is_told() {
     let near = checked(86_f64.to_radians());
     assert!(line(&near).ends_with("across a singular pose") && !line(&near).contains("NOT"), "{near}");
     assert!(line(&near).contains(", the nearest 8.0 deg and "), "{near}");
-    assert!(near.contains("WARNING: at start-up lengths alone may not tell it from home"), "{near}");
+    assert!(
+        near.contains("WARNING: at start-up the lengths alone may not distinguish it from home"),
+        "{near}"
+    );
     let far = checked(0.0);
     assert!(!far.contains("WARNING"), "{far}");
 }

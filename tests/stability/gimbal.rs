@@ -12,8 +12,8 @@ use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::rise;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
+use super::common::rig::Rig;
 use super::common::{Legs, deployed, largest};
-use super::rig::Rig;
 
 /// The platform turns so far to either side of the lock \[rad\].
 const TURN: f64 = 0.15;

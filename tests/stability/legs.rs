@@ -16,8 +16,8 @@ use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use hexad::model::task::TaskState;
 use nalgebra::{Vector3, Vector6};
 
+use super::common::rig::Rig;
 use super::common::{Legs, deployed, largest};
-use super::rig::Rig;
 
 fn home(machine: &Machine) -> Pose {
     TaskState::at_rest(machine.home).motion().pose

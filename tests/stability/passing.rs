@@ -19,8 +19,8 @@ use nalgebra::Vector6;
 use rayon::prelude::*;
 
 use super::common::largest;
+use super::common::rig::Rig;
 use super::fichter::{ANY, AT_HOME, CONDITION, HOLDING_N, at, before, motion_base, on_the_way};
-use super::rig::Rig;
 
 /// From home to the nearest pose \[s\]: up to 0.14, 0.38 and 0.94 rad/s.
 const TIMES_S: [f64; 3] = [4.0, 1.5, 0.6];

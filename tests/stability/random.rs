@@ -3,9 +3,9 @@
 use hexad::model::machine::Machine;
 use rayon::prelude::*;
 
+use super::common::stability::rivals::Update;
+use super::common::stability::trials::{End, Method, ambiguous, pose, step, trial, within_reach};
 use super::common::{MACHINES, machine};
-use super::rivals::Update;
-use super::trials::{End, Method, ambiguous, pose, step, trial, within_reach};
 
 /// Trials per machine; `cargo bench --bench stability` makes a million.
 const TRIALS: u64 = 10_000;

@@ -10,8 +10,8 @@ use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::imperfections::SensorErrors;
 use nalgebra::Vector6;
 
+use super::common::stability::delayed::{Delayed, PUSH, Setup, boundary};
 use super::common::{deployed, largest};
-use super::delayed::{Delayed, PUSH, Setup, boundary};
 use super::transition::Transition;
 
 const LOOP: SampledLoop =

@@ -10,8 +10,8 @@ use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use nalgebra::Vector3;
 
+use super::common::stability::trials::{pose, rigid};
 use super::common::{Errors, Legs, machine};
-use super::trials::{pose, rigid};
 
 /// Radii of the platforms \[m\].
 const RADII: [f64; 4] = [0.01, 0.5, 5.0, 50.0];

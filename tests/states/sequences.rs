@@ -14,8 +14,8 @@ use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
+use super::common::rig::Rig;
 use super::common::{deployed, largest};
-use super::rig::Rig;
 
 static CONFIG: LazyLock<Config> = LazyLock::new(|| {
     let mut config = deployed("motion_base");

@@ -1,8 +1,9 @@
 //! Regions that are said to be without obstacle have none, and hardly larger ones have one.
 
-use hexad::analysis::clearance::{Clearance, PoseCell, RegionShape, WorkspaceLimit};
+use hexad::analysis::clearance::{Clearance, WorkspaceLimit};
 use hexad::analysis::reachable_envelope::nominal_bounds;
 use hexad::analysis::region_search::{RegionBounds, largest_region};
+use hexad::analysis::region_shape::{PoseCell, RegionShape};
 use hexad::config::Config;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::inverse_jacobian::scaled_wrenches;

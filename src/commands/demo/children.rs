@@ -1,4 +1,4 @@
-//! The processes of a demonstration: started, watched, stopped; never left behind.
+//! Child processes of a demonstration, which end with it at the latest.
 
 use core::time::Duration;
 use std::ffi::OsStr;
@@ -9,19 +9,19 @@ use std::{env, io};
 
 use crate::realtime::process::terminate;
 
-/// Environment variable with the process number of the demo: a child stops when that process dies.
-pub const PARENT: &str = "HEXAD_PARENT";
+/// Environment variable with the process number of the parent: a child stops when that process dies.
+pub const PARENT_VARIABLE: &str = "HEXAD_PARENT";
 
 /// Time for a process to stop in order before it is killed.
-const PATIENCE: Duration = Duration::from_secs(5);
+const STOP_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A running child; killed when dropped.
-pub struct Process {
+/// Running child process, killed when dropped.
+pub struct ChildProcess {
     pub name: &'static str,
     child: Child,
 }
 
-impl Process {
+impl ChildProcess {
     /// Starts `hexad <name> <arguments>`; only its warnings are shown.
     pub fn start<S: AsRef<OsStr>>(
         name: &'static str,
@@ -31,28 +31,28 @@ impl Process {
             .arg(name)
             .args(arguments)
             .env("HEXAD_LOG", "warn")
-            .env(PARENT, id().to_string())
+            .env(PARENT_VARIABLE, id().to_string())
             .stdin(Stdio::null())
             .spawn()?;
         Ok(Self { name, child })
     }
 
-    /// How it ended, if it has.
-    pub fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
+    /// Exit status, if the process has ended.
+    pub fn exit_status(&mut self) -> io::Result<Option<ExitStatus>> {
         self.child.try_wait()
     }
 
-    /// Asks it to stop and waits; kills it if it does not.
+    /// Stops the process in order and waits for its end; kills it if it does not end in time.
     pub fn stop(mut self) -> io::Result<ExitStatus> {
-        if self.ended()?.is_none() {
+        if self.exit_status()?.is_none() {
             terminate(self.child.id());
         }
-        let asked = Instant::now();
+        let began = Instant::now();
         loop {
-            if let Some(status) = self.ended()? {
+            if let Some(status) = self.exit_status()? {
                 return Ok(status);
             }
-            if asked.elapsed() > PATIENCE {
+            if began.elapsed() > STOP_TIMEOUT {
                 self.child.kill()?;
             }
             sleep(Duration::from_millis(5));
@@ -60,9 +60,9 @@ impl Process {
     }
 }
 
-impl Drop for Process {
+impl Drop for ChildProcess {
     fn drop(&mut self) {
-        // Both fail only if it has ended already.
+        // Both fail only if the process has ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -6,18 +6,22 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use std::{env, fs, io, process, thread};
 
-use indicatif::{ProgressBar, ProgressStyle};
+use clap::Args;
 
-use self::children::Process;
-use self::recording::{Recorder, Recording};
+use self::children::ChildProcess;
+use self::recording::{Recording, TopicRecorder};
 use self::summary::Summary;
+use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, duration};
+use super::failure::{CommandError, Failure};
 use super::operate::Operator;
-use crate::config::text::text_of;
+use super::progress::time_bar;
+use crate::config::text::read_file;
 use crate::config::{Config, ConfigError};
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::{Request, State};
 use crate::daemon::report::Report;
 use crate::messages::PortError;
+use crate::motion::built_in::BuiltInMotion;
 use crate::output::files::{FileError, print, write_whole};
 use crate::output::svg::ChartError;
 use crate::realtime::stop_request::Stop;
@@ -27,37 +31,54 @@ mod pictures;
 mod recording;
 mod summary;
 
-/// The machine of a demonstration without `--config`.
-pub const DEFAULT_MACHINE: &str = include_str!("../../../config/fried2008.toml");
-
-/// How often the topics are emptied: a fraction of what they can hold at 20 kHz.
-const POLL: Duration = Duration::from_millis(3);
+/// Interval between two polls of the topics, in which they fill by a fraction at 20 kHz.
+const POLL_INTERVAL: Duration = Duration::from_millis(3);
 
 /// Timeouts of a demonstration \[ms\]: four times the longest pause seen on a busy virtual machine.
-const PATIENCE_MS: f64 = 200.0;
+const DEFAULT_TIMEOUT_MS: f64 = 200.0;
 
-/// Seconds for processes to start and for the approach, beyond the motion itself, before something is
-/// wrong.
-const GRACE_S: f64 = 20.0;
+/// Longest time for the start of the processes and the approach, beyond the motion itself \[s\].
+const MAX_OVERHEAD_S: f64 = 20.0;
 
-/// Typical seconds from start to end beyond the motion itself; for the progress bar.
-const AROUND_S: f64 = 2.5;
+/// Typical time from start to end beyond the motion itself, for the progress bar \[s\].
+const TYPICAL_OVERHEAD_S: f64 = 2.5;
 
-/// What to demonstrate.
-#[derive(Clone, Debug)]
-pub struct Demo {
-    pub config: Option<PathBuf>,
-    /// The plant's own machine file, if it shall differ from the controller's.
-    pub plant_config: Option<PathBuf>,
-    pub motion: String,
-    pub seconds: f64,
-    pub rate_hz: Option<f64>,
-    pub report: Option<PathBuf>,
-    /// Folder for the pictures.
-    pub charts: PathBuf,
+/// Tracking errors above which the motion counts as not made \[m\], \[rad\].
+const MAX_POSITION_ERROR_M: f64 = 0.01;
+const MAX_ORIENTATION_ERROR_RAD: f64 = 0.02;
+
+#[derive(Debug, Args)]
+pub struct DemoArguments {
+    /// Machine file [default: the built-in fried2008]
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Machine file of the plant, if it shall differ from the controller's
+    #[arg(long, value_name = "FILE")]
+    plant_config: Option<PathBuf>,
+    /// The motion to make
+    #[arg(long, value_enum, default_value_t = BuiltInMotion::Paper)]
+    motion: BuiltInMotion,
+    /// Length of the motion [s]; approach and settling come on top
+    #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true)]
+    seconds: f64,
+    /// Rate of the loop [Hz], instead of the configured one
+    #[arg(long, allow_negative_numbers = true)]
+    rate_hz: Option<f64>,
+    /// Write a JSON report
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Folder for the pictures
+    #[arg(long, value_name = "FOLDER", default_value = "hexad-demo")]
+    charts: PathBuf,
 }
 
-/// Why a demonstration did not go well.
+impl DemoArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        Ok(run(&self, &Stop::on_signals()?)?)
+    }
+}
+
+/// Error that ends a demonstration, or its bad outcome.
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
     #[error(transparent)]
@@ -76,12 +97,18 @@ pub enum DemoError {
     TooLong(f64),
     #[error("stopped by a signal")]
     Interrupted,
-    #[error("it did not go well: {0}")]
-    NotWell(String),
+    #[error("the demonstration failed: {0}")]
+    Failed(String),
 }
 
-/// Runs the demonstration and prints what came of it.
-pub fn run(demo: &Demo, stop: &Stop) -> Result<(), DemoError> {
+impl CommandError for DemoError {
+    fn has_begun(&self) -> bool {
+        !matches!(self, Self::Config(_) | Self::File(_) | Self::Port(_))
+    }
+}
+
+/// Runs the demonstration, prints its summary and writes its files.
+fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
     let stage = Stage::new(demo)?;
     fs::create_dir_all(&demo.charts).map_err(FileError::on(&demo.charts))?;
     let recording = stage.perform(demo, stop)?;
@@ -97,22 +124,26 @@ pub fn run(demo: &Demo, stop: &Stop) -> Result<(), DemoError> {
         print(format_args!("report           {}\n", path.display()))?;
     }
     if !report.faults.is_empty() {
-        return Err(DemoError::NotWell(format!("{} faults", report.faults.len())));
+        return Err(DemoError::Failed(format!("{} faults", report.faults.len())));
     }
     if tracking.count() == 0 {
-        return Err(DemoError::NotWell("nothing was recorded".into()));
+        return Err(DemoError::Failed("nothing was recorded".into()));
     }
     let control = &stage.config.deployment.control;
-    let lost = report.tracking.position_max_m > control.engage_position_m.max(MAX_ERROR_M)
-        || report.tracking.orientation_max_rad > control.engage_orientation_rad.max(MAX_ERROR_RAD);
-    if lost { Err(DemoError::NotWell("the platform left the path".into())) } else { Ok(()) }
+    let position = (report.tracking.position_max_m, control.engage_position_m.max(MAX_POSITION_ERROR_M));
+    let orientation =
+        (report.tracking.orientation_max_rad, control.engage_orientation_rad.max(MAX_ORIENTATION_ERROR_RAD));
+    for (unit, (error, bound)) in [("m", position), ("rad", orientation)] {
+        if error > bound {
+            return Err(DemoError::Failed(format!(
+                "tracking error {error:.3e} {unit} exceeds {bound} {unit}"
+            )));
+        }
+    }
+    Ok(())
 }
 
-/// Off the path by more than this, the motion cannot be said to have been made \[m\], \[rad\].
-const MAX_ERROR_M: f64 = 0.01;
-const MAX_ERROR_RAD: f64 = 0.02;
-
-/// Files for one demonstration, in a folder that goes away with it.
+/// Files of one demonstration, in a temporary folder that is removed with it.
 struct Stage {
     folder: PathBuf,
     title: String,
@@ -125,9 +156,9 @@ struct Stage {
 impl Stage {
     /// Copies the configurations under a name of their own, so that a demonstration never meets a daemon
     /// in service, nor another demonstration.
-    fn new(demo: &Demo) -> Result<Self, DemoError> {
+    fn new(demo: &DemoArguments) -> Result<Self, DemoError> {
         let (text, place) = read(demo.config.as_deref())?;
-        // The user's files are judged under their own names.
+        // Error texts about the user's files show the names of those files.
         let original = Config::parse(&text, &place)?;
         let (plant_text, plant_place) = match &demo.plant_config {
             Some(path) => read(Some(path))?,
@@ -155,27 +186,27 @@ impl Stage {
         Ok(stage)
     }
 
-    fn perform(&self, demo: &Demo, stop: &Stop) -> Result<Recording, DemoError> {
+    fn perform(&self, demo: &DemoArguments, stop: &Stop) -> Result<Recording, DemoError> {
         let bus = self.config.join()?;
-        let mut recorder = Recorder::new(&bus)?;
+        let mut recorder = TopicRecorder::new(&bus)?;
         let seconds = format!("{}", demo.seconds);
         let controller = ["--config".as_ref(), self.controller.as_os_str()];
-        let plant = Process::start("plant", ["--config".as_ref(), self.plant.as_os_str()])?;
-        let daemon = Process::start(
+        let plant = ChildProcess::start("plant", ["--config".as_ref(), self.plant.as_os_str()])?;
+        let daemon = ChildProcess::start(
             "run",
             controller.into_iter().chain(["--report".as_ref(), self.report.as_os_str()]),
         )?;
-        let setpoints = Process::start(
+        let setpoints = ChildProcess::start(
             "move",
             controller
                 .into_iter()
-                .chain(["--motion", demo.motion.as_str(), "--seconds", &seconds].map(AsRef::as_ref)),
+                .chain(["--motion", demo.motion.name(), "--seconds", &seconds].map(AsRef::as_ref)),
         )?;
         let mut processes = vec![plant, daemon, setpoints];
         let operator = Operator::new(&bus)?;
         watch(&mut processes, &mut recorder, operator, demo.seconds, stop)?;
-        // In the order they were started in reverse: the setpoint source has ended, the daemon says that
-        // no force is valid, the plant brakes.
+        // In reverse order of their start: the setpoint source has ended, the daemon publishes that no force is
+        // valid, the plant brakes.
         for process in processes.drain(..).rev() {
             let name = process.name;
             let status = process.stop()?;
@@ -196,14 +227,14 @@ impl Drop for Stage {
 
 /// Engages, and records until the setpoint source, the last of the processes, has ended well.
 fn watch(
-    processes: &mut [Process],
-    recorder: &mut Recorder,
+    processes: &mut [ChildProcess],
+    recorder: &mut TopicRecorder,
     mut operator: Operator,
     seconds: f64,
     stop: &Stop,
 ) -> Result<(), DemoError> {
     let started = Instant::now();
-    let bar = progress(seconds + AROUND_S);
+    let bar = time_bar(seconds + TYPICAL_OVERHEAD_S);
     loop {
         if stop.is_requested() {
             return Err(DemoError::Interrupted);
@@ -212,14 +243,14 @@ fn watch(
         if let Some(status) = operator.status() {
             if status.state == State::Fault as u32 {
                 let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
-                return Err(DemoError::NotWell(format!("fault: {diagnostic}")));
+                return Err(DemoError::Failed(format!("fault: {diagnostic}")));
             }
             if status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
                 operator.send(Request::Engage)?;
             }
         }
         for process in processes.iter_mut() {
-            match process.ended()? {
+            match process.exit_status()? {
                 Some(status) if status.success() && process.name == "move" => {
                     bar.finish_and_clear();
                     return Ok(());
@@ -229,28 +260,22 @@ fn watch(
             }
         }
         let elapsed = started.elapsed();
-        if elapsed.as_secs_f64() > seconds + GRACE_S {
-            return Err(DemoError::TooLong(seconds + GRACE_S));
+        if elapsed.as_secs_f64() > seconds + MAX_OVERHEAD_S {
+            return Err(DemoError::TooLong(seconds + MAX_OVERHEAD_S));
         }
         bar.set_position(elapsed.as_millis() as u64);
-        thread::sleep(POLL);
+        thread::sleep(POLL_INTERVAL);
     }
 }
 
-fn progress(seconds: f64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {elapsed}");
-    ProgressBar::new((seconds * 1e3) as u64)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
-}
-
 fn read(path: Option<&Path>) -> Result<(String, String), ConfigError> {
-    path.map_or_else(|| Ok((DEFAULT_MACHINE.into(), "fried2008.toml".into())), text_of)
+    path.map_or_else(|| Ok((DEFAULT_CONFIG.into(), DEFAULT_CONFIG_NAME.into())), read_file)
 }
 
 /// The configuration under another name and rate. The text has been parsed before.
 ///
 /// A desktop takes the processor away for tens of milliseconds now and then. That is no fault of the loop,
-/// so where the file sets no timeouts a demonstration is more patient than a deployment.
+/// so where the file sets no timeouts those of a demonstration are longer than those of a deployment.
 fn adapted(text: &str, name: &str, rate_hz: Option<f64>) -> String {
     let mut table: toml::Table = toml::from_str(text).unwrap_or_default();
     table.insert("name".into(), name.into());
@@ -264,7 +289,7 @@ fn adapted(text: &str, name: &str, rate_hz: Option<f64>) -> String {
     for (section, key) in
         [("timeouts", "setpoint_ms"), ("timeouts", "measured_ms"), ("plant", "force_timeout_ms")]
     {
-        set(section, key, PATIENCE_MS, false);
+        set(section, key, DEFAULT_TIMEOUT_MS, false);
     }
     if let Some(rate_hz) = rate_hz {
         set("realtime", "rate_hz", rate_hz, true);

@@ -1,4 +1,4 @@
-//! What went over the topics during a demonstration, and how well it was tracked.
+//! Recording of the topics during a demonstration, and its tracking error.
 
 use crate::control::controller::Setpoint;
 use crate::control::input_validation::seconds_between;
@@ -9,17 +9,17 @@ use crate::model::rigid::{Motion, Pose};
 use crate::model::task::TaskState;
 
 /// Messages kept between two polls: all that the topic can hold.
-const DEPTH: usize = usize::MAX;
+const TOPIC_DEPTH: usize = usize::MAX;
 
-/// Subscribes to everything.
-pub struct Recorder {
+/// Subscriber to setpoints, measurements and forces, which keeps every message.
+pub struct TopicRecorder {
     setpoints: Subscriber<SetpointMessage>,
     measured: Subscriber<MeasuredMessage>,
     forces: Subscriber<ForceMessage>,
     recording: Recording,
 }
 
-/// All messages, in order.
+/// All messages of a demonstration, in order.
 #[derive(Default)]
 pub struct Recording {
     pub setpoints: Vec<SetpointMessage>,
@@ -27,25 +27,25 @@ pub struct Recording {
     pub forces: Vec<ForceMessage>,
 }
 
-impl Recorder {
-    /// Begins to listen.
+impl TopicRecorder {
+    /// Subscribes to the topics of a machine.
     pub fn new(bus: &Bus) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.subscriber(DEPTH)?,
-            measured: bus.subscriber(DEPTH)?,
-            forces: bus.subscriber(DEPTH)?,
+            setpoints: bus.subscriber(TOPIC_DEPTH)?,
+            measured: bus.subscriber(TOPIC_DEPTH)?,
+            forces: bus.subscriber(TOPIC_DEPTH)?,
             recording: Recording::default(),
         })
     }
 
-    /// Takes what has arrived.
+    /// Takes the messages that have arrived since the last call.
     pub fn poll(&mut self) {
         self.recording.setpoints.extend(core::iter::from_fn(|| self.setpoints.receive()));
         self.recording.measured.extend(core::iter::from_fn(|| self.measured.receive()));
         self.recording.forces.extend(core::iter::from_fn(|| self.forces.receive()));
     }
 
-    /// What was recorded.
+    /// The recording, with the messages that have arrived last.
     pub fn finish(mut self) -> Recording {
         self.poll();
         self.recording
@@ -53,7 +53,7 @@ impl Recorder {
 }
 
 impl Recording {
-    /// The instant that charts call zero: the first setpoint.
+    /// Instant of the first setpoint, which is time zero of the charts.
     pub fn start_ns(&self) -> u64 {
         self.setpoints.first().map_or(0, |message| message.header.time_ns)
     }
@@ -103,12 +103,12 @@ fn with_desired<'a, T>(
     })
 }
 
-/// The pose a plant says it has.
+/// True pose of the plant in a message.
 pub fn measured_pose(message: &MeasuredMessage) -> Pose {
     TaskState::at_rest(message.x).motion().pose
 }
 
-/// Desired motion of a setpoint.
+/// Desired motion of a setpoint message.
 pub fn desired_motion(message: &SetpointMessage) -> Motion {
     Setpoint::from(message).task.motion()
 }

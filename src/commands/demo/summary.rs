@@ -1,11 +1,12 @@
-//! What a demonstration prints at its end.
+//! Summary that `hexad demo` prints at its end.
 
 use core::fmt;
 
 use crate::daemon::report::Report;
 use crate::messages::{Times, WorstCycle};
+use crate::output::text_table::{Left, Right, text_table};
 
-/// The table printed at the end.
+/// Tracking, timing and faults of a run; displays as text.
 pub struct Summary<'a> {
     pub title: &'a str,
     pub report: &'a Report,
@@ -13,30 +14,17 @@ pub struct Summary<'a> {
 
 impl fmt::Display for Summary<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Report { cycles, rate_hz, deadline_misses, tracking, rt_thread, faults, .. } = self.report;
-        writeln!(f, "{}: {cycles} cycles at {rate_hz} Hz\n", self.title)?;
-        writeln!(f, "tracking               RMS          max")?;
-        let (position, orientation) = (tracking.position_rms_m, tracking.orientation_rms_rad);
-        writeln!(f, "  position    {:>9.3} µm {:>9.3} µm", position * 1e6, tracking.position_max_m * 1e6)?;
+        let Report { cycles, rate_hz, deadline_misses, rt_thread, faults, .. } = self.report;
         writeln!(
             f,
-            "  orientation {:>9.3} µrad {:>7.3} µrad\n",
-            orientation * 1e6,
-            tracking.orientation_max_rad * 1e6
+            "{}: {cycles} cycles at {rate_hz} Hz\n\n{}\n{}",
+            self.title,
+            self.tracking(),
+            self.times()
         )?;
-        writeln!(f, "time [µs]            p50        p99      p99.9        max")?;
-        for (name, times) in [
-            ("wake-up", &self.report.wakeup_ns),
-            ("compute", &self.report.compute_ns),
-            ("end to end", &self.report.end_to_end_ns),
-        ] {
-            let Times { p50, p99, p999, max, .. } = *times;
-            let [p50, p99, p999, max] = [p50, p99, p999, max].map(|ns| ns as f64 * 1e-3);
-            writeln!(f, "  {name:<11} {p50:>10.1} {p99:>10.1} {p999:>10.1} {max:>10.1}")?;
-        }
         writeln!(
             f,
-            "\ndeadline misses  {} late wake-ups, {} overruns, {} skipped cycles",
+            "deadline misses  {} late wake-ups, {} overruns, {} skipped cycles",
             deadline_misses.late_wakeup, deadline_misses.overrun, deadline_misses.skipped
         )?;
         writeln!(
@@ -57,7 +45,38 @@ impl fmt::Display for Summary<'_> {
     }
 }
 
-/// A slow cycle, and what may have made it so.
+impl Summary<'_> {
+    fn tracking(&self) -> String {
+        let tracking = &self.report.tracking;
+        let row = |name: &str, unit: &str, rms: f64, max: f64| {
+            [name.into(), format!("{:.3} {unit}", rms * 1e6), format!("{:.3} {unit}", max * 1e6)]
+        };
+        text_table(
+            2,
+            &[("tracking", Left), ("RMS", Right), ("max", Right)],
+            [
+                row("  position", "µm", tracking.position_rms_m, tracking.position_max_m),
+                row("  orientation", "µrad", tracking.orientation_rms_rad, tracking.orientation_max_rad),
+            ],
+        )
+    }
+
+    fn times(&self) -> String {
+        let Report { wakeup_ns, compute_ns, end_to_end_ns, .. } = self.report;
+        let row = |(name, times): (&str, &Times)| {
+            let [p50, p99, p999, max] = [times.p50, times.p99, times.p999, times.max]
+                .map(|time_ns| format!("{:.1}", time_ns as f64 * 1e-3));
+            [name.into(), p50, p99, p999, max]
+        };
+        text_table(
+            2,
+            &[("time [µs]", Left), ("p50", Right), ("p99", Right), ("p99.9", Right), ("max", Right)],
+            [("  wake-up", wakeup_ns), ("  compute", compute_ns), ("  end to end", end_to_end_ns)].map(row),
+        )
+    }
+}
+
+/// A slow cycle, and the events around it that may have made it slow.
 fn described(worst: &WorstCycle) -> String {
     let WorstCycle {
         cycle, wakeup_ns, compute_ns, io_late, involuntary_switches, page_faults, steal_ms, ..
@@ -72,7 +91,7 @@ fn described(worst: &WorstCycle) -> String {
     let hints: Vec<_> =
         hints.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
     let around = if hints.is_empty() {
-        "nothing that the kernel saw (a pause of the host, or of the firmware)".into()
+        "no event that the kernel counts (a pause of the host, or of the firmware)".into()
     } else {
         hints.join(", ")
     };

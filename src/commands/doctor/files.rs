@@ -1,22 +1,22 @@
-//! What the kernel tells in files, read under a root that a test can put elsewhere.
+//! Files in which the kernel describes the host, read under a root that a test can replace.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// `/proc`, `/sys` and what else tells about a host.
+/// Root of the file system that describes a host: `/proc`, `/sys`, `/boot`.
 #[derive(Clone, Debug)]
 pub struct HostFiles {
     root: PathBuf,
 }
 
 impl HostFiles {
-    /// Of the host under this root; `/` is this one.
+    /// Files of the host under this root; `/` is this host.
     pub fn under(root: &Path) -> Self {
         Self { root: root.into() }
     }
 
-    /// The text of a file without the blanks around it, or why it cannot be had.
+    /// Text of a file without the blanks around it, or the reason why it cannot be read.
     pub fn text(&self, path: &str) -> Result<String, String> {
         match fs::read_to_string(self.root.join(path)) {
             Ok(text) => Ok(text.trim().into()),
@@ -25,13 +25,13 @@ impl HostFiles {
         }
     }
 
-    /// The number in a file.
+    /// Number in a file, or the reason why there is none.
     pub fn number(&self, path: &str) -> Result<i64, String> {
         let text = self.text(path)?;
         text.parse().map_err(|_| format!("/{path} is {text:?} and no number"))
     }
 
-    /// The names in a folder that are numbers: processes, threads, interrupts. None where it cannot be read.
+    /// Names in a folder that are numbers: processes, threads, interrupts. Empty if it cannot be read.
     pub fn numbered(&self, folder: &str) -> Vec<u32> {
         let entries = fs::read_dir(self.root.join(folder)).into_iter().flatten().flatten();
         let mut numbers: Vec<_> =
@@ -40,24 +40,24 @@ impl HostFiles {
         numbers
     }
 
-    /// Whether there is such a file or folder.
+    /// Whether a file or folder exists.
     pub fn exists(&self, path: &str) -> bool {
         self.root.join(path).exists()
     }
 }
 
-/// A host made of files, for tests.
+/// Sample hosts for tests.
 #[cfg(test)]
 pub mod sample {
     use super::*;
 
-    /// A folder with these files; it goes away when dropped.
-    pub struct Sample {
+    /// Host made of files in a temporary folder.
+    pub struct SampleHost {
         _folder: tempfile::TempDir,
         pub files: HostFiles,
     }
 
-    pub fn host(files: &[(&str, &str)]) -> Sample {
+    pub fn host(files: &[(&str, &str)]) -> SampleHost {
         let folder = tempfile::TempDir::new().unwrap();
         for (path, text) in files {
             let path = folder.path().join(path);
@@ -65,7 +65,7 @@ pub mod sample {
             fs::write(path, format!("{text}\n")).unwrap();
         }
         let files = HostFiles::under(folder.path());
-        Sample { _folder: folder, files }
+        SampleHost { _folder: folder, files }
     }
 }
 
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_cannot_be_read_says_why() {
+    fn the_reason_of_an_unreadable_file_is_returned() {
         let host =
             sample::host(&[("proc/good", " 7"), ("proc/bad", "seven"), ("proc/5/x", ""), ("proc/30/x", "")]);
         assert_eq!(host.files.number("proc/good"), Ok(7));

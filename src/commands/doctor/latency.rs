@@ -1,4 +1,4 @@
-//! Wake-up latency: a thread set up as the daemon's, waiting as the daemon waits, at several rates.
+//! Wake-up latency of a thread that is set up and waits like the daemon's real-time thread, at several rates.
 //!
 //! Nothing is computed between two wake-ups, and no io thread runs beside it: this is the latency that the
 //! host adds to any loop.
@@ -9,10 +9,10 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread::{Builder, scope};
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
 use super::files::HostFiles;
+use crate::commands::progress::time_bar;
 use crate::config::deployment::{Deployment, Realtime};
 use crate::daemon::start::prepare_loop;
 use crate::daemon::time_histogram::TimeHistogram;
@@ -25,79 +25,60 @@ use crate::realtime::stop_request::Stop;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
 
-/// Measured beside the configured one, from slow drives to fast ones.
+/// Rates measured beside the configured one, from slow drives to fast ones.
 const RATES_HZ: [f64; 5] = [250.0, 1000.0, 4000.0, 10_000.0, 20_000.0];
 
-/// What is configured gets so many times the time of anything else.
-const WEIGHT: f64 = 4.0;
+/// Duration of the configured rate and release mode, as a multiple of the duration of every other.
+const CONFIGURED_WEIGHT: f64 = 4.0;
 
-/// How often the bar moves.
-const BAR: Duration = Duration::from_millis(100);
+/// Interval between two updates of the progress bar.
+const BAR_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Unit of `/proc/stat`: `USER_HZ` is 100 on every Linux that matters \[ms\].
 const TICK_MS: u64 = 10;
 
-/// How a release is waited for. One that a message gives cannot be measured without the drives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Waiting {
-    Sleep,
-    Hybrid,
+/// Release mode that the doctor measures for a configured one: without the drives it cannot measure a release by their
+/// messages, and measures the sleep instead.
+pub fn measured_mode(configured: ReleaseMode) -> ReleaseMode {
+    if configured == ReleaseMode::Hybrid { ReleaseMode::Hybrid } else { ReleaseMode::Sleep }
 }
 
-impl Waiting {
-    /// As in the configuration.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sleep => "sleep",
-            Self::Hybrid => "hybrid",
-        }
-    }
-}
-
-impl From<ReleaseMode> for Waiting {
-    fn from(release: ReleaseMode) -> Self {
-        if release == ReleaseMode::Hybrid { Self::Hybrid } else { Self::Sleep }
-    }
-}
-
-/// One rate and way of waiting, measured.
+/// Measured wake-up latency at one rate and release mode.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Latency {
     pub rate_hz: f64,
-    pub release: Waiting,
-    /// From a release to the thread running.
+    pub release: ReleaseMode,
+    /// Time from a release to the thread running.
     pub wakeup_ns: Times,
-    /// Wake-ups later than this are late.
+    /// Delay above which a wake-up counts as late.
     pub late_wakeup_ns: u64,
     pub late_wakeups: u64,
-    /// Releases that had passed when the one before them was woken for.
+    /// Releases that had passed when the thread woke for the one before them.
     pub missed: u64,
-    /// What was spun before a release in the end; 0 for sleep.
+    /// Final spin before a release; 0 for sleep.
     pub lead_ns: u64,
-    /// What the host of a virtual machine took meanwhile, of the thread's processor or of all.
+    /// Time that the host of a virtual machine took meanwhile, of the thread's processor or of all.
     pub stolen_ms: Option<u64>,
     pub thread: ThreadUsage,
 }
 
 impl Latency {
-    /// Whether it is of this rate and way of waiting.
-    pub fn is(&self, rate_hz: f64, release: Waiting) -> bool {
+    /// Whether this is the latency at a rate and release mode.
+    pub fn is_of(&self, rate_hz: f64, release: ReleaseMode) -> bool {
         (self.rate_hz, self.release) == (rate_hz, release)
     }
 
-    /// Distance of two releases.
+    /// Time from one release to the next.
     pub fn period_ns(&self) -> f64 {
         1e9 / self.rate_hz
     }
 }
 
-/// One rate and way of waiting, to be measured.
+/// A rate and release mode to measure.
 #[derive(Clone, Debug)]
 struct Plan {
-    /// As configured, at this rate and with this release.
+    /// The configured deployment with this rate and release mode.
     deployment: Deployment,
-    waiting: Waiting,
     seconds: f64,
 }
 
@@ -108,17 +89,15 @@ pub fn measure_all(
     seconds: f64,
     stop: &Stop,
 ) -> io::Result<Option<Vec<Latency>>> {
-    let style = ProgressStyle::with_template("{bar:40} {elapsed} {msg}");
-    let bar = ProgressBar::new((seconds * 1e3) as u64)
-        .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    let start = Instant::now();
+    let (bar, start) = (time_bar(seconds), Instant::now());
     let mut all = vec![];
     let cpu = deployment.realtime.cpu;
     for plan in plans(deployment, seconds) {
-        bar.set_message(format!("{} Hz, {}", plan.deployment.realtime.rate_hz, plan.waiting.name()));
+        let Realtime { rate_hz, release, .. } = &plan.deployment.realtime;
+        bar.set_message(format!("{rate_hz} Hz, {}", release.name()));
         let before = stolen_ms(host, cpu);
-        let moved = || bar.set_position(start.elapsed().as_millis() as u64);
-        let mut latency = measure(&plan, moved, stop)?;
+        let update_bar = || bar.set_position(start.elapsed().as_millis() as u64);
+        let mut latency = measure(&plan, update_bar, stop)?;
         latency.stolen_ms = stolen_ms(host, cpu).zip(before).map(|(after, before)| after - before);
         all.push(latency);
     }
@@ -133,25 +112,23 @@ fn plans(deployment: &Deployment, seconds: f64) -> Vec<Plan> {
         rates.push(configured.rate_hz);
         rates.sort_by(f64::total_cmp);
     }
-    let whole = WEIGHT + 2.0 * rates.len() as f64 - 1.0;
-    let each = [(ReleaseMode::Sleep, Waiting::Sleep), (ReleaseMode::Hybrid, Waiting::Hybrid)];
+    let whole = CONFIGURED_WEIGHT + 2.0 * rates.len() as f64 - 1.0;
     let plan = |rate_hz: f64| {
-        each.map(|(release, waiting)| {
-            let asked = rate_hz == configured.rate_hz && waiting == configured.release.into();
+        [ReleaseMode::Sleep, ReleaseMode::Hybrid].map(|release| {
+            let is_configured = rate_hz == configured.rate_hz && release == measured_mode(configured.release);
             Plan {
                 deployment: Deployment {
                     realtime: Realtime { release, ..at(configured, rate_hz) },
                     ..deployment.clone()
                 },
-                waiting,
-                seconds: seconds / whole * if asked { WEIGHT } else { 1.0 },
+                seconds: seconds / whole * if is_configured { CONFIGURED_WEIGHT } else { 1.0 },
             }
         })
     };
     rates.into_iter().flat_map(plan).collect()
 }
 
-/// The same at another rate: what is bounded by half a period stays so.
+/// The configured section at another rate, with the durations that half a period bounds.
 fn at(configured: &Realtime, rate_hz: f64) -> Realtime {
     let half_s = 0.5 / rate_hz;
     Realtime {
@@ -162,18 +139,18 @@ fn at(configured: &Realtime, rate_hz: f64) -> Realtime {
     }
 }
 
-/// Measures on a thread of its own; `moved` is called now and then meanwhile.
-fn measure(plan: &Plan, moved: impl Fn(), stop: &Stop) -> io::Result<Latency> {
+/// Measures on a thread of its own and calls `update_bar` meanwhile.
+fn measure(plan: &Plan, update_bar: impl Fn(), stop: &Stop) -> io::Result<Latency> {
     scope(|threads| {
         let (done, result) = channel();
         Builder::new().name("hexad-doctor".into()).spawn_scoped(threads, move || {
-            // Nobody listens only if the process is going down.
+            // Fails only while the process ends.
             let _ = done.send(measure_here(plan, stop));
         })?;
         loop {
-            match result.recv_timeout(BAR) {
+            match result.recv_timeout(BAR_INTERVAL) {
                 Ok(latency) => return Ok(latency),
-                Err(RecvTimeoutError::Timeout) => moved(),
+                Err(RecvTimeoutError::Timeout) => update_bar(),
                 Err(RecvTimeoutError::Disconnected) => return Err(io::Error::other("the thread has died")),
             }
         }
@@ -181,9 +158,9 @@ fn measure(plan: &Plan, moved: impl Fn(), stop: &Stop) -> io::Result<Latency> {
 }
 
 fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
-    let Plan { deployment, waiting, seconds } = plan;
+    let Plan { deployment, seconds } = plan;
     let mut histogram = TimeHistogram::default();
-    // What it lacks has been told before: every thread of this process lacks the same.
+    // Its shortfalls have been printed before: every thread of this process has the same.
     prepare_loop(&deployment.realtime, || {
         histogram.record(monotonic_ns());
         histogram.clear();
@@ -207,7 +184,7 @@ fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
     }
     Latency {
         rate_hz: deployment.realtime.rate_hz,
-        release: *waiting,
+        release: deployment.realtime.release,
         wakeup_ns: histogram.times(),
         late_wakeup_ns,
         late_wakeups,
@@ -218,7 +195,7 @@ fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
     }
 }
 
-/// Since boot; `None` if it is not told.
+/// Processor time that the host of a virtual machine took since boot; `None` where the kernel does not count it.
 fn stolen_ms(host: &HostFiles, cpu: Option<usize>) -> Option<u64> {
     let name = cpu.map_or_else(|| "cpu".into(), |cpu| format!("cpu{cpu}"));
     let stat = host.text("proc/stat").ok()?;
@@ -260,7 +237,7 @@ mod tests {
     fn every_release_is_either_woken_for_or_missed() {
         for release in ["sleep", "hybrid"] {
             let deployment = configured(&format!("rate_hz = 4000\nrelease = \"{release}\""));
-            let plan = Plan { waiting: deployment.realtime.release.into(), deployment, seconds: 0.1 };
+            let plan = Plan { deployment, seconds: 0.1 };
             let latency = measure(&plan, || (), &Stop::default()).unwrap();
             assert_eq!(latency.wakeup_ns.count + latency.missed, 400, "{latency:?}");
             assert_eq!(latency.lead_ns > 0, release == "hybrid", "{latency:?}");

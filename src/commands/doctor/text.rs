@@ -1,192 +1,171 @@
-//! The diagnosis as text for a terminal.
+//! Text of the diagnosis for a terminal.
 
-use core::fmt::Write as _;
+use console::{Color, colors_enabled, style};
 
-use console::{Color, Term, colors_enabled, measure_text_width, style};
-
-use super::facts::{Fact, Rating, surroundings};
-use super::latency::{Latency, Waiting};
-use super::verdict::Judgement;
-use super::{Diagnosis, Rate};
+use super::Diagnosis;
+use super::facts::{Assessment, Fact, surroundings};
+use super::latency::{Latency, measured_mode};
+use super::verdict::{Feasibility, RateVerdict};
 use crate::config::deployment::Realtime;
-use crate::realtime::cyclic::ReleaseMode;
+use crate::output::text_table::{DEFAULT_WIDTH, Left, Right, paragraph, stdout_width, text_table};
 
-/// Longer lines are hard to read, even where the terminal has room.
-const WIDEST: usize = 100;
-/// Below, every word would be a line.
-const NARROWEST: usize = 60;
-/// Where there is no terminal.
-const USUAL: usize = 80;
+/// Widths of the columns of the facts: assessment and name.
+const ASSESSMENT_WIDTH: usize = 9;
+const NAME_WIDTH: usize = 17;
 
-/// Columns of the facts: rating and name.
-const RATING: usize = 9;
-const NAME: usize = 17;
+/// Measurements shorter than this get a note that they show no rare event \[s\].
+const LONG_MEASUREMENT_S: f64 = 3600.0;
 
-/// A shorter measurement says nothing about what is rare \[s\].
-const LONG_S: f64 = 3600.0;
-
-/// How to write.
+/// Width and colours of the text.
 #[derive(Clone, Copy, Debug)]
-pub struct Layout {
+pub struct TextStyle {
     width: usize,
-    colours: bool,
+    has_colours: bool,
 }
 
-impl Layout {
-    /// As standard output likes it.
+impl TextStyle {
+    /// The style that suits standard output.
     pub fn of_stdout() -> Self {
-        let width = Term::stdout().size_checked().map_or(USUAL, |(_, width)| usize::from(width));
-        Self { width: width.clamp(NARROWEST, WIDEST), colours: colors_enabled() }
+        Self { width: stdout_width(), has_colours: colors_enabled() }
     }
 
-    /// What was looked at, and the facts.
+    /// The examined rate and CPU, and the facts.
     pub fn facts(&self, name: &str, realtime: &Realtime, facts: &[Fact]) -> String {
-        let release = match realtime.release {
-            ReleaseMode::External => "sleep (instead of external)",
-            ReleaseMode::Lockstep => "sleep (instead of lockstep)",
-            release => Waiting::from(release).name(),
+        let (configured, measured) = (realtime.release, measured_mode(realtime.release));
+        let instead = if configured == measured {
+            String::new()
+        } else {
+            format!(" (instead of {})", configured.name())
         };
-        let on = realtime.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
-        let mut text = format!("{name}: {} Hz by {release}, on {on}\n\n", realtime.rate_hz);
-        for Fact { name, rating, found, remedy } in facts {
-            let (word, colour) = match rating {
-                Rating::Good => ("good", Color::Green),
-                Rating::Fair => ("fair", Color::Yellow),
-                Rating::Bad => ("bad", Color::Red),
-                Rating::Unknown => ("unknown", Color::Magenta),
+        let cpu = realtime.cpu.map_or_else(|| "any CPU".into(), |cpu| format!("CPU {cpu}"));
+        let mut text =
+            format!("{name}: {} Hz by {}{instead}, on {cpu}\n\n", realtime.rate_hz, measured.name());
+        for Fact { name, assessment, found, remedy } in facts {
+            let (word, colour) = match assessment {
+                Assessment::Good => ("good", Color::Green),
+                Assessment::Fair => ("fair", Color::Yellow),
+                Assessment::Bad => ("bad", Color::Red),
+                Assessment::Unknown => ("unknown", Color::Magenta),
             };
-            let head = format!("{}{name:<NAME$}", self.paint(&format!("{word:<RATING$}"), colour));
-            self.paragraph(&mut text, &head, found);
+            let word = self.paint(&format!("{word:<ASSESSMENT_WIDTH$}"), colour);
+            text += &paragraph(&format!("{word}{name:<NAME_WIDTH$}"), found, self.width);
             if let Some(remedy) = remedy {
-                self.paragraph(&mut text, &" ".repeat(RATING + NAME), &format!("-> {remedy}"));
+                let indent = " ".repeat(ASSESSMENT_WIDTH + NAME_WIDTH);
+                text += &paragraph(&indent, &format!("-> {remedy}"), self.width);
             }
         }
         text
     }
 
-    /// The measurement and the verdicts.
+    /// The measured latencies and the verdicts.
     pub fn rates(&self, diagnosis: &Diagnosis) -> String {
         let Diagnosis { rate_hz, release, rates, seconds, verdict, .. } = diagnosis;
-        let mut text = String::from("\n");
         let what = "wake-up after the release [us]; late: by more than late_wakeup_us, or half a period";
-        self.paragraph(&mut text, "", what);
-        text += "    Hz by     ";
-        text += &self.times(["min", "p50", "p99", "p99.9", "p99.99"].map(String::from));
-        text += "    max  late missed verdict\n";
-        for Rate { latency, verdict, .. } in rates {
-            text += &self.row(latency, *verdict);
-        }
-        text += "\n";
+        let mut text = String::from("\n") + &paragraph("", what, self.width) + &self.table(rates) + "\n";
         for rate in rates {
             let Latency { rate_hz, release, .. } = &rate.latency;
             let head = format!("{rate_hz:>6} {:<7}", release.name());
-            self.paragraph(&mut text, &head, &reasons(rate));
+            text += &paragraph(&head, &reasons(rate), self.width);
         }
         text += "\n";
         for note in notes(diagnosis) {
-            self.paragraph(&mut text, "", &note);
+            text += &paragraph("", &note, self.width);
         }
         let (word, colour) = words(*verdict);
-        let asked = format!("{rate_hz} Hz by {}, in {seconds} s: ", release.name());
-        text + &format!("\n{asked}{}\n", self.paint(word, colour))
+        let verdict = self.paint(word, colour);
+        text + &format!("\n{rate_hz} Hz by {}, in {seconds} s: {verdict}\n", release.name())
     }
 
-    fn row(&self, latency: &Latency, verdict: Judgement) -> String {
-        let Latency { rate_hz, release, wakeup_ns, late_wakeups, missed, .. } = latency;
-        // Of fewer, the longest stands for all of them.
-        let quantile = |time_ns: u64, least: u64| {
-            if wakeup_ns.count < least { "-".into() } else { microseconds(time_ns) }
-        };
-        let times = [
-            microseconds(wakeup_ns.min),
-            microseconds(wakeup_ns.p50),
-            quantile(wakeup_ns.p99, 100),
-            quantile(wakeup_ns.p999, 1_000),
-            quantile(wakeup_ns.p9999, 10_000),
-        ];
-        let (word, colour) = words(verdict);
-        format!(
-            "{rate_hz:>6} {:<7}{}{:>7} {late_wakeups:>5} {missed:>6} {}\n",
-            release.name(),
-            self.times(times),
-            microseconds(wakeup_ns.max),
-            self.paint(word, colour),
-        )
-    }
-
-    /// Shortest time and quantiles; where there is no room, those between 50 % and 99.9 %.
-    fn times(&self, times: [String; 5]) -> String {
-        let [min, p50, p99, p999, p9999] = times.map(|time| format!("{time:>6} "));
-        if self.width < USUAL { p50 + &p99 + &p999 } else { min + &p50 + &p99 + &p999 + &p9999 }
+    /// A row for each rate and release mode. A narrow table lacks the least used quantiles.
+    fn table(&self, rates: &[RateVerdict]) -> String {
+        let header = ["Hz", "by", "min", "p50", "p99", "p99.9", "p99.99", "max", "late", "missed", "verdict"];
+        let columns = header.map(|name| (name, if ["by", "verdict"].contains(&name) { Left } else { Right }));
+        let is_shown =
+            |column: &&(&str, _)| self.width >= DEFAULT_WIDTH || !["min", "p99.99"].contains(&column.0);
+        let shown: Vec<_> = columns.iter().filter(is_shown).copied().collect();
+        let rows = rates.iter().map(|rate| {
+            let cells = columns.iter().zip(cells(rate));
+            cells.filter(|(column, _)| is_shown(column)).map(|(_, cell)| cell)
+        });
+        let table = text_table(1, &shown, rows);
+        let mut lines = table.lines();
+        let mut text = format!("{}\n", lines.next().unwrap_or_default());
+        for (line, rate) in lines.zip(rates) {
+            let (word, colour) = words(rate.verdict);
+            text += &format!("{}{}\n", line.strip_suffix(word).unwrap_or(line), self.paint(word, colour));
+        }
+        text
     }
 
     fn paint(&self, word: &str, colour: Color) -> String {
-        style(word).fg(colour).force_styling(self.colours).to_string()
-    }
-
-    /// Words beside a head, wrapped.
-    fn paragraph(&self, text: &mut String, head: &str, words: &str) {
-        let indent = measure_text_width(head);
-        text.push_str(head);
-        let mut column = indent;
-        for word in words.split(' ') {
-            let width = measure_text_width(word);
-            if column > indent && column + 1 + width > self.width {
-                // A String takes all.
-                let _ = write!(text, "\n{:indent$}", "");
-                column = indent;
-            } else if column > indent {
-                text.push(' ');
-                column += 1;
-            }
-            text.push_str(word);
-            column += width;
-        }
-        text.push('\n');
+        style(word).fg(colour).force_styling(self.has_colours).to_string()
     }
 }
 
-fn words(verdict: Judgement) -> (&'static str, Color) {
+/// Cells of a row, in the order of the header.
+fn cells(rate: &RateVerdict) -> [String; 11] {
+    let Latency { rate_hz, release, wakeup_ns, late_wakeups, missed, .. } = &rate.latency;
+    // A quantile of too few wake-ups is only their maximum.
+    let quantile = |time_ns: u64, min_count: u64| {
+        if wakeup_ns.count < min_count { "-".into() } else { microseconds(time_ns) }
+    };
+    [
+        rate_hz.to_string(),
+        release.name().into(),
+        microseconds(wakeup_ns.min),
+        microseconds(wakeup_ns.p50),
+        quantile(wakeup_ns.p99, 100),
+        quantile(wakeup_ns.p999, 1_000),
+        quantile(wakeup_ns.p9999, 10_000),
+        microseconds(wakeup_ns.max),
+        late_wakeups.to_string(),
+        missed.to_string(),
+        words(rate.verdict).0.into(),
+    ]
+}
+
+fn words(verdict: Feasibility) -> (&'static str, Color) {
     match verdict {
-        Judgement::Good => ("good", Color::Green),
-        Judgement::Marginal => ("marginal", Color::Yellow),
-        Judgement::Impossible => ("impossible", Color::Red),
+        Feasibility::Good => ("good", Color::Green),
+        Feasibility::Marginal => ("marginal", Color::Yellow),
+        Feasibility::Impossible => ("impossible", Color::Red),
     }
 }
 
-/// At least two digits.
+/// A time in microseconds, with at least two digits.
 pub fn microseconds(time_ns: u64) -> String {
     let time_us = time_ns as f64 / 1e3;
     let decimals = if time_us < 0.995 { 2 } else { usize::from(time_us < 9.95) };
     format!("{time_us:.decimals$}")
 }
 
-fn reasons(rate: &Rate) -> String {
+fn reasons(rate: &RateVerdict) -> String {
     let latency = &rate.latency;
-    let mut why = rate.why.join("; ");
+    let mut reasons = rate.reasons.join("; ");
     if latency.lead_ns > 0 {
         let lead_us = microseconds(latency.lead_ns);
         let share = 100.0 * latency.lead_ns as f64 / latency.period_ns();
-        why += &format!("; spins {lead_us} us before a release, {share:.0}% of a processor");
+        reasons += &format!("; spins {lead_us} us before a release, {share:.0}% of a processor");
     }
-    why
+    reasons
 }
 
-/// What the numbers do not say.
+/// Limits of the measurement, which its numbers do not show.
 fn notes(diagnosis: &Diagnosis) -> Vec<String> {
     let Diagnosis { seconds, rates, facts, .. } = diagnosis;
     let mut notes = Vec::new();
     let stolen_ms: Option<u64> = rates.iter().map(|rate| rate.latency.stolen_ms).sum();
-    if let Some(stolen_ms) = stolen_ms.filter(|_| facts.contains(&surroundings::virtual_machine())) {
+    let is_virtual = facts.iter().any(|fact| fact.found == surroundings::virtual_machine().found);
+    if let Some(stolen_ms) = stolen_ms.filter(|_| is_virtual) {
         notes.push(format!(
-            "The longest wake-ups may be pauses by the host of this virtual machine. It says that it took \
+            "The longest wake-ups may be pauses by the host of this virtual machine. The host reports that it took \
              {stolen_ms} ms of processor time meanwhile; it may take more at any time."
         ));
     }
-    if *seconds < LONG_S {
+    if *seconds < LONG_MEASUREMENT_S {
         notes.push(
-            "What happens once an hour is not in so short a measurement. Before a machine moves, measure for \
-             hours, under the load that it will run with."
+            "A measurement this short does not show events that occur once an hour. Before a machine moves, measure \
+             for hours, under the load that it will run with."
                 .into(),
         );
     }
@@ -196,12 +175,20 @@ fn notes(diagnosis: &Diagnosis) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::demo::DEFAULT_MACHINE;
+    use crate::commands::arguments::DEFAULT_CONFIG;
     use crate::config::Config;
     use crate::messages::Times;
+    use crate::realtime::cyclic::ReleaseMode;
     use crate::realtime::usage::ThreadUsage;
 
     const RARE: u64 = 123_456_789;
+
+    const PLAIN: TextStyle = TextStyle { width: 80, has_colours: false };
+
+    /// The words with one blank between two.
+    fn single_spaced(text: &str) -> String {
+        text.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
 
     fn diagnosis(virtual_machine: bool, count: u64, seconds: f64) -> Diagnosis {
         let times = Times {
@@ -217,7 +204,7 @@ mod tests {
         };
         let latency = Latency {
             rate_hz: 20_000.0,
-            release: Waiting::Hybrid,
+            release: ReleaseMode::Hybrid,
             wakeup_ns: times,
             late_wakeup_ns: 25_000,
             late_wakeups: 12_345,
@@ -226,25 +213,26 @@ mod tests {
             stolen_ms: Some(40),
             thread: ThreadUsage::default(),
         };
-        let verdict = Judgement::Impossible;
+        let verdict = Feasibility::Impossible;
         Diagnosis {
             name: "test".into(),
             rate_hz: 20_000.0,
-            release: Waiting::Hybrid,
+            release: ReleaseMode::Hybrid,
             cpu: None,
             seconds,
             facts: if virtual_machine { vec![surroundings::virtual_machine()] } else { vec![] },
-            rates: vec![Rate { latency, verdict, why: vec!["it is late".into()] }],
+            rates: vec![RateVerdict { latency, verdict, reasons: vec!["it is late".into()] }],
             verdict,
         }
     }
 
     #[test]
     fn lines_fit_the_terminal_and_lose_no_word() {
-        let realtime = Config::parse(DEFAULT_MACHINE, "test").unwrap().deployment.realtime;
-        let facts = [Fact::fair("isolation", "one two three ".repeat(20).trim(), "four ".repeat(30).trim())];
+        let realtime = Config::parse(DEFAULT_CONFIG, "test").unwrap().deployment.realtime;
+        let fact = Fact::fair("one two three ".repeat(20).trim(), "four ".repeat(30).trim());
+        let facts = [Fact { name: "isolation".into(), ..fact }];
         for width in [60, 80, 100] {
-            let layout = Layout { width, colours: false };
+            let layout = TextStyle { width, has_colours: false };
             let text = layout.facts("test", &realtime, &facts);
             let words = |word: &str| text.split_whitespace().filter(|found| *found == word).count();
             assert_eq!((words("one"), words("three"), words("four")), (20, 20, 30), "{text}");
@@ -256,27 +244,26 @@ mod tests {
 
     #[test]
     fn numbers_and_reasons_are_there() {
-        let text = Layout { width: 80, colours: false }.rates(&diagnosis(true, 100_000, 10.0));
-        let row = "20000 hybrid   0.01    3.5     46 123457 123457  123457 12345  23456 impossible";
-        assert!(text.contains(row), "{text}");
+        let text = PLAIN.rates(&diagnosis(true, 100_000, 10.0));
+        let row = "20000 hybrid 0.01 3.5 46 123457 123457 123457 12345 23456 impossible";
+        assert!(text.lines().any(|line| single_spaced(line) == row), "{text}");
         assert!(text.contains("it is late; spins 20 us before a release, 40% of a processor"), "{text}");
         assert!(text.ends_with("20000 Hz by hybrid, in 10 s: impossible\n"), "{text}");
     }
 
     #[test]
     fn quantiles_of_too_few_wake_ups_are_not_shown() {
-        for (count, row) in
-            [(99, "3.5      -      -      -"), (999, "46      -      -"), (9_999, "46 123457      -")]
+        for (count, row) in [(99, "3.5 - - - 123457"), (999, "46 - - 123457"), (9_999, "46 123457 - 123457")]
         {
-            let text = Layout { width: 80, colours: false }.rates(&diagnosis(true, count, 10.0));
-            assert!(text.contains(row), "{count}:\n{text}");
+            let text = PLAIN.rates(&diagnosis(true, count, 10.0));
+            assert!(single_spaced(&text).contains(row), "{count}:\n{text}");
         }
     }
 
     #[test]
-    fn it_says_what_it_cannot_know() {
+    fn the_limits_of_the_measurement_are_noted() {
         let text = |virtual_machine, seconds| {
-            let text = Layout { width: 80, colours: false }.rates(&diagnosis(virtual_machine, 1, seconds));
+            let text = PLAIN.rates(&diagnosis(virtual_machine, 1, seconds));
             (text.contains("it took 40 ms"), text.contains("once an hour"))
         };
         assert_eq!(text(true, 10.0), (true, true));
@@ -286,7 +273,7 @@ mod tests {
     #[test]
     fn colours_are_for_terminals() {
         for colours in [false, true] {
-            let text = Layout { width: 80, colours }.rates(&diagnosis(true, 1, 10.0));
+            let text = TextStyle { width: 80, has_colours: colours }.rates(&diagnosis(true, 1, 10.0));
             assert_eq!(text.contains("\u{1b}[31mimpossible"), colours, "{text:?}");
         }
     }

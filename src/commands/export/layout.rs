@@ -1,5 +1,4 @@
-//! The machine at home, body by body: frames, inertias that engines of rigid bodies accept, and shapes to
-//! look at.
+//! Layout of the machine at home: frames, inertias that rigid-body engines accept, and shapes for display.
 
 use core::fmt;
 
@@ -10,14 +9,14 @@ use crate::model::machine::{Link, Machine, TransverseInertia};
 use crate::model::rigid::Pose;
 use crate::model::task::TaskState;
 
-/// How far the greatest principal moment stays below the sum of the others, as a share of it. Flat plates
-/// have no distance at all, and engines refuse what rounding puts beyond.
+/// Least difference between the greatest principal moment and the sum of the others, as a share of the former. Flat
+/// plates have none, and engines reject a negative one, which rounding may make.
 const INERTIA_MARGIN: f64 = 1e-12;
 
 /// Least principal moment \[kg m^2\]. MuJoCo refuses 1e-15 and less; thin rods may be configured with none.
-const LEAST_INERTIA: f64 = 1e-14;
+const MIN_PRINCIPAL_MOMENT: f64 = 1e-14;
 
-/// Numbers as XML attributes have them: shortest digits that read back the same, blanks between.
+/// Numbers of an XML attribute: shortest digits that read back the same, blanks between.
 pub(super) struct Numbers<'a>(pub &'a [f64]);
 
 impl fmt::Display for Numbers<'_> {
@@ -30,9 +29,9 @@ impl fmt::Display for Numbers<'_> {
     }
 }
 
-/// One leg at home.
+/// Frames of a leg at home.
 pub(super) struct LegLayout {
-    /// As people count.
+    /// Number from 1.
     pub number: usize,
     /// `A_i`, base axes.
     pub base: Vector3<f64>,
@@ -71,7 +70,7 @@ pub(super) fn home(machine: &Machine) -> Pose {
     TaskState::at_rest(machine.home).motion().pose
 }
 
-/// `w x y z`
+/// Quaternion `w x y z` of a rotation.
 pub(super) fn quaternion(rotation: &Rotation3<f64>) -> [f64; 4] {
     let q = UnitQuaternion::from_rotation_matrix(rotation);
     [q.w, q.i, q.j, q.k]
@@ -85,22 +84,22 @@ pub(super) fn link_inertia(link: &Link, length: f64) -> Matrix3<f64> {
 }
 
 /// The tensor with its principal moments raised, all alike, until the greatest is at most the sum of the
-/// others with [`INERTIA_MARGIN`] to spare, and the least is [`LEAST_INERTIA`]. Most bodies stay as they are;
+/// others with [`INERTIA_MARGIN`] to spare, and the least is [`MIN_PRINCIPAL_MOMENT`]. Most bodies stay as they are;
 /// none changes by more than 1e-9 of its greatest moment, the tolerance of the configuration.
 pub(super) fn realizable(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     let principal = inertia.symmetric_eigenvalues();
     let greatest = principal.max();
     let lacking = 2.0 * greatest - principal.sum() + INERTIA_MARGIN * greatest;
-    inertia + Matrix3::identity() * lacking.max(LEAST_INERTIA - principal.min()).max(0.0)
+    inertia + Matrix3::identity() * lacking.max(MIN_PRINCIPAL_MOMENT - principal.min()).max(0.0)
 }
 
-/// Shapes to look at: nothing but pictures depends on them.
+/// Shapes for display, without effect on the dynamics.
 pub(super) struct Shapes {
     /// Radii of cylinders, rods and joints \[m\].
     pub cylinder_radius: f64,
     pub rod_radius: f64,
     pub ball_radius: f64,
-    /// How long both links are drawn \[m\].
+    /// Length at which both links are drawn \[m\].
     pub link_length: f64,
     /// Corners of the plates that carry the joints, base axes and platform axes.
     pub base_corners: Vec<Vector3<f64>>,

@@ -7,13 +7,13 @@ use crate::config::Config;
 use crate::model::machine::{Link, Machine};
 use crate::model::rigid::Pose;
 
-/// MuJoCo's step \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
+/// Time step of MuJoCo \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
 const STEP_S: f64 = 1e-4;
 /// The stiffest constraints of that step: MuJoCo holds time constants to two steps and impedances to 0.9999.
-const TIME_CONSTANT_S: f64 = 2.0 * STEP_S;
-const IMPEDANCE: f64 = 0.9999;
+const CONSTRAINT_TIME_CONSTANT_S: f64 = 2.0 * STEP_S;
+const CONSTRAINT_IMPEDANCE: f64 = 0.9999;
 
-const HEAD: &str = "  Written by `hexad export`. SI units and radians. The world is the base frame of the configuration.
+const HEADER_COMMENT: &str = "  Written by `hexad export`. SI units and radians. The world is the base frame of the configuration.
   Legs i = 1 to 6. At reset the machine stands at home, without brakes: without forces it falls.
   body platform        origin and axes of the platform; joint platform_free: its position and quaternion w x y z in the
                        world; their rates: velocity of the origin in the world, angular velocity in the platform
@@ -25,11 +25,11 @@ const HEAD: &str = "  Written by `hexad export`. SI units and radians. The world
   actuator force_i     force along the leg [N], positive pushes the platform away from the base
   armature: reflected mass; damping: viscous friction; frictionloss: Coulomb friction.";
 
-const VARYING: &str = "
+const VARYING_INERTIA_COMMENT: &str = "
   numeric LINK_transverse_inertia    c q l0: the link's transverse inertia is c + q (L - l0)^2 at length L; the model
                                      has its value at home. Set body_inertia before each step to follow it.";
 
-/// The whole file.
+/// Text of the MJCF file.
 pub(super) fn text(config: &Config) -> String {
     let machine = &config.machine;
     let legs = legs(machine);
@@ -37,7 +37,7 @@ pub(super) fn text(config: &Config) -> String {
     let laws: String = [("cylinder", &machine.cylinder), ("rod", &machine.rod)].map(law).concat();
     let (varying, custom) = match laws.as_str() {
         "" => ("", String::new()),
-        laws => (VARYING, format!("  <custom>\n{laws}  </custom>\n")),
+        laws => (VARYING_INERTIA_COMMENT, format!("  <custom>\n{laws}  </custom>\n")),
     };
     let bodies: String = legs.iter().map(|leg| leg_body(machine, leg, &shapes)).collect();
     let each = |line: fn(&LegLayout, &Machine) -> String| -> String {
@@ -46,7 +46,7 @@ pub(super) fn text(config: &Config) -> String {
     format!(
         r#"<mujoco model="{name}">
 <!--
-{HEAD}{varying}
+{HEADER_COMMENT}{varying}
 -->
   <compiler angle="radian"/>
   <option timestep="{STEP_S:?}" integrator="implicitfast" gravity="{gravity}">
@@ -54,7 +54,7 @@ pub(super) fn text(config: &Config) -> String {
   </option>
 {custom}  <default>
     <geom contype="0" conaffinity="0"/>
-    <equality solref="{TIME_CONSTANT_S:?} 1" solimp="{IMPEDANCE:?} {IMPEDANCE:?} 1 0.5 1"/>
+    <equality solref="{CONSTRAINT_TIME_CONSTANT_S:?} 1" solimp="{CONSTRAINT_IMPEDANCE:?} {CONSTRAINT_IMPEDANCE:?} 1 0.5 1"/>
   </default>
 {looks}  <worldbody>
 {scenery}{bodies}{platform}  </worldbody>
@@ -82,7 +82,7 @@ pub(super) fn text(config: &Config) -> String {
     )
 }
 
-/// `c q l0` of a link that has them.
+/// Numbers `c q l0` of a link whose transverse inertia varies.
 fn law((name, link): (&str, &Link)) -> String {
     let inertia = &link.transverse_inertia;
     if inertia.quadratic == 0.0 {
@@ -129,7 +129,7 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
     )
 }
 
-/// A link whose centre of mass is at `z`.
+/// Inertia of a link whose centre of mass is at `z`.
 fn inertial(mass: f64, z: f64, link: &Link, length: f64) -> String {
     let moments = link_inertia(link, length).diagonal();
     format!("<inertial pos=\"0 0 {z:?}\" mass=\"{mass:?}\" diaginertia=\"{}\"/>", Numbers(moments.as_slice()))

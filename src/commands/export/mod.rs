@@ -14,13 +14,13 @@
 //! | actuator | `force_i` | Gamma \[N\]: positive pushes the platform away from the base |
 //!
 //! Rotations are right-handed. MJCF closes the loops by `connect` constraints `ball_i`; URDF cannot, and
-//! leaves it to its reader that `ball_rod_i` and `ball_platform_i` coincide.
+//! leaves it to the reader of the file to make `ball_rod_i` and `ball_platform_i` coincide.
 //!
 //! | of the configuration | MJCF | URDF |
 //! | --- | --- | --- |
 //! | masses, centres, inertias | exact, one body a link | the same |
 //! | `c + q (L - l0)^2` | its value at home, and `c q l0` in `custom/numeric` | its value at home |
-//! | reflected mass | `armature` of `prismatic_i` | none: URDF has no word for it |
+//! | reflected mass | `armature` of `prismatic_i` | none: URDF has no element for it |
 //! | viscous friction | `damping` | `damping` |
 //! | Coulomb friction | `frictionloss`: a constraint, creeps where hexad's is proportional | `friction` |
 //! | stroke, force, rate | `range`, `ctrlrange`, none | `limit` |
@@ -30,39 +30,57 @@
 //! the paper does, Newton-Euler with the instantaneous value, a reader of the MJCF does by setting
 //! `body_inertia` from the numbers before each step (`tests/clients/machine.py`).
 //!
-//! What it does not do: brakes, drives, controllers. Without forces the machine falls.
+//! The models have no brakes, drives or controllers. Without forces the machine falls.
 
-use std::path::Path;
+use std::path::PathBuf;
 
+use clap::{Args, ValueEnum};
+
+use super::arguments::MachineFile;
+use super::failure::Failure;
 use crate::config::Config;
-use crate::output::files::{FileError, print, write_whole};
+use crate::output::files::{print, write_whole};
 
 mod layout;
 mod mjcf;
 mod urdf;
 
-/// A language for machines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// MuJoCo's own.
+#[derive(Debug, Args)]
+pub struct ExportArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    /// The language of the model
+    #[arg(long, value_enum)]
+    format: ModelFormat,
+    /// File to write [default: standard output]
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Format of a machine model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ModelFormat {
+    /// A model for MuJoCo, its loops closed
     Mjcf,
-    /// The Unified Robot Description Format of ROS.
+    /// URDF, its loops open at the platform
     Urdf,
 }
 
-/// The machine in this format.
-pub fn text(config: &Config, format: Format) -> String {
+/// The machine as text in a format.
+pub fn text(config: &Config, format: ModelFormat) -> String {
     match format {
-        Format::Mjcf => mjcf::text(config),
-        Format::Urdf => urdf::text(config),
+        ModelFormat::Mjcf => mjcf::text(config),
+        ModelFormat::Urdf => urdf::text(config),
     }
 }
 
-/// Writes the machine to a file, or to standard output.
-pub fn export(config: &Config, format: Format, output: Option<&Path>) -> Result<(), FileError> {
-    let text = text(config, format);
-    match output {
-        Some(path) => write_whole(path, text.as_bytes()),
-        None => print(text),
+impl ExportArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let text = text(&self.machine.load()?, self.format);
+        match &self.output {
+            Some(path) => write_whole(path, text.as_bytes()),
+            None => print(text),
+        }
+        .map_err(Failure::before_start)
     }
 }

@@ -8,8 +8,8 @@ use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
 use crate::model::task::task_coordinates;
 
-const HEAD: &str = "  Written by `hexad export`. SI units and radians. The link base is the base frame of the configuration.
-  Legs i = 1 to 6. URDF knows no closed loops: whoever reads this has to make the frames ball_rod_i and
+const HEADER_COMMENT: &str = "  Written by `hexad export`. SI units and radians. The link base is the base frame of the configuration.
+  Legs i = 1 to 6. URDF has no closed loops: the reader of this file must make the frames ball_rod_i and
   ball_platform_i coincide (universal joints at 0, prismatic_i at the length at home, platform_free at its origin: home).
   link platform        origin and axes of the platform
   link cross_i         the cross of the universal joint, without mass
@@ -18,7 +18,7 @@ const HEAD: &str = "  Written by `hexad export`. SI units and radians. The link 
   joint universal_first_i, universal_second_i    the first axis is fixed in the base; both 0 at home
   joint prismatic_i    position: LENGTH of the leg between joint centres; force: positive pushes the platform away";
 
-/// The whole file.
+/// Text of the URDF file.
 pub(super) fn text(config: &Config) -> String {
     let machine = &config.machine;
     let legs = legs(machine);
@@ -27,10 +27,10 @@ pub(super) fn text(config: &Config) -> String {
     format!(
         r#"<robot name="{name}">
 <!--
-{HEAD}
+{HEADER_COMMENT}
   Not in URDF: gravity {gravity} m/s^2, reflected mass {reflected:?} kg of every prismatic joint.
 -->
-  <!-- Only MuJoCo reads this: it refuses links without mass, so they get next to none. -->
+  <!-- Only for MuJoCo, which rejects links without mass: they get a negligible one. -->
   <mujoco><compiler boundmass="2e-15" boundinertia="2e-15"/></mujoco>
   <material name="cylinder"><color rgba="0.25 0.25 0.28 1"/></material>
   <material name="rod"><color rgba="0.75 0.77 0.8 1"/></material>
@@ -138,7 +138,7 @@ fn platform_link(machine: &Machine, legs: &[LegLayout], shapes: &Shapes) -> Stri
     )
 }
 
-/// `rpy` are turns about fixed axes, `R = Rz(yaw) Ry(pitch) Rx(roll)`: the Bryan angles of the transpose,
+/// Origin element. `rpy` are turns about fixed axes, `R = Rz(yaw) Ry(pitch) Rx(roll)`: the Bryan angles of the transpose,
 /// turned back.
 fn origin(position: &Vector3<f64>, rotation: &Rotation3<f64>) -> String {
     let back = Pose { rotation: rotation.matrix().transpose(), position: Vector3::zeros() };

@@ -1,6 +1,7 @@
-//! Whether the daemon would take the setpoints of a score, by its own rule, before anything moves.
+//! Precheck of a trajectory: whether the daemon would accept its setpoints, by the daemon's own rule, before anything
+//! moves.
 //!
-//! What this file does not do: say whether the forces suffice; the way to the first setpoint keeps the limits by itself.
+//! The precheck does not look at forces, nor at the approach to the first setpoint, which keeps the limits by itself.
 
 use core::fmt;
 
@@ -19,25 +20,25 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 
-/// What a motion of hexad's own uses of each limit, the rest is reserve: where between two setpoints a cycle
-/// begins is not known before.
+/// Share of each limit that a built-in motion may use; the rest is reserve, as the instant between two setpoints at
+/// which a cycle begins is not known in advance.
 const USABLE_SHARE: f64 = 0.95;
 
-/// Most steps in which a span is looked through: its polynomials of fifth order need far fewer.
-const MOST_STEPS: f64 = 100.0;
+/// Largest number of setpoints that are checked in a span; its polynomials of fifth order need far fewer.
+const MAX_STEPS_PER_SPAN: f64 = 100.0;
 
-/// Looks at setpoints as the daemon does.
-pub struct Rehearsal<'a> {
+/// Check of setpoints by the rule and the parameters of the daemon.
+pub struct Precheck<'a> {
     machine: &'a Machine,
     parameters: Parameters,
     home: KinematicState,
 }
 
-impl<'a> Rehearsal<'a> {
-    /// With the daemon's own limits.
+impl<'a> Precheck<'a> {
+    /// Precheck with the limits of the daemon.
     pub fn new(config: &'a Config) -> Self {
         let machine = &config.machine;
-        // A setpoint is taken or not whatever the fidelity.
+        // The fidelity has no part in the decision about a setpoint.
         let parameters = daemon::parameters(machine, &config.deployment, Fidelity::Exact);
         Self {
             machine,
@@ -46,7 +47,7 @@ impl<'a> Rehearsal<'a> {
         }
     }
 
-    /// With a reserve to each limit; standing at home keeps them all the same.
+    /// The same with a reserve to each limit; home at rest keeps the reduced limits too.
     pub fn with_reserve(mut self) -> Self {
         let Parameters { limits, envelope, condition, .. } = &mut self.parameters;
         limits.position = limits.position.scaled(USABLE_SHARE);
@@ -62,12 +63,12 @@ impl<'a> Rehearsal<'a> {
         self
     }
 
-    /// The first setpoint after `from` and not after `to` that would be refused after the one a cycle before it. Both
-    /// ends of the span are looked at: jerk is greatest there.
+    /// The first setpoint after `from` and not after `to` that the daemon would refuse after the setpoint of the cycle
+    /// before. Both ends of the span are checked, where jerk is greatest.
     pub fn refusal(&self, at: impl Fn(f64) -> TaskState, [from, to]: [f64; 2]) -> Option<Refusal> {
         let period_s = self.parameters.period_ns as f64 * 1e-9;
         let first = (from + period_s).min(to);
-        let steps = ((to - first) / period_s).ceil().clamp(1.0, MOST_STEPS);
+        let steps = ((to - first) / period_s).ceil().clamp(1.0, MAX_STEPS_PER_SPAN);
         let t = |k: u32| first + (to - first) * f64::from(k) / steps;
         (0..=steps as u32).find_map(|k| self.refused(t(k), [at(t(k) - period_s), at(t(k))]))
     }
@@ -81,7 +82,7 @@ impl<'a> Rehearsal<'a> {
         result.err().map(|diagnostic| Refusal { t, diagnostic, active_limits })
     }
 
-    /// The first one in the first of many spans that has any.
+    /// The first refusal within `seconds`, searched in equal spans.
     pub fn first_refusal(
         &self,
         at: impl Fn(f64) -> TaskState + Sync,
@@ -93,10 +94,10 @@ impl<'a> Rehearsal<'a> {
     }
 }
 
-/// A setpoint that would be refused.
+/// Refusal of a setpoint: its time, the reason, and the limits that it exceeds.
 #[derive(Clone, Copy, Debug)]
 pub struct Refusal {
-    /// Of the score \[s\].
+    /// Time since the start of the trajectory \[s\].
     pub t: f64,
     diagnostic: Diagnostic,
     active_limits: LimitSet,
@@ -106,7 +107,7 @@ impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { t, diagnostic, active_limits } = self;
         write!(f, "t = {t:.4}: ")?;
-        // From the last that is looked at to the first: what is beyond ends the looking.
+        // In reverse order of the checks, which end at the first limit that is exceeded.
         let limits = [Limit::Jerk, Limit::LegRate, Limit::Acceleration, Limit::Velocity];
         let beyond = limits.into_iter().find(|limit| active_limits.contains(*limit));
         if let (DiagnosticCode::SetpointTooFast, Some(limit)) = (diagnostic.code, beyond) {

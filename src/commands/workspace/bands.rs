@@ -1,27 +1,28 @@
-//! What a picture shows of a pose, and the round numbers at which its colour changes.
+//! Quantities of a pose that a map shows, and the round thresholds at which the colour changes.
 
 use crate::analysis::pose_quality::PoseQuality;
 
-/// Most bands of colour.
-pub const BANDS: usize = 10;
-/// The worst band is no thinner than this share of the range, so that two numbers do not read the same.
-const THINNEST: f64 = 0.05;
-/// From this ratio of its ends on a range is divided by ratios.
-const WIDE: f64 = 8.0;
+/// Largest number of bands of colour.
+pub const MAX_BANDS: usize = 10;
+/// Least width of the worst band as a share of the range, so that two thresholds do not read the same.
+const MIN_BAND_SHARE: f64 = 0.05;
+/// Ratio of the ends of a range from which its bands have equal ratios.
+const MIN_RATIO_FOR_RATIOS: f64 = 8.0;
 
-/// A quantity of a pose.
+/// Quantity of a pose, as a map shows it.
 #[derive(Clone, Copy)]
 pub struct Quantity {
-    /// With its unit.
+    /// Name with the unit.
     pub label: &'static str,
     pub value: fn(&PoseQuality) -> f64,
     pub better: Better,
-    /// Beyond it there is no colour.
+    /// Worst value that has a colour.
     pub worst: f64,
-    /// Nor where the worst force is beyond this.
+    /// Largest worst force at which a pose has a colour.
     pub max_force: f64,
 }
 
+/// Sense of a quantity: which values are better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Better {
     Higher,
@@ -29,17 +30,17 @@ pub enum Better {
 }
 
 impl Quantity {
-    /// At least 0 where a pose is as good as a threshold.
-    pub fn beyond(&self, quality: &PoseQuality, threshold: f64) -> f64 {
+    /// How far a pose is better than a threshold; negative where it is worse.
+    pub fn margin(&self, quality: &PoseQuality, threshold: f64) -> f64 {
         match self.better {
             Better::Higher => (self.value)(quality) - threshold,
             Better::Lower => threshold - (self.value)(quality),
         }
     }
 
-    /// Thresholds from the worst to the best, so that something lies beyond each; none where nothing is good enough.
+    /// Thresholds from the worst to the best, each with some pose beyond it; none where no pose is good enough.
     pub fn thresholds<'a>(&self, qualities: impl Iterator<Item = &'a PoseQuality> + Clone) -> Vec<f64> {
-        let good = |quality: &&PoseQuality| self.beyond(quality, self.worst) >= 0.0;
+        let good = |quality: &&PoseQuality| self.margin(quality, self.worst) >= 0.0;
         let values = qualities.clone().filter(good).map(self.value).filter(|value| value.is_finite());
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         match self.better {
@@ -48,7 +49,7 @@ impl Quantity {
             Better::Lower => {
                 let worst = if qualities.clone().all(|quality| good(&quality)) { high } else { self.worst };
                 let mut numbers = round_numbers(low, worst);
-                numbers.retain(|number| worst - number > THINNEST * (worst - low));
+                numbers.retain(|number| worst - number > MIN_BAND_SHARE * (worst - low));
                 numbers.push(worst);
                 numbers.reverse();
                 numbers
@@ -57,7 +58,7 @@ impl Quantity {
     }
 }
 
-/// Round numbers between two, in order, fewer than [`BANDS`].
+/// Round numbers between two, in order, fewer than [`MAX_BANDS`].
 fn round_numbers(low: f64, high: f64) -> Vec<f64> {
     let within = |number: &f64| low < *number && *number < high;
     let by_ratio = |leads: &[f64], stride: usize| -> Vec<f64> {
@@ -68,12 +69,12 @@ fn round_numbers(low: f64, high: f64) -> Vec<f64> {
             .collect()
     };
     let by_step = |lead: f64| -> Vec<f64> {
-        let step = lead * 10f64.powi(((high - low) / BANDS as f64).log10().floor() as i32);
+        let step = lead * 10f64.powi(((high - low) / MAX_BANDS as f64).log10().floor() as i32);
         let count = ((high - low) / step).min(100.0) as i32 + 1;
         (0..=count).map(|k| ((low / step).floor() + f64::from(k)) * step).filter(within).collect()
     };
-    let few = |numbers: &Vec<f64>| numbers.len() < BANDS;
-    if low > 0.0 && high / low > WIDE {
+    let few = |numbers: &Vec<f64>| numbers.len() < MAX_BANDS;
+    if low > 0.0 && high / low > MIN_RATIO_FOR_RATIOS {
         let leads: [&[f64]; 3] = [&[1.0, 1.5, 2.0, 3.0, 5.0, 7.0], &[1.0, 2.0, 5.0], &[1.0, 3.0]];
         let fine = leads.into_iter().map(|leads| by_ratio(leads, 1)).find(few);
         fine.or_else(|| (1..).map(|stride| by_ratio(&[1.0], stride)).find(few)).unwrap_or_default()
@@ -82,7 +83,7 @@ fn round_numbers(low: f64, high: f64) -> Vec<f64> {
     }
 }
 
-/// A threshold without digits nobody needs.
+/// A threshold with three digits at most.
 pub fn plain(x: f64) -> String {
     format!("{}", format!("{x:.2e}").parse().unwrap_or(x))
 }
@@ -100,7 +101,10 @@ mod tests {
             for (low, high) in [(0.0, 1.0), (0.01, 1.0), (0.3, 0.31), (1e-12, 1e6), (-3.0, 5.0)] {
                 let scale = 10f64.powi(exponent);
                 let numbers = round_numbers(low * scale, high * scale);
-                assert!((2..BANDS).contains(&numbers.len()), "{numbers:?} in {low} to {high} times {scale}");
+                assert!(
+                    (2..MAX_BANDS).contains(&numbers.len()),
+                    "{numbers:?} in {low} to {high} times {scale}"
+                );
                 assert!(numbers.is_sorted());
             }
         }

@@ -5,22 +5,22 @@
 
 use std::collections::BTreeMap;
 
-/// A point of an outline.
+/// Corner of an outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// Places along both axes.
+    /// Position along both axes, in nodes.
     pub at: (f64, f64),
-    /// The number that vanishes; none at the edge of the grid.
+    /// Index of the number that vanishes; `None` at the edge of the grid.
     pub cause: Option<usize>,
 }
 
-/// Places of a node, one more than in the grid: 0 is beyond its edge.
+/// Indices of a node, one more than in the grid: 0 is beyond its edge.
 type Node = (usize, usize);
 
-/// From a node of the part to a neighbour that is not.
+/// Step from a node of the part to a neighbour outside.
 type Crossing = (Node, Node);
 
-/// Closed outlines, the part to their left. The grid has `count` by `count` nodes.
+/// Closed outlines of the part, which lies to their left. The grid has `count` by `count` nodes.
 pub fn outlines<const N: usize>(
     count: usize,
     numbers: impl Fn([usize; 2]) -> Option<[f64; N]>,
@@ -51,7 +51,7 @@ pub fn outlines<const N: usize>(
     outlines
 }
 
-/// Where an outline crosses.
+/// Corner where an outline crosses a step.
 fn corner<const N: usize>((from, to): Crossing, at: &impl Fn(Node) -> Option<[f64; N]>) -> Corner {
     let ((i, j), (k, l)) = (from, to);
     let first = match (at(from), at(to)) {
@@ -69,7 +69,7 @@ fn corner<const N: usize>((from, to): Crossing, at: &impl Fn(Node) -> Option<[f6
     Corner { at: (between(i, k), between(j, l)), cause }
 }
 
-/// The share of the way from a number that is not negative to one that is at which they pass 0.
+/// Share of the way from a number that is not negative to one that is, at which the interpolation vanishes.
 fn share(from: f64, to: f64) -> f64 {
     let share = from / (from - to);
     if share.is_finite() { share } else { 0.5 }
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_fills_the_grid_ends_at_its_edge() {
+    fn a_part_that_fills_the_grid_ends_at_its_edge() {
         let found = outlines(COUNT, |[i, j]: [usize; 2]| (i < COUNT && j < COUNT).then_some([1.0]));
         assert_eq!(found.len(), 1);
         assert!((area(&found[0]) - 400.0).abs() < 1e-12 && found[0].iter().all(|c| c.cause.is_none()));

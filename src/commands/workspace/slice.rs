@@ -12,25 +12,27 @@ use rayon::prelude::*;
 use crate::analysis::pose_quality::{PoseEvaluator, PoseQuality};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::output::csv_table::{Writer, coordinates};
+use crate::output::csv_table::coordinates;
+use crate::output::csv_writer::CsvWriter;
 use crate::output::files::FileError;
 
-/// Poses along each axis while the range is looked for.
-const COARSE: usize = 41;
-/// The first range: this to both sides, in strokes and \[rad\]. It grows by half where reach goes on.
-const FIRST_STROKES: f64 = 0.1;
-const FIRST_ANGLE: f64 = 0.1;
-const GROWTH: f64 = 1.5;
-/// Enough growth for a thousand times the first range.
-const ROUNDS: usize = 20;
+/// Poses along each axis during the search for the range.
+const COARSE_POSES: usize = 41;
+/// First range to both sides, in strokes and \[rad\].
+const FIRST_RANGE_STROKES: f64 = 0.1;
+const FIRST_RANGE_RAD: f64 = 0.1;
+/// Factor by which the range grows while the reach goes on beyond it.
+const RANGE_GROWTH: f64 = 1.5;
+/// Most growths of a range: enough for a thousand times the first range.
+const MAX_RANGE_GROWTHS: usize = 20;
 
-/// Two coordinates of X, by their places: to the right, and up.
+/// Plane of two task coordinates, by their indices in X: to the right, and up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plane(pub [usize; 2]);
 
 impl Plane {
-    /// Horizontal, vertical, and tilt about both horizontal axes: what gravity says is up.
-    pub fn usual(gravity: &Vector3<f64>) -> [Self; 3] {
+    /// The horizontal plane, the vertical one, and tilt about both horizontal axes; gravity decides what is up.
+    pub fn default_three(gravity: &Vector3<f64>) -> [Self; 3] {
         let up = if gravity.norm() > 0.0 { gravity.iamax() } else { 2 };
         let (first, second) = match up {
             0 => (1, 2),
@@ -55,20 +57,20 @@ impl FromStr for Plane {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let names = coordinates("");
-        let axis = |name: &str| names.iter().position(|known| known == name);
+        let axis = |name: &str| names.iter().position(|axis| axis == name);
         let axes = text.split_once('-').and_then(|(right, up)| Some([axis(right)?, axis(up)?]));
         let bound = "must be two different ones of alpha, beta, gamma, x, y, z, as in x-z";
         axes.filter(|[right, up]| right != up).map(Self).ok_or_else(|| bound.into())
     }
 }
 
-/// The poses of a slice and what they are worth, row by row.
+/// Grid of poses in a plane with the quality of each, row by row.
 #[derive(Clone, Debug)]
 pub struct Slice {
     pub plane: Plane,
     /// X of the pose that the slice goes through.
     pub through: [f64; 6],
-    /// Along both axes, absolute.
+    /// Ranges of the coordinates along both axes.
     pub ranges: [(f64, f64); 2],
     /// Poses along each axis.
     pub count: usize,
@@ -76,7 +78,7 @@ pub struct Slice {
 }
 
 impl Slice {
-    /// The part of a plane with all that is in reach around a pose. The bar advances by poses.
+    /// The part of a plane with all poses in reach around a pose. The bar advances by poses.
     pub fn new(
         workspace: &PoseEvaluator,
         machine: &Machine,
@@ -85,14 +87,15 @@ impl Slice {
         count: usize,
         bar: &ProgressBar,
     ) -> Self {
-        let mut slice = Self { plane, through, ranges: [(0.0, 0.0); 2], count: COARSE, qualities: vec![] };
-        slice.ranges = slice.reached(workspace, machine);
+        let mut slice =
+            Self { plane, through, ranges: [(0.0, 0.0); 2], count: COARSE_POSES, qualities: vec![] };
+        slice.ranges = slice.range_of_reach(workspace, machine);
         slice.count = count;
-        slice.judge(workspace, bar);
+        slice.evaluate(workspace, bar);
         slice
     }
 
-    /// X of a pose by its places along both axes.
+    /// X of a pose by its indices along both axes.
     pub fn x(&self, places: [usize; 2]) -> [f64; 6] {
         let mut x = self.through;
         for ((axis, place), (low, high)) in self.plane.0.into_iter().zip(places).zip(self.ranges) {
@@ -105,12 +108,12 @@ impl Slice {
         x
     }
 
-    /// The quality at places along both axes.
+    /// PoseQuality of a pose by its indices along both axes.
     pub fn at(&self, [right, up]: [usize; 2]) -> Option<&PoseQuality> {
         if right < self.count { self.qualities.get(up * self.count + right) } else { None }
     }
 
-    fn judge(&mut self, workspace: &PoseEvaluator, bar: &ProgressBar) {
+    fn evaluate(&mut self, workspace: &PoseEvaluator, bar: &ProgressBar) {
         let row = |up: usize| {
             let quality = |right| workspace.quality(&TaskState::at_rest(self.x([right, up])).motion().pose);
             let row: Vec<_> = (0..self.count).map(quality).collect();
@@ -121,24 +124,25 @@ impl Slice {
         self.qualities = rows.concat();
     }
 
-    /// Ranges that grow from the pose on until reach ends within them, then shrink onto it.
-    fn reached(&mut self, workspace: &PoseEvaluator, machine: &Machine) -> [(f64, f64); 2] {
+    /// Ranges around the pose, grown until the reach ends within them, then shrunk onto the reach.
+    fn range_of_reach(&mut self, workspace: &PoseEvaluator, machine: &Machine) -> [(f64, f64); 2] {
         let stroke = machine.actuator.max_length - machine.actuator.min_length;
         let middles = self.plane.0.map(|axis| self.through.get(axis).copied().unwrap_or_default());
-        let firsts = self.plane.0.map(|axis| if axis < 3 { FIRST_ANGLE } else { FIRST_STROKES * stroke });
+        let firsts =
+            self.plane.0.map(|axis| if axis < 3 { FIRST_RANGE_RAD } else { FIRST_RANGE_STROKES * stroke });
         // Angles further from the pose than a quarter turn are no tilt, and Bryan's fold over there.
         let most = self.plane.0.map(|axis| if axis < 3 { FRAC_PI_2 } else { f64::INFINITY });
         let mut sides = firsts.map(|first| [first; 2]);
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_RANGE_GROWTHS {
             self.ranges = around(middles, sides);
-            self.judge(workspace, &ProgressBar::hidden());
+            self.evaluate(workspace, &ProgressBar::hidden());
             let ends = self.ends_of_reach();
-            let last = COARSE - 1;
+            let last = COARSE_POSES - 1;
             let mut grows = false;
             for ((sides, most), (low, high)) in sides.iter_mut().zip(most).zip(ends) {
                 for (side, touches) in sides.iter_mut().zip([low == 0, high == last]) {
                     if touches && *side < most {
-                        *side = (GROWTH * *side).min(most);
+                        *side = (RANGE_GROWTH * *side).min(most);
                         grows = true;
                     }
                 }
@@ -147,17 +151,17 @@ impl Slice {
                 break;
             }
         }
-        // A step more on each side, where the coarse grid sees none of it.
+        // A step more on each side, where the coarse grid has no pose in reach.
         let mut ranges = self.ranges;
         for ((low, high), (first, last)) in ranges.iter_mut().zip(self.ends_of_reach()) {
-            let (start, step) = (*low, (*high - *low) / (COARSE - 1) as f64);
+            let (start, step) = (*low, (*high - *low) / (COARSE_POSES - 1) as f64);
             *low = start + step * (first as f64 - 1.5).max(0.0);
-            *high = start + step * (last as f64 + 1.5).min((COARSE - 1) as f64);
+            *high = start + step * (last as f64 + 1.5).min((COARSE_POSES - 1) as f64);
         }
         ranges
     }
 
-    /// First and last place along both axes with a pose in reach; the middle, if there is none.
+    /// First and last index along both axes with a pose in reach; the middle if there is none.
     fn ends_of_reach(&self) -> [(usize, usize); 2] {
         let mut ends = [(self.count / 2, self.count / 2); 2];
         for (k, _) in self.qualities.iter().enumerate().filter(|(_, quality)| quality.within_reach()) {
@@ -175,7 +179,7 @@ impl Slice {
             ["in_reach", "stroke_margin", "determinant", "condition", "worst_force", "payload"]
                 .map(String::from),
         );
-        let mut writer = Writer::new(&columns);
+        let mut writer = CsvWriter::new(&columns);
         for (k, quality) in self.qualities.iter().enumerate() {
             let PoseQuality { stroke_margin, determinant, condition, worst_force, payload } = *quality;
             let in_reach = f64::from(u8::from(quality.within_reach()));
@@ -185,8 +189,8 @@ impl Slice {
         writer.save(path)
     }
 
-    /// `x-z.svg`
-    pub fn file(&self, extension: &str) -> String {
+    /// Name of a file of the slice, as `x-z.svg`.
+    pub fn file_name(&self, extension: &str) -> String {
         format!("{}.{extension}", self.plane)
     }
 }
@@ -211,8 +215,8 @@ mod tests {
     }
 
     #[test]
-    fn the_usual_planes_follow_gravity() {
-        let names = |x, y, z| Plane::usual(&Vector3::new(x, y, z)).map(|plane| plane.to_string());
+    fn the_default_planes_follow_gravity() {
+        let names = |x, y, z| Plane::default_three(&Vector3::new(x, y, z)).map(|plane| plane.to_string());
         assert_eq!(names(0.0, 0.0, -9.81), ["x-y", "x-z", "alpha-beta"]);
         assert_eq!(names(-9.81, 0.0, 0.1), ["y-z", "y-x", "beta-gamma"]);
         assert_eq!(names(0.0, 9.81, 0.1), ["z-x", "z-y", "gamma-alpha"]);

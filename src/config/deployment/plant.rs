@@ -1,11 +1,11 @@
-//! `[plant]`: the simulated hardware, and how much worse than the model it is.
+//! `[plant]`: the simulated hardware, and its differences from the model.
 
 use nalgebra::Vector3;
 
-use super::{STRONGEST_BRAKE_M_S2, timeout_s};
+use super::{MAX_BRAKE_DECELERATION_M_S2, timeout_s};
 use crate::config::bound::Bound;
 use crate::config::machine::rounded;
-use crate::config::reader::Reader;
+use crate::config::reader::SectionReader;
 use crate::model::machine::Machine;
 use crate::model::rigid::Wrench;
 use crate::plant::imperfections::{
@@ -13,37 +13,37 @@ use crate::plant::imperfections::{
 };
 use crate::plant::terms::PlantTerms;
 
-/// The plant's step \[us\]: below, it cannot keep up; above, its drives are not stable.
-const SHORTEST_STEP_US: f64 = 10.0;
-const LONGEST_STEP_US: f64 = 1000.0;
-/// Default of `tolerance_um`: a tenth of what a good encoder sees.
-const TOLERANCE_UM: f64 = 0.1;
-/// Longest dead time \[us\]: a drive whose force comes later than that is broken.
-const LONGEST_DEAD_TIME_US: f64 = 10_000.0;
+/// Bounds of the integration step \[us\]: below, the simulation is slower than real time; above, its drives are unstable.
+const MIN_STEP_US: f64 = 10.0;
+const MAX_STEP_US: f64 = 1000.0;
+/// Default of `tolerance_um`: a tenth of the resolution of a good encoder.
+const DEFAULT_TOLERANCE_UM: f64 = 0.1;
+/// Longest dead time of a drive \[us\].
+const MAX_DEAD_TIME_US: f64 = 10_000.0;
 
-/// `[plant]`: the simulated hardware.
+/// Section `[plant]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plant {
-    /// Without a force command for this long, the plant brakes by itself.
+    /// Time without a force command after which the brakes close.
     pub force_timeout_s: f64,
-    /// How hard the brakes decelerate each leg.
+    /// Deceleration of each leg by the brakes.
     pub brake_deceleration_m_s2: f64,
     /// Longest step of the integration.
     pub step_s: f64,
-    /// How exact positions are; decides which imperfections are evaluated, and in what steps.
+    /// Tolerance of positions; decides which imperfections are evaluated, and in what steps.
     pub tolerance_m: f64,
-    /// What the model does not have.
+    /// Differences from the model.
     pub imperfections: Imperfections,
 }
 
-pub(super) fn read(mut section: Reader, rate_hz: f64, machine: &Machine) -> Plant {
-    let brake = Bound::UpTo(STRONGEST_BRAKE_M_S2);
-    let step = Bound::Within(SHORTEST_STEP_US, LONGEST_STEP_US);
+pub(super) fn read(mut section: SectionReader, rate_hz: f64, machine: &Machine) -> Plant {
+    let brake = Bound::UpTo(MAX_BRAKE_DECELERATION_M_S2);
+    let step = Bound::Within(MIN_STEP_US, MAX_STEP_US);
     let plant = Plant {
         force_timeout_s: timeout_s(&mut section, "force_timeout_ms", 50.0, rate_hz),
         brake_deceleration_m_s2: section.number_or("brake_deceleration_m_s2", 9.81, brake),
         step_s: section.number_or("step_us", 250.0, step) / 1e6,
-        tolerance_m: section.number_or("tolerance_um", TOLERANCE_UM, Bound::UpTo(1000.0)) / 1e6,
+        tolerance_m: section.number_or("tolerance_um", DEFAULT_TOLERANCE_UM, Bound::UpTo(1000.0)) / 1e6,
         imperfections: Imperfections {
             seed: u64::try_from(section.integer_or("seed", 1, 0, i32::MAX)).unwrap_or_default(),
             drive: drive(section.section("drive")),
@@ -56,19 +56,19 @@ pub(super) fn read(mut section: Reader, rate_hz: f64, machine: &Machine) -> Plan
     };
     let needed_us =
         1e6 * PlantTerms::choose(machine, &plant.imperfections, plant.step_s, plant.tolerance_m).step;
-    if needed_us < SHORTEST_STEP_US {
-        section.refuse_as(
+    if needed_us < MIN_STEP_US {
+        section.reject_as(
             "step_us",
             format!("{} needed by plant.drive, plant.leg and plant.friction", rounded(needed_us)),
-            format!("must be at least {SHORTEST_STEP_US}: more tolerance_um, a softer leg, less friction"),
+            format!("must be at least {MIN_STEP_US}: more tolerance_um, a softer leg, less friction"),
         );
     }
     section.finish();
     plant
 }
 
-fn drive(mut section: Reader) -> DriveErrors {
-    let dead_time_us = section.number_or("dead_time_us", 0.0, Bound::Within(0.0, LONGEST_DEAD_TIME_US));
+fn drive(mut section: SectionReader) -> DriveErrors {
+    let dead_time_us = section.number_or("dead_time_us", 0.0, Bound::Within(0.0, MAX_DEAD_TIME_US));
     let drive = DriveErrors {
         bandwidth_hz: finite(section.number_or("bandwidth_hz", f64::INFINITY, Bound::Positive)),
         force_step: section.number_or("force_step_n", 0.0, Bound::NotNegative),
@@ -78,7 +78,7 @@ fn drive(mut section: Reader) -> DriveErrors {
     drive
 }
 
-fn friction(mut section: Reader) -> Friction {
+fn friction(mut section: SectionReader) -> Friction {
     let friction = Friction {
         viscous: section.number_or("viscous_n_s_m", 0.0, Bound::NotNegative),
         coulomb: section.number_or("coulomb_n", 0.0, Bound::NotNegative),
@@ -93,24 +93,24 @@ fn friction(mut section: Reader) -> Friction {
     friction
 }
 
-fn leg(mut section: Reader, machine: &Machine) -> Option<ElasticLeg> {
+fn leg(mut section: SectionReader, machine: &Machine) -> Option<ElasticLeg> {
     let stiffness = finite(section.number_or("stiffness_n_m", f64::INFINITY, Bound::Positive));
     let damping = section.number_or("damping_n_s_m", 0.0, Bound::NotNegative);
     let backlash = section.number_or("backlash_m", 0.0, Bound::NotNegative);
     if stiffness.is_some() && machine.actuator.reflected_mass == 0.0 {
-        section.refuse(
+        section.reject(
             "stiffness_n_m",
             "must not be given with actuator.reflected_mass_kg = 0: a drive behind a spring has mass",
         );
     }
     if stiffness.is_none() && backlash > 0.0 {
-        section.refuse("backlash_m", "must be 0 without stiffness_n_m: play has flanks");
+        section.reject("backlash_m", "must be 0 without stiffness_n_m: the flanks of a backlash are springs");
     }
     section.finish();
     stiffness.map(|stiffness| ElasticLeg { stiffness, damping, backlash })
 }
 
-fn sensor(mut section: Reader) -> SensorErrors {
+fn sensor(mut section: SectionReader) -> SensorErrors {
     let mut number = |key| section.number_or(key, 0.0, Bound::NotNegative);
     let sensor = SensorErrors {
         length_step: number("length_step_m"),
@@ -122,17 +122,17 @@ fn sensor(mut section: Reader) -> SensorErrors {
     sensor
 }
 
-fn build(mut section: Reader) -> BuildErrors {
+fn build(mut section: SectionReader) -> BuildErrors {
     let build = BuildErrors {
         payload: section.number_or("payload_kg", 0.0, Bound::NotNegative),
-        payload_at: Vector3::from(section.vector_or("payload_at_m", [0.0; 3])),
-        joints: section.number_or("joint_m", 0.0, Bound::NotNegative),
+        payload_at: Vector3::from(section.vector_or("payload_position_m", [0.0; 3])),
+        joints: section.number_or("joint_error_m", 0.0, Bound::NotNegative),
     };
     section.finish();
     build
 }
 
-fn external(mut section: Reader) -> ExternalWrench {
+fn external(mut section: SectionReader) -> ExternalWrench {
     let external = ExternalWrench {
         wrench: Wrench {
             force: Vector3::from(section.vector_or("force_n", [0.0; 3])),
@@ -144,7 +144,7 @@ fn external(mut section: Reader) -> ExternalWrench {
     external
 }
 
-/// Keys whose default is that there is no limit.
+/// Value of a key whose default, infinity, means that there is no limit.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

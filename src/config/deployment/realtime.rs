@@ -1,48 +1,48 @@
-//! `[realtime]`: the cycle, its release, and the threads that run it.
+//! `[realtime]`: the cycle, its release, and the threads that execute it.
 
 use core::f64::consts::TAU;
 
 use crate::analysis::sampled_loop::SampledLoop;
 use crate::config::bound::Bound;
-use crate::config::reader::Reader;
+use crate::config::reader::SectionReader;
 use crate::realtime::cyclic::ReleaseMode;
 use crate::realtime::overrun::OverrunPolicy;
 
-/// Slowest and fastest loop \[Hz\]. Above, one wake-up costs more than the period leaves.
-const RATE_HZ: Bound = Bound::Within(10.0, 20_000.0);
+/// Bounds of the rate \[Hz\]. Above, one wake-up takes longer than the period leaves.
+const RATE_BOUND_HZ: Bound = Bound::Within(10.0, 20_000.0);
 /// Default of `late_wakeup_us` where half a period is longer; the wake-up latency of an ordinary kernel
 /// stays below at the 99th percentile.
-const LATE_WAKEUP_US: f64 = 200.0;
+const DEFAULT_LATE_WAKEUP_US: f64 = 200.0;
 /// Default of `max_lead_us` where half a period is longer: covers the wake-up latency of an ordinary
 /// kernel at the 99.9th percentile.
-const MAX_LEAD_US: f64 = 200.0;
-/// Defaults of `io_lead_us` where a quarter of the period is longer. Asleep until then, the io thread
-/// wakes about 50 us later and must still read in time; awake before then, it needs only the reading.
-const IO_LEAD_US: f64 = 100.0;
-const IO_LEAD_AWAKE_US: f64 = 10.0;
-/// CPUs count from 0; a `cpu_set_t` holds 1024.
-const LAST_CPU: i32 = 1023;
-/// Linux's range of `SCHED_FIFO`.
-const PRIORITY: (i32, i32) = (1, 99);
-/// Longest burst of `on_overrun = "catch_up"`: more is not catching up but another rate.
-const MOST_CAUGHT_UP: i32 = 100;
-/// Longest wake-up that `/dev/cpu_dma_latency` can be asked to allow \[us\]: more than any idle state needs.
-const LONGEST_CPU_LATENCY_US: i32 = 1_000_000;
+const DEFAULT_MAX_LEAD_US: f64 = 200.0;
+/// Defaults of `io_lead_us` where a quarter of the period is longer. An io thread that sleeps until then wakes about
+/// 50 us later and must still read in time; one that spins needs only the time for reading.
+const DEFAULT_IO_LEAD_US: f64 = 100.0;
+const DEFAULT_IO_LEAD_SPINNING_US: f64 = 10.0;
+/// Largest number of a CPU: CPUs count from 0, and a `cpu_set_t` holds 1024.
+const MAX_CPU: i32 = 1023;
+/// Bounds of a `SCHED_FIFO` priority on Linux.
+const PRIORITY_BOUNDS: (i32, i32) = (1, 99);
+/// Largest number of cycles that `on_overrun = "catch_up"` executes at once.
+const MAX_CATCH_UP: i32 = 100;
+/// Largest bound of the wake-up latency for `/dev/cpu_dma_latency` \[us\]: more than any idle state needs.
+const MAX_CPU_LATENCY_US: i32 = 1_000_000;
 
-/// `[realtime]`: the cycle and its threads.
+/// Section `[realtime]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Realtime {
     /// Cycles per second.
     pub rate_hz: f64,
-    /// What begins a cycle.
+    /// Release mode: the event that begins a cycle.
     pub release: ReleaseMode,
-    /// Longest spin before a release, where there is one.
+    /// Longest spin before a release, in the hybrid mode.
     pub max_lead_s: f64,
-    /// What follows a cycle that was not done at its next release.
+    /// Reaction to a cycle that has not ended at its next release.
     pub on_overrun: OverrunPolicy,
-    /// A wake-up later than this after its release time counts as missed.
+    /// Delay of a wake-up above which it counts as a missed deadline.
     pub late_wakeup_s: f64,
-    /// Inputs are read this long before the release.
+    /// Time before the release at which the io thread reads the inputs.
     pub io_lead_s: f64,
     /// CPU of the real-time thread; `None` leaves it to the scheduler.
     pub cpu: Option<usize>,
@@ -56,13 +56,13 @@ pub struct Realtime {
     pub io_priority: i32,
     /// Whether all memory is locked.
     pub lock_memory: bool,
-    /// Longest wake-up from an idle state that processors may choose \[us\].
+    /// Largest exit latency of the idle states that processors may enter \[us\].
     pub cpu_dma_latency_us: i32,
-    /// Whether to refuse to start where the system does not grant the above.
+    /// Whether the daemon refuses to start if the system does not grant the above.
     pub require_realtime: bool,
 }
 
-/// `realtime.scheduler`: the scheduling class of the real-time thread.
+/// Scheduling class of the real-time thread, `realtime.scheduler`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scheduler {
     /// `SCHED_FIFO` at `priority`.
@@ -105,25 +105,21 @@ impl Realtime {
     }
 }
 
-pub(super) fn read(mut section: Reader) -> Realtime {
-    let rate_hz = section.number_or("rate_hz", 1000.0, RATE_HZ);
-    let releases = [
-        ("sleep", ReleaseMode::Sleep),
-        ("hybrid", ReleaseMode::Hybrid),
-        ("external", ReleaseMode::External),
-        ("lockstep", ReleaseMode::Lockstep),
-    ];
+pub(super) fn read(mut section: SectionReader) -> Realtime {
+    let rate_hz = section.number_or("rate_hz", 1000.0, RATE_BOUND_HZ);
+    let releases = ReleaseMode::ALL.map(|release| (release.name(), release));
     let release = section.choice_or("release", ReleaseMode::Sleep, &releases);
-    let io_lead_us = if release == ReleaseMode::Hybrid { IO_LEAD_AWAKE_US } else { IO_LEAD_US };
+    let io_lead_us =
+        if release == ReleaseMode::Hybrid { DEFAULT_IO_LEAD_SPINNING_US } else { DEFAULT_IO_LEAD_US };
     let schedulers = [("fifo", Scheduler::Fifo), ("deadline", Scheduler::Deadline)];
     let scheduler = section.choice_or("scheduler", Scheduler::Fifo, &schedulers);
-    let (low, high) = PRIORITY;
+    let (low, high) = PRIORITY_BOUNDS;
     let realtime = Realtime {
         rate_hz,
         release,
-        max_lead_s: within_half_period_s(&mut section, "max_lead_us", MAX_LEAD_US, rate_hz),
+        max_lead_s: within_half_period_s(&mut section, "max_lead_us", DEFAULT_MAX_LEAD_US, rate_hz),
         on_overrun: on_overrun(&mut section),
-        late_wakeup_s: within_half_period_s(&mut section, "late_wakeup_us", LATE_WAKEUP_US, rate_hz),
+        late_wakeup_s: within_half_period_s(&mut section, "late_wakeup_us", DEFAULT_LATE_WAKEUP_US, rate_hz),
         io_lead_s: within_half_period_s(
             &mut section,
             "io_lead_us",
@@ -136,11 +132,11 @@ pub(super) fn read(mut section: Reader) -> Realtime {
         priority: section.integer_or("priority", 80, low, high),
         io_priority: section.integer_or("io_priority", 79, low, high),
         lock_memory: section.flag_or("lock_memory", true),
-        cpu_dma_latency_us: section.integer_or("cpu_dma_latency_us", 0, 0, LONGEST_CPU_LATENCY_US),
+        cpu_dma_latency_us: section.integer_or("cpu_dma_latency_us", 0, 0, MAX_CPU_LATENCY_US),
         require_realtime: section.flag_or("require_realtime", false),
     };
     if realtime.scheduler == Scheduler::Deadline && realtime.cpu.is_some() {
-        section.refuse(
+        section.reject(
             "cpu",
             "must not be given with realtime.scheduler = \"deadline\" (Linux places such threads itself)",
         );
@@ -148,19 +144,19 @@ pub(super) fn read(mut section: Reader) -> Realtime {
     if realtime.release == ReleaseMode::External
         && matches!(realtime.on_overrun, OverrunPolicy::CatchUp { .. })
     {
-        section.refuse(
+        section.reject(
             "on_overrun",
             "must be one of \"skip\", \"fault\" with realtime.release = \"external\" (only the newest message is kept)",
         );
     }
     if realtime.release == ReleaseMode::Lockstep && realtime.require_realtime {
-        section.refuse(
+        section.reject(
             "require_realtime",
             "must be false with realtime.release = \"lockstep\" (simulated time)",
         );
     }
     if realtime.release == ReleaseMode::Lockstep && realtime.on_overrun != OverrunPolicy::Skip {
-        section.refuse(
+        section.reject(
             "on_overrun",
             "must be \"skip\" with realtime.release = \"lockstep\" (simulated time waits for the loop)",
         );
@@ -170,11 +166,16 @@ pub(super) fn read(mut section: Reader) -> Realtime {
 }
 
 /// A duration of at most half a period.
-fn within_half_period_s(section: &mut Reader, key: &'static str, default_us: f64, rate_hz: f64) -> f64 {
+fn within_half_period_s(
+    section: &mut SectionReader,
+    key: &'static str,
+    default_us: f64,
+    rate_hz: f64,
+) -> f64 {
     let half_us = 0.5e6 / rate_hz;
     let duration_us = section.number_or(key, default_us.min(half_us), Bound::Positive);
     if duration_us > half_us {
-        section.refuse(
+        section.reject(
             key,
             format!("must be at most {half_us} (half a period of realtime.rate_hz = {rate_hz})"),
         );
@@ -183,13 +184,13 @@ fn within_half_period_s(section: &mut Reader, key: &'static str, default_us: f64
     duration_us / 1e6
 }
 
-fn on_overrun(section: &mut Reader) -> OverrunPolicy {
-    let most = section.integer_or("max_catch_up", 4, 1, MOST_CAUGHT_UP);
+fn on_overrun(section: &mut SectionReader) -> OverrunPolicy {
+    let most = section.integer_or("max_catch_up", 4, 1, MAX_CATCH_UP);
     let catch_up = OverrunPolicy::CatchUp { most: u64::try_from(most).unwrap_or_default() };
     let policies = [("skip", OverrunPolicy::Skip), ("catch_up", catch_up), ("fault", OverrunPolicy::Fault)];
     section.choice_or("on_overrun", OverrunPolicy::Skip, &policies)
 }
 
-fn cpu(section: &mut Reader, key: &'static str) -> Option<usize> {
-    section.integer(key, 0, LAST_CPU).and_then(|cpu| usize::try_from(cpu).ok())
+fn cpu(section: &mut SectionReader, key: &'static str) -> Option<usize> {
+    section.integer(key, 0, MAX_CPU).and_then(|cpu| usize::try_from(cpu).ok())
 }

@@ -104,8 +104,7 @@ impl<'a, S: Simd> Newton<'a, S> {
         mut factorization: Factorization<'a, S>,
     ) -> NewtonReport {
         let Self { simd, joints, target, inverse_target } = *self;
-        // Sizes are squares.
-        let last = square(last_step(joints, kinematic_state));
+        let last = square(last_step(joints, kinematic_state)); // All sizes are squares.
         let linear_weight = f64x4::splat(simd, 1.0 / square(joints.radius));
         let mut at = Iterate::start(simd, joints, &kinematic_state.pose);
         let mut residual = target - legs.length;
@@ -123,8 +122,7 @@ impl<'a, S: Simd> Newton<'a, S> {
                 let Some(step) = factorization.twist(&legs, residual) else {
                     return NewtonReport { outcome: Outcome::NearSingular, ..report };
                 };
-                let linear = step.linear.dot(step.linear);
-                let size = linear.mul_add(linear_weight, step.angular.dot(step.angular)).first();
+                let size = step.size_squared(linear_weight);
                 if report.iterations == 1 {
                     report.step_ratio = (size / longest).sqrt();
                     // Also where it is not a number.
@@ -136,8 +134,8 @@ impl<'a, S: Simd> Newton<'a, S> {
                 }
                 if size <= last && report.iterations == 1 {
                     // Already at the pose. Steps smaller than rounding in the legs would add up over the cycles.
-                    let sound = kinematic_state.sensitivity.condition <= MAX_CONDITION;
-                    report.outcome = if sound { Outcome::Solved } else { Outcome::NearSingular };
+                    let is_regular = kinematic_state.sensitivity.condition <= MAX_CONDITION;
+                    report.outcome = if is_regular { Outcome::Solved } else { Outcome::NearSingular };
                     return report;
                 }
                 at = at.moved(simd, &step);
@@ -151,8 +149,7 @@ impl<'a, S: Simd> Newton<'a, S> {
                 longest = size.max(last);
                 let s = at.reach + at.arm;
                 residual = self.residual(s);
-                let error = first * size;
-                if error <= last || first * error > last {
+                if first * size <= last || first * (first * size) > last {
                     break s;
                 }
             };

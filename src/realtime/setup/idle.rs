@@ -22,22 +22,3 @@ pub fn limit_wakeup_latency(latency_us: i32) -> Result<PmQosRequest, Shortfall> 
     };
     request().map_err(|error| refusals::explained(&SetupStep::WakeupLatency, &error))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::io::Read;
-
-    #[test]
-    fn a_request_is_in_force_until_dropped() {
-        const REQUESTED_US: i32 = 123;
-        let mut held = match limit_wakeup_latency(REQUESTED_US) {
-            Ok(held) => held,
-            Err(shortfall) => return println!("SKIPPED, as there is {shortfall}"),
-        };
-        // The lowest request of any process.
-        let mut in_force = [0; 4];
-        held.0.read_exact(&mut in_force).unwrap();
-        assert!(i32::from_ne_bytes(in_force) <= REQUESTED_US);
-    }
-}

@@ -1,7 +1,7 @@
 //! Any bytes as a configuration file: refused in so many words, or a machine that works at home.
 
 use hexad::commands::check::Check;
-use hexad::config::text::text;
+use hexad::config::text::read_text;
 use hexad::config::{Config, ConfigError, Violation};
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
@@ -19,7 +19,7 @@ const MAX_VIOLATIONS: usize = 100 + 1;
 
 /// Whether the input is accepted; panics where either answer is wrong.
 pub fn hold(input: &[u8]) -> bool {
-    let read = text(input, PLACE).and_then(|text| Config::parse(&text, PLACE));
+    let read = read_text(input, PLACE).and_then(|text| Config::parse(&text, PLACE));
     match &read {
         Ok(config) => check_machine(config),
         Err(error) => check_refusal(error, input),

@@ -3,20 +3,23 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use hexad::commands::r#move::{Score, SetpointError};
-use hexad::commands::offline::{Start, forward_kinematics, inverse_dynamics};
+use hexad::commands::forward_kinematics::{StartPose, forward_kinematics};
+use hexad::commands::inverse_dynamics::inverse_dynamics;
+use hexad::commands::r#move::SetpointError;
+use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::machine::Machine;
-use hexad::output::csv_table::{Table, TableError, Writer, legs, length_columns, trajectory_columns};
+use hexad::output::csv_table::{NumberTable, TableError, legs, length_columns, trajectory_columns};
+use hexad::output::csv_writer::CsvWriter;
 
 use super::{line_number, lines};
 
-/// What messages call the input.
+/// Name of the input in error texts.
 const PLACE: &str = "fuzz.csv";
 
-/// Complaints shown at most, and how many there are beyond.
-const MAX_COMPLAINTS: usize = 20 + 1;
+/// Errors shown at most, and one line for those beyond.
+const MAX_ERRORS: usize = 20 + 1;
 
 /// No number of a table is larger.
 const LARGEST: f64 = 1e12;
@@ -28,7 +31,7 @@ static MACHINE: LazyLock<Machine> = LazyLock::new(|| {
 /// Whether the input is accepted by one of the readers; panics where an answer is wrong.
 pub fn hold(input: &[u8]) -> bool {
     let read = |required: &[String], optional: &[String]| {
-        let table = Table::from_reader(input, Path::new(PLACE), required, optional);
+        let table = NumberTable::from_reader(input, Path::new(PLACE), required, optional);
         match &table {
             Ok(table) => check_table(table, required.len(), optional.len(), input),
             Err(error) => check_refusal(error, input),
@@ -37,22 +40,22 @@ pub fn hold(input: &[u8]) -> bool {
     };
     let motions = read(&trajectory_columns(), &[]);
     if let Some(table) = &motions {
-        check_output(table, &inverse_dynamics(&MACHINE, Fidelity::Exact, table).0, 1 + 4 * 6);
+        check_output(table, &mut inverse_dynamics(&MACHINE, Fidelity::Exact, table).0, 1 + 4 * 6);
         check_trajectory(table, input);
     }
     let lengths = read(&length_columns(), &legs("length_rate"));
     if let Some(table) = &lengths {
         let with_rates = table.rows().first().is_some_and(|row| row.len() > length_columns().len());
         let width = if with_rates { 9 + 6 } else { 9 };
-        for start in [Start::Previous, Start::Home] {
-            check_output(table, &forward_kinematics(&MACHINE, start, table).0, width);
+        for start in [StartPose::Previous, StartPose::Home] {
+            check_output(table, &mut forward_kinematics(&MACHINE, start, table).0, width);
         }
     }
     motions.is_some() || lengths.is_some()
 }
 
 /// Rows of one width, of finite numbers, each with its line.
-fn check_table(table: &Table, required: usize, optional: usize, input: &[u8]) {
+fn check_table(table: &NumberTable, required: usize, optional: usize, input: &[u8]) {
     let width = table.rows().first().expect("at least one row").len();
     assert!(width == required || width == required + optional, "{width} columns");
     assert_eq!(table.rows().len(), table.lines().len());
@@ -74,13 +77,13 @@ fn check_line(t: f64, number: usize, input: &[u8]) {
     }
 }
 
-/// A line per complaint, each with its place and what must be.
+/// A line per error, each with its place and its bound.
 fn check_refusal(error: &TableError, input: &[u8]) {
-    let TableError::Content { complaints } = error else { panic!("bytes can be read: {error}") };
-    assert!((1..=MAX_COMPLAINTS).contains(&complaints.len()), "{} complaints", complaints.len());
+    let TableError::Content(errors) = error else { panic!("bytes can be read: {error}") };
+    assert!((1..=MAX_ERRORS).contains(&errors.len()), "{} errors", errors.len());
     let message = error.to_string();
     let lines = lines(&message);
-    assert_eq!(lines.len(), complaints.len(), "a line each: {message}");
+    assert_eq!(lines.len(), errors.len(), "a line each: {message}");
     for line in lines {
         let what = line.strip_prefix(PLACE).and_then(|rest| rest.strip_prefix(": ")).expect(line);
         if let Some(rest) = what.strip_prefix("line ") {
@@ -96,8 +99,8 @@ fn check_refusal(error: &TableError, input: &[u8]) {
 
 /// What a command writes has a row for each of the input's, with its time to the last bit; numbers that a
 /// row has not are NaN, none is infinite.
-fn check_output(input: &Table, output: &Writer, width: usize) {
-    let rows: Vec<&str> = output.text().lines().skip(1).collect();
+fn check_output(input: &NumberTable, output: &mut CsvWriter, width: usize) {
+    let rows: Vec<&str> = str::from_utf8(output.text()).expect("text").lines().skip(1).collect();
     assert_eq!(rows.len(), input.rows().len());
     for (row, input) in rows.into_iter().zip(input.rows()) {
         let numbers: Vec<f64> = row.split(',').map(|x| x.parse().expect("a number")).collect();
@@ -109,17 +112,17 @@ fn check_output(input: &Table, output: &Writer, width: usize) {
 
 /// A trajectory that is accepted has finite setpoints wherever it is asked; else the refusal is one of a
 /// table.
-fn check_trajectory(table: &Table, input: &[u8]) {
-    match Score::from_rows(table, Path::new(PLACE)) {
+fn check_trajectory(table: &NumberTable, input: &[u8]) {
+    match Trajectory::from_rows(table, Path::new(PLACE)) {
         Err(SetpointError::Table(error)) => check_refusal(&error, input),
         Err(error) => panic!("bytes can be read: {error}"),
-        Ok(score) => {
-            let duration = score.duration();
+        Ok(trajectory) => {
+            let duration = trajectory.duration();
             assert!(duration.is_finite() && duration >= 0.0, "{duration} s");
             let starts = table.rows().iter().map(|row| row[0] - table.rows()[0][0]);
             let shares = (0..=64).map(|k| duration * f64::from(k) / 64.0);
             for t in starts.flat_map(|t| [t, t + 1e-7, t + 1e-3]).chain(shares) {
-                let state = score.at(t.min(duration));
+                let state = trajectory.at(t.min(duration));
                 assert!(state.is_finite(), "at {t}: {state:?}");
             }
         }

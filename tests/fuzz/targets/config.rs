@@ -1,9 +1,6 @@
 //! See `tests/fuzz/main.rs`.
 #![no_main]
 
-#[path = "../properties/mod.rs"]
-mod properties;
-
 libfuzzer_sys::fuzz_target!(|input: &[u8]| {
-    properties::config::hold(input);
+    hexad_fuzz::config::hold(input);
 });

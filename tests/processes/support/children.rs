@@ -7,7 +7,7 @@ use std::process::{self, Child, Command, ExitStatus, Stdio};
 use std::thread::{panicking, sleep};
 use std::time::{Duration, Instant};
 
-use hexad::commands::demo::children::PARENT;
+use hexad::commands::demo::children::PARENT_VARIABLE;
 
 use super::machine::Machine;
 use super::threads::all_stopped;
@@ -36,7 +36,7 @@ pub struct Ended {
 /// The command, for those who start it in a special way. It stops when the tests are killed.
 pub fn hexad() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
-    command.env(PARENT, process::id().to_string()).env_remove("HEXAD_LOG").stdin(Stdio::null());
+    command.env(PARENT_VARIABLE, process::id().to_string()).env_remove("HEXAD_LOG").stdin(Stdio::null());
     command
 }
 

@@ -9,7 +9,6 @@ pub mod peer;
 pub mod random;
 pub mod recorder;
 pub mod rules;
-pub mod stalls;
 pub mod steps;
 pub mod threads;
 pub mod trio;

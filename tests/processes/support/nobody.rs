@@ -7,6 +7,7 @@ use std::process::Command;
 
 use super::children::hexad;
 use super::machine::Machine;
+use crate::common::not_run::lacking;
 
 /// `nobody` on every Linux.
 const NOBODY: &str = "65534";
@@ -40,14 +41,14 @@ pub fn wrapped(machine: &Machine, wrappers: &[&[&str]]) -> Command {
     command
 }
 
-/// Says that a test is left out, and why, where these wrappers do not work.
-pub fn cannot(test: &str, wrappers: &[&[&str]]) -> bool {
+/// Whether these wrappers do not work here; the calling test is then not run.
+pub fn cannot(wrappers: &[&[&str]]) -> bool {
     let reason = match behind(wrappers, "true".into()).output() {
         Ok(output) if output.status.success() => return false,
         Ok(output) => String::from_utf8_lossy(&output.stderr).trim().to_owned(),
         Err(error) => error.to_string(),
     };
-    println!("SKIPPED {test}: {wrappers:?}: {reason}");
+    lacking(&format!("what it takes for {wrappers:?}: {reason}"));
     true
 }
 

@@ -1,63 +1,59 @@
-//! How the kernel schedules, and how it tells the time.
+//! Facts about the kernel: preemption, throttling of real-time threads, clock.
 
-use super::Fact;
+use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::clock_cost::ClockCost;
 
-/// Of its period, real-time threads may use at least this: a loop that sleeps or spins for half of its
+/// Least share of the time that real-time threads must be allowed: a loop that sleeps or spins for half of its
 /// period, and the io thread beside it, stay below.
-const ENOUGH_SHARE: f64 = 0.9;
+const MIN_RUNTIME_SHARE: f64 = 0.9;
 
-/// Reading the clock costs less than this part of a system call, or it is one.
-const ANSWERED_WITHOUT_CALL: f64 = 0.75;
+/// Cost of a clock reading above which it is a system call, as a share of the cost of a system call.
+const MAX_READING_SHARE: f64 = 0.75;
 
 const REALTIME_KERNEL: &str =
     "use a kernel with PREEMPT_RT (Debian, Ubuntu: linux-image-rt-amd64, linux-realtime)";
 
-/// Version and preemption model.
-pub fn preemption(host: &HostFiles) -> Fact {
-    let name = "kernel";
+/// Version and preemption model of the kernel.
+pub fn preemption(host: &HostFiles) -> Examined {
     let read = |file: &str| host.text(&format!("proc/sys/kernel/{file}"));
-    let (release, version) = match (read("osrelease"), read("version")) {
-        (Ok(release), Ok(version)) => (release, version),
-        (Err(reason), _) | (_, Err(reason)) => return Fact::unknown(name, reason, None),
-    };
+    let (release, version) = (read("osrelease")?, read("version")?);
     let is = |word: &str| version.split_whitespace().any(|found| found == word);
     if is("PREEMPT_RT") || host.text("sys/kernel/realtime").is_ok_and(|text| text == "1") {
-        return Fact::good(name, format!("Linux {release}, PREEMPT_RT"));
+        return Ok(Fact::good(format!("Linux {release}, PREEMPT_RT")));
     }
     if is("PREEMPT_DYNAMIC") {
-        return dynamic(name, host, &release);
+        return dynamic(host, &release);
     }
     if is("PREEMPT") {
-        return Fact::fair(name, format!("Linux {release}, preemptible but not PREEMPT_RT"), REALTIME_KERNEL);
+        return Ok(Fact::fair(format!("Linux {release}, preemptible but not PREEMPT_RT"), REALTIME_KERNEL));
     }
-    Fact::bad(name, format!("Linux {release}, not preemptible"), REALTIME_KERNEL)
+    Ok(Fact::bad(format!("Linux {release}, not preemptible"), REALTIME_KERNEL))
 }
 
-/// A kernel whose model is chosen at boot.
-fn dynamic(name: &str, host: &HostFiles, release: &str) -> Fact {
+/// Fact about a kernel whose preemption model is chosen at boot.
+fn dynamic(host: &HostFiles, release: &str) -> Examined {
     let boot = format!("{REALTIME_KERNEL}, or boot with preempt=full");
     match mode(host, release) {
         Ok(mode) if mode == "full" || mode == "lazy" => {
-            Fact::fair(name, format!("Linux {release}, preempt={mode}, not PREEMPT_RT"), REALTIME_KERNEL)
+            Ok(Fact::fair(format!("Linux {release}, preempt={mode}, not PREEMPT_RT"), REALTIME_KERNEL))
         }
-        Ok(mode) => Fact::bad(name, format!("Linux {release}, preempt={mode}"), boot),
-        Err(reason) => Fact::unknown(
-            name,
+        Ok(mode) => Ok(Fact::bad(format!("Linux {release}, preempt={mode}"), boot)),
+        Err(reason) => Ok(Fact::unknown(
             format!("Linux {release}, not PREEMPT_RT; how it preempts was chosen at boot, and {reason}"),
             Some(&format!("as root, mount -t debugfs debugfs /sys/kernel/debug shows it; better {boot}")),
-        ),
+        )),
     }
 }
 
-/// Of the running kernel, as it says, or else as it was asked to boot or built.
+/// Preemption mode of the running kernel: as it reports, or else as it was booted, or built.
 fn mode(host: &HostFiles, release: &str) -> Result<String, String> {
-    let told = host.text("sys/kernel/debug/sched/preempt").and_then(|text| {
+    let reported = host.text("sys/kernel/debug/sched/preempt").and_then(|text| {
         let chosen = text.split_whitespace().find_map(|word| word.strip_prefix('(')?.strip_suffix(')'));
         chosen.map(Into::into).ok_or_else(|| format!("/sys/kernel/debug/sched/preempt is {text:?}"))
     });
-    told.or_else(|reason| boot_parameter(host, "preempt").ok_or(reason))
+    reported
+        .or_else(|reason| boot_parameter(host, "preempt").ok_or(reason))
         .or_else(|reason| built(host, release).ok_or(reason))
 }
 
@@ -68,132 +64,127 @@ fn built(host: &HostFiles, release: &str) -> Option<String> {
     models.into_iter().find(|(key, _)| built(key)).map(|(_, mode)| mode.into())
 }
 
-/// `name=value` of the kernel's command line.
+/// Value of a parameter of the kernel's command line.
 pub(super) fn boot_parameter(host: &HostFiles, name: &str) -> Option<String> {
     let line = host.text("proc/cmdline").ok()?;
     // The last one counts.
     line.split_whitespace().rev().find_map(|word| Some(word.strip_prefix(name)?.strip_prefix('=')?.into()))
 }
 
-/// The share of each processor that all real-time threads together may use.
-pub fn throttling(host: &HostFiles) -> Fact {
-    let name = "throttling";
-    let [runtime, period] =
-        ["runtime", "period"].map(|which| host.number(&format!("proc/sys/kernel/sched_rt_{which}_us")));
-    let (runtime_us, period_us) = match (runtime, period) {
-        (Ok(runtime), Ok(period)) => (runtime, period),
-        (Err(reason), _) | (_, Err(reason)) => return Fact::unknown(name, reason, None),
-    };
+/// Share of each processor that all real-time threads together may use.
+pub fn throttling(host: &HostFiles) -> Examined {
+    let read = |which| host.number(&format!("proc/sys/kernel/sched_rt_{which}_us"));
+    let (runtime_us, period_us) = (read("runtime")?, read("period")?);
     if runtime_us < 0 {
-        return Fact::good(name, "none for real-time threads");
+        return Ok(Fact::good("none for real-time threads"));
     }
     let found = format!(
         "real-time threads may use {} of each {} ms",
         runtime_us as f64 / 1e3,
         period_us as f64 / 1e3
     );
-    if runtime_us as f64 >= ENOUGH_SHARE * period_us as f64 {
-        return Fact::good(name, found);
+    if runtime_us as f64 >= MIN_RUNTIME_SHARE * period_us as f64 {
+        return Ok(Fact::good(found));
     }
-    Fact::bad(name, found, "sysctl -w kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000")
+    Ok(Fact::bad(found, "sysctl -w kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000"))
 }
 
-/// What answers the loop's questions for the time.
-pub fn clock(host: &HostFiles, cost: &ClockCost) -> Fact {
-    let name = "clock";
-    let source = match host.text("sys/devices/system/clocksource/clocksource0/current_clocksource") {
-        Ok(source) => source,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
+/// Clock source, and the cost of reading it.
+pub fn clock(host: &HostFiles, cost: &ClockCost) -> Examined {
+    let source = host.text("sys/devices/system/clocksource/clocksource0/current_clocksource")?;
     let ClockCost { reading_ns, system_call_ns } = *cost;
-    if reading_ns < ANSWERED_WITHOUT_CALL * system_call_ns {
-        return Fact::good(name, format!("{source}, {reading_ns:.0} ns a reading, without a system call"));
+    if reading_ns < MAX_READING_SHARE * system_call_ns {
+        return Ok(Fact::good(format!("{source}, {reading_ns:.0} ns a reading, without a system call")));
     }
-    Fact::bad(
-        name,
+    Ok(Fact::bad(
         format!("{source}, {reading_ns:.0} ns a reading: each is a system call"),
-        "find out why the kernel gave up a faster one: dmesg | grep -i -e clocksource -e tsc",
-    )
+        "find the reason why the kernel abandoned a faster one: dmesg | grep -i -e clocksource -e tsc",
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::doctor::facts::Rating;
+    use crate::commands::doctor::facts::Assessment;
+    use crate::commands::doctor::facts::tests::examined;
     use crate::commands::doctor::files::sample::host;
 
     const RELEASE: (&str, &str) = ("proc/sys/kernel/osrelease", "6.12.1");
 
     fn kernel(version: &str, more: &[(&str, &str)]) -> Fact {
-        let mut files = std::vec![RELEASE, ("proc/sys/kernel/version", version)];
+        let mut files = vec![RELEASE, ("proc/sys/kernel/version", version)];
         files.extend(more);
-        preemption(&host(&files).files)
+        examined(preemption(&host(&files).files))
     }
 
     #[test]
-    fn preemption_models_are_told_apart() {
+    fn preemption_models_are_distinguished() {
         let debug = "sys/kernel/debug/sched/preempt";
         let line = |text: &'static str| ("proc/cmdline", text);
         let dynamic = "#1 SMP PREEMPT_DYNAMIC Debian 6.12.1";
-        for (version, more, rating, words) in [
-            ("#1 SMP PREEMPT_RT Debian 6.12.1", std::vec![], Rating::Good, "Linux 6.12.1, PREEMPT_RT"),
-            ("#1 SMP odd", std::vec![("sys/kernel/realtime", "1")], Rating::Good, "PREEMPT_RT"),
-            ("#1 SMP odd", std::vec![("sys/kernel/realtime", "0")], Rating::Bad, "not preemptible"),
-            ("#1 SMP PREEMPT x", std::vec![], Rating::Fair, "not PREEMPT_RT"),
-            ("#1 SMP x", std::vec![], Rating::Bad, "not preemptible"),
-            (dynamic, std::vec![(debug, "none voluntary (full) lazy")], Rating::Fair, "preempt=full"),
-            (dynamic, std::vec![(debug, "none (voluntary) full")], Rating::Bad, "preempt=voluntary"),
-            (dynamic, std::vec![(debug, "(none) full"), line("preempt=full")], Rating::Bad, "preempt=none"),
-            (dynamic, std::vec![line("quiet preempt=none preempt=full")], Rating::Fair, "preempt=full"),
+        for (version, more, assessment, words) in [
+            ("#1 SMP PREEMPT_RT Debian 6.12.1", vec![], Assessment::Good, "Linux 6.12.1, PREEMPT_RT"),
+            ("#1 SMP odd", vec![("sys/kernel/realtime", "1")], Assessment::Good, "PREEMPT_RT"),
+            ("#1 SMP odd", vec![("sys/kernel/realtime", "0")], Assessment::Bad, "not preemptible"),
+            ("#1 SMP PREEMPT x", vec![], Assessment::Fair, "not PREEMPT_RT"),
+            ("#1 SMP x", vec![], Assessment::Bad, "not preemptible"),
+            (dynamic, vec![(debug, "none voluntary (full) lazy")], Assessment::Fair, "preempt=full"),
+            (dynamic, vec![(debug, "none (voluntary) full")], Assessment::Bad, "preempt=voluntary"),
+            (dynamic, vec![(debug, "(none) full"), line("preempt=full")], Assessment::Bad, "preempt=none"),
+            (dynamic, vec![line("quiet preempt=none preempt=full")], Assessment::Fair, "preempt=full"),
             (
                 dynamic,
-                std::vec![("boot/config-6.12.1", "CONFIG_PREEMPT_BUILD=y\nCONFIG_PREEMPT_NONE=y")],
-                Rating::Bad,
+                vec![("boot/config-6.12.1", "CONFIG_PREEMPT_BUILD=y\nCONFIG_PREEMPT_NONE=y")],
+                Assessment::Bad,
                 "preempt=none",
             ),
-            (dynamic, std::vec![("boot/config-6.12.1", "CONFIG_PREEMPT=y")], Rating::Fair, "preempt=full"),
+            (dynamic, vec![("boot/config-6.12.1", "CONFIG_PREEMPT=y")], Assessment::Fair, "preempt=full"),
             (
                 dynamic,
-                std::vec![line("quiet")],
-                Rating::Unknown,
+                vec![line("quiet")],
+                Assessment::Unknown,
                 "there is no /sys/kernel/debug/sched/preempt",
             ),
-            (dynamic, std::vec![(debug, "odd")], Rating::Unknown, "sched/preempt is \"odd\""),
+            (dynamic, vec![(debug, "odd")], Assessment::Unknown, "sched/preempt is \"odd\""),
         ] {
             let fact = kernel(version, &more);
-            assert_eq!(fact.rating, rating, "{version} {more:?}: {fact:?}");
+            assert_eq!(fact.assessment, assessment, "{version} {more:?}: {fact:?}");
             assert!(fact.found.contains(words), "{fact:?}");
-            assert_eq!(fact.remedy.is_none(), rating == Rating::Good, "{fact:?}");
+            assert_eq!(fact.remedy.is_none(), assessment == Assessment::Good, "{fact:?}");
         }
-        assert_eq!(preemption(&host(&[RELEASE]).files).found, "there is no /proc/sys/kernel/version");
+        assert_eq!(
+            examined(preemption(&host(&[RELEASE]).files)).found,
+            "there is no /proc/sys/kernel/version"
+        );
     }
 
     #[test]
     fn throttling_is_good_where_the_loop_does_not_meet_it() {
-        for (runtime, period, rating) in [
-            ("-1", "1000000", Rating::Good),
-            ("950000", "1000000", Rating::Good),
-            ("500000", "1000000", Rating::Bad),
-            ("0", "1000000", Rating::Bad),
-            ("all", "1000000", Rating::Unknown),
+        for (runtime, period, assessment) in [
+            ("-1", "1000000", Assessment::Good),
+            ("950000", "1000000", Assessment::Good),
+            ("500000", "1000000", Assessment::Bad),
+            ("0", "1000000", Assessment::Bad),
+            ("all", "1000000", Assessment::Unknown),
         ] {
             let host = host(&[
                 ("proc/sys/kernel/sched_rt_runtime_us", runtime),
                 ("proc/sys/kernel/sched_rt_period_us", period),
             ]);
-            assert_eq!(throttling(&host.files).rating, rating, "{runtime} of {period}");
+            assert_eq!(examined(throttling(&host.files)).assessment, assessment, "{runtime} of {period}");
         }
-        assert_eq!(throttling(&host(&[]).files).rating, Rating::Unknown);
+        assert_eq!(examined(throttling(&host(&[]).files)).assessment, Assessment::Unknown);
     }
 
     #[test]
     fn a_clock_that_costs_a_system_call_is_bad() {
         let empty = host(&[]);
         let host = host(&[("sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc")]);
-        let fact = |reading_ns| clock(&host.files, &ClockCost { reading_ns, system_call_ns: 120.0 });
-        assert_eq!(fact(25.0), Fact::good("clock", "tsc, 25 ns a reading, without a system call"));
-        assert_eq!(fact(125.0).rating, Rating::Bad);
+        let fact =
+            |reading_ns| examined(clock(&host.files, &ClockCost { reading_ns, system_call_ns: 120.0 }));
+        assert_eq!(fact(25.0), Fact::good("tsc, 25 ns a reading, without a system call"));
+        assert_eq!(fact(125.0).assessment, Assessment::Bad);
         let cost = ClockCost { reading_ns: 25.0, system_call_ns: 120.0 };
-        assert_eq!(clock(&empty.files, &cost).rating, Rating::Unknown);
+        assert_eq!(examined(clock(&empty.files, &cost)).assessment, Assessment::Unknown);
     }
 }

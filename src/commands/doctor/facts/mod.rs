@@ -1,11 +1,11 @@
-//! What a host offers to a hard real-time loop: facts, each with its rating and what would make it better.
+//! Facts about a host that matter to a hard real-time loop, each with an assessment and a remedy.
 //!
-//! Nothing is guessed: what cannot be read is unknown, with the reason.
+//! Nothing is guessed: a fact that cannot be read is unknown, with the reason.
 
 use serde::{Deserialize, Serialize};
 
-use self::permissions::Refused;
-use self::processors::Chosen;
+use self::permissions::RefusedRights;
+use self::processors::LoopCpus;
 use super::files::HostFiles;
 use crate::config::deployment::Realtime;
 use crate::messages::Bus;
@@ -18,83 +18,102 @@ mod power;
 mod processors;
 pub mod surroundings;
 
-/// What a fact means to a loop that must never be late.
+/// Assessment of a fact: its consequence for a loop that must never be late.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Rating {
-    /// Nothing is left to be done.
+pub enum Assessment {
+    /// Nothing needs to be improved.
     Good,
-    /// It costs latency, in a way that has an end.
+    /// The fact costs a bounded amount of latency.
     Fair,
-    /// While it is so, no bound of the latency can be promised.
+    /// The fact makes any bound of the latency impossible.
     Bad,
-    /// Could not be found out.
+    /// The fact could not be determined.
     Unknown,
 }
 
-/// One thing about a host.
+/// Fact about a host.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fact {
     pub name: String,
-    pub rating: Rating,
-    /// What it is, or why that is unknown.
+    pub assessment: Assessment,
+    /// The finding, or the reason why there is none.
     pub found: String,
-    /// What to do about it, where it is not good.
+    /// Action that improves the fact, where it is not good.
     pub remedy: Option<String>,
 }
 
+/// Outcome of an examination: a fact without its name, or the reason why it is unknown.
+type Examined = Result<Fact, String>;
+
 impl Fact {
-    /// Nothing to be done.
-    pub fn good(name: &str, found: impl Into<String>) -> Self {
-        Self { name: name.into(), rating: Rating::Good, found: found.into(), remedy: None }
+    /// Good fact.
+    pub fn good(found: impl Into<String>) -> Self {
+        Self { name: String::new(), assessment: Assessment::Good, found: found.into(), remedy: None }
     }
 
-    /// Could be better.
-    pub fn fair(name: &str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { rating: Rating::Fair, remedy: Some(remedy.into()), ..Self::good(name, found) }
+    /// Fair fact.
+    pub fn fair(found: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { assessment: Assessment::Fair, remedy: Some(remedy.into()), ..Self::good(found) }
     }
 
-    /// Stands against a bound of the latency.
-    pub fn bad(name: &str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { rating: Rating::Bad, ..Self::fair(name, found, remedy) }
+    /// Bad fact.
+    pub fn bad(found: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { assessment: Assessment::Bad, ..Self::fair(found, remedy) }
     }
 
-    /// Could not be found out; `remedy` is how it could.
-    pub fn unknown(name: &str, reason: impl Into<String>, remedy: Option<&str>) -> Self {
-        Self { rating: Rating::Unknown, remedy: remedy.map(Into::into), ..Self::good(name, reason) }
+    /// Unknown fact; `remedy` is how it can be determined.
+    pub fn unknown(reason: impl Into<String>, remedy: Option<&str>) -> Self {
+        Self { assessment: Assessment::Unknown, remedy: remedy.map(Into::into), ..Self::good(reason) }
     }
 }
 
-/// Everything, the most important first.
+/// All facts, the most important first.
 pub fn all(
     host: &HostFiles,
     realtime: &Realtime,
     permissions: &Permissions,
-    refused: &Refused,
+    refused: &RefusedRights,
     cost: &ClockCost,
 ) -> Vec<Fact> {
     let permitted = permissions.cpus_permitted.clone();
-    let chosen = &Chosen { realtime: realtime.cpu, io: realtime.io_cpu, permitted };
-    let mut facts = std::vec![kernel::preemption(host), surroundings::machine(host)];
-    facts.extend(permissions::scheduling(permissions, realtime, refused));
-    facts.extend([
-        permissions::locked_memory(permissions, realtime, refused),
-        permissions::cgroup(permissions, refused),
-        permissions::container(permissions),
-        kernel::throttling(host),
-        processors::count(chosen),
-        processors::isolation(host, chosen),
-        processors::siblings(host, chosen),
-    ]);
-    facts.extend(processors::interrupts(host, chosen));
+    let chosen = &LoopCpus { realtime: realtime.cpu, io: realtime.io_cpu, permitted };
     let idle_us = realtime.cpu_dma_latency_us;
+    let mut facts = vec![("kernel", kernel::preemption(host)), ("machine", surroundings::machine(host))];
+    let scheduling = permissions::scheduling(permissions, realtime, refused);
+    facts.extend(scheduling.into_iter().map(|fact| ("scheduling", Ok(fact))));
     facts.extend([
-        power::frequency(host, chosen),
-        power::idle(host, chosen, idle_us, refused.shallow_sleep.as_ref()),
-        kernel::clock(host, cost),
-        surroundings::swap(host),
-        surroundings::huge_pages(host),
-        surroundings::shared_memory(host, Bus::fallback_location().as_deref()),
+        ("locked memory", Ok(permissions::locked_memory(permissions, realtime, refused))),
+        ("cgroup", Ok(permissions::cgroup(permissions, refused))),
+        ("container", Ok(permissions::container(permissions))),
+        ("throttling", kernel::throttling(host)),
+        ("processors", Ok(processors::count(chosen))),
+        ("isolation", processors::isolation(host, chosen)),
+        ("hyper-threading", processors::siblings(host, chosen)),
     ]);
-    facts
+    facts.extend(processors::interrupts(host, chosen).map(|fact| ("interrupts", Ok(fact))));
+    facts.extend([
+        ("frequency", power::frequency(host, chosen)),
+        ("idle states", power::idle(host, chosen, idle_us, refused.idle_bound.as_ref())),
+        ("clock", kernel::clock(host, cost)),
+        ("swap", surroundings::swap(host)),
+        ("huge pages", surroundings::huge_pages(host)),
+        ("shared memory", surroundings::shared_memory(host, Bus::fallback_location().as_deref())),
+    ]);
+    facts.into_iter().map(|(name, examined)| named(name, examined)).collect()
+}
+
+/// The fact under a name, unknown if its examination failed.
+fn named(name: &str, examined: Examined) -> Fact {
+    Fact { name: name.into(), ..examined.unwrap_or_else(|reason| Fact::unknown(reason, None)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A fact as [`all`] has it, but for the name.
+    pub fn examined(examined: Examined) -> Fact {
+        named("", examined)
+    }
 }

@@ -1,4 +1,4 @@
-//! What this process is allowed: found by doing what the daemon does, explained by what the kernel tells.
+//! Facts about the rights of this process: found by requesting what the daemon requests, explained by kernel files.
 
 use super::Fact;
 use crate::config::deployment::{Realtime, Scheduler};
@@ -6,32 +6,32 @@ use crate::realtime::setup::Shortfall;
 use crate::realtime::setup::budget::GroupBudget;
 use crate::realtime::setup::permissions::Permissions;
 
-/// What the set-up of the daemon was refused here.
+/// Rights that this host refused to the set-up of the daemon.
 #[derive(Clone, Debug, Default)]
-pub struct Refused {
-    /// To the real-time thread: its scheduling class, its processor.
+pub struct RefusedRights {
+    /// Scheduling class and processor of the real-time thread.
     pub thread: Vec<Shortfall>,
-    pub shallow_sleep: Option<Shortfall>,
+    pub idle_bound: Option<Shortfall>,
     pub locked_memory: Option<Shortfall>,
 }
 
-impl Refused {
-    /// All of it.
+impl RefusedRights {
+    /// All refused rights.
     pub fn all(&self) -> impl Iterator<Item = &Shortfall> {
-        self.thread.iter().chain(&self.shallow_sleep).chain(&self.locked_memory)
+        self.thread.iter().chain(&self.idle_bound).chain(&self.locked_memory)
     }
 }
 
-fn lacking(name: &str, shortfall: &Shortfall) -> Fact {
+/// Bad fact for a refused right.
+fn refused_fact(shortfall: &Shortfall) -> Fact {
     let Shortfall { what, reason, remedy } = shortfall;
-    Fact::bad(name, format!("no {what}: {reason}"), remedy.as_str())
+    Fact::bad(format!("no {what}: {reason}"), remedy.as_str())
 }
 
-/// Class and priority of the real-time thread, and its binding.
-pub fn scheduling(permissions: &Permissions, realtime: &Realtime, refused: &Refused) -> Vec<Fact> {
-    let name = "scheduling";
+/// Scheduling class, priority and binding of the real-time thread.
+pub fn scheduling(permissions: &Permissions, realtime: &Realtime, refused: &RefusedRights) -> Vec<Fact> {
     if !refused.thread.is_empty() {
-        return refused.thread.iter().map(|shortfall| lacking(name, shortfall)).collect();
+        return refused.thread.iter().map(refused_fact).collect();
     }
     let class = match realtime.scheduler {
         Scheduler::Fifo => format!("FIFO priority {}", realtime.priority),
@@ -39,65 +39,60 @@ pub fn scheduling(permissions: &Permissions, realtime: &Realtime, refused: &Refu
     };
     let limit = permissions.priority_limit;
     let by = if permissions.sys_nice { "CAP_SYS_NICE".into() } else { format!("RLIMIT_RTPRIO {limit}") };
-    std::vec![Fact::good(name, format!("{class} granted ({by})"))]
+    vec![Fact::good(format!("{class} granted ({by})"))]
 }
 
-/// Whether pages stay in memory.
-pub fn locked_memory(permissions: &Permissions, realtime: &Realtime, refused: &Refused) -> Fact {
-    let name = "locked memory";
+/// Whether the pages of the process stay in memory.
+pub fn locked_memory(permissions: &Permissions, realtime: &Realtime, refused: &RefusedRights) -> Fact {
     if !realtime.lock_memory {
         return Fact::bad(
-            name,
-            "not asked for: pages may have to be read again",
+            "not requested: the kernel may move pages to a disk",
             "realtime.lock_memory = true",
         );
     }
     match (&refused.locked_memory, permissions.locked_limit_kb) {
-        (Some(shortfall), _) => lacking(name, shortfall),
-        (None, _) if permissions.ipc_lock => Fact::good(name, "granted (CAP_IPC_LOCK)"),
-        (None, Some(limit)) => Fact::good(name, format!("granted (RLIMIT_MEMLOCK {limit} kB)")),
-        (None, None) => Fact::good(name, "granted (RLIMIT_MEMLOCK unlimited)"),
+        (Some(shortfall), _) => refused_fact(shortfall),
+        (None, _) if permissions.ipc_lock => Fact::good("granted (CAP_IPC_LOCK)"),
+        (None, Some(limit)) => Fact::good(format!("granted (RLIMIT_MEMLOCK {limit} kB)")),
+        (None, None) => Fact::good("granted (RLIMIT_MEMLOCK unlimited)"),
     }
 }
 
-/// The group's budget of real-time scheduling.
-pub fn cgroup(permissions: &Permissions, refused: &Refused) -> Fact {
-    let name = "cgroup";
+/// Budget of the process's cgroup for real-time scheduling.
+pub fn cgroup(permissions: &Permissions, refused: &RefusedRights) -> Fact {
     match &permissions.group_budget {
-        GroupBudget::Unlimited => Fact::good(name, "does not limit real-time threads"),
+        GroupBudget::Unlimited => Fact::good("does not limit real-time threads"),
         GroupBudget::Limited { file, budget_us: 0 } => Fact::bad(
-            name,
             format!("has no budget for real-time threads ({})", file.display()),
             format!("write one there, in the groups above it first: echo 950000 > {}", file.display()),
         ),
         GroupBudget::Limited { file, budget_us } => {
-            Fact::good(name, format!("{budget_us} us a period for real-time threads ({})", file.display()))
+            Fact::good(format!("{budget_us} us a period for real-time threads ({})", file.display()))
         }
         GroupBudget::Unknown { group } if refused.thread.is_empty() => {
-            Fact::good(name, format!("{} does not limit real-time threads", group.display()))
+            Fact::good(format!("{} does not limit real-time threads", group.display()))
         }
         GroupBudget::Unknown { group } => {
-            Fact::unknown(name, format!("{} does not tell its budget", group.display()), None)
+            Fact::unknown(format!("{} does not show its budget", group.display()), None)
         }
     }
 }
 
-/// Whether rights come from a container.
+/// Whether the process runs in a container, which limits its rights.
 pub fn container(permissions: &Permissions) -> Fact {
-    let name = "container";
     let found = match (permissions.container, permissions.user_namespace) {
-        (false, false) => return Fact::good(name, "none"),
-        (_, true) => "of a user: no capability of the host holds",
+        (false, false) => return Fact::good("none"),
+        (_, true) => "of a user namespace: no capability of the host holds",
         (true, false) => "its rights come from how it was started",
     };
-    Fact::fair(name, found, "or run the daemon on the host itself")
+    Fact::fair(found, "or run the daemon on the host itself")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::demo::DEFAULT_MACHINE;
-    use crate::commands::doctor::facts::Rating;
+    use crate::commands::arguments::DEFAULT_CONFIG;
+    use crate::commands::doctor::facts::Assessment;
     use crate::config::Config;
 
     fn shortfall(what: &str) -> Shortfall {
@@ -105,33 +100,33 @@ mod tests {
     }
 
     fn realtime() -> Realtime {
-        Config::parse(DEFAULT_MACHINE, "test").unwrap().deployment.realtime
+        Config::parse(DEFAULT_CONFIG, "test").unwrap().deployment.realtime
     }
 
     #[test]
-    fn what_was_refused_is_bad_and_says_why() {
+    fn refused_rights_are_bad_and_have_a_reason() {
         let permissions = Permissions::of_this_process();
-        let refused = Refused {
+        let refused = RefusedRights {
             thread: vec![shortfall("FIFO priority 80"), shortfall("binding to CPU 7")],
             locked_memory: Some(shortfall("locked memory")),
-            shallow_sleep: None,
+            idle_bound: None,
         };
         let facts = scheduling(&permissions, &realtime(), &refused);
-        let found: Vec<_> = facts.iter().map(|fact| (fact.rating, fact.found.as_str())).collect();
+        let found: Vec<_> = facts.iter().map(|fact| (fact.assessment, fact.found.as_str())).collect();
         assert_eq!(
             found,
             [
-                (Rating::Bad, "no FIFO priority 80: it is not allowed"),
-                (Rating::Bad, "no binding to CPU 7: it is not allowed")
+                (Assessment::Bad, "no FIFO priority 80: it is not allowed"),
+                (Assessment::Bad, "no binding to CPU 7: it is not allowed")
             ]
         );
         let fact = locked_memory(&permissions, &realtime(), &refused);
-        assert_eq!(fact, Fact::bad("locked memory", "no locked memory: it is not allowed", "allow it"));
+        assert_eq!(fact, Fact::bad("no locked memory: it is not allowed", "allow it"));
     }
 
     #[test]
-    fn what_was_granted_says_by_what() {
-        let refused = Refused::default();
+    fn granted_rights_name_their_source() {
+        let refused = RefusedRights::default();
         let lesser = Permissions {
             sys_nice: false,
             ipc_lock: false,
@@ -151,35 +146,38 @@ mod tests {
         let limits = ["FIFO priority 80 granted (RLIMIT_RTPRIO 90)", "granted (RLIMIT_MEMLOCK unlimited)"];
         assert_eq!(found(&lesser), limits.map(ToString::to_string));
         let unlocked = Realtime { lock_memory: false, ..realtime() };
-        assert_eq!(locked_memory(&greater, &unlocked, &refused).rating, Rating::Bad);
+        assert_eq!(locked_memory(&greater, &unlocked, &refused).assessment, Assessment::Bad);
     }
 
     #[test]
-    fn budgets_of_a_group_are_told_apart() {
+    fn budgets_of_a_group_are_distinguished() {
         let of = |budget_us| GroupBudget::Limited { file: "/c/cpu.rt_runtime_us".into(), budget_us };
         let unseen = GroupBudget::Unknown { group: "/c/g".into() };
-        let refused = Refused { thread: vec![shortfall("FIFO priority 80")], ..Refused::default() };
-        for (group_budget, refused, rating) in [
-            (GroupBudget::Unlimited, &refused, Rating::Good),
-            (of(0), &refused, Rating::Bad),
-            (of(-1), &refused, Rating::Good),
-            (of(950_000), &refused, Rating::Good),
-            (unseen.clone(), &refused, Rating::Unknown),
-            (unseen, &Refused::default(), Rating::Good),
+        let refused =
+            RefusedRights { thread: vec![shortfall("FIFO priority 80")], ..RefusedRights::default() };
+        for (group_budget, refused, assessment) in [
+            (GroupBudget::Unlimited, &refused, Assessment::Good),
+            (of(0), &refused, Assessment::Bad),
+            (of(-1), &refused, Assessment::Good),
+            (of(950_000), &refused, Assessment::Good),
+            (unseen.clone(), &refused, Assessment::Unknown),
+            (unseen, &RefusedRights::default(), Assessment::Good),
         ] {
             let permissions = Permissions { group_budget, ..Permissions::of_this_process() };
             let fact = cgroup(&permissions, refused);
-            assert_eq!(fact.rating, rating, "{fact:?}");
+            assert_eq!(fact.assessment, assessment, "{fact:?}");
         }
     }
 
     #[test]
-    fn containers_are_told_apart() {
-        for (inside, user_namespace, rating) in
-            [(false, false, Rating::Good), (true, false, Rating::Fair), (true, true, Rating::Fair)]
-        {
+    fn containers_are_distinguished() {
+        for (inside, user_namespace, assessment) in [
+            (false, false, Assessment::Good),
+            (true, false, Assessment::Fair),
+            (true, true, Assessment::Fair),
+        ] {
             let facts = Permissions { container: inside, user_namespace, ..Permissions::of_this_process() };
-            assert_eq!(container(&facts).rating, rating);
+            assert_eq!(container(&facts).assessment, assessment);
         }
     }
 }

@@ -1,16 +1,15 @@
-//! How fast the processors of the two threads run, and how deeply they sleep.
+//! Facts about the power management of the processors: frequency, idle states.
 
-use super::Fact;
-use super::processors::{CPU, Chosen};
+use super::processors::{CPU, LoopCpus};
+use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::setup::Shortfall;
 
-/// An idle state that is left within this does not matter beside a wake-up, which takes tens \[us\].
-const SHALLOW_US: i64 = 10;
+/// Exit latency below which an idle state does not matter beside a wake-up, which takes tens of microseconds \[us\].
+const MAX_SHALLOW_EXIT_US: i64 = 10;
 
-/// Who decides how fast they run.
-pub fn frequency(host: &HostFiles, chosen: &Chosen) -> Fact {
-    let name = "frequency";
+/// Frequency governors of the processors.
+pub fn frequency(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     let mut others = vec![];
     for cpu in chosen.used() {
         match host.text(&format!("{CPU}/cpu{cpu}/cpufreq/scaling_governor")) {
@@ -18,48 +17,40 @@ pub fn frequency(host: &HostFiles, chosen: &Chosen) -> Fact {
             Ok(governor) => others.push(format!("{governor} on CPU {cpu}")),
             Err(reason) => {
                 let reason = format!("not set by this kernel: {reason}");
-                return Fact::unknown(name, reason, None);
+                return Ok(Fact::unknown(reason, None));
             }
         }
     }
     if others.is_empty() {
-        return Fact::good(name, "governor performance");
+        return Ok(Fact::good("governor performance"));
     }
-    Fact::fair(
-        name,
-        format!("governor {}", others.join(", ")),
-        "cpupower frequency-set --governor performance",
-    )
+    Ok(Fact::fair(format!("governor {}", others.join(", ")), "cpupower frequency-set --governor performance"))
 }
 
-/// How deeply they sleep. `bound_us` is what the daemon asks for while it runs, `against` why it may not.
-pub fn idle(host: &HostFiles, chosen: &Chosen, bound_us: i32, against: Option<&Shortfall>) -> Fact {
-    let name = "idle states";
-    let deepest = match deepest_state(host, chosen) {
-        Ok(deepest) => deepest,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
-    let Some((latency_us, state)) = deepest.filter(|(latency_us, _)| *latency_us > SHALLOW_US) else {
-        return Fact::good(name, format!("none takes longer than {SHALLOW_US} us to leave"));
+/// Deepest idle state of the processors. `bound_us` is the bound that the daemon requests while it runs, `refused` the reason if it may not.
+pub fn idle(host: &HostFiles, chosen: &LoopCpus, bound_us: i32, refused: Option<&Shortfall>) -> Examined {
+    let Some((latency_us, state)) =
+        deepest_state(host, chosen)?.filter(|(latency_us, _)| *latency_us > MAX_SHALLOW_EXIT_US)
+    else {
+        return Ok(Fact::good(format!("none takes longer than {MAX_SHALLOW_EXIT_US} us to leave")));
     };
     let found = format!("{state} takes {latency_us} us to leave");
-    match against {
-        None if i64::from(bound_us) <= SHALLOW_US => {
-            Fact::good(name, format!("{found}; the daemon allows at most {bound_us} us while it runs"))
+    match refused {
+        None if i64::from(bound_us) <= MAX_SHALLOW_EXIT_US => {
+            Ok(Fact::good(format!("{found}; the daemon allows at most {bound_us} us while it runs")))
         }
-        None => Fact::fair(
-            name,
+        None => Ok(Fact::fair(
             format!("{found}; the daemon allows {bound_us} us"),
             "lower realtime.cpu_dma_latency_us",
-        ),
+        )),
         Some(Shortfall { reason, remedy, .. }) => {
-            Fact::fair(name, format!("{found}, and the daemon cannot prevent it: {reason}"), remedy.as_str())
+            Ok(Fact::fair(format!("{found}, and the daemon cannot prevent it: {reason}"), remedy.as_str()))
         }
     }
 }
 
 /// Latency and name of the deepest enabled idle state; `None` if there are no states.
-fn deepest_state(host: &HostFiles, chosen: &Chosen) -> Result<Option<(i64, String)>, String> {
+fn deepest_state(host: &HostFiles, chosen: &LoopCpus) -> Result<Option<(i64, String)>, String> {
     let driver = host.text(&format!("{CPU}/cpuidle/current_driver"))?;
     if driver == "none" {
         return Ok(None);
@@ -81,8 +72,9 @@ fn deepest_state(host: &HostFiles, chosen: &Chosen) -> Result<Option<(i64, Strin
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::doctor::facts::Rating;
+    use crate::commands::doctor::facts::Assessment;
     use crate::commands::doctor::facts::processors::tests::chosen;
+    use crate::commands::doctor::facts::tests::examined;
     use crate::commands::doctor::files::sample::host;
 
     #[test]
@@ -91,17 +83,17 @@ mod tests {
         let files = [(governor(0), "powersave"), (governor(1), "performance"), (governor(2), "performance")];
         let files: Vec<_> = files.iter().map(|(path, text)| (path.as_str(), *text)).collect();
         let host = host(&files);
-        for (realtime, io, permitted, rating) in [
-            (Some(1), Some(2), "0-2", Rating::Good),
-            (Some(1), Some(0), "0-2", Rating::Fair),
-            (None, None, "0-2", Rating::Fair),
-            (None, None, "1-2", Rating::Good),
-            (Some(1), Some(3), "0-3", Rating::Unknown),
+        for (realtime, io, permitted, assessment) in [
+            (Some(1), Some(2), "0-2", Assessment::Good),
+            (Some(1), Some(0), "0-2", Assessment::Fair),
+            (None, None, "0-2", Assessment::Fair),
+            (None, None, "1-2", Assessment::Good),
+            (Some(1), Some(3), "0-3", Assessment::Unknown),
         ] {
-            let fact = frequency(&host.files, &chosen(realtime, io, permitted));
-            assert_eq!(fact.rating, rating, "{realtime:?} {io:?}: {fact:?}");
+            let fact = examined(frequency(&host.files, &chosen(realtime, io, permitted)));
+            assert_eq!(fact.assessment, assessment, "{realtime:?} {io:?}: {fact:?}");
         }
-        let fact = frequency(&host.files, &chosen(None, None, "0-2"));
+        let fact = examined(frequency(&host.files, &chosen(None, None, "0-2")));
         assert_eq!(fact.found, "governor powersave on CPU 0");
     }
 
@@ -124,19 +116,19 @@ mod tests {
         let against =
             Shortfall { what: "bound".into(), reason: "it is not allowed".into(), remedy: "allow it".into() };
         let one = chosen(Some(0), Some(0), "0");
-        for (deep, off, bound_us, against, rating) in [
-            ("133", "0", 0, None, Rating::Good),
-            ("133", "0", 200, None, Rating::Fair),
-            ("133", "0", 0, Some(&against), Rating::Fair),
-            ("133", "1", 0, Some(&against), Rating::Good),
-            ("2", "0", 0, Some(&against), Rating::Good),
-            ("deep", "0", 0, None, Rating::Unknown),
+        for (deep, off, bound_us, against, assessment) in [
+            ("133", "0", 0, None, Assessment::Good),
+            ("133", "0", 200, None, Assessment::Fair),
+            ("133", "0", 0, Some(&against), Assessment::Fair),
+            ("133", "1", 0, Some(&against), Assessment::Good),
+            ("2", "0", 0, Some(&against), Assessment::Good),
+            ("deep", "0", 0, None, Assessment::Unknown),
         ] {
-            let fact = idle(&files(deep, off).files, &one, bound_us, against);
-            assert_eq!(fact.rating, rating, "{deep} {off} {bound_us}: {fact:?}");
+            let fact = examined(idle(&files(deep, off).files, &one, bound_us, against));
+            assert_eq!(fact.assessment, assessment, "{deep} {off} {bound_us}: {fact:?}");
         }
         let none = host(&[("sys/devices/system/cpu/cpuidle/current_driver", "none")]);
-        assert_eq!(idle(&none.files, &one, 0, None).rating, Rating::Good);
-        assert_eq!(idle(&host(&[]).files, &one, 0, None).rating, Rating::Unknown);
+        assert_eq!(examined(idle(&none.files, &one, 0, None)).assessment, Assessment::Good);
+        assert_eq!(examined(idle(&host(&[]).files, &one, 0, None)).assessment, Assessment::Unknown);
     }
 }

@@ -1,28 +1,28 @@
-//! The processors of the two threads: how many, and how far left alone.
+//! Facts about the processors of the real-time and the io thread: number, isolation, siblings, interrupts.
 
-use super::Fact;
 use super::kernel::boot_parameter;
+use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::setup::cpus::Cpus;
 
-/// One for the real-time thread and one for the io thread.
-const LEAST: usize = 2;
+/// Least number of processors: one for the real-time thread and one for the io thread.
+const MIN_PROCESSORS: usize = 2;
 
 pub(super) const CPU: &str = "sys/devices/system/cpu";
 
-/// The processors a loop would use.
+/// Processors of the threads of a loop.
 #[derive(Clone, Debug)]
-pub struct Chosen {
-    /// Of the real-time thread; `None` if the scheduler decides.
+pub struct LoopCpus {
+    /// CPU of the real-time thread; `None` if the scheduler decides.
     pub realtime: Option<usize>,
-    /// Of the io thread.
+    /// CPU of the io thread; `None` if the scheduler decides.
     pub io: Option<usize>,
-    /// Those that this process may use.
+    /// CPUs that this process may use.
     pub permitted: Cpus,
 }
 
-impl Chosen {
-    /// Those that matter: the chosen ones, or all where one is not chosen.
+impl LoopCpus {
+    /// CPUs that the threads may run on: the configured ones, or all permitted ones where one is not configured.
     pub(super) fn used(&self) -> Vec<usize> {
         match (self.realtime, self.io) {
             (Some(realtime), Some(io)) if realtime == io => vec![realtime],
@@ -32,7 +32,7 @@ impl Chosen {
     }
 }
 
-/// A set of processors in a file; none where the file says `(null)`.
+/// Set of processors in a file; empty where the file contains `(null)`.
 fn set(host: &HostFiles, path: &str) -> Result<Cpus, String> {
     let text = host.text(path)?;
     if text == "(null)" {
@@ -41,87 +41,79 @@ fn set(host: &HostFiles, path: &str) -> Result<Cpus, String> {
     Cpus::parse(&text).ok_or_else(|| format!("/{path} is {text:?} and no list of CPUs"))
 }
 
-/// How many there are.
-pub fn count(chosen: &Chosen) -> Fact {
-    let (name, permitted) = ("processors", &chosen.permitted);
+/// Number of processors.
+pub fn count(chosen: &LoopCpus) -> Fact {
+    let permitted = &chosen.permitted;
     if chosen.realtime.is_some() && chosen.realtime == chosen.io {
         let cpu = chosen.realtime.unwrap_or_default();
         let found = format!("real-time and io thread are both on CPU {cpu}: each delays the other");
-        return Fact::bad(name, found, "choose different realtime.cpu and realtime.io_cpu");
+        return Fact::bad(found, "choose different realtime.cpu and realtime.io_cpu");
     }
     let number = permitted.iter().count();
-    if number < LEAST {
+    if number < MIN_PROCESSORS {
         let found = format!("only CPU {permitted}: real-time and io thread delay each other");
-        return Fact::bad(name, found, "allow this process at least two (cpuset, taskset), better three");
+        return Fact::bad(found, "allow this process at least two (cpuset, taskset), better three");
     }
-    if number == LEAST {
+    if number == MIN_PROCESSORS {
         let found = format!("{number} (CPU {permitted}): real-time and io thread leave none for the rest");
-        return Fact::fair(name, found, "a third leaves one for everything else");
+        return Fact::fair(found, "a third leaves one for everything else");
     }
-    Fact::good(name, format!("{number} (CPU {permitted})"))
+    Fact::good(format!("{number} (CPU {permitted})"))
 }
 
-/// Whether the kernel keeps other work off the real-time thread's.
-pub fn isolation(host: &HostFiles, chosen: &Chosen) -> Fact {
-    let name = "isolation";
-    let isolated = match set(host, &format!("{CPU}/isolated")) {
-        Ok(isolated) => isolated,
-        Err(reason) => return Fact::unknown(name, reason, None),
-    };
+/// Whether the kernel keeps other work off the processor of the real-time thread.
+pub fn isolation(host: &HostFiles, chosen: &LoopCpus) -> Examined {
+    let isolated = set(host, &format!("{CPU}/isolated"))?;
     let Some(cpu) = chosen.realtime else {
         let found = format!("no CPU is chosen for the real-time thread; isolated: {isolated}");
-        return Fact::fair(name, found, "choose realtime.cpu, and boot with isolcpus= for it");
+        return Ok(Fact::fair(found, "choose realtime.cpu, and boot with isolcpus= for it"));
     };
     let boot = format!("boot with isolcpus=managed_irq,domain,{cpu} nohz_full={cpu} rcu_nocbs={cpu}");
     if !isolated.contains(cpu) {
-        return Fact::fair(name, format!("CPU {cpu} is shared with everything else"), boot);
+        return Ok(Fact::fair(format!("CPU {cpu} is shared with everything else"), boot));
     }
     let no_ticks = set(host, &format!("{CPU}/nohz_full")).is_ok_and(|cpus| cpus.contains(cpu));
     let listed = boot_parameter(host, "rcu_nocbs").and_then(|list| Cpus::parse(&list));
     // The former implies the latter.
     let no_callbacks = no_ticks || listed.is_some_and(|cpus| cpus.contains(cpu));
     match (no_ticks, no_callbacks) {
-        (true, _) => Fact::good(name, format!("CPU {cpu}: isolated, without ticks and RCU callbacks")),
-        (false, true) => Fact::fair(name, format!("CPU {cpu}: isolated, but ticking"), boot),
+        (true, _) => Ok(Fact::good(format!("CPU {cpu}: isolated, without ticks and RCU callbacks"))),
+        (false, true) => Ok(Fact::fair(format!("CPU {cpu}: isolated, but ticking"), boot)),
         (false, false) => {
-            Fact::fair(name, format!("CPU {cpu}: isolated, but ticking and with RCU callbacks"), boot)
+            Ok(Fact::fair(format!("CPU {cpu}: isolated, but ticking and with RCU callbacks"), boot))
         }
     }
 }
 
 /// Whether the real-time thread shares its core with another hardware thread.
-pub fn siblings(host: &HostFiles, chosen: &Chosen) -> Fact {
-    let name = "hyper-threading";
+pub fn siblings(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     let Some(cpu) = chosen.realtime else {
         return match host.number(&format!("{CPU}/smt/active")) {
-            Ok(0) => Fact::good(name, "off"),
-            Ok(_) => Fact::fair(
-                name,
+            Ok(0) => Ok(Fact::good("off")),
+            Ok(_) => Ok(Fact::fair(
                 "on: what runs on the other half of a core slows this one",
                 "boot with nosmt, or choose realtime.cpu and switch its sibling off",
-            ),
-            Err(reason) => Fact::unknown(name, reason, None),
+            )),
+            Err(reason) => Ok(Fact::unknown(reason, None)),
         };
     };
     let siblings = set(host, &format!("{CPU}/cpu{cpu}/topology/thread_siblings_list"));
     match siblings.map(|siblings| siblings.iter().find(|sibling| *sibling != cpu)) {
-        Ok(None) => Fact::good(name, format!("CPU {cpu} has its core to itself")),
-        Ok(Some(sibling)) => Fact::fair(
-            name,
+        Ok(None) => Ok(Fact::good(format!("CPU {cpu} has its core to itself"))),
+        Ok(Some(sibling)) => Ok(Fact::fair(
             format!("CPU {cpu} shares its core with CPU {sibling}"),
             format!("echo 0 > /{CPU}/cpu{sibling}/online"),
-        ),
-        Err(reason) => Fact::unknown(name, reason, None),
+        )),
+        Err(reason) => Ok(Fact::unknown(reason, None)),
     }
 }
 
-/// Which interrupts may hit the real-time thread's. `None` where it has no processor of its own.
-pub fn interrupts(host: &HostFiles, chosen: &Chosen) -> Option<Fact> {
-    let name = "interrupts";
+/// Interrupts that the processor of the real-time thread may get. `None` where no processor is configured.
+pub fn interrupts(host: &HostFiles, chosen: &LoopCpus) -> Option<Fact> {
     let cpu = chosen.realtime?;
     let lines = host.numbered("proc/irq");
     if lines.is_empty() {
-        return Some(Fact::unknown(name, "there is nothing in /proc/irq", None));
+        return Some(Fact::unknown("there is nothing in /proc/irq", None));
     }
     let allowed = |line: &&u32| {
         let place = |file| set(host, &format!("proc/irq/{line}/{file}"));
@@ -136,10 +128,9 @@ pub fn interrupts(host: &HostFiles, chosen: &Chosen) -> Option<Fact> {
         .any(|process| host.text(&format!("proc/{process}/comm")).is_ok_and(|name| name == "irqbalance"));
     let balance = if balanced { "; irqbalance moves them" } else { "" };
     if hitting == 0 && !balanced {
-        return Some(Fact::good(name, format!("none of {} on CPU {cpu}", lines.len())));
+        return Some(Fact::good(format!("none of {} on CPU {cpu}", lines.len())));
     }
     Some(Fact::fair(
-        name,
         format!("{hitting} of {} may hit CPU {cpu}{balance}", lines.len()),
         format!("boot with irqaffinity= without {cpu}, and IRQBALANCE_BANNED_CPULIST={cpu} or no irqbalance"),
     ))
@@ -148,24 +139,25 @@ pub fn interrupts(host: &HostFiles, chosen: &Chosen) -> Option<Fact> {
 #[cfg(test)]
 pub mod tests {
     use super::*;
-    use crate::commands::doctor::Rating;
+    use crate::commands::doctor::facts::Assessment;
+    use crate::commands::doctor::facts::tests::examined;
     use crate::commands::doctor::files::sample::host;
 
-    pub fn chosen(realtime: Option<usize>, io: Option<usize>, permitted: &str) -> Chosen {
-        Chosen { realtime, io, permitted: Cpus::parse(permitted).unwrap() }
+    pub fn chosen(realtime: Option<usize>, io: Option<usize>, permitted: &str) -> LoopCpus {
+        LoopCpus { realtime, io, permitted: Cpus::parse(permitted).unwrap() }
     }
 
     #[test]
     fn two_threads_need_two_processors() {
-        for (realtime, io, permitted, rating) in [
-            (None, None, "0", Rating::Bad),
-            (None, None, "0,5", Rating::Fair),
-            (Some(1), Some(0), "0-1", Rating::Fair),
-            (Some(1), Some(2), "0-3", Rating::Good),
-            (Some(1), Some(1), "0-3", Rating::Bad),
+        for (realtime, io, permitted, assessment) in [
+            (None, None, "0", Assessment::Bad),
+            (None, None, "0,5", Assessment::Fair),
+            (Some(1), Some(0), "0-1", Assessment::Fair),
+            (Some(1), Some(2), "0-3", Assessment::Good),
+            (Some(1), Some(1), "0-3", Assessment::Bad),
         ] {
             let fact = count(&chosen(realtime, io, permitted));
-            assert_eq!(fact.rating, rating, "{fact:?}");
+            assert_eq!(fact.assessment, assessment, "{fact:?}");
         }
     }
 
@@ -175,19 +167,24 @@ pub mod tests {
         let ticks = "sys/devices/system/cpu/nohz_full";
         let line = "proc/cmdline";
         let (mine, any) = (chosen(Some(3), None, "0-3"), chosen(None, None, "0-3"));
-        for (files, chosen, rating, words) in [
-            (vec![(isolated, "")], &any, Rating::Fair, "isolated: none"),
-            (vec![(isolated, "2-3")], &any, Rating::Fair, "isolated: 2-3"),
-            (vec![(isolated, "")], &mine, Rating::Fair, "shared with everything"),
-            (vec![(isolated, "2")], &mine, Rating::Fair, "shared with everything"),
-            (vec![(isolated, "2-3")], &mine, Rating::Fair, "ticking and with RCU"),
-            (vec![(isolated, "3"), (ticks, "(null)"), (line, "rcu_nocbs=3")], &mine, Rating::Fair, "ticking"),
-            (vec![(isolated, "3"), (ticks, "1-3")], &mine, Rating::Good, "without ticks"),
-            (vec![(isolated, "three")], &mine, Rating::Unknown, "no list of CPUs"),
-            (vec![], &mine, Rating::Unknown, "there is no /sys/devices"),
+        for (files, chosen, assessment, words) in [
+            (vec![(isolated, "")], &any, Assessment::Fair, "isolated: none"),
+            (vec![(isolated, "2-3")], &any, Assessment::Fair, "isolated: 2-3"),
+            (vec![(isolated, "")], &mine, Assessment::Fair, "shared with everything"),
+            (vec![(isolated, "2")], &mine, Assessment::Fair, "shared with everything"),
+            (vec![(isolated, "2-3")], &mine, Assessment::Fair, "ticking and with RCU"),
+            (
+                vec![(isolated, "3"), (ticks, "(null)"), (line, "rcu_nocbs=3")],
+                &mine,
+                Assessment::Fair,
+                "ticking",
+            ),
+            (vec![(isolated, "3"), (ticks, "1-3")], &mine, Assessment::Good, "without ticks"),
+            (vec![(isolated, "three")], &mine, Assessment::Unknown, "no list of CPUs"),
+            (vec![], &mine, Assessment::Unknown, "there is no /sys/devices"),
         ] {
-            let fact = isolation(&host(&files).files, chosen);
-            assert_eq!(fact.rating, rating, "{files:?}: {fact:?}");
+            let fact = examined(isolation(&host(&files).files, chosen));
+            assert_eq!(fact.assessment, assessment, "{files:?}: {fact:?}");
             assert!(fact.found.contains(words), "{fact:?}");
         }
     }
@@ -197,17 +194,17 @@ pub mod tests {
         let list = "sys/devices/system/cpu/cpu1/topology/thread_siblings_list";
         let active = "sys/devices/system/cpu/smt/active";
         let (mine, any) = (chosen(Some(1), None, "0-3"), chosen(None, None, "0-3"));
-        for (files, chosen, rating) in [
-            (vec![(list, "1")], &mine, Rating::Good),
-            (vec![(list, "1,3")], &mine, Rating::Fair),
-            (vec![], &mine, Rating::Unknown),
-            (vec![(active, "0")], &any, Rating::Good),
-            (vec![(active, "1")], &any, Rating::Fair),
-            (vec![], &any, Rating::Unknown),
+        for (files, chosen, assessment) in [
+            (vec![(list, "1")], &mine, Assessment::Good),
+            (vec![(list, "1,3")], &mine, Assessment::Fair),
+            (vec![], &mine, Assessment::Unknown),
+            (vec![(active, "0")], &any, Assessment::Good),
+            (vec![(active, "1")], &any, Assessment::Fair),
+            (vec![], &any, Assessment::Unknown),
         ] {
-            assert_eq!(siblings(&host(&files).files, chosen).rating, rating, "{files:?}");
+            assert_eq!(examined(siblings(&host(&files).files, chosen)).assessment, assessment, "{files:?}");
         }
-        let fact = siblings(&host(&[(list, "1,3")]).files, &mine);
+        let fact = examined(siblings(&host(&[(list, "1,3")]).files, &mine));
         assert_eq!(fact.remedy.unwrap(), "echo 0 > /sys/devices/system/cpu/cpu3/online");
     }
 
@@ -217,14 +214,14 @@ pub mod tests {
         let elsewhere = ("proc/irq/24/effective_affinity_list", "0");
         let here = ("proc/irq/25/smp_affinity_list", "0-1");
         let balance = ("proc/77/comm", "irqbalance");
-        for (files, rating, words) in [
-            (vec![elsewhere], Rating::Good, "none of 1 on CPU 1"),
-            (vec![elsewhere, here], Rating::Fair, "1 of 2 may hit CPU 1"),
-            (vec![elsewhere, balance], Rating::Fair, "irqbalance moves them"),
-            (vec![], Rating::Unknown, "nothing in /proc/irq"),
+        for (files, assessment, words) in [
+            (vec![elsewhere], Assessment::Good, "none of 1 on CPU 1"),
+            (vec![elsewhere, here], Assessment::Fair, "1 of 2 may hit CPU 1"),
+            (vec![elsewhere, balance], Assessment::Fair, "irqbalance moves them"),
+            (vec![], Assessment::Unknown, "nothing in /proc/irq"),
         ] {
             let fact = interrupts(&host(&files).files, &mine).unwrap();
-            assert_eq!(fact.rating, rating, "{fact:?}");
+            assert_eq!(fact.assessment, assessment, "{fact:?}");
             assert!(fact.found.contains(words), "{fact:?}");
         }
         assert_eq!(interrupts(&host(&[here]).files, &chosen(None, None, "0-1")), None);

@@ -1,11 +1,13 @@
-//! `hexad check`: what a machine file means, in numbers an engineer can compare with the drawing.
+//! `hexad check`: the machine of a file at home, in numbers that an engineer can compare with the drawing.
 
 use core::fmt;
+use std::path::PathBuf;
 
 use crate::analysis::assembly_modes::{OtherMode, other_modes};
+use crate::commands::arguments::MachineFile;
+use crate::commands::failure::Failure;
 use crate::config::Config;
 use crate::config::control_loops::loops;
-use crate::control::leg_masses::LegMasses;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
@@ -13,19 +15,43 @@ use crate::model::inverse_jacobian::condition;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
+use crate::output::files::print;
+use crate::output::text_table::{Right, text_table};
 
-/// The machine at its home pose.
+mod drawing;
+
+#[derive(Debug, clap::Args)]
+pub struct CheckArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    /// Draw the machine at home (SVG): from above, from the side, in perspective, with numbered joints
+    #[arg(long, value_name = "FILE")]
+    drawing: Option<PathBuf>,
+}
+
+impl CheckArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let config = self.machine.load()?;
+        // First the figures: they are of use where no file can be written.
+        print(Check::new(&config))?;
+        let Some(path) = self.drawing else { return Ok(()) };
+        drawing::write_svg(&path, &config.name, &config.machine)?;
+        Ok(print(format_args!("drawing of the machine at home: {}\n", path.display()))?)
+    }
+}
+
+/// Lengths, forces, conditioning and control loops of a machine at its home pose; displays as text.
 pub struct Check<'a> {
     config: &'a Config,
     lengths: [f64; LEGS],
-    /// Static forces; none at a singular pose.
+    /// Static forces \[N\]; none at a singular pose.
     forces: Option<[f64; LEGS]>,
     /// Angle between each leg and the first axis of its universal joint \[deg\].
     joint_angles: [f64; LEGS],
     condition: f64,
-    /// How far one measurement may be from the next for its pose to be certain \[rad\], \[radius\].
+    /// Largest motion from one measurement to the next for which the pose is certain \[rad\], \[radius\].
     trusted_step: f64,
-    /// OtherMode poses with the same lengths, the nearest first.
+    /// Other poses with the same lengths, the nearest first.
     others: Vec<OtherMode>,
 }
 
@@ -59,20 +85,21 @@ impl fmt::Display for Check<'_> {
         let Config { name, machine, .. } = self.config;
         let actuator = &machine.actuator;
         writeln!(f, "{name}: valid. At home, at rest:\n")?;
-        writeln!(f, "leg   length      to shortest  to longest   force        of the limit  to joint axis")?;
         let forces = self.forces.unwrap_or([f64::NAN; LEGS]);
-        for (leg, ((length, force), angle)) in
-            self.lengths.iter().zip(forces).zip(self.joint_angles).enumerate()
-        {
-            writeln!(
-                f,
-                "{:>3}   {length:>7.4} m   {:>7.4} m    {:>7.4} m   {force:>9.2} N   {:>7.1} %     {angle:>7.1} deg",
-                leg + 1,
-                length - actuator.min_length,
-                actuator.max_length - length,
-                100.0 * force.abs() / actuator.max_force,
-            )?;
-        }
+        let legs = self.lengths.iter().zip(forces).zip(self.joint_angles).enumerate();
+        let header = ["leg", "length", "to shortest", "to longest", "force", "of the limit", "to joint axis"];
+        let rows = legs.map(|(leg, ((length, force), angle))| {
+            [
+                format!("{}", leg + 1),
+                format!("{length:.4} m"),
+                format!("{:.4} m", length - actuator.min_length),
+                format!("{:.4} m", actuator.max_length - length),
+                format!("{force:.2} N"),
+                format!("{:.1} %", 100.0 * force.abs() / actuator.max_force),
+                format!("{angle:.1} deg"),
+            ]
+        });
+        write!(f, "{}", text_table(2, &header.map(|name| (name, Right)), rows))?;
         writeln!(f, "\ncondition of the Jacobian  {:.2}   (1 is best; errors grow with it)", self.condition)?;
         self.fmt_modes(f)?;
         self.fmt_loops(f)
@@ -80,27 +107,26 @@ impl fmt::Display for Check<'_> {
 }
 
 impl Check<'_> {
-    /// How far the loops are from unstable.
+    /// Writes the stability margins of the control loops.
     fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Config { machine, deployment, .. } = self.config;
-        let control = &deployment.control;
+        let control = &self.config.deployment.control;
         let observed = if control.observer_bandwidth_hz > 0.0 {
             format!(", with an observer of {} Hz", control.observer_bandwidth_hz)
         } else {
             String::new()
         };
         writeln!(f, "control mode {}{observed}", control.mode.name())?;
-        let legs = LegMasses::at_home(machine);
         if control.mode.acts_on_legs() {
+            let legs = &control.leg_masses;
             let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
             writeln!(
                 f,
-                "legs         together they move like one of {:.2} to {:.2} Hz",
+                "legs         coupled, they move with {:.2} to {:.2} Hz",
                 root(legs.softest),
                 root(legs.stiffest)
             )?;
         }
-        for control_loop in loops(self.config, &legs) {
+        for control_loop in loops(self.config) {
             writeln!(f, "{control_loop}")?;
             if let Some(warning) = control_loop.warning() {
                 writeln!(f, "WARNING: {warning}")?;
@@ -109,7 +135,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// What start-up and the loop can be certain of.
+    /// Writes within which bounds start-up and the loop know the pose.
     fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Config { machine, deployment, .. } = self.config;
         let step_m = self.trusted_step * machine.joints.radius;
@@ -131,7 +157,7 @@ impl Check<'_> {
         if nearest.is_nearby() {
             writeln!(
                 f,
-                "WARNING: at start-up lengths alone may not tell it from home; move home away from it"
+                "WARNING: at start-up the lengths alone may not distinguish it from home; choose a home further away from it"
             )?;
         }
         Ok(())

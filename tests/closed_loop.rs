@@ -2,17 +2,19 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod built_in;
-#[path = "../common/mod.rs"]
 mod common;
-mod evidence;
-mod fidelities;
-mod inputs;
-mod limits;
-mod modes;
-mod observer;
-mod poses;
-mod replay;
-#[path = "../common/rig.rs"]
-mod rig;
-mod tracking;
+
+mod closed_loop {
+    use super::*;
+
+    mod built_in;
+    mod evidence;
+    mod fidelities;
+    mod inputs;
+    mod limits;
+    mod modes;
+    mod observer;
+    mod poses;
+    mod replay;
+    mod tracking;
+}

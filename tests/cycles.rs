@@ -6,8 +6,15 @@
 
 #![allow(clippy::expect_used, clippy::unreachable, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod external;
-mod oracle;
-mod policies;
-mod real_clock;
-mod rig;
+mod common;
+
+mod cycles {
+    use super::*;
+
+    mod external;
+    mod oracle;
+    mod policies;
+    mod real_clock;
+    mod rig;
+    mod rights;
+}

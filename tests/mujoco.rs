@@ -3,13 +3,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
-mod in_the_loop;
-mod layouts;
-mod python;
-#[path = "../processes/support/stalls.rs"]
-mod stalls;
+
+mod mujoco {
+    use super::*;
+
+    mod in_the_loop;
+    mod layouts;
+    pub mod python;
+}
 
 use std::ffi::OsStr;
 use std::fs;
@@ -23,9 +25,10 @@ use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;
+use mujoco::python;
 use nalgebra::Vector3;
 
-use self::common::{Errors, MACHINES, Table, data, largest, machine, motions};
+use common::{Errors, MACHINES, Table, data, largest, machine, motions};
 
 /// The machines that come with hexad.
 const DEPLOYED: [&str; 3] = ["fried2008", "motion_base", "tsai2000"];
@@ -90,6 +93,9 @@ fn without_dry_friction(mut machine: Machine) -> Machine {
 
 #[test]
 fn mujoco_computes_the_same_forces_from_the_mjcf() {
+    if python::is_lacking() {
+        return;
+    }
     for name in MACHINES {
         let found = forces_by_mujoco(name, "mjcf", &exported(name, "mjcf"));
         let errors = differences(&without_dry_friction(machine(name)), &motions(name), &found);
@@ -100,6 +106,9 @@ fn mujoco_computes_the_same_forces_from_the_mjcf() {
 /// URDF has no gravity (MuJoCo takes its own), no reflected mass, and inertias as at home.
 #[test]
 fn mujoco_computes_the_same_forces_from_the_urdf() {
+    if python::is_lacking() {
+        return;
+    }
     for name in MACHINES {
         let mut machine = without_dry_friction(machine(name));
         let home = TaskState::at_rest(machine.home).motion().pose;
@@ -119,6 +128,9 @@ fn mujoco_computes_the_same_forces_from_the_urdf() {
 /// what is allowed above.
 #[test]
 fn mujoco_sees_what_is_wrong_in_a_model() {
+    if python::is_lacking() {
+        return;
+    }
     let name = "motion_base";
     let right = exported(name, "mjcf");
     let wrong = [
@@ -163,6 +175,9 @@ fn poses(machine: &Machine) -> Vec<[f64; 6]> {
 
 #[test]
 fn mujoco_holds_the_machine_with_the_same_forces() {
+    if python::is_lacking() {
+        return;
+    }
     for name in DEPLOYED {
         let machine = machine(name);
         let [model, input, output] =

@@ -3,17 +3,21 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod brakes;
-#[path = "../common/mod.rs"]
 mod common;
-mod dynamics;
-mod elastic;
-mod energy;
-mod friction;
-mod hardware;
-mod imperfect;
-mod integration;
-mod power;
+
+mod plant {
+    use super::*;
+
+    mod brakes;
+    mod dynamics;
+    mod elastic;
+    mod energy;
+    mod friction;
+    mod hardware;
+    mod imperfect;
+    mod integration;
+    mod power;
+}
 
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
@@ -69,7 +73,7 @@ fn holding(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     inverse_dynamics::<Exact>(machine, &motion).unwrap()
 }
 
-/// DriveStates that only push.
+/// Drives that only push.
 fn without_drives(mut machine: Machine) -> Machine {
     let actuator = &mut machine.actuator;
     (actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction) = (0.0, 0.0, 0.0);

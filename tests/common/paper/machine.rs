@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 use toml::{Table, Value};
 
-use super::common::data;
+use crate::common::data;
 
 #[derive(Clone)]
 pub struct Body {

@@ -4,15 +4,19 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
-mod dynamics;
-mod invariance;
-mod kinematics;
-mod layouts;
-mod regressor;
-mod rotations;
-mod stances;
+
+mod properties {
+    use super::*;
+
+    mod dynamics;
+    mod invariance;
+    mod kinematics;
+    mod layouts;
+    mod regressor;
+    mod rotations;
+    mod stances;
+}
 
 use std::sync::LazyLock;
 

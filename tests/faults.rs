@@ -3,14 +3,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
-mod disturbances;
-mod pictures;
-mod recording;
-#[path = "../common/rig.rs"]
-mod rig;
-mod scenarios;
-mod situations;
-mod table;
-mod world;
+
+mod faults {
+    use super::*;
+
+    mod disturbances;
+    mod pictures;
+    mod recording;
+    mod scenarios;
+    mod situations;
+    mod table;
+    mod world;
+}

@@ -244,7 +244,7 @@ fn whole(pixel: &Pixel) -> (i32, i32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::demo::DEFAULT_MACHINE;
+    use crate::commands::arguments::DEFAULT_CONFIG;
     use crate::config::Config;
 
     #[test]
@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn every_joint_has_its_number_in_every_view() {
-        let machine = Config::parse(DEFAULT_MACHINE, "test").unwrap().machine;
+        let machine = Config::parse(DEFAULT_CONFIG, "test").unwrap().machine;
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("machine.svg");
         write_svg(&path, "test", &machine).unwrap();

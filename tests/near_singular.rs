@@ -3,10 +3,14 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
-mod reference;
-mod scenes;
+
+mod near_singular {
+    use super::*;
+
+    pub mod reference;
+    pub mod scenes;
+}
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,7 +20,8 @@ use hexad::model::inverse_jacobian::{leg_wrenches, twist_from_rates};
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Pose;
 use nalgebra::{Matrix3, Vector6};
-use scenes::{Scene, scenes};
+use near_singular::reference;
+use near_singular::scenes::{Scene, scenes};
 
 /// What the errors may be, over those of partial pivoting.
 const WORST_RATIO: f64 = 2.0;

@@ -3,12 +3,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
-mod forward;
-mod inverse;
-mod refusals;
-mod unsolved;
+
+mod vectors {
+    use super::*;
+
+    mod forward;
+    mod inverse;
+    mod refusals;
+    mod unsolved;
+}
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -47,15 +47,14 @@
     reason = "a test helper that fails is a failed test; indices count legs, links and axes"
 )]
 
-mod agreement;
-#[path = "../common/mod.rs"]
 mod common;
-mod dense;
-mod errata;
-mod force;
-mod form;
-mod kinematics;
-mod last_term;
-mod machine;
-mod power;
-mod vectors;
+
+mod paper {
+    use super::*;
+
+    mod agreement;
+    mod errata;
+    mod last_term;
+    mod power;
+    mod vectors;
+}

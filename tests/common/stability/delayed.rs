@@ -147,6 +147,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             &config.machine,
             ControlMode::ComputedTorque,
             [gains; 2],
+            config.deployment.control.leg_masses,
             observer * wn,
             &parameters.limits,
         ),

@@ -2,10 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
-mod every_transition;
-mod oracle;
-#[path = "../common/rig.rs"]
-mod rig;
-mod sequences;
+
+mod states {
+    use super::*;
+
+    mod every_transition;
+    mod oracle;
+    mod sequences;
+}

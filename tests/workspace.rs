@@ -2,11 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod command;
-#[path = "../common/mod.rs"]
 mod common;
-mod forces;
-mod regions;
+
+mod workspace {
+    use super::*;
+
+    mod command;
+    mod forces;
+    mod regions;
+}
 
 use hexad::analysis::envelope::MotionEnvelope;
 use hexad::model::machine::Machine;

@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-#[path = "../common/mod.rs"]
 mod common;
 
-mod advise;
-mod dense;
-mod envelope;
-mod scenes;
+mod fidelity {
+    use super::*;
+
+    mod advise;
+    mod dense;
+    mod envelope;
+    mod scenes;
+}

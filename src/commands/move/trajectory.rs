@@ -1,0 +1,176 @@
+//! Trajectory of a setpoint source: a built-in motion, or the rows of a file.
+
+use std::path::Path;
+
+use tracing::info;
+
+use super::SetpointError;
+use super::precheck::Precheck;
+use crate::analysis::sampled_loop::boundary;
+use crate::commands::offline_tables::{read_trajectory, task_state, time};
+use crate::config::Config;
+use crate::model::task::TaskState;
+use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
+use crate::motion::trajectory::{Knot, interpolate};
+use crate::output::csv_table::{NumberTable, TableError, TableErrors};
+use crate::output::numbers::percent;
+
+/// Largest X' and X'' at the ends of a trajectory that count as at rest, per second.
+const MAX_REST_RATE: f64 = 1e-3;
+
+/// Least time from one row of a trajectory to the next \[s\], far below the period of any loop. Between
+/// rows that are nearer, X'' has no digits.
+const MIN_STEP_S: f64 = 1e-6;
+
+/// Least amplitude of a built-in motion, as a share of its usual one; a smaller motion is invisible.
+pub(super) const MIN_AMPLITUDE_SHARE: f64 = 1e-3;
+
+/// Length of the spans in which the precheck looks at a built-in motion \[s\]; in these it misses nothing at 1 kHz.
+const PRECHECK_SPAN_S: f64 = 0.1;
+
+/// Largest number of such spans. The precheck of a day then looks every 43 ms, in which the fastest sine changes by a
+/// hundredth.
+const MAX_PRECHECK_SPANS: f64 = 20_000.0;
+
+/// X, X', X'' as a function of time, from rest to rest.
+#[derive(Clone, Debug)]
+pub enum Trajectory {
+    BuiltIn(FittedMotion),
+    Knots(Vec<Knot>),
+}
+
+impl Trajectory {
+    /// A built-in motion, as large as the machine can carry and the daemon accepts.
+    pub fn built_in(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<Self, SetpointError> {
+        let precheck = Precheck::new(config).with_reserve();
+        let largest = fit(&config.machine, motion, seconds);
+        let spans = (seconds / PRECHECK_SPAN_S).ceil().clamp(1.0, MAX_PRECHECK_SPANS) as u32;
+        let refusal = |scene: &FittedMotion| precheck.first_refusal(|t| scene.at(t), seconds, spans);
+        let Some(too_large) = refusal(&largest) else { return Ok(Self::BuiltIn(largest)) };
+        let smallest = largest.smaller(MIN_AMPLITUDE_SHARE / largest.angle_share);
+        if let Some(refusal) = refusal(&smallest) {
+            return Err(SetpointError::TooSmall { motion, seconds, refusal });
+        }
+        let share = boundary(1.0, |share| refusal(&largest.smaller(share)).is_none());
+        info!(
+            "{} with {} of the amplitude that the drives carry: with more, at {too_large}",
+            motion.name(),
+            percent(share)
+        );
+        Ok(Self::BuiltIn(largest.smaller(share)))
+    }
+
+    /// A trajectory from a CSV file, which must begin and end at rest, have times that increase, and be accepted by the
+    /// daemon.
+    pub fn from_file(config: &Config, path: &Path) -> Result<Self, SetpointError> {
+        let table = read_trajectory(path)?;
+        let trajectory = Self::from_rows(&table, path)?;
+        trajectory.check(config, &table, path)?;
+        Ok(trajectory)
+    }
+
+    /// Reports each row on the way to which the daemon would refuse a setpoint.
+    fn check(&self, config: &Config, table: &NumberTable, path: &Path) -> Result<(), TableError> {
+        let precheck = Precheck::new(config);
+        let times = table.rows().iter().map(|row| time(row));
+        let first = times.clone().next().unwrap_or_default();
+        let mut errors = TableErrors::new(path);
+        // The first row has none before it: the span from it to itself.
+        let starts = times.clone().take(1).chain(times.clone());
+        for ((start, end), line) in starts.zip(times).zip(table.lines()) {
+            if let Some(refusal) = precheck.refusal(|t| self.at(t - first), [start, end]) {
+                errors.add(format!("line {line}: on the way to it, at {refusal}"));
+            }
+        }
+        errors.into_result()
+    }
+
+    /// A trajectory from a table with its columns; error texts name it `path`.
+    pub fn from_rows(table: &NumberTable, path: &Path) -> Result<Self, SetpointError> {
+        let mut errors = TableErrors::new(path);
+        let knots: Vec<_> =
+            table.rows().iter().map(|row| Knot { t: time(row), state: task_state(row) }).collect();
+        let rows = || knots.iter().zip(table.lines());
+        for ((before, _), (after, line)) in rows().zip(rows().skip(1)) {
+            if !(after.t - before.t >= MIN_STEP_S) {
+                errors.add(format!(
+                    "line {line}: t = {:?} after t = {:?}: must increase, by at least {MIN_STEP_S:?}",
+                    after.t, before.t
+                ));
+            }
+        }
+        for (end, row) in [("first", rows().next()), ("last", rows().next_back())] {
+            let Some((Knot { state, .. }, line)) = row else { continue };
+            for (quantity, largest) in [("rate", state.xd.amax()), ("acceleration", state.xdd.amax())] {
+                if largest > MAX_REST_RATE {
+                    errors.add(format!(
+                        "line {line}: {end} row: {quantity} {largest:?}: must be at rest, at most {MAX_REST_RATE:?}"
+                    ));
+                }
+            }
+        }
+        errors.into_result()?;
+        Ok(Self::Knots(knots))
+    }
+
+    /// Duration \[s\].
+    pub fn duration(&self) -> f64 {
+        match self {
+            Self::BuiltIn(scene) => scene.duration,
+            Self::Knots(knots) => knots.last().map_or(0.0, |b| b.t) - knots.first().map_or(0.0, |a| a.t),
+        }
+    }
+
+    /// X, X', X'' at `t`, within the duration.
+    pub fn at(&self, t: f64) -> TaskState {
+        match self {
+            Self::BuiltIn(scene) => scene.at(t),
+            Self::Knots(knots) => {
+                interpolate(knots, knots.first().map_or(0.0, |first| first.t) + t).unwrap_or_default()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::csv_table::trajectory_columns;
+
+    /// A row at rest with these t and x.
+    fn row(t: &str, x: &str) -> String {
+        format!("{t},0,0,0,{x},0,0{}\n", ",0".repeat(12))
+    }
+
+    fn read(rows: &[String]) -> Result<Trajectory, SetpointError> {
+        let text = trajectory_columns().join(",") + "\n" + &rows.concat();
+        let path = Path::new("x.csv");
+        let table = NumberTable::from_reader(text.as_bytes(), path, &trajectory_columns(), &[]).unwrap();
+        Trajectory::from_rows(&table, path)
+    }
+
+    #[test]
+    fn rows_that_are_too_near_are_refused_each_with_its_line() {
+        let rows = [row("0", "1"), row("1e-300", "2"), row("0.5", "2"), row("0.5", "1")];
+        assert_eq!(
+            read(&rows).unwrap_err().to_string(),
+            "x.csv: line 3: t = 1e-300 after t = 0.0: must increase, by at least 1e-6\n\
+             x.csv: line 5: t = 0.5 after t = 0.5: must increase, by at least 1e-6"
+        );
+    }
+
+    #[test]
+    fn a_refusal_of_many_rows_is_short() {
+        let message = read(&vec![row("0", "1"); 1000]).unwrap_err().to_string();
+        assert_eq!(message.lines().count(), 21);
+        assert!(message.ends_with("\nx.csv: and 979 more"), "{message}");
+    }
+
+    #[test]
+    fn the_largest_numbers_still_make_setpoints() {
+        let trajectory = read(&[row("-1e12", "1e12"), row("0", "-1e12"), row("1e-6", "1e12")]).unwrap();
+        for t in [0.0, 0.5e12, 1e12, trajectory.duration()] {
+            assert!(trajectory.at(t).is_finite(), "{t}");
+        }
+    }
+}

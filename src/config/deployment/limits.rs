@@ -1,0 +1,65 @@
+//! `[limits]`: limits of motions and forces.
+
+use crate::config::bound::Bound;
+use crate::config::machine::rounded;
+use crate::config::reader::SectionReader;
+use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
+
+/// Time from no force to the largest at the default force rate \[s\]: slower than any noise
+/// worth following, faster than any motion.
+const FORCE_RISE_S: f64 = 0.01;
+/// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
+/// a load needs leg forces of up to a hundred times its size.
+const DEFAULT_CONDITION: f64 = 100.0;
+
+/// Section `[limits]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeploymentLimits {
+    /// Limits of setpoints and of autonomous motions of the daemon.
+    pub reference: ReferenceLimits,
+    /// Largest change of a force.
+    pub force_rate_n_s: f64,
+    /// Largest Frobenius condition of the legs' wrenches under control.
+    pub condition: f64,
+}
+
+/// Reads the section. The defaults are motions that a standing person tolerates: half of gravity, a tenth of a second to
+/// build it up. Autonomous motions use a fifth of them.
+pub(super) fn read(mut section: SectionReader, machine: &Machine) -> DeploymentLimits {
+    let mut positive = |key, default| section.number_or(key, default, Bound::Positive);
+    let position = AxisLimits {
+        velocity: positive("velocity_m_s", 1.0),
+        acceleration: positive("acceleration_m_s2", 5.0),
+        jerk: positive("jerk_m_s3", 500.0),
+    };
+    let orientation = AxisLimits {
+        velocity: positive("velocity_rad_s", 2.0),
+        acceleration: positive("acceleration_rad_s2", 20.0),
+        jerk: positive("jerk_rad_s3", 2000.0),
+    };
+    let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
+    let force_rate_n_s =
+        section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
+    let condition = condition(&mut section, machine);
+    section.finish();
+    DeploymentLimits {
+        reference: ReferenceLimits { position, orientation, autonomous_scale },
+        force_rate_n_s,
+        condition,
+    }
+}
+
+/// Largest condition. The default leaves room around a home that is badly conditioned; home must keep the limit.
+fn condition(section: &mut SectionReader, machine: &Machine) -> f64 {
+    let home = TaskState::at_rest(machine.home).motion().pose;
+    let at_home = KinematicState::new(machine, home).sensitivity().condition;
+    let limit = section.number_or("condition", DEFAULT_CONDITION.max(2.0 * at_home), Bound::Positive);
+    if limit < at_home {
+        let bound = format!("must be at least {} (that of home)", rounded(at_home));
+        section.reject("condition", bound);
+    }
+    limit
+}
