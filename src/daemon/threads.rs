@@ -64,11 +64,7 @@ pub(super) fn run(
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
     let machine = &config.machine;
-    let parameters = parameters(machine, &config.deployment, fidelity::fidelity(config));
-    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
-        warn!("{warning}");
-    }
-    let controller = Controller::new(machine, parameters);
+    let controller = controller(config);
     let (realtime_side, io_side) = exchange();
     let event = io_side.event.clone();
     let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
@@ -123,6 +119,16 @@ pub(super) fn run(
         let counts_csv = mem::take(&mut log.counts_csv);
         Ok((Report::new(config, &cyclic, &io, log), counts_csv))
     })
+}
+
+/// The controller of a configuration; logs a warning for each control loop near its stability limit.
+fn controller(config: &Config) -> Controller {
+    let machine = &config.machine;
+    let parameters = parameters(machine, &config.deployment, fidelity::fidelity(config));
+    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+        warn!("{warning}");
+    }
+    Controller::new(machine, parameters)
 }
 
 /// Links of the real-time thread to the other threads.

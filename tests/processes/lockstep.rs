@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use std::{env, thread};
 
-use hexad::commands::demo::children::PARENT;
+use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
 use hexad::messages::Bus;
@@ -52,7 +52,7 @@ impl Build {
             None => Command::new(&self.program),
         };
         line.arg(command).arg("--config").arg(&machine.file).args(more);
-        line.env(PARENT, std::process::id().to_string()).env_remove("HEXAD_LOG");
+        line.env(PARENT_VARIABLE, std::process::id().to_string()).env_remove("HEXAD_LOG");
         Hexad::spawn(machine, command, line)
     }
 
