@@ -9,8 +9,8 @@ use super::failure::Failure;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::limits::Limit;
 use crate::control::state::{Request, State};
-use crate::messages::layout::{Field, Kind, Layout};
-use crate::messages::{MESSAGES, SCHEMA};
+use crate::messages::MESSAGES;
+use crate::messages::layout::{Field, Kind, Layout, Topic};
 use crate::output::files::print;
 
 #[derive(Debug, Args)]
@@ -113,17 +113,18 @@ fn summary(layout: &Layout) -> String {
 fn c_header(f: &mut fmt::Formatter<'_>) -> fmt::Result {
     writeln!(f, "/* Messages of hexad, by `hexad messages --language c`. */")?;
     writeln!(f, "#ifndef HEXAD_MESSAGES_H\n#define HEXAD_MESSAGES_H\n")?;
-    writeln!(
-        f,
-        "#include <assert.h>\n#include <stdalign.h>\n#include <stddef.h>\n#include <stdint.h>\n\n#define HEXAD_SCHEMA {SCHEMA}u\n"
-    )?;
+    writeln!(f, "#include <assert.h>\n#include <stdalign.h>\n#include <stddef.h>\n#include <stdint.h>\n")?;
     for (prefix, name, number) in constants() {
         writeln!(f, "#define HEXAD_{prefix}_{name} {number}u")?;
     }
     for layout in structs() {
         let Layout { type_name, topic, size, align, .. } = layout;
-        let topic = topic.map_or(String::new(), |topic| format!(" Topic `{topic}`."));
-        writeln!(f, "\n/* {}{topic} */\nstruct {type_name} {{", summary(layout))?;
+        writeln!(f)?;
+        if let Some(Topic { name, schema }) = topic {
+            let prefix = type_name.to_uppercase();
+            writeln!(f, "#define {prefix}_TOPIC \"{name}\"\n#define {prefix}_SCHEMA {schema}u")?;
+        }
+        writeln!(f, "/* {} */\nstruct {type_name} {{", summary(layout))?;
         for field in layout.fields {
             let kind = match field.kind {
                 Kind::U32 => "uint32_t".into(),
@@ -149,9 +150,10 @@ fn c_header(f: &mut fmt::Formatter<'_>) -> fmt::Result {
 const PYTHON_BASE: &str = r#"
 
 class Message(ctypes.Structure):
-    """Base of all messages; `topic` is the last part of the topic's name."""
+    """Base of all messages; `topic` is the last part of the topic's name, `schema` the version."""
 
     topic = ""
+    schema = 0
 
     def is_intact(self):
         """Whether the checksum, if there is one, is the CRC-32 of the bytes before it."""
@@ -162,7 +164,6 @@ class Message(ctypes.Structure):
 fn python_module(f: &mut fmt::Formatter<'_>) -> fmt::Result {
     writeln!(f, "\"\"\"Messages of hexad, by `hexad messages --language python`.\"\"\"\n")?;
     writeln!(f, "import ctypes\nimport zlib\nfrom ctypes import c_double, c_uint32, c_uint64\n")?;
-    writeln!(f, "SCHEMA = {SCHEMA}\n")?;
     for (prefix, name, number) in constants() {
         writeln!(f, "{prefix}_{name} = {number}")?;
     }
@@ -170,8 +171,8 @@ fn python_module(f: &mut fmt::Formatter<'_>) -> fmt::Result {
     for layout in structs() {
         let base = if layout.topic.is_some() { "Message" } else { "ctypes.Structure" };
         writeln!(f, "\n\nclass {}({base}):\n    \"\"\"{}\"\"\"\n", class(layout), summary(layout))?;
-        if let Some(topic) = layout.topic {
-            writeln!(f, "    topic = \"{topic}\"")?;
+        if let Some(Topic { name, schema }) = layout.topic {
+            writeln!(f, "    topic = \"{name}\"\n    schema = {schema}")?;
         }
         writeln!(f, "    _fields_ = [")?;
         for field in layout.fields {
@@ -209,9 +210,10 @@ fn json_document() -> Value {
     let structs = structs().into_iter().map(|layout| {
         let Layout { type_name, topic, size, align, fields, .. } = layout;
         let fields: Vec<_> = fields.iter().map(field).collect();
-        json!({"name": type_name, "topic": topic, "size": size, "alignment": align, "meaning": summary(layout), "fields": fields})
+        let (topic, schema) = topic.map(|Topic { name, schema }| (name, schema)).unzip();
+        json!({"name": type_name, "topic": topic, "schema": schema, "size": size, "alignment": align, "meaning": summary(layout), "fields": fields})
     });
     let constants = constants().into_iter();
     let constants = constants.map(|(prefix, name, number)| (format!("{prefix}_{name}"), json!(number)));
-    json!({"schema": SCHEMA, "constants": Value::Object(constants.collect()), "structs": structs.collect::<Vec<_>>()})
+    json!({"constants": Value::Object(constants.collect()), "structs": structs.collect::<Vec<_>>()})
 }

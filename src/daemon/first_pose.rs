@@ -1,5 +1,5 @@
-//! Search for other poses near the first one that have the same leg lengths: only a person who looks at the platform can
-//! say which of them it is in.
+//! Search for other poses near the first one that have the same leg lengths: only a person at the platform can
+//! see which of them it is in.
 //!
 //! The search is made once, in a thread of its own, on one processor and for some tenths of a second. It covers the
 //! neighbourhood that `hexad check` covers around the home pose, here around the pose that was measured.

@@ -7,7 +7,7 @@ use crate::control::state::{OperatorRequest, Request};
 
 message! {
     /// Operator request, one per message.
-    CommandMessage = "hexad_command" on "command" {
+    CommandMessage = "hexad_command" on "command" schema 5 {
         header: super::Header,
         /// Number of the `Request`.
         request: u32,

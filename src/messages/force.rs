@@ -4,15 +4,15 @@ use core::mem::offset_of;
 
 use iceoryx2::prelude::ZeroCopySend;
 
+use super::Message as _;
 use super::layout::{Declared as _, message};
-use super::{Message as _, SCHEMA};
 use crate::control::controller::Output;
 
 message! {
     /// Actuator forces of one cycle. A driver brakes at a message that is not `valid`, and when its own watchdog has seen no
     /// applicable message for too long. A message is applicable only if schema and checksum are right, the sequence
     /// number increases and `time_ns` is neither in the future nor too old.
-    ForceMessage = "hexad_force" on "force" sealed by checksum {
+    ForceMessage = "hexad_force" on "force" schema 5 sealed by checksum {
         header: super::Header,
         /// Gamma; positive pushes the platform away from the base. Zero unless valid.
         force_n: [f64; 6] ["N"],
@@ -50,7 +50,7 @@ impl ForceMessage {
 
     /// Whether a driver may apply the forces, provided that the message is recent and newer than the one before.
     pub fn may_be_applied(&self) -> bool {
-        self.header.schema == SCHEMA
+        self.header.schema == Self::SCHEMA
             && self.is_intact()
             && self.valid == 1
             && self.force_n.iter().all(|force| force.is_finite())

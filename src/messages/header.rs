@@ -4,13 +4,10 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
 
-/// Version of every struct of the messages. Any change of layout or meaning raises it.
-pub const SCHEMA: u32 = 5;
-
 message! {
     /// First field of every message; the publisher fills it in.
     Header = "hexad_header" {
-        /// Version of the structs, `SCHEMA`.
+        /// Version of the message: of its fields and their meaning.
         schema: u32,
         /// Zero.
         reserved: u32,

@@ -8,12 +8,21 @@
 pub struct Layout {
     /// Name under which iceoryx2 identifies the type: `hexad_` and the rest in snake case.
     pub type_name: &'static str,
-    /// Last part of the topic's name; `None` for a struct that is part of a message.
-    pub topic: Option<&'static str>,
+    /// `None` for a struct that is part of a message.
+    pub topic: Option<Topic>,
     pub size: usize,
     pub align: usize,
     pub fields: &'static [Field],
     pub doc: &'static str,
+}
+
+/// Topic of a message.
+#[derive(Clone, Copy, Debug)]
+pub struct Topic {
+    /// Last part of the topic's name.
+    pub name: &'static str,
+    /// Version of the message.
+    pub schema: u32,
 }
 
 /// One field of a [`Layout`].
@@ -121,12 +130,12 @@ impl<T: FieldType, const N: usize> FieldType for [T; N] {
 
 /// Declares a `#[repr(C)]` struct: its fields with type, unit and meaning.
 ///
-/// `on "topic"` makes it a [`Message`](super::Message), whose first field is the header; `sealed by` names the field
-/// for the checksum of the fields before it. A struct with gaps between its fields does not compile.
+/// `on "topic" schema 1` makes it a [`Message`](super::Message), whose first field is the header; `sealed by` names the
+/// field for the checksum of the fields before it. A struct with gaps between its fields does not compile.
 macro_rules! message {
     (
         $(#[doc = $doc:literal])*
-        $name:ident = $type_name:tt $(on $topic:literal $(sealed by $checksum:ident)?)? {
+        $name:ident = $type_name:tt $(on $topic:literal schema $schema:literal $(sealed by $checksum:ident)?)? {
             $($(#[doc = $field_doc:literal])* $field:ident: $type:ty $([$unit:literal])?,)*
         }
     ) => {
@@ -155,7 +164,8 @@ macro_rules! message {
             const LAYOUT: $crate::messages::layout::Layout = $crate::messages::layout::Layout {
                 type_name: $type_name,
                 topic: {
-                    let topic: &[&'static str] = &[$($topic)?];
+                    let topic: &[$crate::messages::layout::Topic] =
+                        &[$($crate::messages::layout::Topic { name: $topic, schema: $schema })?];
                     topic.first().copied()
                 },
                 size: size_of::<Self>(),
@@ -174,6 +184,7 @@ macro_rules! message {
 
         $(impl $crate::messages::Message for $name {
             const TOPIC: &'static str = $topic;
+            const SCHEMA: u32 = $schema;
 
             fn header(&self) -> &$crate::messages::Header {
                 &self.header

@@ -1,8 +1,8 @@
 //! Messages on the topics `hexad/<name>/...` and the ports that publish and receive them: all that a driver needs.
 //!
 //! A message is a `#[repr(C)]` struct of plain numbers in SI units and radians. Each begins with a [`Header`]. iceoryx2
-//! compares only name, size and alignment of a type, so the header carries a schema version; a subscriber rejects
-//! messages of another one.
+//! compares only name, size and alignment of a type, so the header carries the schema version of the message; a
+//! subscriber rejects messages of another one.
 //!
 //! # In other languages
 //!
@@ -51,7 +51,7 @@ mod subscriber;
 pub use self::bus::{Bus, PortError};
 pub use self::command::CommandMessage;
 pub use self::force::ForceMessage;
-pub use self::header::{Header, SCHEMA};
+pub use self::header::Header;
 pub use self::measured::MeasuredMessage;
 pub use self::publisher::Publisher;
 pub use self::setpoint::SetpointMessage;
@@ -76,6 +76,9 @@ pub const MESSAGES: [&Layout; 5] = [
 pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
     /// Last part of the topic's name.
     const TOPIC: &'static str;
+
+    /// Version of the message. Any change of layout or meaning raises it, also of a struct that it contains.
+    const SCHEMA: u32;
 
     fn header(&self) -> &Header;
 

@@ -4,7 +4,7 @@ use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::prelude::ipc;
 
 use super::bus::{PortError, port_error};
-use super::{Header, Message, SCHEMA};
+use super::{Header, Message};
 
 /// Publisher of one topic, which numbers its messages.
 pub struct Publisher<T: Message> {
@@ -34,7 +34,7 @@ impl<T: Message> Publisher<T> {
         self.sequence += 1;
         let epoch = *self.epoch.get_or_insert(time_ns);
         *message.header_mut() =
-            Header { schema: SCHEMA, reserved: 0, epoch, sequence: self.sequence, time_ns };
+            Header { schema: T::SCHEMA, reserved: 0, epoch, sequence: self.sequence, time_ns };
         message.seal();
         let sample = self
             .port

@@ -8,7 +8,7 @@ use crate::model::task::TaskState;
 
 message! {
     /// Desired motion of the platform: X = alpha, beta, gamma, x, y, z and its derivatives.
-    SetpointMessage = "hexad_setpoint" on "setpoint" {
+    SetpointMessage = "hexad_setpoint" on "setpoint" schema 5 {
         header: super::Header,
         /// X.
         x: [f64; 6] ["rad, m"],

@@ -38,8 +38,8 @@ message! {
 }
 
 message! {
-    /// One of the worst cycles since start, ranked by wake-up and compute time together. The last four fields say what
-    /// happened in the 20 ms around it, observed from outside the real-time thread.
+    /// One of the worst cycles since start, ranked by wake-up and compute time together. The last three fields
+    /// cover the 20 ms around it, observed from outside the real-time thread.
     WorstCycle = "hexad_worst_cycle" {
         /// Number of the cycle, from 1; 0 beyond the end of the list.
         cycle: u64,

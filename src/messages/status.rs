@@ -25,7 +25,7 @@ message! {
 
 message! {
     /// State of the daemon, published every cycle.
-    StatusMessage = "hexad_status" on "status" {
+    StatusMessage = "hexad_status" on "status" schema 5 {
         header: super::Header,
         /// Number of the `State`.
         state: u32,

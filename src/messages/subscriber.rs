@@ -7,7 +7,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::bus::{BUFFER, MAX_PUBLISHERS};
 use super::clock::monotonic_ns;
-use super::{Message, RejectionCounts, SCHEMA};
+use super::{Message, RejectionCounts};
 
 /// Most messages that the buffers of all publishers hold: bounds the time of one call, however fast they publish.
 const MAX_PENDING: usize = MAX_PUBLISHERS * BUFFER;
@@ -50,7 +50,7 @@ impl<T: Message> Subscriber<T> {
     pub fn receive_from_any(&mut self) -> Option<T> {
         for _ in 0..MAX_PENDING {
             let message = self.receive_unchecked()?;
-            if message.header().schema == SCHEMA {
+            if message.header().schema == T::SCHEMA {
                 return Some(message);
             }
             self.rejected.schema += 1;
@@ -104,7 +104,7 @@ impl<T: Message> Subscriber<T> {
         // A life that begins in the future (another clock) would take precedence over all that begin later. In
         // simulated time it may begin at any instant.
         let has_begun = self.is_simulated || header.epoch <= monotonic_ns();
-        let count = if header.schema != SCHEMA {
+        let count = if header.schema != T::SCHEMA {
             &mut self.rejected.schema
         } else if !(message.is_intact() && has_begun) {
             &mut self.rejected.damaged

@@ -78,7 +78,7 @@ impl ReleaseMode {
     }
 }
 
-/// Input of a cycle, as far as the loop needs to know it.
+/// Input of a cycle: the part that the loop reads and writes.
 pub trait CyclicInput: Copy {
     /// Begins a cycle: its release instant \[ns\], and whether missed cycles are to be treated as a fault.
     fn begin_cycle(&mut self, release_ns: u64, deadline_missed: bool);
@@ -96,13 +96,13 @@ pub struct CycleRecord<I, O> {
     pub due_ns: u64,
     pub wakeup_ns: u64,
     pub compute_ns: u64,
-    /// The io thread had handed in nothing new since the last cycle.
+    /// The io thread wrote no new input since the last cycle.
     pub io_late: bool,
     pub input: I,
     pub output: O,
 }
 
-/// What the loop used and counted.
+/// Resources and counters of the loop over a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LoopReport {
     pub counters: LoopCounters,

@@ -17,7 +17,7 @@ import time
 import iceoryx2 as iox2
 
 import hexad_messages
-from hexad_messages import SCHEMA, Command, Header, Measured, Setpoint, Status
+from hexad_messages import Command, Header, Measured, Setpoint, Status
 
 # A force older than this is not applied [ns].
 FORCE_TIMEOUT_NS = 50_000_000
@@ -92,7 +92,7 @@ class Publisher:
     def publish(self, time_ns, message):
         """`time_ns` is the instant at which the content holds."""
         self.sequence += 1
-        message.header = Header(SCHEMA, 0, self.epoch, self.sequence, time_ns)
+        message.header = Header(message.schema, 0, self.epoch, self.sequence, time_ns)
         self.port.send_copy(message)
 
 
@@ -109,7 +109,7 @@ class Subscriber:
             header = message.header
             order = (header.epoch, header.sequence)
             has_begun = self.simulated or header.epoch <= monotonic_ns()
-            if header.schema == SCHEMA and has_begun and order > self.last and message.is_intact():
+            if header.schema == message.schema and has_begun and order > self.last and message.is_intact():
                 self.last = order
                 return message
         return None

@@ -16,7 +16,7 @@ COORDINATES = ["alpha", "beta", "gamma", "x", "y", "z"]
 
 
 def load(path):
-    """The model of an exported file. The loops of a URDF are closed here, as URDF cannot say it."""
+    """The model of an exported file. The loops of a URDF are closed here, as URDF cannot express it."""
     spec = mujoco.MjSpec.from_file(path)
     root = xml.parse(path).getroot()
     if root.tag == "robot":

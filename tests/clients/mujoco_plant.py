@@ -15,7 +15,7 @@ import sys
 from hexad import Bus, Force, Measured, use_fifo_priority, monotonic_ns, sleep_until
 from mujoco_machine import COORDINATES, LEGS, Machine, write_rows
 
-# Without an answer a measurement is said again: nobody may have been there [ns].
+# Without a response a measurement is repeated: a participant may not be connected yet [ns].
 REPEAT_NS = 100_000_000
 
 

@@ -4,7 +4,7 @@
 
 NAME is that of the configuration. The file has t [s] and X, X', X'' in rows `t, alpha..z, alpha_rate.., alpha_accel..`,
 at rest at both ends, its first pose where the platform stands. That pose is offered until the daemon follows it; then
-the trajectory is played once. --engage asks for control, as `hexad engage` does. With --lockstep it answers the
+the trajectory is played once. --engage requests control, as `hexad engage` does. With --lockstep it responds to the
 measurements of a plant in simulated time.
 """
 
@@ -88,7 +88,7 @@ def run_in_lockstep(bus, player, _period_ns, rows):
             os.sched_yield()
             continue
         time_ns = measured.header.time_ns
-        # A measurement that is said again has the same answer.
+        # A measurement that is repeated has the same response.
         if setpoint is None or time_ns != setpoint.header.time_ns:
             setpoint = player.setpoint(time_ns)
             if setpoint is None:

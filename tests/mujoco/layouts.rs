@@ -6,11 +6,12 @@ use std::process::Command;
 
 use crate::{file, python};
 use hexad::messages::layout::{Declared, Kind, Layout};
-use hexad::messages::{ForceMessage, Header, MESSAGES, SCHEMA, StatusMessage};
+use hexad::messages::{ForceMessage, Header, MESSAGES, StatusMessage};
 
 /// A line for each struct and one for each of its fields.
 fn lines(layout: &Layout, seen: &mut Vec<&'static str>) -> String {
-    let mut lines = format!("{} {} {}\n", layout.type_name, layout.size, layout.align);
+    let schema = layout.topic.map_or(0, |topic| topic.schema);
+    let mut lines = format!("{} {schema} {} {}\n", layout.type_name, layout.size, layout.align);
     let mut nested = String::new();
     for field in layout.fields {
         lines += &format!("  {} {}\n", field.name, field.offset);
@@ -31,10 +32,9 @@ fn all_lines() -> String {
 
 const PRINT: &str = "
 import ctypes, hexad_messages
-print(hexad_messages.SCHEMA)
 seen = []
 def show(struct):
-    print(struct.type_name(), ctypes.sizeof(struct), ctypes.alignment(struct))
+    print(struct.type_name(), struct.schema if hasattr(struct, 'topic') else 0, ctypes.sizeof(struct), ctypes.alignment(struct))
     nested = []
     for name, kind in struct._fields_:
         print(' ', name, getattr(struct, name).offset)
@@ -52,7 +52,7 @@ for name in ['Setpoint', 'Measured', 'Command', 'Force', 'Status']:
 
 #[test]
 fn python_sees_the_layouts_of_rust() {
-    assert_eq!(python::printed(PRINT), format!("{SCHEMA}\n{}", all_lines()));
+    assert_eq!(python::printed(PRINT), all_lines());
 }
 
 /// The header asserts every size and offset itself.
@@ -78,7 +78,8 @@ fn a_c_compiler_sees_the_layouts_of_rust() {
         structs > 10 && fields > 80 && asserted == 2 * structs + fields,
         "{asserted} assertions for:\n{ours}"
     );
-    assert!(!accepts("wrong.h", &header.replace("uint32_t limiting", "uint64_t limiting")));
+    let wrong = header.replace("uint32_t active_limits", "uint64_t active_limits");
+    assert!(wrong != header && !accepts("wrong.h", &wrong));
 }
 
 /// The list of fields says what the compiler does, here where a mistake would be seen least.
@@ -100,7 +101,7 @@ fn the_list_of_fields_is_that_of_the_structs() {
 const JUDGE: &str = "
 import hexad, zlib
 def judged(now_ns=1_000_000_000, **fields):
-    force = hexad.Force(hexad.Header(hexad.SCHEMA, 0, 7, 1, 1_000_000_000), valid=1, force_n=(1, 2, 3, 4, 5, 6))
+    force = hexad.Force(hexad.Header(hexad.Force.schema, 0, 7, 1, 1_000_000_000), valid=1, force_n=(1, 2, 3, 4, 5, 6))
     damaged = fields.pop('damaged', 0)
     for name, value in fields.items():
         setattr(force, name, value)

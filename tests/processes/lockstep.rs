@@ -10,7 +10,8 @@ use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
 use hexad::messages::Bus;
-use hexad::messages::{ForceMessage, Header, MeasuredMessage};
+use hexad::messages::layout::FieldType;
+use hexad::messages::{ForceMessage, MeasuredMessage};
 use hexad::realtime::setup::scheduling;
 
 use crate::support::children::{HANG, Hexad, hexad};
@@ -129,31 +130,12 @@ impl Build {
     }
 }
 
-/// As it is in memory. A field that is not here does not compile.
+/// As it is in memory.
 fn bytes(force: &ForceMessage) -> Vec<u8> {
-    let ForceMessage {
-        header,
-        force_n,
-        valid,
-        state,
-        diagnostic_code,
-        active_limits,
-        release_ns,
-        checksum,
-        reserved,
-    } = force;
-    let Header { schema, reserved: zero, epoch, sequence, time_ns } = header;
-    let words = |words: &[u32]| words.iter().flat_map(|word| word.to_ne_bytes()).collect::<Vec<_>>();
-    let longs = |longs: &[u64]| longs.iter().flat_map(|long| long.to_ne_bytes()).collect::<Vec<_>>();
-    [
-        words(&[*schema, *zero]),
-        longs(&[*epoch, *sequence, *time_ns]),
-        longs(&force_n.map(f64::to_bits)),
-        words(&[*valid, *state, *diagnostic_code, *active_limits]),
-        longs(&[*release_ns]),
-        words(&[*checksum, *reserved]),
-    ]
-    .concat()
+    let mut bytes = vec![];
+    force.visit(&mut |_, field| bytes.extend_from_slice(field));
+    assert_eq!(bytes.len(), size_of::<ForceMessage>());
+    bytes
 }
 
 /// Every byte of every message.

@@ -98,8 +98,8 @@ fn what_is_refused_is_refused_with_the_reason() {
     is_refused(&machine, "engage", &["--wait", "--within", "0.5"], words);
     let offered = Offered::start(&machine, 0.01);
     daemon.says("standby: setpoint too far from the platform");
-    let words =
-        "engage was refused: setpoint too far from the platform: 10.000 mm and 0.000 mrad away; start";
+    let words = "engage was refused: setpoint too far from the platform: the difference between setpoint and platform is 5 times \
+         the tolerance control.engage_*; start the setpoints where the platform stands (10.000 mm and 0.000 mrad away)";
     is_refused(&machine, "engage", &[], words);
     let waits = Hexad::start(&machine, "engage", &["--wait"]);
     let asked =

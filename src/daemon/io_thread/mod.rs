@@ -3,7 +3,7 @@
 //! It reads the newest messages a lead before the release and publishes when the output of the cycle appears; with
 //! external release it waits for measured messages and signals the real-time thread; in lock-step it waits for all
 //! participants. When a peer connects or disappears, the port calls here allocate and block for a moment; the real-time
-//! thread continues with data whose age it knows.
+//! thread continues with data of known age.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 

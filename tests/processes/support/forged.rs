@@ -23,6 +23,7 @@ struct Forged(ForceMessage);
 
 impl Message for Forged {
     const TOPIC: &'static str = ForceMessage::TOPIC;
+    const SCHEMA: u32 = ForceMessage::SCHEMA;
     fn header(&self) -> &Header {
         self.0.header()
     }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
-use hexad::messages::{ForceMessage, MeasuredMessage, Message, SCHEMA};
+use hexad::messages::{ForceMessage, MeasuredMessage, Message};
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
 use super::recorder::Recording;
@@ -61,7 +61,7 @@ fn forces_are_whole_and_in_order(recording: &Recording) {
         assert_eq!(force.checksum, force.computed_checksum(), "{force:#?}");
         assert_eq!(
             (force.header.schema, force.header.reserved, force.reserved),
-            (SCHEMA, 0, 0),
+            (ForceMessage::SCHEMA, 0, 0),
             "{force:#?}"
         );
     }
