@@ -29,7 +29,7 @@ impl fmt::Display for FaultTables {
             let text = paragraph("    ", &format!("{reaction}{}", code.remedy()), stdout_width());
             write!(f, "{:>3} {}\n{text}", *code as u32, code.name())?;
         }
-        writeln!(f, "\nbits of `limiting`")?;
+        writeln!(f, "\nbits of `active_limits`")?;
         let limits = Limit::ALL.map(|limit| [(limit as u32).to_string(), limit.name().into()]);
         write!(f, "{}", text_table(2, &[("bit", Right), ("limit", Left)], limits))
     }
