@@ -2,7 +2,7 @@
 
 use super::controller::{Cycle, Input};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
-use super::input_validation::SetpointInput;
+use super::input_validation::ValidatedSetpoint;
 use super::limits::{Limit, LimitSet};
 use super::localization::Localization;
 use super::parameters::Parameters;
@@ -15,7 +15,7 @@ use super::tracking_error::{ErrorSample, TrackingError};
 pub(super) fn assess(
     cycle: &Cycle<'_>,
     input: &Input,
-    setpoint: &SetpointInput<'_>,
+    setpoint: &ValidatedSetpoint<'_>,
     platform: Result<(), Diagnostic>,
     localization: &Localization,
     reference: &ReferenceGenerator,
@@ -24,7 +24,8 @@ pub(super) fn assess(
     let parameters = &cycle.constants.parameters;
     let error = sample.map(|sample| &sample.error);
     let (near_singular, conditioned) = localization.check_condition(parameters.condition);
-    let engagement = conditioned.and(setpoint.status).and_then(|()| check_distance(parameters, error));
+    let engagement =
+        conditioned.and(setpoint.status).and_then(|()| check_engage_tolerance(parameters, error));
     let (mut tracking, mut active_limits) = (Ok(()), near_singular);
     if cycle.state.has_control() {
         tracking = check_following_error(parameters, error, &mut active_limits)
@@ -35,12 +36,12 @@ pub(super) fn assess(
             });
     }
     let tracking = tracking.and(conditioned);
-    let has_arrived = reference.has_arrived(cycle.release_ns);
-    (Findings { localization: platform, engagement, tracking, has_arrived }, active_limits)
+    let has_ended = reference.has_ended(cycle.release_ns);
+    (Findings { localization: platform, engagement, tracking, has_ended }, active_limits)
 }
 
 /// Control may begin only where it is no motion by itself: near the setpoint in pose and velocity.
-fn check_distance(parameters: &Parameters, error: Option<&TrackingError>) -> Result<(), Diagnostic> {
+fn check_engage_tolerance(parameters: &Parameters, error: Option<&TrackingError>) -> Result<(), Diagnostic> {
     let Some(error) = error else { return Err(DiagnosticCode::NoSetpoint.into()) };
     let ratio = error.tolerance_ratio(parameters);
     if ratio <= 1.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0)) }

@@ -5,7 +5,7 @@
 
 use super::assessment::assess;
 use super::diagnostic::{Diagnostic, DiagnosticCode};
-use super::disturbance_observer::{Continuity, DisturbanceObserver};
+use super::disturbance_observer::{DisturbanceObserver, ObserverReset};
 use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
 use super::input_validation::{MeasurementValidator, SetpointValidator};
@@ -126,7 +126,7 @@ impl Controller {
         // Validate inputs.
         let measurement = measurements.validate(&cycle, input.measurement.as_ref());
         let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref());
-        let is_rebased = reference.rebase(&cycle, &setpoint);
+        let is_blended = reference.blend_after_gap(&cycle, &setpoint);
 
         // Locate platform.
         let located = measurement.and_then(|measurement| localization.locate(&cycle, measurement));
@@ -145,7 +145,7 @@ impl Controller {
         );
         let next = supervisor.decide(request, &findings, parameters.after_loss);
         if request.is_some_and(|new| new.request == Request::Clear) {
-            localization.clear(&constants.home);
+            localization.clear_assembly_mode_fault(&constants.home);
         }
 
         // Reference.
@@ -156,9 +156,9 @@ impl Controller {
 
         // Control law, forces, checks.
         let continuity = match cycle.state {
-            state if !state.has_control() => Continuity::Started,
-            state if is_rebased || next != state || limiter.is_limited => Continuity::Interrupted,
-            _ => Continuity::Continuous,
+            state if !state.has_control() => ObserverReset::All,
+            state if is_blended || next != state || limiter.is_limited => ObserverReset::Prediction,
+            _ => ObserverReset::Keep,
         };
         let mut actuate = || {
             let ErrorSample { error, deviation, .. } = sample.as_ref().ok_or(DiagnosticCode::SetpointLost)?;
@@ -167,7 +167,7 @@ impl Controller {
             let desired = reference.motion_at(parameters, setpoint.valid, middle_of_hold_ns);
             let desired = desired.ok_or(DiagnosticCode::SetpointLost)?;
             let acceleration = observer.update(&parameters.law, deviation, parameters.period_s(), continuity);
-            let motion = parameters.law.commanded_motion(desired, error, &acceleration);
+            let motion = parameters.law.dynamics_motion(desired, error, &acceleration);
             let force = forces(constants, &motion, &acceleration)?;
             limiter.limit(&cycle, &force, &motion)
         };

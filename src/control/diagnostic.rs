@@ -18,7 +18,7 @@ pub enum Reaction {
 
 /// Meaning of the number of a diagnostic and source of its bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Comparison {
+pub enum BoundDescription {
     /// The code has no number.
     None,
     /// A quantity in `unit`, one-sided: `relation` is "exceeds", two-sided: "is outside".
@@ -32,21 +32,21 @@ const fn absolute(
     unit: &'static str,
     relation: &'static str,
     bound: &'static str,
-) -> Comparison {
-    Comparison::Absolute { quantity, unit, relation, bound }
+) -> BoundDescription {
+    BoundDescription::Absolute { quantity, unit, relation, bound }
 }
 
-const fn ratio(quantity: &'static str, bound: &'static str) -> Comparison {
-    Comparison::Ratio { quantity, bound }
+const fn ratio(quantity: &'static str, bound: &'static str) -> BoundDescription {
+    BoundDescription::Ratio { quantity, bound }
 }
 
-const NO_NUMBER: Comparison = Comparison::None;
+const NO_NUMBER: BoundDescription = BoundDescription::None;
 
 /// Remedy of a code that asks nothing of the operator.
 const NO_REMEDY: &str = "nothing";
 
 /// Leg lengths and the stroke.
-const STROKE: Comparison = absolute(
+const STROKE: BoundDescription = absolute(
     "leg length",
     "m",
     "is outside",
@@ -92,7 +92,7 @@ macro_rules! codes {
             }
 
             /// The quantity that was compared, and the source of its bound.
-            pub fn comparison(self) -> Comparison {
+            pub fn comparison(self) -> BoundDescription {
                 match self { $(Self::$variant => $comparison,)* }
             }
 
@@ -123,7 +123,7 @@ codes! {
     /// The setpoint source ended while its setpoint was at rest.
     SetpointEnded = 5, None, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint source ended at rest", "start a setpoint source, then engage";
     /// The daemon is ending.
-    Stopping = 6, None, NO_NUMBER, "daemon stopping", "nothing";
+    DaemonEnding = 6, None, NO_NUMBER, "daemon stopping", "nothing";
     /// Control may begin; the controller waits for the request `engage`.
     ReadyToEngage = 7, None, NO_NUMBER, "ready to engage", "engage";
     /// An operator requested this state.
@@ -230,14 +230,14 @@ impl fmt::Display for Diagnostic {
             };
             let (value, bound) = (Rounded(*value), Rounded(*bound));
             match code.comparison() {
-                Comparison::None => {}
-                Comparison::Absolute { quantity, unit, relation, bound: source } => {
+                BoundDescription::None => {}
+                BoundDescription::Absolute { quantity, unit, relation, bound: source } => {
                     let space = if unit.is_empty() { "" } else { " " };
                     write!(f, ": {quantity} {value}{space}{unit}")?;
                     place(f)?;
                     write!(f, " {relation} {source} {bound}{space}{unit}")?;
                 }
-                Comparison::Ratio { quantity, bound: source } => {
+                BoundDescription::Ratio { quantity, bound: source } => {
                     write!(f, ": {quantity}")?;
                     place(f)?;
                     write!(f, " is {value} times {source}")?;

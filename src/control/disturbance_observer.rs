@@ -20,17 +20,17 @@
 use nalgebra::Vector6;
 
 use super::law::Law;
-use super::tracking_error::Deviation;
+use super::tracking_error::FeedbackError;
 
-/// Whether the last commanded acceleration still predicts the present deviation.
+/// What the observer forgets before its update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Continuity {
-    /// The last cycle applied what was commanded, on the same reference.
-    Continuous,
-    /// Forces were limited in the last cycle, or the reference has changed: no prediction.
-    Interrupted,
-    /// Control has just begun. The payload may be another: no estimate, either.
-    Started,
+pub enum ObserverReset {
+    /// Nothing: the last cycle applied what was commanded, on the same reference.
+    Keep,
+    /// The prediction: forces were limited in the last cycle, or the reference has changed.
+    Prediction,
+    /// The estimate, too: control has just begun, and the payload may be another.
+    All,
 }
 
 /// Estimate of the disturbance, as the acceleration that cancels it.
@@ -47,17 +47,17 @@ impl DisturbanceObserver {
     pub fn update(
         &mut self,
         law: &Law,
-        deviation: &Deviation,
+        deviation: &FeedbackError,
         dt: f64,
-        continuity: Continuity,
+        continuity: ObserverReset,
     ) -> Vector6<f64> {
         match continuity {
-            Continuity::Continuous => {}
-            Continuity::Interrupted => self.expected = None,
-            Continuity::Started => *self = Self::default(),
+            ObserverReset::Keep => {}
+            ObserverReset::Prediction => self.expected = None,
+            ObserverReset::All => *self = Self::default(),
         }
         let (stiffness, damping) = law.gains();
-        let Deviation { value, rate } = deviation;
+        let FeedbackError { value, rate } = deviation;
         let restoring = value.component_mul(&stiffness);
         let filtered = rate + value.component_mul(&damping);
         if let Some(expected) = self.expected {

@@ -39,8 +39,8 @@ impl ForceLimiter {
         motion: &Motion,
     ) -> Result<LimitedForces, Diagnostic> {
         let Cycle { constants, state, .. } = *cycle;
-        let possible = within_magnitude(constants, commanded, motion)?;
-        let force = if state.has_control() { self.within_rate(constants, &possible) } else { possible };
+        let possible = limit_magnitude(constants, commanded, motion)?;
+        let force = if state.has_control() { self.limit_rate(constants, &possible) } else { possible };
         let active_limits = LimitSet::default()
             .with(Limit::Force, possible != *commanded)
             .with(Limit::ForceRate, force != possible);
@@ -53,10 +53,10 @@ impl ForceLimiter {
     }
 
     /// Limits the change since the last cycle, by the same factor for every leg.
-    fn within_rate(&self, constants: &Constants, force: &[f64; LEGS]) -> [f64; LEGS] {
+    fn limit_rate(&self, constants: &Constants, force: &[f64; LEGS]) -> [f64; LEGS] {
         let parameters = &constants.parameters;
         let change = parameters.force_rate * parameters.period_ns as f64 * 1e-9;
-        toward(&self.last, force, |last| (last - change, last + change))
+        scale_into_bounds(&self.last, force, |last| (last - change, last + change))
     }
 }
 
@@ -69,7 +69,7 @@ fn wrench_error(constants: &Constants, pose: &Pose, force: &[f64; LEGS], command
 
 /// Forces beyond the limit keep the part that carries the weight and reduce all else by the same factor, so that the
 /// rest keeps its direction.
-fn within_magnitude(
+fn limit_magnitude(
     constants: &Constants,
     force: &[f64; LEGS],
     motion: &Motion,
@@ -79,11 +79,15 @@ fn within_magnitude(
         return Ok(*force);
     }
     let weight = constants.dynamics.forces::<Gravity>(motion).ok_or(DiagnosticCode::SingularPose)?;
-    Ok(toward(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
+    Ok(scale_into_bounds(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
 }
 
 /// From `start`, which is within its bounds, as far toward `end` as all bounds allow.
-fn toward(start: &[f64; LEGS], end: &[f64; LEGS], bounds: impl Fn(f64) -> (f64, f64)) -> [f64; LEGS] {
+fn scale_into_bounds(
+    start: &[f64; LEGS],
+    end: &[f64; LEGS],
+    bounds: impl Fn(f64) -> (f64, f64),
+) -> [f64; LEGS] {
     let fraction = |(start, end): (&f64, &f64)| {
         let ((low, high), way) = (bounds(*start), end - start);
         let room = if way > 0.0 { high - start } else { low - start };

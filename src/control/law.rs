@@ -28,7 +28,7 @@ use nalgebra::Vector6;
 use super::gains::Gains;
 use super::leg_masses::LegMasses;
 use super::limits::Limits;
-use super::tracking_error::{Deviation, TrackingError};
+use super::tracking_error::{FeedbackError, TrackingError};
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Gravity;
 use crate::model::machine::{LEGS, Machine};
@@ -120,16 +120,16 @@ impl Law {
     }
 
     /// `Kp e + Kd e'`
-    pub fn feedback(&self, deviation: &Deviation) -> Vector6<f64> {
+    pub fn feedback(&self, deviation: &FeedbackError) -> Vector6<f64> {
         let (stiffness, damping) = self.gains();
         deviation.value.component_mul(&stiffness) + deviation.rate.component_mul(&damping)
     }
 
     /// The deviation after `dt` seconds without a measurement, if the platform has the commanded acceleration:
     /// `e'' = -Kd e' - Kp e`, by one step of the semi-implicit Euler method, stable at these gains.
-    pub fn predicted(&self, deviation: &Deviation, dt: f64) -> Deviation {
+    pub fn predicted(&self, deviation: &FeedbackError, dt: f64) -> FeedbackError {
         let rate = deviation.rate - self.feedback(deviation) * dt;
-        Deviation { value: deviation.value + rate * dt, rate }
+        FeedbackError { value: deviation.value + rate * dt, rate }
     }
 
     /// The motion whose inverse dynamics are the forces of computed torque: where the platform will be at the
@@ -151,7 +151,7 @@ impl Law {
     }
 
     /// The motion whose forces the mode commands: in a mode on legs the desired one.
-    pub(super) fn commanded_motion(
+    pub(super) fn dynamics_motion(
         &self,
         desired: Motion,
         error: &TrackingError,
@@ -161,7 +161,7 @@ impl Law {
     }
 
     /// Forces `m_i a_i` of the drives for accelerations of the legs.
-    pub fn leg_forces(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
+    pub fn feedback_leg_forces(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
         acceleration.component_mul(&self.leg_masses.mass).into()
     }
 }

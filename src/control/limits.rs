@@ -98,21 +98,21 @@ impl LimitSet {
 /// Largest velocity, acceleration and jerk of a reference, for position and orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    pub position: AxisLimits,
-    pub orientation: AxisLimits,
+    pub position: DerivativeLimits,
+    pub orientation: DerivativeLimits,
     /// Factor on the limits for the autonomous motions, onto the setpoint and home.
     pub autonomous_scale: f64,
 }
 
 /// Largest magnitudes of the derivatives of a position \[m\] or an orientation \[rad\], per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisLimits {
+pub struct DerivativeLimits {
     pub velocity: f64,
     pub acceleration: f64,
     pub jerk: f64,
 }
 
-impl AxisLimits {
+impl DerivativeLimits {
     /// All three times a factor.
     pub fn scaled(&self, scale: f64) -> Self {
         Self {

@@ -100,7 +100,7 @@ impl Localization {
         match tracked {
             TrackingResult::Found => self.is_known = true,
             TrackingResult::Approaching if state.has_control() => {
-                return Err(self.jump(constants, &start_length, &measurement.length));
+                return Err(self.jump_diagnostic(constants, &start_length, &measurement.length));
             }
             TrackingResult::Approaching => return Err(DiagnosticCode::FindingPose.into()),
             TrackingResult::NotConverged => {
@@ -118,7 +118,7 @@ impl Localization {
     }
 
     /// Ends an assembly mode fault: an operator has inspected the platform.
-    pub fn clear(&mut self, home: &KinematicState) {
+    pub fn clear_assembly_mode_fault(&mut self, home: &KinematicState) {
         if self.assembly_mode_fault.take().is_some() {
             self.restart(home);
         }
@@ -146,19 +146,24 @@ impl Localization {
     fn is_assembly_mode_uncertain(&self, constants: &Constants, start: &Pose) -> bool {
         let kinematic_state = self.tracker.kinematic_state();
         let Sensitivity { condition, trusted_step, .. } = *kinematic_state.sensitivity();
-        condition > max_certain_condition(&constants.parameters)
+        condition > assembly_mode_condition_bound(&constants.parameters)
             && constants.machine().joints.distance(start, kinematic_state.pose()) > trusted_step
     }
 
     fn fail_assembly_mode(&mut self, parameters: &Parameters) -> Diagnostic {
         self.is_known = false;
         let condition = self.tracker.kinematic_state().sensitivity().condition;
-        let bound = max_certain_condition(parameters);
+        let bound = assembly_mode_condition_bound(parameters);
         *self.assembly_mode_fault.insert(Diagnostic::new(DiagnosticCode::SingularPose, condition, bound))
     }
 
     /// The lengths are further away than the steps of a cycle. All legs have moved by the same part of their way.
-    fn jump(&self, constants: &Constants, start: &[f64; LEGS], measured: &[f64; LEGS]) -> Diagnostic {
+    fn jump_diagnostic(
+        &self,
+        constants: &Constants,
+        start: &[f64; LEGS],
+        measured: &[f64; LEGS],
+    ) -> Diagnostic {
         let largest_change =
             |to: &[f64; LEGS]| to.iter().zip(start).map(|(to, start)| (to - start).abs()).fold(0.0, f64::max);
         let reached = largest_change(&self.tracker.kinematic_state().lengths(constants.machine()));
@@ -181,6 +186,6 @@ impl Localization {
     }
 }
 
-fn max_certain_condition(parameters: &Parameters) -> f64 {
+fn assembly_mode_condition_bound(parameters: &Parameters) -> f64 {
     parameters.condition.min(MAX_CERTAIN_CONDITION)
 }

@@ -4,19 +4,19 @@ use nalgebra::Vector3;
 
 use super::controller::Cycle;
 use super::diagnostic::{Diagnostic, DiagnosticCode};
-use super::input_validation::{SetpointInput, SetpointMotion, check_measurable_stroke};
+use super::input_validation::{SetpointMotion, ValidatedSetpoint, check_stroke_with_tolerance};
 use super::limits::Limits;
 use super::localization::Located;
 use super::parameters::{Constants, Parameters};
-use super::segment::Segment;
+use super::quintic_offset::QuinticOffset;
 use super::state::State;
-use super::tracking_error::{Deviation, TrackingError};
+use super::tracking_error::{FeedbackError, TrackingError};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 /// Least step of a resuming setpoint over the engage tolerance that is worth a segment; a smaller one comes from time
 /// stamps and rounding.
-const MIN_REBASE_RATIO: f64 = 0.05;
+const MIN_BLEND_RATIO: f64 = 0.05;
 
 /// Reference of a state.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,9 +25,9 @@ enum Reference {
     #[default]
     Setpoint,
     /// The setpoint, with a displacement that decays.
-    OntoSetpoint(Segment),
+    OntoSetpoint(QuinticOffset),
     /// A displaced pose at rest.
-    FromPose(Pose, Segment),
+    FromPose(Pose, QuinticOffset),
 }
 
 /// Fourth stage of the cycle: the reference of the present state at any instant.
@@ -53,7 +53,7 @@ impl ReferenceGenerator {
     }
 
     /// Whether the autonomous motion of the state has come to its end.
-    pub fn has_arrived(&self, instant_ns: u64) -> bool {
+    pub fn has_ended(&self, instant_ns: u64) -> bool {
         match &self.reference {
             Reference::Setpoint => true,
             Reference::OntoSetpoint(segment) | Reference::FromPose(_, segment) => {
@@ -71,7 +71,7 @@ impl ReferenceGenerator {
     ) -> Result<(), Diagnostic> {
         let Some(motion) = self.motion_at(&constants.parameters, setpoint, instant_ns) else { return Ok(()) };
         let machine = constants.machine();
-        check_measurable_stroke(
+        check_stroke_with_tolerance(
             &machine.actuator,
             DiagnosticCode::SetpointOutOfReach,
             &leg_lengths(machine, &motion.pose),
@@ -80,7 +80,7 @@ impl ReferenceGenerator {
 
     /// After a gap a setpoint may differ, within its tolerance, from the continuation of the one before. If the step
     /// would exceed the limit of jerk, a segment leads onto the setpoint. True if the reference has changed.
-    pub fn rebase(&mut self, cycle: &Cycle<'_>, setpoint: &SetpointInput<'_>) -> bool {
+    pub fn blend_after_gap(&mut self, cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>) -> bool {
         setpoint.before_gap.as_ref().is_some_and(|before| self.bridge(cycle, setpoint.valid, before))
     }
 
@@ -98,10 +98,10 @@ impl ReferenceGenerator {
         let (Some(present), Some(next)) = (present, next) else { return false };
         let Parameters { law, limits, .. } = parameters;
         let error = TrackingError::new(&present, &next.pose, &next.twist);
-        if error.tolerance_ratio(parameters) < MIN_REBASE_RATIO {
+        if error.tolerance_ratio(parameters) < MIN_BLEND_RATIO {
             return false;
         }
-        let feedback = law.feedback(&Deviation::from(&error));
+        let feedback = law.feedback(&FeedbackError::from(&error));
         let command = law.command(&present, &error, &feedback).acceleration;
         let step = |command: Vector3<f64>, next: Vector3<f64>| (command - next).norm();
         let period_s = parameters.period_s();
@@ -136,14 +136,15 @@ impl ReferenceGenerator {
                 onto_setpoint(parameters, setpoint, &measured, measurement.time_ns, scale)
             }
             State::Stopping => {
-                let segment = Segment::to_rest(release_ns, &present.twist, &present.acceleration, limits);
+                let segment =
+                    QuinticOffset::to_rest(release_ns, &present.twist, &present.acceleration, limits);
                 Reference::FromPose(present.pose, segment)
             }
             State::Parking => {
                 let home = *constants.home.pose();
                 let displacement = home.displacement_to(&present.pose);
                 let Motion { twist: rate, acceleration, .. } = present;
-                let segment = Segment::to_base(release_ns, &displacement, &rate, &acceleration, limits);
+                let segment = QuinticOffset::to_zero(release_ns, &displacement, &rate, &acceleration, limits);
                 Reference::FromPose(home, segment)
             }
             State::Off | State::Standby | State::Active | State::Fault => Reference::Setpoint,
@@ -165,7 +166,7 @@ fn onto_setpoint(
     let rate = Twist::from_vector(&(from.twist.vector() - base.twist.vector()));
     let acceleration = Acceleration::from_vector(&(from.acceleration.vector() - base.acceleration.vector()));
     let limits = Limits { autonomous_scale: scale, ..parameters.limits };
-    Reference::OntoSetpoint(Segment::to_base(instant_ns, &displacement, &rate, &acceleration, &limits))
+    Reference::OntoSetpoint(QuinticOffset::to_zero(instant_ns, &displacement, &rate, &acceleration, &limits))
 }
 
 fn at_rest(pose: &Pose) -> Motion {

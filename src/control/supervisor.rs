@@ -39,7 +39,7 @@ pub struct Findings {
     /// Whether the reference can be followed further. A diagnostic that is no fault ends it by a stop.
     pub tracking: Result<(), Diagnostic>,
     /// The reference of engaging, stopping or parking has come to its end.
-    pub has_arrived: bool,
+    pub has_ended: bool,
 }
 
 /// Third stage of the cycle: the state, and the answer to the last request.
@@ -179,7 +179,7 @@ fn following(
         Some(Request::Park) => (stop(REQUESTED, AfterStop::Park), None),
         Some(Request::Clear) => (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Engage | Request::Off | Request::Estop) | None => {
-            let state = if findings.has_arrived { State::Active } else { mode.state };
+            let state = if findings.has_ended { State::Active } else { mode.state };
             (Mode { state, ..mode }, None)
         }
     }
@@ -197,7 +197,7 @@ fn stopping(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode,
         }
         _ => (mode, None),
     };
-    if !findings.has_arrived {
+    if !findings.has_ended {
         return (mode, refused);
     }
     let rest = match mode.after {
@@ -217,7 +217,7 @@ fn parking(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, 
         Some(Request::Engage | Request::Clear) => return (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Park | Request::Off | Request::Estop) | None => {}
     }
-    (if findings.has_arrived { OFF_BY_REQUEST } else { mode }, None)
+    (if findings.has_ended { OFF_BY_REQUEST } else { mode }, None)
 }
 
 /// The diagnostic of a code with the number of this cycle, if the code still prevents control.

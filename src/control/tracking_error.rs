@@ -8,7 +8,7 @@ use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use super::controller::Cycle;
-use super::input_validation::SetpointInput;
+use super::input_validation::ValidatedSetpoint;
 use super::law::ControlMode;
 use super::localization::Located;
 use super::parameters::Parameters;
@@ -56,15 +56,15 @@ impl TrackingError {
     }
 }
 
-/// Deviation that feedback acts on, desired minus measured: angles and positions, or leg lengths.
+/// FeedbackError that feedback acts on, desired minus measured: angles and positions, or leg lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Deviation {
+pub struct FeedbackError {
     pub value: Vector6<f64>,
     /// Its time derivative.
     pub rate: Vector6<f64>,
 }
 
-impl Deviation {
+impl FeedbackError {
     /// Of the legs.
     pub fn of_legs(machine: &Machine, desired: &Motion, length: &[f64; LEGS], rate: &[f64; LEGS]) -> Self {
         let LegMotion { length: desired, rate: desired_rate, .. } = leg_motion(machine, desired);
@@ -75,14 +75,14 @@ impl Deviation {
     }
 }
 
-impl From<&TrackingError> for Deviation {
+impl From<&TrackingError> for FeedbackError {
     fn from(error: &TrackingError) -> Self {
         Self { value: error.pose.vector(), rate: error.twist.vector() }
     }
 }
 
-impl From<&Deviation> for TrackingError {
-    fn from(deviation: &Deviation) -> Self {
+impl From<&FeedbackError> for TrackingError {
+    fn from(deviation: &FeedbackError) -> Self {
         Self { pose: Twist::from_vector(&deviation.value), twist: Twist::from_vector(&deviation.rate) }
     }
 }
@@ -92,7 +92,7 @@ impl From<&Deviation> for TrackingError {
 pub(super) struct ErrorSample {
     time_ns: u64,
     pub error: TrackingError,
-    pub deviation: Deviation,
+    pub deviation: FeedbackError,
 }
 
 impl ErrorSample {
@@ -100,23 +100,25 @@ impl ErrorSample {
     fn measure(
         cycle: &Cycle<'_>,
         reference: &ReferenceGenerator,
-        setpoint: &SetpointInput<'_>,
+        setpoint: &ValidatedSetpoint<'_>,
         Located { measurement, platform }: &Located<'_>,
     ) -> Option<Self> {
         let constants = cycle.constants;
         let desired = reference.motion_at(&constants.parameters, setpoint.valid, measurement.time_ns)?;
         let error = TrackingError::new(&desired, &platform.pose, &platform.twist);
         let deviation = match constants.parameters.law.mode {
-            ControlMode::ComputedTorque => Deviation::from(&error),
-            _ => Deviation::of_legs(constants.machine(), &desired, &measurement.length, &measurement.rate),
+            ControlMode::ComputedTorque => FeedbackError::from(&error),
+            _ => {
+                FeedbackError::of_legs(constants.machine(), &desired, &measurement.length, &measurement.rate)
+            }
         };
         Some(Self { time_ns: measurement.time_ns, error, deviation })
     }
 
     /// A period later, without a new measurement.
     fn predicted(&self, parameters: &Parameters) -> Self {
-        let after = |deviation: &Deviation| parameters.law.predicted(deviation, parameters.period_s());
-        let error = TrackingError::from(&after(&Deviation::from(&self.error)));
+        let after = |deviation: &FeedbackError| parameters.law.predicted(deviation, parameters.period_s());
+        let error = TrackingError::from(&after(&FeedbackError::from(&self.error)));
         Self { error, deviation: after(&self.deviation), ..*self }
     }
 }
@@ -134,7 +136,7 @@ impl ErrorTracker {
         &mut self,
         cycle: &Cycle<'_>,
         reference: &ReferenceGenerator,
-        setpoint: &SetpointInput<'_>,
+        setpoint: &ValidatedSetpoint<'_>,
         located: Option<&Located<'_>>,
     ) -> Option<ErrorSample> {
         let has_control = cycle.state.has_control();
@@ -153,7 +155,7 @@ impl ErrorTracker {
         cycle: &Cycle<'_>,
         next: State,
         reference: &ReferenceGenerator,
-        setpoint: &SetpointInput<'_>,
+        setpoint: &ValidatedSetpoint<'_>,
         located: &Located<'_>,
     ) -> Option<ErrorSample> {
         let sample = ErrorSample::measure(cycle, reference, setpoint, located);

@@ -155,7 +155,7 @@ fn run_realtime(
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
     let step = |input: &Input| controller.step(input);
-    let last = Output { diagnostic: DiagnosticCode::Stopping.into(), ..Output::default() };
+    let last = Output { diagnostic: DiagnosticCode::DaemonEnding.into(), ..Output::default() };
     let timing = timing(&config.deployment);
     Some(cyclic::run(&mut Monotonic, &timing, step, last, links.exchange, links.records, stop))
 }

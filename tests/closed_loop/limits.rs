@@ -2,7 +2,7 @@
 
 use hexad::config::Config;
 use hexad::control::controller::{Input, Output};
-use hexad::control::limits::{AxisLimits, Limit, Limits};
+use hexad::control::limits::{DerivativeLimits, Limit, Limits};
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Gravity;
 use hexad::model::machine::LEGS;
@@ -17,7 +17,7 @@ use super::common::{deployed, largest};
 /// Without a bound on what a setpoint may ask for.
 fn unbounded(name: &str) -> Config {
     let mut config = deployed(name);
-    let axis = AxisLimits { velocity: 1e9, acceleration: 1e9, jerk: 1e12 };
+    let axis = DerivativeLimits { velocity: 1e9, acceleration: 1e9, jerk: 1e12 };
     let limits = &mut config.deployment.limits;
     limits.reference = Limits { position: axis, orientation: axis, ..limits.reference };
     limits.force_rate_n_s = 1e12;

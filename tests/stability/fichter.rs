@@ -5,7 +5,7 @@
 use core::f64::consts::FRAC_PI_2;
 
 use hexad::config::Config;
-use hexad::control::limits::{AxisLimits, Limits};
+use hexad::control::limits::{DerivativeLimits, Limits};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Pose;
@@ -29,7 +29,7 @@ pub const ANY: f64 = 1e12;
 /// Home so near to it, legs and drives for a quarter turn, strong enough for any pose that is found.
 pub fn motion_base(condition: f64) -> Config {
     let mut config = deployed("motion_base");
-    let axis = AxisLimits { velocity: 10.0, acceleration: 50.0, jerk: 5000.0 };
+    let axis = DerivativeLimits { velocity: 10.0, acceleration: 50.0, jerk: 5000.0 };
     let limits = &mut config.deployment.limits;
     limits.reference = Limits { position: axis, orientation: axis, ..limits.reference };
     (limits.condition, limits.force_rate_n_s) = (condition, f64::MAX);

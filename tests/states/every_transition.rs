@@ -2,7 +2,7 @@
 
 use hexad::control::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
 use hexad::control::state::{Request, State};
-use hexad::control::supervisor::{AfterStop, Findings, Mode, next};
+use hexad::control::supervisor::{AfterStop, Findings, SupervisorState, next};
 use rayon::prelude::*;
 
 use super::oracle;
@@ -28,30 +28,35 @@ fn requests() -> Vec<Option<Request>> {
 /// Calls `check` with all of them; returns how many there were. Whether control may begin is of no interest
 /// where it has begun, or after a fault: two verdicts show that.
 fn every(
-    check: impl Fn(Mode, Option<Request>, &Findings, AfterStop, (Mode, Option<Diagnostic>)) + Sync,
+    check: impl Fn(SupervisorState, Option<Request>, &Findings, AfterStop, (SupervisorState, Option<Diagnostic>))
+    + Sync,
 ) -> u64 {
     let modes: Vec<_> = State::ALL
         .into_iter()
         .flat_map(|state| GOALS.map(|after| (state, after)))
         .flat_map(|(state, after)| {
-            DiagnosticCode::ALL.iter().map(move |code| Mode { state, diagnostic: numbered(*code), after })
+            DiagnosticCode::ALL.iter().map(move |code| SupervisorState {
+                state,
+                diagnostic: numbered(*code),
+                after,
+            })
         })
         .collect();
     let [localizations, trackings, engagements] = [2.0, 3.0, 4.0].map(verdicts);
     let requests = requests();
-    let of_mode = |mode: &Mode| {
+    let of_mode = |mode: &SupervisorState| {
         let idle = matches!(mode.state, State::Off | State::Standby);
         let engagements = if idle { &engagements[..] } else { &engagements[..2] };
         let mut count = 0;
         for localization in &localizations {
             for tracking in &trackings {
                 for engagement in engagements {
-                    for has_arrived in [false, true] {
+                    for has_ended in [false, true] {
                         let found = Findings {
                             localization: *localization,
                             engagement: *engagement,
                             tracking: *tracking,
-                            has_arrived,
+                            has_ended,
                         };
                         for request in &requests {
                             for after_loss in GOALS {

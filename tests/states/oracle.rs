@@ -2,20 +2,20 @@
 
 use hexad::control::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
 use hexad::control::state::{Request, State};
-use hexad::control::supervisor::{AfterStop, Findings, Mode};
+use hexad::control::supervisor::{AfterStop, Findings, SupervisorState};
 
-type Next = (Mode, Option<Diagnostic>);
+type Next = (SupervisorState, Option<Diagnostic>);
 
-fn mode(state: State, why: impl Into<Diagnostic>, after: AfterStop) -> Mode {
-    Mode { state, diagnostic: why.into(), after }
+fn mode(state: State, why: impl Into<Diagnostic>, after: AfterStop) -> SupervisorState {
+    SupervisorState { state, diagnostic: why.into(), after }
 }
 
-fn plain(state: State, why: impl Into<Diagnostic>) -> Mode {
+fn plain(state: State, why: impl Into<Diagnostic>) -> SupervisorState {
     mode(state, why, AfterStop::Standby)
 }
 
 /// What a platform without force shows: whether it could engage, and if not, why.
-fn shown(findings: &Findings) -> Mode {
+fn shown(findings: &Findings) -> SupervisorState {
     match (findings.localization, findings.engagement) {
         (Err(cause), _) => plain(State::Off, cause),
         (Ok(()), Err(cause)) => plain(State::Standby, cause),
@@ -24,7 +24,7 @@ fn shown(findings: &Findings) -> Mode {
 }
 
 /// Where a stop ends.
-fn after_stop(now: Mode, findings: &Findings) -> Mode {
+fn after_stop(now: SupervisorState, findings: &Findings) -> SupervisorState {
     let code = now.diagnostic.code;
     // In standby the number is that of this cycle, if there is one.
     let current = findings.engagement.err().filter(|found| found.code == code);
@@ -35,7 +35,7 @@ fn after_stop(now: Mode, findings: &Findings) -> Mode {
     }
 }
 
-pub fn next(now: Mode, request: Option<Request>, found: &Findings, after_loss: AfterStop) -> Next {
+pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, after_loss: AfterStop) -> Next {
     use Request::{Clear, Engage, Estop, Off, Park, Stop};
     use State as S;
     let is = |what| request == Some(what);
@@ -81,13 +81,13 @@ pub fn next(now: Mode, request: Option<Request>, found: &Findings, after_loss: A
         (follows && is(Stop), &|| to_stop(requested, AfterStop::Standby)),
         (follows && is(Park), &|| to_stop(requested, AfterStop::Park)),
         (follows && is(Clear), &|| refuse(DiagnosticCode::InvalidInState)),
-        (follows && found.has_arrived, &|| (mode(S::Active, now.diagnostic, now.after), None)),
+        (follows && found.has_ended, &|| (mode(S::Active, now.diagnostic, now.after), None)),
         (follows, &|| (now, None)),
         // On the way home.
         (now.state == S::Parking && trouble.is_some(), &|| to_stop(trouble.unwrap(), AfterStop::Fault)),
         (now.state == S::Parking && is(Stop), &|| to_stop(requested, AfterStop::Standby)),
         (now.state == S::Parking && (is(Engage) || is(Clear)), &|| refuse(DiagnosticCode::InvalidInState)),
-        (now.state == S::Parking && found.has_arrived, &|| (off, None)),
+        (now.state == S::Parking && found.has_ended, &|| (off, None)),
         (now.state == S::Parking, &|| (now, None)),
     ];
     if let Some((_, then)) = table.iter().find(|(applies, _)| *applies) {
@@ -103,5 +103,5 @@ pub fn next(now: Mode, request: Option<Request>, found: &Findings, after_loss: A
     } else {
         (now, (asks && !is(Stop)).then_some(DiagnosticCode::InvalidInState.into()))
     };
-    (if found.has_arrived { after_stop(goal, found) } else { goal }, refused)
+    (if found.has_ended { after_stop(goal, found) } else { goal }, refused)
 }

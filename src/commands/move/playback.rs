@@ -7,7 +7,7 @@ use super::trajectory::Trajectory;
 use crate::commands::operate::Operator;
 use crate::config::Config;
 use crate::control::diagnostic::DiagnosticCode;
-use crate::control::limits::{AxisLimits, Limits};
+use crate::control::limits::{DerivativeLimits, Limits};
 use crate::control::state::{Request, State};
 use crate::messages::PortError;
 use crate::messages::StatusMessage;
@@ -112,8 +112,8 @@ fn approach_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
     let way = to - from;
     // No angle turns the platform further than by itself.
     let angle = way.fixed_rows::<3>(0).abs().sum();
-    let shortest = |way: f64, limits: &AxisLimits| {
-        let AxisLimits { velocity, acceleration, jerk } = limits.scaled(APPROACH_SHARE);
+    let shortest = |way: f64, limits: &DerivativeLimits| {
+        let DerivativeLimits { velocity, acceleration, jerk } = limits.scaled(APPROACH_SHARE);
         shortest_duration(way, [velocity, acceleration, jerk])
     };
     shortest(angle, &limits.orientation).max(shortest(way.fixed_rows::<3>(3).norm(), &limits.position))

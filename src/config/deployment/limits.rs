@@ -3,7 +3,7 @@
 use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
-use crate::control::limits::{AxisLimits, Limits as ReferenceLimits};
+use crate::control::limits::{DerivativeLimits, Limits as ReferenceLimits};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
@@ -30,12 +30,12 @@ pub struct DeploymentLimits {
 /// build it up. Autonomous motions use a fifth of them.
 pub(super) fn read(mut section: SectionReader, machine: &Machine) -> DeploymentLimits {
     let mut positive = |key, default| section.number_or(key, default, Bound::Positive);
-    let position = AxisLimits {
+    let position = DerivativeLimits {
         velocity: positive("velocity_m_s", 1.0),
         acceleration: positive("acceleration_m_s2", 5.0),
         jerk: positive("jerk_m_s3", 500.0),
     };
-    let orientation = AxisLimits {
+    let orientation = DerivativeLimits {
         velocity: positive("velocity_rad_s", 2.0),
         acceleration: positive("acceleration_rad_s2", 20.0),
         jerk: positive("jerk_rad_s3", 2000.0),

@@ -1,6 +1,6 @@
 //! Validation of measurements: stroke, change of lengths and rates, and rates that are those of the lengths.
 
-use super::{LastValid, check_measurable_stroke, check_time_stamp, seconds_between, stroke};
+use super::{LastValid, check_stroke_with_tolerance, check_time_stamp, seconds_between, stroke};
 use crate::control::controller::{Cycle, Measurement};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::machine::{Actuator, LEGS};
@@ -143,7 +143,7 @@ impl MeasurementValidator {
         if now.length.iter().chain(&now.rate).any(|value| !value.is_finite()) {
             return Err(DiagnosticCode::MeasurementNotFinite.into());
         }
-        check_measurable_stroke(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
+        check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
         let Some(before) = before else { return Ok(RateConsistency::default()) };
         let dt = seconds_between(before.time_ns, now.time_ns);
         if dt < 0.0 {

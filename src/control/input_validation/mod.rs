@@ -8,7 +8,7 @@ mod setpoint;
 
 pub(super) use measurement::MeasurementValidator;
 pub use setpoint::{SetpointCheck, SetpointMotion, check_setpoint};
-pub(super) use setpoint::{SetpointInput, SetpointValidator};
+pub(super) use setpoint::{SetpointValidator, ValidatedSetpoint};
 
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::machine::{Actuator, LEGS};
@@ -78,7 +78,7 @@ fn check_time_stamp(
 }
 
 /// Whether all lengths are within the stroke and the tolerance of a measurement.
-pub(super) fn check_measurable_stroke(
+pub(super) fn check_stroke_with_tolerance(
     actuator: &Actuator,
     code: DiagnosticCode,
     length: &[f64; LEGS],

@@ -5,7 +5,7 @@ use crate::control::controller::{Cycle, Setpoint};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::limits::{Limit, LimitSet, Limits};
 use crate::control::parameters::Parameters;
-use crate::control::segment::Segment;
+use crate::control::quintic_offset::QuinticOffset;
 use crate::control::state::State;
 use crate::control::tracking_error::TrackingError;
 use crate::model::inverse_geometry::leg_motion;
@@ -51,7 +51,7 @@ impl SetpointMotion {
 }
 
 /// The last valid setpoint, whether it may be followed, and the limits it is near to.
-pub(in crate::control) struct SetpointInput<'a> {
+pub(in crate::control) struct ValidatedSetpoint<'a> {
     pub valid: Option<&'a SetpointMotion>,
     /// Whether the valid setpoint is young enough.
     pub status: Result<(), Diagnostic>,
@@ -73,7 +73,7 @@ pub(in crate::control) struct SetpointValidator {
 
 impl SetpointValidator {
     /// Validates the newest setpoint, if it is new.
-    pub fn validate(&mut self, cycle: &Cycle<'_>, newest: Option<&Setpoint>) -> SetpointInput<'_> {
+    pub fn validate(&mut self, cycle: &Cycle<'_>, newest: Option<&Setpoint>) -> ValidatedSetpoint<'_> {
         let new =
             newest.filter(|newest| self.last.newest.as_ref().map(|last| &last.setpoint) != Some(newest));
         let (mut is_accepted, mut before_gap) = (false, None);
@@ -81,7 +81,7 @@ impl SetpointValidator {
             (is_accepted, before_gap) = self.accept(cycle, SetpointMotion::new(*new));
         }
         self.missed += u64::from(cycle.state.has_control() && !is_accepted);
-        SetpointInput {
+        ValidatedSetpoint {
             valid: self.last.valid.as_ref(),
             status: self.check_age(cycle),
             active_limits: self.active_limits,
@@ -182,13 +182,13 @@ fn check_limits(
     if !setpoint.task.is_finite() {
         return Err(DiagnosticCode::SetpointNotFinite.into());
     }
-    check_magnitudes(parameters, motion, active)?;
+    check_velocity_and_acceleration(parameters, motion, active)?;
     check_envelope(parameters, setpoint, active)?;
     check_legs(machine, motion, active)?;
     check_room_to_stop(machine, parameters, home, motion, active)
 }
 
-fn check_magnitudes(
+fn check_velocity_and_acceleration(
     parameters: &Parameters,
     motion: &Motion,
     active: &mut LimitSet,
@@ -266,7 +266,7 @@ fn stop_pose(parameters: &Parameters, motion: &Motion) -> Pose {
     let t = parameters.max_extrapolation_s();
     let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
     let last = Twist::from_vector(&(v + a * t));
-    let stop = Segment::to_rest(0, &last, &motion.acceleration, &parameters.limits);
+    let stop = QuinticOffset::to_rest(0, &last, &motion.acceleration, &parameters.limits);
     motion.pose.displaced(&Twist::from_vector(&((v + a * (0.5 * t)) * t + stop.end())))
 }
 

@@ -40,7 +40,7 @@ pub fn stands(measured: &MeasuredMessage) -> bool {
 /// For a daemon that was stopped in order: the platform was at rest before nobody controlled it any more.
 pub fn ends_at_rest(recording: &Recording) {
     let last = recording.forces.last().expect("forces");
-    assert_eq!((last.valid, last.diagnostic_code), (0, DiagnosticCode::Stopping as u32), "{last:#?}");
+    assert_eq!((last.valid, last.diagnostic_code), (0, DiagnosticCode::DaemonEnding as u32), "{last:#?}");
     let valid = recording.forces.iter().rfind(|force| force.valid == 1).expect("a valid force");
     assert_eq!(State::from_number(valid.state), Some(State::Stopping), "the last valid one: {valid:#?}");
     let until_then = |measured: &&MeasuredMessage| measured.header.time_ns <= valid.header.time_ns;
@@ -127,7 +127,7 @@ fn nothing_moves_unasked(recording: &Recording) {
             if (a.valid == 1 && b.valid == 0) || is_fault == [false, true] {
                 since_ns = a.header.time_ns;
             }
-            if is_fault == [true, false] && b.diagnostic_code != DiagnosticCode::Stopping as u32 {
+            if is_fault == [true, false] && b.diagnostic_code != DiagnosticCode::DaemonEnding as u32 {
                 let cleared_ns = asked(|request| request == Request::Clear, since_ns, b.header.time_ns);
                 since_ns = cleared_ns.unwrap_or_else(|| panic!("not cleared: {a:#?} and then {b:#?}"));
             }
@@ -177,7 +177,7 @@ fn every_grid_point_is_counted(recording: &Recording) {
     let released: HashMap<_, _> = recording
         .forces
         .iter()
-        .filter(|force| force.diagnostic_code != DiagnosticCode::Stopping as u32)
+        .filter(|force| force.diagnostic_code != DiagnosticCode::DaemonEnding as u32)
         .map(|force| ((force.header.epoch, force.header.sequence), force.release_ns))
         .collect();
     let mut first = HashMap::new();

@@ -28,7 +28,7 @@ pub fn steps(recording: &Recording) -> Vec<Step> {
     let released: HashMap<_, _> = recording
         .forces
         .iter()
-        .filter(|force| force.release_ns != 0 && force.diagnostic_code != DiagnosticCode::Stopping as u32)
+        .filter(|force| force.release_ns != 0 && force.diagnostic_code != DiagnosticCode::DaemonEnding as u32)
         .map(|force| (order(&force.header), *force))
         .collect();
     let published =

@@ -14,7 +14,7 @@ use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::input_validation::seconds_between;
-use super::limits::{AxisLimits, Limits};
+use super::limits::{DerivativeLimits, Limits};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
 
 /// Shortest duration of a segment \[s\]: some cycles, also without displacement.
@@ -22,16 +22,16 @@ const MIN_DURATION_S: f64 = 0.02;
 
 /// Displacement `[rotation vector; vector]` of a base motion as a quintic in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Segment {
+pub struct QuinticOffset {
     /// Coefficients of 1, t, ... t^5.
     coefficients: [Vector6<f64>; 6],
     duration_s: f64,
     start_ns: u64,
 }
 
-impl Segment {
+impl QuinticOffset {
     /// From a displacement with its derivatives to zero, as fast as `limits` times `autonomous_scale` allow.
-    pub fn to_base(
+    pub fn to_zero(
         start_ns: u64,
         displacement: &Twist,
         rate: &Twist,
@@ -39,16 +39,16 @@ impl Segment {
         limits: &Limits,
     ) -> Self {
         let from = [displacement.vector(), rate.vector(), acceleration.vector()];
-        let scaled = |axis: &AxisLimits| axis.scaled(limits.autonomous_scale);
+        let scaled = |axis: &DerivativeLimits| axis.scaled(limits.autonomous_scale);
         let limits = [scaled(&limits.orientation), scaled(&limits.position)];
-        Self::quintic(start_ns, longer_duration_s(&limits, &from, to_base_s), from, Vector6::zeros())
+        Self::quintic(start_ns, longer_duration_s(&limits, &from, duration_to_zero_s), from, Vector6::zeros())
     }
 
     /// From zero displacement with a rate and an acceleration until at rest: the rate follows a cubic.
     pub fn to_rest(start_ns: u64, rate: &Twist, acceleration: &Acceleration, limits: &Limits) -> Self {
         let (v, a) = (rate.vector(), acceleration.vector());
         let from = [Vector6::zeros(), v, a];
-        let duration_s = longer_duration_s(&[limits.orientation, limits.position], &from, to_rest_s);
+        let duration_s = longer_duration_s(&[limits.orientation, limits.position], &from, duration_to_rest_s);
         let end = (v * 0.5 + a * (duration_s / 12.0)) * duration_s;
         Self::quintic(start_ns, duration_s, from, end)
     }
@@ -97,9 +97,9 @@ impl Segment {
 
 /// The longer of the durations \[s\] that rotation and translation need.
 fn longer_duration_s(
-    limits: &[AxisLimits; 2],
+    limits: &[DerivativeLimits; 2],
     [d, v, a]: &[Vector6<f64>; 3],
-    duration_s: impl Fn(&AxisLimits, f64, f64, f64) -> f64,
+    duration_s: impl Fn(&DerivativeLimits, f64, f64, f64) -> f64,
 ) -> f64 {
     let norms = |of: &Vector6<f64>| [of.fixed_rows::<3>(0).norm(), of.fixed_rows::<3>(3).norm()];
     let ([d_r, d_p], [v_r, v_p], [a_r, a_p]) = (norms(d), norms(v), norms(a));
@@ -110,7 +110,7 @@ fn longer_duration_s(
 /// Duration of the quintic from d, v, a to zero. Its peaks are at most `1.875 d / T` (velocity),
 /// `5.774 d / T^2 + 6 v / T + a` and `60 d / T^3 + 36 v / T^2 + 9 a / T`. With the second within the
 /// limit A, the third is at most `10.39 A / T`: no cubic equation is left.
-fn to_base_s(limit: &AxisLimits, d: f64, v: f64, a: f64) -> f64 {
+fn duration_to_zero_s(limit: &DerivativeLimits, d: f64, v: f64, a: f64) -> f64 {
     // At least half of the limit is for the displacement.
     let free = (limit.acceleration - a).max(0.5 * limit.acceleration);
     let by_velocity = 1.875 * d / limit.velocity;
@@ -120,7 +120,7 @@ fn to_base_s(limit: &AxisLimits, d: f64, v: f64, a: f64) -> f64 {
 
 /// Duration of the cubic from v with v' = a to rest. Its peaks are at most `1.5 v / T + a / 3`, or a, and
 /// `6 v / T^2 + 4 a / T`.
-fn to_rest_s(limit: &AxisLimits, _: f64, v: f64, a: f64) -> f64 {
+fn duration_to_rest_s(limit: &DerivativeLimits, _: f64, v: f64, a: f64) -> f64 {
     let free = (limit.acceleration - a / 3.0).max(0.2 * limit.acceleration);
     let by_jerk = (2.0 * a + (4.0 * a * a + 6.0 * v * limit.jerk).sqrt()) / limit.jerk;
     (1.5 * v / free).max(by_jerk)
@@ -156,8 +156,8 @@ mod tests {
     use crate::model::task::TaskState;
 
     const LIMITS: Limits = Limits {
-        position: AxisLimits { velocity: 0.5, acceleration: 5.0, jerk: 100.0 },
-        orientation: AxisLimits { velocity: 1.0, acceleration: 10.0, jerk: 200.0 },
+        position: DerivativeLimits { velocity: 0.5, acceleration: 5.0, jerk: 100.0 },
+        orientation: DerivativeLimits { velocity: 1.0, acceleration: 10.0, jerk: 200.0 },
         autonomous_scale: 1.0,
     };
 
@@ -175,7 +175,7 @@ mod tests {
     }
 
     /// Asserts at every instant that the derivatives are those of the pose and that limits are kept.
-    fn assert_smooth(segment: &Segment, base: &Motion, limits: Option<&Limits>) {
+    fn assert_smooth(segment: &QuinticOffset, base: &Motion, limits: Option<&Limits>) {
         let h_ns = 100_000;
         let h = 1e-4;
         let mut before: Option<Motion> = None;
@@ -207,7 +207,7 @@ mod tests {
         let base = TaskState::at_rest([0.1, 0.2, 0.3, 0.0, 0.0, 1.0]).motion();
         let d = twist([0.1, -0.05, 0.1, 0.02, -0.03, 0.01]);
         let segment =
-            Segment::to_base(5_000_000_000, &d, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
+            QuinticOffset::to_zero(5_000_000_000, &d, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
         let first = segment.displace(&base, 5_000_000_000);
         assert!((base.pose.displacement_to(&first.pose).vector() - d.vector()).norm() < 1e-14);
         assert_smooth(&segment, &base, Some(&LIMITS));
@@ -221,7 +221,7 @@ mod tests {
         let base = moving();
         let (d, v) =
             (twist([0.004, 0.001, -0.002, 0.001, 0.002, 0.0]), twist([0.02, 0.0, 0.01, 0.0, 0.01, 0.0]));
-        let segment = Segment::to_base(7, &d, &v, &Acceleration::default(), &LIMITS);
+        let segment = QuinticOffset::to_zero(7, &d, &v, &Acceleration::default(), &LIMITS);
         let added = segment.displace(&base, 7).twist.vector() - base.twist.vector();
         assert!((added - v.vector()).norm() < 1e-2, "{added}");
     }
@@ -230,7 +230,7 @@ mod tests {
     fn a_motion_comes_to_rest_with_continuous_acceleration() {
         let motion = moving();
         let base = Motion { pose: motion.pose, ..TaskState::at_rest([0.0; 6]).motion() };
-        let segment = Segment::to_rest(5_000_000_000, &motion.twist, &motion.acceleration, &LIMITS);
+        let segment = QuinticOffset::to_rest(5_000_000_000, &motion.twist, &motion.acceleration, &LIMITS);
         let first = segment.displace(&base, 5_000_000_000);
         assert!((first.twist.vector() - motion.twist.vector()).norm() < 1e-12);
         assert!((first.acceleration.vector() - motion.acceleration.vector()).norm() < 1e-12);
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn a_segment_without_displacement_has_the_minimum_duration() {
-        let segment = Segment::to_rest(9, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
+        let segment = QuinticOffset::to_rest(9, &twist([0.0; 6]), &Acceleration::default(), &LIMITS);
         assert!(!segment.has_ended(9) && segment.has_ended(9 + 20_000_001));
     }
 }
