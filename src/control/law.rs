@@ -38,10 +38,14 @@ use crate::model::task::TaskState;
 /// Control mode: on which errors feedback acts, and with which terms of the dynamics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ControlMode {
+    /// Inverse dynamics at the measured pose, with feedback on errors of the pose.
     #[default]
     ComputedTorque,
+    /// Inverse dynamics of the desired motion, with feedback on errors of the legs.
     FeedforwardJointPd,
+    /// Weight at the desired pose, with feedback on errors of the legs.
     GravityJointPd,
+    /// Feedback on errors of the legs alone, without the dynamics.
     JointPd,
 }
 
@@ -69,9 +73,11 @@ impl ControlMode {
 /// Control law of one deployment: mode, gains, observer.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
+    /// Errors that feedback acts on and terms of the dynamics that are added.
     pub mode: ControlMode,
     /// Of the position, and of the legs.
     pub position: Gains,
+    /// Gains of the orientation; not used in modes that act on the legs.
     pub orientation: Gains,
     /// L of the disturbance observer \[1/s\]; 0 is without.
     pub observer: f64,

@@ -27,7 +27,9 @@ const MAX_CERTAIN_CONDITION: f64 = 300.0;
 /// Pose and twist of the platform at the instant of a measurement, and how near they are to a singularity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlatformState {
+    /// Measured pose by forward kinematics: R, and C \[m\], in the base frame.
     pub pose: Pose,
+    /// Measured omega \[rad/s\] and v \[m/s\], base axes.
     pub twist: Twist,
     /// Of the pose, see [`crate::model::sensitivity`].
     pub condition: f64,

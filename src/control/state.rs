@@ -111,6 +111,7 @@ impl Request {
 /// An operator's request with the identity of its message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OperatorRequest {
+    /// Change of state that the operator requests.
     pub request: Request,
     /// Epoch and sequence number of the message.
     pub message: (u64, u64),

@@ -59,6 +59,7 @@ impl TrackingError {
 /// Deviation that feedback acts on, desired minus measured: angles and positions, or leg lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
+    /// Desired minus measured: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,
     /// Its time derivative.
     pub rate: Vector6<f64>,

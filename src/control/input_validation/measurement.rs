@@ -1,6 +1,6 @@
 //! Validation of measurements: stroke, change of lengths and rates, and rates that are those of the lengths.
 
-use super::{LastValid, check_measurable_stroke, check_time_stamp, seconds_between, stroke};
+use super::{LastValid, check_measurable_stroke, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Measurement};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::machine::{Actuator, LEGS};
@@ -60,7 +60,7 @@ impl RateConsistency {
 
     fn check(&self, actuator: &Actuator) -> Result<(), Diagnostic> {
         for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
-            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * stroke(actuator);
+            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * actuator.stroke();
             if residual.abs() > bound {
                 let code = DiagnosticCode::RateInconsistent;
                 return Err(Diagnostic::new(code, residual.abs(), bound).at(leg));
@@ -149,7 +149,7 @@ impl MeasurementValidator {
         if dt < 0.0 {
             return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
         }
-        let noise = LENGTH_NOISE_RATIO * stroke(actuator);
+        let noise = LENGTH_NOISE_RATIO * actuator.stroke();
         let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
         check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
         let limit = cycle.constants.parameters.limits.position.acceleration;

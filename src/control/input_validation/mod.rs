@@ -83,7 +83,7 @@ pub(super) fn check_measurable_stroke(
     code: DiagnosticCode,
     length: &[f64; LEGS],
 ) -> Result<(), Diagnostic> {
-    check_stroke(actuator, STROKE_TOLERANCE_RATIO * stroke(actuator), code, length)
+    check_stroke(actuator, STROKE_TOLERANCE_RATIO * actuator.stroke(), code, length)
 }
 
 /// Whether all lengths are within the stroke and `tolerance` \[m\].
@@ -104,10 +104,6 @@ fn check_stroke(
         }
     }
     Ok(())
-}
-
-fn stroke(actuator: &Actuator) -> f64 {
-    actuator.max_length - actuator.min_length
 }
 
 /// `to - from` in seconds, either sign.

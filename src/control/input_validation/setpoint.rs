@@ -1,6 +1,6 @@
 //! Validation of setpoints: limits, envelope, stroke, room to stop, and the continuation of the one before.
 
-use super::{LastValid, check_stroke, check_time_stamp, seconds_between, stroke};
+use super::{LastValid, check_stroke, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Setpoint};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::limits::{Limit, LimitSet, Limits};
@@ -29,7 +29,9 @@ const ENVELOPE_ROUNDING: f64 = 1e-9;
 /// A setpoint with the motion of the platform it describes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SetpointMotion {
+    /// The setpoint as received: time stamp and X, X', X''.
     pub setpoint: Setpoint,
+    /// Pose, twist and acceleration of the platform at its time stamp, base axes.
     pub motion: Motion,
 }
 
@@ -153,6 +155,7 @@ fn check_resumption(
 pub struct SetpointCheck {
     /// The limits that the setpoint is near to, up to the check that failed.
     pub active_limits: LimitSet,
+    /// `Ok` if the setpoint passed every check, else the diagnostic of the first that failed.
     pub result: Result<(), Diagnostic>,
 }
 
@@ -249,7 +252,7 @@ fn check_room_to_stop(
     let length = stop.lengths(machine);
     let middle = 0.5 * (actuator.min_length + actuator.max_length);
     let distance = length.iter().fold(0.0_f64, |largest, length| largest.max((length - middle).abs()));
-    active.check(Limit::Stroke, distance / (0.5 * stroke(actuator)));
+    active.check(Limit::Stroke, distance / (0.5 * actuator.stroke()));
     check_stroke(actuator, 0.0, DiagnosticCode::SetpointOutOfReach, &length)?;
     let (stop, home) = (stop.sensitivity(), home.sensitivity());
     // The way to the other side of a singularity crosses it: the condition has no bound there.
@@ -285,7 +288,7 @@ fn check_continuation(
         return Err(Diagnostic::new(DiagnosticCode::SetpointStampInvalid, -dt, 0.0));
     }
     let (now, before) = (&now.motion, &before.motion);
-    let tolerance = CONTINUATION_TOLERANCE_PER_STROKE * stroke(&machine.actuator);
+    let tolerance = CONTINUATION_TOLERANCE_PER_STROKE * machine.actuator.stroke();
     let time = dt.min(window_s);
     let moved = before.pose.displacement_to(&now.pose);
     let rates = |motion: &Motion| [motion.twist.angular, motion.twist.linear];
