@@ -96,6 +96,7 @@
 #[cfg(feature = "daemon")]
 pub mod analysis;
 #[cfg(feature = "daemon")]
+#[allow(missing_docs, reason = "the command line: its help texts document it")]
 pub mod commands;
 #[cfg(feature = "daemon")]
 pub mod config;

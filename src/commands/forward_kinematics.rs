@@ -11,7 +11,7 @@ use super::progress::item_bar;
 use crate::model::forward_kinematics::{Tracker, TrackingResult};
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Twist;
-use crate::model::task::{TaskState, task_coordinates};
+use crate::model::task::task_coordinates;
 use crate::output::csv_table::{NumberTable, coordinates, legs, length_columns, six};
 use crate::output::csv_writer::CsvWriter;
 
@@ -60,7 +60,7 @@ pub fn forward_kinematics(
     }
     let mut writer = CsvWriter::new(&columns);
     let mut unsolved = UnsolvedRows::new("did not converge (column converged)");
-    let home = Tracker::new(machine, TaskState::at_rest(machine.home).motion().pose);
+    let home = Tracker::new(machine, machine.home_pose());
     let (mut tracker, mut near) = (home, machine.home);
     for row in table.rows().iter().progress_with(item_bar(table.rows().len(), "rows")) {
         if start == StartPose::Home {

@@ -10,9 +10,13 @@ use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
 /// Control loop with the longest delay that the daemon may have.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlLoop {
+    /// Name for people: `position`, `orientation` or `legs`.
     pub name: &'static str,
+    /// Natural frequency of the error dynamics \[Hz\].
     pub bandwidth_hz: f64,
+    /// Cycles per second \[Hz\].
     pub rate_hz: f64,
+    /// The loop without units, with its longest delay in periods; its margins decide stability.
     pub sampled: SampledLoop,
 }
 

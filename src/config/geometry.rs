@@ -12,7 +12,6 @@ use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::inverse_jacobian::condition;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
-use crate::model::task::TaskState;
 
 /// Distance below which two points coincide, as a share of the joints' radius: a micrometre on a machine of a metre,
 /// less than any joint can be placed or measured. The equations would allow two joints in one place, as on
@@ -35,7 +34,7 @@ pub(super) fn check(machine: &Machine, legs: &[LegSection], home: &SectionReader
     let base_spans = check_joints(legs, "base_m", |leg| leg.base);
     let platform_spans = check_joints(legs, "platform_m", |leg| leg.platform);
 
-    let pose = TaskState::at_rest(machine.home).motion().pose;
+    let pose = machine.home_pose();
     let complete = check_legs(machine, legs, &pose);
     if base_spans && platform_spans && complete {
         check_condition(machine, legs, &pose, home);

@@ -40,7 +40,7 @@ pub(super) fn assess(
     (Findings { localization: platform, engagement, tracking, has_ended }, active_limits)
 }
 
-/// Control may begin only where it is no motion by itself: near the setpoint in pose and velocity.
+/// Control may begin only if closing the loop does not itself move the platform: near the setpoint in pose and velocity.
 fn check_engage_tolerance(parameters: &Parameters, error: Option<&TrackingError>) -> Result<(), Diagnostic> {
     let Some(error) = error else { return Err(DiagnosticCode::NoSetpoint.into()) };
     let ratio = error.tolerance_ratio(parameters);

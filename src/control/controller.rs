@@ -23,15 +23,20 @@ use crate::model::task::TaskState;
 /// Task coordinates, with their derivatives, that the platform shall have at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Setpoint {
+    /// Instant for which the setpoint holds, on the clock of the releases \[ns\].
     pub time_ns: u64,
+    /// X, X', X'' at that instant.
     pub task: TaskState,
 }
 
 /// Lengths \[m\] and rates \[m/s\] of the legs at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measurement {
+    /// Instant of the measurement, on the clock of the releases \[ns\].
     pub time_ns: u64,
+    /// Measured leg lengths L, from base joint to platform joint \[m\].
     pub length: [f64; LEGS],
+    /// Measured leg rates L' \[m/s\].
     pub rate: [f64; LEGS],
 }
 
@@ -53,6 +58,7 @@ pub struct Input {
 /// Result of one cycle: forces, state, and the numbers that explain them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
+    /// State of the controller from this cycle on; it decides whether the forces are valid.
     pub state: State,
     /// Why the state is not active, or soon will not be; code `None` while engaging and active.
     pub diagnostic: Diagnostic,

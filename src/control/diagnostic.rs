@@ -21,10 +21,24 @@ pub enum Reaction {
 pub enum BoundDescription {
     /// The code has no number.
     None,
-    /// A quantity in `unit`, one-sided: `relation` is "exceeds", two-sided: "is outside".
-    Absolute { quantity: &'static str, unit: &'static str, relation: &'static str, bound: &'static str },
+    /// A quantity with a unit, compared with a bound in the same unit.
+    Absolute {
+        /// Name of the quantity.
+        quantity: &'static str,
+        /// Unit of value and bound; empty for a number without unit.
+        unit: &'static str,
+        /// "exceeds" if the bound is one-sided, "is outside" if it is one of two.
+        relation: &'static str,
+        /// Source of the bound: a key of the configuration, or words.
+        bound: &'static str,
+    },
     /// A quantity as a multiple of its bound.
-    Ratio { quantity: &'static str, bound: &'static str },
+    Ratio {
+        /// Name of the quantity.
+        quantity: &'static str,
+        /// Source of the bound, which is 1 in this ratio.
+        bound: &'static str,
+    },
 }
 
 const fn absolute(
@@ -191,9 +205,11 @@ impl DiagnosticCode {
 /// Result of a check: what happened, the number that was found and its bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Diagnostic {
+    /// Event that the check found, with its reaction and remedy.
     pub code: DiagnosticCode,
     /// In the unit of [`DiagnosticCode::comparison`]; 0 if there is no number, as `bound`.
     pub value: f64,
+    /// Bound that `value` was compared with, in the same unit.
     pub bound: f64,
     /// Leg or axis, from 1; 0 if the code concerns neither.
     pub index: u32,

@@ -19,9 +19,9 @@
 //!
 //! The law combines two instants. The error is taken at the instant of the measurement, where both sides are
 //! known. The force is needed for the middle of the interval in which it will be held, about a period
-//! later. Mixing them would make every delay look like a tracking error of speed times delay. So the
-//! error is used unchanged, and the present pose is where the platform will be if the error stays as it is: the
-//! desired motion at that later instant, displaced by minus the error.
+//! later. Subtracting quantities of different instants would add speed times delay to the error. So the
+//! error of the measurement's instant is held, and the pose for the dynamics is the desired pose at the later instant minus
+//! that error.
 
 use nalgebra::Vector6;
 
@@ -38,10 +38,14 @@ use crate::model::task::TaskState;
 /// Control mode: on which errors feedback acts, and with which terms of the dynamics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ControlMode {
+    /// Inverse dynamics at the measured pose, with feedback on errors of the pose.
     #[default]
     ComputedTorque,
+    /// Inverse dynamics of the desired motion, with feedback on errors of the legs.
     FeedforwardJointPd,
+    /// Weight at the desired pose, with feedback on errors of the legs.
     GravityJointPd,
+    /// Feedback on errors of the legs alone, without the dynamics.
     JointPd,
 }
 
@@ -69,9 +73,11 @@ impl ControlMode {
 /// Control law of one deployment: mode, gains, observer.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
+    /// Errors that feedback acts on and terms of the dynamics that are added.
     pub mode: ControlMode,
     /// Of the position, and of the legs.
     pub position: Gains,
+    /// Gains of the orientation; not used in modes that act on the legs.
     pub orientation: Gains,
     /// L of the disturbance observer \[1/s\]; 0 is without.
     pub observer: f64,
@@ -132,7 +138,7 @@ impl Law {
         FeedbackError { value: deviation.value + rate * dt, rate }
     }
 
-    /// The motion whose inverse dynamics are the forces of computed torque: where the platform will be at the
+    /// Pose, twist and acceleration at which computed torque evaluates the inverse dynamics: where the platform will be at the
     /// instant of `desired` if `error` stays as it is, with `acceleration` added.
     pub fn command(&self, desired: &Motion, error: &TrackingError, acceleration: &Vector6<f64>) -> Motion {
         let (e, e_rate) = (&error.pose, &error.twist);

@@ -16,22 +16,22 @@ use nalgebra::{Matrix6, Vector6};
 
 use crate::model::machine::Machine;
 use crate::model::mass_matrix::MassMatrix;
-use crate::model::task::TaskState;
 
 /// Effective mass of each drive at the home pose, and the loop gains of the softest and stiffest mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LegMasses {
     /// `m_i` \[kg\].
     pub mass: Vector6<f64>,
-    /// Least and greatest loop gain of a mode, times that of the law.
+    /// Least loop gain of a mode, times that of the law.
     pub softest: f64,
+    /// Greatest loop gain of a mode, times that of the law; it decides the stability of the loop.
     pub stiffest: f64,
 }
 
 impl LegMasses {
     /// At the home pose; NaN if the machine has no mass.
     pub fn at_home(machine: &Machine) -> Self {
-        let home = TaskState::at_rest(machine.home).motion().pose;
+        let home = machine.home_pose();
         let mobility = MassMatrix::new(machine).leg_mobility(&home).unwrap_or(Matrix6::repeat(f64::NAN));
         let mass = mobility.diagonal().map(f64::recip);
         let roots = Matrix6::from_diagonal(&mass.map(f64::sqrt));

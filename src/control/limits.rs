@@ -20,15 +20,25 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Limit {
+    /// Actuator force, `actuator.max_force_n` \[N\].
     Force = 0,
+    /// Change of an actuator's force, `limits.force_rate_n_s` \[N/s\].
     ForceRate = 1,
+    /// Leg length, `actuator.min_length_m` to `actuator.max_length_m` \[m\].
     Stroke = 2,
+    /// Rate of a leg's length, `actuator.max_rate_m_s` \[m/s\].
     LegRate = 3,
+    /// Range of X, `[envelope]` \[rad\], \[m\].
     Envelope = 4,
+    /// Velocity of the platform, `limits.velocity_*` \[rad/s\], \[m/s\].
     Velocity = 5,
+    /// Acceleration of the platform, `limits.acceleration_*` \[rad/s^2\], \[m/s^2\].
     Acceleration = 6,
+    /// Jerk of the platform, `limits.jerk_*` \[rad/s^3\], \[m/s^3\].
     Jerk = 7,
+    /// Following error while active, `control.following_*` \[rad\], \[m\].
     Following = 8,
+    /// Condition of the pose, `limits.condition`; without unit.
     Condition = 9,
 }
 
@@ -98,7 +108,9 @@ impl LimitSet {
 /// Largest velocity, acceleration and jerk of a reference, for position and orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
+    /// Limits of the position of C \[m\], per second.
     pub position: DerivativeLimits,
+    /// Limits of the orientation \[rad\], per second.
     pub orientation: DerivativeLimits,
     /// Factor on the limits for the autonomous motions, onto the setpoint and home.
     pub autonomous_scale: f64,
@@ -107,8 +119,11 @@ pub struct Limits {
 /// Largest magnitudes of the derivatives of a position \[m\] or an orientation \[rad\], per second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DerivativeLimits {
+    /// Largest magnitude of the first derivative \[m/s\] or \[rad/s\].
     pub velocity: f64,
+    /// Largest magnitude of the second derivative \[m/s^2\] or \[rad/s^2\].
     pub acceleration: f64,
+    /// Largest magnitude of the third derivative \[m/s^3\] or \[rad/s^3\].
     pub jerk: f64,
 }
 

@@ -15,19 +15,21 @@ use crate::model::machine::LEGS;
 use crate::model::rigid::{Pose, Twist};
 use crate::model::sensitivity::Sensitivity;
 
-/// Bound on the trusted steps of forward kinematics in one cycle under control. One is far more than a cycle's
-/// motion; after a pause of the measurements it may take some.
+/// Most Newton steps per cycle under control. One step covers far more than a cycle's motion; after a gap in the
+/// measurements several may be needed.
 const MAX_NEWTON_STEPS_PER_CYCLE: u32 = 8;
 
-/// From this condition on (or from `limits.condition`, if that is less) the assembly mode is uncertain after a motion
-/// longer than a trusted step. Such poses are within a hundredth of the radius or of a radian of a singularity: no
-/// platform crosses that between two measurements.
+/// Above this condition (or `limits.condition`, if that is less) a change of pose longer than a trusted step, within which
+/// forward kinematics has one solution, may have crossed a singularity. Below it, the singularity is too far away to be
+/// crossed between two measurements.
 const MAX_CERTAIN_CONDITION: f64 = 300.0;
 
 /// Pose and twist of the platform at the instant of a measurement, and how near they are to a singularity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlatformState {
+    /// Measured pose by forward kinematics: R, and C \[m\], in the base frame.
     pub pose: Pose,
+    /// Measured omega \[rad/s\] and v \[m/s\], base axes.
     pub twist: Twist,
     /// Of the pose, see [`crate::model::sensitivity`].
     pub condition: f64,
@@ -141,8 +143,8 @@ impl Localization {
     }
 
     /// Beyond a singularity are poses with the same lengths as before it, and forward kinematics cannot distinguish
-    /// them. The assembly mode is uncertain if, near one, the platform moves so far in one measurement that the next
-    /// may come from there.
+    /// them. Near one the assembly mode is uncertain if the change of pose is so long that the next measurement may
+    /// belong to the other branch.
     fn is_assembly_mode_uncertain(&self, constants: &Constants, start: &Pose) -> bool {
         let kinematic_state = self.tracker.kinematic_state();
         let Sensitivity { condition, trusted_step, .. } = *kinematic_state.sensitivity();
@@ -157,7 +159,7 @@ impl Localization {
         *self.assembly_mode_fault.insert(Diagnostic::new(DiagnosticCode::SingularPose, condition, bound))
     }
 
-    /// The lengths are further away than the steps of a cycle. All legs have moved by the same part of their way.
+    /// Diagnostic of lengths that the steps of one cycle do not reach. Its bound is the largest change of a leg reached.
     fn jump_diagnostic(
         &self,
         constants: &Constants,

@@ -7,12 +7,13 @@ use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
-use crate::model::task::TaskState;
 
 /// Parameters that a deployment chooses for a controller. Times are in nanoseconds, like the clock.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
+    /// Time from one cycle to the next \[ns\]; each force is held this long.
     pub period_ns: u64,
+    /// Control law with its gains and disturbance observer.
     pub law: Law,
     /// Which terms of the dynamics are evaluated. Inertia must be one of them: the law commands an
     /// acceleration, and without inertia there would be no feedback.
@@ -56,7 +57,9 @@ impl Parameters {
 /// Range of the setpoint: lowest and highest X.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Envelope {
+    /// Lowest value of each coordinate of X \[rad\], \[m\].
     pub lowest: [f64; 6],
+    /// Highest value of each coordinate of X \[rad\], \[m\].
     pub highest: [f64; 6],
 }
 
@@ -70,7 +73,7 @@ pub(super) struct Constants {
 
 impl Constants {
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
-        let home = KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose);
+        let home = KinematicState::new(machine, machine.home_pose());
         Self { dynamics: InverseDynamics::new(machine), parameters, home }
     }
 

@@ -107,9 +107,9 @@ fn longer_duration_s(
     MIN_DURATION_S.max(duration_s(orientation, d_r, v_r, a_r)).max(duration_s(position, d_p, v_p, a_p))
 }
 
-/// Duration of the quintic from d, v, a to zero. Its peaks are at most `1.875 d / T` (velocity),
-/// `5.774 d / T^2 + 6 v / T + a` and `60 d / T^3 + 36 v / T^2 + 9 a / T`. With the second within the
-/// limit A, the third is at most `10.39 A / T`: no cubic equation is left.
+/// Duration of the quintic from d, v, a to zero. Upper bounds of peak velocity, acceleration and jerk are `1.875 d / T`,
+/// `5.774 d / T^2 + 6 v / T + a` and `60 d / T^3 + 36 v / T^2 + 9 a / T`. Where the second is within the limit A, the third
+/// is at most `10.39 A / T`, so that T has a closed form.
 fn duration_to_zero_s(limit: &DerivativeLimits, d: f64, v: f64, a: f64) -> f64 {
     // At least half of the limit is for the displacement.
     let free = (limit.acceleration - a).max(0.5 * limit.acceleration);
@@ -118,7 +118,7 @@ fn duration_to_zero_s(limit: &DerivativeLimits, d: f64, v: f64, a: f64) -> f64 {
     by_velocity.max(by_acceleration).max(10.39 * limit.acceleration.max(a) / limit.jerk)
 }
 
-/// Duration of the cubic from v with v' = a to rest. Its peaks are at most `1.5 v / T + a / 3`, or a, and
+/// Duration in which a cubic profile of the velocity goes from v, with slope a, to rest. Its peaks are at most `1.5 v / T + a / 3`, or a, and
 /// `6 v / T^2 + 4 a / T`.
 fn duration_to_rest_s(limit: &DerivativeLimits, _: f64, v: f64, a: f64) -> f64 {
     let free = (limit.acceleration - a / 3.0).max(0.2 * limit.acceleration);

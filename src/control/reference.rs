@@ -14,19 +14,19 @@ use super::tracking_error::{FeedbackError, TrackingError};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
-/// Least step of a resuming setpoint over the engage tolerance that is worth a segment; a smaller one comes from time
-/// stamps and rounding.
+/// Smallest jump after a gap in the setpoints, relative to the engage tolerance, that is blended; smaller ones come from
+/// time stamps and rounding.
 const MIN_BLEND_RATIO: f64 = 0.05;
 
 /// Reference of a state.
 #[derive(Clone, Copy, Debug, Default)]
 enum Reference {
-    /// The setpoint; without control, too.
+    /// The setpoint; also the value while there is no control.
     #[default]
     Setpoint,
     /// The setpoint, with a displacement that decays.
     OntoSetpoint(QuinticOffset),
-    /// A displaced pose at rest.
+    /// A fixed pose (where the stop began, or home) plus an offset that varies in time.
     FromPose(Pose, QuinticOffset),
 }
 
@@ -108,7 +108,7 @@ impl ReferenceGenerator {
         let has_jerk = step(command.linear, next.acceleration.linear) > limits.position.jerk * period_s
             || step(command.angular, next.acceleration.angular) > limits.orientation.jerk * period_s;
         if has_jerk {
-            // With the full limits, as a stop: a delay is a deviation from the planned path.
+            // With the full limits, as for a stop: a slower blend would stay off the planned path for longer.
             self.reference = onto_setpoint(parameters, setpoint, &present, now_ns, 1.0);
         }
         has_jerk

@@ -4,10 +4,10 @@
 //! | --- | --- | --- |
 //! | off | not valid: brake | the pose is known: standby; after the request `off`: `clear`, `engage` or `park` |
 //! | standby | not valid: brake | `engage`: engaging; `park`: parking; the pose is lost: off |
-//! | engaging | controlled, from where the platform stands onto the setpoint | on the setpoint: active |
+//! | engaging | controlled, from where the platform stands onto the setpoint | on the setpoint: active; `stop`, `park`, a setpoint that ended or was lost: stopping |
 //! | active | controlled, on the setpoint | `stop`, `park`, a setpoint that ended or was lost: stopping |
 //! | stopping | controlled, to rest along the present motion | at rest: standby, parking or fault |
-//! | parking | controlled, to the home pose | at home: off |
+//! | parking | controlled, to the home pose | at home: off; `stop`, a fault that stops: stopping |
 //! | fault | not valid: brake | `clear`: off, and on to standby |
 //!
 //! In every state `off` leads to off and `estop` to fault, within the cycle; only `clear` ends a fault. There is no
@@ -111,6 +111,7 @@ impl Request {
 /// An operator's request with the identity of its message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OperatorRequest {
+    /// Change of state that the operator requests.
     pub request: Request,
     /// Epoch and sequence number of the message.
     pub message: (u64, u64),

@@ -22,6 +22,7 @@ pub enum AfterStop {
 /// State of the controller, with its reason and the goal of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mode {
+    /// State of the controller; it decides whether forces are applied.
     pub state: State,
     /// Why it is not active, or soon will not be.
     pub diagnostic: Diagnostic,

@@ -39,8 +39,8 @@ impl TrackingError {
         }
     }
 
-    /// The error over the engage tolerance, the largest of its four parts. An error of velocity weighs as much as
-    /// the error of pose to which the law gives the same force, `wn` times as large.
+    /// The error over the engage tolerance, the largest of its four parts. A velocity error is
+    /// divided by `wn = sqrt(Kp)`, so that it compares with a pose error.
     pub(super) fn tolerance_ratio(&self, parameters: &Parameters) -> f64 {
         let Parameters { law, engage_position, engage_orientation, .. } = parameters;
         let ratio = |pose: f64, rate: f64, tolerance: f64, stiffness: f64| {
@@ -59,6 +59,7 @@ impl TrackingError {
 /// FeedbackError that feedback acts on, desired minus measured: angles and positions, or leg lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedbackError {
+    /// Desired minus measured: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,
     /// Its time derivative.
     pub rate: Vector6<f64>,
@@ -131,7 +132,7 @@ pub(super) struct ErrorTracker {
 
 impl ErrorTracker {
     /// The error against the reference followed so far; while there is no new measurement, its prediction. Without
-    /// control it needs a setpoint that may be followed.
+    /// control the result is `None` unless the setpoint is valid and recent.
     pub fn update(
         &mut self,
         cycle: &Cycle<'_>,

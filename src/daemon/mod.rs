@@ -35,14 +35,19 @@ pub const REALTIME_THREAD: &str = "hexad-rt";
 /// Why the daemon did not run.
 #[derive(Debug, thiserror::Error)]
 pub enum DaemonError {
+    /// A call to the shared memory failed, such as opening a topic.
     #[error(transparent)]
     Port(#[from] PortError),
+    /// The operating system refused to start a thread.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] io::Error),
+    /// The kernel refused steps of the real-time set-up, and the deployment requires them all.
     #[error("realtime.require_realtime is set, and there is {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     NotRealtime(Vec<Shortfall>),
+    /// The named thread panicked or ended before it was stopped.
     #[error("the {0} thread ended unexpectedly")]
     Died(&'static str),
+    /// The report or another file of the run could not be written.
     #[error(transparent)]
     Report(#[from] FileError),
 }

@@ -17,8 +17,11 @@ use crate::realtime::usage::ThreadUsage;
 /// Report of a run: timing, tracking, resources and faults.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
+    /// Number of cycles run since start.
     pub cycles: u64,
+    /// Configured rate of the cycles \[Hz\].
     pub rate_hz: f64,
+    /// Numbers of cycles that were late or not run.
     pub deadline_misses: DeadlineMisses,
     /// Release to the first instruction of the cycle.
     pub wakeup_ns: Times,
@@ -30,20 +33,26 @@ pub struct Report {
     pub end_to_end_ns: Times,
     /// The worst first.
     pub worst_cycles: Vec<WorstCycle>,
+    /// Tracking error over the cycles in state `active`.
     pub tracking: Tracking,
+    /// Resources of the real-time thread from the first release to the end of the last cycle.
     pub rt_thread: ThreadUsage,
     /// It allocates only while a peer connects or disappears.
     pub io_thread: ThreadUsage,
     /// It allocates only to log a change of state.
     pub log_thread: ThreadUsage,
+    /// The first faults of the run, in the order of their cycles.
     pub faults: Vec<Fault>,
 }
 
 /// Numbers of missed deadlines, by kind.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct DeadlineMisses {
+    /// Cycles that began later after their release than the configured threshold.
     pub late_wakeup: u64,
+    /// Cycles still computing at their next release.
     pub overrun: u64,
+    /// Release instants for which no cycle was run.
     pub skipped: u64,
     /// Cycles run at once because their release had passed; not misses of their own.
     pub caught_up: u64,
@@ -52,17 +61,24 @@ pub struct DeadlineMisses {
 /// Desired minus actual pose.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Tracking {
+    /// Root mean square of the distance between desired and actual position \[m\].
     pub position_rms_m: f64,
+    /// Largest distance between desired and actual position \[m\].
     pub position_max_m: f64,
+    /// Root mean square of the angle between desired and actual orientation \[rad\].
     pub orientation_rms_rad: f64,
+    /// Largest angle between desired and actual orientation \[rad\].
     pub orientation_max_rad: f64,
 }
 
 /// Fault that ended control.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Fault {
+    /// Number of the cycle that entered the fault, from 1.
     pub cycle: u64,
+    /// Number of the [`DiagnosticCode`](crate::control::diagnostic::DiagnosticCode).
     pub number: u32,
+    /// Name of that code, in words.
     pub name: String,
 }
 

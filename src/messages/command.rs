@@ -8,6 +8,7 @@ use crate::control::state::{OperatorRequest, Request};
 message! {
     /// Operator request, one per message.
     CommandMessage = "hexad_command" on "command" schema 5 {
+        /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// Number of the `Request`.
         request: u32,

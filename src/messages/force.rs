@@ -13,6 +13,7 @@ message! {
     /// applicable message for too long. A message is applicable only if schema and checksum are right, the sequence
     /// number increases and `time_ns` is neither in the future nor too old.
     ForceMessage = "hexad_force" on "force" schema 5 sealed by checksum {
+        /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// Gamma; positive pushes the platform away from the base. Zero unless valid.
         force_n: [f64; 6] ["N"],

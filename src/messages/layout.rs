@@ -10,9 +10,13 @@ pub struct Layout {
     pub type_name: &'static str,
     /// `None` for a struct that is part of a message.
     pub topic: Option<Topic>,
+    /// Size of the struct \[bytes\].
     pub size: usize,
+    /// Alignment of the struct \[bytes\].
     pub align: usize,
+    /// The fields in the order of their offsets, without gaps.
     pub fields: &'static [Field],
+    /// Meaning of the struct, from its doc comment.
     pub doc: &'static str,
 }
 
@@ -28,7 +32,9 @@ pub struct Topic {
 /// One field of a [`Layout`].
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
+    /// Name of the field, the same in every language.
     pub name: &'static str,
+    /// Type of the value, or of each element of an array.
     pub kind: Kind,
     /// Number of elements of an array; `None` for a single value.
     pub count: Option<usize>,
@@ -36,21 +42,28 @@ pub struct Field {
     pub offset: usize,
     /// Empty for a number without unit.
     pub unit: &'static str,
+    /// Meaning of the field, from its doc comment.
     pub doc: &'static str,
 }
 
 /// Type of a field or of the elements of an array.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
+    /// Unsigned integer of 32 bits.
     U32,
+    /// Unsigned integer of 64 bits.
     U64,
+    /// IEEE 754 number of 64 bits.
     F64,
+    /// Another struct declared by `message!`, with its layout.
     Struct(&'static Layout),
 }
 
 /// A type that a message may contain: a number, an array, a struct declared by `message!`.
 pub trait FieldType {
+    /// Type of the value, or of each element of an array.
     const KIND: Kind;
+    /// Number of elements of an array; `None` for a single value.
     const COUNT: Option<usize> = None;
 
     /// Calls `visit` with each number in order, as a float and as the bytes in memory.
@@ -59,6 +72,7 @@ pub trait FieldType {
 
 /// A struct declared by `message!`.
 pub trait Declared: FieldType {
+    /// Description of the struct in memory; declarations in other languages follow from it.
     const LAYOUT: Layout;
 
     /// All numbers of the struct, in the order of [`Layout::columns`].

@@ -8,6 +8,7 @@ use crate::control::controller::Measurement;
 message! {
     /// Measured leg lengths and rates, and optionally a measured pose.
     MeasuredMessage = "hexad_measured" on "measured" schema 5 {
+        /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// L.
         length_m: [f64; 6] ["m"],

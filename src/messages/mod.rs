@@ -80,8 +80,10 @@ pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
     /// Version of the message. Any change of layout or meaning raises it, also of a struct that it contains.
     const SCHEMA: u32;
 
+    /// Schema version, publisher, sequence number and time stamp of the message.
     fn header(&self) -> &Header;
 
+    /// The header for the publisher to fill in.
     fn header_mut(&mut self) -> &mut Header;
 
     /// Fills in the checksum, if the message has one.

@@ -9,6 +9,7 @@ use crate::model::task::TaskState;
 message! {
     /// Desired motion of the platform: X = alpha, beta, gamma, x, y, z and its derivatives.
     SetpointMessage = "hexad_setpoint" on "setpoint" schema 5 {
+        /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// X.
         x: [f64; 6] ["rad, m"],

@@ -73,6 +73,7 @@ message! {
 message! {
     /// Totals of the cyclic loop since start.
     LoopCounters = "hexad_loop_counters" {
+        /// Cycles run.
         cycles: u64,
         /// Cycles that woke later than the configured threshold.
         late_wakeups: u64,

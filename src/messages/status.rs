@@ -26,6 +26,7 @@ message! {
 message! {
     /// State of the daemon, published every cycle.
     StatusMessage = "hexad_status" on "status" schema 5 {
+        /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// Number of the `State`.
         state: u32,

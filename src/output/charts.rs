@@ -39,6 +39,7 @@ pub struct Series<'a> {
     pub label: &'a str,
     /// Points in drawing order. Those that are not finite are left out.
     pub points: &'a [(f64, f64)],
+    /// Solid or dashed: measured or commanded.
     pub style: LineStyle,
     /// Index into the palette, which repeats after its last.
     pub color: usize,
@@ -78,6 +79,7 @@ impl Series<'_> {
 pub struct Panel<'a> {
     /// Quantity and unit, such as `position [mm]`.
     pub y_label: &'a str,
+    /// Lines of the panel; the range of the y axis covers them all.
     pub series: Vec<Series<'a>>,
 }
 

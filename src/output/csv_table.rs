@@ -21,8 +21,10 @@ const MAX_ROWS: usize = 10_000_000;
 /// Error of reading a table: the file, or its content.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
+    /// The file could not be read.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The content is not the expected table: one message for each error.
     #[error("{}", .0.join("\n"))]
     Content(Vec<String>),
 }

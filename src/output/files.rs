@@ -11,7 +11,9 @@ use serde::Serialize;
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {cause}", path.display())]
 pub struct FileError {
+    /// Path of the file, as given.
     pub path: PathBuf,
+    /// Error of the operating system or of the file's format.
     pub cause: io::Error,
 }
 

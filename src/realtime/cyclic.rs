@@ -32,11 +32,13 @@ pub struct Timing {
     pub period_ns: u64,
     /// Offset of the grid from the multiples of the period.
     pub phase_ns: u64,
+    /// Event that begins a cycle: a point of the grid or a message.
     pub release: ReleaseMode,
     /// Hybrid: longest spin before a release.
     pub max_lead_ns: u64,
     /// External: when no message arrives for this long, a cycle is run without one, so that the loss is noticed.
     pub timeout_ns: u64,
+    /// Policy after cycles whose release has passed: skip them, catch up, or report a fault.
     pub on_overrun: OverrunPolicy,
     /// A wake-up later than this after its release is a miss.
     pub late_wakeup_ns: u64,
@@ -94,17 +96,22 @@ pub struct CycleRecord<I, O> {
     pub cycle: u64,
     /// CLOCK_MONOTONIC instant at which it was due \[ns\].
     pub due_ns: u64,
+    /// Release to the first instruction of the cycle \[ns\].
     pub wakeup_ns: u64,
+    /// First instruction of the cycle to its output \[ns\].
     pub compute_ns: u64,
     /// The io thread wrote no new input since the last cycle.
     pub io_late: bool,
+    /// Input that the cycle used.
     pub input: I,
+    /// Output that the cycle computed.
     pub output: O,
 }
 
 /// Resources and counters of the loop over a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LoopReport {
+    /// Numbers of cycles, missed deadlines and lost records since start.
     pub counters: LoopCounters,
     /// From the first release to the last cycle's end.
     pub usage: ThreadUsage,

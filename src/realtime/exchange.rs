@@ -24,20 +24,27 @@ pub struct CycleOutput<O> {
     pub due_ns: u64,
     /// Instant for which it was computed \[ns\]: `due_ns`, or where measurements release cycles the measurement's.
     pub release_ns: u64,
+    /// Output that the cycle computed, to be published.
     pub output: O,
+    /// Counters of the loop since start, this cycle included.
     pub counters: LoopCounters,
 }
 
 /// The real-time thread's ends.
 pub struct RealtimeSide<I, O> {
+    /// Reader of the newest input.
     pub inputs: Reader<CycleInput<I>>,
+    /// Writer of the output of each cycle.
     pub outputs: Writer<CycleOutput<O>>,
+    /// Event by which the io thread releases a cycle, with external release.
     pub event: Arc<Event>,
 }
 
 /// The io thread's ends.
 pub struct IoSide<I, O> {
+    /// Writer of the newest input.
     pub inputs: Writer<CycleInput<I>>,
+    /// Reader of the newest output.
     pub outputs: Reader<CycleOutput<O>>,
     /// Signals new inputs, with external release.
     pub event: Arc<Event>,

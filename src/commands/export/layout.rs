@@ -7,7 +7,6 @@ use nalgebra::{Matrix3, Rotation3, SymmetricEigen, UnitQuaternion, Vector3};
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::machine::{Link, Machine, TransverseInertia};
 use crate::model::rigid::Pose;
-use crate::model::task::TaskState;
 
 /// Least difference between the greatest principal moment and the sum of the others, as a share of the former. Flat
 /// plates have none, and engines reject a negative one, which rounding may make.
@@ -67,7 +66,7 @@ pub(super) fn legs(machine: &Machine) -> Vec<LegLayout> {
 
 /// The home pose.
 pub(super) fn home(machine: &Machine) -> Pose {
-    TaskState::at_rest(machine.home).motion().pose
+    machine.home_pose()
 }
 
 /// Quaternion `w x y z` of a rotation.

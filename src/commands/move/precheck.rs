@@ -40,11 +40,7 @@ impl<'a> Precheck<'a> {
         let machine = &config.machine;
         // The fidelity has no part in the decision about a setpoint.
         let parameters = daemon::parameters(machine, &config.deployment, Fidelity::Exact);
-        Self {
-            machine,
-            parameters,
-            home: KinematicState::new(machine, TaskState::at_rest(machine.home).motion().pose),
-        }
+        Self { machine, parameters, home: KinematicState::new(machine, machine.home_pose()) }
     }
 
     /// The same with a reserve to each limit; home at rest keeps the reduced limits too.

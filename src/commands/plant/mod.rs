@@ -3,7 +3,7 @@
 //! In real time its ticks are the multiples of the period. At each tick it simulates the time since the last one, with
 //! every force applied from the instant its message was sent, as a drive would; then it publishes lengths and rates. A
 //! force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if its message is valid
-//! ([`validation`]).
+//! (`validation`).
 
 use std::time::Instant;
 

@@ -126,7 +126,7 @@ impl Slice {
 
     /// Ranges around the pose, grown until the reach ends within them, then shrunk onto the reach.
     fn range_of_reach(&mut self, workspace: &PoseEvaluator, machine: &Machine) -> [(f64, f64); 2] {
-        let stroke = machine.actuator.max_length - machine.actuator.min_length;
+        let stroke = machine.actuator.stroke();
         let middles = self.plane.0.map(|axis| self.through.get(axis).copied().unwrap_or_default());
         let firsts =
             self.plane.0.map(|axis| if axis < 3 { FIRST_RANGE_RAD } else { FIRST_RANGE_STROKES * stroke });

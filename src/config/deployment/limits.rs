@@ -6,7 +6,6 @@ use crate::config::reader::SectionReader;
 use crate::control::limits::{DerivativeLimits, Limits as ReferenceLimits};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
-use crate::model::task::TaskState;
 
 /// Time from no force to the largest at the default force rate \[s\]: slower than any noise
 /// worth following, faster than any motion.
@@ -54,7 +53,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine) -> DeploymentL
 
 /// Largest condition. The default leaves room around a home that is badly conditioned; home must keep the limit.
 fn condition(section: &mut SectionReader, machine: &Machine) -> f64 {
-    let home = TaskState::at_rest(machine.home).motion().pose;
+    let home = machine.home_pose();
     let at_home = KinematicState::new(machine, home).sensitivity().condition;
     let limit = section.number_or("condition", DEFAULT_CONDITION.max(2.0 * at_home), Bound::Positive);
     if limit < at_home {

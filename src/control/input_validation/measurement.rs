@@ -1,6 +1,6 @@
 //! Validation of measurements: stroke, change of lengths and rates, and rates that are those of the lengths.
 
-use super::{LastValid, check_stroke_with_tolerance, check_time_stamp, seconds_between, stroke};
+use super::{LastValid, check_stroke_with_tolerance, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Measurement};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::machine::{Actuator, LEGS};
@@ -22,8 +22,8 @@ const RESIDUAL_NOISE_RATIO: f64 = 3e-4;
 /// Time constant of residual and travel \[s\]: long against the delay of a filter, short against a motion.
 const RESIDUAL_TIME_CONSTANT_S: f64 = 0.03;
 
-/// Acceleration that no drive gives a leg \[m/s^2\], five times gravity: an impact. If ten times the limit of
-/// acceleration is more, that counts.
+/// Acceleration that no drive gives a leg \[m/s^2\], five times gravity: more is an impact. The bound is the larger of
+/// this and ten times the linear acceleration limit.
 const MAX_LEG_ACCELERATION_M_S2: f64 = 50.0;
 const ACCELERATION_LIMIT_FACTOR: f64 = 10.0;
 
@@ -60,7 +60,7 @@ impl RateConsistency {
 
     fn check(&self, actuator: &Actuator) -> Result<(), Diagnostic> {
         for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
-            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * stroke(actuator);
+            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * actuator.stroke();
             if residual.abs() > bound {
                 let code = DiagnosticCode::RateInconsistent;
                 return Err(Diagnostic::new(code, residual.abs(), bound).at(leg));
@@ -80,7 +80,8 @@ pub(in crate::control) struct MeasurementValidator {
 }
 
 impl MeasurementValidator {
-    /// The last valid measurement if it is young enough, and under control was so when the cycle began.
+    /// The last valid measurement if it is recent. Under control, the one held before this cycle must also still be within
+    /// the timeout.
     pub fn validate(
         &mut self,
         cycle: &Cycle<'_>,
@@ -149,7 +150,7 @@ impl MeasurementValidator {
         if dt < 0.0 {
             return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
         }
-        let noise = LENGTH_NOISE_RATIO * stroke(actuator);
+        let noise = LENGTH_NOISE_RATIO * actuator.stroke();
         let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
         check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
         let limit = cycle.constants.parameters.limits.position.acceleration;

@@ -16,8 +16,8 @@ use crate::model::machine::{Actuator, LEGS};
 /// Tolerance at the ends of the stroke, as a ratio of the stroke: encoders have offsets, end stops have springs.
 const STROKE_TOLERANCE_RATIO: f64 = 0.02;
 
-/// The change that is plausible grows with the time since the last valid input, up to this many intervals of the
-/// messages: rejected ones must not widen it further. Two, as one message may get lost.
+/// The plausible change grows with the time since the last valid input, for at most this many intervals of the messages,
+/// so that a series of rejected inputs cannot widen it without limit. Two, as one message may get lost.
 const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
 
 /// The last valid input, and why the one after it was rejected.
@@ -38,8 +38,8 @@ impl<T> Default for LastValid<T> {
 }
 
 impl<T: Copy> LastValid<T> {
-    /// Longest time since the last valid input \[s\] over which a change counts as plausible: unbounded, as long as
-    /// no input was rejected since.
+    /// Upper bound on the time used for the plausible change \[s\]; infinite if no input was rejected since the last
+    /// valid one.
     pub fn plausibility_window_s(&self, now_ns: u64, period_ns: u64) -> f64 {
         if self.rejection.is_none() {
             return f64::INFINITY;
@@ -49,7 +49,7 @@ impl<T: Copy> LastValid<T> {
     }
 
     /// Records an input with the result of its validation. With `keep_first` the first of several rejections stays:
-    /// the later inputs may only be far from one that was valid long before.
+    /// later ones may be rejected merely because the last valid input is old.
     pub fn record(&mut self, input: T, result: Result<(), Diagnostic>, now_ns: u64, keep_first: bool) {
         (self.newest, self.newest_ns) = (Some(input), now_ns);
         match result {
@@ -83,7 +83,7 @@ pub(super) fn check_stroke_with_tolerance(
     code: DiagnosticCode,
     length: &[f64; LEGS],
 ) -> Result<(), Diagnostic> {
-    check_stroke(actuator, STROKE_TOLERANCE_RATIO * stroke(actuator), code, length)
+    check_stroke(actuator, STROKE_TOLERANCE_RATIO * actuator.stroke(), code, length)
 }
 
 /// Whether all lengths are within the stroke and `tolerance` \[m\].
@@ -104,10 +104,6 @@ fn check_stroke(
         }
     }
     Ok(())
-}
-
-fn stroke(actuator: &Actuator) -> f64 {
-    actuator.max_length - actuator.min_length
 }
 
 /// `to - from` in seconds, either sign.

@@ -1,6 +1,6 @@
 //! Validation of setpoints: limits, envelope, stroke, room to stop, and the continuation of the one before.
 
-use super::{LastValid, check_stroke, check_time_stamp, seconds_between, stroke};
+use super::{LastValid, check_stroke, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Setpoint};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::limits::{Limit, LimitSet, Limits};
@@ -20,16 +20,18 @@ const CONTINUATION_TOLERANCE_RATIO: f64 = 0.25;
 /// The constant part of that tolerance, as a ratio of the stroke: too small to do harm, and numbers are rounded.
 const CONTINUATION_TOLERANCE_PER_STROKE: f64 = 1e-4;
 
-/// Time in which the constant tolerance of the rate covers that of the position \[s\].
+/// The constant tolerance of the rate is that of the position divided by this time \[s\].
 const RATE_TOLERANCE_TIME_S: f64 = 0.1;
 
-/// A range without width is kept by what does not leave it by more than rounding \[rad\] or \[m\].
+/// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
 const ENVELOPE_ROUNDING: f64 = 1e-9;
 
 /// A setpoint with the motion of the platform it describes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SetpointMotion {
+    /// The setpoint as received: time stamp and X, X', X''.
     pub setpoint: Setpoint,
+    /// Pose, twist and acceleration of the platform at its time stamp, base axes.
     pub motion: Motion,
 }
 
@@ -133,7 +135,7 @@ impl SetpointValidator {
     }
 }
 
-/// After a gap the setpoint must be as near the continuation of the one before it as for engaging.
+/// After a gap the setpoint must be within the engage tolerance of the extrapolated previous one.
 // Out of line, as it is rare: the cycle stays short.
 #[inline(never)]
 fn check_resumption(
@@ -153,6 +155,7 @@ fn check_resumption(
 pub struct SetpointCheck {
     /// The limits that the setpoint is near to, up to the check that failed.
     pub active_limits: LimitSet,
+    /// `Ok` if the setpoint passed every check, else the diagnostic of the first that failed.
     pub result: Result<(), Diagnostic>,
 }
 
@@ -249,7 +252,7 @@ fn check_room_to_stop(
     let length = stop.lengths(machine);
     let middle = 0.5 * (actuator.min_length + actuator.max_length);
     let distance = length.iter().fold(0.0_f64, |largest, length| largest.max((length - middle).abs()));
-    active.check(Limit::Stroke, distance / (0.5 * stroke(actuator)));
+    active.check(Limit::Stroke, distance / (0.5 * actuator.stroke()));
     check_stroke(actuator, 0.0, DiagnosticCode::SetpointOutOfReach, &length)?;
     let (stop, home) = (stop.sensitivity(), home.sensitivity());
     // The way to the other side of a singularity crosses it: the condition has no bound there.
@@ -285,7 +288,7 @@ fn check_continuation(
         return Err(Diagnostic::new(DiagnosticCode::SetpointStampInvalid, -dt, 0.0));
     }
     let (now, before) = (&now.motion, &before.motion);
-    let tolerance = CONTINUATION_TOLERANCE_PER_STROKE * stroke(&machine.actuator);
+    let tolerance = CONTINUATION_TOLERANCE_PER_STROKE * machine.actuator.stroke();
     let time = dt.min(window_s);
     let moved = before.pose.displacement_to(&now.pose);
     let rates = |motion: &Motion| [motion.twist.angular, motion.twist.linear];
