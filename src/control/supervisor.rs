@@ -21,7 +21,7 @@ pub enum AfterStop {
 
 /// State of the controller, with its reason and the goal of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Mode {
+pub struct SupervisorState {
     /// State of the controller; it decides whether forces are applied.
     pub state: State,
     /// Why it is not active, or soon will not be.
@@ -46,7 +46,7 @@ pub struct Findings {
 /// Third stage of the cycle: the state, and the answer to the last request.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Supervisor {
-    pub mode: Mode,
+    pub mode: SupervisorState,
     /// Message of the last request carried out or refused.
     pub answered: (u64, u64),
     /// Why that one was refused; code `None` if it was not.
@@ -83,11 +83,11 @@ impl Supervisor {
 /// The next state, and why a request was refused if it was. `after_loss` follows the stop of a platform that lost its
 /// setpoint.
 pub fn next(
-    mode: Mode,
+    mode: SupervisorState,
     request: Option<Request>,
     findings: &Findings,
     after_loss: AfterStop,
-) -> (Mode, Option<Diagnostic>) {
+) -> (SupervisorState, Option<Diagnostic>) {
     if request == Some(Request::Estop) {
         return (fault(DiagnosticCode::EmergencyStop.into()), None);
     }
@@ -115,58 +115,70 @@ pub fn next(
 }
 
 /// Off by request of an operator: it does not become standby by itself.
-const OFF_BY_REQUEST: Mode = Mode { state: State::Off, diagnostic: REQUESTED, after: AfterStop::Standby };
+const OFF_BY_REQUEST: SupervisorState =
+    SupervisorState { state: State::Off, diagnostic: REQUESTED, after: AfterStop::Standby };
 
 const REQUESTED: Diagnostic =
     Diagnostic { code: DiagnosticCode::OperatorRequest, value: 0.0, bound: 0.0, index: 0 };
 
-fn fault(diagnostic: Diagnostic) -> Mode {
-    Mode { state: State::Fault, diagnostic, ..Mode::default() }
+fn fault(diagnostic: Diagnostic) -> SupervisorState {
+    SupervisorState { state: State::Fault, diagnostic, ..SupervisorState::default() }
 }
 
-fn stop(diagnostic: Diagnostic, after: AfterStop) -> Mode {
-    Mode { state: State::Stopping, diagnostic, after }
+fn stop(diagnostic: Diagnostic, after: AfterStop) -> SupervisorState {
+    SupervisorState { state: State::Stopping, diagnostic, after }
 }
 
-fn standby(diagnostic: Diagnostic) -> Mode {
-    Mode { state: State::Standby, diagnostic, ..Mode::default() }
+fn standby(diagnostic: Diagnostic) -> SupervisorState {
+    SupervisorState { state: State::Standby, diagnostic, ..SupervisorState::default() }
 }
 
-fn without_force(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Diagnostic>) {
+fn without_force(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+) -> (SupervisorState, Option<Diagnostic>) {
     let ready = match findings.localization {
         Ok(()) => standby(findings.engagement.err().unwrap_or(DiagnosticCode::ReadyToEngage.into())),
-        Err(diagnostic) => Mode { state: State::Off, diagnostic, ..Mode::default() },
+        Err(diagnostic) => SupervisorState { state: State::Off, diagnostic, ..SupervisorState::default() },
     };
     let rest = if mode == OFF_BY_REQUEST { mode } else { ready };
     match request {
         Some(Request::Engage) => match findings.localization.and(findings.engagement) {
-            Ok(()) => (Mode { state: State::Engaging, ..Mode::default() }, None),
+            Ok(()) => (SupervisorState { state: State::Engaging, ..SupervisorState::default() }, None),
             Err(diagnostic) => (rest, Some(diagnostic)),
         },
         Some(Request::Clear) => (ready, None),
         // Parking needs no setpoint.
         Some(Request::Park) => match findings.localization {
-            Ok(()) => (Mode { state: State::Parking, diagnostic: REQUESTED, ..Mode::default() }, None),
+            Ok(()) => (
+                SupervisorState {
+                    state: State::Parking,
+                    diagnostic: REQUESTED,
+                    ..SupervisorState::default()
+                },
+                None,
+            ),
             Err(diagnostic) => (rest, Some(diagnostic)),
         },
         None | Some(Request::Stop | Request::Off | Request::Estop) => (rest, None),
     }
 }
 
-fn in_fault(mode: Mode, request: Option<Request>) -> (Mode, Option<Diagnostic>) {
+fn in_fault(mode: SupervisorState, request: Option<Request>) -> (SupervisorState, Option<Diagnostic>) {
     match request {
-        Some(Request::Clear) => (Mode::default(), None),
+        Some(Request::Clear) => (SupervisorState::default(), None),
         Some(Request::Engage | Request::Park) => (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Stop | Request::Off | Request::Estop) | None => (mode, None),
     }
 }
 
 fn following(
-    mode: Mode,
+    mode: SupervisorState,
     request: Option<Request>,
     findings: &Findings,
     after_loss: AfterStop,
-) -> (Mode, Option<Diagnostic>) {
+) -> (SupervisorState, Option<Diagnostic>) {
     if let Err(diagnostic) = findings.tracking {
         let after = match diagnostic.code {
             DiagnosticCode::SetpointLost => after_loss,
@@ -181,12 +193,16 @@ fn following(
         Some(Request::Clear) => (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Engage | Request::Off | Request::Estop) | None => {
             let state = if findings.has_ended { State::Active } else { mode.state };
-            (Mode { state, ..mode }, None)
+            (SupervisorState { state, ..mode }, None)
         }
     }
 }
 
-fn stopping(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Diagnostic>) {
+fn stopping(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+) -> (SupervisorState, Option<Diagnostic>) {
     let (mode, refused) = match (request, mode.after) {
         _ if findings.tracking.is_err() && mode.after != AfterStop::Fault => {
             (findings.tracking.map_or_else(|diagnostic| stop(diagnostic, AfterStop::Fault), |()| mode), None)
@@ -203,13 +219,17 @@ fn stopping(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode,
     }
     let rest = match mode.after {
         AfterStop::Standby => standby(current(mode.diagnostic.code, findings)),
-        AfterStop::Park => Mode { state: State::Parking, after: AfterStop::default(), ..mode },
+        AfterStop::Park => SupervisorState { state: State::Parking, after: AfterStop::default(), ..mode },
         AfterStop::Fault => fault(mode.diagnostic),
     };
     (rest, refused)
 }
 
-fn parking(mode: Mode, request: Option<Request>, findings: &Findings) -> (Mode, Option<Diagnostic>) {
+fn parking(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+) -> (SupervisorState, Option<Diagnostic>) {
     if let Err(diagnostic) = findings.tracking {
         return (stop(diagnostic, AfterStop::Fault), None);
     }
