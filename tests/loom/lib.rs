@@ -17,6 +17,10 @@ pub mod clock;
 pub mod event;
 pub mod flaw;
 pub mod futex;
+pub mod messages {
+    #[path = "../../../src/messages/clock.rs"]
+    pub mod clock;
+}
 pub mod models;
 pub mod sync;
 #[path = "../../src/realtime/triple_buffer.rs"]

@@ -90,10 +90,9 @@ fn run(config: &Config, trajectory: &Trajectory, engage: bool, stop: &Stop) -> R
     let setpoints = bus.publisher()?;
     let playback = Playback::new(config, trajectory, Operator::new(&bus)?, engage);
     info!(name = %config.name, seconds = trajectory.duration(), "waiting until the daemon knows the pose of the platform");
-    if bus.is_simulated() {
-        run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?;
-    } else {
-        run_in_real_time(config, playback, setpoints, stop)?;
+    match bus.is_simulated() {
+        false => run_in_real_time(config, playback, setpoints, stop)?,
+        true => run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?,
     }
     Ok(())
 }
