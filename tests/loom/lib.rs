@@ -17,10 +17,7 @@ pub mod clock;
 pub mod event;
 pub mod flaw;
 pub mod futex;
-pub mod messages {
-    #[path = "../../../src/messages/clock.rs"]
-    pub mod clock;
-}
+pub mod messages;
 pub mod models;
 pub mod sync;
 #[path = "../../src/realtime/triple_buffer.rs"]
