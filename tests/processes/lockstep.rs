@@ -183,6 +183,8 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     let daemon = Hexad::start::<&str>(&machine, "run", &[]);
     let plant = Hexad::start::<&str>(&machine, "plant", &[]);
     let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "10000"]);
+    // Before that it checks the whole motion, and no status is published without it.
+    source.says("waiting until the daemon knows");
     operator::engage(&machine);
     operator::does(&machine, "stop", &[], &["standby"]);
     operator::engage(&machine);
