@@ -2,7 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "a bench that cannot load its machine has nothing to measure")]
 
-mod shared;
+mod support;
 
 use std::path::Path;
 use std::time::Instant;
@@ -28,7 +28,7 @@ fn main() {
         .collect();
     bar.finish_and_clear();
     let mut forces = vec![None; LARGEST];
-    println!("{}", shared::provenance());
+    println!("{}", support::provenance());
     println!("{} threads", rayon::current_num_threads());
     for size in [1_000, 10_000, 100_000, 1_000_000, LARGEST] {
         let repetitions = (LARGEST / size).min(1_000);

@@ -2,5 +2,5 @@
 
 #![allow(dead_code, clippy::unwrap_used, reason = "a part of the benches, of which only its tests are run")]
 
-#[path = "../benches/shared/scatter.rs"]
+#[path = "../benches/support/scatter.rs"]
 mod scatter;

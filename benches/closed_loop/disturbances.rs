@@ -7,8 +7,8 @@ use hexad::plant::imperfections::Imperfections;
 use serde::Deserialize;
 
 use super::run::Run;
-use super::shared::Figures;
-use super::shared::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
+use super::support::Figures;
+use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
 use super::{Failure, MODES, cells, chart, common, play, write_csv};
 
 const FILE: &str = "closed_loop_disturbances.csv";

@@ -18,14 +18,14 @@ mod common;
 mod disturbances;
 mod rates;
 mod run;
-#[path = "../shared/mod.rs"]
-mod shared;
+#[path = "../support/mod.rs"]
+mod support;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use run::{Outcome, Run};
-use shared::{Failure, cells, chart, write_csv};
+use support::{Failure, cells, chart, write_csv};
 
 fn main() -> Result<(), Failure> {
     let has = |flag: &str| std::env::args().any(|argument| argument == flag);

@@ -8,8 +8,8 @@ use super::contest::Contestant;
 use super::distribution::us;
 use super::results::{DISTRIBUTIONS, late_ns};
 use super::rig::Release;
-use super::shared::scatter::{Grid, Line, Sample, Scatter, Width, fit_ranges};
-use super::shared::{Failure, Figures, chart};
+use super::support::scatter::{Grid, Line, Sample, Scatter, Width, fit_ranges};
+use super::support::{Failure, Figures, chart};
 
 /// One look at the clock, which is what `hybrid` spins with: shorter times are drawn as this one \[us\].
 const SHORTEST_US: f64 = 0.01;

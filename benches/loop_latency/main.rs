@@ -33,11 +33,11 @@ mod fleet;
 mod load;
 mod results;
 mod rig;
-#[path = "../shared/mod.rs"]
-mod shared;
 mod size;
 mod subscriber;
 mod summary;
+#[path = "../support/mod.rs"]
+mod support;
 mod syscalls;
 mod tools;
 
@@ -53,8 +53,8 @@ use driver::Driver;
 use load::Load;
 use results::Row;
 use rig::{Release, Rig};
-use shared::Failure;
 use size::{Effort, Size, Unit};
+use support::Failure;
 
 /// Rates of the loop \[Hz\].
 const RATES: [u32; 5] = [250, 1000, 4000, 10_000, 20_000];

@@ -2,7 +2,7 @@
 
 use super::contest::{Contestant, HISTOGRAM_NS, Round};
 use super::distribution::{Distribution, us};
-use super::shared::{self, Failure};
+use super::support::{self, Failure};
 
 /// Curves of the chart.
 pub const DISTRIBUTIONS: &str = "loop_latency_distribution.csv";
@@ -125,7 +125,7 @@ pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
     }
     header.push("steal_ms".into());
     let header: Vec<_> = header.iter().map(String::as_str).collect();
-    shared::write_csv("loop_latency.csv", &header, rows.iter().map(|row| record(row, rows)))
+    support::write_csv("loop_latency.csv", &header, rows.iter().map(|row| record(row, rows)))
 }
 
 fn record(row: &Row, rows: &[Row]) -> Vec<String> {
@@ -182,5 +182,5 @@ pub fn write_distributions(rows: &[Row]) -> Result<(), Failure> {
             [row.rate_hz.to_string(), row.load().into(), row.contestant.name().into(), latency_us, share]
         })
     });
-    shared::write_csv(DISTRIBUTIONS, &header, records)
+    support::write_csv(DISTRIBUTIONS, &header, records)
 }

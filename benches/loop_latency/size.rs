@@ -17,8 +17,8 @@ use super::distribution::{Distribution, us};
 use super::driver::Driver;
 use super::fleet;
 use super::rig::{Process, Release, Rig};
-use super::shared::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
-use super::shared::{self, Failure, Figures, chart};
+use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
+use super::support::{self, Failure, Figures, chart};
 
 const FILE: &str = "loop_size.csv";
 
@@ -206,7 +206,7 @@ pub fn write_csv(sizes: &[Size], steps: &Distribution) -> Result<(), Failure> {
         let Size { unit, rate_hz, count, busy, repetitions, carried } = size;
         record(unit.name(), rate_hz.to_string(), *count, busy, [repetitions, carried].map(usize::to_string))
     });
-    shared::write_csv(FILE, &header, [step].into_iter().chain(sizes))
+    support::write_csv(FILE, &header, [step].into_iter().chain(sizes))
 }
 
 /// What the chart needs of a row. The step of one controller has no rate.

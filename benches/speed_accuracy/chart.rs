@@ -11,10 +11,10 @@ use serde::Deserialize;
 
 use super::methods::BASELINE;
 use super::results::{FILE, PAPER};
-use super::shared::scatter::{
+use super::support::scatter::{
     Grid, Label, Line, Mark, Point, Sample, Scatter, Width, log_range, pareto_front,
 };
-use super::shared::{Failure, Figures, chart};
+use super::support::{Failure, Figures, chart};
 
 const HEXAD: usize = 0;
 const DENSE: usize = 2;

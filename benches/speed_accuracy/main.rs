@@ -20,8 +20,8 @@ mod paper;
 mod peers;
 mod results;
 mod scenes;
-#[path = "../shared/mod.rs"]
-mod shared;
+#[path = "../support/mod.rs"]
+mod support;
 mod timing;
 
 use std::process::ExitCode;
@@ -37,7 +37,7 @@ use methods::{BASELINE, Method, instruction_sets};
 use peers::{PEERS, Peer};
 use results::{Row, print_ratios, write_csv};
 use scenes::Scene;
-use shared::Failure;
+use support::Failure;
 use timing::{Samples, sample};
 
 /// Samples of each method on each scene, spread over the run: in all a minute, or ten seconds.

@@ -2,7 +2,7 @@
 
 use super::peers::PEERS;
 use super::scenes::{Errors, Pace};
-use super::shared::{self, Failure};
+use super::support::{self, Failure};
 use super::timing::Samples;
 
 pub const FILE: &str = "speed_accuracy.csv";
@@ -37,7 +37,7 @@ pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
         let errors = [max, rms].map(|error| format!("{error:.2e}"));
         [method, isa, scene].into_iter().chain(times).chain(errors)
     });
-    shared::write_csv(FILE, &header, records)
+    support::write_csv(FILE, &header, records)
 }
 
 /// How many times longer the peers take than the exact model on the same inputs.

@@ -4,8 +4,8 @@ use hexad::model::inverse_geometry::leg_lengths;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
-use super::shared::provenance;
 use super::speed::newton;
+use super::support::provenance;
 use super::{Failure, MACHINES, cells, chart, common, write_csv};
 
 const RATES_HZ: [f64; 2] = [1000.0, 250.0];

@@ -18,15 +18,15 @@ mod common;
 mod cycles;
 mod maps;
 mod sampled;
-#[path = "../shared/mod.rs"]
-mod shared;
 mod speed;
+#[path = "../support/mod.rs"]
+mod support;
 #[path = "../speed_accuracy/timing.rs"]
 mod timing;
 
 use common::stability::{delayed, rivals, trials};
 
-use shared::{Failure, cells, chart, write_csv};
+use support::{Failure, cells, chart, write_csv};
 
 /// The machines that are looked at.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];

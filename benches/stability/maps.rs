@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 use super::rivals::Update;
-use super::shared::Figures;
+use super::support::Figures;
 use super::trials::{End, Method, ambiguous, pose, step, trial, within_reach};
 use super::{Failure, MACHINES, cells, chart, common, write_csv};
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 use super::delayed::boundary;
-use super::shared::Figures;
+use super::support::Figures;
 use super::{Failure, cells, chart, common, write_csv};
 
 const FILE: &str = "stability_sampled.csv";

@@ -12,8 +12,8 @@ use nalgebra::{Vector3, Vector6};
 use serde::Deserialize;
 
 use super::rivals::Update;
-use super::shared::Figures;
-use super::shared::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
+use super::support::Figures;
+use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
 use super::timing::{Samples, sample};
 use super::trials::{pose, rigid};
 use super::{Failure, MACHINES, cells, chart, common, rivals, write_csv};
