@@ -7,13 +7,13 @@ use crate::realtime::exchange;
 
 /// One cycle of the controller, for statistics and log.
 pub type CycleRecord = cyclic::CycleRecord<Input, Output>;
-/// Input of a cycle, from the io thread.
+/// Input of a cycle, from the I/O thread.
 pub type CycleInput = exchange::CycleInput<Input>;
-/// Output of a cycle, to the io thread.
+/// Output of a cycle, to the I/O thread.
 pub type CycleOutput = exchange::CycleOutput<Output>;
-/// The io thread's ends of the exchange with the real-time thread.
+/// The I/O thread's ends of the exchange with the real-time thread.
 pub type IoSide = exchange::IoSide<Input, Output>;
-/// The real-time thread's ends of the exchange with the io thread.
+/// The real-time thread's ends of the exchange with the I/O thread.
 pub type RealtimeSide = exchange::RealtimeSide<Input, Output>;
 
 impl CyclicInput for Input {

@@ -34,7 +34,7 @@ const MAX_FAULTS: usize = 1000;
 /// Links of the log thread to the other threads.
 pub struct LogLinks<'a> {
     pub records: Consumer<'a, CycleRecord>,
-    /// Release to force sent \[ns\], from the io thread.
+    /// Release to force sent \[ns\], from the I/O thread.
     pub delays: Consumer<'a, u64>,
     /// For the status message.
     pub statistics: Writer<Statistics>,

@@ -1,7 +1,7 @@
 //! `hexad run`: the daemon.
 //!
 //! Start: configuration, ports, threads, real-time set-up; only then the first release. Stop, in this order: the platform
-//! comes to rest, the real-time thread ends its cycle and writes an output without valid forces, the io thread publishes
+//! comes to rest, the real-time thread ends its cycle and writes an output without valid forces, the I/O thread publishes
 //! it, the log thread empties its queues, the report is written.
 
 use std::io;

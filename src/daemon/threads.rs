@@ -160,7 +160,7 @@ fn run_realtime(
     Some(cyclic::run(&mut Monotonic, &timing, step, last, links.exchange, links.records, stop))
 }
 
-/// Body of the io thread; `None` if its ports could not be opened.
+/// Body of the I/O thread; `None` if its ports could not be opened.
 fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &AtomicBool) -> Option<IoReport> {
     let Config { machine, deployment, .. } = config;
     let realtime = &deployment.realtime;

@@ -26,7 +26,7 @@ const MAX_SUBSCRIBERS: usize = 16;
 const MAX_NODES: usize = 32;
 /// Messages that a slow subscriber (a recorder) may fall behind: 256 are 12.8 ms at 20 kHz, 0.25 s at 1 kHz.
 pub(super) const BUFFER: usize = 256;
-/// A port that cannot be opened (another user's) must not block the io thread for the default second.
+/// A port that cannot be opened (another user's) must not block the I/O thread for the default second.
 const CREATION_TIMEOUT: Duration = Duration::from_millis(5);
 
 /// Failure of a call to iceoryx2: what was attempted, and its own words.

@@ -118,9 +118,9 @@ impl core::ops::Add for RejectionCounts {
 }
 
 message! {
-    /// Totals of the daemon's io thread since start.
+    /// Totals of the daemon's I/O thread since start.
     IoCounters = "hexad_io_counters" {
-        /// Calls of the io thread to the allocator: a peer connected or disappeared.
+        /// Calls of the I/O thread to the allocator: a peer connected or disappeared.
         allocations: u64,
         /// Messages rejected on all topics that the daemon subscribes to.
         rejected: RejectionCounts,

@@ -65,7 +65,7 @@ message! {
         missed_setpoints: u64,
         /// Counters of the real-time thread.
         counters: LoopCounters,
-        /// Counters of the io thread.
+        /// Counters of the I/O thread.
         io: IoCounters,
         /// Timing of the loop.
         statistics: Statistics,

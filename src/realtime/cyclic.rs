@@ -100,7 +100,7 @@ pub struct CycleRecord<I, O> {
     pub wakeup_ns: u64,
     /// First instruction of the cycle to its output \[ns\].
     pub compute_ns: u64,
-    /// The io thread wrote no new input since the last cycle.
+    /// The I/O thread wrote no new input since the last cycle.
     pub io_late: bool,
     /// Input that the cycle used.
     pub input: I,

@@ -1,7 +1,7 @@
 //! Event: one thread sleeps until another has handed in what it needs, where a message and not the clock
 //! releases a cycle.
 //!
-//! The real-time thread sleeps on a futex: one system call, like the sleep of the grid. The io thread signals
+//! The real-time thread sleeps on a futex: one system call, like the sleep of the grid. The I/O thread signals
 //! after it has handed in the input of the cycle. Not `park` of the standard library: it may panic, and it
 //! allocates where it has no handle of the thread yet. `tests/loom` checks that no signal is lost, in every order
 //! in which the two threads can run.

@@ -1,4 +1,4 @@
-//! Exchange between the io thread and the real-time thread: the newest value each way.
+//! Exchange between the I/O thread and the real-time thread: the newest value each way.
 
 use std::sync::Arc;
 
@@ -6,14 +6,14 @@ use super::event::Event;
 use super::triple_buffer::{Reader, Writer, triple_buffer};
 use crate::messages::LoopCounters;
 
-/// Input of a cycle as the io thread writes it.
+/// Input of a cycle as the I/O thread writes it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CycleInput<I> {
     /// The release instant in it is not used: the loop sets it.
     pub input: I,
     /// Number of measured messages received since start.
     pub measurements: u64,
-    /// When the io thread wrote it \[ns\].
+    /// When the I/O thread wrote it \[ns\].
     pub handed_ns: u64,
 }
 
@@ -36,11 +36,11 @@ pub struct RealtimeSide<I, O> {
     pub inputs: Reader<CycleInput<I>>,
     /// Writer of the output of each cycle.
     pub outputs: Writer<CycleOutput<O>>,
-    /// Event by which the io thread releases a cycle, with external release.
+    /// Event by which the I/O thread releases a cycle, with external release.
     pub event: Arc<Event>,
 }
 
-/// The io thread's ends.
+/// The I/O thread's ends.
 pub struct IoSide<I, O> {
     /// Writer of the newest input.
     pub inputs: Writer<CycleInput<I>>,

@@ -1,6 +1,6 @@
 //! Wake-up latency of a thread that is set up and waits like the daemon's real-time thread, at several rates.
 //!
-//! Nothing is computed between two wake-ups, and no io thread runs beside it: this is the latency that the
+//! Nothing is computed between two wake-ups, and no I/O thread runs beside it: this is the latency that the
 //! host adds to any loop.
 
 use core::time::Duration;

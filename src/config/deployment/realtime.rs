@@ -16,7 +16,7 @@ const DEFAULT_LATE_WAKEUP_US: f64 = 200.0;
 /// Default of `max_lead_us` where half a period is longer: covers the wake-up latency of an ordinary
 /// kernel at the 99.9th percentile.
 const DEFAULT_MAX_LEAD_US: f64 = 200.0;
-/// Defaults of `io_lead_us` where a quarter of the period is longer. An io thread that sleeps until then wakes about
+/// Defaults of `io_lead_us` where a quarter of the period is longer. An I/O thread that sleeps until then wakes about
 /// 50 us later and must still read in time; one that spins needs only the time for reading.
 const DEFAULT_IO_LEAD_US: f64 = 100.0;
 const DEFAULT_IO_LEAD_SPINNING_US: f64 = 10.0;
@@ -42,7 +42,7 @@ pub struct Realtime {
     pub on_overrun: OverrunPolicy,
     /// Delay of a wake-up above which it counts as a missed deadline.
     pub late_wakeup_s: f64,
-    /// Time before the release at which the io thread reads the inputs.
+    /// Time before the release at which the I/O thread reads the inputs.
     pub io_lead_s: f64,
     /// CPU of the real-time thread; `None` leaves it to the scheduler.
     pub cpu: Option<usize>,

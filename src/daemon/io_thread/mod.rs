@@ -1,4 +1,4 @@
-//! The io thread: owner of every port of the daemon, in phase with the cycle.
+//! The I/O thread: owner of every port of the daemon, in phase with the cycle.
 //!
 //! It reads the newest messages a lead before the release and publishes when the output of the cycle appears; with
 //! external release it waits for measured messages and signals the real-time thread; in lock-step it waits for all
@@ -40,7 +40,7 @@ pub struct Ports {
     outputs: Outputs,
 }
 
-/// Links of the io thread to the other threads.
+/// Links of the I/O thread to the other threads.
 pub struct IoLinks<'a> {
     pub exchange: IoSide,
     /// Release to force sent \[ns\], to the log thread.
@@ -53,7 +53,7 @@ pub struct IoLinks<'a> {
     pub may_end: &'a AtomicBool,
 }
 
-/// Settings of the io thread.
+/// Settings of the I/O thread.
 #[derive(Clone, Copy)]
 pub struct IoSettings {
     pub timing: Timing,
@@ -64,7 +64,7 @@ pub struct IoSettings {
     pub home: [f64; 6],
 }
 
-/// Totals of the io thread over a run.
+/// Totals of the I/O thread over a run.
 #[derive(Debug, Default)]
 pub struct IoReport {
     /// Messages that could not be sent.

@@ -5,7 +5,7 @@ use crate::commands::doctor::files::HostFiles;
 use crate::realtime::clock_cost::ClockCost;
 
 /// Least share of the time that real-time threads must be allowed: a loop that sleeps or spins for half of its
-/// period, and the io thread beside it, stay below.
+/// period, and the I/O thread beside it, stay below.
 const MIN_RUNTIME_SHARE: f64 = 0.9;
 
 /// Cost of a clock reading above which it is a system call, as a share of the cost of a system call.

@@ -1,11 +1,11 @@
-//! Facts about the processors of the real-time and the io thread: number, isolation, siblings, interrupts.
+//! Facts about the processors of the real-time and the I/O thread: number, isolation, siblings, interrupts.
 
 use super::kernel::boot_parameter;
 use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::setup::cpus::Cpus;
 
-/// Least number of processors: one for the real-time thread and one for the io thread.
+/// Least number of processors: one for the real-time thread and one for the I/O thread.
 const MIN_PROCESSORS: usize = 2;
 
 pub(super) const CPU: &str = "sys/devices/system/cpu";
@@ -15,7 +15,7 @@ pub(super) const CPU: &str = "sys/devices/system/cpu";
 pub struct LoopCpus {
     /// CPU of the real-time thread; `None` if the scheduler decides.
     pub realtime: Option<usize>,
-    /// CPU of the io thread; `None` if the scheduler decides.
+    /// CPU of the I/O thread; `None` if the scheduler decides.
     pub io: Option<usize>,
     /// CPUs that this process may use.
     pub permitted: Cpus,
