@@ -110,7 +110,7 @@ impl Run {
             let (length, rate) = hardware.measure();
             let input = Input {
                 release_ns: now_ns + period_ns / 2,
-                setpoint: Some(Setpoint { time_ns: now_ns, task }),
+                setpoint: Some(Setpoint::motion(now_ns, task)),
                 measurement: Some(Measurement { time_ns: now_ns, length, rate }),
                 request: (cycle > 0).then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
                 deadline_missed: false,

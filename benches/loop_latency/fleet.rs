@@ -94,7 +94,7 @@ impl Fleet {
             let Some((task, length, rate)) = self.path.get(row) else { continue };
             last = controller.step(&Input {
                 release_ns,
-                setpoint: Some(Setpoint { time_ns: release_ns, task: *task }),
+                setpoint: Some(Setpoint::motion(release_ns, *task)),
                 measurement: Some(Measurement { time_ns: release_ns, length: *length, rate: *rate }),
                 request,
                 ..Input::default()

@@ -20,13 +20,37 @@ use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Wrench;
 use crate::model::task::TaskState;
 
+/// Meaning of the numbers of a setpoint, as the messages carry it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+pub enum SetpointKind {
+    /// X, X' and X'' of a motion at one instant.
+    #[default]
+    Motion = 0,
+    /// X of a motion at one instant, without derivatives; the messages may arrive more slowly than the cycles.
+    Pose = 1,
+    /// X of a pose to move to and to stand at.
+    Target = 2,
+    /// No kind has the number of the message: the setpoint is rejected.
+    Unknown = 3,
+}
+
 /// Task coordinates, with their derivatives, that the platform shall have at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Setpoint {
+    /// Which of the numbers hold, and for how long.
+    pub kind: SetpointKind,
     /// Instant for which the setpoint holds, on the clock of the releases \[ns\].
     pub time_ns: u64,
     /// X, X', X'' at that instant.
     pub task: TaskState,
+}
+
+impl Setpoint {
+    /// X, X' and X'' of a motion at an instant.
+    pub fn motion(time_ns: u64, task: TaskState) -> Self {
+        Self { kind: SetpointKind::Motion, time_ns, task }
+    }
 }
 
 /// Lengths \[m\] and rates \[m/s\] of the legs at one instant.

@@ -144,6 +144,8 @@ codes! {
     OperatorRequest = 8, None, NO_NUMBER, "requested by the operator", "nothing";
     /// The request cannot be carried out in this state.
     InvalidInState = 9, None, NO_NUMBER, "not possible in this state", "see the table of states";
+    /// The platform moves so that it could not be brought to rest within every limit.
+    PlatformMoving = 10, None, ratio("what a stop of the platform would reach", "the limit"), "platform moves too fast to take control", "wait until the platform stands";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
     /// Measurements stopped arriving.
@@ -188,6 +190,12 @@ codes! {
     NearSingular = 119, Stop, absolute("condition", "", "exceeds", "limits.condition"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
     /// The measured rates changed faster than actuators can.
     RateJumped = 120, Brake, absolute("change of rate", "m/s", "exceeds", "the plausible change,"), "measured rates jumped", "check for a collision; check the encoders and the driver";
+    /// A setpoint of an unknown kind, or of poses alone under `on_violation = "stop"`.
+    SetpointKindInvalid = 121, Stop, absolute("kind", "", "exceeds", "the largest that [setpoint] on_violation allows,"), "kind of the setpoint not allowed", "send X, X' and X'', or set [setpoint] on_violation to limit";
+    /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
+    VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
+    /// Feedback was limited by `limits.feedback_scale` for too long.
+    FeedbackSaturated = 123, Stop, absolute("time of saturation", "s", "exceeds", "the longest allowed,"), "feedback saturated", "check for a collision, a payload, a drive without force; limits.feedback_scale";
 }
 
 impl DiagnosticCode {

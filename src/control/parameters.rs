@@ -26,6 +26,16 @@ pub struct Parameters {
     pub condition: f64,
     /// Largest change of a force \[N/s\].
     pub force_rate: f64,
+    /// Reaction to a setpoint that the limits do not allow to follow.
+    pub on_violation: ViolationPolicy,
+    /// Acceleration that feedback may add to the limits, as a ratio of them.
+    pub feedback_scale: f64,
+    /// Distance that the reference keeps from the ends of the stroke \[m\].
+    pub stroke_margin: f64,
+    /// Largest velocity error while active \[m/s\].
+    pub following_velocity: f64,
+    /// Largest angular velocity error while active \[rad/s\].
+    pub following_angular_velocity: f64,
     /// Goal of the stop of a platform that lost its setpoint.
     pub after_loss: AfterStop,
     /// Largest position error at which control may begin \[m\].
@@ -52,6 +62,16 @@ impl Parameters {
     pub(super) fn max_extrapolation_s(&self) -> f64 {
         self.setpoint_timeout_ns.saturating_add(self.period_ns) as f64 * 1e-9
     }
+}
+
+/// Reaction to a setpoint that the limits do not allow to follow, `[setpoint] on_violation`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ViolationPolicy {
+    /// The platform comes to rest, which is a fault. For trajectories that were checked before.
+    #[default]
+    Stop,
+    /// The platform follows as near as the limits allow, without a fault. For people, joysticks and simulators.
+    Limit,
 }
 
 /// Range of the setpoint: lowest and highest X.

@@ -45,6 +45,11 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         condition: limits.condition,
         envelope,
         after_loss: control.on_setpoint_lost,
+        on_violation: deployment.setpoint.on_violation,
+        feedback_scale: limits.feedback_scale,
+        stroke_margin: limits.stroke_margin_m,
+        following_velocity: control.following_velocity_m_s,
+        following_angular_velocity: control.following_velocity_rad_s,
     }
 }
 

@@ -3,14 +3,16 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
-use crate::control::controller::Setpoint;
+use crate::control::controller::{Setpoint, SetpointKind};
 use crate::model::task::TaskState;
 
 message! {
     /// Desired motion of the platform: X = alpha, beta, gamma, x, y, z and its derivatives.
-    SetpointMessage = "hexad_setpoint" on "setpoint" schema 5 {
+    SetpointMessage = "hexad_setpoint" on "setpoint" schema 6 {
         /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
+        /// 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and stand at.
+        kind: u64,
         /// X.
         x: [f64; 6] ["rad, m"],
         /// X'.
@@ -29,6 +31,12 @@ impl From<&TaskState> for SetpointMessage {
 impl From<&SetpointMessage> for Setpoint {
     fn from(message: &SetpointMessage) -> Self {
         let task = TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() };
-        Self { time_ns: message.header.time_ns, task }
+        let kind = match message.kind {
+            0 => SetpointKind::Motion,
+            1 => SetpointKind::Pose,
+            2 => SetpointKind::Target,
+            _ => SetpointKind::Unknown,
+        };
+        Self { kind, time_ns: message.header.time_ns, task }
     }
 }

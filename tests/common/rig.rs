@@ -94,7 +94,7 @@ impl Rig {
         let legs = self.simulator.leg_motion();
         Input {
             release_ns: self.now_ns + self.period_ns / 2,
-            setpoint: Some(Setpoint { time_ns: self.now_ns, task: *task }),
+            setpoint: Some(Setpoint::motion(self.now_ns, *task)),
             measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: legs.rate }),
             request: self.asked,
             deadline_missed: false,

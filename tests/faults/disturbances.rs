@@ -313,10 +313,8 @@ pub mod setpoints {
         let instant_ns = m.world.rig.now_ns - back_ns;
         let task = m.world.task(instant_ns);
         if let Some(task) = task {
-            *wanted(m.input) = hexad::control::controller::Setpoint {
-                time_ns: instant_ns.wrapping_add_signed(jitter),
-                task,
-            };
+            let stamp_ns = instant_ns.wrapping_add_signed(jitter);
+            *wanted(m.input) = hexad::control::controller::Setpoint::motion(stamp_ns, task);
         }
     }
 }

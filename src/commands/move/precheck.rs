@@ -72,7 +72,7 @@ impl<'a> Precheck<'a> {
     fn refused(&self, t: f64, [before, now]: [TaskState; 2]) -> Option<SetpointRefusal> {
         let Self { machine, parameters, home } = self;
         let [before, now] = [(0, before), (parameters.period_ns, now)]
-            .map(|(time_ns, task)| SetpointMotion::new(Setpoint { time_ns, task }));
+            .map(|(time_ns, task)| SetpointMotion::new(Setpoint::motion(time_ns, task)));
         let SetpointCheck { active_limits, result } =
             check_setpoint(machine, parameters, home, &now, Some(&before), f64::INFINITY);
         result.err().map(|diagnostic| SetpointRefusal { t, diagnostic, active_limits })

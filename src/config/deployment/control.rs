@@ -2,6 +2,7 @@
 
 use core::f64::consts::TAU;
 
+use super::limits::DeploymentLimits;
 use super::realtime::Realtime;
 use crate::analysis::sampled_loop::{SampledLoop, boundary};
 use crate::config::bound::Bound;
@@ -29,6 +30,9 @@ const MAX_ENGAGE_RAD: f64 = 0.2;
 /// Largest following errors that a configuration may allow \[m\], \[rad\].
 const MAX_FOLLOWING_M: f64 = 1.0;
 const MAX_FOLLOWING_RAD: f64 = 1.0;
+/// Default of the largest velocity errors over the velocity limits: far above the noise of rates, and reached by a free
+/// fall within hundredths of a second.
+const DEFAULT_VELOCITY_ERROR_RATIO: f64 = 0.3;
 
 /// Section `[control]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +55,10 @@ pub struct Control {
     pub following_position_m: f64,
     /// The same for the angle between them.
     pub following_orientation_rad: f64,
+    /// Largest velocity error while the platform is controlled.
+    pub following_velocity_m_s: f64,
+    /// The same for the angular velocity.
+    pub following_velocity_rad_s: f64,
     /// Terms of the dynamics that the loop evaluates.
     pub fidelity: FidelityChoice,
     /// Frequency below which the observer cancels disturbances; 0 is without observer.
@@ -72,7 +80,12 @@ pub enum FidelityChoice {
     Fixed(Fidelity),
 }
 
-pub(super) fn read(mut section: SectionReader, realtime: &Realtime, machine: &Machine) -> Control {
+pub(super) fn read(
+    mut section: SectionReader,
+    realtime: &Realtime,
+    machine: &Machine,
+    limits: &DeploymentLimits,
+) -> Control {
     let modes = ControlMode::ALL.map(|mode| (mode.name(), mode));
     let mode = section.choice_or("mode", ControlMode::default(), &modes);
     let leg_masses = LegMasses::at_home(machine);
@@ -104,6 +117,16 @@ pub(super) fn read(mut section: SectionReader, realtime: &Realtime, machine: &Ma
             "following_orientation_rad",
             0.05,
             Bound::UpTo(MAX_FOLLOWING_RAD),
+        ),
+        following_velocity_m_s: section.number_or(
+            "following_velocity_m_s",
+            DEFAULT_VELOCITY_ERROR_RATIO * limits.reference.position.velocity,
+            Bound::Positive,
+        ),
+        following_velocity_rad_s: section.number_or(
+            "following_velocity_rad_s",
+            DEFAULT_VELOCITY_ERROR_RATIO * limits.reference.orientation.velocity,
+            Bound::Positive,
         ),
         fidelity: fidelity(&mut section),
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),

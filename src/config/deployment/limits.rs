@@ -4,6 +4,7 @@ use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
 use crate::control::limits::{DerivativeLimits, Limits as ReferenceLimits};
+use crate::model::inverse_geometry::leg_lengths;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 
@@ -13,12 +14,19 @@ const FORCE_RISE_S: f64 = 0.01;
 /// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
 /// a load needs leg forces of up to a hundred times its size.
 const DEFAULT_CONDITION: f64 = 100.0;
+/// Default of the distance from the ends of the stroke, as a ratio of the stroke: many times the following error of a
+/// machine in order.
+const DEFAULT_STROKE_MARGIN_RATIO: f64 = 0.005;
 
 /// Section `[limits]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeploymentLimits {
     /// Limits of setpoints and of autonomous motions of the daemon.
     pub reference: ReferenceLimits,
+    /// Acceleration that feedback may add to the limits, as a ratio of them.
+    pub feedback_scale: f64,
+    /// Distance that the reference keeps from the ends of the stroke.
+    pub stroke_margin_m: f64,
     /// Largest change of a force.
     pub force_rate_n_s: f64,
     /// Largest Frobenius condition of the legs' wrenches under control.
@@ -42,13 +50,31 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine) -> DeploymentL
     let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
     let force_rate_n_s =
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
+    let feedback_scale = section.number_or("feedback_scale", 0.5, Bound::Positive);
+    let stroke_margin_m = stroke_margin_m(&mut section, machine);
     let condition = condition(&mut section, machine);
     section.finish();
     DeploymentLimits {
         reference: ReferenceLimits { position, orientation, autonomous_scale },
+        feedback_scale,
+        stroke_margin_m,
         force_rate_n_s,
         condition,
     }
+}
+
+/// Distance from the ends of the stroke. Home must keep it, or the platform could not park.
+fn stroke_margin_m(section: &mut SectionReader, machine: &Machine) -> f64 {
+    let lengths = leg_lengths(machine, &machine.home_pose());
+    let at_home =
+        lengths.map(|length| machine.actuator.margin(length)).into_iter().fold(f64::INFINITY, f64::min);
+    let default = (DEFAULT_STROKE_MARGIN_RATIO * machine.actuator.stroke()).min(0.5 * at_home).max(0.0);
+    let margin = section.number_or("stroke_margin_m", default, Bound::NotNegative);
+    if margin > at_home {
+        let bound = format!("must be at most {} (the margin of home)", rounded(at_home));
+        section.reject("stroke_margin_m", bound);
+    }
+    margin
 }
 
 /// Largest condition. The default leaves room around a home that is badly conditioned; home must keep the limit.

@@ -1,5 +1,5 @@
-//! The sections of the deployment: `[realtime]`, `[control]`, `[limits]`, `[timeouts]`,
-//! `[plant]`, `[envelope]`.
+//! The sections of the deployment: `[realtime]`, `[control]`, `[limits]`, `[setpoint]`,
+//! `[timeouts]`, `[plant]`, `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
 //! timeouts. What is given is checked against the limits that follow from the rate.
@@ -12,6 +12,7 @@ use super::bound::Bound;
 use super::machine::rounded;
 use super::reader::SectionReader;
 use crate::analysis::envelope;
+use crate::control::parameters::ViolationPolicy;
 use crate::model::machine::Machine;
 
 mod control;
@@ -39,10 +40,19 @@ pub struct Deployment {
     pub limits: DeploymentLimits,
     /// Largest ages of messages.
     pub timeouts: Timeouts,
+    /// Treatment of setpoints.
+    pub setpoint: SetpointPolicy,
     /// Simulated hardware.
     pub plant: Plant,
     /// Ranges of the motions that the machine is used for, if configured.
     pub envelope: Option<envelope::EnvelopeBounds>,
+}
+
+/// Section `[setpoint]`: treatment of setpoints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SetpointPolicy {
+    /// Reaction to a setpoint that the limits do not allow to follow.
+    pub on_violation: ViolationPolicy,
 }
 
 /// Section `[timeouts]`: largest ages of the newest messages.
@@ -54,18 +64,27 @@ pub struct Timeouts {
     pub measured_s: f64,
 }
 
-/// Reads and checks the six sections; some defaults follow from the machine. Rejected numbers are NaN.
+/// Reads and checks the sections; some defaults follow from the machine. Rejected numbers are NaN.
 pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
+    let limits = limits::read(root.section("limits"), machine);
     Deployment {
-        control: control::read(root.section("control"), &realtime, machine),
-        limits: limits::read(root.section("limits"), machine),
+        control: control::read(root.section("control"), &realtime, machine, &limits),
+        limits,
+        setpoint: setpoint(root.section("setpoint")),
         timeouts: timeouts(root.section("timeouts"), rate_hz),
         plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
         realtime,
     }
+}
+
+fn setpoint(mut section: SectionReader) -> SetpointPolicy {
+    let policies = [("stop", ViolationPolicy::Stop), ("limit", ViolationPolicy::Limit)];
+    let on_violation = section.choice_or("on_violation", ViolationPolicy::Stop, &policies);
+    section.finish();
+    SetpointPolicy { on_violation }
 }
 
 fn timeouts(mut section: SectionReader, rate_hz: f64) -> Timeouts {

@@ -101,7 +101,7 @@ impl Delayed {
         let (time_ns, task) = (self.now_ns, self.setpoint);
         let output = self.controller.step(&Input {
             release_ns: time_ns + self.age_ns,
-            setpoint: Some(Setpoint { time_ns, task }),
+            setpoint: Some(Setpoint::motion(time_ns, task)),
             measurement: Some(Measurement { time_ns, length, rate }),
             request: Some(OperatorRequest { request: Request::Engage, message: (START_NS, 1) }),
             deadline_missed: false,

@@ -98,7 +98,7 @@ impl<'a> Play<'a> {
         let legs = leg_motion(&CONFIG.machine, &task.motion());
         Input {
             release_ns: self.now_ns + self.parameters.period_ns / 2,
-            setpoint: Some(Setpoint { time_ns: self.now_ns, task }),
+            setpoint: Some(Setpoint::motion(self.now_ns, task)),
             measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: legs.rate }),
             request: self.asked,
             deadline_missed: false,
