@@ -1,50 +1,94 @@
 //! Assessment of a cycle: whether the platform is located, may be engaged, and can follow its reference further.
 
-use super::controller::{Cycle, Input};
+use super::controller::{Cycle, Input, SetpointKind};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
+use super::feedback_bound::FeedbackBound;
 use super::input_validation::ValidatedSetpoint;
 use super::limits::{Limit, LimitSet};
-use super::localization::Localization;
+use super::localization::{Localization, Located};
 use super::parameters::Parameters;
-use super::reference::ReferenceGenerator;
+use super::reference::{ReferenceGenerator, Target};
 use super::state::State;
 use super::supervisor::Findings;
-use super::tracking_error::{ErrorSample, TrackingError};
+use super::tracking_error::TrackingError;
+
+/// Deviation of the reference from a target at which it counts as reached, over the engage tolerance: near enough to a
+/// setpoint in motion, and at home almost at rest.
+const REACHED_RATIO: f64 = 0.05;
+const AT_HOME_RATIO: f64 = 0.005;
+
+/// Inputs of an assessment, beside the memory of the stages.
+pub(super) struct Evidence<'a> {
+    pub input: &'a Input,
+    pub setpoint: &'a ValidatedSetpoint<'a>,
+    pub located: Result<&'a Located<'a>, Diagnostic>,
+    pub error: Option<&'a TrackingError>,
+    pub feedback: &'a FeedbackBound,
+}
 
 /// The findings that decide the next state, and the limits that the platform is near to.
 pub(super) fn assess(
     cycle: &Cycle<'_>,
-    input: &Input,
-    setpoint: &ValidatedSetpoint<'_>,
-    platform: Result<(), Diagnostic>,
+    evidence: &Evidence<'_>,
     localization: &Localization,
-    reference: &ReferenceGenerator,
-    sample: Option<&ErrorSample>,
+    reference: &mut ReferenceGenerator,
 ) -> (Findings, LimitSet) {
     let parameters = &cycle.constants.parameters;
-    let error = sample.map(|sample| &sample.error);
-    let (near_singular, conditioned) = localization.check_condition(parameters.condition);
-    let engagement =
-        conditioned.and(setpoint.status).and_then(|()| check_engage_tolerance(parameters, error));
-    let (mut tracking, mut active_limits) = (Ok(()), near_singular);
+    let Evidence { input, setpoint, located, error, feedback } = evidence;
+    let (mut active_limits, conditioned) = localization.check_condition(parameters.condition);
+    let (mut tracking, mut start) = (conditioned, Ok(()));
     if cycle.state.has_control() {
-        tracking = check_following_error(parameters, error, &mut active_limits)
+        tracking = check_following_error(parameters, *error, &mut active_limits)
+            .and_then(|()| feedback.check())
             .and_then(|()| check_deadline(input))
-            .and_then(|()| match cycle.state {
+            .and(match cycle.state {
                 State::Engaging | State::Active => setpoint.status,
-                _ => reference.check_stroke(cycle.constants, setpoint.valid, cycle.release_ns),
-            });
+                _ => Ok(()),
+            })
+            .and(conditioned);
+    } else if let Ok(Located { platform, .. }) = located {
+        start = reference
+            .check_start(cycle.constants, &platform.pose, &platform.twist)
+            .map_err(|limit| Diagnostic::from(DiagnosticCode::PlatformMoving).at(limit as usize));
     }
-    let tracking = tracking.and(conditioned);
-    let has_ended = reference.has_ended(cycle.release_ns);
-    (Findings { localization: platform, engagement, tracking, has_ended }, active_limits)
+    let engagement = conditioned
+        .and(setpoint.status)
+        .and_then(|()| check_engage_tolerance(parameters, setpoint, *error))
+        .and(start);
+    let has_ended = has_ended(cycle, setpoint, reference);
+    let localization = located.map(drop);
+    (Findings { localization, start, engagement, tracking, has_ended }, active_limits)
+}
+
+/// Whether the motion of the state has come to its end.
+fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &ReferenceGenerator) -> bool {
+    let parameters = &cycle.constants.parameters;
+    let is_within = |target: &Target<'_>, ratio: f64| {
+        let deviation = reference.deviation(cycle.constants, target);
+        deviation.is_some_and(|deviation| deviation.tolerance_ratio(parameters) <= ratio)
+    };
+    match cycle.state {
+        State::Engaging => setpoint.target.as_ref().is_some_and(|target| is_within(target, REACHED_RATIO)),
+        State::Stopping => reference.is_at_rest(),
+        State::Parking => is_within(&Target::Pose(cycle.constants.home.pose()), AT_HOME_RATIO),
+        State::Off | State::Standby | State::Active | State::Fault => false,
+    }
 }
 
 /// Control may begin only if closing the loop does not itself move the platform: near the setpoint in pose and velocity.
-fn check_engage_tolerance(parameters: &Parameters, error: Option<&TrackingError>) -> Result<(), Diagnostic> {
+/// A pose to move to may be anywhere.
+fn check_engage_tolerance(
+    parameters: &Parameters,
+    setpoint: &ValidatedSetpoint<'_>,
+    error: Option<&TrackingError>,
+) -> Result<(), Diagnostic> {
     let Some(error) = error else { return Err(DiagnosticCode::NoSetpoint.into()) };
+    let is_target = setpoint.valid.is_some_and(|valid| valid.setpoint.kind == SetpointKind::Target);
     let ratio = error.tolerance_ratio(parameters);
-    if ratio <= 1.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0)) }
+    if ratio <= 1.0 || is_target {
+        return Ok(());
+    }
+    Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))
 }
 
 fn check_following_error(
@@ -52,13 +96,19 @@ fn check_following_error(
     error: Option<&TrackingError>,
     active: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
-    let Some(TrackingError { pose, .. }) = error else { return Ok(()) };
+    let Some(TrackingError { pose, twist }) = error else { return Ok(()) };
     let Parameters { following_position, following_orientation, .. } = parameters;
+    let Parameters { following_velocity, following_angular_velocity, .. } = parameters;
     let ratio = (pose.linear.norm() / following_position).max(pose.angular.norm() / following_orientation);
+    if !active.check(Limit::Following, ratio) {
+        return Err(Diagnostic::new(DiagnosticCode::FollowingError, ratio, 1.0));
+    }
+    let ratio =
+        (twist.linear.norm() / following_velocity).max(twist.angular.norm() / following_angular_velocity);
     if active.check(Limit::Following, ratio) {
         return Ok(());
     }
-    Err(Diagnostic::new(DiagnosticCode::FollowingError, ratio, 1.0))
+    Err(Diagnostic::new(DiagnosticCode::VelocityError, ratio, 1.0))
 }
 
 fn check_deadline(input: &Input) -> Result<(), Diagnostic> {

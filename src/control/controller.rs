@@ -3,21 +3,22 @@
 //! [`Controller::step`] shows the stages in order. Each is a function of its arguments and of the memory of its own
 //! struct; none changes the memory of another. A cycle does a bounded amount of work.
 
-use super::assessment::assess;
+use super::assessment::{Evidence, assess};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::disturbance_observer::{DisturbanceObserver, ObserverReset};
+use super::feedback_bound::FeedbackBound;
 use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
-use super::input_validation::{MeasurementValidator, SetpointValidator};
+use super::input_validation::{MeasurementValidator, SetpointValidator, ValidatedSetpoint};
 use super::limits::LimitSet;
 use super::localization::{Localization, PlatformState};
 use super::parameters::{Constants, Parameters};
-use super::reference::ReferenceGenerator;
+use super::reference::{ReferenceGenerator, Target};
 use super::state::{OperatorRequest, Request, State};
 use super::supervisor::Supervisor;
 use super::tracking_error::{ErrorSample, ErrorTracker, TrackingError};
 use crate::model::machine::{LEGS, Machine};
-use crate::model::rigid::Wrench;
+use crate::model::rigid::{Acceleration, Motion, Wrench};
 use crate::model::task::TaskState;
 
 /// Meaning of the numbers of a setpoint, as the messages carry it.
@@ -104,6 +105,8 @@ pub struct Output {
     pub platform: Option<PlatformState>,
     /// Reference minus measured under control; else setpoint minus measured, if both are known.
     pub error: Option<TrackingError>,
+    /// The reference at the end of this cycle's period, under control.
+    pub reference: Option<Motion>,
 }
 
 /// Context of one cycle, which every stage may depend on.
@@ -126,6 +129,7 @@ pub struct Controller {
     supervisor: Supervisor,
     reference: ReferenceGenerator,
     observer: DisturbanceObserver,
+    feedback: FeedbackBound,
     limiter: ForceLimiter,
 }
 
@@ -135,13 +139,14 @@ impl Controller {
         let constants = Constants::new(machine, parameters);
         Self {
             localization: Localization::new(&constants),
+            reference: ReferenceGenerator::new(&constants),
             constants,
             measurements: MeasurementValidator::default(),
             setpoints: SetpointValidator::default(),
             errors: ErrorTracker::default(),
             supervisor: Supervisor::default(),
-            reference: ReferenceGenerator::default(),
             observer: DisturbanceObserver::default(),
+            feedback: FeedbackBound::default(),
             limiter: ForceLimiter::default(),
         }
     }
@@ -149,14 +154,13 @@ impl Controller {
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
-        let Self { errors, observer, limiter, .. } = self;
+        let Self { errors, observer, feedback, limiter, .. } = self;
         let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
         let parameters = &constants.parameters;
 
         // Validate inputs.
         let measurement = measurements.validate(&cycle, input.measurement.as_ref());
-        let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref());
-        let is_blended = reference.blend_after_gap(&cycle, &setpoint);
+        let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref(), reference);
 
         // Locate platform.
         let located = measurement.and_then(|measurement| localization.locate(&cycle, measurement));
@@ -164,39 +168,48 @@ impl Controller {
 
         // Decide state.
         let request = supervisor.new_request(input);
-        let (findings, assessed_limits) = assess(
-            &cycle,
+        let evidence = Evidence {
             input,
-            &setpoint,
-            located.as_ref().err().map_or(Ok(()), |diagnostic| Err(*diagnostic)),
-            localization,
-            reference,
-            sample.as_ref(),
-        );
+            setpoint: &setpoint,
+            located: located.as_ref().map_err(|diagnostic| *diagnostic),
+            error: sample.as_ref().map(|sample| &sample.error),
+            feedback,
+        };
+        let (findings, assessed_limits) = assess(&cycle, &evidence, localization, reference);
         let next = supervisor.decide(request, &findings, parameters.after_loss);
         if request.is_some_and(|new| new.request == Request::Clear) {
             localization.clear_assembly_mode_fault(&constants.home);
         }
 
         // Reference.
-        if let Some(located) = located.as_ref().ok().filter(|_| next != cycle.state) {
-            reference.enter(&cycle, next, setpoint.valid, located);
-            sample = errors.restart(&cycle, next, reference, &setpoint, located);
+        let begins = next.has_control() && !cycle.state.has_control();
+        if let Some(located) = located.as_ref().ok().filter(|_| begins) {
+            // Without force its acceleration is that of the brakes, which the drives take over from: it begins at zero.
+            let PlatformState { pose, twist, .. } = located.platform;
+            let measured = Motion { pose, twist, acceleration: Acceleration::default() };
+            reference.start(constants, cycle.release_ns, &measured);
+            sample = errors.restart(&cycle, reference, &setpoint, located);
+        }
+        if next.has_control() {
+            let target = target(constants, next, &setpoint);
+            reference.set_closing_scale(closing_scale(parameters, next));
+            let end_ns = cycle.release_ns.saturating_add(parameters.period_ns);
+            reference.advance(constants, end_ns, target.as_ref());
         }
 
         // Control law, forces, checks.
-        let continuity = match cycle.state {
-            state if !state.has_control() => ObserverReset::All,
-            state if is_blended || next != state || limiter.is_limited => ObserverReset::Prediction,
-            _ => ObserverReset::Keep,
+        let continuity = match begins {
+            true => ObserverReset::All,
+            false if limiter.is_limited || feedback.is_saturated() => ObserverReset::Prediction,
+            false => ObserverReset::Keep,
         };
         let mut actuate = || {
             let ErrorSample { error, deviation, .. } = sample.as_ref().ok_or(DiagnosticCode::SetpointLost)?;
             // The force is held for one period from about the release on.
             let middle_of_hold_ns = cycle.release_ns.saturating_add(parameters.period_ns / 2);
-            let desired = reference.motion_at(parameters, setpoint.valid, middle_of_hold_ns);
-            let desired = desired.ok_or(DiagnosticCode::SetpointLost)?;
-            let acceleration = observer.update(&parameters.law, deviation, parameters.period_s(), continuity);
+            let desired = reference.motion_at(middle_of_hold_ns);
+            let wanted = observer.update(&parameters.law, deviation, parameters.period_s(), continuity);
+            let acceleration = feedback.limit(&cycle, &desired.acceleration, &wanted);
             let motion = parameters.law.dynamics_motion(desired, error, &acceleration);
             let force = forces(constants, &motion, &acceleration)?;
             limiter.limit(&cycle, &force, &motion)
@@ -214,11 +227,34 @@ impl Controller {
             request_diagnostic: supervisor.request_diagnostic,
             force,
             wrench_error,
-            active_limits: setpoint.active_limits.union(assessed_limits).union(active_limits),
+            active_limits: setpoint
+                .active_limits
+                .union(assessed_limits)
+                .union(reference.active_limits())
+                .union(active_limits),
             missed_measurements: measurements.missed,
             missed_setpoints: setpoints.missed,
             platform,
             error: sample.map(|sample| sample.error),
+            reference: Some(*reference.motion()).filter(|_| supervisor.mode.state.has_control()),
         }
     }
+}
+
+/// What the reference shall approach in a state; nothing where it follows its stop.
+fn target<'a>(
+    constants: &'a Constants,
+    state: State,
+    setpoint: &ValidatedSetpoint<'a>,
+) -> Option<Target<'a>> {
+    match state {
+        State::Engaging | State::Active => setpoint.target.filter(|_| setpoint.status.is_ok()),
+        State::Parking => Some(Target::Pose(constants.home.pose())),
+        State::Off | State::Standby | State::Stopping | State::Fault => None,
+    }
+}
+
+/// Share of the limits with which the distance to the target is closed.
+fn closing_scale(parameters: &Parameters, state: State) -> f64 {
+    if state == State::Engaging { parameters.limits.autonomous_scale } else { 1.0 }
 }

@@ -145,7 +145,9 @@ codes! {
     /// The request cannot be carried out in this state.
     InvalidInState = 9, None, NO_NUMBER, "not possible in this state", "see the table of states";
     /// The platform moves so that it could not be brought to rest within every limit.
-    PlatformMoving = 10, None, ratio("what a stop of the platform would reach", "the limit"), "platform moves too fast to take control", "wait until the platform stands";
+    PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and no stop within every limit was found", "wait until the platform stands";
+    /// Without setpoints the platform holds its pose, as `[setpoint] on_violation` is `limit`.
+    HoldingPose = 11, None, absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"), "no setpoints: the platform holds its pose", "start a setpoint source";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
     /// Measurements stopped arriving.
@@ -192,6 +194,8 @@ codes! {
     RateJumped = 120, Brake, absolute("change of rate", "m/s", "exceeds", "the plausible change,"), "measured rates jumped", "check for a collision; check the encoders and the driver";
     /// A setpoint of an unknown kind, or of poses alone under `on_violation = "stop"`.
     SetpointKindInvalid = 121, Stop, absolute("kind", "", "exceeds", "the largest that [setpoint] on_violation allows,"), "kind of the setpoint not allowed", "send X, X' and X'', or set [setpoint] on_violation to limit";
+    /// The limits kept the reference from following the setpoint within the tolerance `control.engage_*`.
+    SetpointBeyondLimits = 124, Stop, ratio("the distance of the reference from the setpoint", "the tolerance control.engage_*"), "setpoint beyond the limits of a motion that can be stopped", "correct the trajectory, or [limits], or set [setpoint] on_violation to limit";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long.

@@ -99,6 +99,11 @@ impl LimitSet {
         Self(self.0 | other.0)
     }
 
+    /// Whether no limit is in the set.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
     /// Whether a limit is in the set.
     pub fn contains(self, limit: Limit) -> bool {
         self.0 & 1 << limit as u32 != 0
@@ -114,6 +119,17 @@ pub struct Limits {
     pub orientation: DerivativeLimits,
     /// Factor on the limits for the autonomous motions, onto the setpoint and home.
     pub autonomous_scale: f64,
+}
+
+impl Limits {
+    /// Velocity, acceleration and jerk times a factor.
+    pub fn scaled(&self, scale: f64) -> Self {
+        Self {
+            position: self.position.scaled(scale),
+            orientation: self.orientation.scaled(scale),
+            autonomous_scale: self.autonomous_scale,
+        }
+    }
 }
 
 /// Largest magnitudes of the derivatives of a position \[m\] or an orientation \[rad\], per second.

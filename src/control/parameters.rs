@@ -85,18 +85,27 @@ pub struct Envelope {
 
 /// Machine model, parameters and home pose: constant while the controller runs.
 #[derive(Clone, Debug)]
-pub(super) struct Constants {
+pub struct Constants {
+    /// Inverse dynamics of the machine.
     pub dynamics: InverseDynamics,
+    /// Choices of the deployment.
     pub parameters: Parameters,
+    /// At home.
     pub home: KinematicState,
+    /// Largest distance of a joint on the platform from C \[m\].
+    pub arm: f64,
 }
 
 impl Constants {
+    /// Evaluates them.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
         let home = KinematicState::new(machine, machine.home_pose());
-        Self { dynamics: InverseDynamics::new(machine), parameters, home }
+        let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
+        let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
+        Self { dynamics: InverseDynamics::new(machine), parameters, home, arm }
     }
 
+    /// The machine.
     pub fn machine(&self) -> &Machine {
         self.dynamics.machine()
     }

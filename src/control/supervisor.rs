@@ -35,7 +35,9 @@ pub struct SupervisorState {
 pub struct Findings {
     /// Whether the pose is known, from valid measurements.
     pub localization: Result<(), Diagnostic>,
-    /// Whether control may begin.
+    /// Whether a stop is known for the platform as it moves without force.
+    pub start: Result<(), Diagnostic>,
+    /// Whether control may begin on the setpoint.
     pub engagement: Result<(), Diagnostic>,
     /// Whether the reference can be followed further. A diagnostic that is no fault ends it by a stop.
     pub tracking: Result<(), Diagnostic>,
@@ -149,16 +151,9 @@ fn without_force(
             Err(diagnostic) => (rest, Some(diagnostic)),
         },
         Some(Request::Clear) => (ready, None),
-        // Parking needs no setpoint.
-        Some(Request::Park) => match findings.localization {
-            Ok(()) => (
-                SupervisorState {
-                    state: State::Parking,
-                    diagnostic: REQUESTED,
-                    ..SupervisorState::default()
-                },
-                None,
-            ),
+        // Parking needs no setpoint. A platform that still moves is brought to rest first.
+        Some(Request::Park) => match findings.localization.and(findings.start) {
+            Ok(()) => (stop(REQUESTED, AfterStop::Park), None),
             Err(diagnostic) => (rest, Some(diagnostic)),
         },
         None | Some(Request::Stop | Request::Off | Request::Estop) => (rest, None),
@@ -179,20 +174,30 @@ fn following(
     findings: &Findings,
     after_loss: AfterStop,
 ) -> (SupervisorState, Option<Diagnostic>) {
+    let (mut mode, mut has_ended) = (mode, findings.has_ended);
     if let Err(diagnostic) = findings.tracking {
         let after = match diagnostic.code {
-            DiagnosticCode::SetpointLost => after_loss,
-            code if code.is_fault() => AfterStop::Fault,
-            _ => AfterStop::Standby,
+            // Holds its pose; from there it engages again.
+            DiagnosticCode::HoldingPose => {
+                (mode, has_ended) = (SupervisorState { state: State::Engaging, diagnostic, ..mode }, false);
+                None
+            }
+            DiagnosticCode::SetpointLost => Some(after_loss),
+            code if code.is_fault() => Some(AfterStop::Fault),
+            _ => Some(AfterStop::Standby),
         };
-        return (stop(diagnostic, after), None);
+        if let Some(after) = after {
+            return (stop(diagnostic, after), None);
+        }
+    } else {
+        mode.diagnostic = Diagnostic::default();
     }
     match request {
         Some(Request::Stop) => (stop(REQUESTED, AfterStop::Standby), None),
         Some(Request::Park) => (stop(REQUESTED, AfterStop::Park), None),
         Some(Request::Clear) => (mode, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Engage | Request::Off | Request::Estop) | None => {
-            let state = if findings.has_ended { State::Active } else { mode.state };
+            let state = if has_ended { State::Active } else { mode.state };
             (SupervisorState { state, ..mode }, None)
         }
     }

@@ -13,7 +13,6 @@ use super::law::ControlMode;
 use super::localization::Located;
 use super::parameters::Parameters;
 use super::reference::ReferenceGenerator;
-use super::state::State;
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Motion, Pose, Twist};
@@ -97,15 +96,20 @@ pub(super) struct ErrorSample {
 }
 
 impl ErrorSample {
-    /// The error of the platform against a reference; `None` if there is no reference.
+    /// The error of the platform against the reference, without control against the setpoint; `None` if there is none.
     fn measure(
         cycle: &Cycle<'_>,
+        has_control: bool,
         reference: &ReferenceGenerator,
         setpoint: &ValidatedSetpoint<'_>,
         Located { measurement, platform }: &Located<'_>,
     ) -> Option<Self> {
         let constants = cycle.constants;
-        let desired = reference.motion_at(&constants.parameters, setpoint.valid, measurement.time_ns)?;
+        let time_ns = measurement.time_ns;
+        let desired = match has_control {
+            true => reference.motion_at(time_ns),
+            false => setpoint.target.as_ref()?.motion_at(&constants.parameters, time_ns)?,
+        };
         let error = TrackingError::new(&desired, &platform.pose, &platform.twist);
         let deviation = match constants.parameters.law.mode {
             ControlMode::ComputedTorque => FeedbackError::from(&error),
@@ -144,23 +148,21 @@ impl ErrorTracker {
         let located = located.filter(|_| has_control || setpoint.status.is_ok())?;
         let sample = match self.last.filter(|last| last.time_ns == located.measurement.time_ns) {
             Some(last) => last.predicted(&cycle.constants.parameters),
-            None => ErrorSample::measure(cycle, reference, setpoint, located)?,
+            None => ErrorSample::measure(cycle, has_control, reference, setpoint, located)?,
         };
         self.last = Some(sample).filter(|_| has_control);
         Some(sample)
     }
 
-    /// The error against the reference of the state just entered.
+    /// The error against the reference that has just begun.
     pub fn restart(
         &mut self,
         cycle: &Cycle<'_>,
-        next: State,
         reference: &ReferenceGenerator,
         setpoint: &ValidatedSetpoint<'_>,
         located: &Located<'_>,
     ) -> Option<ErrorSample> {
-        let sample = ErrorSample::measure(cycle, reference, setpoint, located);
-        self.last = sample.filter(|_| next.has_control());
-        sample
+        self.last = ErrorSample::measure(cycle, true, reference, setpoint, located);
+        self.last
     }
 }

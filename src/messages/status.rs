@@ -158,6 +158,7 @@ mod tests {
                 time_to_singularity: 51.0,
             }),
             error: Some(TrackingError { pose: twist(60.0), twist: twist(70.0) }),
+            reference: None,
         }
     }
 

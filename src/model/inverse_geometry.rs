@@ -136,6 +136,16 @@ pub fn leg_lengths(machine: &Machine, pose: &Pose) -> [f64; LEGS] {
     })
 }
 
+/// Lengths `L_i` \[m\] and rates `L_i'` \[m/s\] of the six legs at a pose, for a twist.
+pub fn leg_lengths_and_rates(machine: &Machine, pose: &Pose, twist: &Twist) -> ([f64; LEGS], [f64; LEGS]) {
+    let unpack = |lane: LegLanes| machine.joints.triples.unpack(&lane);
+    dispatch!(machine.level, simd => {
+        let legs = LegGeometry::new(simd, &machine.joints, pose);
+        let velocity = legs.velocity(simd, twist);
+        (unpack(legs.length.into()), unpack(velocity.rate.into()))
+    })
+}
+
 /// Directions `n_i` of the six legs at a pose: unit vectors from base to platform, base axes.
 pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
     dispatch!(machine.level, simd => {

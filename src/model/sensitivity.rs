@@ -25,6 +25,8 @@ pub struct Sensitivity {
     /// Frobenius condition of N: never below the 2-norm condition and at most six times it, at a singular pose
     /// not finite.
     pub condition: f64,
+    /// Frobenius norm of N: between `sqrt 6` and `sqrt 12`.
+    pub norm: f64,
     /// `det N / radius^3`: changes its sign where the platform passes a singular pose.
     pub determinant: f64,
     /// Largest step (radian, or radius) for which Newton's method is proved to find the only pose nearby.
@@ -59,6 +61,7 @@ impl Sensitivity {
         let inverse = inverse_norm_squared(factorization, legs);
         Self {
             condition: (wrench * inverse).sqrt(),
+            norm: wrench.sqrt(),
             determinant: factorization.determinant() * joints.inverse_radius_cubed,
             trusted_step: MAX_KANTOROVICH_H / (curvature * inverse).sqrt(),
         }

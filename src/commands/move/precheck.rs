@@ -1,5 +1,5 @@
-//! Precheck of a trajectory: whether the daemon would accept its setpoints, by the daemon's own rule, before anything
-//! moves.
+//! Precheck of a trajectory: whether the daemon would follow its setpoints, by the daemon's own rules, before anything
+//! moves. The daemon's reference generator follows the whole trajectory, cycle by cycle.
 //!
 //! The precheck does not look at forces, nor at the approach to the first setpoint, which keeps the limits by itself.
 
@@ -11,9 +11,10 @@ use rayon::prelude::*;
 use crate::config::Config;
 use crate::control::controller::Setpoint;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::input_validation::{SetpointCheck, SetpointMotion, check_setpoint};
+use crate::control::input_validation::{SetpointCheck, SetpointMotion, check_deviation, check_setpoint};
 use crate::control::limits::{Limit, LimitSet};
-use crate::control::parameters::{Envelope, Parameters};
+use crate::control::parameters::{Constants, Envelope, Parameters};
+use crate::control::reference::{ReferenceGenerator, Target};
 use crate::daemon;
 use crate::model::fidelity::Fidelity;
 use crate::model::kinematic_state::KinematicState;
@@ -24,14 +25,10 @@ use crate::model::task::TaskState;
 /// which a cycle begins is not known in advance.
 const USABLE_SHARE: f64 = 0.95;
 
-/// Largest number of setpoints that are checked in a span; its polynomials of fifth order need far fewer.
-const MAX_STEPS_PER_SPAN: f64 = 100.0;
-
 /// Check of setpoints by the rule and the parameters of the daemon.
 pub struct Precheck<'a> {
     machine: &'a Machine,
     parameters: Parameters,
-    home: KinematicState,
 }
 
 impl<'a> Precheck<'a> {
@@ -40,7 +37,7 @@ impl<'a> Precheck<'a> {
         let machine = &config.machine;
         // The fidelity has no part in the decision about a setpoint.
         let parameters = daemon::parameters(machine, &config.deployment, Fidelity::Exact);
-        Self { machine, parameters, home: KinematicState::new(machine, machine.home_pose()) }
+        Self { machine, parameters }
     }
 
     /// The same with a reserve to each limit; home at rest keeps the reduced limits too.
@@ -54,28 +51,37 @@ impl<'a> Precheck<'a> {
             lowest: nearer(lowest),
             highest: nearer(highest),
         });
-        let at_home = self.home.sensitivity().condition;
+        let at_home = KinematicState::new(self.machine, self.machine.home_pose()).sensitivity().condition;
         *condition = at_home + USABLE_SHARE * (*condition - at_home);
         self
     }
 
-    /// The first setpoint after `from` and not after `to` that the daemon would refuse after the setpoint of the cycle
-    /// before. Both ends of the span are checked, where jerk is greatest.
+    /// The first setpoint from `from` to `to` that the daemon would refuse, if it follows the trajectory from `from` on.
     pub fn refusal(&self, at: impl Fn(f64) -> TaskState, [from, to]: [f64; 2]) -> Option<SetpointRefusal> {
-        let period_s = self.parameters.period_ns as f64 * 1e-9;
-        let first = (from + period_s).min(to);
-        let steps = ((to - first) / period_s).ceil().clamp(1.0, MAX_STEPS_PER_SPAN);
-        let t = |k: u32| first + (to - first) * f64::from(k) / steps;
-        (0..=steps as u32).find_map(|k| self.refused(t(k), [at(t(k) - period_s), at(t(k))]))
+        let constants = Constants::new(self.machine, self.parameters);
+        let period_ns = self.parameters.period_ns;
+        let setpoint = |k: u64| SetpointMotion::new(Setpoint::motion(k * period_ns, at(self.time(from, k))));
+        let mut reference = ReferenceGenerator::new(&constants);
+        let mut now = setpoint(0);
+        reference.start(&constants, 0, &now.motion);
+        let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
+        for k in 0..=steps {
+            let SetpointCheck { active_limits, result } =
+                check_setpoint(self.machine, &self.parameters, &now);
+            let result = result.and_then(|()| check_deviation(&self.parameters, &reference, &now));
+            if let Err(diagnostic) = result {
+                let active_limits = active_limits.union(reference.active_limits());
+                return Some(SetpointRefusal { t: self.time(from, k), diagnostic, active_limits });
+            }
+            reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
+            now = setpoint(k + 1);
+        }
+        None
     }
 
-    fn refused(&self, t: f64, [before, now]: [TaskState; 2]) -> Option<SetpointRefusal> {
-        let Self { machine, parameters, home } = self;
-        let [before, now] = [(0, before), (parameters.period_ns, now)]
-            .map(|(time_ns, task)| SetpointMotion::new(Setpoint::motion(time_ns, task)));
-        let SetpointCheck { active_limits, result } =
-            check_setpoint(machine, parameters, home, &now, Some(&before), f64::INFINITY);
-        result.err().map(|diagnostic| SetpointRefusal { t, diagnostic, active_limits })
+    /// Time of the k-th cycle \[s\].
+    fn time(&self, from: f64, k: u64) -> f64 {
+        from + (k * self.parameters.period_ns) as f64 * 1e-9
     }
 
     /// The first refusal within `seconds`, searched in equal spans.

@@ -7,7 +7,7 @@ mod measurement;
 mod setpoint;
 
 pub(super) use measurement::MeasurementValidator;
-pub use setpoint::{SetpointCheck, SetpointMotion, check_setpoint};
+pub use setpoint::{SetpointCheck, SetpointMotion, check_deviation, check_setpoint};
 pub(super) use setpoint::{SetpointValidator, ValidatedSetpoint};
 
 use super::diagnostic::{Diagnostic, DiagnosticCode};

@@ -1,0 +1,142 @@
+//! Approach of a vector to a moving target, of third order: the acceleration of the next instant.
+//!
+//! A cascade of two braking curves, on the vectors themselves and not per axis. With the target `p_t, v_t, a_t` of the next
+//! instant, and P, Q the position and velocity that the present acceleration leads to:
+//!
+//! ```text
+//! e   = p_t - P                       of the orientation log(R_t R^T): |e|' = e^ . (w_t - w) holds exactly
+//! d(v)= tau1 v + v^2/2a + v a/2j      v >= a^2/j,   a = 0.95 A, j = J: the way in which v can be stopped
+//!       tau1 v + v^1.5 / sqrt(j)      below;        phi = inverse of d
+//! v_d = v_t + e^ phi(|e|)             velocity wanted
+//! a_f = a_t + (phi/|e|)(v_t - Q) + (phi' - phi/|e|) e^ (e^ . (v_t - Q))       its derivative
+//! x   = v_d - Q
+//! a*  = a_f + 2 x / (tau2 (1 + sqrt(1 + 2 |x| / (0.7 J tau2^2))))             limited to A, its change to J h
+//! ```
+//!
+//! d is the way from `a = 0`: the plain braking curve would overshoot where the limit of velocity hands over to it. Without
+//! limits `x' = -psi(x)` and `|e|' <= -phi + |x|`: a globally stable cascade, whose jerk is below 0.7 J.
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+use nalgebra::Vector3;
+
+use crate::control::limits::DerivativeLimits;
+
+/// Share of the acceleration limit that the outer curve brakes with; the rest is for corrections.
+const BRAKING_SHARE: f64 = 0.95;
+/// Share of the velocity limit that is wanted: the inner curve ends there without exceeding the limit.
+const VELOCITY_SHARE: f64 = 0.999;
+/// Share of the jerk limit that the inner curve uses.
+const INNER_JERK_SHARE: f64 = 0.7;
+/// Time constant of the outer curve, in times of the build-up `A / J`, and at least this many steps.
+const OUTER_TIME_PER_RAMP: f64 = 0.4;
+const MIN_OUTER_STEPS: f64 = 4.0;
+/// Time constant of the inner curve over that of the outer one.
+const INNER_TIME_RATIO: f64 = 0.5;
+/// Steps of Newton's method on the braking curve from above; each leaves less than half of the error.
+const NEWTON_STEPS: u32 = 4;
+
+/// Target of one vector at the next instant, relative to where the present acceleration leads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TargetOffset {
+    /// `e`.
+    pub offset: Vector3<f64>,
+    /// `v_t` and `a_t`.
+    pub velocity: Vector3<f64>,
+    pub acceleration: Vector3<f64>,
+}
+
+/// Velocity wanted at the next instant, and its derivative.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WantedVelocity {
+    pub velocity: Vector3<f64>,
+    pub derivative: Vector3<f64>,
+    /// Whether the limit of velocity holds it back.
+    pub is_limited: bool,
+}
+
+/// Limits of the approach of one vector, and the length of a step \[s\].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Approach {
+    limits: DerivativeLimits,
+    /// Limits of the way to the target, without the target's own motion.
+    closing: DerivativeLimits,
+    step_s: f64,
+    outer_s: f64,
+}
+
+impl Approach {
+    /// `closing_scale` is the share of the limits for closing the distance to the target.
+    pub fn new(limits: DerivativeLimits, closing_scale: f64, step_s: f64) -> Self {
+        let ramp_s = limits.acceleration / limits.jerk;
+        let outer_s = (OUTER_TIME_PER_RAMP * ramp_s).max(MIN_OUTER_STEPS * step_s);
+        Self { limits, closing: limits.scaled(closing_scale), step_s, outer_s }
+    }
+
+    /// The velocity wanted where the present motion leads with the velocity `ahead`.
+    pub fn wanted(&self, target: &TargetOffset, ahead: &Vector3<f64>) -> WantedVelocity {
+        let TargetOffset { offset, velocity, acceleration } = target;
+        let distance = offset.norm();
+        let (closing, slope) = self.closing_velocity(distance);
+        let ratio = if closing > 0.0 { closing / distance } else { slope };
+        let direction = if distance > 0.0 { offset / distance } else { Vector3::zeros() };
+        let relative = velocity - ahead;
+        let mut wanted = velocity + offset * ratio;
+        let mut derivative =
+            acceleration + relative * ratio + direction * ((slope - ratio) * direction.dot(&relative));
+        let (speed, limit) = (wanted.norm(), VELOCITY_SHARE * self.limits.velocity);
+        let is_limited = speed > limit;
+        if is_limited {
+            wanted *= limit / speed;
+            let u = wanted / limit;
+            // On the sphere of the limit the velocity can turn only.
+            derivative = (derivative - u * derivative.dot(&u)) * (limit / speed);
+        }
+        WantedVelocity { velocity: wanted, derivative, is_limited }
+    }
+
+    /// phi and phi' at a distance.
+    fn closing_velocity(&self, distance: f64) -> (f64, f64) {
+        let DerivativeLimits { velocity: limit, acceleration, jerk } = self.closing;
+        let a = BRAKING_SHARE * acceleration;
+        let linear = self.outer_s + a / (2.0 * jerk);
+        let v = 2.0 * distance / (linear + (linear * linear + 2.0 * distance / a).sqrt());
+        let (v, slope) = if v * jerk >= a * a {
+            (v, 1.0 / (linear + v / a))
+        } else {
+            let root_jerk = jerk.sqrt();
+            let mut root = (distance / self.outer_s).sqrt();
+            for _ in 0..NEWTON_STEPS {
+                let excess = (self.outer_s + root / root_jerk) * root * root - distance;
+                root -=
+                    excess / (root * (2.0 * self.outer_s + 3.0 * root / root_jerk)).max(f64::MIN_POSITIVE);
+            }
+            (root * root, 1.0 / (self.outer_s + 1.5 * root / root_jerk))
+        };
+        if v > limit { (limit, 0.0) } else { (v, slope) }
+    }
+
+    /// The acceleration of the next instant for a wanted velocity, and whether the limits of acceleration and jerk
+    /// hold it back.
+    pub fn acceleration(
+        &self,
+        wanted: &WantedVelocity,
+        ahead: &Vector3<f64>,
+        present: &Vector3<f64>,
+    ) -> (Vector3<f64>, [bool; 2]) {
+        let x = wanted.velocity - ahead;
+        let time = INNER_TIME_RATIO * self.outer_s;
+        let jerk = INNER_JERK_SHARE * self.limits.jerk;
+        let gain = 2.0 / (time * (1.0 + (1.0 + 2.0 * x.norm() / (jerk * time * time)).sqrt()));
+        let (aim, is_acceleration_limited) =
+            limited(&(wanted.derivative + x * gain), self.limits.acceleration);
+        let (change, is_jerk_limited) = limited(&(aim - present), self.limits.jerk * self.step_s);
+        (present + change, [is_acceleration_limited, is_jerk_limited])
+    }
+}
+
+/// A vector shortened to at most `limit`, and whether it was longer.
+fn limited(v: &Vector3<f64>, limit: f64) -> (Vector3<f64>, bool) {
+    let norm = v.norm();
+    if norm > limit { (v * (limit / norm), true) } else { (*v, false) }
+}

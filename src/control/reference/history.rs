@@ -1,0 +1,76 @@
+//! The reference of the last cycles: its motion at the instant of a measurement.
+
+use crate::control::input_validation::seconds_between;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+
+/// Segments kept, a power of two: at 1 kHz those of 64 ms, longer than the oldest measurement under control as a rule. An
+/// older instant is extrapolated.
+const SEGMENT_COUNT: usize = 64;
+
+/// Motion of the reference from one instant to the next, with constant jerk.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    begin_ns: u64,
+    motion: Motion,
+    jerk: Acceleration,
+}
+
+/// Ring of the last segments.
+#[derive(Clone, Debug)]
+pub(super) struct History {
+    segments: [Option<Segment>; SEGMENT_COUNT],
+    /// Number of segments ever recorded; the last has the index of this less one.
+    count: usize,
+}
+
+impl Default for History {
+    fn default() -> Self {
+        Self { segments: [None; SEGMENT_COUNT], count: 0 }
+    }
+}
+
+impl History {
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Records the segment from `motion` at `begin_ns` to another acceleration `dt` seconds later.
+    pub fn record(&mut self, begin_ns: u64, motion: &Motion, next: &Acceleration, dt: f64) {
+        let change = (next.vector() - motion.acceleration.vector()) / dt;
+        let segment = Segment { begin_ns, motion: *motion, jerk: Acceleration::from_vector(&change) };
+        if let Some(slot) = self.segments.get_mut(self.count % SEGMENT_COUNT) {
+            *slot = Some(segment);
+        }
+        self.count += 1;
+    }
+
+    /// The motion at an instant, extrapolated before the first and after the last segment.
+    pub fn motion_at(&self, instant_ns: u64) -> Option<Motion> {
+        let kept = self.count.min(SEGMENT_COUNT);
+        let mut found = None;
+        for age in 1..=kept {
+            found = self.segments.get((self.count - age) % SEGMENT_COUNT).and_then(Option::as_ref);
+            if found.is_some_and(|segment| segment.begin_ns <= instant_ns) {
+                break;
+            }
+        }
+        found.map(|segment| segment.motion_at(instant_ns))
+    }
+}
+
+impl Segment {
+    fn motion_at(&self, instant_ns: u64) -> Motion {
+        let t = seconds_between(self.begin_ns, instant_ns);
+        // Before the first segment the motion had no other jerk that would be known.
+        let jerk = if t > 0.0 { self.jerk.vector() } else { Acceleration::default().vector() };
+        let Motion { pose, twist, acceleration } = &self.motion;
+        let (v, a) = (twist.vector(), acceleration.vector());
+        let displacement = Twist::from_vector(&((v + (a / 2.0 + jerk * (t / 6.0)) * t) * t));
+        Motion {
+            pose: pose.displaced(&displacement),
+            twist: Twist::from_vector(&(v + (a + jerk * (0.5 * t)) * t)),
+            acceleration: Acceleration::from_vector(&(a + jerk * t)),
+        }
+    }
+}

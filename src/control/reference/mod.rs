@@ -1,0 +1,267 @@
+//! The reference generator: pose, twist and acceleration of the platform in every cycle, within every limit.
+//!
+//! The reference owns its state and moves only by steps of constant jerk, or along a verified stop. Setpoints are targets:
+//! never copied, only approached. So the limits hold whatever is sent, and whatever the state of the controller.
+//!
+//! Each step proposes a state a step later ([`approach`]) and verifies that the stop from there keeps every limit along its
+//! whole way ([`verification`]). If so, the state is taken, with its stop. Otherwise the reference follows the stop that was
+//! verified before, which needs no check. By induction every limit holds at all times, also if every setpoint is lost.
+//! The assumptions and the proof: `docs/safety.md`.
+//!
+//! | file | content |
+//! | --- | --- |
+//! | [`stop`] | stop of a vector in closed form |
+//! | [`verification`] | whether a stop keeps the limits along its way |
+//! | [`regularity`] | balls of poses proved regular, for the limit of the condition |
+//! | [`pose_bounds`] | lengths of the legs and envelope |
+//! | [`approach`] | acceleration towards a moving target |
+//! | [`target`] | setpoint, samples of poses, or a pose |
+//! | [`history`] | the reference of the last cycles |
+
+use nalgebra::Vector3;
+
+use self::approach::{Approach, TargetOffset};
+use self::history::History;
+use self::pose_bounds::PoseBounds;
+use self::regularity::RegularBalls;
+pub use self::target::Target;
+use self::target::at_rest;
+use self::verification::{PoseStop, PoseStopState, StopKind, advanced, verify};
+use super::input_validation::seconds_between;
+use super::limits::{Limit, LimitSet};
+use super::parameters::Constants;
+use super::tracking_error::TrackingError;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+
+mod approach;
+mod history;
+mod pose_bounds;
+mod regularity;
+#[cfg(test)]
+mod samples;
+mod stop;
+mod target;
+mod verification;
+
+/// Longest step of the generator \[s\], so that slow loops give the same motion as fast ones.
+const MAX_STEP_S: f64 = 1e-3;
+/// Most steps in a cycle: after missed cycles they are longer, which is as safe and less smooth.
+const MAX_STEPS: f64 = 32.0;
+
+/// The stop that may be followed from the present state on.
+#[derive(Clone, Copy, Debug, Default)]
+enum HeldStop {
+    /// The platform does not move.
+    #[default]
+    AtRest,
+    /// From the present state.
+    Verified(StopKind),
+    /// Followed since `elapsed` seconds.
+    Followed { stop: PoseStop, state: PoseStopState, elapsed: f64 },
+}
+
+/// Reference generator.
+#[derive(Clone, Debug)]
+pub struct ReferenceGenerator {
+    /// At `time_ns`, the end of the last cycle's period.
+    motion: Motion,
+    time_ns: u64,
+    stop: HeldStop,
+    bounds: PoseBounds,
+    balls: RegularBalls,
+    history: History,
+    /// Share of the limits for closing the distance to a target.
+    closing_scale: f64,
+    /// What held the reference back in the last cycle.
+    active_limits: LimitSet,
+}
+
+impl ReferenceGenerator {
+    /// At home, at rest.
+    pub fn new(constants: &Constants) -> Self {
+        Self {
+            motion: at_rest(constants.home.pose()),
+            time_ns: 0,
+            stop: HeldStop::AtRest,
+            bounds: PoseBounds::nominal(constants),
+            balls: RegularBalls::default(),
+            history: History::default(),
+            closing_scale: 1.0,
+            active_limits: LimitSet::default(),
+        }
+    }
+
+    /// Whether a verified stop exists for a platform that moves without force. If not, the limit that none was proved to
+    /// keep.
+    pub fn check_start(&mut self, constants: &Constants, pose: &Pose, twist: &Twist) -> Result<(), Limit> {
+        let motion = Motion { twist: *twist, ..at_rest(pose) };
+        let bounds = PoseBounds::around(constants, pose);
+        verify(constants, &bounds, &mut self.balls, &motion, 0.0).map(drop)
+    }
+
+    /// Begins with a motion at an instant. A stop must exist for it.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
+        (self.motion, self.time_ns) = (*motion, time_ns);
+        self.bounds = PoseBounds::around(constants, &motion.pose);
+        let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, 0.0);
+        self.stop = HeldStop::Verified(verified.unwrap_or(StopKind::Planar));
+        self.history.clear();
+        self.closing_scale = 1.0;
+    }
+
+    /// Sets the share of the limits with which the distance to a target is closed.
+    pub fn set_closing_scale(&mut self, scale: f64) {
+        self.closing_scale = scale;
+    }
+
+    /// The motion at the end of the last cycle.
+    pub fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    /// What held the reference back in the last cycle.
+    pub fn active_limits(&self) -> LimitSet {
+        self.active_limits
+    }
+
+    /// The reference at an instant of the last cycles.
+    pub fn motion_at(&self, instant_ns: u64) -> Motion {
+        let start = || self.motion.after(seconds_between(self.time_ns, instant_ns));
+        self.history.motion_at(instant_ns).unwrap_or_else(start)
+    }
+
+    /// Whether the reference has come to rest along its stop.
+    pub fn is_at_rest(&self) -> bool {
+        match &self.stop {
+            HeldStop::AtRest => true,
+            HeldStop::Verified(_) => false,
+            HeldStop::Followed { stop, elapsed, .. } => *elapsed >= stop.duration(),
+        }
+    }
+
+    /// Target minus reference at the end of the last cycle.
+    pub fn deviation(&self, constants: &Constants, target: &Target<'_>) -> Option<TrackingError> {
+        let desired = target.motion_at(&constants.parameters, self.time_ns)?;
+        Some(TrackingError::new(&desired, &self.motion.pose, &self.motion.twist))
+    }
+
+    /// Moves the reference to an instant, towards a target; without one along the stop.
+    pub fn advance(&mut self, constants: &Constants, to_ns: u64, target: Option<&Target<'_>>) {
+        let duration_s = seconds_between(self.time_ns, to_ns);
+        self.active_limits = LimitSet::default();
+        if !(duration_s > 0.0) {
+            return;
+        }
+        let steps = (duration_s / MAX_STEP_S).max(1.0).min(MAX_STEPS);
+        // Rounded up, but for the rounding of a period.
+        let steps = (steps - 1e-6) as u32 + 1;
+        let step_ns = (to_ns - self.time_ns) / u64::from(steps);
+        for k in 1..=steps {
+            let end_ns = if k == steps { to_ns } else { self.time_ns + step_ns };
+            self.step(constants, end_ns, target);
+        }
+        self.bounds.tighten(constants, &self.motion.pose);
+    }
+
+    fn step(&mut self, constants: &Constants, end_ns: u64, target: Option<&Target<'_>>) {
+        let step_s = seconds_between(self.time_ns, end_ns);
+        let proposed = target
+            .and_then(|target| Some((target, target.motion_at(&constants.parameters, end_ns)?)))
+            .map(|(target, desired)| self.proposed(constants, target, &desired, step_s));
+        let verified = proposed.and_then(|motion| {
+            match verify(constants, &self.bounds, &mut self.balls, &motion, step_s) {
+                Ok(kind) => Some((motion, HeldStop::Verified(kind))),
+                Err(limit) => {
+                    self.active_limits = self.active_limits.with(limit, true);
+                    None
+                }
+            }
+        });
+        let (next, stop) = match verified {
+            Some(verified) => verified,
+            None => self.stopped(constants, step_s),
+        };
+        self.history.record(self.time_ns, &self.motion, &next.acceleration, step_s);
+        (self.motion, self.stop, self.time_ns) = (next, stop, end_ns);
+    }
+
+    /// A step of constant jerk towards the desired motion of the next instant.
+    fn proposed(&mut self, constants: &Constants, target: &Target<'_>, desired: &Motion, h: f64) -> Motion {
+        let limits = target.limits(&constants.parameters.limits);
+        let approach = |limits| Approach::new(limits, self.closing_scale, h);
+        let (turning, shifting) = (approach(limits.orientation), approach(limits.position));
+        let Motion { acceleration, .. } = &self.motion;
+        // Where the present acceleration leads.
+        let led = moved(&self.motion, &acceleration.angular, &acceleration.linear, h);
+        let offset = led.pose.displacement_to(&desired.pose);
+        let orientation = TargetOffset {
+            offset: offset.angular,
+            velocity: desired.twist.angular,
+            acceleration: desired.acceleration.angular,
+        };
+        let position = TargetOffset {
+            offset: offset.linear,
+            velocity: desired.twist.linear,
+            acceleration: desired.acceleration.linear,
+        };
+        let turn = turning.wanted(&orientation, &led.twist.angular);
+        let shift = shifting.wanted(&position, &led.twist.linear);
+        let (angular, turn_limits) = turning.acceleration(&turn, &led.twist.angular, &acceleration.angular);
+        let (linear, shift_limits) = shifting.acceleration(&shift, &led.twist.linear, &acceleration.linear);
+        let [by_acceleration, by_jerk] = [turn_limits, shift_limits]
+            .into_iter()
+            .fold([false; 2], |[a, j], [next_a, next_j]| [a | next_a, j | next_j]);
+        self.active_limits = self
+            .active_limits
+            .with(Limit::Velocity, turn.is_limited | shift.is_limited)
+            .with(Limit::Acceleration, by_acceleration)
+            .with(Limit::Jerk, by_jerk);
+        moved(&self.motion, &angular, &linear, h)
+    }
+
+    /// The motion a step later along the stop.
+    fn stopped(&self, constants: &Constants, h: f64) -> (Motion, HeldStop) {
+        let (stop, state, elapsed) = match self.stop {
+            HeldStop::AtRest => return (self.motion, HeldStop::AtRest),
+            HeldStop::Verified(kind) => {
+                let stop = PoseStop::new(kind, &self.motion, &constants.parameters.limits);
+                let start = stop.at(0.0);
+                (stop, start, 0.0)
+            }
+            HeldStop::Followed { stop, state, elapsed } => (stop, state, elapsed),
+        };
+        let elapsed = elapsed + h;
+        let next = stop.at(elapsed);
+        let motion = Motion {
+            pose: advanced(&self.motion.pose, &state, &next, h),
+            twist: Twist { angular: next.orientation.velocity, linear: next.position.velocity },
+            acceleration: Acceleration {
+                angular: next.orientation.acceleration,
+                linear: next.position.acceleration,
+            },
+        };
+        (motion, HeldStop::Followed { stop, state: next, elapsed })
+    }
+}
+
+/// The motion `h` seconds later if the acceleration changes linearly to another one.
+fn moved(motion: &Motion, angular: &Vector3<f64>, linear: &Vector3<f64>, h: f64) -> Motion {
+    let Motion { pose, twist, acceleration } = motion;
+    let shift = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| (v + (a * 2.0 + a1) * (h / 6.0)) * h;
+    let velocity = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| v + (a + a1) * (0.5 * h);
+    // Magnus: the axis of rotation turns meanwhile.
+    let commutator = twist.angular.cross(&acceleration.angular) * (h * h * h / 12.0);
+    Motion {
+        pose: pose.displaced(&Twist {
+            angular: shift(&twist.angular, &acceleration.angular, angular) - commutator,
+            linear: shift(&twist.linear, &acceleration.linear, linear),
+        }),
+        twist: Twist {
+            angular: velocity(&twist.angular, &acceleration.angular, angular),
+            linear: velocity(&twist.linear, &acceleration.linear, linear),
+        },
+        acceleration: Acceleration { angular: *angular, linear: *linear },
+    }
+}

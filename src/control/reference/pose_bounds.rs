@@ -1,0 +1,93 @@
+//! Bounds of the pose that the reference keeps: the lengths of the legs and the envelope of X.
+
+#[cfg(not(feature = "client"))]
+use nalgebra::{ComplexField as _, RealField as _};
+
+use crate::control::parameters::{Constants, Envelope};
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::machine::LEGS;
+use crate::model::rigid::Pose;
+use crate::model::task::task_coordinates;
+
+/// Room around a pose beyond the nominal bounds, in which the reference may begin to move back, as a ratio of the stroke:
+/// above the noise of lengths.
+const START_ROOM_RATIO: f64 = 2.5e-4;
+
+/// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
+const ROUNDING: f64 = 1e-9;
+
+/// Bounds of the legs and of X. A platform that is beyond the nominal bounds when control begins may come back: its
+/// bounds are relaxed to where it is, and follow it until they are the nominal ones.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PoseBounds {
+    /// \[m\]
+    pub shortest: [f64; LEGS],
+    /// \[m\]
+    pub longest: [f64; LEGS],
+    pub envelope: Option<Envelope>,
+    is_relaxed: bool,
+}
+
+impl PoseBounds {
+    /// The nominal bounds: the stroke less the margin, and the configured envelope.
+    pub fn nominal(constants: &Constants) -> Self {
+        let (actuator, parameters) = (&constants.machine().actuator, &constants.parameters);
+        Self {
+            shortest: [actuator.min_length + parameters.stroke_margin; LEGS],
+            longest: [actuator.max_length - parameters.stroke_margin; LEGS],
+            envelope: parameters.envelope.map(|Envelope { lowest, highest }| Envelope {
+                lowest: lowest.map(|x| x - ROUNDING),
+                highest: highest.map(|x| x + ROUNDING),
+            }),
+            is_relaxed: false,
+        }
+    }
+
+    /// The nominal bounds, relaxed where a pose exceeds them.
+    pub fn around(constants: &Constants, pose: &Pose) -> Self {
+        let mut bounds = Self::nominal(constants);
+        let stroke_room = START_ROOM_RATIO * constants.machine().actuator.stroke();
+        for (bound, length) in bounds.shortest.iter_mut().zip(leg_lengths(constants.machine(), pose)) {
+            bounds.is_relaxed |= relax(bound, length, -stroke_room);
+        }
+        for (bound, length) in bounds.longest.iter_mut().zip(leg_lengths(constants.machine(), pose)) {
+            bounds.is_relaxed |= relax(bound, length, stroke_room);
+        }
+        if let Some(Envelope { lowest, highest }) = &mut bounds.envelope {
+            let x = task_coordinates(pose, &constants.machine().home);
+            let turn_room = stroke_room / constants.machine().joints.radius;
+            let rooms = [turn_room, turn_room, turn_room, stroke_room, stroke_room, stroke_room];
+            for ((low, high), (x, room)) in lowest.iter_mut().zip(highest).zip(x.iter().zip(rooms)) {
+                bounds.is_relaxed |= relax(low, *x, -room) | relax(high, *x, room);
+            }
+        }
+        bounds
+    }
+
+    /// Lets relaxed bounds follow a pose, never away from the nominal ones.
+    pub fn tighten(&mut self, constants: &Constants, pose: &Pose) {
+        if !self.is_relaxed {
+            return;
+        }
+        let around = Self::around(constants, pose);
+        let inner = |bound: &mut [f64; LEGS], other: &[f64; LEGS], pick: fn(f64, f64) -> f64| {
+            bound.iter_mut().zip(other).for_each(|(bound, other)| *bound = pick(*bound, *other));
+        };
+        inner(&mut self.shortest, &around.shortest, f64::max);
+        inner(&mut self.longest, &around.longest, f64::min);
+        if let (Some(own), Some(other)) = (&mut self.envelope, &around.envelope) {
+            inner(&mut own.lowest, &other.lowest, f64::max);
+            inner(&mut own.highest, &other.highest, f64::min);
+        }
+        self.is_relaxed = around.is_relaxed;
+    }
+}
+
+/// Moves a bound to `room` beyond `value` if the value exceeds it, outward in the direction of `room`. True if so.
+fn relax(bound: &mut f64, value: f64, room: f64) -> bool {
+    let is_beyond = (value - *bound) * room > 0.0;
+    if is_beyond {
+        *bound = value + room;
+    }
+    is_beyond
+}

@@ -1,0 +1,96 @@
+//! Balls of poses in which no pose is singular and none has a condition beyond the limit.
+//!
+//! With N the wrenches of the legs at the centre of a ball, `F = |N|`, `B = |N^-1|` (Frobenius norms, torques about the mean
+//! of the joints and divided by the radius r), a pose displaced by at most d and turned by at most t, the arms `a` of the
+//! joints from C and `a'` from their mean:
+//!
+//! ```text
+//! s = d + a t                           displacement of a joint
+//! q = s / sqrt(L (L - s))               change of a leg's direction, L the shortest leg at the centre
+//! |N - N0| <= D = sqrt(6 q^2 + 6 (t + q)^2)                      as the mean of (a'/r)^2 is 1
+//! condition <= min(F + D, sqrt 12) B / (1 - B D)                 where B D < 1
+//! ```
+//!
+//! The same bounds as those of a cell in the search for the workspace. A ball found once holds for many cycles.
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+
+use crate::control::parameters::Constants;
+use crate::model::kinematic_state::KinematicState;
+use crate::model::rigid::Pose;
+use crate::model::sensitivity::Sensitivity;
+
+/// Balls kept: those along one stop.
+const BALL_COUNT: usize = 4;
+
+/// Square of the largest Frobenius norm of N: six directions, and six arms whose mean square is 1.
+const MAX_WRENCH_NORM_SQUARED: f64 = 12.0;
+
+/// Largest `|R - R0| / sqrt 2` for which an angle is bounded, and its ratio to the angle's bound: `2 asin(1/2)`.
+const MAX_CHORD: f64 = 1.0;
+const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
+
+/// Centre of a ball.
+#[derive(Clone, Copy, Debug)]
+struct Ball {
+    center: Pose,
+    /// F, B, and the length of the shortest leg \[m\].
+    norm: f64,
+    inverse_norm: f64,
+    shortest: f64,
+}
+
+impl Ball {
+    fn new(constants: &Constants, center: &Pose) -> Self {
+        let machine = constants.machine();
+        let kinematic_state = KinematicState::new(machine, *center);
+        let Sensitivity { condition, norm, .. } = *kinematic_state.sensitivity();
+        let shortest = kinematic_state.lengths(machine).into_iter().fold(f64::INFINITY, f64::min);
+        Self { center: *center, norm, inverse_norm: condition / norm, shortest }
+    }
+
+    /// Whether every pose within `shift` \[m\] and `turn` \[rad\] of a pose is regular and keeps the limit.
+    fn covers(&self, constants: &Constants, pose: &Pose, [shift, turn]: [f64; 2]) -> bool {
+        let Self { center, norm, inverse_norm, shortest } = self;
+        let chord = ((pose.rotation - center.rotation).norm_squared() * 0.5).sqrt();
+        let turn = ANGLE_PER_CHORD * chord + turn;
+        let moved = (pose.position - center.position).norm() + shift + constants.arm * turn;
+        let left = shortest - moved;
+        let turned_squared = moved * moved / (shortest * left);
+        let turned_arm = turn + turned_squared.sqrt();
+        let change = (6.0 * (turned_squared + turned_arm * turned_arm)).sqrt();
+        let largest_norm = (norm + change).min(MAX_WRENCH_NORM_SQUARED.sqrt());
+        let limit = constants.parameters.condition * (1.0 - inverse_norm * change);
+        chord <= MAX_CHORD && left > 0.0 && largest_norm * inverse_norm <= limit
+    }
+}
+
+/// The balls found last.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RegularBalls {
+    balls: [Option<Ball>; BALL_COUNT],
+}
+
+impl RegularBalls {
+    /// Whether every pose within `reach`, a shift \[m\] and a turn \[rad\], of a pose is regular and keeps the limit of the
+    /// condition. `false` is no proof of the contrary.
+    pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2]) -> bool {
+        self.balls.iter().flatten().any(|ball| ball.covers(constants, pose, reach))
+            || self.cover_by_new(constants, pose, reach)
+    }
+
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn cover_by_new(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2]) -> bool {
+        let ball = Ball::new(constants, pose);
+        let is_covered = ball.covers(constants, pose, reach);
+        if is_covered {
+            self.balls.rotate_right(1);
+            if let Some(first) = self.balls.first_mut() {
+                *first = Some(ball);
+            }
+        }
+        is_covered
+    }
+}

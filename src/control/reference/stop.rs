@@ -1,0 +1,389 @@
+//! Stop of a vector: from any velocity and acceleration to rest, in closed form, within acceleration and jerk limits.
+//!
+//! Position and orientation are each a triple integrator in base axes, `v' = a`, `a' = j`: one stop serves both.
+//! There are two stops. No end pose is given: it is where the stop ends.
+//!
+//! **Release first**, in free space: `a` decreases to zero along itself within `|a| / J`, so `v` moves straight to
+//! `v1 = v + a |a| / 2J`; then `v1` decreases along itself. Only its extent is needed as a rule:
+//!
+//! ```text
+//! duration = |a|/J + d(v1)                        d = v/A + A/J, length v^2/2A + v A/2J      v >= A^2/J
+//! length  <= max(|v|, |v1|) |a|/J + length(v1)    d = 2 sqrt(v/J), length v sqrt(v/J)        below
+//! ```
+//!
+//! **Planar**, near a wall, where releasing the brake first would waste room: with `u = v/|v|` and
+//! `a = a_p u + c e`, `c >= 0`, the part across (along e) ends with neither velocity nor acceleration:
+//!
+//! ```text
+//! across:  -Jc for (1 + sqrt 1/2) c/Jc, then +Jc for sqrt(1/2) c/Jc,  Jc = 0.8 J c/A;    speed <= c^2/2Jc
+//! along:   meanwhile brakes with A1 = sqrt(A^2 - c^2/2), Jp = sqrt(J^2 - Jc^2), the jerk into braking at most
+//!          j1 = min(Jp, (a_p + A1) Jc / ((1 - sqrt(1/2)) c));  afterwards with A and J
+//! ```
+//!
+//! `|a| <= A`: the path `(a_p, a_c)` starts in the disk of radius A. j1 lets it reach `-A1` only when `a_c <= c/sqrt 2`, which
+//! is in the disk too, on a straight line, and disks are convex. Later both parts stay below these corners. And
+//! `|j|^2 = Jp^2 + Jc^2 = J^2`. Cases: `v = 0` has `u` along `a`, so `c = 0`.
+
+use core::f64::consts::FRAC_1_SQRT_2;
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+use nalgebra::Vector3;
+
+use crate::control::limits::DerivativeLimits;
+
+/// Jerk across as a ratio of `J c/A`. The larger, the sooner the part across ends, and the less is left along.
+const ACROSS_JERK_RATIO: f64 = 0.8;
+
+/// Ratios of the limits below which a velocity or an acceleration is zero.
+const NEGLIGIBLE_RATIO: f64 = 1e-9;
+
+/// Most pieces of a stop: five while there is a part across, three afterwards, and the rest.
+const MAX_PIECES: usize = 9;
+
+/// Largest velocity, duration and length of a stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct StopExtent {
+    pub peak_velocity: f64,
+    /// \[s\]
+    pub duration: f64,
+    /// Bound on the distance from the start.
+    pub length: f64,
+}
+
+/// Extent of the stop that releases the acceleration first.
+pub(super) fn release_first_extent(
+    v: &Vector3<f64>,
+    a: &Vector3<f64>,
+    limits: &DerivativeLimits,
+) -> StopExtent {
+    let release = a.norm() / limits.jerk;
+    let released = (v + a * (0.5 * release)).norm();
+    let peak_velocity = v.norm().max(released);
+    let straight = straight_extent(released, limits);
+    StopExtent {
+        peak_velocity,
+        duration: release + straight.duration,
+        length: peak_velocity * release + straight.length,
+    }
+}
+
+/// Extent of the stop from a velocity without acceleration.
+fn straight_extent(v: f64, DerivativeLimits { acceleration, jerk, .. }: &DerivativeLimits) -> StopExtent {
+    let ramp = acceleration / jerk;
+    let (duration, length) = if v >= acceleration * ramp {
+        (v / acceleration + ramp, 0.5 * v * (v / acceleration + ramp))
+    } else {
+        let ramp = (v / jerk).sqrt();
+        (2.0 * ramp, v * ramp)
+    };
+    StopExtent { peak_velocity: v, duration, length }
+}
+
+/// Displacement, velocity and acceleration at one instant of a stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct StopState {
+    pub displacement: Vector3<f64>,
+    pub velocity: Vector3<f64>,
+    pub acceleration: Vector3<f64>,
+}
+
+impl StopState {
+    /// After `dt` seconds of constant jerk.
+    fn after(&self, jerk: &Vector3<f64>, dt: f64) -> Self {
+        let Self { displacement, velocity, acceleration } = self;
+        Self {
+            displacement: displacement + (velocity + (acceleration / 2.0 + jerk * (dt / 6.0)) * dt) * dt,
+            velocity: velocity + (acceleration + jerk * (0.5 * dt)) * dt,
+            acceleration: acceleration + jerk * dt,
+        }
+    }
+}
+
+/// Piece of a stop with constant jerk.
+#[derive(Clone, Copy, Debug, Default)]
+struct Piece {
+    begin: f64,
+    state: StopState,
+    jerk: Vector3<f64>,
+}
+
+/// A stop as pieces of constant jerk.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Stop {
+    pieces: [Piece; MAX_PIECES],
+    count: usize,
+    /// Bound on the velocity.
+    pub peak_velocity: f64,
+    /// \[s\]
+    pub duration: f64,
+}
+
+impl Stop {
+    /// The stop that releases the acceleration first.
+    pub fn release_first(v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) -> Self {
+        let DerivativeLimits { acceleration: limit, jerk, .. } = *limits;
+        let mut pieces = Pieces::new(v, a);
+        let magnitude = a.norm();
+        if magnitude > 0.0 {
+            pieces.push(magnitude / jerk, -a * (jerk / magnitude));
+        }
+        let v1 = pieces.end.velocity;
+        let speed = v1.norm();
+        let u = if speed > 0.0 { v1 / speed } else { Vector3::zeros() };
+        for (dt, jerk) in brake(speed, 0.0, jerk, limit, |_| jerk) {
+            pieces.push(dt, u * jerk);
+        }
+        pieces.finish(v.norm().max(speed))
+    }
+
+    /// The planar stop.
+    pub fn planar(v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) -> Self {
+        let DerivativeLimits { acceleration: limit, jerk, .. } = *limits;
+        let (speed, magnitude) = (v.norm(), a.norm());
+        let u = if speed > NEGLIGIBLE_RATIO * limits.velocity {
+            v / speed
+        } else if magnitude > 0.0 {
+            a / magnitude
+        } else {
+            Vector3::zeros()
+        };
+        let rest = a - u * a.dot(&u);
+        let c = rest.norm();
+        let mut pieces = Pieces::new(v, a);
+        let (mut across_speed, mut peak) = (0.0, 0.0);
+        if c > NEGLIGIBLE_RATIO * limit {
+            let across_jerk = ACROSS_JERK_RATIO * jerk * c / limit;
+            let across = [
+                ((1.0 + FRAC_1_SQRT_2) * c / across_jerk, -across_jerk),
+                (FRAC_1_SQRT_2 * c / across_jerk, across_jerk),
+            ];
+            across_speed = 0.5 * c * c / across_jerk;
+            let limit_along = (limit * limit - 0.5 * c * c).sqrt();
+            let jerk_along = (jerk * jerk - across_jerk * across_jerk).sqrt();
+            let steepness = across_jerk / ((1.0 - FRAC_1_SQRT_2) * c);
+            let (speed, along) = (v.dot(&u), a.dot(&u));
+            let plan = brake(speed, along, jerk_along, limit_along, |a| {
+                jerk_along.min((a + limit_along).max(0.0) * steepness)
+            });
+            peak = peak_speed(speed, along, &plan);
+            pieces.push_both(&u, &plan, &(rest / c), &across);
+        }
+        let (speed, along) = (pieces.end.velocity.dot(&u), pieces.end.acceleration.dot(&u));
+        let plan = brake(speed, along, jerk, limit, |_| jerk);
+        peak = peak_speed(speed, along, &plan).max(peak);
+        for (dt, jerk) in plan {
+            pieces.push(dt, u * jerk);
+        }
+        pieces.finish((peak * peak + across_speed * across_speed).sqrt())
+    }
+
+    /// State `t` seconds after the start; at rest from the end on.
+    pub fn at(&self, t: f64) -> StopState {
+        let mut present = &Piece::default();
+        for piece in self.pieces.iter().take(self.count) {
+            if piece.begin <= t {
+                present = piece;
+            }
+        }
+        present.state.after(&present.jerk, t - present.begin)
+    }
+}
+
+/// Pieces in the making, and the state at their end.
+struct Pieces {
+    stop: Stop,
+    end: StopState,
+}
+
+impl Pieces {
+    fn new(v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
+        let end = StopState { velocity: *v, acceleration: *a, ..StopState::default() };
+        Self { stop: Stop::default(), end }
+    }
+
+    /// Appends a piece.
+    fn push(&mut self, dt: f64, jerk: Vector3<f64>) {
+        if !(dt > 0.0) {
+            return;
+        }
+        let Self { stop: Stop { pieces, count, duration, .. }, end } = self;
+        if let Some(piece) = pieces.get_mut(*count) {
+            *piece = Piece { begin: *duration, state: *end, jerk };
+            *count += 1;
+            *duration += dt;
+            *end = end.after(&jerk, dt);
+        }
+    }
+
+    /// Appends the pieces of a plan along `u` and of one across along `e`, until the one across ends.
+    fn push_both(&mut self, u: &Vector3<f64>, along: &Plan, e: &Vector3<f64>, across: &[(f64, f64); 2]) {
+        let [(first, _), (second, _)] = *across;
+        let end = first + second;
+        let mut t = 0.0;
+        // Each pass ends at one of five instants.
+        for _ in 0..5 {
+            let ((left, jerk), (left_across, jerk_across)) = (present(along, t), present(across, t));
+            let dt = left.min(left_across).min(end - t);
+            self.push(dt, u * jerk + e * jerk_across);
+            t += dt;
+        }
+    }
+
+    /// Ends at rest.
+    fn finish(mut self, peak_velocity: f64) -> Stop {
+        let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
+        let Stop { pieces, count, duration, .. } = &mut self.stop;
+        if let Some(piece) = pieces.get_mut(*count) {
+            *piece = Piece { begin: *duration, state: rest, jerk: Vector3::zeros() };
+            *count += 1;
+        }
+        Stop { peak_velocity, ..self.stop }
+    }
+}
+
+/// Durations and jerks of one component: ramp into braking, hold, release.
+type Plan = [(f64, f64); 3];
+
+/// Time left in the present part of a plan, and its jerk; none after the end.
+fn present(plan: &[(f64, f64)], t: f64) -> (f64, f64) {
+    let mut end = 0.0;
+    for (dt, jerk) in plan {
+        end += dt;
+        if t < end {
+            return (end - t, *jerk);
+        }
+    }
+    (f64::INFINITY, 0.0)
+}
+
+/// Stop of one component from (v, a) with the release jerk `jerk` and the acceleration `limit`. `ramp_jerk` is that of the
+/// ramp into braking, from the acceleration in the direction in which the component would come to move.
+fn brake(v: f64, a: f64, jerk: f64, limit: f64, ramp_jerk: impl Fn(f64) -> f64) -> Plan {
+    // Released now, the component would move on in the direction of `sign`.
+    let sign = if v + a * a.abs() / (2.0 * jerk) >= 0.0 { 1.0 } else { -1.0 };
+    let (v, a) = (sign * v, sign * a);
+    let ramp_jerk = ramp_jerk(a);
+    if !(ramp_jerk > 0.0) {
+        // Braking at the limit already.
+        let hold = (v - limit * limit / (2.0 * jerk)) / limit;
+        return [(0.0, 0.0), (hold.max(0.0), 0.0), (limit / jerk, sign * jerk)];
+    }
+    let peak = ((2.0 * v * ramp_jerk + a * a) / (1.0 + ramp_jerk / jerk)).max(0.0).sqrt();
+    let hold = (v + (a - limit) * (a + limit) / (2.0 * ramp_jerk) - limit * limit / (2.0 * jerk)) / limit;
+    let (peak, hold) = if peak > limit { (limit, hold.max(0.0)) } else { (peak, 0.0) };
+    [((a + peak).max(0.0) / ramp_jerk, -sign * ramp_jerk), (hold, 0.0), (peak / jerk, sign * jerk)]
+}
+
+/// Largest speed of a component during its plan: at the start, or where the acceleration changes its sign.
+fn peak_speed(v: f64, a: f64, [(_, jerk), ..]: &Plan) -> f64 {
+    let turned = if a * jerk < 0.0 { v - 0.5 * a * a / jerk } else { v };
+    v.abs().max(turned.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::reference::samples::Samples;
+
+    const LIMITS: [DerivativeLimits; 5] = [
+        DerivativeLimits { velocity: 1.0, acceleration: 5.0, jerk: 500.0 },
+        DerivativeLimits { velocity: 2.0, acceleration: 20.0, jerk: 2000.0 },
+        DerivativeLimits { velocity: 1.0, acceleration: 5.0, jerk: 50.0 },
+        DerivativeLimits { velocity: 0.2, acceleration: 8.0, jerk: 300.0 },
+        DerivativeLimits { velocity: 0.01, acceleration: 1e-3, jerk: 1e-4 },
+    ];
+
+    /// A velocity and an acceleration within the limits: of any direction, often at the limits or aligned.
+    fn start(samples: &mut Samples, limits: &DerivativeLimits) -> [Vector3<f64>; 2] {
+        let v = samples.vector(limits.velocity);
+        let a = match samples.below(4) {
+            0 => v * (-limits.acceleration / v.norm().max(1e-30) * samples.uniform()),
+            _ => samples.vector(limits.acceleration),
+        };
+        [v, a]
+    }
+
+    type Plan = fn(&Vector3<f64>, &Vector3<f64>, &DerivativeLimits) -> Stop;
+
+    #[test]
+    fn a_stop_keeps_acceleration_jerk_and_its_peak_velocity_and_ends_at_rest() {
+        let mut samples = Samples::new(1);
+        let mut worst = [0.0_f64; 4];
+        for limits in LIMITS {
+            for _ in 0..20_000 {
+                let [v, a] = start(&mut samples, &limits);
+                for plan in [Stop::release_first as Plan, Stop::planar] {
+                    let stop = plan(&v, &a, &limits);
+                    let first = stop.at(0.0);
+                    assert!((first.velocity - v).norm() <= 1e-12 && (first.acceleration - a).norm() <= 1e-12);
+                    let last = stop.pieces[stop.count - 1].begin;
+                    assert_eq!(last, stop.duration);
+                    let before = stop.at(stop.duration * (1.0 - 1e-12));
+                    let mut check = |k: usize, ratio: f64| worst[k] = worst[k].max(ratio);
+                    check(0, before.velocity.norm() / limits.velocity);
+                    for k in 0..=40 {
+                        let state = stop.at(stop.duration * f64::from(k) / 40.0);
+                        check(1, state.acceleration.norm() / limits.acceleration);
+                        check(2, state.velocity.norm() - stop.peak_velocity * (1.0 + 1e-9));
+                    }
+                    for piece in &stop.pieces[..stop.count - 1] {
+                        check(1, piece.state.acceleration.norm() / limits.acceleration);
+                        check(2, piece.state.velocity.norm() - stop.peak_velocity * (1.0 + 1e-9));
+                        check(3, piece.jerk.norm() / limits.jerk);
+                    }
+                }
+            }
+        }
+        let [at_end, acceleration, velocity, jerk] = worst;
+        assert!(at_end < 1e-6 && velocity <= 1e-9, "{at_end} {velocity}");
+        assert!(
+            (1.0..1.0 + 1e-9).contains(&acceleration.max(1.0)) && jerk < 1.0 + 1e-9,
+            "{acceleration} {jerk}"
+        );
+        assert!(acceleration > 0.99 && jerk > 0.99, "the limits are used: {acceleration} {jerk}");
+    }
+
+    #[test]
+    fn the_extent_bounds_the_stop_that_releases_first() {
+        let mut samples = Samples::new(2);
+        let mut largest_use: f64 = 0.0;
+        for limits in LIMITS {
+            for _ in 0..10_000 {
+                let [v, a] = start(&mut samples, &limits);
+                let extent = release_first_extent(&v, &a, &limits);
+                let stop = Stop::release_first(&v, &a, &limits);
+                assert!((stop.duration - extent.duration).abs() <= 1e-9 * extent.duration);
+                for k in 0..=20 {
+                    let state = stop.at(stop.duration * f64::from(k) / 20.0);
+                    let used = state.displacement.norm() / extent.length.max(1e-30);
+                    assert!(
+                        used <= 1.0 + 1e-9 && state.velocity.norm() <= extent.peak_velocity * (1.0 + 1e-9)
+                    );
+                    largest_use = largest_use.max(used);
+                }
+            }
+        }
+        assert!(largest_use > 0.99, "{largest_use}");
+    }
+
+    /// Ways from 1 m/s, in mm: bounds of any stop and of this one.
+    #[test]
+    fn a_stop_takes_little_more_than_the_shortest_way() {
+        let [limits, ..] = LIMITS;
+        let v = Vector3::new(1.0, 0.0, 0.0);
+        for (a, planar, release_first) in [
+            ([0.0, 0.0, 0.0], 105.0, 105.0),
+            ([-5.0, 0.0, 0.0], 100.0, 110.0),
+            ([0.0, 5.0, 0.0], 113.0, 115.0),
+            ([-3.5, 3.5, 0.0], 104.0, 111.0),
+        ] {
+            let end = |plan: Plan| plan(&v, &a.into(), &limits).at(10.0).displacement.norm() * 1e3;
+            let ways = [end(Stop::planar), end(Stop::release_first)];
+            assert!(
+                (ways[0] - planar).abs() < 1.0 && (ways[1] - release_first).abs() < 1.0,
+                "{a:?} {ways:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Target of the reference in one cycle: where it shall go, and with which share of the limits.
+
+use crate::control::controller::SetpointKind;
+use crate::control::input_validation::SetpointMotion;
+use crate::control::limits::Limits;
+use crate::control::parameters::Parameters;
+use crate::control::pose_samples::PoseSamples;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+
+/// Target of one cycle.
+#[derive(Clone, Copy, Debug)]
+pub enum Target<'a> {
+    /// The motion of a setpoint, which goes on between the messages.
+    Motion(&'a SetpointMotion),
+    /// Samples of a motion.
+    Samples(&'a PoseSamples),
+    /// A pose to move to and stand at, with the limits of autonomous motions.
+    Pose(&'a Pose),
+}
+
+impl<'a> Target<'a> {
+    /// The target that a valid setpoint stands for.
+    pub fn of_setpoint(setpoint: &'a SetpointMotion, samples: &'a PoseSamples) -> Self {
+        match setpoint.setpoint.kind {
+            SetpointKind::Pose => Self::Samples(samples),
+            SetpointKind::Target => Self::Pose(&setpoint.motion.pose),
+            SetpointKind::Motion | SetpointKind::Unknown => Self::Motion(setpoint),
+        }
+    }
+
+    /// The motion of the target at an instant.
+    pub(in crate::control) fn motion_at(&self, parameters: &Parameters, instant_ns: u64) -> Option<Motion> {
+        match self {
+            Self::Motion(setpoint) => Some(setpoint.motion_at(parameters, instant_ns)),
+            Self::Samples(samples) => samples.target(instant_ns),
+            Self::Pose(pose) => Some(at_rest(pose)),
+        }
+    }
+
+    /// The limits of the way to it.
+    pub(super) fn limits(&self, limits: &Limits) -> Limits {
+        match self {
+            Self::Motion(_) | Self::Samples(_) => *limits,
+            Self::Pose(_) => limits.scaled(limits.autonomous_scale),
+        }
+    }
+}
+
+/// A pose without motion.
+pub(super) fn at_rest(pose: &Pose) -> Motion {
+    Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() }
+}
