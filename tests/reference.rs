@@ -1,0 +1,13 @@
+//! The reference generator alone, against limits evaluated independently of it: targets of every kind, hostile ones too.
+
+#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+
+mod common;
+
+mod reference {
+    use super::*;
+
+    mod limits;
+    mod observer;
+    mod streams;
+}
