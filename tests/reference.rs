@@ -7,7 +7,9 @@ mod common;
 mod reference {
     use super::*;
 
+    mod arrival;
     mod limits;
     mod observer;
     mod streams;
+    mod walls;
 }

@@ -50,9 +50,14 @@ impl SetpointMotion {
         if instant_ns == self.setpoint.time_ns {
             return self.motion;
         }
-        let longest = parameters.max_extrapolation_s();
         // Of the motion and not of X: rates of the angles are unbounded near gimbal lock.
-        self.motion.after(seconds_between(self.setpoint.time_ns, instant_ns).max(-longest).min(longest))
+        self.motion.after(self.extrapolation_s(parameters, instant_ns))
+    }
+
+    /// Time from its instant to another \[s\], no longer than a setpoint may be extrapolated.
+    pub(in crate::control) fn extrapolation_s(&self, parameters: &Parameters, instant_ns: u64) -> f64 {
+        let longest = parameters.max_extrapolation_s();
+        seconds_between(self.setpoint.time_ns, instant_ns).max(-longest).min(longest)
     }
 }
 

@@ -81,22 +81,33 @@ impl Approach {
         let ratio = if closing > 0.0 { closing / distance } else { slope };
         let direction = if distance > 0.0 { offset / distance } else { Vector3::zeros() };
         let relative = velocity - ahead;
-        let mut wanted = velocity + offset * ratio;
-        let mut derivative =
+        let wanted = velocity + offset * ratio;
+        let derivative =
             acceleration + relative * ratio + direction * ((slope - ratio) * direction.dot(&relative));
-        let (speed, limit) = (wanted.norm(), VELOCITY_SHARE * self.limits.velocity);
-        let is_limited = speed > limit;
-        if is_limited {
-            wanted *= limit / speed;
-            let u = wanted / limit;
-            // On the sphere of the limit the velocity can turn only.
-            derivative = (derivative - u * derivative.dot(&u)) * (limit / speed);
+        let mut wanted = WantedVelocity { velocity: wanted, derivative, is_limited: false };
+        self.limit_velocity(&mut wanted);
+        wanted
+    }
+
+    /// Limits a wanted velocity.
+    pub fn limit_velocity(&self, wanted: &mut WantedVelocity) {
+        let (speed, limit) = (wanted.velocity.norm(), VELOCITY_SHARE * self.limits.velocity);
+        if speed > limit {
+            wanted.velocity *= limit / speed;
+            let u = wanted.velocity / limit;
+            // On the sphere of the limit the velocity can only turn.
+            wanted.derivative = (wanted.derivative - u * wanted.derivative.dot(&u)) * (limit / speed);
+            wanted.is_limited = true;
         }
-        WantedVelocity { velocity: wanted, derivative, is_limited }
+    }
+
+    /// phi' at no distance \[1/s\].
+    pub fn slowest_slope(&self) -> f64 {
+        1.0 / self.outer_s
     }
 
     /// phi and phi' at a distance.
-    fn closing_velocity(&self, distance: f64) -> (f64, f64) {
+    pub fn closing_velocity(&self, distance: f64) -> (f64, f64) {
         let DerivativeLimits { velocity: limit, acceleration, jerk } = self.closing;
         let a = BRAKING_SHARE * acceleration;
         let linear = self.outer_s + a / (2.0 * jerk);

@@ -15,10 +15,11 @@
 //! | [`regularity`] | balls of poses proved regular, for the limit of the condition |
 //! | [`pose_bounds`] | lengths of the legs and envelope |
 //! | [`approach`] | acceleration towards a moving target |
+//! | [`walls`] | soft approach of bounds |
 //! | [`target`] | setpoint, samples of poses, or a pose |
 //! | [`history`] | the reference of the last cycles |
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use self::approach::{Approach, TargetOffset};
 use self::history::History;
@@ -26,10 +27,11 @@ use self::pose_bounds::PoseBounds;
 use self::regularity::RegularBalls;
 pub use self::target::Target;
 use self::target::at_rest;
-use self::verification::{PoseStop, PoseStopState, StopKind, advanced, verify};
+use self::verification::{PoseStop, PoseStopState, Step, StopKind, advanced, verify};
+use self::walls::Walls;
 use super::input_validation::seconds_between;
 use super::limits::{Limit, LimitSet};
-use super::parameters::Constants;
+use super::parameters::{Constants, ViolationPolicy};
 use super::tracking_error::TrackingError;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
@@ -42,6 +44,7 @@ mod samples;
 mod stop;
 mod target;
 mod verification;
+mod walls;
 
 /// Longest step of the generator \[s\], so that slow loops give the same motion as fast ones.
 const MAX_STEP_S: f64 = 1e-3;
@@ -56,8 +59,16 @@ enum HeldStop {
     AtRest,
     /// From the present state.
     Verified(StopKind),
-    /// Followed since `elapsed` seconds.
-    Followed { stop: PoseStop, state: PoseStopState, elapsed: f64 },
+    /// The one in [`FollowedStop`].
+    Followed,
+}
+
+/// Stop that is followed.
+#[derive(Clone, Copy, Debug, Default)]
+struct FollowedStop {
+    stop: PoseStop,
+    state: PoseStopState,
+    elapsed_s: f64,
 }
 
 /// Reference generator.
@@ -67,6 +78,7 @@ pub struct ReferenceGenerator {
     motion: Motion,
     time_ns: u64,
     stop: HeldStop,
+    followed: FollowedStop,
     bounds: PoseBounds,
     balls: RegularBalls,
     history: History,
@@ -83,6 +95,7 @@ impl ReferenceGenerator {
             motion: at_rest(constants.home.pose()),
             time_ns: 0,
             stop: HeldStop::AtRest,
+            followed: FollowedStop::default(),
             bounds: PoseBounds::nominal(constants),
             balls: RegularBalls::default(),
             history: History::default(),
@@ -96,7 +109,7 @@ impl ReferenceGenerator {
     pub fn check_start(&mut self, constants: &Constants, pose: &Pose, twist: &Twist) -> Result<(), Limit> {
         let motion = Motion { twist: *twist, ..at_rest(pose) };
         let bounds = PoseBounds::around(constants, pose);
-        verify(constants, &bounds, &mut self.balls, &motion, 0.0).map(drop)
+        verify(constants, &bounds, &mut self.balls, &motion, &Step::default()).map(drop)
     }
 
     /// Begins with a motion at an instant. A stop must exist for it.
@@ -105,7 +118,7 @@ impl ReferenceGenerator {
     pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
         (self.motion, self.time_ns) = (*motion, time_ns);
         self.bounds = PoseBounds::around(constants, &motion.pose);
-        let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, 0.0);
+        let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::default());
         self.stop = HeldStop::Verified(verified.unwrap_or(StopKind::Planar));
         self.history.clear();
         self.closing_scale = 1.0;
@@ -137,7 +150,7 @@ impl ReferenceGenerator {
         match &self.stop {
             HeldStop::AtRest => true,
             HeldStop::Verified(_) => false,
-            HeldStop::Followed { stop, elapsed, .. } => *elapsed >= stop.duration(),
+            HeldStop::Followed => self.followed.elapsed_s >= self.followed.stop.duration(),
         }
     }
 
@@ -168,10 +181,13 @@ impl ReferenceGenerator {
     fn step(&mut self, constants: &Constants, end_ns: u64, target: Option<&Target<'_>>) {
         let step_s = seconds_between(self.time_ns, end_ns);
         let proposed = target
-            .and_then(|target| Some((target, target.motion_at(&constants.parameters, end_ns)?)))
+            .and_then(|target| Some((target, target.displaced_at(&constants.parameters, end_ns)?)))
             .map(|(target, desired)| self.proposed(constants, target, &desired, step_s));
         let verified = proposed.and_then(|motion| {
-            match verify(constants, &self.bounds, &mut self.balls, &motion, step_s) {
+            let (now, next) = (&self.motion.acceleration, &motion.acceleration);
+            let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
+            let step = Step { duration: step_s, change };
+            match verify(constants, &self.bounds, &mut self.balls, &motion, &step) {
                 Ok(kind) => Some((motion, HeldStop::Verified(kind))),
                 Err(limit) => {
                     self.active_limits = self.active_limits.with(limit, true);
@@ -181,21 +197,29 @@ impl ReferenceGenerator {
         });
         let (next, stop) = match verified {
             Some(verified) => verified,
-            None => self.stopped(constants, step_s),
+            None => (self.stopped(constants, step_s), HeldStop::Followed),
         };
         self.history.record(self.time_ns, &self.motion, &next.acceleration, step_s);
         (self.motion, self.stop, self.time_ns) = (next, stop, end_ns);
     }
 
     /// A step of constant jerk towards the desired motion of the next instant.
-    fn proposed(&mut self, constants: &Constants, target: &Target<'_>, desired: &Motion, h: f64) -> Motion {
+    fn proposed(
+        &mut self,
+        constants: &Constants,
+        target: &Target<'_>,
+        (desired, displacement): &(Motion, Vector6<f64>),
+        h: f64,
+    ) -> Motion {
         let limits = target.limits(&constants.parameters.limits);
         let approach = |limits| Approach::new(limits, self.closing_scale, h);
         let (turning, shifting) = (approach(limits.orientation), approach(limits.position));
-        let Motion { acceleration, .. } = &self.motion;
-        // Where the present acceleration leads.
-        let led = moved(&self.motion, &acceleration.angular, &acceleration.linear, h);
-        let offset = led.pose.displacement_to(&desired.pose);
+        let Motion { pose, twist, acceleration } = &self.motion;
+        // Where the present acceleration leads: to first order in its displacement, which is exact on the target.
+        let (v, a) = (twist.vector(), acceleration.vector());
+        let led = Twist::from_vector(&(v + a * h));
+        let offset = pose.displacement_to(&desired.pose).vector() + displacement - (v + a * (0.5 * h)) * h;
+        let offset = Twist::from_vector(&offset);
         let orientation = TargetOffset {
             offset: offset.angular,
             velocity: desired.twist.angular,
@@ -206,10 +230,19 @@ impl ReferenceGenerator {
             velocity: desired.twist.linear,
             acceleration: desired.acceleration.linear,
         };
-        let turn = turning.wanted(&orientation, &led.twist.angular);
-        let shift = shifting.wanted(&position, &led.twist.linear);
-        let (angular, turn_limits) = turning.acceleration(&turn, &led.twist.angular, &acceleration.angular);
-        let (linear, shift_limits) = shifting.acceleration(&shift, &led.twist.linear, &acceleration.linear);
+        let mut turn = turning.wanted(&orientation, &led.angular);
+        let mut shift = shifting.wanted(&position, &led.linear);
+        if constants.parameters.on_violation == ViolationPolicy::Limit {
+            let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
+            let restricting = walls.restrict(&mut turn, &mut shift);
+            if !restricting.is_empty() {
+                turning.limit_velocity(&mut turn);
+                shifting.limit_velocity(&mut shift);
+                self.active_limits = self.active_limits.union(restricting);
+            }
+        }
+        let (angular, turn_limits) = turning.acceleration(&turn, &led.angular, &acceleration.angular);
+        let (linear, shift_limits) = shifting.acceleration(&shift, &led.linear, &acceleration.linear);
         let [by_acceleration, by_jerk] = [turn_limits, shift_limits]
             .into_iter()
             .fold([false; 2], |[a, j], [next_a, next_j]| [a | next_a, j | next_j]);
@@ -222,27 +255,27 @@ impl ReferenceGenerator {
     }
 
     /// The motion a step later along the stop.
-    fn stopped(&self, constants: &Constants, h: f64) -> (Motion, HeldStop) {
-        let (stop, state, elapsed) = match self.stop {
-            HeldStop::AtRest => return (self.motion, HeldStop::AtRest),
-            HeldStop::Verified(kind) => {
-                let stop = PoseStop::new(kind, &self.motion, &constants.parameters.limits);
-                let start = stop.at(0.0);
-                (stop, start, 0.0)
-            }
-            HeldStop::Followed { stop, state, elapsed } => (stop, state, elapsed),
-        };
-        let elapsed = elapsed + h;
-        let next = stop.at(elapsed);
-        let motion = Motion {
-            pose: advanced(&self.motion.pose, &state, &next, h),
-            twist: Twist { angular: next.orientation.velocity, linear: next.position.velocity },
-            acceleration: Acceleration {
-                angular: next.orientation.acceleration,
-                linear: next.position.acceleration,
-            },
-        };
-        (motion, HeldStop::Followed { stop, state: next, elapsed })
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn stopped(&mut self, constants: &Constants, h: f64) -> Motion {
+        if let HeldStop::AtRest = self.stop {
+            self.followed = FollowedStop::default();
+        }
+        if let HeldStop::Verified(kind) = self.stop {
+            let stop = PoseStop::new(kind, &self.motion, &constants.parameters.limits);
+            self.followed = FollowedStop { stop, state: stop.at(0.0), elapsed_s: 0.0 };
+        }
+        let FollowedStop { stop, state, elapsed_s } = &mut self.followed;
+        *elapsed_s += h;
+        let next = stop.at(*elapsed_s);
+        let pose = advanced(&self.motion.pose, state, &next, h);
+        *state = next;
+        let PoseStopState { orientation, position } = next;
+        Motion {
+            pose,
+            twist: Twist { angular: orientation.velocity, linear: position.velocity },
+            acceleration: Acceleration { angular: orientation.acceleration, linear: position.acceleration },
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Target of the reference in one cycle: where it shall go, and with which share of the limits.
 
+use nalgebra::Vector6;
+
 use crate::control::controller::SetpointKind;
 use crate::control::input_validation::SetpointMotion;
 use crate::control::limits::Limits;
@@ -34,6 +36,27 @@ impl<'a> Target<'a> {
             Self::Motion(setpoint) => Some(setpoint.motion_at(parameters, instant_ns)),
             Self::Samples(samples) => samples.target(instant_ns),
             Self::Pose(pose) => Some(at_rest(pose)),
+        }
+    }
+
+    /// The motion at an instant, with the pose as a base pose and the displacement from it: cheaper, and the same to first
+    /// order in the displacement.
+    pub(super) fn displaced_at(
+        &self,
+        parameters: &Parameters,
+        instant_ns: u64,
+    ) -> Option<(Motion, Vector6<f64>)> {
+        match self {
+            Self::Motion(setpoint) => {
+                let SetpointMotion { motion, .. } = setpoint;
+                let dt = setpoint.extrapolation_s(parameters, instant_ns);
+                let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
+                let led = Motion { twist: Twist::from_vector(&(v + a * dt)), ..*motion };
+                Some((led, (v + a * (0.5 * dt)) * dt))
+            }
+            Self::Samples(_) | Self::Pose(_) => {
+                Some((self.motion_at(parameters, instant_ns)?, Vector6::zeros()))
+            }
         }
     }
 

@@ -57,7 +57,7 @@ pub(super) struct PoseStop {
 }
 
 /// Motion parameters of a stop at one instant, relative to its start.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PoseStopState {
     pub orientation: StopState,
     pub position: StopState,
@@ -98,28 +98,44 @@ pub(super) fn advanced(pose: &Pose, from: &PoseStopState, to: &PoseStopState, dt
     })
 }
 
-/// Verifies a stop from a motion that the reference may have at the end of a step of `step_s`. Returns which, or the
-/// limit that no stop was proved to keep.
+/// The step of constant jerk that leads to the motion from which a stop is verified.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Step {
+    /// \[s\]
+    pub duration: f64,
+    /// Change of the acceleration: angular \[rad/s^2\], linear \[m/s^2\].
+    pub change: [f64; 2],
+}
+
+impl Step {
+    /// Largest velocities within the step beyond those at its ends.
+    fn bulge(&self) -> [f64; 2] {
+        self.change.map(|change| change * self.duration / 8.0)
+    }
+}
+
+/// Verifies a step and the stop from the motion at its end. Returns which stop, or the limit that no stop was proved to keep.
 pub(super) fn verify(
     constants: &Constants,
     bounds: &PoseBounds,
     balls: &mut RegularBalls,
     motion: &Motion,
-    step_s: f64,
+    step: &Step,
 ) -> Result<StopKind, Limit> {
     let Limits { orientation, position, .. } = &constants.parameters.limits;
     let Motion { pose, twist, acceleration } = motion;
     let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
     let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
-    let is_free = shift.peak_velocity <= position.velocity
-        && turn.peak_velocity <= orientation.velocity
+    let [angular_bulge, linear_bulge] = step.bulge();
+    let is_free = shift.peak_velocity + linear_bulge <= position.velocity
+        && turn.peak_velocity + angular_bulge <= orientation.velocity
         && shift.peak_velocity + constants.arm * turn.peak_velocity <= constants.machine().actuator.max_rate
-        && has_room(constants, bounds, pose, &shift, &turn, step_s)
+        && has_room(constants, bounds, pose, &shift, &turn, step.duration)
         && balls.cover(constants, pose, [shift.length, turn.length]);
     if is_free {
         return Ok(StopKind::ReleaseFirst);
     }
-    let examination = Examination::new(constants, bounds, motion, step_s)?;
+    let examination = Examination::new(constants, bounds, motion, step)?;
     examination.run(balls, pose)?;
     Ok(StopKind::Planar)
 }
@@ -184,21 +200,26 @@ impl<'a> Examination<'a> {
         constants: &'a Constants,
         bounds: &'a PoseBounds,
         motion: &Motion,
-        step_s: f64,
+        step: &Step,
     ) -> Result<Self, Limit> {
         let limits = &constants.parameters.limits;
         let Limits { orientation, position, .. } = limits;
         let stop = PoseStop::new(StopKind::Planar, motion, limits);
         let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
         let allowed = 1.0 + ROUNDING;
-        if !(v <= allowed * position.velocity && w <= allowed * orientation.velocity) {
+        let [angular_bulge, linear_bulge] = step.bulge();
+        let is_slow = v <= allowed * position.velocity
+            && w <= allowed * orientation.velocity
+            && motion.twist.linear.norm() + linear_bulge <= position.velocity
+            && motion.twist.angular.norm() + angular_bulge <= orientation.velocity;
+        if !is_slow {
             return Err(Limit::Velocity);
         }
         let curvature = curvature(constants, v, w);
         let knots = (stop.duration() * (curvature / (8.0 * CHORD_DEPARTURE_M)).sqrt()).ceil();
         let intervals = knots.max(MIN_INTERVALS).min(MAX_INTERVALS);
         let dt = stop.duration() / intervals;
-        let chord = dt.max(step_s).powi(2) / 8.0;
+        let chord = dt.max(step.duration).powi(2) / 8.0;
         let actuator = &constants.machine().actuator;
         let (arm, joint) = (constants.arm, v + constants.arm * w);
         let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);

@@ -1,0 +1,223 @@
+//! Walls: bounds that the wanted velocity approaches softly, so that a platform pressed against them slides.
+//!
+//! Each bound leaves a gap `g`: of a leg to the ends of its stroke, of a coordinate to the envelope. With its gradient G,
+//! `g' = -G V`. The wanted twist V and its derivative are changed least (rotations weighted by the radius of the joints) so that
+//!
+//! ```text
+//! G V  <= phi(g)                        phi: braking curve of the approach, on a part of the limits; and of a leg its rate
+//! G V' = -phi'(g) G V - G' V            where this bound is active
+//! ```
+//!
+//! by Hildreth's method (C. Hildreth, "A quadratic programming procedure", 1957), a few sweeps over all walls. The walls prove
+//! nothing: the verified stop keeps the bounds. Without them it would do so at the limits of jerk.
+//!
+//! Used under `on_violation = "limit"` only: a certified trajectory may go as near to a bound as it can be stopped.
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+use nalgebra::{Vector3, Vector6};
+
+use super::approach::{Approach, WantedVelocity};
+use super::pose_bounds::PoseBounds;
+use crate::control::limits::{DerivativeLimits, Limit, LimitSet, Limits};
+use crate::control::parameters::{Constants, Envelope};
+use crate::model::inverse_geometry::{LegMotion, leg_motion};
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::task::task_coordinates;
+
+/// Part of the limits with which a wall is approached: several walls and the motion along them take the rest.
+const CLOSING_SHARE: f64 = 0.6;
+/// Distance kept from a bound, so that the examination of the stop between knots finds room, as a ratio of the stroke.
+const KEPT_RATIO: f64 = 1e-3;
+/// Part of a leg's largest rate that is wanted.
+const RATE_SHARE: f64 = 0.97;
+/// Sweeps over the walls: two walls at 60 degrees converge to 1e-4.
+const SWEEPS: u32 = 8;
+/// Slowness of the return from a gap that is negative, over that of the approach.
+const RETURN_RATIO: f64 = 4.0;
+
+/// Both ends of every leg and of every coordinate.
+const WALL_COUNT: usize = 24;
+
+/// One wall, in coordinates in which rotations are multiplied by the radius of the joints.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wall {
+    /// Bit of the limit that it stands for.
+    limit: LimitSet,
+    gradient: Vector6<f64>,
+    norm_squared: f64,
+    /// Largest closing rate \[m/s\].
+    rate: f64,
+    /// Its derivative if the wall is approached at that rate, less the curvature \[m/s^2\].
+    derivative: f64,
+    multiplier: f64,
+}
+
+/// Walls around one pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Walls {
+    walls: [Wall; WALL_COUNT],
+    count: usize,
+    radius: f64,
+}
+
+impl Walls {
+    /// Those around a motion, for the twist that it leads to a step later.
+    pub fn new(
+        constants: &Constants,
+        bounds: &PoseBounds,
+        motion: &Motion,
+        led: &Twist,
+        step_s: f64,
+    ) -> Self {
+        let (machine, limits) = (constants.machine(), &constants.parameters.limits);
+        let radius = machine.joints.radius;
+        let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius };
+        let kept = KEPT_RATIO * machine.actuator.stroke();
+        let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
+        let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
+        let wrenches = leg_wrenches(machine, &motion.pose);
+        let approach = Approach::new(limits.position, CLOSING_SHARE, step_s);
+        let most = RATE_SHARE * machine.actuator.max_rate;
+        let squared_time = stop_time_s(limits, led).powi(2) / 8.0;
+        let ends = bounds.shortest.iter().zip(&bounds.longest);
+        let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
+        for (column, ((length, (rate, curvature)), (shortest, longest))) in wrenches.column_iter().zip(legs) {
+            let moment: Vector3<f64> = column.fixed_rows::<3>(0).into();
+            let direction: Vector3<f64> = column.fixed_rows::<3>(3).into();
+            let gradient = stacked(&(moment / radius), &direction);
+            let next = length + rate * step_s;
+            // A stop leads straight on: what the leg's length departs from its tangent on the way.
+            let departure = curvature * squared_time;
+            let gaps = [longest - next - departure.max(0.0), next - shortest + departure.min(0.0)];
+            let [long, short] = gaps.map(|gap| gap - kept);
+            walls.push(Limit::Stroke, &approach, gradient, long, *curvature, most);
+            walls.push(Limit::Stroke, &approach, -gradient, short, -curvature, most);
+        }
+        if let Some(envelope) = &bounds.envelope {
+            walls.push_envelope(constants, envelope, motion, led, step_s, kept);
+        }
+        walls
+    }
+
+    fn push_envelope(
+        &mut self,
+        constants: &Constants,
+        Envelope { lowest, highest }: &Envelope,
+        motion: &Motion,
+        led: &Twist,
+        step_s: f64,
+        kept: f64,
+    ) {
+        let (machine, limits) = (constants.machine(), &constants.parameters.limits);
+        let x = task_coordinates(&motion.pose, &machine.home);
+        let [alpha, beta, ..] = x;
+        let radius = self.radius;
+        // Rates of the Bryan angles: alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w / c^2.
+        let (e1, e2) = (Vector3::x(), Vector3::new(0.0, alpha.cos(), alpha.sin()));
+        let (s, c) = (beta.sin(), beta.cos());
+        let n = e1 * s + e1.cross(&e2) * c;
+        let zero = Vector3::zeros();
+        let gradients = [
+            stacked(&((e1 - n * s) / (c * c * radius)), &zero),
+            stacked(&(e2 / radius), &zero),
+            stacked(&((n - e1 * s) / (c * c * radius)), &zero),
+            stacked(&zero, &Vector3::x()),
+            stacked(&zero, &Vector3::y()),
+            stacked(&zero, &Vector3::z()),
+        ];
+        let turning = Approach::new(limits.orientation, CLOSING_SHARE, step_s);
+        let shifting = Approach::new(limits.position, CLOSING_SHARE, step_s);
+        let velocity = stacked(&(led.angular * radius), &led.linear);
+        let ranges = lowest.iter().zip(highest);
+        for (axis, ((x, gradient), (low, high))) in x.iter().zip(gradients).zip(ranges).enumerate() {
+            let (approach, kept) = if axis < 3 { (&turning, kept / radius) } else { (&shifting, kept) };
+            let kept = kept.min(0.05 * (high - low));
+            let next = x + gradient.dot(&velocity) * step_s;
+            self.push(Limit::Envelope, approach, gradient, high - next - kept, 0.0, f64::INFINITY);
+            self.push(Limit::Envelope, approach, -gradient, next - low - kept, 0.0, f64::INFINITY);
+        }
+    }
+
+    fn push(
+        &mut self,
+        limit: Limit,
+        approach: &Approach,
+        gradient: Vector6<f64>,
+        gap: f64,
+        curvature: f64,
+        most: f64,
+    ) {
+        let (rate, slope) = if gap > 0.0 {
+            approach.closing_velocity(gap)
+        } else {
+            let slope = approach.slowest_slope() / RETURN_RATIO;
+            (gap * slope, slope)
+        };
+        let (limit, rate, slope) =
+            if rate > most { (Limit::LegRate, most, 0.0) } else { (limit, rate, slope) };
+        if let Some(wall) = self.walls.get_mut(self.count) {
+            *wall = Wall {
+                limit: LimitSet::default().with(limit, true),
+                norm_squared: gradient.norm_squared().max(f64::MIN_POSITIVE),
+                gradient,
+                rate,
+                derivative: -slope * rate - curvature,
+                multiplier: 0.0,
+            };
+            self.count += 1;
+        }
+    }
+
+    /// Changes the wanted velocities of rotation and translation least, so that no wall is approached too fast. Returns the
+    /// limits that required it.
+    pub fn restrict(&mut self, turn: &mut WantedVelocity, shift: &mut WantedVelocity) -> LimitSet {
+        let mut velocity = stacked(&(turn.velocity * self.radius), &shift.velocity);
+        let mut active = LimitSet::default();
+        for _ in 0..SWEEPS {
+            for wall in self.walls.iter_mut().take(self.count) {
+                let excess = (wall.gradient.dot(&velocity) - wall.rate) / wall.norm_squared;
+                let multiplier = (wall.multiplier + excess).max(0.0);
+                velocity -= wall.gradient * (multiplier - wall.multiplier);
+                wall.multiplier = multiplier;
+            }
+        }
+        for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier > 0.0) {
+            active = active.union(wall.limit);
+        }
+        if active.is_empty() {
+            return active;
+        }
+        let mut derivative = stacked(&(turn.derivative * self.radius), &shift.derivative);
+        for _ in 0..SWEEPS {
+            for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier > 0.0) {
+                let excess = (wall.gradient.dot(&derivative) - wall.derivative) / wall.norm_squared;
+                derivative -= wall.gradient * excess;
+            }
+        }
+        (turn.velocity, shift.velocity) = (upper(&velocity) / self.radius, lower(&velocity));
+        (turn.derivative, shift.derivative) = (upper(&derivative) / self.radius, lower(&derivative));
+        active
+    }
+}
+
+/// Duration of the stop from a twist \[s\].
+fn stop_time_s(limits: &Limits, twist: &Twist) -> f64 {
+    let time_s = |limits: &DerivativeLimits, speed: f64| {
+        speed / limits.acceleration + limits.acceleration / limits.jerk
+    };
+    time_s(&limits.position, twist.linear.norm()).max(time_s(&limits.orientation, twist.angular.norm()))
+}
+
+fn stacked(first: &Vector3<f64>, second: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(first.x, first.y, first.z, second.x, second.y, second.z)
+}
+
+fn upper(v: &Vector6<f64>) -> Vector3<f64> {
+    v.fixed_rows::<3>(0).into()
+}
+
+fn lower(v: &Vector6<f64>) -> Vector3<f64> {
+    v.fixed_rows::<3>(3).into()
+}

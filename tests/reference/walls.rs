@@ -1,0 +1,107 @@
+//! Pressing into walls, under `on_violation = "limit"`: the platform slides along them without chatter.
+
+use hexad::config::Config;
+use hexad::control::controller::Setpoint;
+use hexad::control::input_validation::SetpointMotion;
+use hexad::control::parameters::{Constants, Envelope, ViolationPolicy};
+use hexad::control::reference::{ReferenceGenerator, Target};
+use hexad::model::task::TaskState;
+use nalgebra::Vector6;
+
+use super::common::data;
+use super::common::rig::parameters;
+use super::observer::{Largest, examine};
+
+/// Sine of each coordinate: offset, amplitude, frequency \[Hz\].
+type Sines = [(f64, f64, f64); 6];
+
+const STILL: (f64, f64, f64) = (0.0, 0.0, 0.0);
+
+fn at(home: &[f64; 6], sines: &Sines, t: f64) -> TaskState {
+    let mut task = TaskState::at_rest(*home);
+    for (axis, (offset, amplitude, hertz)) in sines.iter().enumerate() {
+        let w = core::f64::consts::TAU * hertz;
+        let (sin, cos) = (w * t).sin_cos();
+        task.x[axis] += offset + amplitude * sin;
+        task.xd[axis] = amplitude * w * cos;
+        task.xdd[axis] = -amplitude * w * w * sin;
+    }
+    task
+}
+
+/// RMS jerk of translation and rotation over the limits once the wall is reached, and the largest values of the run.
+fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines) -> ([f64; 2], Largest) {
+    let config = Config::load(&data(machine, "toml")).unwrap();
+    let mut parameters = parameters(&config);
+    parameters.on_violation = ViolationPolicy::Limit;
+    parameters.period_ns = 1_000_000_000 / rate_hz;
+    let home = Vector6::from(config.machine.home);
+    parameters.envelope =
+        half.map(|half| Envelope { lowest: (home - half).into(), highest: (home + half).into() });
+    let constants = Constants::new(&config.machine, parameters);
+    let mut reference = ReferenceGenerator::new(&constants);
+    let start = *reference.motion();
+    reference.start(&constants, 0, &start);
+    let period_s = parameters.period_ns as f64 * 1e-9;
+    let (mut squares, mut count, mut largest) = ([0.0; 2], 0.0, Largest::default());
+    for k in 0..6 * rate_hz {
+        let now_ns = k * parameters.period_ns;
+        let before = *reference.motion();
+        let task = at(&config.machine.home, sines, k as f64 * period_s);
+        let setpoint = SetpointMotion::new(Setpoint::motion(now_ns, task));
+        reference.advance(&constants, now_ns + parameters.period_ns, Some(&Target::Motion(&setpoint)));
+        examine(&constants, &reference, &before, [now_ns, now_ns + parameters.period_ns], &mut largest);
+        // After the way to the wall.
+        if k > 2 * rate_hz {
+            let change = (reference.motion().acceleration.vector() - before.acceleration.vector()) / period_s;
+            let limits = &parameters.limits;
+            squares[0] += (change.fixed_rows::<3>(3).norm() / limits.position.jerk).powi(2);
+            squares[1] += (change.fixed_rows::<3>(0).norm() / limits.orientation.jerk).powi(2);
+            count += 1.0;
+        }
+    }
+    (squares.map(|sum| f64::sqrt(sum / count)), largest)
+}
+
+#[test]
+fn the_platform_slides_along_walls_without_chatter() {
+    let half = Vector6::new(0.15, 0.15, 0.15, 0.08, 0.08, 0.08);
+    let slow = (0.0, 0.06, 0.5);
+    let cases: [(&str, Option<Vector6<f64>>, Sines); 8] = [
+        ("one face, sliding", Some(half), [STILL, STILL, STILL, slow, (0.2, 0.0, 0.0), STILL]),
+        ("two faces, sliding", Some(half), [STILL, STILL, STILL, slow, (0.2, 0.0, 0.0), (-0.3, 0.0, 0.0)]),
+        (
+            "three faces",
+            Some(half),
+            [STILL, STILL, STILL, (0.2, 0.0, 0.0), (0.2, 0.0, 0.0), (-0.3, 0.0, 0.0)],
+        ),
+        ("angles", Some(half), [(0.4, 0.0, 0.0), (0.0, 0.1, 0.5), (0.3, 0.0, 0.0), slow, STILL, STILL]),
+        ("leg ends, sliding", None, [STILL, STILL, STILL, slow, (0.0, 0.05, 0.3), (1.0, 0.0, 0.0)]),
+        ("leg ends, low", None, [STILL, STILL, STILL, slow, STILL, (-1.0, 0.0, 0.0)]),
+        (
+            "leg ends, turned",
+            None,
+            [(0.3, 0.1, 0.5), (0.2, 0.0, 0.0), (0.0, 0.1, 0.4), slow, STILL, (0.6, 0.0, 0.0)],
+        ),
+        (
+            "leg ends, far aside",
+            None,
+            [STILL, STILL, STILL, (1.0, 0.0, 0.0), (0.0, 0.3, 0.4), (0.2, 0.0, 0.0)],
+        ),
+    ];
+    let mut failures = Vec::new();
+    for machine in ["motion_base", "fried2008", "tsai2000"] {
+        for rate_hz in [250, 1000, 4000] {
+            for (what, half, sines) in &cases {
+                let (jerk, largest) = press(machine, rate_hz, *half, sines);
+                let [shift, turn] = jerk;
+                let stroke = largest.0["stroke"];
+                println!("{machine} {rate_hz} Hz, {what}: jerk {shift:.4} {turn:.4}, stroke {stroke:.2e}");
+                if shift > 0.05 || turn > 0.05 {
+                    failures.push(format!("{machine} {rate_hz} Hz, {what}: {shift:.4} {turn:.4}"));
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
