@@ -8,7 +8,7 @@
 //! | validate inputs | [`input_validation`] |
 //! | locate platform, tracking error | [`localization`], [`tracking_error`] |
 //! | decide state | `assessment`, [`supervisor`] with the states of [`state`] |
-//! | reference | `reference`, with the autonomous motions of [`quintic_offset`] |
+//! | reference | `reference`, with the autonomous motions of [`quintic_offset`]; poses without derivatives: [`pose_samples`] |
 //! | control law | [`law`] with its [`gains`] and [`leg_masses`], [`disturbance_observer`] |
 //! | forces | `forces` |
 //! | checks | `force_limits` |
@@ -28,6 +28,7 @@ pub mod leg_masses;
 pub mod limits;
 pub mod localization;
 pub mod parameters;
+pub mod pose_samples;
 pub mod quintic_offset;
 mod reference;
 pub mod state;
