@@ -165,25 +165,29 @@ fn the_delay_follows_rate_and_jitter() {
 #[test]
 fn a_change_of_rate_changes_the_delay_slowly_and_the_pose_without_a_step() {
     let mut samples = PoseSamples::default();
-    let (mut last, mut next_ns) = (None::<(f64, f64)>, 0);
+    let (mut last, mut next_ns) = (None::<(f64, f64, f64)>, 0);
     for now_ns in (0..20_000).map(|cycle| cycle * MS) {
         if now_ns >= next_ns {
             samples.push(now_ns, now_ns, &at(0.2e-9 * now_ns as f64));
             next_ns += if (5000 * MS..12_000 * MS).contains(&now_ns) { 33 * MS } else { 10 * MS };
         }
-        let x = samples.target(now_ns).unwrap().pose.position.x;
+        let target = samples.target(now_ns).unwrap();
+        let (x, velocity) = (target.pose.position.x, target.twist.linear.x);
         let delay = samples.delay_s(now_ns);
-        if let Some((x_before, delay_before)) = last.filter(|_| now_ns > 200 * MS) {
+        if let Some((x_before, velocity_before, delay_before)) = last.filter(|_| now_ns > 200 * MS) {
             assert!((delay - delay_before).abs() < 0.1001e-3, "{now_ns}: {delay} after {delay_before}");
             // 0.2 m/s; late samples of the slower rate are extrapolated.
             assert!((x - x_before - 0.0002).abs() < 0.00003, "{now_ns}: {x} after {x_before}");
+            // The twist is that of the pose, change of the delay included.
+            let difference = (x - x_before) * 1e3 - 0.5 * (velocity + velocity_before);
+            assert!(difference.abs() < 0.002, "{now_ns}: {difference}");
         }
-        last = Some((x, delay));
+        last = Some((x, velocity, delay));
         if now_ns == 11_900 * MS {
             assert!((delay - 0.066).abs() < 0.001, "{delay}");
         }
     }
-    assert!((last.unwrap().1 - 0.020).abs() < 0.0005, "{last:?}");
+    assert!((last.unwrap().2 - 0.020).abs() < 0.0005, "{last:?}");
 }
 
 fn at(x: f64) -> Pose {
@@ -290,5 +294,46 @@ fn half_turns_between_samples_and_extreme_stamps_give_finite_targets() {
             let target = samples.target(instant_ns).unwrap();
             assert!(target.pose.rotation.iter().chain(target.twist.angular.iter()).all(|x| x.is_finite()));
         }
+    }
+}
+
+#[test]
+fn angular_velocity_is_continuous_where_the_axis_of_rotation_turns() {
+    // 3.1 rad/s about an axis that turns once per second: 0.1 rad between samples, and from one cubic to the next
+    // 0.015 rad/s, were the turn of the axis between two samples left out.
+    let cone = |time_ns: u64| {
+        let (sin, cos) = (TAU * time_ns as f64 * 1e-9).sin_cos();
+        Pose { rotation: exp(&(Vector3::new(cos, sin, 0.0) * 0.5)), position: Vector3::zeros() }
+    };
+    let (mut samples, mut last) = (PoseSamples::default(), None::<Motion>);
+    let step_ns = MS / 10;
+    for now_ns in (0..2000 * MS).step_by(step_ns as usize) {
+        if now_ns % (33 * MS) == 0 {
+            samples.push(now_ns, now_ns, &cone(now_ns));
+        }
+        let target = samples.target(now_ns).unwrap();
+        if let Some(last) = last.filter(|_| now_ns > 200 * MS) {
+            let change = (target.twist.angular - last.twist.angular).norm();
+            assert!(change < 0.004, "{now_ns}: {change} rad/s");
+            let rate = last.pose.displacement_to(&target.pose).angular / (step_ns as f64 * 1e-9);
+            let difference = (rate - target.twist.angular).norm();
+            assert!(difference < 0.005, "{now_ns}: {difference} rad/s");
+        }
+        last = Some(target);
+    }
+}
+
+#[test]
+fn the_delay_changes_by_a_tenth_of_the_time_at_most_and_never_jumps() {
+    for (from, to, after_ms, expected) in
+        [(0.02, 0.15, 100, 0.03), (0.15, 0.02, 100, 0.14), (0.02, 0.03, 250, 0.025)]
+    {
+        let delay = Delay::new(from, 5 * MS).toward(to, 7 * MS);
+        assert_eq!(delay.at(7 * MS), from);
+        assert!((delay.at((7 + after_ms) * MS) - expected).abs() < 1e-12, "{delay:?}");
+        assert!((delay.rate_at(8 * MS) * after_ms as f64 * 1e-3 - (expected - from)).abs() < 1e-12);
+        // It does not go beyond its goal without new samples.
+        assert!((delay.at(90_000 * MS) - to).abs() <= (from - to).abs() && delay.rate_at(90_000 * MS) == 0.0);
+        assert_eq!(delay.toward(0.07, 400 * MS).at(400 * MS), delay.at(400 * MS));
     }
 }
