@@ -66,7 +66,7 @@ struct Sample {
 /// assert!((samples.delay_s(now_ns) - 0.040).abs() < 1e-9);
 /// assert!((target.pose.position.x - 0.5 * (59.0 * 0.020 - 0.040)).abs() < 1e-9);
 /// ```
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct PoseSamples {
     /// A ring; [`Self::newest`] is the place of the newest sample.
     samples: [Option<Sample>; CAPACITY],
@@ -97,6 +97,11 @@ impl PoseSamples {
         self.delay = if is_first { Delay::new(delay, now_ns) } else { self.delay.toward(delay, now_ns) };
         self.append(time_ns, pose);
         self.update_slopes();
+    }
+
+    /// Forgets the source.
+    pub fn clear(&mut self) {
+        *self = Self::default();
     }
 
     /// The motion that the source requested for the instant minus the delay; its acceleration is zero. Behind the newest

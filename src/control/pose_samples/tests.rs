@@ -202,7 +202,11 @@ fn rests_at(samples: &PoseSamples, instant_ns: u64, x: f64) {
 
 #[test]
 fn without_a_sample_there_is_no_target() {
-    assert!(PoseSamples::default().target(7).is_none());
+    let mut samples = PoseSamples::default();
+    assert!(samples.target(7).is_none());
+    samples.push(1000 * MS, 995 * MS, &at(0.1));
+    samples.clear();
+    assert!(samples.target(1000 * MS).is_none());
 }
 
 #[test]
