@@ -328,16 +328,15 @@ fn angular_velocity_is_continuous_where_the_axis_of_rotation_turns() {
 }
 
 #[test]
-fn the_delay_changes_by_a_tenth_of_the_time_at_most_and_never_jumps() {
-    for (from, to, after_ms, expected) in
-        [(0.02, 0.15, 100, 0.03), (0.15, 0.02, 100, 0.14), (0.02, 0.03, 250, 0.025)]
-    {
-        let delay = Delay::new(from, 5 * MS).toward(to, 7 * MS);
-        assert_eq!(delay.at(7 * MS), from);
-        assert!((delay.at((7 + after_ms) * MS) - expected).abs() < 1e-12, "{delay:?}");
-        assert!((delay.rate_at(8 * MS) * after_ms as f64 * 1e-3 - (expected - from)).abs() < 1e-12);
-        // It does not go beyond its goal without new samples.
-        assert!((delay.at(90_000 * MS) - to).abs() <= (from - to).abs() && delay.rate_at(90_000 * MS) == 0.0);
-        assert_eq!(delay.toward(0.07, 400 * MS).at(400 * MS), delay.at(400 * MS));
+fn the_series_displace_as_the_exponential_does() {
+    let start = sine(1.0, 123 * MS).0;
+    for angle in [0.0, 1e-9, 0.01, 0.2, 0.499, 0.501, 3.0] {
+        let angular = Vector3::new(0.3, -0.9, 0.2).normalize() * angle;
+        let displacement = Twist { angular, linear: Vector3::new(1.0, 2.0, 3.0) };
+        let (ours, exact) = (displaced(&start, &displacement), start.displaced(&displacement));
+        assert!(
+            (ours.rotation - exact.rotation).amax() < 3e-11 && ours.position == exact.position,
+            "{angle}"
+        );
     }
 }

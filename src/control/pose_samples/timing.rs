@@ -84,3 +84,27 @@ impl Delay {
 fn median(a: f64, b: f64, c: f64) -> f64 {
     a.min(b).max(a.max(b).min(c))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn the_delay_changes_by_a_tenth_of_the_time_at_most_and_never_jumps() {
+        for (from, to, after_ms, expected) in
+            [(0.02, 0.15, 100, 0.03), (0.15, 0.02, 100, 0.14), (0.02, 0.03, 250, 0.025)]
+        {
+            let delay = Delay::new(from, 5 * MS).toward(to, 7 * MS);
+            assert_eq!(delay.at(7 * MS), from);
+            assert!((delay.at((7 + after_ms) * MS) - expected).abs() < 1e-12, "{delay:?}");
+            assert!((delay.rate_at(8 * MS) * after_ms as f64 * 1e-3 - (expected - from)).abs() < 1e-12);
+            // It does not go beyond its goal without new samples.
+            assert!(
+                (delay.at(90_000 * MS) - to).abs() <= (from - to).abs() && delay.rate_at(90_000 * MS) == 0.0
+            );
+            assert_eq!(delay.toward(0.07, 400 * MS).at(400 * MS), delay.at(400 * MS));
+        }
+    }
+}
