@@ -3,7 +3,7 @@
 //!     cargo run --example setpoint_source --no-default-features --features client -- fried2008 10
 //!
 //! Until the daemon is in control it offers the pose in which the platform stands. Each setpoint is X, X' and X'' of one
-//! smooth motion: the daemon refuses what its limits or the machine do not allow.
+//! smooth motion: if one asks for more than the limits and the machine allow, the daemon comes to rest.
 
 use std::env;
 use std::thread::sleep;

@@ -77,20 +77,25 @@
 //! | park | operator request to move home and disable forces |
 //! | plant | simulated platform with drives and sensors, see [`plant`] |
 //! | plausibility window | longest time over which lengths and rates of a measurement are compared |
+//! | policy | reaction to a setpoint that the limits do not allow: `stop` or `limit`, `[setpoint] on_violation` |
 //! | prefault | touch memory in advance, so that no cycle causes a page fault |
-//! | reference | motion that the controller tracks; generated from the setpoint, within all limits |
+//! | reference | motion that the controller tracks; generated from the target, within all limits |
+//! | reference generator | moves the reference towards the target, only to where a verified stop exists |
 //! | regressor | matrix that takes inertial parameters to forces, see [`model::regressor`] |
 //! | release | instant at which a cycle begins, on a fixed grid |
 //! | reservation | processor time that SCHED_DEADLINE guarantees in each period |
+//! | sample | pose of a motion at one instant, without derivatives, see [`control::reference::pose_samples`] |
 //! | saturation | a quantity held at its limit |
-//! | setpoint | X, X', X'' that a source requests for an instant |
+//! | setpoint | X, X', X'' that a source requests for an instant; or samples of X, or one X to stand at |
 //! | shortfall | set-up step that the kernel refused, with reason and remedy |
 //! | singular pose, singularity | pose at which the legs cannot hold the platform; det N = 0 |
 //! | stamp | CLOCK_MONOTONIC time in a message \[ns\] |
 //! | stroke | range of a leg's length |
+//! | target | where the reference goes: the setpoint, or a pose to stand at |
 //! | timeline | hold, approach, settle, motion, settle |
 //! | trusted step | change of pose for which Newton's method is proved to find the only solution |
 //! | twist, wrench | angular and linear velocity; torque and force; angular part first |
+//! | verified stop | way to rest from the reference that was proved to keep every limit along its whole length |
 #![cfg_attr(not(any(feature = "client", test)), no_std)]
 
 #[cfg(feature = "daemon")]

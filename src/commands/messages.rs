@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::failure::Failure;
+use crate::control::controller::SetpointKind;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::limits::Limit;
 use crate::control::state::{Request, State};
@@ -73,7 +74,8 @@ fn constants() -> Vec<(&'static str, String, u32)> {
     let requests = Request::ALL.into_iter().map(|it| ("REQUEST", format!("{it:?}"), it as u32));
     let codes = DiagnosticCode::ALL.iter().map(|code| ("DIAGNOSTIC", format!("{code:?}"), *code as u32));
     let limits = Limit::ALL.into_iter().map(|limit| ("LIMIT_BIT", format!("{limit:?}"), limit as u32));
-    let all = states.chain(requests).chain(codes).chain(limits);
+    let kinds = SetpointKind::ALL.into_iter().map(|kind| ("SETPOINT_KIND", format!("{kind:?}"), kind as u32));
+    let all = states.chain(requests).chain(kinds).chain(codes).chain(limits);
     all.map(|(prefix, name, number)| (prefix, screaming(&name), number)).collect()
 }
 
@@ -216,4 +218,38 @@ fn json_document() -> Value {
     let constants = constants().into_iter();
     let constants = constants.map(|(prefix, name, number)| (format!("{prefix}_{name}"), json!(number)));
     json!({"constants": Value::Object(constants.collect()), "structs": structs.collect::<Vec<_>>()})
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_language_declares_the_kind_of_a_setpoint() {
+        let text = |language| Declarations(language).to_string();
+        let [c, python, json] = [Language::C, Language::Python, Language::Json].map(text);
+        for (number, name) in ["MOTION", "POSE", "TARGET"].into_iter().enumerate() {
+            assert!(c.contains(&format!("#define HEXAD_SETPOINT_KIND_{name} {number}u\n")), "{c}");
+            assert!(python.contains(&format!("\nSETPOINT_KIND_{name} = {number}\n")), "{python}");
+            assert!(json.contains(&format!("\"SETPOINT_KIND_{name}\": {number}")), "{json}");
+        }
+        assert!(!c.contains("SETPOINT_KIND_UNKNOWN"));
+        assert!(
+            c.contains("#define HEXAD_SETPOINT_SCHEMA 6u\n")
+                && c.contains("\n    uint64_t kind; /* 0: X, X'")
+        );
+        assert!(c.contains("static_assert(offsetof(struct hexad_setpoint, kind) == 32, \"kind\");"));
+        assert!(python.contains("    topic = \"setpoint\"\n    schema = 6\n"));
+        assert!(python.contains("(\"header\", Header),\n") || python.contains("(\"header\", Header),  #"));
+        assert!(python.contains("        (\"kind\", c_uint64),  # 0: X, X'"));
+        let json: Value = serde_json::from_str(&json).unwrap();
+        let structs = json["structs"].as_array().unwrap();
+        let setpoint = structs.iter().find(|it| it["name"] == "hexad_setpoint").unwrap();
+        assert_eq!((&setpoint["schema"], &setpoint["size"]), (&json!(6), &json!(184)));
+        let kind = &setpoint["fields"][1];
+        assert_eq!(
+            (&kind["name"], &kind["type"], &kind["offset"]),
+            (&json!("kind"), &json!("u64"), &json!(32))
+        );
+    }
 }

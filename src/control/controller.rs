@@ -36,6 +36,11 @@ pub enum SetpointKind {
     Unknown = 3,
 }
 
+impl SetpointKind {
+    /// The kinds that a message may have, in the order of their numbers.
+    pub const ALL: [Self; 3] = [Self::Motion, Self::Pose, Self::Target];
+}
+
 /// Task coordinates, with their derivatives, that the platform shall have at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Setpoint {

@@ -8,10 +8,10 @@
 //! | validate inputs | [`input_validation`] |
 //! | locate platform, tracking error | [`localization`], [`tracking_error`] |
 //! | decide state | `assessment`, [`supervisor`] with the states of [`state`] |
-//! | reference | `reference`, with the autonomous motions of [`quintic_offset`] |
+//! | reference | [`reference`] |
 //! | control law | [`law`] with its [`gains`] and [`leg_masses`], [`disturbance_observer`] |
 //! | forces | `forces` |
-//! | checks | `force_limits` |
+//! | checks | `feedback_bound`, `force_limits` |
 //!
 //! The checks of all stages return a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
 
@@ -29,7 +29,6 @@ pub mod leg_masses;
 pub mod limits;
 pub mod localization;
 pub mod parameters;
-pub mod pose_samples;
 pub mod reference;
 pub mod state;
 pub mod supervisor;

@@ -181,7 +181,7 @@ impl Columns {
             age(setpoint.map(|it| it.time_ns)),
             age(measurement.map(|it| it.time_ns)),
         ];
-        let setpoint = setpoint.map(|it| SetpointMessage::from(&it.task).numbers());
+        let setpoint = setpoint.map(|it| SetpointMessage::from(&it).numbers());
         let measured = measurement.map(|it| MeasuredMessage::from(&it).numbers());
         self.setpoint.append(&mut row, setpoint.as_deref());
         self.measured.append(&mut row, measured.as_deref());
@@ -218,12 +218,16 @@ impl Section {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::controller::{Input, Output};
+    use crate::control::controller::{Input, Output, Setpoint, SetpointKind};
 
     fn record(cycle: u64, code: DiagnosticCode) -> CycleRecord {
         CycleRecord {
             cycle,
-            input: Input { release_ns: cycle * 1_000_000, ..Input::default() },
+            input: Input {
+                release_ns: cycle * 1_000_000,
+                setpoint: Some(Setpoint { kind: SetpointKind::Target, ..Setpoint::default() }),
+                ..Input::default()
+            },
             output: Output {
                 state: State::Stopping,
                 diagnostic: code.into(),
@@ -254,7 +258,8 @@ mod tests {
             let text = std::fs::read_to_string(folder.path().join(name)).unwrap();
             let columns: Vec<_> = text.lines().next().unwrap().split(',').collect();
             let place = |name: &str| columns.iter().position(|column| *column == name).unwrap();
-            let [cycle, t, cause, force] = ["cycle", "t", "diagnostic_code", "force_n_6"].map(place);
+            let [cycle, t, cause, force, kind] =
+                ["cycle", "t", "diagnostic_code", "force_n_6", "setpoint_kind"].map(place);
             let rows: Vec<Vec<f64>> = text
                 .lines()
                 .skip(1)
@@ -264,7 +269,7 @@ mod tests {
             for row in rows {
                 assert_eq!(row.len(), columns.len());
                 assert!((row[t] - (row[cycle] - f64::from(fault)) * 1e-3).abs() < 1e-9);
-                assert_eq!(row[force], 7.5);
+                assert_eq!((row[force], row[kind]), (7.5, 2.0));
                 assert_eq!(
                     row[cause] > 0.0,
                     (row[cycle] as i64 - i64::from(fault)) >= 0 && row[cycle] < 3500.0

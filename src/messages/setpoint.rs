@@ -28,15 +28,86 @@ impl From<&TaskState> for SetpointMessage {
     }
 }
 
+impl From<&Setpoint> for SetpointMessage {
+    fn from(setpoint: &Setpoint) -> Self {
+        Self { kind: setpoint.kind as u64, ..Self::from(&setpoint.task) }
+    }
+}
+
 impl From<&SetpointMessage> for Setpoint {
     fn from(message: &SetpointMessage) -> Self {
         let task = TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() };
-        let kind = match message.kind {
-            0 => SetpointKind::Motion,
-            1 => SetpointKind::Pose,
-            2 => SetpointKind::Target,
-            _ => SetpointKind::Unknown,
-        };
+        let has_number = |kind: &SetpointKind| *kind as u64 == message.kind;
+        let kind = SetpointKind::ALL.into_iter().find(has_number).unwrap_or(SetpointKind::Unknown);
         Self { kind, time_ns: message.header.time_ns, task }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::mem::{offset_of, size_of};
+
+    use super::*;
+    use crate::messages::layout::Declared;
+    use crate::messages::{Header, Message};
+
+    /// Numbers that differ: 1 to 18.
+    fn message(kind: u64) -> SetpointMessage {
+        let number = |first: usize| core::array::from_fn(|i| (first + i) as f64);
+        let header = Header { time_ns: 77, ..Header::default() };
+        SetpointMessage { header, kind, x: number(1), x_rate: number(7), x_accel: number(13) }
+    }
+
+    #[test]
+    fn a_setpoint_contains_the_numbers_of_the_message_and_its_kind() {
+        for (number, kind) in [
+            (0, SetpointKind::Motion),
+            (1, SetpointKind::Pose),
+            (2, SetpointKind::Target),
+            (3, SetpointKind::Unknown),
+            (1 << 32, SetpointKind::Unknown),
+            (u64::MAX, SetpointKind::Unknown),
+        ] {
+            let setpoint = Setpoint::from(&message(number));
+            assert_eq!((setpoint.kind, setpoint.time_ns), (kind, 77), "{number}");
+            let TaskState { x, xd, xdd } = setpoint.task;
+            let numbers: Vec<f64> = x.iter().chain(&xd).chain(&xdd).copied().collect();
+            assert_eq!(numbers, (1..=18).map(f64::from).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn the_message_of_a_setpoint_is_that_setpoint() {
+        for kind in SetpointKind::ALL {
+            let setpoint = Setpoint { kind, ..Setpoint::from(&message(0)) };
+            let back = SetpointMessage { header: message(0).header, ..SetpointMessage::from(&setpoint) };
+            assert_eq!((back.kind, Setpoint::from(&back)), (kind as u64, setpoint));
+        }
+        // A source that names no kind sends motions.
+        assert_eq!(Setpoint::from(&SetpointMessage::default()).kind, SetpointKind::Motion);
+        assert_eq!(SetpointMessage::from(&TaskState::default()).kind, 0);
+    }
+
+    #[test]
+    fn the_kind_is_the_first_number_behind_the_header_since_schema_6() {
+        assert_eq!(SetpointMessage::SCHEMA, 6);
+        let layout = SetpointMessage::LAYOUT;
+        let fields: Vec<_> =
+            layout.fields.iter().map(|field| (field.name, field.offset, field.count)).collect();
+        let six = Some(6);
+        assert_eq!(
+            fields,
+            [
+                ("header", 0, None),
+                ("kind", 32, None),
+                ("x", 40, six),
+                ("x_rate", 88, six),
+                ("x_accel", 136, six)
+            ]
+        );
+        assert_eq!((layout.size, size_of::<SetpointMessage>()), (184, 184));
+        assert_eq!((offset_of!(SetpointMessage, kind), offset_of!(SetpointMessage, x)), (32, 40));
+        assert_eq!(SetpointMessage::LAYOUT.columns("").get(5).map(String::as_str), Some("kind"));
+        assert_eq!(message(2).numbers().get(5), Some(&2.0));
     }
 }

@@ -13,7 +13,7 @@ import os
 
 import numpy as np
 
-from hexad_messages import DIAGNOSTIC_READY_TO_ENGAGE, REQUEST_ENGAGE, STATE_ACTIVE
+from hexad_messages import DIAGNOSTIC_READY_TO_ENGAGE, REQUEST_ENGAGE, SETPOINT_KIND_MOTION, STATE_ACTIVE
 from hexad import Bus, Command, Measured, Setpoint, Status, use_fifo_priority, monotonic_ns, sleep_until
 from mujoco_machine import COORDINATES, rows_of, write_rows
 
@@ -66,7 +66,7 @@ class Player:
         if t > self.trajectory.duration + SETTLE_S:
             return None
         x, xd, xdd = self.trajectory.at(t)
-        return Setpoint(x=tuple(x), x_rate=tuple(xd), x_accel=tuple(xdd))
+        return Setpoint(kind=SETPOINT_KIND_MOTION, x=tuple(x), x_rate=tuple(xd), x_accel=tuple(xdd))
 
 
 def run_in_real_time(bus, player, period_ns, rows):

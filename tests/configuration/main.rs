@@ -5,6 +5,7 @@
 mod bodies;
 mod deployment;
 mod files;
+mod limits;
 mod plant;
 mod reference;
 mod values;

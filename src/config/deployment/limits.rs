@@ -70,8 +70,10 @@ fn stroke_margin_m(section: &mut SectionReader, machine: &Machine) -> f64 {
         lengths.map(|length| machine.actuator.margin(length)).into_iter().fold(f64::INFINITY, f64::min);
     let default = (DEFAULT_STROKE_MARGIN_RATIO * machine.actuator.stroke()).min(0.5 * at_home).max(0.0);
     let margin = section.number_or("stroke_margin_m", default, Bound::NotNegative);
-    if margin > at_home {
-        let bound = format!("must be at most {} (the margin of home)", rounded(at_home));
+    // A home beyond the stroke is reported with its legs.
+    if at_home >= 0.0 && margin > at_home {
+        // The number in the message, rounded down, is accepted.
+        let bound = format!("must be at most {} (the margin of home)", rounded(at_home * (1.0 - 5e-6)));
         section.reject("stroke_margin_m", bound);
     }
     margin

@@ -69,11 +69,12 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     let limits = limits::read(root.section("limits"), machine);
+    let setpoint = setpoint(root.section("setpoint"));
     Deployment {
         control: control::read(root.section("control"), &realtime, machine, &limits),
         limits,
-        setpoint: setpoint(root.section("setpoint")),
-        timeouts: timeouts(root.section("timeouts"), rate_hz),
+        timeouts: timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation),
+        setpoint,
         plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
         realtime,
@@ -87,9 +88,14 @@ fn setpoint(mut section: SectionReader) -> SetpointPolicy {
     SetpointPolicy { on_violation }
 }
 
-fn timeouts(mut section: SectionReader, rate_hz: f64) -> Timeouts {
+fn timeouts(mut section: SectionReader, rate_hz: f64, policy: ViolationPolicy) -> Timeouts {
+    let setpoint_ms = match policy {
+        ViolationPolicy::Stop => 50.0,
+        // Sources may send 30 poses a second, and some are lost.
+        ViolationPolicy::Limit => 200.0,
+    };
     let timeouts = Timeouts {
-        setpoint_s: timeout_s(&mut section, "setpoint_ms", 50.0, rate_hz),
+        setpoint_s: timeout_s(&mut section, "setpoint_ms", setpoint_ms, rate_hz),
         measured_s: timeout_s(&mut section, "measured_ms", 20.0, rate_hz),
     };
     section.finish();

@@ -14,7 +14,7 @@ use crate::control::controller::{Cycle, Setpoint, SetpointKind};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::limits::{Limit, LimitSet, Limits};
 use crate::control::parameters::{Parameters, ViolationPolicy};
-use crate::control::pose_samples::PoseSamples;
+use crate::control::reference::pose_samples::PoseSamples;
 use crate::control::reference::{ReferenceGenerator, Target};
 use crate::control::state::State;
 use crate::control::tracking_error::TrackingError;
@@ -146,7 +146,7 @@ impl SetpointValidator {
                     }
                 });
         if result.is_ok() && new.setpoint.kind == SetpointKind::Pose {
-            self.samples.push(new.setpoint.time_ns, &new.motion.pose);
+            self.samples.push(now_ns, new.setpoint.time_ns, &new.motion.pose);
         }
         self.last.record(new, result, now_ns, is_following(cycle.state));
         result.is_ok()

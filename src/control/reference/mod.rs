@@ -17,6 +17,7 @@
 //! | [`approach`] | acceleration towards a moving target |
 //! | [`walls`] | soft approach of bounds |
 //! | [`target`] | setpoint, samples of poses, or a pose |
+//! | [`pose_samples`] | target through poses without derivatives |
 //! | [`history`] | the reference of the last cycles |
 
 use nalgebra::{Vector3, Vector6};
@@ -38,6 +39,7 @@ use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 mod approach;
 mod history;
 mod pose_bounds;
+pub mod pose_samples;
 mod regularity;
 #[cfg(test)]
 mod samples;

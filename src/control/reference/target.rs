@@ -6,7 +6,7 @@ use crate::control::controller::SetpointKind;
 use crate::control::input_validation::SetpointMotion;
 use crate::control::limits::Limits;
 use crate::control::parameters::Parameters;
-use crate::control::pose_samples::PoseSamples;
+use crate::control::reference::pose_samples::PoseSamples;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 /// Target of one cycle.

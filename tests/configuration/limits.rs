@@ -1,0 +1,112 @@
+//! Limits of the reference and of feedback, and what becomes of setpoints beyond them.
+
+use hexad::config::deployment::Deployment;
+use hexad::config::{Config, Violation};
+use hexad::control::parameters::ViolationPolicy;
+use hexad::model::inverse_geometry::leg_lengths;
+
+use super::{FRIED, violations};
+
+fn deployment(text: &str) -> Deployment {
+    Config::parse(&format!("{FRIED}{text}"), "test.toml").unwrap().deployment
+}
+
+/// Asserts that a section with one key is refused with this message, in the line of the key.
+fn refused(section: &str, line: &str, bound: &str) {
+    let text = format!("{FRIED}[{section}]\n{line}\n");
+    let error = Config::parse(&text, "test.toml").unwrap_err().to_string();
+    assert_eq!(error, format!("test.toml:{}: {section}.{line}: {bound}", text.lines().count()));
+}
+
+/// Least distance of home's leg lengths from the ends of the stroke.
+fn margin_of_home(text: &str) -> f64 {
+    let machine = Config::parse(text, "test.toml").unwrap().machine;
+    let lengths = leg_lengths(&machine, &machine.home_pose());
+    let (min, max) = (machine.actuator.min_length, machine.actuator.max_length);
+    lengths.iter().map(|length| (length - min).min(max - length)).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn setpoints_beyond_the_limits_end_in_a_stop_unless_the_policy_is_limit() {
+    assert_eq!(deployment("").setpoint.on_violation, ViolationPolicy::Stop);
+    assert_eq!(deployment("[setpoint]\n").setpoint.on_violation, ViolationPolicy::Stop);
+    let policy = |name: &str| deployment(&format!("[setpoint]\non_violation = \"{name}\"\n"));
+    assert_eq!(policy("stop").setpoint.on_violation, ViolationPolicy::Stop);
+    assert_eq!(policy("limit").setpoint.on_violation, ViolationPolicy::Limit);
+    for value in ["\"clip\"", "\"Limit\"", "\"\"", "true", "1"] {
+        refused("setpoint", &format!("on_violation = {value}"), "must be one of \"stop\", \"limit\"");
+    }
+    let [violation] = violations(&format!("{FRIED}[setpoint]\npolicy = 1\n")).try_into().unwrap();
+    let Violation { key, bound, .. } = &violation;
+    assert_eq!(
+        (key.as_str(), bound.as_str()),
+        ("setpoint.policy", "unknown key, must be one of: on_violation")
+    );
+}
+
+#[test]
+fn velocity_errors_are_bounded_by_a_share_of_the_limits_unless_given() {
+    let bounds = |text: &str| {
+        let control = deployment(text).control;
+        (control.following_velocity_m_s, control.following_velocity_rad_s)
+    };
+    assert_eq!(bounds(""), (0.3 * 1.0, 0.3 * 2.0));
+    assert_eq!(bounds("[limits]\nvelocity_m_s = 0.2\nvelocity_rad_s = 0.5\n"), (0.3 * 0.2, 0.3 * 0.5));
+    let given = "[control]\nfollowing_velocity_m_s = 0.01\nfollowing_velocity_rad_s = 7\n";
+    assert_eq!(bounds(given), (0.01, 7.0));
+    for key in ["following_velocity_m_s", "following_velocity_rad_s"] {
+        refused("control", &format!("{key} = 0"), "must be greater than 0");
+        refused("control", &format!("{key} = -0.3"), "must be greater than 0");
+        refused("control", &format!("{key} = inf"), "must be a finite number, at most 1e12 in magnitude");
+        refused("control", &format!("{key} = \"0.3\""), "must be a number, greater than 0");
+    }
+    // What follows from a refused limit is not reported again.
+    let found = violations(&format!("{FRIED}[limits]\nvelocity_m_s = -1\n"));
+    assert_eq!(found.iter().map(|it| it.key.as_str()).collect::<Vec<_>>(), ["limits.velocity_m_s"]);
+}
+
+#[test]
+fn feedback_may_add_half_of_the_limits_unless_given() {
+    assert_eq!(deployment("").limits.feedback_scale, 0.5);
+    assert_eq!(deployment("[limits]\nfeedback_scale = 3\n").limits.feedback_scale, 3.0);
+    for value in ["0", "-0.5"] {
+        refused("limits", &format!("feedback_scale = {value}"), "must be greater than 0");
+    }
+    refused("limits", "feedback_scale = nan", "must be a finite number, at most 1e12 in magnitude");
+}
+
+#[test]
+fn the_margin_of_the_stroke_is_at_most_that_of_home() {
+    let margin = |text: &str| deployment(text).limits.stroke_margin_m;
+    // Half a percent of 0.85 m to 1.6 m.
+    assert!((margin("") - 0.005 * 0.75).abs() < 1e-15);
+    assert_eq!(margin("[limits]\nstroke_margin_m = 0\n"), 0.0);
+    refused("limits", "stroke_margin_m = -0.001", "must be at least 0");
+    let found = violations(&format!("{FRIED}[limits]\nstroke_margin_m = 0.7\n"));
+    let [violation] = found.as_slice() else { panic!("{found:#?}") };
+    assert_eq!((violation.key.as_str(), violation.value.as_deref()), ("limits.stroke_margin_m", Some("0.7")));
+    assert_eq!(violation.line, FRIED.lines().count() + 2);
+    // The bound in the message is accepted; a thousandth more is not.
+    let bound = violation.bound.strip_prefix("must be at most ").unwrap();
+    let (bound, of) = bound.split_once(' ').unwrap();
+    assert_eq!(of, "(the margin of home)");
+    let bound: f64 = bound.parse().unwrap();
+    let at_home = margin_of_home(FRIED);
+    assert!(bound <= at_home && bound > 0.9999 * at_home, "{bound} of {at_home}");
+    assert_eq!(margin(&format!("[limits]\nstroke_margin_m = {bound}\n")), bound);
+    assert_eq!(violations(&format!("{FRIED}[limits]\nstroke_margin_m = {}\n", 1.001 * bound)).len(), 1);
+}
+
+#[test]
+fn a_home_near_the_end_of_the_stroke_has_a_smaller_default_and_one_beyond_is_reported_alone() {
+    let near = FRIED.replace("max_length_m = 1.6", "max_length_m = 1.205");
+    let at_home = margin_of_home(&near);
+    let config = Config::parse(&near, "test.toml").unwrap();
+    assert!(at_home < 0.002, "{at_home}");
+    assert_eq!(config.deployment.limits.stroke_margin_m, 0.5 * at_home);
+    let beyond = FRIED.replace("max_length_m = 1.6", "max_length_m = 1.0");
+    let found = violations(&beyond);
+    assert!(found.iter().all(|it| it.key.starts_with("leg[")) && found.len() == 6, "{found:#?}");
+    // Nor is a margin that is given.
+    assert_eq!(violations(&format!("{beyond}[limits]\nstroke_margin_m = 0.001\n")).len(), 6);
+}
