@@ -30,10 +30,10 @@ use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
 
 /// Departure of a length from its chord that decides the number of knots \[m\].
-const CHORD_DEPARTURE_M: f64 = 3e-4;
+const CHORD_DEPARTURE_M: f64 = 1e-4;
 /// Bounds on the number of intervals between knots: the last bounds the work of a cycle.
 const MIN_INTERVALS: f64 = 3.0;
-const MAX_INTERVALS: f64 = 16.0;
+const MAX_INTERVALS: f64 = 24.0;
 /// Relative allowance for rounding.
 const ROUNDING: f64 = 1e-9;
 /// Part of the width of an axis of the envelope that the bound between knots may use.

@@ -29,7 +29,7 @@ use crate::model::task::task_coordinates;
 /// Part of the limits with which a wall is approached: several walls and the motion along them take the rest.
 const CLOSING_SHARE: f64 = 0.6;
 /// Distance kept from a bound, so that the examination of the stop between knots finds room, as a ratio of the stroke.
-const KEPT_RATIO: f64 = 1e-3;
+const KEPT_RATIO: f64 = 5e-3;
 /// Part of a leg's largest rate that is wanted.
 const RATE_SHARE: f64 = 0.97;
 /// Sweeps over the walls: two walls at 60 degrees converge to 1e-4.
