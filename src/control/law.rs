@@ -144,7 +144,7 @@ impl Law {
         let (e, e_rate) = (&error.pose, &error.twist);
         let Acceleration { angular, linear } = Acceleration::from_vector(acceleration);
         Motion {
-            pose: desired.pose.displaced(&Twist { angular: -e.angular, linear: -e.linear }),
+            pose: desired.pose.extrapolated(&Twist { angular: -e.angular, linear: -e.linear }),
             twist: Twist {
                 angular: desired.twist.angular - e_rate.angular,
                 linear: desired.twist.linear - e_rate.linear,

@@ -189,27 +189,25 @@ fn check_continuation(
         return check_deviation(parameters, reference, new);
     }
     let continued = before.motion_at(parameters, new.setpoint.time_ns);
-    deviation_result(parameters, &continued, new, LimitSet::default())
+    let error = TrackingError::new(&new.motion, &continued.pose, &continued.twist);
+    deviation_result(parameters, &error, LimitSet::default())
 }
 
-/// Whether the reference is within the engage tolerance of a setpoint at its instant. If not, the diagnostic says what
+/// Whether the reference is within the engage tolerance of a setpoint. If not, the diagnostic says what
 /// held the reference back.
 pub fn check_deviation(
     parameters: &Parameters,
     reference: &ReferenceGenerator,
     setpoint: &SetpointMotion,
 ) -> Result<(), Diagnostic> {
-    let motion = reference.motion_at(setpoint.setpoint.time_ns);
-    deviation_result(parameters, &motion, setpoint, reference.active_limits())
+    deviation_result(parameters, &reference.deviation_of(parameters, setpoint), reference.active_limits())
 }
 
 fn deviation_result(
     parameters: &Parameters,
-    expected: &Motion,
-    setpoint: &SetpointMotion,
+    error: &TrackingError,
     active_limits: LimitSet,
 ) -> Result<(), Diagnostic> {
-    let error = TrackingError::new(&setpoint.motion, &expected.pose, &expected.twist);
     let ratio = error.tolerance_ratio(parameters);
     if ratio <= 1.0 {
         return Ok(());

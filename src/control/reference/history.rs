@@ -68,7 +68,7 @@ impl Segment {
         let (v, a) = (twist.vector(), acceleration.vector());
         let displacement = Twist::from_vector(&((v + (a / 2.0 + jerk * (t / 6.0)) * t) * t));
         Motion {
-            pose: pose.displaced(&displacement),
+            pose: pose.extrapolated(&displacement),
             twist: Twist::from_vector(&(v + (a + jerk * (0.5 * t)) * t)),
             acceleration: Acceleration::from_vector(&(a + jerk * t)),
         }

@@ -30,9 +30,9 @@ pub use self::target::Target;
 use self::target::at_rest;
 use self::verification::{PoseStop, PoseStopState, Step, StopKind, advanced, verify};
 use self::walls::Walls;
-use super::input_validation::seconds_between;
+use super::input_validation::{SetpointMotion, seconds_between};
 use super::limits::{Limit, LimitSet};
-use super::parameters::{Constants, ViolationPolicy};
+use super::parameters::{Constants, Parameters, ViolationPolicy};
 use super::tracking_error::TrackingError;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
@@ -160,6 +160,18 @@ impl ReferenceGenerator {
     pub fn deviation(&self, constants: &Constants, target: &Target<'_>) -> Option<TrackingError> {
         let desired = target.motion_at(&constants.parameters, self.time_ns)?;
         Some(TrackingError::new(&desired, &self.motion.pose, &self.motion.twist))
+    }
+
+    /// The motion of a setpoint minus the reference at the end of the last cycle, to first order in the time between.
+    pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> TrackingError {
+        let motion = &setpoint.motion;
+        let dt = setpoint.extrapolation_s(parameters, self.time_ns);
+        let error = TrackingError::new(motion, &self.motion.pose, &self.motion.twist);
+        let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
+        TrackingError {
+            pose: Twist::from_vector(&(error.pose.vector() + (v + a * (0.5 * dt)) * dt)),
+            twist: Twist::from_vector(&(error.twist.vector() + a * dt)),
+        }
     }
 
     /// Moves the reference to an instant, towards a target; without one along the stop.
