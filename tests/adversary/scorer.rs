@@ -1,0 +1,1 @@
+//! The scorer sees each violation: a platform that is driven beyond a limit on purpose.
