@@ -49,16 +49,18 @@ pub struct Channel {
 impl Messages {
     pub fn read(genes: &mut Reader<'_>, is_limited: bool, duration_s: f64) -> Self {
         use SetpointKind::{Motion, Pose, Target};
-        let kinds: &[SetpointKind] =
-            if is_limited { &[Motion, Motion, Pose, Pose, Target] } else { &[Motion, Motion, Motion, Motion, Target] };
+        let kinds: &[SetpointKind] = if is_limited {
+            &[Motion, Motion, Pose, Pose, Target]
+        } else {
+            &[Motion, Motion, Motion, Motion, Target]
+        };
         let kind = genes.choice(kinds);
         let interval_s = match kind {
             Pose => 1.0 / genes.logarithmic(30.0, 200.0),
             _ => genes.sometimes(0.6, 0.0, 0.04),
         };
-        let silences = [0; 2].map(|_| {
-            [duration_s * genes.within(0.1, 2.5), LONGEST_SILENCE_S * genes.share().powi(2)]
-        });
+        let silences =
+            [0; 2].map(|_| [duration_s * genes.within(0.1, 2.5), LONGEST_SILENCE_S * genes.share().powi(2)]);
         let returns = [0; 2].map(|_| {
             let size = genes.sometimes(0.5, 0.0, FARTHEST_RETURN);
             let axis = (genes.share() * 6.0) as usize;

@@ -38,6 +38,7 @@ struct Source {
 pub fn run(genome: &Genome) -> Outcome {
     let scenario = Scenario::of(genome);
     let mut observed = Observed::with(&scenario.config, &scenario.config.machine, scenario.parameters);
+    observed.phase_ns = scenario.phase_ns;
     observed.force_delay_ns = scenario.force_delay_ns;
     let mut source = Source { engaged: None, shift: [Vector6::zeros(); 2], is_replaced: false };
     let mut channel = scenario.messages.channel();

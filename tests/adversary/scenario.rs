@@ -24,6 +24,8 @@ pub struct Scenario {
     pub config: Arc<Config>,
     pub parameters: Parameters,
     pub duration_s: f64,
+    /// From the measurement to the release.
+    pub phase_ns: u64,
     /// From the release to the force.
     pub force_delay_ns: u64,
     /// The source before and after it is replaced.
@@ -68,6 +70,7 @@ impl Scenario {
         parameters.envelope = envelope(genes, &config);
         let period_s = parameters.period_ns as f64 * 1e-9;
         let duration_s = LONGEST_S.min(MOST_CYCLES * period_s);
+        let phase = genes.choice(&[0.0, 0.0, 0.5]);
         let delay = genes.sometimes(0.6, 0.0, 0.4);
         let streams = [0; 2].map(|_| Stream::read(genes, &config.machine, &parameters));
         let replaced_s = duration_s * genes.within(0.2, 1.6);
@@ -90,6 +93,7 @@ impl Scenario {
             config,
             parameters,
             duration_s,
+            phase_ns: (phase * period_s * 1e9) as u64,
             force_delay_ns: (delay * period_s * 1e9) as u64,
             streams,
             replaced_s,

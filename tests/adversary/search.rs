@@ -91,7 +91,10 @@ impl Search {
             let pool = &mut self.pools[genome.policy as usize][quantity as usize];
             let place = pool.partition_point(|found| found.value >= value);
             if place < KEPT {
-                pool.insert(place, Found { genome: genome.clone(), quantity, value, outcome: outcome.clone() });
+                pool.insert(
+                    place,
+                    Found { genome: genome.clone(), quantity, value, outcome: outcome.clone() },
+                );
                 pool.truncate(KEPT);
             }
         }
@@ -104,8 +107,7 @@ impl Search {
     fn next(&self, seed: u64) -> Genome {
         let machine = self.row.machine;
         let mut random = Random::new(seed ^ self.row.runs << 8 ^ (machine as u64) << 56);
-        let policy =
-            if random.uniform() < 0.5 { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
+        let policy = if random.uniform() < 0.5 { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
         let is_frozen = random.uniform() < FROZEN;
         let pools = &self.pools[policy as usize];
         let quantity = (random.uniform() * Quantity::ALL.len() as f64) as usize;

@@ -202,7 +202,8 @@ fn direction(genes: &mut Reader<'_>) -> Vector6<f64> {
         Vector3::new(across * phi.cos(), across * phi.sin(), z)
     };
     let (angular, linear) = (unit(genes), unit(genes));
-    let [angular_share, linear_share] = genes.choice(&[[0.0, 1.0], [0.0, 1.0], [2.0, 1.0], [4.0, 1.0], [1.0, 0.0]]);
+    let [angular_share, linear_share] =
+        genes.choice(&[[0.0, 1.0], [0.0, 1.0], [2.0, 1.0], [4.0, 1.0], [1.0, 0.0]]);
     let mut direction = Vector6::zeros();
     direction.fixed_rows_mut::<3>(0).copy_from(&(angular * angular_share));
     direction.fixed_rows_mut::<3>(3).copy_from(&(linear * linear_share));

@@ -48,7 +48,13 @@ fn explain(violations: &[&Found]) -> String {
         text += &format!("{} {:.4}: {}\n", found.quantity.name(), found.value, found.genome);
     }
     for found in violations.iter().take(EXPLAINED) {
-        text += &format!("{} {:.4}: {:?} {:#?}\n", found.quantity.name(), found.value, found.outcome.fault, Scenario::of(&found.genome));
+        text += &format!(
+            "{} {:.4}: {:?} {:#?}\n",
+            found.quantity.name(),
+            found.value,
+            found.outcome.fault,
+            Scenario::of(&found.genome)
+        );
     }
     text
 }

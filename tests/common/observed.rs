@@ -1,5 +1,5 @@
-//! The loop without threads with a meter on the platform: measurement at k T, release at k T + T / 2, force a while
-//! after the release. It stops at each release, where the reference of the cycle before is due.
+//! The loop without threads with a meter on the platform: measurement at k T, release at half of the period or at once,
+//! force a while after the release. It stops at each release, where the reference of the cycle before is due.
 
 use hexad::config::Config;
 use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
@@ -15,9 +15,9 @@ use super::true_motion::Meter;
 
 /// The first cycle; the clock of a computer that has been up for a while.
 pub const START_NS: u64 = 86_400_000_000_000;
-/// Longest step of the integration \[s\]: of a millisecond the error is below 1e-9 m, as no machine here has anything
-/// faster than a drive's viscous friction.
-const STEP_S: f64 = 1e-3;
+/// Longest step of the integration \[s\]: no machine here has anything faster than a drive's viscous friction, so that the
+/// error is below 1e-7 m.
+const STEP_S: f64 = 2.5e-3;
 /// More than the gentlest of motions onto a setpoint as near as it must be.
 const LONGEST_ENGAGING_S: f64 = 5.0;
 
@@ -30,6 +30,8 @@ pub struct Observed {
     pub parameters: Parameters,
     pub machine: Machine,
     pub now_ns: u64,
+    /// From the measurement to the release.
+    pub phase_ns: u64,
     /// From the release to the instant at which the force acts.
     pub force_delay_ns: u64,
     pub asked: Option<OperatorRequest>,
@@ -54,6 +56,7 @@ impl Observed {
             parameters,
             machine,
             now_ns: START_NS,
+            phase_ns: parameters.period_ns / 2,
             force_delay_ns: 0,
             asked: None,
             force: None,
@@ -71,7 +74,10 @@ impl Observed {
     pub fn engage(&mut self, task: &TaskState) {
         let mut output = Output::default();
         while output.state != State::Active {
-            assert!(self.time_s() < LONGEST_ENGAGING_S, "not active after {LONGEST_ENGAGING_S} s: {output:?}");
+            assert!(
+                self.time_s() < LONGEST_ENGAGING_S,
+                "not active after {LONGEST_ENGAGING_S} s: {output:?}"
+            );
             if output.state == State::Standby {
                 self.ask(Request::Engage);
             }
@@ -89,7 +95,7 @@ impl Observed {
     }
 
     pub fn release_ns(&self) -> u64 {
-        self.now_ns + self.parameters.period_ns / 2
+        self.now_ns + self.phase_ns
     }
 
     /// A request, from the next input on.
@@ -133,10 +139,10 @@ impl Observed {
     /// One period of the platform, in which the force of an output arrives.
     pub fn apply(&mut self, output: &Output) {
         let (period_ns, release_ns) = (self.parameters.period_ns, self.release_ns());
-        let after_ns = period_ns - period_ns / 2;
+        let after_ns = period_ns - self.phase_ns;
         let delay_ns = self.force_delay_ns.min(after_ns);
         let next = output.state.has_control().then_some(output.force);
-        self.advance(period_ns / 2);
+        self.advance(self.phase_ns);
         self.meter.at_release(&self.simulator, self.force.as_ref(), release_ns);
         self.meter.expect(output, release_ns + period_ns);
         self.advance(delay_ns);

@@ -24,6 +24,9 @@ pub const REFERENCE_ALLOWANCE: f64 = 1e-6;
 pub const ENVELOPE_ALLOWANCE_M: f64 = 50e-6;
 /// The same for an angle \[rad\].
 pub const ENVELOPE_ALLOWANCE_RAD: f64 = 100e-6;
+/// Longest period whose acceleration is measured at its beginning alone: it changes by what a few millimetres per second
+/// change of the velocity terms.
+const LONGEST_EVEN_HOLD_NS: u64 = 1_000_000;
 /// Unit of the margin of a machine whose stroke margin is smaller \[m\].
 const SMALLEST_MARGIN_M: f64 = 1e-4;
 
@@ -228,32 +231,37 @@ impl Meter {
         if let Some(expected) = self.expected {
             self.check_distance(&expected.pose, &state.pose, now_ns);
         }
-        self.at_force(simulator, Some(force), now_ns);
+        if self.parameters.period_ns > LONGEST_EVEN_HOLD_NS {
+            self.at_force(simulator, Some(force), now_ns);
+        } else {
+            self.check_velocity(simulator, now_ns);
+        }
     }
 
     /// The true velocity, and the acceleration under a force.
     pub fn at_force(&mut self, simulator: &Simulator, force: Option<&[f64; LEGS]>, now_ns: u64) {
         self.check_end_stop(simulator, now_ns);
         let (Some(force), None) = (force, self.impact_m_s) else { return };
+        self.check_velocity(simulator, now_ns);
         let state = simulator.state();
         let limits = &self.parameters.limits;
         let (angular, linear) = (&limits.orientation, &limits.position);
-        let (omega, v) = (state.twist.angular.norm(), state.twist.linear.norm());
         let not_a_number = Acceleration { angular: [f64::NAN; 3].into(), linear: [f64::NAN; 3].into() };
         let acceleration =
             self.dynamics.acceleration(&state.pose, &state.twist, force).unwrap_or(not_a_number);
         let share = 1.0 + self.parameters.feedback_scale;
         let (alpha, a) = (acceleration.angular.norm(), acceleration.linear.norm());
-        self.fastest_m_s = self.fastest_m_s.max(v);
         self.hardest_m_s2 = self.hardest_m_s2.max(a);
-        for (quantity, value) in [
-            (Quantity::Velocity, v / linear.velocity),
-            (Quantity::AngularVelocity, omega / angular.velocity),
-            (Quantity::Acceleration, a / (share * linear.acceleration)),
-            (Quantity::AngularAcceleration, alpha / (share * angular.acceleration)),
-        ] {
-            self.extremes.add(quantity, value, now_ns);
-        }
+        self.extremes.add(Quantity::Acceleration, a / (share * linear.acceleration), now_ns);
+        self.extremes.add(Quantity::AngularAcceleration, alpha / (share * angular.acceleration), now_ns);
+    }
+
+    fn check_velocity(&mut self, simulator: &Simulator, now_ns: u64) {
+        let (limits, twist) = (&self.parameters.limits, &simulator.state().twist);
+        let (omega, v) = (twist.angular.norm(), twist.linear.norm());
+        self.fastest_m_s = self.fastest_m_s.max(v);
+        self.extremes.add(Quantity::Velocity, v / limits.position.velocity, now_ns);
+        self.extremes.add(Quantity::AngularVelocity, omega / limits.orientation.velocity, now_ns);
     }
 
     /// The reference of an output, from which the platform is measured at the next release.
@@ -291,8 +299,7 @@ impl Meter {
     }
 
     fn check_distance(&mut self, expected: &Pose, actual: &Pose, now_ns: u64) {
-        let quantity =
-            if self.state == State::Engaging { Quantity::Engaging } else { Quantity::Following };
+        let quantity = if self.state == State::Engaging { Quantity::Engaging } else { Quantity::Following };
         let position = (actual.position - expected.position).norm() / self.parameters.following_position;
         let orientation =
             angle_between(&actual.rotation, &expected.rotation) / self.parameters.following_orientation;

@@ -35,7 +35,8 @@ fn can_engage(parameters: &Parameters, task: &TaskState) -> bool {
     let twist = task.motion().twist;
     let stiffness = [parameters.law.position.stiffness, parameters.law.orientation.stiffness];
     let [v, omega] = [twist.linear.norm() / stiffness[0].sqrt(), twist.angular.norm() / stiffness[1].sqrt()];
-    v < WITHIN_TOLERANCE * parameters.engage_position && omega < WITHIN_TOLERANCE * parameters.engage_orientation
+    v < WITHIN_TOLERANCE * parameters.engage_position
+        && omega < WITHIN_TOLERANCE * parameters.engage_orientation
 }
 
 fn engage_at(config: &Config, parameters: Parameters, motion: Motion<'_>, t: f64, runs: &mut Runs) {
@@ -59,7 +60,13 @@ fn engage_at(config: &Config, parameters: Parameters, motion: Motion<'_>, t: f64
     runs.add(&observed);
 }
 
-fn engage_on(config: &Config, parameters: Parameters, motion: Motion<'_>, range_s: [f64; 2], runs: &mut Runs) {
+fn engage_on(
+    config: &Config,
+    parameters: Parameters,
+    motion: Motion<'_>,
+    range_s: [f64; 2],
+    runs: &mut Runs,
+) {
     let mut t = range_s[0];
     while t < range_s[1] {
         if can_engage(&parameters, &motion(t)) {
