@@ -57,10 +57,10 @@ impl Messages {
         let kind = genes.choice(kinds);
         let interval_s = match kind {
             Pose => 1.0 / genes.logarithmic(30.0, 200.0),
-            _ => genes.sometimes(0.6, 0.0, 0.04),
+            _ => genes.sometimes(0.75, 0.0, 0.04),
         };
         let silences =
-            [0; 2].map(|_| [duration_s * genes.within(0.1, 2.5), LONGEST_SILENCE_S * genes.share().powi(2)]);
+            [0; 2].map(|_| [duration_s * genes.within(0.1, 4.0), LONGEST_SILENCE_S * genes.share().powi(2)]);
         let returns = [0; 2].map(|_| {
             let size = genes.sometimes(0.5, 0.0, FARTHEST_RETURN);
             let axis = (genes.share() * 6.0) as usize;
@@ -71,13 +71,13 @@ impl Messages {
         Self {
             kind,
             interval_s,
-            delay_s: genes.sometimes(0.5, 0.0, LONGEST_DELAY_S),
-            jitter_s: genes.sometimes(0.6, 0.0, LARGEST_JITTER_S),
-            loss: genes.sometimes(0.5, 0.0, 0.9),
+            delay_s: genes.sometimes(0.75, 0.0, LONGEST_DELAY_S),
+            jitter_s: genes.sometimes(0.75, 0.0, LARGEST_JITTER_S),
+            loss: genes.sometimes(0.75, 0.0, 0.9),
             silences,
             returns,
-            measurement_delay_s: genes.sometimes(0.7, 0.0, LONGEST_MEASUREMENT_DELAY_S),
-            measurement_loss: genes.sometimes(0.7, 0.0, 0.2),
+            measurement_delay_s: genes.sometimes(0.8, 0.0, LONGEST_MEASUREMENT_DELAY_S),
+            measurement_loss: genes.sometimes(0.8, 0.0, 0.2),
             seed: (genes.share() * 65_536.0) as u64,
         }
     }

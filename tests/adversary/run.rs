@@ -1,9 +1,10 @@
 //! One run of a genome: the controller against the plant, scored by the true motion.
 
-use hexad::control::controller::{Input, Measurement, Output};
+use hexad::control::controller::{Controller, Input, Measurement, Output};
 use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::parameters::ViolationPolicy;
+use hexad::control::parameters::{Parameters, ViolationPolicy};
 use hexad::control::state::{Request, State};
+use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{Profile, rise};
 use nalgebra::Vector6;
@@ -34,10 +35,18 @@ struct Source {
     is_replaced: bool,
 }
 
+/// What a controller is made of that is wrong on purpose; the meter keeps the right one.
+pub type Doctor = fn(&mut Machine, &mut Parameters);
+
 /// Runs a genome.
-pub fn run(genome: &Genome) -> Outcome {
+pub fn run(genome: &Genome, doctor: Option<Doctor>) -> Outcome {
     let scenario = Scenario::of(genome);
     let mut observed = Observed::with(&scenario.config, &scenario.config.machine, scenario.parameters);
+    if let Some(doctor) = doctor {
+        let (mut machine, mut parameters) = (scenario.config.machine.clone(), scenario.parameters);
+        doctor(&mut machine, &mut parameters);
+        observed.controller = Controller::new(&machine, parameters);
+    }
     observed.phase_ns = scenario.phase_ns;
     observed.force_delay_ns = scenario.force_delay_ns;
     let mut source = Source { engaged: None, shift: [Vector6::zeros(); 2], is_replaced: false };
@@ -47,30 +56,43 @@ pub fn run(genome: &Genome) -> Outcome {
     requests.reverse();
     let mut frozen: Option<Measurement> = None;
     let mut before = Output::default();
-    let (mut without_s, mut faults, mut fault) = (0.0, 0, DiagnosticCode::None);
+    let (mut without_s, mut faults) = (0.0, Faults::default());
     while observed.time_s() < scenario.duration_s && observed.meter.impact_m_s.is_none() {
         source.follow(&scenario, &observed, before.state);
         ask(&scenario, &mut observed, before.state, &mut requests, &mut without_s);
         let input = input(&scenario, &observed, &source, &mut channel, &mut frozen);
         let output = observed.cycle(&input);
-        if before.state.has_control() && is_own_fault(&output) && !is_own_fault(&before) {
-            (faults, fault) = (faults + 1, output.diagnostic.code);
-        }
+        faults.add(&before, &output);
         before = output;
     }
     let mut extremes = observed.meter.extremes;
     if genome.policy == ViolationPolicy::Limit && !genome.is_frozen {
-        extremes.add(Quantity::Fault, f64::from(faults), observed.now_ns);
+        extremes.add(Quantity::Fault, f64::from(faults.count), observed.now_ns);
     }
     Outcome {
         extremes,
         cycles: observed.meter.cycles,
-        fault,
+        fault: faults.last,
         end_stops: u32::from(observed.meter.impact_m_s.is_some()),
     }
 }
 
-/// A fault that is neither the operator's nor that of lost measurements.
+/// Faults that ended control, but for the operator's and those of lost measurements.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Faults {
+    pub count: u32,
+    pub last: DiagnosticCode,
+}
+
+impl Faults {
+    /// Two outputs, one after the other.
+    pub fn add(&mut self, before: &Output, output: &Output) {
+        if before.state.has_control() && is_own_fault(output) && !is_own_fault(before) {
+            (self.count, self.last) = (self.count + 1, output.diagnostic.code);
+        }
+    }
+}
+
 fn is_own_fault(output: &Output) -> bool {
     use DiagnosticCode::{EmergencyStop, MeasurementLost, MeasurementStampInvalid};
     let code = output.diagnostic.code;

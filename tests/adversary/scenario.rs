@@ -13,8 +13,8 @@ use super::messages::Messages;
 use super::stream::Stream;
 
 /// Longest run, in seconds and in cycles.
-const LONGEST_S: f64 = 2.5;
-const MOST_CYCLES: f64 = 6000.0;
+const LONGEST_S: f64 = 2.0;
+const MOST_CYCLES: f64 = 4000.0;
 /// Requests of a run besides those that bring the platform back under control.
 const REQUESTS: usize = 5;
 
@@ -73,16 +73,17 @@ impl Scenario {
         let phase = genes.choice(&[0.0, 0.0, 0.5]);
         let delay = genes.sometimes(0.6, 0.0, 0.4);
         let streams = [0; 2].map(|_| Stream::read(genes, &config.machine, &parameters));
-        let replaced_s = duration_s * genes.within(0.2, 1.6);
+        let replaced_s = duration_s * genes.within(0.2, 2.2);
         let is_continued = genes.choice(&[true, true, false]);
         let start = Start {
             is_moving: genes.choice(&[true, false, false]),
-            fade_s: genes.choice(&[0.0, 0.05, 0.2, 0.4]) * duration_s.min(1.0),
+            fade_s: genes.choice(&[0.0, 0.4, 1.2, 1.5, 2.0])
+                * streams[0].approach_s(&config.machine, &parameters),
         };
         let messages = Messages::read(genes, genome.policy == ViolationPolicy::Limit, duration_s);
         let request = |genes: &mut Reader<'_>| {
-            // Most runs have one or two.
-            let at_s = duration_s * genes.within(0.1, 3.0);
+            // Most runs have one or none.
+            let at_s = duration_s * genes.within(0.1, 6.0);
             (at_s, genes.choice(&Request::ALL))
         };
         let requests = [0; REQUESTS].map(|_| request(genes));

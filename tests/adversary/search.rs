@@ -11,7 +11,7 @@ use hexad::plant::random::Random;
 use super::common::true_motion::Quantity;
 use super::genome::Genome;
 use super::machines::MACHINES;
-use super::run::{Outcome, run};
+use super::run::{Doctor, Outcome, run};
 use super::table::Row;
 
 /// Genomes that are kept of each quantity and policy.
@@ -28,7 +28,7 @@ const FIRST_RUNS: u64 = 60;
 #[derive(Clone, Copy, Debug)]
 pub enum Budget {
     Time(Duration),
-    /// Under control.
+    /// Under control with each policy.
     Cycles(u64),
 }
 
@@ -52,6 +52,9 @@ pub struct Search {
     pub row: Row,
     /// The worst first, for each policy and quantity.
     pools: [[Vec<Found>; Quantity::ALL.len()]; 2],
+    doctor: Option<Doctor>,
+    /// The only quantity to climb for.
+    aim: Option<Quantity>,
 }
 
 /// With frozen sensors only the acceleration has a bound: the rest depends on when the fault comes.
@@ -72,15 +75,27 @@ impl Search {
         Self {
             row: Row { machine, ..Row::default() },
             pools: core::array::from_fn(|_| core::array::from_fn(|_| Vec::new())),
+            doctor: None,
+            aim: None,
         }
+    }
+
+    /// A search for one violation, against a controller that is wrong on purpose.
+    pub fn doctored(machine: usize, doctor: Doctor, aim: Quantity) -> Self {
+        Self { doctor: Some(doctor), aim: Some(aim), ..Self::new(machine) }
+    }
+
+    /// Whether what it aims at is found.
+    fn is_found(&self) -> bool {
+        self.aim.is_some_and(|aim| self.row.violations[aim as usize] > 0)
     }
 
     /// Runs a genome and keeps it where it is among the worst.
     pub fn add(&mut self, genome: &Genome) {
-        let outcome = run(genome);
+        let outcome = run(genome, self.doctor);
         let row = &mut self.row;
         row.runs += 1;
-        row.cycles += outcome.cycles;
+        row.cycles[genome.policy as usize] += outcome.cycles;
         for quantity in Quantity::ALL {
             let value = outcome.extremes.of(quantity);
             if allowed(genome, quantity) == f64::INFINITY || value == f64::NEG_INFINITY {
@@ -111,6 +126,7 @@ impl Search {
         let is_frozen = random.uniform() < FROZEN;
         let pools = &self.pools[policy as usize];
         let quantity = (random.uniform() * Quantity::ALL.len() as f64) as usize;
+        let quantity = self.aim.map_or(quantity, |aim| aim as usize);
         let is_drawn = self.row.runs < FIRST_RUNS || random.uniform() < DRAWN;
         let pick = |random: &mut Random, pool: &[Found]| {
             pool.get((random.uniform() * pool.len() as f64) as usize).map(|found| found.genome.clone())
@@ -125,13 +141,13 @@ impl Search {
         }
     }
 
-    fn climb(&mut self, seed: u64, budget: Budget) {
+    pub fn climb(&mut self, seed: u64, budget: Budget) {
         let begun = Instant::now();
         let goes_on = |row: &Row| match budget {
             Budget::Time(time) => begun.elapsed() < time,
-            Budget::Cycles(cycles) => row.cycles < cycles,
+            Budget::Cycles(cycles) => row.cycles.iter().any(|done| *done < cycles),
         };
-        while goes_on(&self.row) {
+        while goes_on(&self.row) && !self.is_found() {
             let genome = self.next(seed);
             self.add(&genome);
         }

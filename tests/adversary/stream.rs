@@ -2,11 +2,12 @@
 
 use core::f64::consts::TAU;
 
+use hexad::control::limits::DerivativeLimits;
 use hexad::control::parameters::Parameters;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;
-use hexad::motion::minimum_jerk::{Profile, rise};
+use hexad::motion::minimum_jerk::{Profile, rise, shortest_duration};
 use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};
 
@@ -14,6 +15,8 @@ use super::genome::Reader;
 
 /// Farthest way to a wall that is looked for \[m\].
 const FARTHEST_M: f64 = 2.0;
+/// Part of the sources that send wrong derivatives.
+const WRONG: f64 = 0.2;
 /// Parts of it.
 const STEPS: u32 = 200;
 
@@ -71,12 +74,14 @@ impl Stream {
         let shape = genes.choice(&SHAPES);
         let seed = (genes.share() * 65_536.0) as u64;
         let directions = [0; 2].map(|_| direction(genes));
-        let factor = genes.within(0.3, 1.3);
+        // Most sources keep the limits, as nearly as they can.
+        let factor = genes.choice(&[0.6, 0.9, 0.99, 1.3]) * genes.within(0.8, 1.0);
         let omega = genes.logarithmic(0.8, 120.0);
         let phase = TAU * genes.share();
         let side = genes.choice(&[-1.0, 1.0]);
         let near_wall = genes.sometimes(0.4, 0.0, 1.1);
-        let sent = [0; 2].map(|_| genes.choice(&[1.0, 1.0, 1.0, 1.0, 0.0, 0.5, -1.0, 2.0]));
+        let wrong = [0; 2].map(|_| genes.choice(&[1.0, 0.0, 0.5, -1.0, 2.0]));
+        let sent = if genes.share() < WRONG { wrong } else { [1.0; 2] };
         let limits = &parameters.limits;
         let [angular, linear] = [0, 3].map(|row| directions[0].fixed_rows::<3>(row).norm());
         let lesser = |of_angle: f64, of_position: f64| (of_angle / angular).min(of_position / linear);
@@ -105,6 +110,17 @@ impl Stream {
             acceleration,
             sent,
         }
+    }
+
+    /// Time in which the way from home to the farthest point of the stream can be gone within the limits \[s\].
+    pub fn approach_s(&self, machine: &Machine, parameters: &Parameters) -> f64 {
+        let way = self.center - Vector6::from(machine.home) + self.directions[0] * self.amplitude;
+        let limits = &parameters.limits;
+        let time_s = |distance: f64, limits: &DerivativeLimits| {
+            shortest_duration(distance, [limits.velocity, limits.acceleration, limits.jerk])
+        };
+        let [angular, linear] = [0, 3].map(|row| way.fixed_rows::<3>(row).norm());
+        time_s(angular, &limits.orientation).max(time_s(linear, &limits.position))
     }
 
     /// X, X', X'' at an instant; the derivatives as they are sent.

@@ -9,7 +9,8 @@ use super::machines::MACHINES;
 #[derive(Clone, Debug, Default)]
 pub struct Row {
     pub machine: usize,
-    pub cycles: u64,
+    /// Under control, with each policy.
+    pub cycles: [u64; 2],
     pub runs: u64,
     pub end_stops: u64,
     pub extremes: Extremes,
@@ -23,7 +24,8 @@ pub fn text(rows: &[Row]) -> String {
     let column = |text: &mut String, content: &str| write!(text, "{content:>14}").unwrap();
     rows.iter().for_each(|row| column(&mut text, MACHINES[row.machine]));
     for (name, value) in [
-        ("cycles under control", (|row| row.cycles) as fn(&Row) -> u64),
+        ("cycles, policy stop", (|row| row.cycles[0]) as fn(&Row) -> u64),
+        ("cycles, policy limit", |row| row.cycles[1]),
         ("runs", |row| row.runs),
         ("end stops", |row| row.end_stops),
     ] {

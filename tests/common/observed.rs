@@ -6,18 +6,19 @@ use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoin
 use hexad::control::parameters::Parameters;
 use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::model::machine::{LEGS, Machine};
+use hexad::model::rigid::Motion;
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::plant::simulator::{Brakes, Simulator};
 use nalgebra::Vector6;
 
 use super::rig::parameters;
-use super::true_motion::Meter;
+use super::true_motion::{Meter, reference};
 
 /// The first cycle; the clock of a computer that has been up for a while.
 pub const START_NS: u64 = 86_400_000_000_000;
 /// Longest step of the integration \[s\]: no machine here has anything faster than a drive's viscous friction, so that the
 /// error is below 1e-7 m.
-const STEP_S: f64 = 2.5e-3;
+pub const STEP_S: f64 = 2.5e-3;
 /// More than the gentlest of motions onto a setpoint as near as it must be.
 const LONGEST_ENGAGING_S: f64 = 5.0;
 
@@ -138,13 +139,18 @@ impl Observed {
 
     /// One period of the platform, in which the force of an output arrives.
     pub fn apply(&mut self, output: &Output) {
+        self.apply_with(output, reference(output));
+    }
+
+    /// The same with a reference from elsewhere.
+    pub fn apply_with(&mut self, output: &Output, reference: Option<Motion>) {
         let (period_ns, release_ns) = (self.parameters.period_ns, self.release_ns());
         let after_ns = period_ns - self.phase_ns;
         let delay_ns = self.force_delay_ns.min(after_ns);
         let next = output.state.has_control().then_some(output.force);
         self.advance(self.phase_ns);
         self.meter.at_release(&self.simulator, self.force.as_ref(), release_ns);
-        self.meter.expect(output, release_ns + period_ns);
+        self.meter.expect(reference, output.state, release_ns + period_ns);
         self.advance(delay_ns);
         self.force = next;
         if self.simulator.brakes() != Brakes::Closed || self.force.is_some() {

@@ -264,11 +264,11 @@ impl Meter {
         self.extremes.add(Quantity::AngularVelocity, omega / limits.orientation.velocity, now_ns);
     }
 
-    /// The reference of an output, from which the platform is measured at the next release.
-    pub fn expect(&mut self, output: &Output, next_release_ns: u64) {
-        let next = reference(output).filter(|_| output.state.has_control());
+    /// The reference for the next release, in the state of the cycle that gave it.
+    pub fn expect(&mut self, reference: Option<Motion>, state: State, next_release_ns: u64) {
+        let next = reference.filter(|_| state.has_control());
         let before = core::mem::replace(&mut self.expected, next);
-        self.state = output.state;
+        self.state = state;
         let Some(next) = next else { return };
         self.check_reference(&next, before.as_ref(), next_release_ns);
     }
