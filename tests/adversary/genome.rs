@@ -105,7 +105,7 @@ impl<'a> Reader<'a> {
 
     /// In \[0, 1).
     pub fn share(&mut self) -> f64 {
-        f64::from(*self.0.next().expect("a gene")) / 65_536.0
+        f64::from(*self.0.next().unwrap_or_else(|| panic!("more than {GENES} genes"))) / 65_536.0
     }
 
     pub fn within(&mut self, low: f64, high: f64) -> f64 {
