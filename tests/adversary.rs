@@ -6,9 +6,15 @@
 //!
 //! `HEXAD_ADVERSARY_SECONDS` is the time of the search (default 60); `HEXAD_ADVERSARY_CYCLES=1e7` searches for that many
 //! cycles under control of each machine instead; `HEXAD_SEED` begins elsewhere; `HEXAD_ADVERSARY_KEEP=FILE` writes the
-//! worst genomes.
+//! worst genomes, and `HEXAD_ADVERSARY_TRACE` with the test `trace` prints one run.
 
-#![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    reason = "helpers of tests"
+)]
 
 mod common;
 
@@ -25,4 +31,5 @@ mod adversary {
     mod stream;
     mod table;
     mod tests;
+    mod trace;
 }

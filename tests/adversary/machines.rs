@@ -38,6 +38,9 @@ const DEFAULTS: [[f64; 3]; 2] = [[1.0, 5.0, 500.0], [2.0, 20.0, 2000.0]];
 /// `autonomous_scale`.
 pub const AUTONOMOUS: [f64; 3] = [0.2, 1.0, 0.05];
 
+/// Factor on the drives' forces, and with them on the rate of the forces.
+const STRONGER: f64 = 10.0;
+
 /// Which of the values above.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
@@ -68,6 +71,9 @@ fn edited(Variant { machine, rate, limits, autonomous }: Variant) -> Config {
     }
     // The plant smooths dry friction more than the model does: it would not be the exact plant.
     set(&mut table, "actuator", "coulomb_friction_n", 0.0);
+    // Forces are no limit of a reference: a drive too weak for the limits leaves it, whatever the controller does.
+    let max_force_n = table["actuator"]["max_force_n"].as_float().unwrap();
+    set(&mut table, "actuator", "max_force_n", STRONGER * max_force_n);
     set(&mut table, "realtime", "rate_hz", RATES_HZ[rate]);
     let keys = [
         ["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"],

@@ -10,8 +10,9 @@ use super::genome::Reader;
 /// Longest delay of a setpoint, and largest jitter of its stamp \[s\].
 const LONGEST_DELAY_S: f64 = 0.048;
 const LARGEST_JITTER_S: f64 = 0.01;
-/// Longest delay of a measurement \[s\].
-const LONGEST_MEASUREMENT_DELAY_S: f64 = 0.003;
+/// Longest delay of a measurement, as a ratio of the period: the loop is stable with two periods from the measurement to the
+/// force.
+const LONGEST_MEASUREMENT_DELAY_RATIO: f64 = 1.0;
 /// Longest silence of the source \[s\].
 const LONGEST_SILENCE_S: f64 = 0.25;
 /// Farthest from where it fell silent that a source comes back \[m\], \[rad\].
@@ -47,7 +48,7 @@ pub struct Channel {
 }
 
 impl Messages {
-    pub fn read(genes: &mut Reader<'_>, is_limited: bool, duration_s: f64) -> Self {
+    pub fn read(genes: &mut Reader<'_>, is_limited: bool, [duration_s, period_s]: [f64; 2]) -> Self {
         use SetpointKind::{Motion, Pose, Target};
         let kinds: &[SetpointKind] = if is_limited {
             &[Motion, Motion, Pose, Pose, Target]
@@ -76,7 +77,7 @@ impl Messages {
             loss: genes.sometimes(0.75, 0.0, 0.9),
             silences,
             returns,
-            measurement_delay_s: genes.sometimes(0.8, 0.0, LONGEST_MEASUREMENT_DELAY_S),
+            measurement_delay_s: period_s * genes.sometimes(0.8, 0.0, LONGEST_MEASUREMENT_DELAY_RATIO),
             measurement_loss: genes.sometimes(0.8, 0.0, 0.2),
             seed: (genes.share() * 65_536.0) as u64,
         }

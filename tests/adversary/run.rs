@@ -40,6 +40,15 @@ pub type Doctor = fn(&mut Machine, &mut Parameters);
 
 /// Runs a genome.
 pub fn run(genome: &Genome, doctor: Option<Doctor>) -> Outcome {
+    run_with(genome, doctor, |_, _, _| {})
+}
+
+/// The same; each cycle goes to `watch` after the platform has moved.
+pub fn run_with(
+    genome: &Genome,
+    doctor: Option<Doctor>,
+    mut watch: impl FnMut(&Observed, &Input, &Output),
+) -> Outcome {
     let scenario = Scenario::of(genome);
     let mut observed = Observed::with(&scenario.config, &scenario.config.machine, scenario.parameters);
     if let Some(doctor) = doctor {
@@ -62,6 +71,7 @@ pub fn run(genome: &Genome, doctor: Option<Doctor>) -> Outcome {
         ask(&scenario, &mut observed, before.state, &mut requests, &mut without_s);
         let input = input(&scenario, &observed, &source, &mut channel, &mut frozen);
         let output = observed.cycle(&input);
+        watch(&observed, &input, &output);
         faults.add(&before, &output);
         before = output;
     }

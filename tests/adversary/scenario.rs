@@ -15,6 +15,11 @@ use super::stream::Stream;
 /// Longest run, in seconds and in cycles.
 const LONGEST_S: f64 = 2.0;
 const MOST_CYCLES: f64 = 4000.0;
+/// Longest time from the release to the force: of reading, computing and sending \[s\], and as a ratio of the period.
+const LONGEST_FORCE_DELAY_S: f64 = 150e-6;
+const LONGEST_FORCE_DELAY_RATIO: f64 = 0.4;
+/// cos(beta) of a home below which its envelope has no angles.
+const LEAST_COS_BETA: f64 = 0.5;
 /// Requests of a run besides those that bring the platform back under control.
 const REQUESTS: usize = 5;
 
@@ -71,7 +76,8 @@ impl Scenario {
         let period_s = parameters.period_ns as f64 * 1e-9;
         let duration_s = LONGEST_S.min(MOST_CYCLES * period_s);
         let phase = genes.choice(&[0.0, 0.0, 0.5]);
-        let delay = genes.sometimes(0.6, 0.0, 0.4);
+        let delay_s =
+            genes.sometimes(0.6, 0.0, LONGEST_FORCE_DELAY_S).min(LONGEST_FORCE_DELAY_RATIO * period_s);
         let streams = [0; 2].map(|_| Stream::read(genes, &config.machine, &parameters));
         let replaced_s = duration_s * genes.within(0.2, 2.2);
         let is_continued = genes.choice(&[true, true, false]);
@@ -80,7 +86,7 @@ impl Scenario {
             fade_s: genes.choice(&[0.0, 0.4, 1.2, 1.5, 2.0])
                 * streams[0].approach_s(&config.machine, &parameters),
         };
-        let messages = Messages::read(genes, genome.policy == ViolationPolicy::Limit, duration_s);
+        let messages = Messages::read(genes, genome.policy == ViolationPolicy::Limit, [duration_s, period_s]);
         let request = |genes: &mut Reader<'_>| {
             // Most runs have one or none.
             let at_s = duration_s * genes.within(0.1, 6.0);
@@ -95,7 +101,7 @@ impl Scenario {
             parameters,
             duration_s,
             phase_ns: (phase * period_s * 1e9) as u64,
-            force_delay_ns: (delay * period_s * 1e9) as u64,
+            force_delay_ns: (delay_s * 1e9) as u64,
             streams,
             replaced_s,
             is_continued,
@@ -111,7 +117,9 @@ fn envelope(genes: &mut Reader<'_>, config: &Config) -> Option<Envelope> {
     let is_given = genes.choice(&[false, false, true]);
     let stroke = config.machine.actuator.stroke().min(1.0);
     let sizes = [0; 2].map(|_| genes.logarithmic(0.01, 0.8));
-    let half = |axis: usize| if axis < 3 { sizes[0] } else { sizes[1] * stroke };
+    // Bryan angles are no measure near beta = +-90 deg: there an envelope bounds the position alone.
+    let angle = if config.machine.home[1].cos() < LEAST_COS_BETA { 4.0 } else { sizes[0] };
+    let half = |axis: usize| if axis < 3 { angle } else { sizes[1] * stroke };
     is_given.then(|| Envelope {
         lowest: core::array::from_fn(|axis| config.machine.home[axis] - half(axis)),
         highest: core::array::from_fn(|axis| config.machine.home[axis] + half(axis)),

@@ -8,12 +8,13 @@ use std::{env, fs};
 use hexad::control::parameters::ViolationPolicy;
 use hexad::plant::random::Random;
 
+use super::common::true_motion::Extremes;
 use super::genome::Genome;
 use super::machines::MACHINES;
-use super::run::run;
+use super::run::{run, run_with};
 use super::scenario::Scenario;
 use super::search::{Budget, Found, Search, search};
-use super::table;
+use super::{table, trace};
 
 /// Time of the search where none is given \[s\].
 const SECONDS: f64 = 60.0;
@@ -58,7 +59,8 @@ fn keep(searches: &[Search], path: &str) {
 fn explain(violations: &[&Found]) -> String {
     let mut text = String::new();
     for found in violations {
-        text += &format!("{} {:.4}: {}\n", found.quantity.name(), found.value, found.genome);
+        let (name, fault) = (found.quantity.name(), found.outcome.fault);
+        text += &format!("{name} {:.4}, fault {fault:?}: {}\n", found.value, found.genome);
     }
     for found in violations.iter().take(EXPLAINED) {
         text += &format!(
@@ -93,6 +95,20 @@ fn no_search_finds_a_motion_beyond_a_limit() {
         "a machine was never under control"
     );
     assert!(violations.is_empty(), "{} beyond a limit:\n{}", violations.len(), explain(&violations));
+}
+
+/// `HEXAD_ADVERSARY_TRACE="LINE OF A GENOME"` prints its run, and what each cycle added to an extreme.
+#[test]
+#[ignore = "prints a run for a person"]
+fn trace() {
+    let line = env::var("HEXAD_ADVERSARY_TRACE").expect("HEXAD_ADVERSARY_TRACE: a line of worst.txt");
+    let genome = Genome::parse(&line).expect("a genome");
+    println!("{:#?}", Scenario::of(&genome));
+    let mut before = Extremes::default();
+    let outcome = run_with(&genome, None, |observed, input, output| {
+        trace::print(observed, input, output, &mut before);
+    });
+    println!("{:?}", outcome.extremes.violations());
 }
 
 #[test]
