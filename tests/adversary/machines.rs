@@ -80,8 +80,12 @@ fn edited(Variant { machine, rate, limits, autonomous }: Variant) -> Config {
         ["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"],
     ];
     for (keys, defaults) in keys.iter().zip(DEFAULTS) {
-        for ((key, default), factor) in keys.iter().zip(defaults).zip(LIMIT_FACTORS[limits]) {
-            set(&mut table, "limits", key, default * factor);
+        let [velocity, acceleration, jerk]: [f64; 3] =
+            core::array::from_fn(|order| defaults[order] * LIMIT_FACTORS[limits][order]);
+        // With more, the whole acceleration could change within the time for which a force is held.
+        let jerk = jerk.min(acceleration * RATES_HZ[rate]);
+        for (key, limit) in keys.iter().zip([velocity, acceleration, jerk]) {
+            set(&mut table, "limits", key, limit);
         }
     }
     set(&mut table, "limits", "autonomous_scale", AUTONOMOUS[autonomous]);

@@ -4,8 +4,9 @@
 //! release and at each change of the forces. Only the reference is the controller's, as it is judged too.
 
 use hexad::control::controller::Output;
+use hexad::control::gains::Gains;
 use hexad::control::limits::DerivativeLimits;
-use hexad::control::parameters::{Envelope, Parameters};
+use hexad::control::parameters::Parameters;
 use hexad::control::state::State;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::kinematic_state::KinematicState;
@@ -224,13 +225,16 @@ impl Meter {
         let still = Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() };
         let legs = leg_motion(&self.machine, &still);
         self.last_leg_rate = legs.rate.iter().fold(0.0, |fastest, rate| fastest.max(rate.abs()));
-        self.extremes.add(Quantity::LegRate, self.last_leg_rate / self.machine.actuator.max_rate, now_ns);
+        let [angular, linear] = [&self.parameters.limits.orientation, &self.parameters.limits.position]
+            .map(|limits| held_velocity(&self.parameters, limits));
+        let held = linear + angular * self.machine.joints.radius;
+        let leg_rate = (self.last_leg_rate - held) / self.machine.actuator.max_rate;
+        self.extremes.add(Quantity::LegRate, leg_rate, now_ns);
         self.extremes.add(Quantity::Stroke, self.margin_used(&legs.length), now_ns);
         let condition = KinematicState::new(&self.machine, state.pose).sensitivity().condition;
         self.extremes.add(Quantity::Condition, condition / self.parameters.condition, now_ns);
-        if let Some(envelope) = &self.parameters.envelope {
-            let excess = envelope_excess(envelope, &state.pose, &self.machine.home);
-            self.extremes.add(Quantity::Envelope, excess, now_ns);
+        if self.parameters.envelope.is_some() {
+            self.extremes.add(Quantity::Envelope, self.envelope_excess(&state.pose), now_ns);
         }
         if let Some(expected) = self.expected {
             self.check_distance(&expected.pose, &state.pose, now_ns);
@@ -264,9 +268,8 @@ impl Meter {
         let (limits, twist) = (&self.parameters.limits, &simulator.state().twist);
         let (omega, v) = (twist.angular.norm(), twist.linear.norm());
         self.fastest_m_s = self.fastest_m_s.max(v);
-        let period_s = self.parameters.period_ns as f64 * 1e-9;
         let ratio = |velocity: f64, limits: &DerivativeLimits| {
-            (velocity - HELD_FORCE_RATIO * limits.jerk * period_s * period_s) / limits.velocity
+            (velocity - held_velocity(&self.parameters, limits)) / limits.velocity
         };
         self.extremes.add(Quantity::Velocity, ratio(v, &limits.position), now_ns);
         self.extremes.add(Quantity::AngularVelocity, ratio(omega, &limits.orientation), now_ns);
@@ -321,6 +324,25 @@ impl Meter {
         }
     }
 
+    /// Largest distance beyond the envelope over what is allowed; negative inside.
+    fn envelope_excess(&self, pose: &Pose) -> f64 {
+        let Parameters { envelope, limits, law, .. } = &self.parameters;
+        let Some(envelope) = envelope else { return f64::NEG_INFINITY };
+        // A difference of velocity goes on for the time constant of the loop.
+        let held = |limits: &DerivativeLimits, gains: &Gains| {
+            held_velocity(&self.parameters, limits) / gains.stiffness.sqrt()
+        };
+        let angle = ENVELOPE_ALLOWANCE_RAD + held(&limits.orientation, &law.orientation);
+        let distance = ENVELOPE_ALLOWANCE_M + held(&limits.position, &law.position);
+        let x = task_coordinates(pose, &self.machine.home);
+        let ranges = envelope.lowest.iter().zip(&envelope.highest);
+        let excess = x.iter().zip(ranges).enumerate().map(|(axis, (x, (low, high)))| {
+            let allowed = if axis < 3 { angle } else { distance };
+            (low - x).max(x - high) / allowed
+        });
+        excess.fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// 0 at the margin that the reference keeps, 1 at the end of the stroke.
     fn margin_used(&self, lengths: &[f64; LEGS]) -> f64 {
         let margins = lengths.map(|length| self.machine.actuator.margin(length));
@@ -330,13 +352,8 @@ impl Meter {
     }
 }
 
-/// Largest distance beyond the envelope over what is allowed; negative inside.
-fn envelope_excess(envelope: &Envelope, pose: &Pose, home: &[f64; 6]) -> f64 {
-    let x = task_coordinates(pose, home);
-    let ranges = envelope.lowest.iter().zip(&envelope.highest);
-    let excess = x.iter().zip(ranges).enumerate().map(|(axis, (x, (low, high)))| {
-        let allowed = if axis < 3 { ENVELOPE_ALLOWANCE_RAD } else { ENVELOPE_ALLOWANCE_M };
-        (low - x).max(x - high) / allowed
-    });
-    excess.fold(f64::NEG_INFINITY, f64::max)
+/// By how much the velocity may differ from the reference's because a force is held for a period.
+fn held_velocity(parameters: &Parameters, limits: &DerivativeLimits) -> f64 {
+    let period_s = parameters.period_ns as f64 * 1e-9;
+    HELD_FORCE_RATIO * limits.jerk * period_s * period_s
 }
