@@ -57,10 +57,14 @@ pub struct Search {
     aim: Option<Quantity>,
 }
 
+/// True acceleration over its bound with frozen sensors: the forces are those for the pose and twist that were last
+/// measured, from which the platform goes as far as the following limits let it.
+const FROZEN_ACCELERATION: f64 = 1.25;
+
 /// With frozen sensors only the acceleration has a bound: the rest depends on when the fault comes.
 pub fn allowed(genome: &Genome, quantity: Quantity) -> f64 {
     match quantity {
-        Quantity::Acceleration | Quantity::AngularAcceleration => quantity.allowed(),
+        Quantity::Acceleration | Quantity::AngularAcceleration if genome.is_frozen => FROZEN_ACCELERATION,
         Quantity::ReferenceVelocity
         | Quantity::ReferenceAcceleration
         | Quantity::ReferenceJerk

@@ -27,6 +27,9 @@ const SINES_RAD_S: [f64; 4] = [3.0, 4.5, 8.0, 20.0];
 /// platform at rest falls behind a setpoint that leaves with full velocity.
 const LARGEST_LAG_RATIO: f64 = 2.0;
 
+/// Part of the instants at which `engage` may be refused, though the setpoint is within the tolerance.
+const MOST_REFUSED: f64 = 0.2;
+
 /// A setpoint within the limits at every instant.
 type Motion<'a> = &'a dyn Fn(f64) -> TaskState;
 
@@ -41,7 +44,7 @@ fn can_engage(parameters: &Parameters, task: &TaskState) -> bool {
 
 fn engage_at(config: &Config, parameters: Parameters, motion: Motion<'_>, t: f64, runs: &mut Runs) {
     let mut observed = Observed::standing(config, parameters, &motion(t));
-    let mut was_asked = false;
+    let (mut was_asked, mut was_accepted) = (false, false);
     while observed.time_s() < BEFORE_S + AFTER_S {
         if !was_asked && observed.time_s() >= BEFORE_S {
             observed.ask(Request::Engage);
@@ -50,6 +53,7 @@ fn engage_at(config: &Config, parameters: Parameters, motion: Motion<'_>, t: f64
         let task = motion(t - BEFORE_S + observed.time_s());
         let output = observed.cycle(&observed.input(&task));
         if output.state.has_control() {
+            was_accepted = true;
             let expected = motion(t - BEFORE_S + observed.time_s()).motion().pose;
             let distance = (observed.simulator.state().pose.position - expected.position).norm();
             runs.distance_m = runs.distance_m.max(distance);
@@ -57,6 +61,7 @@ fn engage_at(config: &Config, parameters: Parameters, motion: Motion<'_>, t: f64
             break;
         }
     }
+    runs.accepted += u32::from(was_accepted);
     runs.add(&observed);
 }
 
@@ -95,6 +100,12 @@ fn engaging_onto_a_moving_setpoint_stays_within_the_limits() {
             }
         }
         report.add(name, &runs);
+        report.bound(
+            name,
+            "part of the runs refused",
+            f64::from(runs.count - runs.accepted) / f64::from(runs.count),
+            MOST_REFUSED,
+        );
         let limits = &parameters.limits.position;
         let (v, a, j) = (limits.velocity, limits.acceleration, limits.jerk);
         let lag = parameters.engage_position + LARGEST_LAG_RATIO * (0.5 * v * v / a + 0.5 * v * a / j);

@@ -33,7 +33,7 @@ fn release_and_park(name: &str, requests: &[Request], runs: &mut Runs) {
         for (phase, pause_s) in PHASES.iter().flat_map(|phase| PAUSES_S.map(|pause| (phase, pause))) {
             let mut observed = begun.clone();
             let asked_at = |number: usize| start_s + phase * duration_s + pause_s * number as f64;
-            let (mut asked, mut has_parked) = (0, false);
+            let (mut asked, mut has_begun, mut has_parked) = (0, false, false);
             while observed.time_s() < start_s + duration_s + LONGEST_PARKING_S && !has_parked {
                 if asked < requests.len() && observed.time_s() >= asked_at(asked) {
                     observed.ask(requests[asked]);
@@ -43,8 +43,10 @@ fn release_and_park(name: &str, requests: &[Request], runs: &mut Runs) {
                 let output = observed.cycle(&observed.input(&task));
                 let refused = Some(output.answered) == observed.asked.map(|asked| asked.message)
                     && !output.state.has_control();
+                has_begun |= output.state == State::Parking;
                 has_parked = asked == requests.len() && (output.state == State::Off || refused);
             }
+            runs.accepted += u32::from(has_begun);
             runs.add(&observed);
         }
     }
@@ -58,6 +60,7 @@ fn a_platform_that_is_released_in_motion_and_parked_stays_within_the_limits() {
         release_and_park(name, &[Request::Off, Request::Park], &mut runs);
         release_and_park(name, &[Request::Estop, Request::Clear, Request::Park], &mut runs);
         report.add(name, &runs);
+        report.bound(name, "all runs refused", f64::from(u32::from(runs.accepted == 0)), 0.0);
     }
     report.assert();
 }
