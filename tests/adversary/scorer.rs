@@ -213,7 +213,7 @@ fn a_reference_beyond_a_limit_is_seen() {
     let near = |machine: &Machine, parameters: &mut Parameters| {
         let at_home = KinematicState::new(machine, machine.home_pose()).lengths(machine);
         let margins = at_home.map(|length| machine.actuator.margin(length));
-        parameters.stroke_margin = margins.into_iter().fold(f64::INFINITY, f64::min) + 1e-6;
+        parameters.stroke_margin = 2.2 * margins.into_iter().fold(f64::INFINITY, f64::min);
     };
     GENTLE.assert_only(Quantity::ReferenceStroke, near, |_| {});
 }

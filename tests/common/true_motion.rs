@@ -25,6 +25,9 @@ pub const MOTION_ALLOWANCE: f64 = 0.02;
 const HELD_FORCE_RATIO: f64 = 0.25;
 /// Part by which the reference may exceed a limit: rounding.
 pub const REFERENCE_ALLOWANCE: f64 = 1e-6;
+/// Part of the stroke margin that the reference may use: control may begin where a brake has left the platform, and the rest
+/// is for the following error.
+pub const START_IN_MARGIN: f64 = 0.5;
 /// Distance by which the true pose may leave the envelope \[m\]: the following error of a plant without flaws.
 pub const ENVELOPE_ALLOWANCE_M: f64 = 50e-6;
 /// The same for an angle \[rad\].
@@ -102,7 +105,7 @@ impl Quantity {
             Self::ReferenceVelocity | Self::ReferenceAcceleration | Self::ReferenceJerk => {
                 1.0 + REFERENCE_ALLOWANCE
             }
-            Self::ReferenceStroke => REFERENCE_ALLOWANCE,
+            Self::ReferenceStroke => START_IN_MARGIN,
             Self::Fault => 0.0,
         }
     }
