@@ -66,7 +66,10 @@ pub fn run_with(
     let mut frozen: Option<Measurement> = None;
     let mut before = Output::default();
     let (mut without_s, mut faults) = (0.0, Faults::default());
-    while observed.time_s() < scenario.duration_s && observed.meter.impact_m_s.is_none() {
+    while observed.time_s() < scenario.duration_s
+        && observed.meter.impact_m_s.is_none()
+        && !is_carried_out(&observed)
+    {
         source.follow(&scenario, &observed, before.state);
         ask(&scenario, &mut observed, before.state, &mut requests, &mut without_s);
         let input = input(&scenario, &observed, &source, &mut channel, &mut frozen);
@@ -85,6 +88,13 @@ pub fn run_with(
         fault: faults.last,
         end_stops: u32::from(observed.meter.impact_m_s.is_some()),
     }
+}
+
+/// Whether closing brakes have carried a leg beyond its stroke: the plant's brakes know no end stop, and there is nothing that
+/// control could do about it.
+fn is_carried_out(observed: &Observed) -> bool {
+    let actuator = &observed.machine.actuator;
+    observed.force.is_none() && observed.measurement().length.iter().any(|length| !actuator.contains(*length))
 }
 
 /// Faults that ended control, but for the operator's and those of lost measurements.
