@@ -10,12 +10,15 @@
     reason = "helpers of tests and benches, each of which uses a part"
 )]
 
+pub mod edited;
 pub mod fast;
 pub mod not_run;
+pub mod observed;
 pub mod paper;
 pub mod rig;
 pub mod stability;
 pub mod stalls;
+pub mod true_motion;
 
 use std::path::{Path, PathBuf};
 

@@ -38,6 +38,7 @@ mod overruns;
 mod paused;
 mod readme;
 mod refusals;
+mod released;
 mod requests;
 mod rounds;
 mod system_calls;

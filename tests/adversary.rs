@@ -1,0 +1,35 @@
+//! An adversary: it searches for messages, requests, rates and machines that move the platform beyond a limit.
+//!
+//! A genome describes a run of the controller against the plant with exactly the model's parameters. Each run is scored
+//! by the true motion of the platform. The search begins with the worst runs that were ever found, goes on with random ones
+//! and climbs from the best of each quantity.
+//!
+//! `HEXAD_ADVERSARY_SECONDS` is the time of the search (default 60); `HEXAD_ADVERSARY_CYCLES=1e7` searches for that many
+//! cycles under control of each machine instead; `HEXAD_SEED` begins elsewhere; `HEXAD_ADVERSARY_KEEP=FILE` writes the
+//! worst genomes, and `HEXAD_ADVERSARY_TRACE` with the test `trace` prints one run.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    reason = "helpers of tests"
+)]
+
+mod common;
+
+mod adversary {
+    use super::*;
+
+    mod genome;
+    mod machines;
+    mod messages;
+    mod run;
+    mod scenario;
+    mod scorer;
+    mod search;
+    mod stream;
+    mod table;
+    mod tests;
+    mod trace;
+}

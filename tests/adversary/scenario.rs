@@ -1,0 +1,127 @@
+//! What a genome means.
+
+use std::sync::Arc;
+
+use hexad::config::Config;
+use hexad::control::parameters::{Envelope, Parameters, ViolationPolicy};
+use hexad::control::state::Request;
+
+use super::common::rig;
+use super::genome::{Genome, Reader};
+use super::machines::{AUTONOMOUS, LIMIT_FACTORS, RATES_HZ, Variant};
+use super::messages::Messages;
+use super::stream::Stream;
+
+/// Longest run, in seconds and in cycles.
+const LONGEST_S: f64 = 2.0;
+const MOST_CYCLES: f64 = 4000.0;
+/// Longest time from the release to the force: of reading, computing and sending \[s\], and as a ratio of the period.
+const LONGEST_FORCE_DELAY_S: f64 = 150e-6;
+const LONGEST_FORCE_DELAY_RATIO: f64 = 0.4;
+/// cos(beta) of a home below which its envelope has no angles.
+const LEAST_COS_BETA: f64 = 0.5;
+/// Requests of a run besides those that bring the platform back under control.
+const REQUESTS: usize = 5;
+
+/// One run.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    pub config: Arc<Config>,
+    pub parameters: Parameters,
+    pub duration_s: f64,
+    /// From the measurement to the release.
+    pub phase_ns: u64,
+    /// From the release to the force.
+    pub force_delay_ns: u64,
+    /// The source before and after it is replaced.
+    pub streams: [Stream; 2],
+    /// When the second source replaces the first \[s\].
+    pub replaced_s: f64,
+    /// Whether the second source begins where the first was.
+    pub is_continued: bool,
+    pub start: Start,
+    pub messages: Messages,
+    /// Requests at instants \[s\].
+    pub requests: [(f64, Request); REQUESTS],
+    /// Time without control after which the next request is sent that brings it back \[s\].
+    pub retry_s: f64,
+    /// Whether control is taken back with `park`.
+    pub parks: bool,
+    /// When the sensors freeze \[s\].
+    pub frozen_s: Option<f64>,
+}
+
+/// Where the setpoint is as control begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Start {
+    /// Whether the setpoint moves already; else it leaves the platform's pose in the time below.
+    pub is_moving: bool,
+    pub fade_s: f64,
+}
+
+impl Scenario {
+    pub fn of(genome: &Genome) -> Self {
+        let genes = &mut Reader::new(genome);
+        let mut index = |count: usize| (genes.share() * count as f64) as usize;
+        let variant = Variant {
+            machine: genome.machine,
+            rate: index(RATES_HZ.len()),
+            limits: index(LIMIT_FACTORS.len()),
+            autonomous: index(AUTONOMOUS.len()),
+        };
+        let config = super::machines::variant(variant);
+        let mut parameters = rig::parameters(&config);
+        parameters.on_violation = genome.policy;
+        parameters.envelope = envelope(genes, &config);
+        let period_s = parameters.period_ns as f64 * 1e-9;
+        let duration_s = LONGEST_S.min(MOST_CYCLES * period_s);
+        let phase = genes.choice(&[0.0, 0.0, 0.5]);
+        let delay_s =
+            genes.sometimes(0.6, 0.0, LONGEST_FORCE_DELAY_S).min(LONGEST_FORCE_DELAY_RATIO * period_s);
+        let streams = [0; 2].map(|_| Stream::read(genes, &config.machine, &parameters));
+        let replaced_s = duration_s * genes.within(0.2, 2.2);
+        let is_continued = genes.choice(&[true, true, false]);
+        let start = Start {
+            is_moving: genes.choice(&[true, false, false]),
+            fade_s: genes.choice(&[0.0, 0.4, 1.2, 1.5, 2.0])
+                * streams[0].approach_s(&config.machine, &parameters),
+        };
+        let messages = Messages::read(genes, genome.policy == ViolationPolicy::Limit, [duration_s, period_s]);
+        let request = |genes: &mut Reader<'_>| {
+            // Most runs have one or none.
+            let at_s = duration_s * genes.within(0.1, 6.0);
+            (at_s, genes.choice(&Request::ALL))
+        };
+        let requests = [0; REQUESTS].map(|_| request(genes));
+        Self {
+            retry_s: genes.logarithmic(0.001, 0.1),
+            parks: genes.choice(&[false, false, false, true]),
+            frozen_s: genome.is_frozen.then(|| duration_s * genes.within(0.2, 0.9)),
+            config,
+            parameters,
+            duration_s,
+            phase_ns: (phase * period_s * 1e9) as u64,
+            force_delay_ns: (delay_s * 1e9) as u64,
+            streams,
+            replaced_s,
+            is_continued,
+            start,
+            messages,
+            requests,
+        }
+    }
+}
+
+/// None in most runs; else a box around home.
+fn envelope(genes: &mut Reader<'_>, config: &Config) -> Option<Envelope> {
+    let is_given = genes.choice(&[false, false, true]);
+    let stroke = config.machine.actuator.stroke().min(1.0);
+    let sizes = [0; 2].map(|_| genes.logarithmic(0.01, 0.8));
+    // Bryan angles are no measure near beta = +-90 deg: there an envelope bounds the position alone.
+    let angle = if config.machine.home[1].cos() < LEAST_COS_BETA { 4.0 } else { sizes[0] };
+    let half = |axis: usize| if axis < 3 { angle } else { sizes[1] * stroke };
+    is_given.then(|| Envelope {
+        lowest: core::array::from_fn(|axis| config.machine.home[axis] - half(axis)),
+        highest: core::array::from_fn(|axis| config.machine.home[axis] + half(axis)),
+    })
+}

@@ -1,0 +1,192 @@
+//! The search: random genomes first, then changes of the worst of each quantity.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::{available_parallelism, scope};
+use std::time::{Duration, Instant};
+
+use hexad::control::parameters::ViolationPolicy;
+use hexad::plant::random::Random;
+
+use super::common::true_motion::Quantity;
+use super::genome::Genome;
+use super::machines::MACHINES;
+use super::run::{Doctor, Outcome, run};
+use super::table::Row;
+
+/// Genomes that are kept of each quantity and policy.
+const KEPT: usize = 4;
+/// Part of the genomes that are drawn anew, and of the others that are crossed.
+const DRAWN: f64 = 0.25;
+const CROSSED: f64 = 0.2;
+/// Part of the runs in which the sensors freeze.
+const FROZEN: f64 = 0.05;
+/// Runs of each machine that are all drawn anew.
+const FIRST_RUNS: u64 = 60;
+
+/// When the search of one machine ends.
+#[derive(Clone, Copy, Debug)]
+pub enum Budget {
+    Time(Duration),
+    /// Under control with each policy.
+    Cycles(u64),
+}
+
+/// A genome with what it reached.
+#[derive(Clone)]
+pub struct Found {
+    pub genome: Genome,
+    pub quantity: Quantity,
+    pub value: f64,
+    pub outcome: Outcome,
+}
+
+impl Found {
+    pub fn is_violation(&self) -> bool {
+        self.value > allowed(&self.genome, self.quantity)
+    }
+}
+
+/// What the search of one machine has found.
+pub struct Search {
+    pub row: Row,
+    /// The worst first, for each policy and quantity.
+    pools: [[Vec<Found>; Quantity::ALL.len()]; 2],
+    doctor: Option<Doctor>,
+    /// The only quantity to climb for.
+    aim: Option<Quantity>,
+}
+
+/// True acceleration over its bound with frozen sensors: the forces are those for the pose and twist that were last
+/// measured, from which the platform goes as far as the following limits let it.
+const FROZEN_ACCELERATION: f64 = 1.25;
+
+/// With frozen sensors only the acceleration has a bound: the rest depends on when the fault comes.
+pub fn allowed(genome: &Genome, quantity: Quantity) -> f64 {
+    match quantity {
+        Quantity::Acceleration | Quantity::AngularAcceleration if genome.is_frozen => FROZEN_ACCELERATION,
+        Quantity::ReferenceVelocity
+        | Quantity::ReferenceAcceleration
+        | Quantity::ReferenceJerk
+        | Quantity::ReferenceStroke => quantity.allowed(),
+        _ if genome.is_frozen => f64::INFINITY,
+        _ => quantity.allowed(),
+    }
+}
+
+impl Search {
+    pub fn new(machine: usize) -> Self {
+        Self {
+            row: Row { machine, ..Row::default() },
+            pools: core::array::from_fn(|_| core::array::from_fn(|_| Vec::new())),
+            doctor: None,
+            aim: None,
+        }
+    }
+
+    /// A search for one violation, against a controller that is wrong on purpose.
+    pub fn doctored(machine: usize, doctor: Doctor, aim: Quantity) -> Self {
+        Self { doctor: Some(doctor), aim: Some(aim), ..Self::new(machine) }
+    }
+
+    /// Whether what it aims at is found.
+    fn is_found(&self) -> bool {
+        self.aim.is_some_and(|aim| self.row.violations[aim as usize] > 0)
+    }
+
+    /// Runs a genome and keeps it where it is among the worst.
+    pub fn add(&mut self, genome: &Genome) {
+        let outcome = run(genome, self.doctor);
+        let row = &mut self.row;
+        row.runs += 1;
+        row.cycles[genome.policy as usize] += outcome.cycles;
+        for quantity in Quantity::ALL {
+            let value = outcome.extremes.of(quantity);
+            if allowed(genome, quantity) == f64::INFINITY || value == f64::NEG_INFINITY {
+                continue;
+            }
+            row.extremes.add(quantity, value, 0);
+            row.violations[quantity as usize] += u64::from(value > allowed(genome, quantity));
+            let pool = &mut self.pools[genome.policy as usize][quantity as usize];
+            let place = pool.partition_point(|found| found.value >= value);
+            if place < KEPT {
+                pool.insert(
+                    place,
+                    Found { genome: genome.clone(), quantity, value, outcome: outcome.clone() },
+                );
+                pool.truncate(KEPT);
+            }
+        }
+        if !genome.is_frozen {
+            self.row.end_stops += u64::from(outcome.end_stops);
+        }
+    }
+
+    /// The next genome; the same for the same numbers of runs and of the seed.
+    fn next(&self, seed: u64) -> Genome {
+        let machine = self.row.machine;
+        let mut random = Random::new(seed ^ self.row.runs << 8 ^ (machine as u64) << 56);
+        let policy = if random.uniform() < 0.5 { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
+        let is_frozen = random.uniform() < FROZEN;
+        let pools = &self.pools[policy as usize];
+        let quantity = (random.uniform() * Quantity::ALL.len() as f64) as usize;
+        let quantity = self.aim.map_or(quantity, |aim| aim as usize);
+        let is_drawn = self.row.runs < FIRST_RUNS || random.uniform() < DRAWN;
+        let pick = |random: &mut Random, pool: &[Found]| {
+            pool.get((random.uniform() * pool.len() as f64) as usize).map(|found| found.genome.clone())
+        };
+        let Some(parent) = pick(&mut random, &pools[quantity]).filter(|_| !is_drawn) else {
+            return Genome::random(machine, policy, is_frozen, &mut random);
+        };
+        let other = (random.uniform() * Quantity::ALL.len() as f64) as usize;
+        match pick(&mut random, &pools[other]).filter(|_| random.uniform() < CROSSED) {
+            Some(other) => parent.crossed(&other, &mut random).mutated(&mut random),
+            None => parent.mutated(&mut random),
+        }
+    }
+
+    pub fn climb(&mut self, seed: u64, budget: Budget) {
+        let begun = Instant::now();
+        let goes_on = |row: &Row| match budget {
+            Budget::Time(time) => begun.elapsed() < time,
+            Budget::Cycles(cycles) => row.cycles.iter().any(|done| *done < cycles),
+        };
+        while goes_on(&self.row) && !self.is_found() {
+            let genome = self.next(seed);
+            self.add(&genome);
+        }
+    }
+
+    /// The worst genome of each policy and quantity.
+    pub fn worst(&self) -> impl Iterator<Item = &Found> {
+        self.pools.iter().flatten().filter_map(|pool| pool.first())
+    }
+}
+
+/// Searches with every machine, on every processor; each search begins with the genomes that are known.
+pub fn search(known: &[Genome], seed: u64, budget: Budget) -> Vec<Search> {
+    let workers = available_parallelism().map_or(1, usize::from).min(MACHINES.len());
+    let budget = match budget {
+        Budget::Time(total) => Budget::Time(total / MACHINES.len().div_ceil(workers) as u32),
+        cycles @ Budget::Cycles(_) => cycles,
+    };
+    let (next, searches) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        loop {
+            let machine = next.fetch_add(1, Ordering::Relaxed);
+            if machine >= MACHINES.len() {
+                return;
+            }
+            let mut search = Search::new(machine);
+            known.iter().filter(|genome| genome.machine == machine).for_each(|genome| search.add(genome));
+            search.climb(seed, budget);
+            searches.lock().unwrap().push(search);
+        }
+    };
+    scope(|scope| {
+        (0..workers).for_each(|_| drop(scope.spawn(work)));
+    });
+    let mut searches = searches.into_inner().unwrap();
+    searches.sort_by_key(|search| search.row.machine);
+    searches
+}

@@ -1,0 +1,45 @@
+//! A run in words and numbers, for a person who looks into a violation.
+
+use hexad::control::controller::{Input, Output};
+use hexad::control::diagnostic::DiagnosticCode;
+
+use super::common::observed::Observed;
+use super::common::true_motion::{Extremes, Quantity, reference};
+
+/// Largest values below this are not printed.
+const WORTH_PRINTING: f64 = 0.9;
+
+/// Prints a cycle in which the state changed or a quantity was never as large.
+pub fn print(observed: &Observed, input: &Input, output: &Output, before: &mut Extremes) {
+    let now = observed.meter.extremes;
+    let grown: Vec<_> = Quantity::ALL
+        .into_iter()
+        .filter(|quantity| now.of(*quantity) > before.of(*quantity).max(WORTH_PRINTING * quantity.allowed()))
+        .map(|quantity| format!("{} {:.4}", quantity.name(), now.of(quantity)))
+        .collect();
+    *before = now;
+    let state = observed.simulator.state();
+    let (v, omega) = (state.twist.linear.norm(), state.twist.angular.norm());
+    let planned = reference(output).map(|motion| {
+        let [v, a] = [motion.twist.linear.norm(), motion.acceleration.linear.norm()];
+        let [omega, alpha] = [motion.twist.angular.norm(), motion.acceleration.angular.norm()];
+        format!("v {v:.4} a {a:.3} omega {omega:.4} alpha {alpha:.3}")
+    });
+    let age_ms =
+        |time_ns: Option<u64>| time_ns.map(|ns| (input.release_ns - ns.min(input.release_ns)) as f64 * 1e-6);
+    let code = match output.diagnostic.code {
+        DiagnosticCode::None => String::new(),
+        code => format!("{code:?} {:.3}", output.diagnostic.value),
+    };
+    println!(
+        "{:.5} {} {code} | true v {v:.4} omega {omega:.4} | reference {} | setpoint age {:?} ms, measured {:?} ms | limits {:?} {:?} | {}",
+        observed.time_s(),
+        output.state.name(),
+        planned.unwrap_or_default(),
+        age_ms(input.setpoint.map(|setpoint| setpoint.time_ns)),
+        age_ms(input.measurement.map(|measurement| measurement.time_ns)),
+        output.active_limits,
+        output.request_diagnostic.code,
+        grown.join(", ")
+    );
+}

@@ -1,0 +1,362 @@
+//! The true motion of the platform under control, measured on the plant and compared with every limit.
+//!
+//! The controller's own view is not used: pose, twist and acceleration are those of the simulated platform, at each
+//! release and at each change of the forces. Only the reference is the controller's, as it is judged too.
+
+use hexad::control::controller::Output;
+use hexad::control::gains::Gains;
+use hexad::control::limits::DerivativeLimits;
+use hexad::control::parameters::Parameters;
+use hexad::control::state::State;
+use hexad::model::inverse_geometry::leg_motion;
+use hexad::model::kinematic_state::KinematicState;
+use hexad::model::machine::{LEGS, Machine};
+use hexad::model::rigid::{Acceleration, Motion, Pose};
+use hexad::model::task::task_coordinates;
+use hexad::plant::forward_dynamics::ForwardDynamics;
+use hexad::plant::simulator::{Brakes, Simulator};
+
+use super::angle_between;
+
+/// Part by which the true motion may exceed a limit: the loop's own error.
+pub const MOTION_ALLOWANCE: f64 = 0.02;
+/// A force is held for a period while the reference's acceleration changes with the jerk J: the velocity differs from the
+/// reference's by up to this times J h^2, whatever the control law. 0.1 mm/s at 1 kHz, 12 mm/s at 100 Hz, by default.
+const HELD_FORCE_RATIO: f64 = 0.25;
+/// Part by which the reference may exceed a limit: rounding.
+pub const REFERENCE_ALLOWANCE: f64 = 1e-6;
+/// Part of the stroke margin that the reference may use: control may begin where a brake has left the platform, and the rest
+/// is for the following error.
+pub const START_IN_MARGIN: f64 = 0.5;
+/// Distance by which the true pose may leave the envelope \[m\]: the following error of a plant without flaws.
+pub const ENVELOPE_ALLOWANCE_M: f64 = 50e-6;
+/// The same for an angle \[rad\].
+pub const ENVELOPE_ALLOWANCE_RAD: f64 = 100e-6;
+/// Longest period whose acceleration is measured at its beginning alone: it changes by what a few millimetres per second
+/// change of the velocity terms.
+const LONGEST_EVEN_HOLD_NS: u64 = 1_000_000;
+/// Unit of the margin of a machine whose stroke margin is smaller \[m\].
+const SMALLEST_MARGIN_M: f64 = 1e-4;
+
+/// A quantity of which the largest value counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// True velocity of C over its limit.
+    Velocity,
+    /// True angular velocity over its limit.
+    AngularVelocity,
+    /// True rate of the fastest leg over `actuator.max_rate_m_s`.
+    LegRate,
+    /// True acceleration of C over the limit of reference and feedback together.
+    Acceleration,
+    /// True angular acceleration over that limit.
+    AngularAcceleration,
+    /// Part of the stroke margin that the true platform used; 1 is the end stop, above it is the speed of the impact.
+    Stroke,
+    /// Distance of the true pose beyond the envelope, over what is allowed.
+    Envelope,
+    /// True condition over its limit.
+    Condition,
+    /// True distance from the reference while engaging, over the following limit.
+    Engaging,
+    /// True distance from the reference in any other state, over the following limit.
+    Following,
+    /// Velocity or angular velocity of the reference over its limit.
+    ReferenceVelocity,
+    /// Acceleration or angular acceleration of the reference over its limit.
+    ReferenceAcceleration,
+    /// Jerk or angular jerk of the reference over its limit.
+    ReferenceJerk,
+    /// Part of the stroke margin that the reference used.
+    ReferenceStroke,
+    /// Faults for what was asked, under the policy that has none.
+    Fault,
+}
+
+impl Quantity {
+    pub const ALL: [Self; 15] = [
+        Self::Velocity,
+        Self::AngularVelocity,
+        Self::LegRate,
+        Self::Acceleration,
+        Self::AngularAcceleration,
+        Self::Stroke,
+        Self::Envelope,
+        Self::Condition,
+        Self::Engaging,
+        Self::Following,
+        Self::ReferenceVelocity,
+        Self::ReferenceAcceleration,
+        Self::ReferenceJerk,
+        Self::ReferenceStroke,
+        Self::Fault,
+    ];
+
+    /// The largest value that is no violation.
+    pub fn allowed(self) -> f64 {
+        match self {
+            Self::Velocity
+            | Self::AngularVelocity
+            | Self::LegRate
+            | Self::Acceleration
+            | Self::AngularAcceleration
+            | Self::Condition => 1.0 + MOTION_ALLOWANCE,
+            Self::Stroke | Self::Envelope | Self::Engaging | Self::Following => 1.0,
+            Self::ReferenceVelocity | Self::ReferenceAcceleration | Self::ReferenceJerk => {
+                1.0 + REFERENCE_ALLOWANCE
+            }
+            Self::ReferenceStroke => START_IN_MARGIN,
+            Self::Fault => 0.0,
+        }
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::AngularVelocity => "angular velocity",
+            Self::LegRate => "leg rate",
+            Self::Acceleration => "acceleration",
+            Self::AngularAcceleration => "angular acceleration",
+            Self::Stroke => "stroke",
+            Self::Envelope => "envelope",
+            Self::Condition => "condition",
+            Self::Engaging => "engaging",
+            Self::Following => "following",
+            Self::ReferenceVelocity => "reference velocity",
+            Self::ReferenceAcceleration => "reference acceleration",
+            Self::ReferenceJerk => "reference jerk",
+            Self::ReferenceStroke => "reference stroke",
+            Self::Fault => "fault",
+        }
+    }
+}
+
+/// The reference of an output, for the end of its period.
+pub fn reference(_output: &Output) -> Option<Motion> {
+    None
+}
+
+/// Largest value of each quantity, and the instant at which it occurred.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extremes {
+    value: [f64; Quantity::ALL.len()],
+    at_ns: [u64; Quantity::ALL.len()],
+}
+
+impl Default for Extremes {
+    fn default() -> Self {
+        Self { value: [f64::NEG_INFINITY; Quantity::ALL.len()], at_ns: [0; Quantity::ALL.len()] }
+    }
+}
+
+impl Extremes {
+    /// The largest value so far; minus infinity if the quantity was never measured.
+    pub fn of(&self, quantity: Quantity) -> f64 {
+        self.value[quantity as usize]
+    }
+
+    /// The instant of that value.
+    pub fn instant_ns(&self, quantity: Quantity) -> u64 {
+        self.at_ns[quantity as usize]
+    }
+
+    /// A value that is not a number counts as infinite.
+    pub fn add(&mut self, quantity: Quantity, value: f64, at_ns: u64) {
+        let value = if value.is_nan() { f64::INFINITY } else { value };
+        if value > self.of(quantity) {
+            (self.value[quantity as usize], self.at_ns[quantity as usize]) = (value, at_ns);
+        }
+    }
+
+    pub fn merge(&mut self, other: &Self) {
+        for quantity in Quantity::ALL {
+            self.add(quantity, other.of(quantity), other.instant_ns(quantity));
+        }
+    }
+
+    /// Every quantity beyond what is allowed, with its value.
+    pub fn violations(&self) -> Vec<(Quantity, f64)> {
+        let values = Quantity::ALL.into_iter().map(|quantity| (quantity, self.of(quantity)));
+        values.filter(|(quantity, value)| *value > quantity.allowed()).collect()
+    }
+}
+
+/// Measures the true motion of one platform.
+#[derive(Clone, Debug)]
+pub struct Meter {
+    pub extremes: Extremes,
+    /// Largest true acceleration, velocity, distance beyond the envelope: SI units, of C.
+    pub fastest_m_s: f64,
+    pub hardest_m_s2: f64,
+    /// Periods under control.
+    pub cycles: u64,
+    /// Speed of the fastest leg before it met its end stop \[m/s\].
+    pub impact_m_s: Option<f64>,
+    parameters: Parameters,
+    machine: Machine,
+    dynamics: ForwardDynamics,
+    /// For the present release, of the cycle before.
+    expected: Option<Motion>,
+    state: State,
+    last_leg_rate: f64,
+}
+
+impl Meter {
+    /// `plant` is the simulated machine.
+    pub fn new(machine: &Machine, parameters: &Parameters, plant: &Machine) -> Self {
+        Self {
+            extremes: Extremes::default(),
+            fastest_m_s: 0.0,
+            hardest_m_s2: 0.0,
+            cycles: 0,
+            impact_m_s: None,
+            parameters: *parameters,
+            machine: machine.clone(),
+            dynamics: ForwardDynamics::new(plant),
+            expected: None,
+            state: State::Off,
+            last_leg_rate: 0.0,
+        }
+    }
+
+    /// The true motion at a release, under the force of the cycle before.
+    pub fn at_release(&mut self, simulator: &Simulator, force: Option<&[f64; LEGS]>, now_ns: u64) {
+        self.check_end_stop(simulator, now_ns);
+        let (Some(force), Brakes::Open) = (force, simulator.brakes()) else { return };
+        self.cycles += 1;
+        let state = simulator.state();
+        let still = Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() };
+        let legs = leg_motion(&self.machine, &still);
+        self.last_leg_rate = legs.rate.iter().fold(0.0, |fastest, rate| fastest.max(rate.abs()));
+        let [angular, linear] = [&self.parameters.limits.orientation, &self.parameters.limits.position]
+            .map(|limits| held_velocity(&self.parameters, limits));
+        let held = linear + angular * self.machine.joints.radius;
+        let leg_rate = (self.last_leg_rate - held) / self.machine.actuator.max_rate;
+        self.extremes.add(Quantity::LegRate, leg_rate, now_ns);
+        self.extremes.add(Quantity::Stroke, self.margin_used(&legs.length), now_ns);
+        let condition = KinematicState::new(&self.machine, state.pose).sensitivity().condition;
+        self.extremes.add(Quantity::Condition, condition / self.parameters.condition, now_ns);
+        if self.parameters.envelope.is_some() {
+            self.extremes.add(Quantity::Envelope, self.envelope_excess(&state.pose), now_ns);
+        }
+        if let Some(expected) = self.expected {
+            self.check_distance(&expected.pose, &state.pose, now_ns);
+        }
+        if self.parameters.period_ns > LONGEST_EVEN_HOLD_NS {
+            self.at_force(simulator, Some(force), now_ns);
+        } else {
+            self.check_velocity(simulator, now_ns);
+        }
+    }
+
+    /// The true velocity, and the acceleration under a force.
+    pub fn at_force(&mut self, simulator: &Simulator, force: Option<&[f64; LEGS]>, now_ns: u64) {
+        self.check_end_stop(simulator, now_ns);
+        let (Some(force), None) = (force, self.impact_m_s) else { return };
+        self.check_velocity(simulator, now_ns);
+        let state = simulator.state();
+        let limits = &self.parameters.limits;
+        let (angular, linear) = (&limits.orientation, &limits.position);
+        let not_a_number = Acceleration { angular: [f64::NAN; 3].into(), linear: [f64::NAN; 3].into() };
+        let acceleration =
+            self.dynamics.acceleration(&state.pose, &state.twist, force).unwrap_or(not_a_number);
+        let share = 1.0 + self.parameters.feedback_scale;
+        let (alpha, a) = (acceleration.angular.norm(), acceleration.linear.norm());
+        self.hardest_m_s2 = self.hardest_m_s2.max(a);
+        self.extremes.add(Quantity::Acceleration, a / (share * linear.acceleration), now_ns);
+        self.extremes.add(Quantity::AngularAcceleration, alpha / (share * angular.acceleration), now_ns);
+    }
+
+    fn check_velocity(&mut self, simulator: &Simulator, now_ns: u64) {
+        let (limits, twist) = (&self.parameters.limits, &simulator.state().twist);
+        let (omega, v) = (twist.angular.norm(), twist.linear.norm());
+        self.fastest_m_s = self.fastest_m_s.max(v);
+        let ratio = |velocity: f64, limits: &DerivativeLimits| {
+            (velocity - held_velocity(&self.parameters, limits)) / limits.velocity
+        };
+        self.extremes.add(Quantity::Velocity, ratio(v, &limits.position), now_ns);
+        self.extremes.add(Quantity::AngularVelocity, ratio(omega, &limits.orientation), now_ns);
+    }
+
+    /// The reference for the next release, in the state of the cycle that gave it.
+    pub fn expect(&mut self, reference: Option<Motion>, state: State, next_release_ns: u64) {
+        let next = reference.filter(|_| state.has_control());
+        let before = core::mem::replace(&mut self.expected, next);
+        self.state = state;
+        let Some(next) = next else { return };
+        self.check_reference(&next, before.as_ref(), next_release_ns);
+    }
+
+    fn check_reference(&mut self, next: &Motion, before: Option<&Motion>, at_ns: u64) {
+        let limits = &self.parameters.limits;
+        let larger = |angular: f64, linear: f64| angular.max(linear);
+        let velocity = larger(
+            next.twist.angular.norm() / limits.orientation.velocity,
+            next.twist.linear.norm() / limits.position.velocity,
+        );
+        let acceleration = larger(
+            next.acceleration.angular.norm() / limits.orientation.acceleration,
+            next.acceleration.linear.norm() / limits.position.acceleration,
+        );
+        self.extremes.add(Quantity::ReferenceVelocity, velocity, at_ns);
+        self.extremes.add(Quantity::ReferenceAcceleration, acceleration, at_ns);
+        if let Some(before) = before {
+            let period_s = self.parameters.period_ns as f64 * 1e-9;
+            let jerk = larger(
+                (next.acceleration.angular - before.acceleration.angular).norm() / limits.orientation.jerk,
+                (next.acceleration.linear - before.acceleration.linear).norm() / limits.position.jerk,
+            );
+            self.extremes.add(Quantity::ReferenceJerk, jerk / period_s, at_ns);
+        }
+        let used = self.margin_used(&leg_motion(&self.machine, next).length);
+        self.extremes.add(Quantity::ReferenceStroke, used, at_ns);
+    }
+
+    fn check_distance(&mut self, expected: &Pose, actual: &Pose, now_ns: u64) {
+        let quantity = if self.state == State::Engaging { Quantity::Engaging } else { Quantity::Following };
+        let position = (actual.position - expected.position).norm() / self.parameters.following_position;
+        let orientation =
+            angle_between(&actual.rotation, &expected.rotation) / self.parameters.following_orientation;
+        self.extremes.add(quantity, position.max(orientation), now_ns);
+    }
+
+    fn check_end_stop(&mut self, simulator: &Simulator, now_ns: u64) {
+        if self.impact_m_s.is_none() && matches!(simulator.brakes(), Brakes::EndStop { .. }) {
+            self.impact_m_s = Some(self.last_leg_rate);
+            self.extremes.add(Quantity::Stroke, 1.0 + 1e-3 + self.last_leg_rate, now_ns);
+        }
+    }
+
+    /// Largest distance beyond the envelope over what is allowed; negative inside.
+    fn envelope_excess(&self, pose: &Pose) -> f64 {
+        let Parameters { envelope, limits, law, .. } = &self.parameters;
+        let Some(envelope) = envelope else { return f64::NEG_INFINITY };
+        // A difference of velocity goes on for the time constant of the loop.
+        let held = |limits: &DerivativeLimits, gains: &Gains| {
+            held_velocity(&self.parameters, limits) / gains.stiffness.sqrt()
+        };
+        let angle = ENVELOPE_ALLOWANCE_RAD + held(&limits.orientation, &law.orientation);
+        let distance = ENVELOPE_ALLOWANCE_M + held(&limits.position, &law.position);
+        let x = task_coordinates(pose, &self.machine.home);
+        let ranges = envelope.lowest.iter().zip(&envelope.highest);
+        let excess = x.iter().zip(ranges).enumerate().map(|(axis, (x, (low, high)))| {
+            let allowed = if axis < 3 { angle } else { distance };
+            (low - x).max(x - high) / allowed
+        });
+        excess.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// 0 at the margin that the reference keeps, 1 at the end of the stroke.
+    fn margin_used(&self, lengths: &[f64; LEGS]) -> f64 {
+        let margins = lengths.map(|length| self.machine.actuator.margin(length));
+        let least = margins.into_iter().fold(f64::INFINITY, f64::min);
+        let kept = self.parameters.stroke_margin.max(SMALLEST_MARGIN_M);
+        (self.parameters.stroke_margin - least) / kept
+    }
+}
+
+/// By how much the velocity may differ from the reference's because a force is held for a period.
+fn held_velocity(parameters: &Parameters, limits: &DerivativeLimits) -> f64 {
+    let period_s = parameters.period_ns as f64 * 1e-9;
+    HELD_FORCE_RATIO * limits.jerk * period_s * period_s
+}

@@ -1,0 +1,53 @@
+//! Setpoints that arrive late, each stamped with its true instant and within the limits there.
+
+use super::common::deployed;
+use super::common::fast::Fast;
+use super::common::observed::Observed;
+use super::common::rig::parameters;
+use super::heave::{Heave, amplitude};
+use super::report::{Report, Runs};
+use hexad::config::Config;
+use hexad::control::controller::Setpoint;
+use hexad::model::task::TaskState;
+
+const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
+const AGES_NS: [u64; 3] = [20_000_000, 30_000_000, 45_000_000];
+/// Angular frequencies of the vertical sines \[rad/s\].
+const SINES_RAD_S: [f64; 4] = [5.0, 10.0, 25.0, 60.0];
+const DURATION_S: f64 = 5.0;
+
+fn follow_late(config: &Config, motion: &dyn Fn(f64) -> TaskState, age_ns: u64, runs: &mut Runs) {
+    let mut observed = Observed::standing(config, parameters(config), &motion(0.0));
+    observed.engage(&motion(0.0));
+    let start_s = observed.time_s();
+    while observed.time_s() < start_s + DURATION_S {
+        let task = motion(observed.time_s() - start_s - age_ns as f64 * 1e-9);
+        let setpoint = Setpoint::motion(observed.now_ns - age_ns, task);
+        let output = observed.cycle(&observed.input_with(Some(setpoint)));
+        if !output.state.has_control() {
+            break;
+        }
+    }
+    runs.add(&observed);
+}
+
+#[test]
+fn old_setpoints_within_the_limits_lead_to_no_motion_beyond_them() {
+    let mut report = Report::new("old setpoints");
+    for name in MACHINES {
+        let config = deployed(name);
+        let parameters = parameters(&config);
+        let (heave, fast) = (Heave::new(&config.machine, &parameters), Fast::new(&config));
+        let mut runs = Runs::default();
+        for age_ns in AGES_NS {
+            for omega in SINES_RAD_S {
+                let amplitude = amplitude(&parameters, &config.machine, &heave, omega);
+                let sine = |t| heave.sine(heave.middle(), amplitude, omega, t);
+                follow_late(&config, &sine, age_ns, &mut runs);
+            }
+            follow_late(&config, &|t| fast.at(t), age_ns, &mut runs);
+        }
+        report.add(name, &runs);
+    }
+    report.assert();
+}

@@ -1,0 +1,91 @@
+//! Collects what was measured in many runs, prints it, and fails if a limit was exceeded in any.
+
+use std::fmt::Write;
+
+use super::common::observed::Observed;
+use super::common::true_motion::{Extremes, Quantity};
+
+/// What one test has measured.
+pub struct Report {
+    name: &'static str,
+    lines: String,
+    violations: Vec<String>,
+}
+
+/// What the runs of one machine have measured.
+#[derive(Default)]
+pub struct Runs {
+    pub count: u32,
+    /// Runs in which the platform was taken under control as the test asks for.
+    pub accepted: u32,
+    pub end_stops: u32,
+    pub impact_m_s: f64,
+    pub fastest_m_s: f64,
+    pub hardest_m_s2: f64,
+    pub cycles: u64,
+    /// Largest distance from the setpoint \[m\], where it was measured.
+    pub distance_m: f64,
+    pub extremes: Extremes,
+}
+
+impl Runs {
+    pub fn add(&mut self, observed: &Observed) {
+        let meter = &observed.meter;
+        self.count += 1;
+        self.end_stops += u32::from(meter.impact_m_s.is_some());
+        self.impact_m_s = self.impact_m_s.max(meter.impact_m_s.unwrap_or_default());
+        self.fastest_m_s = self.fastest_m_s.max(meter.fastest_m_s);
+        self.hardest_m_s2 = self.hardest_m_s2.max(meter.hardest_m_s2);
+        self.cycles += meter.cycles;
+        self.extremes.merge(&meter.extremes);
+    }
+}
+
+impl Report {
+    pub fn new(name: &'static str) -> Self {
+        Self { name, lines: String::new(), violations: Vec::new() }
+    }
+
+    /// Judges the runs of one machine by every limit.
+    pub fn add(&mut self, machine: &str, runs: &Runs) {
+        self.add_with(machine, runs, Quantity::allowed);
+    }
+
+    /// Judges by other bounds: where a limit is a different one.
+    pub fn add_with(&mut self, machine: &str, runs: &Runs, allowed: impl Fn(Quantity) -> f64) {
+        let Runs { count, accepted, end_stops, impact_m_s, fastest_m_s, hardest_m_s2, .. } = runs;
+        let Runs { cycles, distance_m, extremes, .. } = runs;
+        assert!(*cycles > 0, "{}: {machine} was never under control", self.name);
+        writeln!(
+            self.lines,
+            "{}: {machine}: {count} runs, {accepted} accepted, {cycles} cycles, {end_stops} end stops (to {impact_m_s:.2} m/s), speed \
+             {fastest_m_s:.3} m/s, acceleration {hardest_m_s2:.2} m/s^2, from the setpoint {:.1} mm",
+            self.name,
+            1e3 * distance_m
+        )
+        .unwrap();
+        for quantity in Quantity::ALL {
+            let (value, allowed) = (extremes.of(quantity), allowed(quantity));
+            if value > allowed {
+                let at = extremes.instant_ns(quantity);
+                self.violations.push(format!(
+                    "{machine}: {} {value:.4} beyond {allowed:.4} at {:.4} s",
+                    quantity.name(),
+                    (at - super::common::observed::START_NS) as f64 * 1e-9
+                ));
+            }
+        }
+    }
+
+    /// A bound of this test alone.
+    pub fn bound(&mut self, machine: &str, what: &str, value: f64, bound: f64) {
+        if !(value <= bound) {
+            self.violations.push(format!("{machine}: {what} {value:.4} beyond {bound:.4}"));
+        }
+    }
+
+    pub fn assert(self) {
+        println!("{}", self.lines);
+        assert!(self.violations.is_empty(), "{}\n{}", self.lines, self.violations.join("\n"));
+    }
+}
