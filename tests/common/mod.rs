@@ -16,6 +16,7 @@ pub mod paper;
 pub mod rig;
 pub mod stability;
 pub mod stalls;
+pub mod true_motion;
 
 use std::path::{Path, PathBuf};
 
