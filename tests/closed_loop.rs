@@ -9,12 +9,16 @@ mod closed_loop {
 
     mod built_in;
     mod evidence;
+    mod feedback;
     mod fidelities;
     mod inputs;
     mod limits;
     mod modes;
     mod observer;
+    mod policies;
     mod poses;
     mod replay;
+    mod ride;
+    mod targets;
     mod tracking;
 }

@@ -3,15 +3,19 @@
 //! | state | force | ends with |
 //! | --- | --- | --- |
 //! | off | not valid: brake | the pose is known: standby; after the request `off`: `clear`, `engage` or `park` |
-//! | standby | not valid: brake | `engage`: engaging; `park`: parking; the pose is lost: off |
-//! | engaging | controlled, from where the platform stands onto the setpoint | on the setpoint: active; `stop`, `park`, a setpoint that ended or was lost: stopping |
-//! | active | controlled, on the setpoint | `stop`, `park`, a setpoint that ended or was lost: stopping |
-//! | stopping | controlled, to rest along the present motion | at rest: standby, parking or fault |
+//! | standby | not valid: brake | `engage`: engaging; `park`: stopping, then parking; the pose is lost: off |
+//! | engaging | controlled, from the measured motion onto the setpoint; without setpoints at rest, see below | on the setpoint: active; `stop`, `park`, a setpoint that ended, was lost or rejected: stopping |
+//! | active | controlled, on the setpoint | `stop`, `park`, a setpoint that ended, was lost or rejected: stopping; without setpoints, see below: engaging |
+//! | stopping | controlled, to rest along a verified stop | at rest: standby, parking or fault |
 //! | parking | controlled, to the home pose | at home: off; `stop`, a fault that stops: stopping |
 //! | fault | not valid: brake | `clear`: off, and on to standby |
 //!
 //! In every state `off` leads to off and `estop` to fault, within the cycle; only `clear` ends a fault. There is no
 //! gravity support without control: a driver brakes when it receives no valid force.
+//!
+//! The platform may still move when control begins, by `engage` or `park`. Both are refused if no stop within every limit
+//! exists for its motion. Under `[setpoint] on_violation = "limit"` a platform without setpoints comes to rest and holds its
+//! pose in the state engaging, which is no fault; when setpoints arrive again, it moves onto them.
 
 /// State of the controller, which decides whether forces are valid and which reference the platform follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -22,11 +26,11 @@ pub enum State {
     Off = 0,
     /// No force; ready to engage.
     Standby = 1,
-    /// Moves from where the platform stands onto the setpoint.
+    /// Moves from the measured motion onto the setpoint, or holds its pose until setpoints arrive.
     Engaging = 2,
     /// Follows the setpoint.
     Active = 3,
-    /// Decelerates to rest along the present motion.
+    /// Decelerates to rest along a verified stop.
     Stopping = 4,
     /// Moves to the home pose.
     Parking = 5,

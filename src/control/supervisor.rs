@@ -2,6 +2,9 @@
 //!
 //! Order of precedence: the emergency stop, a fault that brakes, `off`, a fault that stops, then what the
 //! state itself does. In states without force a fault is only reported: no force is to be disabled.
+//!
+//! Control begins in engaging, or by `park` in stopping: a platform that moves without force comes to rest before it goes
+//! home. A setpoint that is lost while the policy is to hold the pose leads to engaging and not to a stop.
 
 use super::controller::Input;
 use super::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
@@ -35,7 +38,7 @@ pub struct SupervisorState {
 pub struct Findings {
     /// Whether the pose is known, from valid measurements.
     pub localization: Result<(), Diagnostic>,
-    /// Whether a stop is known for the platform as it moves without force.
+    /// Whether a verified stop exists for the platform as it moves without force. `engagement` contains it.
     pub start: Result<(), Diagnostic>,
     /// Whether control may begin on the setpoint.
     pub engagement: Result<(), Diagnostic>,

@@ -14,10 +14,10 @@ use nalgebra::Vector6;
 use super::common::rig::{Rig, in_motion};
 use super::common::{deployed, largest};
 
-/// Without a bound on what a setpoint may ask for.
+/// With bounds beyond all that a setpoint or feedback asks for here.
 fn unbounded(name: &str) -> Config {
     let mut config = deployed(name);
-    let axis = DerivativeLimits { velocity: 1e9, acceleration: 1e9, jerk: 1e12 };
+    let axis = DerivativeLimits { velocity: 10.0, acceleration: 1e3, jerk: 1e6 };
     let limits = &mut config.deployment.limits;
     limits.reference = Limits { position: axis, orientation: axis, ..limits.reference };
     limits.force_rate_n_s = 1e12;

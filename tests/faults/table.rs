@@ -9,8 +9,9 @@ use std::sync::LazyLock;
 use hexad::control::diagnostic::DiagnosticCode::{
     self, DeadlineMissed, EmergencyStop, FollowingError, LengthOutOfStroke, MeasurementJumped,
     MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest, RateInconsistent,
-    RateJumped, ReadyToEngage, SetpointEnded, SetpointJumped, SetpointLost, SetpointNotFinite,
-    SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFar, SetpointTooFast,
+    RateJumped, ReadyToEngage, SetpointBeyondLimits, SetpointEnded, SetpointJumped, SetpointLost,
+    SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFar,
+    SetpointTooFast,
 };
 use hexad::control::law::ControlMode;
 use hexad::control::state::State;
@@ -79,9 +80,10 @@ pub struct Bounds {
     rest_s: f64,
 }
 
-/// The limits of the deployment. At the speed of the scene brakes need 50 ms, a stop 140 ms; before it, up to
-/// 50 ms pass until a peer counts as lost.
-const GENTLE: Bounds = Bounds { acceleration: 1.0, jerk: 1.0, rest_s: 0.2 };
+/// The limits of the deployment, which the reference keeps exactly; the platform is driven by forces that are held for a
+/// period. At the speed of the scene brakes need 50 ms, a stop 140 ms; before it, up to 50 ms pass until a peer counts as
+/// lost.
+const GENTLE: Bounds = Bounds { acceleration: 1.015, jerk: 1.025, rest_s: 0.2 };
 /// For those that begin a motion which ends later.
 const LONG: Bounds = Bounds { rest_s: 1.6, ..GENTLE };
 /// A thirtieth of a second without news: what the setpoint did meanwhile comes at once.
@@ -125,8 +127,8 @@ const PARKS: Cell = Path(&[
 ]);
 const OUT_OF_REACH: [(State, DiagnosticCode); 3] = [
     (State::Active, DiagnosticCode::None),
-    (State::Stopping, SetpointOutOfReach),
-    (State::Fault, SetpointOutOfReach),
+    (State::Stopping, SetpointBeyondLimits),
+    (State::Fault, SetpointBeyondLimits),
 ];
 const LATE_STOP: Cell = Path(&OUT_OF_REACH);
 
@@ -205,7 +207,7 @@ const ROWS: &[Row] = &[
     // Setpoints.
     ("setpoints end", setpoints::end, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Stop(SetpointLost), On, On, On]),
     ("setpoints pause for 30 ms", setpoints::pause_30_ms, Bounds { rest_s: 1.6, ..GAP }, EVERYWHERE),
-    ("setpoints repeated with fresh stamps", setpoints::freeze, GENTLE, wrong_in_motion(SetpointJumped)),
+    ("setpoints repeated with fresh stamps", setpoints::freeze, GENTLE, wrong_in_motion(SetpointBeyondLimits)),
     ("X NaN", setpoints::nan_x, GENTLE, unusable_setpoint(SetpointNotFinite)),
     ("X NaN, once", setpoints::nan_x_once, LONG, EVERYWHERE),
     ("X'' infinite", setpoints::infinite_xdd, GENTLE, unusable_setpoint(SetpointNotFinite)),
@@ -216,12 +218,12 @@ const ROWS: &[Row] = &[
     ("X' in mm/s", setpoints::rates_in_mm, GENTLE, wrong_in_motion(SetpointTooFast)),
     ("X' of the wrong sign", setpoints::rates_of_wrong_sign, GENTLE, wrong_in_motion(SetpointJumped)),
     ("X' of another motion", setpoints::rate_while_standing, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), Stop(SetpointJumped), On, On, On]),
-    ("X'' zero", setpoints::without_accelerations, GENTLE, wrong_in_motion(SetpointTooFast)),
-    ("X'' of another motion", setpoints::acceleration_while_standing, GENTLE, [On, Stop(SetpointTooFast), Stop(SetpointTooFast), Stop(SetpointTooFast), On, On, On]),
+    ("X'' zero", setpoints::without_accelerations, LONG, EVERYWHERE),
+    ("X'' of another motion", setpoints::acceleration_while_standing, LONG, EVERYWHERE),
     ("too fast", setpoints::too_fast, GENTLE, unusable_setpoint(SetpointTooFast)),
     ("too strong an acceleration", setpoints::too_strong, GENTLE, unusable_setpoint(SetpointTooFast)),
     ("a step of acceleration", setpoints::step_of_acceleration, GENTLE, [Idle(State::Standby, SetpointTooFast), Stop(SetpointTooFast), Stop(SetpointTooFast), Stop(SetpointTooFast), On, On, On]),
-    ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [Idle(State::Standby, SetpointOutOfReach), LATE_STOP, Stop(SetpointOutOfReach), Stop(SetpointOutOfReach), On, On, On]),
+    ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [Idle(State::Standby, SetpointOutOfReach), LATE_STOP, Stop(SetpointBeyondLimits), Stop(SetpointBeyondLimits), On, On, On]),
     ("beyond the stroke", setpoints::beyond_stroke, GENTLE, unusable_setpoint(SetpointOutOfReach)),
     ("out of the envelope", setpoints::out_of_envelope, GENTLE, unusable_setpoint(SetpointOutOfEnvelope)),
     ("setpoints stamped 1 s ago", setpoints::stamps_1_s_old, GENTLE, unusable_setpoint(SetpointStampInvalid)),

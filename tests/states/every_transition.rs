@@ -25,8 +25,18 @@ fn requests() -> Vec<Option<Request>> {
     [None].into_iter().chain(Request::ALL.map(Some)).collect()
 }
 
-/// Calls `check` with all of them; returns how many there were. Whether control may begin is of no interest
-/// where it has begun, or after a fault: two verdicts show that.
+/// Verdicts on the start of control and on the setpoint to start on. Each decides alone: all of the one where the other is
+/// good, and a pair that is not. Neither is of interest where control has begun, or after a fault: two of each show that.
+fn starts(is_idle: bool) -> Vec<[Result<(), Diagnostic>; 2]> {
+    let [starts, engagements] = [4.0, 5.0].map(verdicts);
+    let pairs = starts.iter().enumerate().flat_map(|(i, start)| {
+        engagements.iter().enumerate().map(move |(j, engagement)| ((i, j), [*start, *engagement]))
+    });
+    let is_wanted = |(i, j): (usize, usize)| i < 2 && j < 2 || is_idle && i.min(j) == 0;
+    pairs.filter(|(at, _)| is_wanted(*at)).map(|(_, pair)| pair).collect()
+}
+
+/// Calls `check` with all of them; returns how many there were.
 fn every(
     check: impl Fn(SupervisorState, Option<Request>, &Findings, AfterStop, (SupervisorState, Option<Diagnostic>))
     + Sync,
@@ -42,18 +52,20 @@ fn every(
             })
         })
         .collect();
-    let [localizations, trackings, engagements] = [2.0, 3.0, 4.0].map(verdicts);
+    let [localizations, trackings] = [2.0, 3.0].map(verdicts);
+    let (idle_starts, other_starts) = (starts(true), starts(false));
     let requests = requests();
     let of_mode = |mode: &SupervisorState| {
         let idle = matches!(mode.state, State::Off | State::Standby);
-        let engagements = if idle { &engagements[..] } else { &engagements[..2] };
+        let starts = if idle { &idle_starts } else { &other_starts };
         let mut count = 0;
         for localization in &localizations {
             for tracking in &trackings {
-                for engagement in engagements {
+                for [start, engagement] in starts {
                     for has_ended in [false, true] {
                         let found = Findings {
                             localization: *localization,
+                            start: *start,
                             engagement: *engagement,
                             tracking: *tracking,
                             has_ended,
@@ -82,7 +94,8 @@ fn every_transition_is_the_documented_one() {
     });
     let causes = DiagnosticCode::ALL.len() as u64;
     let (modes, rest) = (3 * causes, 7 * (causes + 1).pow(2) * 2 * 3);
-    assert_eq!(count, modes * rest * (2 * (causes + 1) + 5 * 2));
+    let idle = 2 * (causes + 1);
+    assert_eq!(count, modes * rest * (2 * idle + 5 * 4));
 }
 
 /// What must hold whatever the table says.
@@ -97,20 +110,26 @@ fn no_transition_takes_force_without_being_asked() {
         assert!(!has || found.localization.is_ok(), "{}", what());
         assert!(mode.state != State::Fault || !has, "{}", what());
         assert!(then.state != State::Engaging || had || found.engagement.is_ok(), "{}", what());
+        // Park begins with a stop, which must exist; no other state follows one without force.
+        let begins_stop = !had && then.state == State::Stopping;
+        let parks = is(Request::Park) && found.start.is_ok() && then.after == AfterStop::Park;
+        assert!(!begins_stop || parks, "{}", what());
+        assert!(had || !matches!(then.state, State::Active | State::Parking), "{}", what());
         // A fault is left only by clear, and clear leads to no force.
         assert!(mode.state != State::Fault || then.state == State::Fault || is(Request::Clear), "{}", what());
         assert!(!is(Request::Clear) || had || !has, "{}", what());
-        // Active is reached only on the setpoint, and followed only while it can be.
+        // Active is reached only on the setpoint, and followed only while it can be. Without setpoints it can hold.
         assert!(
             then.state != State::Active || matches!(mode.state, State::Engaging | State::Active),
             "{}",
             what()
         );
-        assert!(
-            !matches!(then.state, State::Engaging | State::Active) || !had || found.tracking.is_ok(),
-            "{}",
-            what()
-        );
+        let holds = found.tracking.is_err_and(|diagnostic| diagnostic.code == DiagnosticCode::HoldingPose);
+        let may_follow = found.tracking.is_ok() || holds && then.state == State::Engaging;
+        assert!(!matches!(then.state, State::Engaging | State::Active) || !had || may_follow, "{}", what());
+        // What is followed has no cause left from before.
+        let follows = matches!(then.state, State::Engaging | State::Active);
+        assert!(!follows || holds || then.diagnostic.code == DiagnosticCode::None, "{}", what());
         // What brakes, brakes now; off and estop let go now.
         let brakes = found.tracking.is_err_and(|diagnostic| diagnostic.code.reaction() == Reaction::Brake);
         assert!(!(had && brakes && has), "{}", what());

@@ -53,6 +53,14 @@ pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, af
     // Nobody has switched it off: it shows what there is.
     let rest = if idle && now == off { now } else { shown(found) };
     let could_engage = found.localization.and(found.engagement);
+    let could_start = found.localization.and(found.start);
+    // Without setpoints it holds its pose, if the policy lets it, and is engaging until there are some again.
+    let holds = trouble.filter(|found| found.code == DiagnosticCode::HoldingPose);
+    let goes_on = match holds {
+        Some(cause) => mode(S::Engaging, cause, now.after),
+        None => mode(now.state, DiagnosticCode::None, now.after),
+    };
+    let ends = trouble.filter(|_| follows && holds.is_none());
 
     let table: &[(bool, &dyn Fn() -> Next)] = &[
         (is(Estop), &|| (plain(S::Fault, DiagnosticCode::EmergencyStop), None)),
@@ -66,23 +74,24 @@ pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, af
         // Without force.
         (idle && is(Engage) && could_engage.is_ok(), &|| (plain(S::Engaging, DiagnosticCode::None), None)),
         (idle && is(Engage), &|| (rest, could_engage.err())),
-        (idle && is(Park) && lost.is_none(), &|| (plain(S::Parking, DiagnosticCode::OperatorRequest), None)),
-        (idle && is(Park), &|| (rest, lost)),
+        // It may move without force: first it comes to rest.
+        (idle && is(Park) && could_start.is_ok(), &|| to_stop(requested, AfterStop::Park)),
+        (idle && is(Park), &|| (rest, could_start.err())),
         (idle && is(Clear), &|| (shown(found), None)),
         (idle, &|| (rest, None)),
         // What cannot be followed any more ends in a stop, whatever is asked.
-        (follows && trouble.is_some_and(|found| found.code == DiagnosticCode::SetpointLost), &|| {
-            to_stop(trouble.unwrap(), after_loss)
+        (ends.is_some_and(|found| found.code == DiagnosticCode::SetpointLost), &|| {
+            to_stop(ends.unwrap(), after_loss)
         }),
-        (follows && trouble.is_some_and(|found| found.code.is_fault()), &|| {
-            to_stop(trouble.unwrap(), AfterStop::Fault)
-        }),
-        (follows && trouble.is_some(), &|| to_stop(trouble.unwrap(), AfterStop::Standby)),
+        (ends.is_some_and(|found| found.code.is_fault()), &|| to_stop(ends.unwrap(), AfterStop::Fault)),
+        (ends.is_some(), &|| to_stop(ends.unwrap(), AfterStop::Standby)),
         (follows && is(Stop), &|| to_stop(requested, AfterStop::Standby)),
         (follows && is(Park), &|| to_stop(requested, AfterStop::Park)),
-        (follows && is(Clear), &|| refuse(DiagnosticCode::InvalidInState)),
-        (follows && found.has_ended, &|| (mode(S::Active, now.diagnostic, now.after), None)),
-        (follows, &|| (now, None)),
+        (follows && is(Clear), &|| (goes_on, Some(DiagnosticCode::InvalidInState.into()))),
+        (follows && found.has_ended && holds.is_none(), &|| {
+            (SupervisorState { state: S::Active, ..goes_on }, None)
+        }),
+        (follows, &|| (goes_on, None)),
         // On the way home.
         (now.state == S::Parking && trouble.is_some(), &|| to_stop(trouble.unwrap(), AfterStop::Fault)),
         (now.state == S::Parking && is(Stop), &|| to_stop(requested, AfterStop::Standby)),

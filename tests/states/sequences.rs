@@ -188,7 +188,8 @@ impl Watched {
         if has && !had {
             assert!(self.cleared);
             assert!(matches!(request, Some(Request::Engage | Request::Park)), "{request:?}: {now:?}");
-            assert!(matches!(now.state, State::Engaging | State::Parking));
+            // Parking begins with a stop.
+            assert!(matches!(now.state, State::Engaging | State::Stopping));
         }
         if now.state == State::Active {
             assert!(matches!(before.state, State::Engaging | State::Active));
