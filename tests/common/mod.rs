@@ -11,6 +11,7 @@
 )]
 
 pub mod edited;
+pub mod extremes;
 pub mod fast;
 pub mod not_run;
 pub mod observed;
