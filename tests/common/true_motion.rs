@@ -17,7 +17,7 @@ use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::simulator::{Brakes, Simulator};
 
 use super::angle_between;
-pub use super::extremes::{Extremes, MOTION_ALLOWANCE, Quantity};
+use super::extremes::{Extremes, Quantity};
 
 /// A force is held for a period while the reference's acceleration changes with the jerk J: the velocity differs from the
 /// reference's by up to this times J h^2, whatever the control law. 0.1 mm/s at 1 kHz, 12 mm/s at 100 Hz, by default.
@@ -41,7 +41,7 @@ pub fn reference(_output: &Output) -> Option<Motion> {
 #[derive(Clone, Debug)]
 pub struct Meter {
     pub extremes: Extremes,
-    /// Largest true acceleration, velocity, distance beyond the envelope: SI units, of C.
+    /// Largest true velocity and acceleration of C while under control.
     pub fastest_m_s: f64,
     pub hardest_m_s2: f64,
     /// Periods under control.
