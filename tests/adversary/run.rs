@@ -9,8 +9,8 @@ use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{Profile, rise};
 use nalgebra::Vector6;
 
+use super::common::extremes::{Extremes, Quantity};
 use super::common::observed::{Observed, START_NS};
-use super::common::true_motion::{Extremes, Quantity};
 use super::genome::Genome;
 use super::messages::Channel;
 use super::scenario::Scenario;

@@ -15,9 +15,9 @@ use hexad::motion::minimum_jerk::{rise, straight_move};
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector6;
 
+use super::common::extremes::{Extremes, Quantity};
 use super::common::observed::{Observed, STEP_S};
 use super::common::rig::parameters;
-use super::common::true_motion::{Extremes, Quantity};
 use super::common::{deployed, machine};
 use super::machines::MACHINES;
 use super::run::Faults;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use hexad::control::parameters::ViolationPolicy;
 use hexad::plant::random::Random;
 
-use super::common::true_motion::Quantity;
+use super::common::extremes::Quantity;
 use super::genome::Genome;
 use super::machines::MACHINES;
 use super::run::{Doctor, Outcome, run};

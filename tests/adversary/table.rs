@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::common::true_motion::{Extremes, Quantity};
+use super::common::extremes::{Extremes, Quantity};
 use super::machines::MACHINES;
 
 /// Largest values of a machine, and how much was tried.

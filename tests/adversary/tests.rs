@@ -8,7 +8,7 @@ use std::{env, fs};
 use hexad::control::parameters::ViolationPolicy;
 use hexad::plant::random::Random;
 
-use super::common::true_motion::Extremes;
+use super::common::extremes::Extremes;
 use super::genome::Genome;
 use super::machines::MACHINES;
 use super::run::{run, run_with};

@@ -3,8 +3,9 @@
 use hexad::control::controller::{Input, Output};
 use hexad::control::diagnostic::DiagnosticCode;
 
+use super::common::extremes::{Extremes, Quantity};
 use super::common::observed::Observed;
-use super::common::true_motion::{Extremes, Quantity, reference};
+use super::common::true_motion::reference;
 
 /// Largest values below this are not printed.
 const WORTH_PRINTING: f64 = 0.9;

@@ -11,6 +11,7 @@
 )]
 
 pub mod edited;
+pub mod extremes;
 pub mod fast;
 pub mod limit_check;
 pub mod not_run;

@@ -2,9 +2,9 @@
 //! harder than it may.
 
 use super::common::deployed;
+use super::common::extremes::{MOTION_ALLOWANCE, Quantity};
 use super::common::observed::Observed;
 use super::common::rig::parameters;
-use super::common::true_motion::{MOTION_ALLOWANCE, Quantity};
 use super::heave::{FADE_S, Heave, amplitude};
 use super::report::{Report, Runs};
 use hexad::control::controller::Measurement;

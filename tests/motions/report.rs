@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use super::common::extremes::{Extremes, Quantity};
 use super::common::observed::Observed;
-use super::common::true_motion::{Extremes, Quantity};
 
 /// What one test has measured.
 pub struct Report {
