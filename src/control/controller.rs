@@ -212,7 +212,7 @@ impl Controller {
             let ErrorSample { error, deviation, .. } = sample.as_ref().ok_or(DiagnosticCode::SetpointLost)?;
             // The force is held for one period from about the release on.
             let middle_of_hold_ns = cycle.release_ns.saturating_add(parameters.period_ns / 2);
-            let desired = reference.motion_at(middle_of_hold_ns);
+            let desired = reference.motion_of_hold(middle_of_hold_ns);
             let wanted = observer.update(&parameters.law, deviation, parameters.period_s(), continuity);
             let acceleration = feedback.limit(&cycle, &desired.acceleration, &wanted);
             let motion = parameters.law.dynamics_motion(desired, error, &acceleration);

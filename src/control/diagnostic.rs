@@ -198,8 +198,8 @@ codes! {
     SetpointBeyondLimits = 124, Stop, ratio("the distance of the reference from the setpoint", "the tolerance control.engage_*"), "setpoint beyond the limits of a motion that can be stopped", "correct the trajectory, or [limits], or set [setpoint] on_violation to limit";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
-    /// Feedback was limited by `limits.feedback_scale` for too long.
-    FeedbackSaturated = 123, Stop, absolute("time of saturation", "s", "exceeds", "the longest allowed,"), "feedback saturated", "check for a collision, a payload, a drive without force; limits.feedback_scale";
+    /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.
+    FeedbackSaturated = 123, Brake, absolute("time of saturation", "s", "exceeds", "the longest allowed,"), "feedback saturated", "check for a collision, a payload, a drive without force; limits.feedback_scale";
 }
 
 impl DiagnosticCode {

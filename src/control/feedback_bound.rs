@@ -21,16 +21,21 @@ use nalgebra::ComplexField as _;
 /// Longest saturation of feedback \[s\]: a brief impact, or a step at the start of control.
 const MAX_SATURATION_S: f64 = 0.1;
 
-/// Bound of the feedback, and how long it has been reached.
+/// Speed at which the time of saturation is forgotten, over that at which it counts: feedback that oscillates between its
+/// bounds is saturated a third of the time at least.
+const FORGETTING_RATIO: f64 = 0.25;
+
+/// Bound of the feedback, and for how long it was reached lately.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct FeedbackBound {
     saturated_s: f64,
+    is_saturated: bool,
 }
 
 impl FeedbackBound {
     /// Whether the last cycle limited the feedback.
     pub fn is_saturated(&self) -> bool {
-        self.saturated_s > 0.0
+        self.is_saturated
     }
 
     /// Whether saturation has not lasted too long.
@@ -53,8 +58,9 @@ impl FeedbackBound {
             true => limit_legs(cycle, wanted),
             false => limit_pose(parameters, desired, wanted),
         };
-        let is_saturated = limited != *wanted;
-        self.saturated_s = if is_saturated { self.saturated_s + parameters.period_s() } else { 0.0 };
+        self.is_saturated = limited != *wanted;
+        let rate = if self.is_saturated { 1.0 } else { -FORGETTING_RATIO };
+        self.saturated_s = (self.saturated_s + rate * parameters.period_s()).max(0.0);
         limited
     }
 }

@@ -83,6 +83,9 @@ pub struct Envelope {
     pub highest: [f64; 6],
 }
 
+/// Part of the way from the condition at home to its limit that the reference uses.
+const CONDITION_SHARE: f64 = 0.95;
+
 /// Machine model, parameters and home pose: constant while the controller runs.
 #[derive(Clone, Debug)]
 pub struct Constants {
@@ -94,6 +97,8 @@ pub struct Constants {
     pub home: KinematicState,
     /// Largest distance of a joint on the platform from C \[m\].
     pub arm: f64,
+    /// Largest condition of the reference: below that of the platform, for the following error.
+    pub reference_condition: f64,
 }
 
 impl Constants {
@@ -102,7 +107,9 @@ impl Constants {
         let home = KinematicState::new(machine, machine.home_pose());
         let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
-        Self { dynamics: InverseDynamics::new(machine), parameters, home, arm }
+        let at_home = home.sensitivity().condition;
+        let reference_condition = at_home + CONDITION_SHARE * (parameters.condition - at_home);
+        Self { dynamics: InverseDynamics::new(machine), parameters, home, arm, reference_condition }
     }
 
     /// The machine.

@@ -21,6 +21,9 @@ use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
 use crate::control::limits::DerivativeLimits;
+use crate::control::parameters::Constants;
+use crate::model::inverse_geometry::leg_lengths_and_rates;
+use crate::model::rigid::{Pose, Twist};
 
 /// Share of the acceleration limit that the outer curve brakes with; the rest is for corrections.
 const BRAKING_SHARE: f64 = 0.95;
@@ -144,6 +147,35 @@ impl Approach {
         let (change, is_jerk_limited) = limited(&(aim - present), self.limits.jerk * self.step_s);
         (present + change, [is_acceleration_limited, is_jerk_limited])
     }
+}
+
+/// Part of a leg's largest rate that is wanted: the velocity ends there without exceeding the limit.
+const LEG_RATE_SHARE: f64 = 0.97;
+
+/// Reduces the wanted velocities of rotation and translation by one factor, so that no leg moves too fast. True if so.
+pub(super) fn limit_leg_rates(
+    constants: &Constants,
+    pose: &Pose,
+    turn: &mut WantedVelocity,
+    shift: &mut WantedVelocity,
+) -> bool {
+    let machine = constants.machine();
+    let limit = LEG_RATE_SHARE * machine.actuator.max_rate;
+    if shift.velocity.norm() + constants.arm * turn.velocity.norm() <= limit {
+        return false;
+    }
+    let twist = Twist { angular: turn.velocity, linear: shift.velocity };
+    let (_, rates) = leg_lengths_and_rates(machine, pose, &twist);
+    let fastest = rates.iter().fold(0.0_f64, |fastest, rate| fastest.max(rate.abs()));
+    if fastest <= limit {
+        return false;
+    }
+    let factor = limit / fastest;
+    for wanted in [turn, shift] {
+        wanted.velocity *= factor;
+        wanted.derivative *= factor;
+    }
+    true
 }
 
 /// A vector shortened to at most `limit`, and whether it was longer.

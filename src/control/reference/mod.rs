@@ -22,7 +22,7 @@
 
 use nalgebra::{Vector3, Vector6};
 
-use self::approach::{Approach, TargetOffset};
+use self::approach::{Approach, TargetOffset, limit_leg_rates};
 use self::history::History;
 use self::pose_bounds::PoseBounds;
 use self::regularity::RegularBalls;
@@ -79,6 +79,8 @@ pub struct ReferenceGenerator {
     /// At `time_ns`, the end of the last cycle's period.
     motion: Motion,
     time_ns: u64,
+    /// Over the last cycle.
+    mean_acceleration: Acceleration,
     stop: HeldStop,
     followed: FollowedStop,
     bounds: PoseBounds,
@@ -96,6 +98,7 @@ impl ReferenceGenerator {
         Self {
             motion: at_rest(constants.home.pose()),
             time_ns: 0,
+            mean_acceleration: Acceleration::default(),
             stop: HeldStop::AtRest,
             followed: FollowedStop::default(),
             bounds: PoseBounds::nominal(constants),
@@ -147,6 +150,12 @@ impl ReferenceGenerator {
         self.history.motion_at(instant_ns).unwrap_or_else(start)
     }
 
+    /// What a force that is held for the last cycle's period shall move: pose and twist at an instant in its middle, and the
+    /// mean acceleration, which leads to the velocity at its end.
+    pub fn motion_of_hold(&self, middle_ns: u64) -> Motion {
+        Motion { acceleration: self.mean_acceleration, ..self.motion_at(middle_ns) }
+    }
+
     /// Whether the reference has come to rest along its stop.
     pub fn is_at_rest(&self) -> bool {
         match &self.stop {
@@ -185,10 +194,13 @@ impl ReferenceGenerator {
         // Rounded up, but for the rounding of a period.
         let steps = (steps - 1e-6) as u32 + 1;
         let step_ns = (to_ns - self.time_ns) / u64::from(steps);
+        let begin = self.motion.twist.vector();
         for k in 1..=steps {
             let end_ns = if k == steps { to_ns } else { self.time_ns + step_ns };
             self.step(constants, end_ns, target);
         }
+        let change = self.motion.twist.vector() - begin;
+        self.mean_acceleration = Acceleration::from_vector(&(change / duration_s));
         self.bounds.tighten(constants, &self.motion.pose);
     }
 
@@ -246,6 +258,9 @@ impl ReferenceGenerator {
         };
         let mut turn = turning.wanted(&orientation, &led.angular);
         let mut shift = shifting.wanted(&position, &led.linear);
+        if limit_leg_rates(constants, pose, &mut turn, &mut shift) {
+            self.active_limits = self.active_limits.with(Limit::LegRate, true);
+        }
         if constants.parameters.on_violation == ViolationPolicy::Limit {
             let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
             let restricting = walls.restrict(&mut turn, &mut shift);

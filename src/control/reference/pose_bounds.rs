@@ -11,7 +11,7 @@ use crate::model::task::task_coordinates;
 
 /// Room around a pose beyond the nominal bounds, in which the reference may begin to move back, as a ratio of the stroke:
 /// above the noise of lengths.
-const START_ROOM_RATIO: f64 = 2.5e-4;
+const START_ROOM_RATIO: f64 = 2.5e-5;
 
 /// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
 const ROUNDING: f64 = 1e-9;

@@ -61,7 +61,7 @@ impl Ball {
         let turned_arm = turn + turned_squared.sqrt();
         let change = (6.0 * (turned_squared + turned_arm * turned_arm)).sqrt();
         let largest_norm = (norm + change).min(MAX_WRENCH_NORM_SQUARED.sqrt());
-        let limit = constants.parameters.condition * (1.0 - inverse_norm * change);
+        let limit = constants.reference_condition * (1.0 - inverse_norm * change);
         chord <= MAX_CHORD && left > 0.0 && largest_norm * inverse_norm <= limit
     }
 }

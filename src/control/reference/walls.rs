@@ -4,7 +4,7 @@
 //! `g' = -G V`. The wanted twist V and its derivative are changed least (rotations weighted by the radius of the joints) so that
 //!
 //! ```text
-//! G V  <= phi(g)                        phi: braking curve of the approach, on a part of the limits; and of a leg its rate
+//! G V  <= phi(g)                        phi: braking curve of the approach, on a part of the limits
 //! G V' = -phi'(g) G V - G' V            where this bound is active
 //! ```
 //!
@@ -30,8 +30,6 @@ use crate::model::task::task_coordinates;
 const CLOSING_SHARE: f64 = 0.6;
 /// Distance kept from a bound, so that the examination of the stop between knots finds room, as a ratio of the stroke.
 const KEPT_RATIO: f64 = 5e-3;
-/// Part of a leg's largest rate that is wanted.
-const RATE_SHARE: f64 = 0.97;
 /// Sweeps over the walls: two walls at 60 degrees converge to 1e-4.
 const SWEEPS: u32 = 8;
 /// Slowness of the return from a gap that is negative, over that of the approach.
@@ -79,7 +77,6 @@ impl Walls {
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
         let wrenches = leg_wrenches(machine, &motion.pose);
         let approach = Approach::new(limits.position, CLOSING_SHARE, step_s);
-        let most = RATE_SHARE * machine.actuator.max_rate;
         let squared_time = stop_time_s(limits, led).powi(2) / 8.0;
         let ends = bounds.shortest.iter().zip(&bounds.longest);
         let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
@@ -92,8 +89,8 @@ impl Walls {
             let departure = curvature * squared_time;
             let gaps = [longest - next - departure.max(0.0), next - shortest + departure.min(0.0)];
             let [long, short] = gaps.map(|gap| gap - kept);
-            walls.push(Limit::Stroke, &approach, gradient, long, *curvature, most);
-            walls.push(Limit::Stroke, &approach, -gradient, short, -curvature, most);
+            walls.push(Limit::Stroke, &approach, gradient, long, *curvature);
+            walls.push(Limit::Stroke, &approach, -gradient, short, -curvature);
         }
         if let Some(envelope) = &bounds.envelope {
             walls.push_envelope(constants, envelope, motion, led, step_s, kept);
@@ -135,28 +132,18 @@ impl Walls {
             let (approach, kept) = if axis < 3 { (&turning, kept / radius) } else { (&shifting, kept) };
             let kept = kept.min(0.05 * (high - low));
             let next = x + gradient.dot(&velocity) * step_s;
-            self.push(Limit::Envelope, approach, gradient, high - next - kept, 0.0, f64::INFINITY);
-            self.push(Limit::Envelope, approach, -gradient, next - low - kept, 0.0, f64::INFINITY);
+            self.push(Limit::Envelope, approach, gradient, high - next - kept, 0.0);
+            self.push(Limit::Envelope, approach, -gradient, next - low - kept, 0.0);
         }
     }
 
-    fn push(
-        &mut self,
-        limit: Limit,
-        approach: &Approach,
-        gradient: Vector6<f64>,
-        gap: f64,
-        curvature: f64,
-        most: f64,
-    ) {
+    fn push(&mut self, limit: Limit, approach: &Approach, gradient: Vector6<f64>, gap: f64, curvature: f64) {
         let (rate, slope) = if gap > 0.0 {
             approach.closing_velocity(gap)
         } else {
             let slope = approach.slowest_slope() / RETURN_RATIO;
             (gap * slope, slope)
         };
-        let (limit, rate, slope) =
-            if rate > most { (Limit::LegRate, most, 0.0) } else { (limit, rate, slope) };
         if let Some(wall) = self.walls.get_mut(self.count) {
             *wall = Wall {
                 limit: LimitSet::default().with(limit, true),
