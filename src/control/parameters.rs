@@ -84,7 +84,7 @@ pub struct Envelope {
 }
 
 /// Part of the way from the condition at home to its limit that the reference uses.
-const CONDITION_SHARE: f64 = 0.95;
+const CONDITION_SHARE: f64 = 0.85;
 
 /// Machine model, parameters and home pose: constant while the controller runs.
 #[derive(Clone, Debug)]

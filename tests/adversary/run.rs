@@ -2,6 +2,7 @@
 
 use hexad::control::controller::{Controller, Input, Measurement, Output};
 use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::limits::Limit;
 use hexad::control::parameters::{Parameters, ViolationPolicy};
 use hexad::control::state::{Request, State};
 use hexad::model::machine::Machine;
@@ -38,7 +39,7 @@ struct Source {
 /// What a controller is made of that is wrong on purpose; the meter keeps the right one.
 pub type Doctor = fn(&mut Machine, &mut Parameters);
 
-/// Runs a genome.
+/// Runs a genome, until its end or until the drives are too weak.
 pub fn run(genome: &Genome, doctor: Option<Doctor>) -> Outcome {
     run_with(genome, doctor, |_, _, _| {})
 }
@@ -69,6 +70,8 @@ pub fn run_with(
     while observed.time_s() < scenario.duration_s
         && observed.meter.impact_m_s.is_none()
         && !is_carried_out(&observed)
+        // Drives that are too weak move the platform elsewhere whatever the reference is.
+        && !before.active_limits.contains(Limit::Force)
     {
         source.follow(&scenario, &observed, before.state);
         ask(&scenario, &mut observed, before.state, &mut requests, &mut without_s);

@@ -57,14 +57,10 @@ pub struct Search {
     aim: Option<Quantity>,
 }
 
-/// True acceleration over its bound with frozen sensors: the forces are those for the pose and twist that were last
-/// measured, from which the platform goes as far as the following limits let it.
-const FROZEN_ACCELERATION: f64 = 1.25;
-
-/// With frozen sensors only the acceleration has a bound: the rest depends on when the fault comes.
+/// With frozen sensors only the reference has bounds: what the platform does depends on when the fault comes. `motions`
+/// bounds it at turnarounds.
 pub fn allowed(genome: &Genome, quantity: Quantity) -> f64 {
     match quantity {
-        Quantity::Acceleration | Quantity::AngularAcceleration if genome.is_frozen => FROZEN_ACCELERATION,
         Quantity::ReferenceVelocity
         | Quantity::ReferenceAcceleration
         | Quantity::ReferenceJerk

@@ -18,6 +18,9 @@ const PHASES: [f64; 4] = [1.0, 1.5, 2.0, 2.5];
 /// Until a fault must have come \[s\].
 const AFTER_S: f64 = 1.0;
 
+/// Part by which the acceleration may exceed its bound while the platform leaves the pose that the sensors show.
+const FROZEN_POSE_ALLOWANCE: f64 = 1.04;
+
 /// With frozen sensors the velocity may leave its limit by as much as the velocity error may reach before the fault, and
 /// a leg with it.
 fn allowed(quantity: Quantity, following_velocity_ratio: f64) -> f64 {
@@ -25,6 +28,8 @@ fn allowed(quantity: Quantity, following_velocity_ratio: f64) -> f64 {
         Quantity::Velocity | Quantity::AngularVelocity | Quantity::LegRate => {
             1.0 + MOTION_ALLOWANCE + following_velocity_ratio
         }
+        // The forces are those of the pose that the sensors show.
+        Quantity::Acceleration | Quantity::AngularAcceleration => FROZEN_POSE_ALLOWANCE,
         // The distance from the reference is what the controller cannot know; its end is the fault.
         Quantity::Following | Quantity::Engaging => f64::INFINITY,
         quantity => quantity.allowed(),

@@ -58,9 +58,10 @@ impl RateConsistency {
         next
     }
 
-    fn check(&self, actuator: &Actuator) -> Result<(), Diagnostic> {
+    /// `step_error`: what the trapezoidal rule leaves over of a motion within the limits, from one measurement to the next.
+    fn check(&self, actuator: &Actuator, step_error: f64) -> Result<(), Diagnostic> {
         for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
-            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * actuator.stroke();
+            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * actuator.stroke() + step_error;
             if residual.abs() > bound {
                 let code = DiagnosticCode::RateInconsistent;
                 return Err(Diagnostic::new(code, residual.abs(), bound).at(leg));
@@ -158,7 +159,10 @@ impl MeasurementValidator {
         let bound = acceleration * dt.min(window_s) + RATE_NOISE_RATIO * actuator.max_rate;
         check_change(DiagnosticCode::RateJumped, &now.rate, &before.rate, bound)?;
         let consistency = self.consistency.updated(now, before);
-        consistency.check(actuator)?;
+        // J dt^3 / 12 per step, over the steps of the time constant.
+        let limits = &cycle.constants.parameters.limits;
+        let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
+        consistency.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * dt * dt / 12.0)?;
         Ok(consistency)
     }
 }

@@ -31,6 +31,8 @@ use crate::model::task::task_coordinates;
 
 /// Departure of a length from its chord that decides the number of knots \[m\].
 const CHORD_DEPARTURE_M: f64 = 1e-4;
+/// Departure of a leg's rate from its chord that does so, over the largest rate.
+const RATE_DEPARTURE_RATIO: f64 = 0.01;
 /// Bounds on the number of intervals between knots: the last bounds the work of a cycle.
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: f64 = 24.0;
@@ -216,16 +218,20 @@ impl<'a> Examination<'a> {
             return Err(Limit::Velocity);
         }
         let curvature = curvature(constants, v, w);
-        let knots = (stop.duration() * (curvature / (8.0 * CHORD_DEPARTURE_M)).sqrt()).ceil();
-        let intervals = knots.max(MIN_INTERVALS).min(MAX_INTERVALS);
-        let dt = stop.duration() / intervals;
-        let chord = dt.max(step.duration).powi(2) / 8.0;
         let actuator = &constants.machine().actuator;
         let (arm, joint) = (constants.arm, v + constants.arm * w);
+        let needs_rates = joint > actuator.max_rate;
         let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);
         let rate_curvature = position.jerk
             + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w)
             + 3.0 * joint * joint_acceleration / actuator.min_length;
+        let rates =
+            if needs_rates { rate_curvature / (RATE_DEPARTURE_RATIO * actuator.max_rate) } else { 0.0 };
+        let density = (curvature / CHORD_DEPARTURE_M).max(rates);
+        let knots = (stop.duration() * (density / 8.0).sqrt()).ceil();
+        let intervals = knots.max(MIN_INTERVALS).min(MAX_INTERVALS);
+        let dt = stop.duration() / intervals;
+        let chord = dt.max(step.duration).powi(2) / 8.0;
         // Along the velocity and, across it, along the rest of the present acceleration.
         let Motion { twist, acceleration, .. } = motion;
         let u = twist.linear.try_normalize(0.0).unwrap_or_default();
@@ -239,7 +245,7 @@ impl<'a> Examination<'a> {
             length_slack: curvature * chord,
             rate_slack: rate_curvature * chord,
             position_slack: position_curvature * chord,
-            needs_rates: joint > actuator.max_rate,
+            needs_rates,
             stop,
         })
     }
