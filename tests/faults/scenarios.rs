@@ -3,12 +3,14 @@
 //!
 //! With `HEXAD_CHARTS=FOLDER` each is drawn into a picture.
 
+use super::cells::{Bounds, GENTLE};
 use super::common::rig::Rig;
 use super::pictures::draw;
 use super::situations::{Situation, machine};
 use super::world::{Grip, Source, World};
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
+use hexad::control::parameters::ViolationPolicy;
 use hexad::control::state::{Request, State};
 
 /// Without a force from the daemon for this long, the drives brake \[cycles\].
@@ -57,7 +59,9 @@ fn assert_smooth(name: &str, title: &str, world: &World, expected: &[(State, Dia
     let peaks = world.recording.peaks(&world.parameters, world.machine.actuator.max_force);
     println!("{title}: {peaks:?}");
     draw(name, title, world);
-    assert!(peaks.acceleration <= 1.0 && peaks.jerk <= 1.0 && peaks.force < 1.0, "{peaks:?}");
+    // The reference keeps the limits exactly, the platform but for what held forces add.
+    let Bounds { acceleration, jerk, .. } = GENTLE;
+    assert!(peaks.acceleration <= acceleration && peaks.jerk <= jerk && peaks.force < 1.0, "{peaks:?}");
     assert!(peaks.force_rate < 1.0, "never cut: {peaks:?}");
     let path = world.recording.path();
     let states = path.iter().filter(|(state, cause)| {
@@ -190,7 +194,7 @@ fn daemon_killed_in_motion_and_restarted() {
 fn situations_are_what_they_say() {
     for mode in ControlMode::ALL {
         for situation in Situation::ALL {
-            let mut world = situation.world(mode);
+            let mut world = situation.world(mode, ViolationPolicy::default());
             let output = world.cycle(|_, _| {});
             assert_eq!(output.state, situation.state());
             assert_eq!(output.force != [0.0; 6], situation.state().has_control());

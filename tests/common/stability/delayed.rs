@@ -29,7 +29,7 @@ const START_NS: u64 = 86_400_000_000_000;
 /// as long as the loop is stable, where everything is linear and nothing is limited.
 pub const PUSH: f64 = 1e-4;
 
-/// Nothing but the loop limits the loop: more force and change of force than anything asks for.
+/// Nothing but the loop limits the loop: more force, change of force and feedback than anything asks for.
 const UNLIMITED: f64 = 1e12;
 
 /// What is between controller and platform.
@@ -152,6 +152,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             &parameters.limits,
         ),
         force_rate: UNLIMITED,
+        feedback_scale: UNLIMITED,
         ..parameters
     }
 }
