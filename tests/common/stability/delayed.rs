@@ -67,6 +67,8 @@ pub struct Delayed {
     now_ns: u64,
     period_ns: u64,
     age_ns: u64,
+    /// Of the last cycle.
+    state: State,
 }
 
 impl Delayed {
@@ -90,6 +92,7 @@ impl Delayed {
             now_ns: START_NS,
             period_ns: parameters.period_ns,
             age_ns: in_ns(setup.age),
+            state: State::Off,
         }
     }
 
@@ -120,17 +123,16 @@ impl Delayed {
     /// So many cycles under control, or until the controller gives up, and why.
     pub fn run(&mut self, cycles: usize) -> (Vec<Cycle>, DiagnosticCode) {
         let mut seen = vec![];
-        let mut before = State::Off;
         while seen.len() < cycles {
             let (cycle, output) = self.cycle();
-            if before.has_control() && !output.state.has_control() {
+            if self.state.has_control() && !output.state.has_control() {
                 return (seen, output.diagnostic.code);
             }
-            before = output.state;
-            if before.has_control() {
+            self.state = output.state;
+            if self.state.has_control() {
                 seen.push(cycle);
             }
-            assert!(self.now_ns < START_NS + 10 * self.period_ns || before.has_control(), "{output:?}");
+            assert!(self.now_ns < START_NS + 10 * self.period_ns || self.state.has_control(), "{output:?}");
         }
         (seen, DiagnosticCode::None)
     }
