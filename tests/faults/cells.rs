@@ -77,7 +77,7 @@ pub const LATE: Bounds = Bounds { rest_s: 0.8, ..GENTLE };
 pub const ACCELERATED: Bounds = Bounds { rest_s: 0.3, ..GENTLE };
 /// Brakes decelerate the platform until the first force arrives.
 pub const OUT_OF_THE_BRAKES: Bounds = Bounds { acceleration: 1.06, jerk: 2.6, ..LONG };
-pub const PARKED_OUT_OF_THE_BRAKES: Bounds = Bounds { jerk: 1.06, ..LONG };
+pub const PARKED_OUT_OF_THE_BRAKES: Bounds = Bounds { jerk: 1.08, ..LONG };
 /// Drives at the limit of their force: position and orientation are accelerated at once with all that is allowed.
 pub const AT_FORCE_LIMIT: Bounds = Bounds { acceleration: 1.35, jerk: 1.3, ..LONG };
 /// Without end.
@@ -148,6 +148,9 @@ pub fn in_mode(
         ..bounds
     };
     let (is_gravity, is_pd) = (mode == ControlMode::GravityJointPd, mode == ControlMode::JointPd);
+    if let Some(cell) = without_a_leg(mode, situation).filter(|_| name == "a leg without force") {
+        return (if is_pd { wider(1.4, 6.3) } else { wider(1.25, 1.16) }, cell);
+    }
     match (name, situation) {
         // Missing measurements are replaced by errors that vanish as the law wants it. Errors that hold up what the
         // model leaves out do not: force comes back with the next measurement.
@@ -179,15 +182,6 @@ pub fn in_mode(
             (wider(1.8, 3.3), cell)
         }
         ("lengths and rates frozen", InMotion) if is_pd => (wider(1.8, 6.3), cell),
-        // The legs are bounded one by one, more widely: feedback is saturated before the velocity is wrong.
-        ("a leg without force", Engaging | AtRest | InMotion | Parking) if mode.acts_on_legs() && !is_pd => {
-            (wider(1.25, 1.16), without_a_leg(mode, situation))
-        }
-        ("a leg without force", InMotion) if is_pd => (wider(1.4, 6.3), without_a_leg(mode, situation)),
-        ("a leg without force", Engaging) if is_pd => {
-            (wider(1.4, 6.3), Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FollowingError)]))
-        }
-        ("a leg without force", AtRest | Parking) if is_pd => (wider(1.4, 6.3), Brake(FollowingError)),
         // It still sags, and nothing damps that.
         ("lengths and rates frozen" | "rates zero", AtRest) if is_pd => {
             (Bounds { rest_s: f64::INFINITY, ..wider(1.4, 6.3) }, cell)
@@ -207,20 +201,29 @@ pub fn in_mode(
     }
 }
 
-fn without_a_leg(mode: ControlMode, situation: Situation) -> Cell {
-    let is_gravity = mode == ControlMode::GravityJointPd;
-    match situation {
-        Situation::Engaging if is_gravity => Path(&[
+/// A leg without force in a mode on legs. They are bounded one by one, more widely: feedback is saturated, or the platform
+/// too far away, before its velocity is wrong.
+fn without_a_leg(mode: ControlMode, situation: Situation) -> Option<Cell> {
+    let is_pd = mode == ControlMode::JointPd;
+    Some(match (mode, situation) {
+        (ControlMode::ComputedTorque, _) => return None,
+        (_, Situation::InMotion) => SATURATED,
+        (_, Situation::Parking) if !is_pd => SATURATED,
+        (_, Situation::AtRest) if !is_pd => Stop(FeedbackSaturated),
+        (_, Situation::AtRest | Situation::Parking) => Brake(FollowingError),
+        (ControlMode::JointPd, Situation::Engaging) => {
+            Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FollowingError)])
+        }
+        (ControlMode::GravityJointPd, Situation::Engaging) => Path(&[
             (State::Active, DiagnosticCode::None),
             (State::Stopping, FeedbackSaturated),
             (State::Fault, FeedbackSaturated),
         ]),
-        Situation::Engaging => Path(&[
+        (_, Situation::Engaging) => Path(&[
             (State::Active, DiagnosticCode::None),
             (State::Stopping, FeedbackSaturated),
             (State::Fault, FollowingError),
         ]),
-        Situation::AtRest => Stop(FeedbackSaturated),
-        _ => SATURATED,
-    }
+        (_, Situation::Standby | Situation::Stopping | Situation::Fault) => return None,
+    })
 }

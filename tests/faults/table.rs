@@ -175,7 +175,8 @@ fn every_fault_in_every_state_does_what_the_table_says() {
     assert!(wrong.is_empty(), "{wrong}");
 }
 
-const CSV_HEADER: &str = "on_violation,mode,fault,state,then,force_share,force_rate_share,acceleration_share,jerk_share,at_rest_s\n";
+const CSV_HEADER: &str = "on_violation,mode,fault,state,then,force_share,force_rate_share,acceleration_share,\
+    jerk_share,at_rest_s\n";
 
 fn csv_line(
     policy: ViolationPolicy,
