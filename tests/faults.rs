@@ -8,10 +8,13 @@ mod common;
 mod faults {
     use super::*;
 
+    mod cells;
     mod disturbances;
     mod pictures;
     mod recording;
+    mod rows;
     mod scenarios;
+    mod sequences;
     mod situations;
     mod table;
     mod world;

@@ -4,19 +4,19 @@
 //! | --- | --- | --- | --- |
 //! | 0 | force | `actuator.max_force_n` | the force keeps its gravity part and the rest is reduced by the same factor |
 //! | 1 | force rate | `limits.force_rate_n_s` | the change of force is reduced by the same factor on every leg |
-//! | 2 | stroke | `actuator.*_length_m` less `limits.stroke_margin_m` | kept by the reference |
+//! | 2 | stroke | `actuator.*_length_m` less `limits.stroke_margin_m` | the reference comes to rest before it |
 //! | 3 | leg rate | `actuator.max_rate_m_s` | kept by the reference |
-//! | 4 | envelope | `[envelope]` | kept by the reference |
+//! | 4 | envelope | `[envelope]` | the reference comes to rest before it |
 //! | 5 | velocity | `limits.velocity_*` | kept by the reference |
 //! | 6 | acceleration | `limits.acceleration_*` | kept by the reference |
 //! | 7 | jerk | `limits.jerk_*` | kept by the reference |
-//! | 8 | following error | `control.following_*` | fault |
-//! | 9 | condition | `limits.condition` | kept by the reference; stop, fault if the platform exceeds it |
+//! | 8 | following error | `control.following_*`, of pose and velocity | fault |
+//! | 9 | condition | `limits.condition` | the reference comes to rest before it; where the platform is: stop, fault |
 //!
-//! The reference keeps its limits along its way and along the stop from there, whatever the setpoint. With
-//! `on_violation = "stop"` it follows a setpoint within the engage tolerance, or the platform comes to rest: a
-//! setpoint beyond a limit counts as none, so that the reference continues over one wrong message among valid ones, and
-//! ends in a stop after a stream of them. With `on_violation = "limit"` it follows as near as the limits allow.
+//! The reference keeps its limits whatever is sent. Under `on_violation = "stop"` a setpoint beyond one of them, but for
+//! jerk and condition, is rejected, and so is one that the reference falls behind by more than the engage tolerance. A
+//! rejected setpoint counts as none: the reference continues over one wrong message among valid ones, and ends in a stop
+//! after a stream of them. Under "limit" the reference follows as near as the limits allow.
 
 /// Limit by the number of its bit in a [`LimitSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

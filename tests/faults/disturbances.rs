@@ -185,9 +185,14 @@ pub mod setpoints {
         m.input.setpoint = m.before.setpoint;
     }
 
+    /// No new message in this cycle.
+    pub fn end_for_now(m: &mut Moment) {
+        m.input.setpoint = m.before.setpoint;
+    }
+
     pub fn pause_30_ms(m: &mut Moment) {
         if m.cycle < 30 {
-            m.input.setpoint = m.before.setpoint;
+            end_for_now(m);
         }
     }
 

@@ -4,7 +4,7 @@ use hexad::analysis::envelope;
 use hexad::config::Config;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
-use hexad::control::parameters::Parameters;
+use hexad::control::parameters::{Parameters, ViolationPolicy};
 use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
@@ -59,12 +59,13 @@ impl Situation {
     }
 
     /// A machine for a person, in this situation.
-    pub fn world(self, mode: ControlMode) -> World {
-        let (mut config, mut parameters) = machine(mode);
+    pub fn world(self, mode: ControlMode, policy: ViolationPolicy) -> World {
+        let (mut config, _) = machine(mode);
+        config.deployment.setpoint.on_violation = policy;
         if self == Self::Engaging {
             config.deployment.limits.reference.autonomous_scale = SLOW_SCALE;
-            parameters = super::common::rig::parameters(&config);
         }
+        let parameters = parameters(&config);
         let mut world = World::new(Rig::new(&config, &config.machine), &config.machine, parameters);
         let mut home = TaskState::at_rest(config.machine.home);
         match self {
@@ -80,7 +81,8 @@ impl Situation {
             Self::AtRest => {
                 world.ask(Request::Engage);
                 world.until(|output| output.state == State::Active);
-                world.run(50);
+                // In a mode without weight the platform sags for a while.
+                world.run(500);
             }
             Self::InMotion => moving(&mut world),
             Self::Stopping => {

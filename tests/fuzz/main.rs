@@ -31,6 +31,7 @@ use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 use hexad::control::law::ControlMode;
+use hexad::control::parameters::ViolationPolicy;
 
 /// Memory of this process at its largest: the readers' bounds and the test itself \[kB\].
 const MAX_MEMORY_KB: u64 = 256 << 10;
@@ -100,7 +101,8 @@ fn random_cycles() {
         }
         let mode = ControlMode::ALL[programs as usize % ControlMode::ALL.len()];
         let observer_hz = if programs / 4 % 2 == 0 { 0.0 } else { properties::step::OBSERVER_HZ };
-        let (cycles, reached) = properties::step::run(&program, mode, observer_hz);
+        let policy = if programs / 8 % 2 == 0 { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
+        let (cycles, reached) = properties::step::run(&program, mode, observer_hz, policy);
         (done, programs, controlled) = (done + cycles, programs + 1, controlled + u64::from(reached));
     }
     println!("{done} cycles in {programs} programs, {controlled} of them reached control");

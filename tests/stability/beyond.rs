@@ -105,6 +105,10 @@ fn a_platform_pushed_through_a_singular_pose_is_let_go_before() {
             config.machine.actuator.max_force = 20e3;
             config.deployment.control.following_position_m = f64::MAX;
             config.deployment.control.following_orientation_rad = f64::MAX;
+            config.deployment.control.following_velocity_m_s = f64::MAX;
+            config.deployment.control.following_velocity_rad_s = f64::MAX;
+            // The drives are what gives way, not the bound of feedback.
+            config.deployment.limits.feedback_scale = 1e6;
             let wrench = Wrench { torque: Vector3::z() * torque, force: Vector3::zeros() };
             let mut rig = Rig::new(&config, &config.machine);
             let home = on_the_way(AT_HOME, &Profile::default());
@@ -168,6 +172,8 @@ fn further_than_the_steps_of_a_cycle_is_told_with_how_far_they_came() {
     /// Less than the timeout of measurements.
     const PAUSE: u32 = 18;
     let mut config = motion_base(ANY);
+    // Somebody moves the platform beside its reference.
+    config.deployment.control.following_velocity_m_s = f64::MAX;
     let home = at(0.012);
     config.machine.home = home.x.into();
     // Up, with the speed that it takes for that.

@@ -140,7 +140,8 @@ mod tests {
                 let timeline =
                     Timeline::new(&config.machine, &from, &home, 1.0).with_shortest_approach(duration_s);
                 let at = |t| timeline.at(t, |_| TaskState::at_rest(config.machine.home));
-                precheck.first_refusal(at, timeline.motion_start(), 500)
+                // In one piece: where the reference begins anew it has fallen behind nothing.
+                precheck.refusal(at, [0.0, timeline.motion_start()])
             };
             assert!(refused(1.0).is_none(), "{tight}: {:?}", refused(1.0));
             assert!(refused(0.25).is_some(), "{tight}");

@@ -29,7 +29,7 @@ const START_NS: u64 = 86_400_000_000_000;
 /// as long as the loop is stable, where everything is linear and nothing is limited.
 pub const PUSH: f64 = 1e-4;
 
-/// Nothing but the loop limits the loop: more force and change of force than anything asks for.
+/// Nothing but the loop limits the loop: more force, change of force and feedback than anything asks for.
 const UNLIMITED: f64 = 1e12;
 
 /// What is between controller and platform.
@@ -67,6 +67,8 @@ pub struct Delayed {
     now_ns: u64,
     period_ns: u64,
     age_ns: u64,
+    /// Of the last cycle.
+    state: State,
 }
 
 impl Delayed {
@@ -90,6 +92,7 @@ impl Delayed {
             now_ns: START_NS,
             period_ns: parameters.period_ns,
             age_ns: in_ns(setup.age),
+            state: State::Off,
         }
     }
 
@@ -120,17 +123,16 @@ impl Delayed {
     /// So many cycles under control, or until the controller gives up, and why.
     pub fn run(&mut self, cycles: usize) -> (Vec<Cycle>, DiagnosticCode) {
         let mut seen = vec![];
-        let mut before = State::Off;
         while seen.len() < cycles {
             let (cycle, output) = self.cycle();
-            if before.has_control() && !output.state.has_control() {
+            if self.state.has_control() && !output.state.has_control() {
                 return (seen, output.diagnostic.code);
             }
-            before = output.state;
-            if before.has_control() {
+            self.state = output.state;
+            if self.state.has_control() {
                 seen.push(cycle);
             }
-            assert!(self.now_ns < START_NS + 10 * self.period_ns || before.has_control(), "{output:?}");
+            assert!(self.now_ns < START_NS + 10 * self.period_ns || self.state.has_control(), "{output:?}");
         }
         (seen, DiagnosticCode::None)
     }
@@ -152,6 +154,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             &parameters.limits,
         ),
         force_rate: UNLIMITED,
+        feedback_scale: UNLIMITED,
         ..parameters
     }
 }

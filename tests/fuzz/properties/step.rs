@@ -3,10 +3,11 @@
 
 use std::sync::LazyLock;
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
-use hexad::control::parameters::Parameters;
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint, SetpointKind};
+use hexad::control::parameters::{Parameters, ViolationPolicy};
 
 use hexad::config::Config;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
 use hexad::control::limits::Limit;
 use hexad::control::localization::PlatformState;
@@ -25,18 +26,22 @@ const START_NS: u64 = 86_400_000_000_000;
 /// The observer of half of the runs.
 pub const OBSERVER_HZ: f64 = 5.0;
 
-/// Rounding of a force at its bound.
+/// Rounding of a force at its bound, and of the reference at its limits.
 const ROUNDING: f64 = 1e-9;
+
+const KINDS: [SetpointKind; 4] =
+    [SetpointKind::Motion, SetpointKind::Pose, SetpointKind::Target, SetpointKind::Unknown];
 
 /// Whether control was reached; panics where an output is wrong, in any mode.
 pub fn hold(input: &[u8]) -> bool {
-    let others = ControlMode::ALL.map(|mode| run(input, mode, OBSERVER_HZ).1);
-    run(input, ControlMode::default(), 0.0).1 | others.contains(&true)
+    let others = ControlMode::ALL.map(|mode| run(input, mode, OBSERVER_HZ, ViolationPolicy::Stop).1);
+    let limited = run(input, ControlMode::default(), 0.0, ViolationPolicy::Limit).1;
+    run(input, ControlMode::default(), 0.0, ViolationPolicy::Stop).1 | limited | others.contains(&true)
 }
 
 /// How many cycles it was, and whether control was reached.
-pub fn run(input: &[u8], mode: ControlMode, observer_hz: f64) -> (u64, bool) {
-    let mut play = Play::new(input, mode, observer_hz);
+pub fn run(input: &[u8], mode: ControlMode, observer_hz: f64, policy: ViolationPolicy) -> (u64, bool) {
+    let mut play = Play::new(input, mode, observer_hz, policy);
     while play.cycle() {}
     (play.cycles, play.controlled)
 }
@@ -55,9 +60,10 @@ struct Play<'a> {
 }
 
 impl<'a> Play<'a> {
-    fn new(bytes: &'a [u8], mode: ControlMode, observer_hz: f64) -> Self {
+    fn new(bytes: &'a [u8], mode: ControlMode, observer_hz: f64, policy: ViolationPolicy) -> Self {
         let mut deployment = CONFIG.deployment.clone();
         (deployment.control.mode, deployment.control.observer_bandwidth_hz) = (mode, observer_hz);
+        deployment.setpoint.on_violation = policy;
         let parameters = daemon::parameters(&CONFIG.machine, &deployment, Fidelity::Exact);
         Self {
             bytes,
@@ -154,6 +160,7 @@ impl<'a> Play<'a> {
                 2 => input.release_ns = bits,
                 _ => self.now_ns = START_NS + bits % (1 << 40),
             },
+            14 if place >= 12 => setpoint.kind = KINDS[place % 4],
             14 => match place % 4 {
                 0 => input.setpoint = None,
                 1 => input.measurement = None,
@@ -216,6 +223,7 @@ impl<'a> Play<'a> {
                 pose.position.iter().chain(&pose.rotation).chain(&twist.angular).chain(&twist.linear);
             assert!(numbers.into_iter().all(|number| number.is_finite()), "{output:?}");
         }
+        self.check_reference(output);
         assert!(*state != State::Fault || diagnostic.code.is_fault(), "{output:?}");
         match request {
             Some(Request::Estop) => assert_eq!(*state, State::Fault),
@@ -227,17 +235,40 @@ impl<'a> Play<'a> {
             State::Off | State::Fault => true,
             State::Standby => matches!(before, State::Off | State::Standby | State::Stopping),
             State::Engaging => {
+                // Without setpoints an active platform holds its pose.
+                let holds = diagnostic.code == DiagnosticCode::HoldingPose;
                 before == State::Engaging
+                    || holds
+                        && before == State::Active
+                        && self.parameters.on_violation == ViolationPolicy::Limit
                     || matches!(before, State::Off | State::Standby) && request == Some(Request::Engage)
             }
             State::Active => matches!(before, State::Engaging | State::Active),
-            State::Stopping => before.has_control(),
-            State::Parking => {
-                matches!(before, State::Parking | State::Stopping)
+            // Parking begins with a stop.
+            State::Stopping => {
+                before.has_control()
                     || matches!(before, State::Off | State::Standby) && request == Some(Request::Park)
             }
+            State::Parking => matches!(before, State::Parking | State::Stopping),
         };
         let cleared = before != State::Fault || *state == State::Fault || request == Some(Request::Clear);
         assert!(allowed && cleared, "{before:?} to {state:?} by {request:?}");
+    }
+
+    /// There is a reference under control and only there, and it keeps its limits whatever was sent and whenever.
+    fn check_reference(&self, output: &Output) {
+        assert_eq!(output.reference.is_some(), output.state.has_control(), "{output:?}");
+        let Some(reference) = output.reference else { return };
+        let limits = &self.parameters.limits;
+        for (v, a, limits) in [
+            (reference.twist.angular, reference.acceleration.angular, limits.orientation),
+            (reference.twist.linear, reference.acceleration.linear, limits.position),
+        ] {
+            assert!(v.norm() <= limits.velocity * (1.0 + ROUNDING), "{output:?}");
+            assert!(a.norm() <= limits.acceleration * (1.0 + ROUNDING), "{output:?}");
+        }
+        let lengths = leg_motion(&CONFIG.machine, &reference).length;
+        let margins = lengths.map(|length| CONFIG.machine.actuator.margin(length));
+        assert!(margins.into_iter().all(|margin| margin > -ROUNDING), "{margins:?} {output:?}");
     }
 }

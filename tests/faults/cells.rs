@@ -1,0 +1,229 @@
+//! What becomes of a fault in a state, and what the platform may feel meanwhile.
+
+use hexad::control::diagnostic::DiagnosticCode::{
+    self, EmergencyStop, FeedbackSaturated, FollowingError, OperatorRequest, ReadyToEngage,
+    SetpointBeyondLimits, SetpointTooFar,
+};
+use hexad::control::law::ControlMode;
+use hexad::control::parameters::ViolationPolicy;
+use hexad::control::state::State;
+
+use super::disturbances::Disturbance;
+use super::situations::Situation;
+
+/// What becomes of it.
+#[derive(Clone, Copy, Debug)]
+pub enum Cell {
+    /// As if nothing had happened.
+    On,
+    /// Lets go at once, until cleared.
+    Brake(DiagnosticCode),
+    /// Stops under control, then lets go, until cleared.
+    Stop(DiagnosticCode),
+    /// Stops under control, then stands by.
+    End(DiagnosticCode),
+    /// Every state under control that is entered, and the first one without force.
+    Path(&'static [(State, DiagnosticCode)]),
+    /// Every state under control and every fault after the one that it began in, to the end; and the last state.
+    Full(&'static [(State, DiagnosticCode)]),
+    /// Without force all the time; in the end this.
+    Idle(State, DiagnosticCode),
+    /// Nothing in the messages tells it from a platform that stands: it is driven to its end stops. What
+    /// guards against it are drives that check their own encoders.
+    Unseen,
+}
+
+use Cell::{Brake, End, Full, Idle, On, Path, Stop, Unseen};
+
+impl Cell {
+    /// The states that follow, as [`changes`] tells them.
+    pub fn expected(self, situation: Situation) -> Vec<(State, DiagnosticCode)> {
+        match self {
+            On => match situation {
+                Situation::Standby => vec![(State::Standby, ReadyToEngage)],
+                Situation::Engaging => vec![(State::Active, DiagnosticCode::None)],
+                Situation::AtRest | Situation::InMotion => vec![],
+                Situation::Stopping => vec![(State::Standby, OperatorRequest)],
+                Situation::Parking => vec![(State::Off, OperatorRequest)],
+                Situation::Fault => vec![(State::Fault, EmergencyStop)],
+            },
+            Brake(cause) => vec![(State::Fault, cause)],
+            Stop(cause) => vec![(State::Stopping, cause), (State::Fault, cause)],
+            End(cause) => vec![(State::Stopping, cause), (State::Standby, cause)],
+            Path(path) | Full(path) => path.into(),
+            Idle(state, cause) => vec![(state, cause)],
+            Unseen => vec![(State::Active, DiagnosticCode::None)],
+        }
+    }
+}
+
+/// What the platform may feel: shares of the limits of acceleration and jerk, and seconds until it stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    pub acceleration: f64,
+    pub jerk: f64,
+    pub rest_s: f64,
+}
+
+/// The limits of the deployment, which the reference keeps exactly; the platform is driven by forces that are held for a
+/// period. At the speed of the scene brakes need 50 ms, a stop 100 ms; before it, up to 50 ms pass until a peer counts as
+/// lost.
+pub const GENTLE: Bounds = Bounds { acceleration: 1.015, jerk: 1.04, rest_s: 0.2 };
+/// For those that begin a motion which ends later.
+pub const LONG: Bounds = Bounds { rest_s: 1.6, ..GENTLE };
+/// For a motion that ends in a stop most of a second later.
+pub const LATE: Bounds = Bounds { rest_s: 0.8, ..GENTLE };
+/// A tenth of a second of acceleration, the timeout, and the stop.
+pub const ACCELERATED: Bounds = Bounds { rest_s: 0.3, ..GENTLE };
+/// Brakes decelerate the platform until the first force arrives.
+pub const OUT_OF_THE_BRAKES: Bounds = Bounds { acceleration: 1.06, jerk: 2.6, ..LONG };
+pub const PARKED_OUT_OF_THE_BRAKES: Bounds = Bounds { jerk: 1.08, ..LONG };
+/// Drives at the limit of their force: position and orientation are accelerated at once with all that is allowed.
+pub const AT_FORCE_LIMIT: Bounds = Bounds { acceleration: 1.35, jerk: 1.3, ..LONG };
+/// Without end.
+pub const ENDLESS: Bounds = Bounds { rest_s: f64::INFINITY, ..GENTLE };
+/// Counts and noise of good encoders.
+pub const NOISE: Bounds = Bounds { acceleration: 1.03, jerk: 1.3, rest_s: f64::INFINITY };
+/// Rates that come late by 5 ms: an error of velocity of 25 mm/s while the platform is stopped with all that is allowed.
+pub const FILTERED: Bounds = Bounds { acceleration: 1.33, jerk: 1.33, ..LONG };
+/// What hangs on the platform besides is pulled by feedback.
+pub const PULLED: Bounds = Bounds { acceleration: 1.05, ..LONG };
+/// After cycles that were missed the setpoint is followed in longer steps.
+pub const MISSED: Bounds = Bounds { jerk: 1.31, ..LONG };
+/// Within what is believed to be noise of an encoder.
+pub const UNSEEN: Bounds = Bounds { acceleration: 1.03, jerk: 1.6, ..GENTLE };
+/// A lie of the sensors works until it has made a difference that can be seen, and no more than the bound of feedback.
+pub const LIE: Bounds = Bounds { acceleration: 1.5, jerk: 1.5, rest_s: 0.2 };
+/// The same, and where nothing can be seen the impact on an end stop.
+pub const FROZEN: Bounds = Bounds { jerk: 5.2, rest_s: 0.75, ..LIE };
+/// Ten times the weight of the platform: it falls.
+pub const LOAD: Bounds = Bounds { acceleration: 10.8, jerk: 6.4, rest_s: 0.2 };
+
+pub type Row = (&'static str, Disturbance, Bounds, [Cell; 7]);
+
+/// Not finite, from another time, ...: the same in every state.
+pub const fn unusable_measurement(cause: DiagnosticCode) -> [Cell; 7] {
+    let brake = Brake(cause);
+    [Idle(State::Off, cause), brake, brake, brake, brake, brake, On]
+}
+
+pub const fn unusable_setpoint(cause: DiagnosticCode) -> [Cell; 7] {
+    [Idle(State::Standby, cause), Stop(cause), Stop(cause), Stop(cause), On, On, On]
+}
+
+/// Of setpoints that are wrong only in motion.
+pub const fn wrong_in_motion(cause: DiagnosticCode) -> [Cell; 7] {
+    [On, On, On, Stop(cause), On, On, On]
+}
+
+pub const EVERYWHERE: [Cell; 7] = [On; 7];
+pub const TOO_FAR: Cell = Idle(State::Standby, SetpointTooFar);
+pub const FULL_STOP: Cell = Brake(EmergencyStop);
+pub const SWITCHED_OFF: Cell = Idle(State::Off, OperatorRequest);
+pub const SATURATED: Cell = Path(&[(State::Stopping, FeedbackSaturated), (State::Fault, FollowingError)]);
+pub const PARKS: Cell = Path(&[
+    (State::Stopping, OperatorRequest),
+    (State::Parking, OperatorRequest),
+    (State::Off, OperatorRequest),
+]);
+pub const LATE_STOP: Cell = Path(&[
+    (State::Active, DiagnosticCode::None),
+    (State::Stopping, SetpointBeyondLimits),
+    (State::Fault, SetpointBeyondLimits),
+]);
+
+/// A cell in a mode that knows less. Its causes and states are those of the table; where not, it is said here.
+pub fn in_mode(
+    policy: ViolationPolicy,
+    mode: ControlMode,
+    name: &str,
+    situation: Situation,
+    bounds: Bounds,
+    cell: Cell,
+) -> (Bounds, Cell) {
+    use Situation::{AtRest, Engaging, InMotion, Parking, Stopping};
+    let wider = |acceleration: f64, jerk: f64| Bounds {
+        acceleration: bounds.acceleration.max(acceleration),
+        jerk: bounds.jerk.max(jerk),
+        ..bounds
+    };
+    let (is_gravity, is_pd) = (mode == ControlMode::GravityJointPd, mode == ControlMode::JointPd);
+    if let Some(cell) = without_a_leg(mode, situation).filter(|_| name == "a leg without force") {
+        return (if is_pd { wider(1.4, 6.3) } else { wider(1.25, 1.16) }, cell);
+    }
+    match (name, situation) {
+        // Missing measurements are replaced by errors that vanish as the law wants it. Errors that hold up what the
+        // model leaves out do not: force comes back with the next measurement.
+        ("measurements pause for 10 ms", Engaging | InMotion | Stopping | Parking) if is_gravity => {
+            (wider(1.85, 4.1), cell)
+        }
+        ("measurements pause for 10 ms", Stopping) if is_pd => (wider(1.9, 6.3), cell),
+        ("one rate NaN, once" | "a leg's length jumps by 20 mm, once", _) if is_gravity => {
+            (wider(1.25, 1.8), cell)
+        }
+        ("setpoints end, then measurements" | "daemon held for 5 ms", Stopping) if is_gravity => {
+            (wider(1.31, 1.31), cell)
+        }
+        ("rates filtered with 5 ms", Stopping) if is_gravity => (wider(1.4, 1.4), cell),
+        ("daemon held for 5 ms", Stopping) if mode.acts_on_legs() && !is_pd => (wider(1.02, 1.46), cell),
+        ("off, and engage 3 ms later", Engaging | InMotion | Stopping) if is_pd => {
+            (bounds, Full(&[(State::Off, OperatorRequest)]))
+        }
+        ("off, and park 10 ms later" | "estop, then clear, and park 10 ms later", InMotion | Stopping)
+            if is_gravity =>
+        {
+            (wider(1.25, 1.6), cell)
+        }
+        ("lengths and rates frozen", Engaging) if is_gravity => (wider(0.0, 6.0), cell),
+        // Feedback of the legs may be larger than that of the pose.
+        ("lengths and rates frozen" | "rates zero" | "rates in mm/s" | "rates of the wrong sign", _)
+            if mode.acts_on_legs() && !is_pd =>
+        {
+            (wider(1.8, 3.3), cell)
+        }
+        ("lengths and rates frozen", InMotion) if is_pd => (wider(1.8, 6.3), cell),
+        // It still sags, and nothing damps that.
+        ("lengths and rates frozen" | "rates zero", AtRest) if is_pd => {
+            (Bounds { rest_s: f64::INFINITY, ..wider(1.4, 6.3) }, cell)
+        }
+        // By now it sags further from the setpoint than it may be.
+        ("daemon restarted", Engaging) if is_pd => (bounds, TOO_FAR),
+        // What the reference does with all that the limits allow, and on both sides of them.
+        _ if policy == ViolationPolicy::Limit && (is_gravity || is_pd) => {
+            let wider = wider(1.8, if is_pd { 6.3 } else { 1.8 });
+            (Bounds { rest_s: if bounds.rest_s > 0.5 { f64::INFINITY } else { 0.4 }, ..wider }, cell)
+        }
+        // It falls by its sag when control begins, and further where an error that holds it up is not measured.
+        _ if is_pd => (wider(1.4, 6.3), cell),
+        // Inertia is left to feedback: the platform lags, and shoots over at the end of a stop with all that is allowed.
+        _ if is_gravity => (wider(1.25, 1.03), cell),
+        _ => (bounds, cell),
+    }
+}
+
+/// A leg without force in a mode on legs. They are bounded one by one, more widely: feedback is saturated, or the platform
+/// too far away, before its velocity is wrong.
+fn without_a_leg(mode: ControlMode, situation: Situation) -> Option<Cell> {
+    let is_pd = mode == ControlMode::JointPd;
+    Some(match (mode, situation) {
+        (ControlMode::ComputedTorque, _) => return None,
+        (_, Situation::InMotion) => SATURATED,
+        (_, Situation::Parking) if !is_pd => SATURATED,
+        (_, Situation::AtRest) if !is_pd => Stop(FeedbackSaturated),
+        (_, Situation::AtRest | Situation::Parking) => Brake(FollowingError),
+        (ControlMode::JointPd, Situation::Engaging) => {
+            Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FollowingError)])
+        }
+        (ControlMode::GravityJointPd, Situation::Engaging) => Path(&[
+            (State::Active, DiagnosticCode::None),
+            (State::Stopping, FeedbackSaturated),
+            (State::Fault, FeedbackSaturated),
+        ]),
+        (_, Situation::Engaging) => Path(&[
+            (State::Active, DiagnosticCode::None),
+            (State::Stopping, FeedbackSaturated),
+            (State::Fault, FollowingError),
+        ]),
+        (_, Situation::Standby | Situation::Stopping | Situation::Fault) => return None,
+    })
+}

@@ -1,0 +1,157 @@
+//! The rows of the table: every fault, and what becomes of it in every state.
+
+use hexad::control::diagnostic::DiagnosticCode::{
+    self, DeadlineMissed, EmergencyStop, HoldingPose, LengthOutOfStroke, MeasurementJumped, MeasurementLost,
+    MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest, RateInconsistent, RateJumped,
+    ReadyToEngage, SetpointBeyondLimits, SetpointEnded, SetpointJumped, SetpointLost, SetpointNotFinite,
+    SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFast, VelocityError,
+};
+use hexad::control::state::State;
+
+use super::cells::Cell::{self, Brake, End, Full, Idle, On, Path, Stop, Unseen};
+use super::cells::{
+    ACCELERATED, AT_FORCE_LIMIT, Bounds, ENDLESS, EVERYWHERE, FILTERED, FROZEN, FULL_STOP, GENTLE, LATE,
+    LATE_STOP, LIE, LOAD, LONG, MISSED, NOISE, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED,
+    Row, SATURATED, SWITCHED_OFF, TOO_FAR, UNSEEN, unusable_measurement, unusable_setpoint, wrong_in_motion,
+};
+use super::disturbances::{host, machine, measurements, operator, setpoints, together};
+use super::sequences;
+
+/// Engaged, without a fault, and never on the setpoint.
+const NEVER_ACTIVE: Cell = Path(&[]);
+/// The platform must move before its rates can be seen to be wrong.
+const SEEN_LATE: Cell = Path(&[(State::Active, DiagnosticCode::None), (State::Fault, RateInconsistent)]);
+const ENGAGES: Cell = Full(&[(State::Engaging, DiagnosticCode::None), (State::Active, DiagnosticCode::None)]);
+const OFF_TO_THE_END: Cell = Full(&[(State::Off, OperatorRequest)]);
+const PARKS_AGAIN: Cell = Full(&[
+    (State::Stopping, OperatorRequest),
+    (State::Parking, OperatorRequest),
+    (State::Off, OperatorRequest),
+]);
+const PARKS_AFTER_ESTOP: Cell = Full(&[
+    (State::Fault, EmergencyStop),
+    (State::Stopping, OperatorRequest),
+    (State::Parking, OperatorRequest),
+    (State::Off, OperatorRequest),
+]);
+
+/// In the columns: standby, engaging, active at rest, active in motion, stopping, parking, fault.
+#[rustfmt::skip]
+pub const ROWS: &[Row] = &[
+    ("nothing", |_| {}, LONG, EVERYWHERE),
+    // Measurements.
+    ("measurements end", measurements::end, GENTLE, unusable_measurement(MeasurementLost)),
+    ("measurements pause for 10 ms", measurements::pause_10_ms, LONG, EVERYWHERE),
+    ("measurements pause for 30 ms", measurements::pause_30_ms, GENTLE, [On, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
+    ("lengths NaN", measurements::nan_length, GENTLE, unusable_measurement(MeasurementNotFinite)),
+    ("one rate NaN, once", measurements::nan_rate_once, LONG, EVERYWHERE),
+    ("rates infinite", measurements::infinite_rate, GENTLE, unusable_measurement(MeasurementNotFinite)),
+    ("a leg's length jumps by 20 mm", measurements::jump_20_mm, GENTLE, [TOO_FAR, Brake(MeasurementJumped), Brake(MeasurementJumped), Brake(MeasurementJumped), Brake(MeasurementJumped), Brake(MeasurementJumped), On]),
+    ("a leg's length jumps by 20 mm, once", measurements::jump_20_mm_once, LONG, EVERYWHERE),
+    ("a leg's length slips by 1 mm", measurements::slip_1_mm, UNSEEN, [On, Brake(RateInconsistent), Brake(RateInconsistent), On, On, On, On]),
+    ("lengths and rates frozen", measurements::freeze, FROZEN, [On, Unseen, On, Brake(RateInconsistent), Brake(RateInconsistent), Brake(RateInconsistent), On]),
+    ("a length beyond the stroke", measurements::out_of_stroke, GENTLE, unusable_measurement(LengthOutOfStroke)),
+    ("rates of the wrong sign", measurements::rates_of_wrong_sign, Bounds { rest_s: 0.7, ..LIE }, [On, Brake(RateInconsistent), Brake(RateInconsistent), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("rates in mm/s", measurements::rates_in_mm, LIE, [On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("rates zero", measurements::rates_zero, Bounds { rest_s: 0.9, ..LIE }, [On, SEEN_LATE, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("measurements stamped 1 s ago", measurements::stamps_1_s_old, GENTLE, unusable_measurement(MeasurementStampInvalid)),
+    ("measurements stamped 1 s ahead", measurements::stamps_1_s_ahead, GENTLE, unusable_measurement(MeasurementStampInvalid)),
+    ("measurements stamped 0", measurements::stamps_of_nothing, GENTLE, unusable_measurement(MeasurementStampInvalid)),
+    ("measurements' stamps run backward", measurements::stamps_run_backward, GENTLE, unusable_measurement(MeasurementStampInvalid)),
+    ("counts of 1 um, noise of 1 mm/s", measurements::noise_of_encoders, NOISE, EVERYWHERE),
+    ("rates filtered with 5 ms", measurements::filtered_rates, FILTERED, EVERYWHERE),
+    // Setpoints.
+    ("setpoints end", setpoints::end, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Stop(SetpointLost), On, On, On]),
+    ("setpoints pause for 30 ms", setpoints::pause_30_ms, LONG, EVERYWHERE),
+    ("setpoints repeated with fresh stamps", setpoints::freeze, GENTLE, wrong_in_motion(SetpointBeyondLimits)),
+    ("X NaN", setpoints::nan_x, GENTLE, unusable_setpoint(SetpointNotFinite)),
+    ("X NaN, once", setpoints::nan_x_once, LONG, EVERYWHERE),
+    ("X'' infinite", setpoints::infinite_xdd, GENTLE, unusable_setpoint(SetpointNotFinite)),
+    ("X jumps by 10 mm", setpoints::jump_10_mm, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), Stop(SetpointJumped), On, On, On]),
+    ("X jumps by 10 mm, once", setpoints::jump_10_mm_once, LONG, EVERYWHERE),
+    ("X, X', X'' zero", setpoints::all_zero, GENTLE, unusable_setpoint(SetpointOutOfEnvelope)),
+    ("X' zero", setpoints::without_rates, GENTLE, wrong_in_motion(SetpointJumped)),
+    ("X' in mm/s", setpoints::rates_in_mm, GENTLE, wrong_in_motion(SetpointTooFast)),
+    ("X' of the wrong sign", setpoints::rates_of_wrong_sign, GENTLE, wrong_in_motion(SetpointJumped)),
+    ("X' of another motion", setpoints::rate_while_standing, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), Stop(SetpointJumped), On, On, On]),
+    ("X'' zero", setpoints::without_accelerations, LONG, EVERYWHERE),
+    ("X'' of another motion", setpoints::acceleration_while_standing, LONG, [On, NEVER_ACTIVE, On, On, On, On, On]),
+    ("too fast", setpoints::too_fast, GENTLE, unusable_setpoint(SetpointTooFast)),
+    ("too strong an acceleration", setpoints::too_strong, GENTLE, unusable_setpoint(SetpointTooFast)),
+    ("a step of acceleration", setpoints::step_of_acceleration, LATE, [Idle(State::Standby, SetpointTooFast), Path(&[(State::Active, DiagnosticCode::None), (State::Stopping, SetpointTooFast), (State::Fault, SetpointTooFast)]), Stop(SetpointTooFast), Stop(SetpointTooFast), On, On, On]),
+    ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [Idle(State::Standby, SetpointOutOfReach), LATE_STOP, Stop(SetpointBeyondLimits), Stop(SetpointBeyondLimits), On, On, On]),
+    ("beyond the stroke", setpoints::beyond_stroke, GENTLE, unusable_setpoint(SetpointOutOfReach)),
+    ("out of the envelope", setpoints::out_of_envelope, GENTLE, unusable_setpoint(SetpointOutOfEnvelope)),
+    ("setpoints stamped 1 s ago", setpoints::stamps_1_s_old, GENTLE, unusable_setpoint(SetpointStampInvalid)),
+    ("setpoints stamped 1 s ahead", setpoints::stamps_1_s_ahead, GENTLE, unusable_setpoint(SetpointStampInvalid)),
+    ("setpoints' stamps run backward", setpoints::stamps_run_backward, GENTLE, unusable_setpoint(SetpointStampInvalid)),
+    ("two sources at once", setpoints::second_source, LONG, [TOO_FAR, On, On, On, On, On, On]),
+    ("100 Hz, stamps off by 0.2 ms", setpoints::slow_and_jittery, LONG, EVERYWHERE),
+    // The operator.
+    ("estop", operator::estop, GENTLE, [FULL_STOP; 7]),
+    ("off", operator::off, GENTLE, [SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, SWITCHED_OFF, On]),
+    ("stop", operator::stop, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
+    ("park", operator::park, LONG, [PARKS, PARKS, PARKS, PARKS, Path(&[(State::Parking, OperatorRequest), (State::Off, OperatorRequest)]), On, On]),
+    ("clear", operator::clear, LONG, [On, On, On, On, On, On, TOO_FAR]),
+    ("engage", operator::engage, LONG, [Path(&[(State::Engaging, DiagnosticCode::None), (State::Active, DiagnosticCode::None)]), On, On, On, On, On, On]),
+    ("engage far away", operator::engage_far_away, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), On, On, On, On]),
+    // The machine.
+    ("collision", machine::collision, GENTLE, [On, On, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("the drives brake by themselves", machine::braked, GENTLE, [On, On, On, Brake(VelocityError), On, SATURATED, On]),
+    ("a leg without force", machine::leg_without_force, Bounds { rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On, Brake(VelocityError), On]),
+    ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, EVERYWHERE),
+    ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On]),
+    // The host.
+    ("deadline missed", host::deadline_missed, GENTLE, [On, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
+    ("daemon held for 1 s", host::held_1_s, GENTLE, [On, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
+    ("daemon held for 5 ms", host::held_5_ms, MISSED, EVERYWHERE),
+    ("daemon restarted", host::restarted, GENTLE, [On, Idle(State::Standby, ReadyToEngage), Idle(State::Standby, ReadyToEngage), TOO_FAR, TOO_FAR, TOO_FAR, TOO_FAR]),
+    // Two at once.
+    ("setpoints end, then measurements", together::setpoint_ends_then_measurement, GENTLE, [Idle(State::Off, MeasurementLost), End(SetpointEnded), End(SetpointEnded), Path(&[(State::Stopping, SetpointLost), (State::Fault, MeasurementLost)]), On, Brake(MeasurementLost), On]),
+    ("both end", together::both_end, GENTLE, unusable_measurement(MeasurementLost)),
+    ("NaN in both", together::nan_in_both, GENTLE, unusable_measurement(MeasurementNotFinite)),
+    ("X jumps and a deadline is missed", together::setpoint_jumps_and_deadline_missed, GENTLE, [TOO_FAR, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
+    ("estop without measurements", together::estop_without_measurement, GENTLE, [FULL_STOP; 7]),
+    ("off without measurements", together::off_without_measurement, GENTLE, [SWITCHED_OFF, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
+    ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(VelocityError), On, SATURATED, On]),
+    ("stop every 10 ms", together::stop_every_10_ms, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
+    ("estop, then engage", together::estop_then_engage, GENTLE, [FULL_STOP; 7]),
+    // One after the other.
+    ("off, and engage 3 ms later", sequences::off_then_engage, OUT_OF_THE_BRAKES, [ENGAGES, ENGAGES, ENGAGES, ENGAGES, ENGAGES, OFF_TO_THE_END, On]),
+    ("off, and park 10 ms later", sequences::off_then_park, PARKED_OUT_OF_THE_BRAKES, [PARKS_AGAIN, PARKS_AGAIN, PARKS_AGAIN, PARKS_AGAIN, PARKS_AGAIN, PARKS_AGAIN, On]),
+    ("estop, then clear, and park 10 ms later", sequences::estop_clear_park, PARKED_OUT_OF_THE_BRAKES, [PARKS_AFTER_ESTOP, PARKS_AFTER_ESTOP, PARKS_AFTER_ESTOP, PARKS_AFTER_ESTOP, PARKS_AFTER_ESTOP, PARKS_AFTER_ESTOP, PARKS_AGAIN]),
+    ("the source ends while it accelerates", sequences::ends_while_accelerating, ACCELERATED, [Idle(State::Standby, SetpointLost), Path(&[(State::Active, DiagnosticCode::None), (State::Stopping, SetpointLost), (State::Fault, SetpointLost)]), Stop(SetpointLost), Stop(SetpointLost), On, On, On]),
+];
+
+const HOLDS: Cell = Path(&[(State::Engaging, HoldingPose)]);
+/// And is still on its way onto the setpoint a second later.
+const HOLDS_AND_CLOSES: Cell =
+    Path(&[(State::Engaging, HoldingPose), (State::Engaging, DiagnosticCode::None)]);
+const HOLDS_AND_GOES_ON: Cell = Path(&[
+    (State::Engaging, HoldingPose),
+    (State::Engaging, DiagnosticCode::None),
+    (State::Active, DiagnosticCode::None),
+]);
+
+/// Under `on_violation = "limit"`: no setpoint is a fault, and what the platform feels is the same.
+#[rustfmt::skip]
+pub const ROWS_UNDER_LIMIT: &[Row] = &[
+    ("nothing", |_| {}, LONG, EVERYWHERE),
+    ("setpoints end", setpoints::end, GENTLE, [Idle(State::Standby, SetpointEnded), HOLDS, HOLDS, HOLDS, On, On, On]),
+    ("the source ends while it accelerates", sequences::ends_while_accelerating, ACCELERATED, [Idle(State::Standby, SetpointLost), Path(&[(State::Active, DiagnosticCode::None), (State::Engaging, HoldingPose)]), HOLDS, HOLDS, On, On, On]),
+    ("setpoints end, and go on 5 cm beside", sequences::end_and_go_on_elsewhere, Bounds { rest_s: f64::INFINITY, ..AT_FORCE_LIMIT }, [TOO_FAR, HOLDS_AND_CLOSES, HOLDS_AND_GOES_ON, HOLDS_AND_CLOSES, On, On, On]),
+    ("setpoints repeated with fresh stamps", setpoints::freeze, LONG, EVERYWHERE),
+    ("X NaN", setpoints::nan_x, GENTLE, [Idle(State::Standby, SetpointNotFinite), HOLDS, HOLDS, HOLDS, On, On, On]),
+    ("X jumps by 10 mm", setpoints::jump_10_mm, LONG, [TOO_FAR, On, On, On, On, On, On]),
+    ("X' of another motion", setpoints::rate_while_standing, LONG, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
+    ("too fast", setpoints::too_fast, AT_FORCE_LIMIT, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
+    ("too strong an acceleration", setpoints::too_strong, LONG, [On, NEVER_ACTIVE, On, On, On, On, On]),
+    ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [TOO_FAR, On, On, On, On, On, On]),
+    ("beyond the stroke", setpoints::beyond_stroke, LONG, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
+    ("out of the envelope", setpoints::out_of_envelope, LONG, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
+    ("two sources at once", setpoints::second_source, ENDLESS, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
+    ("measurements end", measurements::end, GENTLE, unusable_measurement(MeasurementLost)),
+    ("estop", operator::estop, GENTLE, [FULL_STOP; 7]),
+    ("stop", operator::stop, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
+];
