@@ -22,8 +22,8 @@ use nalgebra::ComplexField as _;
 const MAX_SATURATION_S: f64 = 0.1;
 
 /// Speed at which the time of saturation is forgotten, over that at which it counts: feedback that oscillates between its
-/// bounds is saturated an eighth of the time at least.
-const FORGETTING_RATIO: f64 = 0.1;
+/// bounds, as about a sensor that is frozen, is saturated a twentieth of the time at least.
+const FORGETTING_RATIO: f64 = 0.03;
 
 /// Bound of the feedback, and for how long it was reached lately.
 #[derive(Clone, Copy, Debug, Default)]

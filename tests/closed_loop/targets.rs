@@ -58,7 +58,6 @@ fn a_target_is_reached_gently_and_stood_at_without_further_messages() {
 
 /// Control may begin on a target however far it is; the distance is closed with the limits of autonomous motions.
 #[test]
-#[ignore = "while engaging autonomous_scale counts twice: 0.1 m take 3 s instead of 0.8 s"]
 fn control_begins_on_a_target_far_away() {
     for policy in [ViolationPolicy::Stop, ViolationPolicy::Limit] {
         let config = with_policy("motion_base", policy);

@@ -145,7 +145,6 @@ fn nearer_than_the_limit_of_condition_is_stopped_before() {
 
 /// Under the other policy it is no fault to send more: the platform waits at the limit, and comes back.
 #[test]
-#[ignore = "the reference goes to the limit itself, and the platform microradians beyond: NearSingular"]
 fn under_the_policy_limit_the_platform_waits_before_the_limit_of_condition() {
     for time_s in TIMES_S {
         let mut config = motion_base(100.0);

@@ -4,9 +4,9 @@
 //! The precheck does not look at forces, nor at the approach to the first setpoint, which keeps the limits by itself.
 
 use core::fmt;
+use core::ops::ControlFlow;
 
 use nalgebra::Vector6;
-use rayon::prelude::*;
 
 use crate::config::Config;
 use crate::control::controller::Setpoint;
@@ -57,7 +57,22 @@ impl<'a> Precheck<'a> {
     }
 
     /// The first setpoint from `from` to `to` that the daemon would refuse, if it follows the trajectory from `from` on.
-    pub fn refusal(&self, at: impl Fn(f64) -> TaskState, [from, to]: [f64; 2]) -> Option<SetpointRefusal> {
+    pub fn refusal(&self, at: impl Fn(f64) -> TaskState, span: [f64; 2]) -> Option<SetpointRefusal> {
+        let mut first = None;
+        self.follow(at, span, |refusal| {
+            first = Some(refusal);
+            ControlFlow::Break(())
+        });
+        first
+    }
+
+    /// Follows the trajectory from `from` to `to`; after a refusal, unless that ends it, from the refused setpoint on.
+    pub fn follow(
+        &self,
+        at: impl Fn(f64) -> TaskState,
+        [from, to]: [f64; 2],
+        mut refused: impl FnMut(SetpointRefusal) -> ControlFlow<()>,
+    ) {
         let constants = Constants::new(self.machine, self.parameters);
         let period_ns = self.parameters.period_ns;
         let setpoint = |k: u64| SetpointMotion::new(Setpoint::motion(k * period_ns, at(self.time(from, k))));
@@ -71,28 +86,20 @@ impl<'a> Precheck<'a> {
             let result = result.and_then(|()| check_deviation(&self.parameters, &reference, &now));
             if let Err(diagnostic) = result {
                 let active_limits = active_limits.union(reference.active_limits());
-                return Some(SetpointRefusal { t: self.time(from, k), diagnostic, active_limits });
+                let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits };
+                if refused(refusal).is_break() {
+                    return;
+                }
+                reference.start(&constants, k * period_ns, &now.motion);
             }
             reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
             now = setpoint(k + 1);
         }
-        None
     }
 
     /// Time of the k-th cycle \[s\].
     fn time(&self, from: f64, k: u64) -> f64 {
         from + (k * self.parameters.period_ns) as f64 * 1e-9
-    }
-
-    /// The first refusal within `seconds`, searched in equal spans.
-    pub fn first_refusal(
-        &self,
-        at: impl Fn(f64) -> TaskState + Sync,
-        seconds: f64,
-        spans: u32,
-    ) -> Option<SetpointRefusal> {
-        let end = |k: u32| seconds * f64::from(k) / f64::from(spans);
-        (0..spans).into_par_iter().find_map_first(|k| self.refusal(&at, [end(k), end(k + 1)]))
     }
 }
 

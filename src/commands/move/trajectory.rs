@@ -1,5 +1,6 @@
 //! Trajectory of a setpoint source: a built-in motion, or the rows of a file.
 
+use core::ops::ControlFlow;
 use std::path::Path;
 
 use tracing::info;
@@ -25,13 +26,6 @@ const MIN_STEP_S: f64 = 1e-6;
 /// Least amplitude of a built-in motion, as a share of its usual one; a smaller motion is invisible.
 pub(super) const MIN_AMPLITUDE_SHARE: f64 = 1e-3;
 
-/// Length of the spans in which the precheck looks at a built-in motion \[s\]; in these it misses nothing at 1 kHz.
-const PRECHECK_SPAN_S: f64 = 0.1;
-
-/// Largest number of such spans. The precheck of a day then looks every 43 ms, in which the fastest sine changes by a
-/// hundredth.
-const MAX_PRECHECK_SPANS: f64 = 20_000.0;
-
 /// X, X', X'' as a function of time, from rest to rest.
 #[derive(Clone, Debug)]
 pub enum Trajectory {
@@ -44,8 +38,7 @@ impl Trajectory {
     pub fn built_in(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<Self, SetpointError> {
         let precheck = Precheck::new(config).with_reserve();
         let largest = fit(&config.machine, motion, seconds);
-        let spans = (seconds / PRECHECK_SPAN_S).ceil().clamp(1.0, MAX_PRECHECK_SPANS) as u32;
-        let refusal = |scene: &FittedMotion| precheck.first_refusal(|t| scene.at(t), seconds, spans);
+        let refusal = |scene: &FittedMotion| precheck.refusal(|t| scene.at(t), [0.0, seconds]);
         let Some(too_large) = refusal(&largest) else { return Ok(Self::BuiltIn(largest)) };
         let smallest = largest.smaller(MIN_AMPLITUDE_SHARE / largest.angle_share);
         if let Some(refusal) = refusal(&smallest) {
@@ -72,16 +65,26 @@ impl Trajectory {
     /// Reports each row on the way to which the daemon would refuse a setpoint.
     fn check(&self, config: &Config, table: &NumberTable, path: &Path) -> Result<(), TableError> {
         let precheck = Precheck::new(config);
-        let times = table.rows().iter().map(|row| time(row));
-        let first = times.clone().next().unwrap_or_default();
+        let times: Vec<f64> = table.rows().iter().map(|row| time(row)).collect();
+        let (Some(first), Some(last)) = (times.first().copied(), times.last().copied()) else {
+            return Ok(());
+        };
         let mut errors = TableErrors::new(path);
-        // The first row has none before it: the span from it to itself.
-        let starts = times.clone().take(1).chain(times.clone());
-        for ((start, end), line) in starts.zip(times).zip(table.lines()) {
-            if let Some(refusal) = precheck.refusal(|t| self.at(t - first), [start, end]) {
-                errors.add(format!("line {line}: on the way to it, at {refusal}"));
-            }
-        }
+        let mut reported = None;
+        precheck.follow(
+            |t| self.at(t - first),
+            [first, last],
+            |refusal| {
+                // The setpoint is that of the row after it, or of the last.
+                let row = times.partition_point(|time| *time < refusal.t);
+                let line = table.lines().get(row).or(table.lines().last());
+                if let Some(line) = line.filter(|line| reported != Some(**line)) {
+                    errors.add(format!("line {line}: on the way to it, at {refusal}"));
+                    reported = Some(*line);
+                }
+                ControlFlow::Continue(())
+            },
+        );
         errors.into_result()
     }
 

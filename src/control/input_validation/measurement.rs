@@ -1,5 +1,8 @@
 //! Validation of measurements: stroke, change of lengths and rates, and rates that are those of the lengths.
 
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+
 use super::{LastValid, check_stroke_with_tolerance, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Measurement};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
@@ -162,7 +165,7 @@ impl MeasurementValidator {
         // J dt^3 / 12 per step, over the steps of the time constant.
         let limits = &cycle.constants.parameters.limits;
         let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
-        consistency.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * dt * dt / 12.0)?;
+        consistency.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * dt.min(window_s).powi(2) / 12.0)?;
         Ok(consistency)
     }
 }

@@ -248,7 +248,7 @@ fn check_limits(
 ) -> Result<(), Diagnostic> {
     check_velocity_and_acceleration(parameters, motion, active)?;
     check_envelope(parameters, setpoint, active)?;
-    check_legs(machine, motion, active)
+    check_legs(machine, parameters, motion, active)
 }
 
 fn check_velocity_and_acceleration(
@@ -287,7 +287,12 @@ fn check_envelope(
     Ok(())
 }
 
-fn check_legs(machine: &Machine, motion: &Motion, active: &mut LimitSet) -> Result<(), Diagnostic> {
+fn check_legs(
+    machine: &Machine,
+    parameters: &Parameters,
+    motion: &Motion,
+    active: &mut LimitSet,
+) -> Result<(), Diagnostic> {
     let actuator = &machine.actuator;
     let legs = leg_motion(machine, motion);
     for (leg, rate) in legs.rate.iter().enumerate() {
@@ -296,5 +301,5 @@ fn check_legs(machine: &Machine, motion: &Motion, active: &mut LimitSet) -> Resu
             return Err(Diagnostic::new(DiagnosticCode::SetpointTooFast, ratio, 1.0).at(leg));
         }
     }
-    check_stroke(actuator, 0.0, DiagnosticCode::SetpointOutOfReach, &legs.length)
+    check_stroke(actuator, -parameters.stroke_margin, DiagnosticCode::SetpointOutOfReach, &legs.length)
 }

@@ -238,7 +238,8 @@ impl ReferenceGenerator {
         h: f64,
     ) -> Motion {
         let limits = target.limits(&constants.parameters.limits);
-        let approach = |limits| Approach::new(limits, self.closing_scale, h);
+        let closing_scale = target.closing_scale(self.closing_scale);
+        let approach = |limits| Approach::new(limits, closing_scale, h);
         let (turning, shifting) = (approach(limits.orientation), approach(limits.position));
         let Motion { pose, twist, acceleration } = &self.motion;
         // Where the present acceleration leads: to first order in its displacement, which is exact on the target.

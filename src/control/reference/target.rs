@@ -60,6 +60,11 @@ impl<'a> Target<'a> {
         }
     }
 
+    /// Share of its limits with which the distance is closed: those of a pose are scaled already.
+    pub(super) fn closing_scale(&self, scale: f64) -> f64 {
+        if let Self::Pose(_) = self { 1.0 } else { scale }
+    }
+
     /// The limits of the way to it.
     pub(super) fn limits(&self, limits: &Limits) -> Limits {
         match self {
