@@ -103,7 +103,11 @@ fn poses_beyond_the_stroke_are_approached_to_its_end() {
             let home = ride.home;
             (0..4000).for_each(|_| _ = ride.follow(Some(home)));
             ride.assert_limits([0.1, 0.5, 0.5], &format!("{name} {axis} {sign}"));
-            assert!(ride.distance(&home).into_iter().all(|distance| distance < 1e-6), "{name} {axis} {sign}");
+            let distance = ride.distance(&home);
+            assert!(
+                distance.into_iter().all(|distance| distance < 1e-6),
+                "{name} {axis} {sign}: {distance:?}"
+            );
         }
     }
 }

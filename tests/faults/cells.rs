@@ -120,7 +120,6 @@ pub const EVERYWHERE: [Cell; 7] = [On; 7];
 pub const TOO_FAR: Cell = Idle(State::Standby, SetpointTooFar);
 pub const FULL_STOP: Cell = Brake(EmergencyStop);
 pub const SWITCHED_OFF: Cell = Idle(State::Off, OperatorRequest);
-pub const SATURATED: Cell = Path(&[(State::Stopping, FeedbackSaturated), (State::Fault, FollowingError)]);
 pub const PARKS: Cell = Path(&[
     (State::Stopping, OperatorRequest),
     (State::Parking, OperatorRequest),
@@ -205,25 +204,17 @@ pub fn in_mode(
 /// too far away, before its velocity is wrong.
 fn without_a_leg(mode: ControlMode, situation: Situation) -> Option<Cell> {
     let is_pd = mode == ControlMode::JointPd;
-    Some(match (mode, situation) {
-        (ControlMode::ComputedTorque, _) => return None,
-        (_, Situation::InMotion) => SATURATED,
-        (_, Situation::Parking) if !is_pd => SATURATED,
-        (_, Situation::AtRest) if !is_pd => Stop(FeedbackSaturated),
-        (_, Situation::AtRest | Situation::Parking) => Brake(FollowingError),
-        (ControlMode::JointPd, Situation::Engaging) => {
+    Some(match situation {
+        _ if mode == ControlMode::ComputedTorque => return None,
+        Situation::InMotion => Brake(FeedbackSaturated),
+        Situation::AtRest | Situation::Parking if is_pd => Brake(FollowingError),
+        Situation::AtRest | Situation::Parking => Brake(FeedbackSaturated),
+        Situation::Engaging if is_pd => {
             Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FollowingError)])
         }
-        (ControlMode::GravityJointPd, Situation::Engaging) => Path(&[
-            (State::Active, DiagnosticCode::None),
-            (State::Stopping, FeedbackSaturated),
-            (State::Fault, FeedbackSaturated),
-        ]),
-        (_, Situation::Engaging) => Path(&[
-            (State::Active, DiagnosticCode::None),
-            (State::Stopping, FeedbackSaturated),
-            (State::Fault, FollowingError),
-        ]),
-        (_, Situation::Standby | Situation::Stopping | Situation::Fault) => return None,
+        Situation::Engaging => {
+            Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FeedbackSaturated)])
+        }
+        Situation::Standby | Situation::Stopping | Situation::Fault => return None,
     })
 }

@@ -1,10 +1,11 @@
 //! The rows of the table: every fault, and what becomes of it in every state.
 
 use hexad::control::diagnostic::DiagnosticCode::{
-    self, DeadlineMissed, EmergencyStop, HoldingPose, LengthOutOfStroke, MeasurementJumped, MeasurementLost,
-    MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest, RateInconsistent, RateJumped,
-    ReadyToEngage, SetpointBeyondLimits, SetpointEnded, SetpointJumped, SetpointLost, SetpointNotFinite,
-    SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFast, VelocityError,
+    self, DeadlineMissed, EmergencyStop, FeedbackSaturated, HoldingPose, LengthOutOfStroke,
+    MeasurementJumped, MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest,
+    RateInconsistent, RateJumped, ReadyToEngage, SetpointBeyondLimits, SetpointEnded, SetpointJumped,
+    SetpointLost, SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid,
+    SetpointTooFast, VelocityError,
 };
 use hexad::control::state::State;
 
@@ -12,7 +13,7 @@ use super::cells::Cell::{self, Brake, End, Full, Idle, On, Path, Stop, Unseen};
 use super::cells::{
     ACCELERATED, AT_FORCE_LIMIT, Bounds, ENDLESS, EVERYWHERE, FILTERED, FROZEN, FULL_STOP, GENTLE, LATE,
     LATE_STOP, LIE, LOAD, LONG, MISSED, NOISE, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED,
-    Row, SATURATED, SWITCHED_OFF, TOO_FAR, UNSEEN, unusable_measurement, unusable_setpoint, wrong_in_motion,
+    Row, SWITCHED_OFF, TOO_FAR, UNSEEN, unusable_measurement, unusable_setpoint, wrong_in_motion,
 };
 use super::disturbances::{host, machine, measurements, operator, setpoints, together};
 use super::sequences;
@@ -53,7 +54,7 @@ pub const ROWS: &[Row] = &[
     ("a length beyond the stroke", measurements::out_of_stroke, GENTLE, unusable_measurement(LengthOutOfStroke)),
     ("rates of the wrong sign", measurements::rates_of_wrong_sign, Bounds { rest_s: 0.7, ..LIE }, [On, Brake(RateInconsistent), Brake(RateInconsistent), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
     ("rates in mm/s", measurements::rates_in_mm, LIE, [On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("rates zero", measurements::rates_zero, Bounds { rest_s: 0.9, ..LIE }, [On, SEEN_LATE, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("rates zero", measurements::rates_zero, Bounds { jerk: 6.4, rest_s: 0.9, ..LIE }, [On, SEEN_LATE, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
     ("measurements stamped 1 s ago", measurements::stamps_1_s_old, GENTLE, unusable_measurement(MeasurementStampInvalid)),
     ("measurements stamped 1 s ahead", measurements::stamps_1_s_ahead, GENTLE, unusable_measurement(MeasurementStampInvalid)),
     ("measurements stamped 0", measurements::stamps_of_nothing, GENTLE, unusable_measurement(MeasurementStampInvalid)),
@@ -97,7 +98,7 @@ pub const ROWS: &[Row] = &[
     ("engage far away", operator::engage_far_away, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), On, On, On, On]),
     // The machine.
     ("collision", machine::collision, GENTLE, [On, On, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake by themselves", machine::braked, GENTLE, [On, On, On, Brake(VelocityError), On, SATURATED, On]),
+    ("the drives brake by themselves", machine::braked, GENTLE, [On, On, On, Brake(VelocityError), On, Brake(FeedbackSaturated), On]),
     ("a leg without force", machine::leg_without_force, Bounds { rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On, Brake(VelocityError), On]),
     ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, EVERYWHERE),
     ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On]),
@@ -114,7 +115,7 @@ pub const ROWS: &[Row] = &[
     ("estop without measurements", together::estop_without_measurement, GENTLE, [FULL_STOP; 7]),
     ("off without measurements", together::off_without_measurement, GENTLE, [SWITCHED_OFF, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
     ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(VelocityError), On, SATURATED, On]),
+    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(VelocityError), On, Brake(FeedbackSaturated), On]),
     ("stop every 10 ms", together::stop_every_10_ms, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
     ("estop, then engage", together::estop_then_engage, GENTLE, [FULL_STOP; 7]),
     // One after the other.
@@ -145,7 +146,7 @@ pub const ROWS_UNDER_LIMIT: &[Row] = &[
     ("X NaN", setpoints::nan_x, GENTLE, [Idle(State::Standby, SetpointNotFinite), HOLDS, HOLDS, HOLDS, On, On, On]),
     ("X jumps by 10 mm", setpoints::jump_10_mm, LONG, [TOO_FAR, On, On, On, On, On, On]),
     ("X' of another motion", setpoints::rate_while_standing, LONG, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
-    ("too fast", setpoints::too_fast, AT_FORCE_LIMIT, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
+    ("too fast", setpoints::too_fast, Bounds { rest_s: f64::INFINITY, ..AT_FORCE_LIMIT }, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),
     ("too strong an acceleration", setpoints::too_strong, LONG, [On, NEVER_ACTIVE, On, On, On, On, On]),
     ("smoothly to the end of the stroke", setpoints::run_out_of_stroke, LONG, [TOO_FAR, On, On, On, On, On, On]),
     ("beyond the stroke", setpoints::beyond_stroke, LONG, [TOO_FAR, NEVER_ACTIVE, On, On, On, On, On]),

@@ -87,6 +87,8 @@ fn through_the_axis_of_a_joint_forces_are_cut_or_know_nothing_of_it() {
     {
         let (mut config, along) = through_axis(beside);
         config.deployment.control.fidelity = FidelityChoice::Fixed(fidelity);
+        // Forces are what is limited here, and not feedback.
+        config.deployment.limits.feedback_scale = 1e6;
         // On the machine that is controlled the joint gives way.
         let mut rig = Rig::new(&config, &deployed("motion_base").machine);
         rig.engage(&TaskState::at_rest(config.machine.home));

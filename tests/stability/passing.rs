@@ -215,9 +215,14 @@ fn saturation_on_the_way_is_told_and_ends_in_a_fault() {
             let run = run(&config, time_s, distance);
             assert!(run.limited.unwrap().abs_diff(more) <= 2, "{what}: {:?}, not {more}", run.limited);
             assert_eq!(run.force, 20e3, "{what}");
-            // Too far beside its reference, or too fast, whichever is first.
+            // Too far beside its reference, too fast, or feedback saturated for too long, whichever is first.
             let Diagnostic { code, .. } = run.last.diagnostic;
-            let gives_way = matches!(code, DiagnosticCode::FollowingError | DiagnosticCode::VelocityError);
+            let gives_way = matches!(
+                code,
+                DiagnosticCode::FollowingError
+                    | DiagnosticCode::VelocityError
+                    | DiagnosticCode::FeedbackSaturated
+            );
             assert!(run.last.state == State::Fault && gives_way, "{what}: {:?}", run.last.diagnostic);
         }
     }

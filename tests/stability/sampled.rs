@@ -96,8 +96,12 @@ fn below_the_limit_errors_fade_as_predicted() {
 }
 
 /// What is found of a loop that is not stable.
-const LETS_GO: [DiagnosticCode; 3] =
-    [DiagnosticCode::FollowingError, DiagnosticCode::VelocityError, DiagnosticCode::RateJumped];
+const LETS_GO: [DiagnosticCode; 4] = [
+    DiagnosticCode::FollowingError,
+    DiagnosticCode::VelocityError,
+    DiagnosticCode::RateJumped,
+    DiagnosticCode::RateInconsistent,
+];
 
 /// Until the path is left, or until rates jump further than a leg can accelerate.
 #[test]

@@ -13,6 +13,7 @@
 //!
 //! The attitude at the knots is that of the motion that would be played, `R <- exp(W) R` with
 //! `W = theta - dt^2/12 w0 x w1`, theta the integral of w (Magnus; the remainder is of order dt^5).
+//! Between knots a length may exceed its bound by 2.5e-5 of the stroke, an angle by as much at the outermost joint.
 //! An axis of the envelope narrower than four times the bound between knots is examined at the knots only.
 
 use nalgebra::Vector3;
@@ -36,6 +37,9 @@ const RATE_DEPARTURE_RATIO: f64 = 0.01;
 /// Bounds on the number of intervals between knots: the last bounds the work of a cycle.
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: f64 = 24.0;
+/// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
+/// it, as the departures from chords are bounded for the worst direction.
+const ROOM_RATIO: f64 = 2.5e-5;
 /// Relative allowance for rounding.
 const ROUNDING: f64 = 1e-9;
 /// Part of the width of an axis of the envelope that the bound between knots may use.
@@ -232,6 +236,7 @@ impl<'a> Examination<'a> {
         let intervals = knots.max(MIN_INTERVALS).min(MAX_INTERVALS);
         let dt = stop.duration() / intervals;
         let chord = dt.max(step.duration).powi(2) / 8.0;
+        let room = ROOM_RATIO * actuator.stroke();
         // Along the velocity and, across it, along the rest of the present acceleration.
         let Motion { twist, acceleration, .. } = motion;
         let u = twist.linear.try_normalize(0.0).unwrap_or_default();
@@ -242,7 +247,7 @@ impl<'a> Examination<'a> {
             bounds,
             intervals,
             dt,
-            length_slack: curvature * chord,
+            length_slack: (curvature * chord - room).max(0.0),
             rate_slack: rate_curvature * chord,
             position_slack: position_curvature * chord,
             needs_rates,
@@ -304,7 +309,8 @@ impl<'a> Examination<'a> {
         let alpha = self.constants.parameters.limits.orientation.acceleration;
         let is_turning = self.stop.orientation.duration > 0.0;
         let curvature = alpha / c + angular * angular * (1.0 + c + 3.0 * s) / (c * c);
-        let turned = if is_turning { curvature * self.dt * self.dt / 8.0 } else { 0.0 };
+        let room = ROOM_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
+        let turned = if is_turning { (curvature * self.dt * self.dt / 8.0 - room).max(0.0) } else { 0.0 };
         let p = &self.position_slack;
         let slacks = [turned, turned, turned, p.x, p.y, p.z];
         let Envelope { lowest, highest } = envelope;
