@@ -4,7 +4,7 @@
 use hexad::control::controller::{Input, Output, SetpointKind};
 use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad::control::limits::Limit;
-use hexad::control::state::{Request, State};
+use hexad::control::state::State;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 

@@ -11,7 +11,6 @@ use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::plant::random::Random;
 use nalgebra::Vector6;
 
-use super::common::deployed;
 use super::ride::{MACHINES, Ride, beside, with_policy};
 
 /// A joystick that is let go: the setpoint jumps by 5 cm and 0.1 rad, and stands there. The platform goes there as fast as

@@ -3,7 +3,7 @@
 use hexad::config::Config;
 use hexad::control::controller::Setpoint;
 use hexad::control::input_validation::SetpointMotion;
-use hexad::control::parameters::{Constants, Envelope, ViolationPolicy};
+use hexad::control::parameters::{Constants, Envelope, Parameters, ViolationPolicy};
 use hexad::control::reference::{ReferenceGenerator, Target};
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
@@ -104,4 +104,59 @@ fn the_platform_slides_along_walls_without_chatter() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// A target far beyond the stroke, in every direction; then home: the platform never gets stuck.
+#[test]
+fn a_platform_pressed_into_any_corner_comes_back() {
+    for machine in ["motion_base", "fried2008", "tsai2000"] {
+        let config = Config::load(&data(machine, "toml")).unwrap();
+        for policy in [ViolationPolicy::Limit, ViolationPolicy::Stop] {
+            let parameters = Parameters { on_violation: policy, ..parameters(&config) };
+            let constants = Constants::new(&config.machine, parameters);
+            for (axis, sign) in (0..6).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+                let mut reference = ReferenceGenerator::new(&constants);
+                let home = *reference.motion();
+                reference.start(&constants, 0, &home);
+                let mut away = TaskState::at_rest(config.machine.home);
+                away.x[axis] += sign * if axis < 3 { 1.5 } else { 2.0 };
+                for (seconds, task) in [(4, away), (8, TaskState::at_rest(config.machine.home))] {
+                    for _ in 0..1000 * seconds {
+                        let now_ns = reference.time_ns();
+                        let setpoint = SetpointMotion::new(Setpoint::motion(now_ns, task));
+                        reference.advance(&constants, now_ns + 1_000_000, Some(&Target::Motion(&setpoint)));
+                    }
+                }
+                let left = reference.motion().pose.displacement_to(&home.pose).vector().amax();
+                if left > 1e-6 {
+                    let m = *reference.motion();
+                    let l = hexad::model::inverse_geometry::leg_motion(&config.machine, &m);
+                    let to = m.pose.displacement_to(&home.pose).vector();
+                    let rates =
+                        hexad::model::inverse_jacobian::leg_wrenches(&config.machine, &m.pose).tr_mul(&to);
+                    let g: Vec<_> = l
+                        .length
+                        .iter()
+                        .map(|x| {
+                            (
+                                (x - config.machine.actuator.min_length - parameters.stroke_margin) * 1e3,
+                                (config.machine.actuator.max_length - parameters.stroke_margin - x) * 1e3,
+                            )
+                        })
+                        .collect();
+                    println!(
+                        "STUCK {machine} {policy:?} {axis} {sign} to home {to:.4?} rates toward home {rates:.3?} gaps {g:.3?} twist {:.2e} acc {:.2e}",
+                        m.twist.vector().norm(),
+                        m.acceleration.vector().norm()
+                    );
+                    continue;
+                }
+                assert!(
+                    left < 1e-6,
+                    "{machine} {policy:?} {axis} {sign}: {left}, {:?}",
+                    reference.active_limits()
+                );
+            }
+        }
+    }
 }

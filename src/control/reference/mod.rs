@@ -12,23 +12,30 @@
 //! | --- | --- |
 //! | [`stop`] | stop of a vector in closed form |
 //! | [`verification`] | whether a stop keeps the limits along its way |
+//! | [`examination`] | a stop near a bound, knot by knot |
+//! | [`pose_stop`] | stop of position and orientation |
 //! | [`regularity`] | balls of poses proved regular, for the limit of the condition |
 //! | [`pose_bounds`] | lengths of the legs and envelope |
 //! | [`approach`] | acceleration towards a moving target |
+//! | [`constant_jerk`] | step of a motion |
+//! | [`components`] | whether translation and rotation move at once |
 //! | [`walls`] | soft approach of bounds |
 //! | [`target`] | setpoint, samples of poses, or a pose |
 //! | [`pose_samples`] | target through poses without derivatives |
 //! | [`history`] | the reference of the last cycles |
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector6;
 
 use self::approach::{Approach, TargetOffset, limit_leg_rates};
+use self::components::Components;
+use self::constant_jerk::moved;
 use self::history::History;
 use self::pose_bounds::PoseBounds;
+use self::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
 use self::regularity::RegularBalls;
 pub use self::target::Target;
 use self::target::at_rest;
-use self::verification::{PoseStop, PoseStopState, Step, StopKind, advanced, verify};
+use self::verification::{Step, verify};
 use self::walls::Walls;
 use super::input_validation::{SetpointMotion, seconds_between};
 use super::limits::{Limit, LimitSet};
@@ -37,9 +44,13 @@ use super::tracking_error::TrackingError;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 mod approach;
+mod components;
+mod constant_jerk;
+mod examination;
 mod history;
 mod pose_bounds;
 pub mod pose_samples;
+mod pose_stop;
 mod regularity;
 #[cfg(test)]
 mod samples;
@@ -90,6 +101,7 @@ pub struct ReferenceGenerator {
     closing_scale: f64,
     /// What held the reference back in the last cycle.
     active_limits: LimitSet,
+    components: Components,
 }
 
 impl ReferenceGenerator {
@@ -106,6 +118,7 @@ impl ReferenceGenerator {
             history: History::default(),
             closing_scale: 1.0,
             active_limits: LimitSet::default(),
+            components: Components::default(),
         }
     }
 
@@ -114,7 +127,7 @@ impl ReferenceGenerator {
     pub fn check_start(&mut self, constants: &Constants, pose: &Pose, twist: &Twist) -> Result<(), Limit> {
         let motion = Motion { twist: *twist, ..at_rest(pose) };
         let bounds = PoseBounds::around(constants, pose);
-        verify(constants, &bounds, &mut self.balls, &motion, &Step::default()).map(drop)
+        verify(constants, &bounds, &mut self.balls, &motion, &Step::none(pose)).map(drop)
     }
 
     /// Begins with a motion at an instant. A stop must exist for it.
@@ -123,7 +136,8 @@ impl ReferenceGenerator {
     pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
         (self.motion, self.time_ns) = (*motion, time_ns);
         self.bounds = PoseBounds::around(constants, &motion.pose);
-        let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::default());
+        let verified =
+            verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::none(&motion.pose));
         self.stop = HeldStop::Verified(verified.unwrap_or(StopKind::Planar));
         self.history.clear();
         self.closing_scale = 1.0;
@@ -137,6 +151,11 @@ impl ReferenceGenerator {
     /// The motion at the end of the last cycle.
     pub fn motion(&self) -> &Motion {
         &self.motion
+    }
+
+    /// The end of the last cycle's period, to which [`Self::motion`] belongs.
+    pub fn time_ns(&self) -> u64 {
+        self.time_ns
     }
 
     /// What held the reference back in the last cycle.
@@ -212,7 +231,7 @@ impl ReferenceGenerator {
         let verified = proposed.and_then(|motion| {
             let (now, next) = (&self.motion.acceleration, &motion.acceleration);
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
-            let step = Step { duration: step_s, change };
+            let step = Step { from: &self.motion.pose, duration: step_s, change };
             match verify(constants, &self.bounds, &mut self.balls, &motion, &step) {
                 Ok(kind) => Some((motion, HeldStop::Verified(kind))),
                 Err(limit) => {
@@ -221,6 +240,7 @@ impl ReferenceGenerator {
                 }
             }
         });
+        self.components = self.components.after(verified.is_some());
         let (next, stop) = match verified {
             Some(verified) => verified,
             None => (self.stopped(constants, step_s), HeldStop::Followed),
@@ -273,6 +293,11 @@ impl ReferenceGenerator {
         }
         let (angular, turn_limits) = turning.acceleration(&turn, &led.angular, &acceleration.angular);
         let (linear, shift_limits) = shifting.acceleration(&shift, &led.linear, &acceleration.linear);
+        let (angular, linear) = match self.components {
+            Components::Both => (angular, linear),
+            Components::Translation { .. } => (self.stop_acceleration(constants, h).angular, linear),
+            Components::Rotation { .. } => (angular, self.stop_acceleration(constants, h).linear),
+        };
         let [by_acceleration, by_jerk] = [turn_limits, shift_limits]
             .into_iter()
             .fold([false; 2], |[a, j], [next_a, next_j]| [a | next_a, j | next_j]);
@@ -282,6 +307,18 @@ impl ReferenceGenerator {
             .with(Limit::Acceleration, by_acceleration)
             .with(Limit::Jerk, by_jerk);
         moved(&self.motion, &angular, &linear, h)
+    }
+
+    /// The acceleration a step later along the stop.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn stop_acceleration(&self, constants: &Constants, h: f64) -> Acceleration {
+        let PoseStopState { orientation, position } = match self.stop {
+            HeldStop::AtRest => PoseStopState::default(),
+            HeldStop::Verified(kind) => PoseStop::new(kind, &self.motion, &constants.parameters.limits).at(h),
+            HeldStop::Followed => self.followed.stop.at(self.followed.elapsed_s + h),
+        };
+        Acceleration { angular: orientation.acceleration, linear: position.acceleration }
     }
 
     /// The motion a step later along the stop.
@@ -306,25 +343,5 @@ impl ReferenceGenerator {
             twist: Twist { angular: orientation.velocity, linear: position.velocity },
             acceleration: Acceleration { angular: orientation.acceleration, linear: position.acceleration },
         }
-    }
-}
-
-/// The motion `h` seconds later if the acceleration changes linearly to another one.
-fn moved(motion: &Motion, angular: &Vector3<f64>, linear: &Vector3<f64>, h: f64) -> Motion {
-    let Motion { pose, twist, acceleration } = motion;
-    let shift = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| (v + (a * 2.0 + a1) * (h / 6.0)) * h;
-    let velocity = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| v + (a + a1) * (0.5 * h);
-    // Magnus: the axis of rotation turns meanwhile.
-    let commutator = twist.angular.cross(&acceleration.angular) * (h * h * h / 12.0);
-    Motion {
-        pose: pose.displaced(&Twist {
-            angular: shift(&twist.angular, &acceleration.angular, angular) - commutator,
-            linear: shift(&twist.linear, &acceleration.linear, linear),
-        }),
-        twist: Twist {
-            angular: velocity(&twist.angular, &acceleration.angular, angular),
-            linear: velocity(&twist.linear, &acceleration.linear, linear),
-        },
-        acceleration: Acceleration { angular: *angular, linear: *linear },
     }
 }

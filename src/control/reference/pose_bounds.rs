@@ -64,6 +64,15 @@ impl PoseBounds {
         bounds
     }
 
+    /// By how much the worst leg exceeds its bound at a pose; 0 if none does \[m\].
+    pub fn length_excess(&self, constants: &Constants, pose: &Pose) -> f64 {
+        let lengths = leg_lengths(constants.machine(), pose);
+        let ends = self.shortest.iter().zip(&self.longest);
+        let excesses =
+            lengths.iter().zip(ends).map(|(length, (short, long))| (short - length).max(length - long));
+        excesses.fold(0.0, f64::max)
+    }
+
     /// Lets relaxed bounds follow a pose, never away from the nominal ones.
     pub fn tighten(&mut self, constants: &Constants, pose: &Pose) {
         if !self.is_relaxed {

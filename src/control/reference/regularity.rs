@@ -50,8 +50,8 @@ impl Ball {
         Self { center: *center, norm, inverse_norm: condition / norm, shortest }
     }
 
-    /// Whether every pose within `shift` \[m\] and `turn` \[rad\] of a pose is regular and keeps the limit.
-    fn covers(&self, constants: &Constants, pose: &Pose, [shift, turn]: [f64; 2]) -> bool {
+    /// Whether every pose within `shift` \[m\] and `turn` \[rad\] of a pose is regular and has at most a condition.
+    fn covers(&self, constants: &Constants, pose: &Pose, [shift, turn]: [f64; 2], limit: f64) -> bool {
         let Self { center, norm, inverse_norm, shortest } = self;
         let chord = ((pose.rotation - center.rotation).norm_squared() * 0.5).sqrt();
         let turn = ANGLE_PER_CHORD * chord + turn;
@@ -61,7 +61,7 @@ impl Ball {
         let turned_arm = turn + turned_squared.sqrt();
         let change = (6.0 * (turned_squared + turned_arm * turned_arm)).sqrt();
         let largest_norm = (norm + change).min(MAX_WRENCH_NORM_SQUARED.sqrt());
-        let limit = constants.reference_condition * (1.0 - inverse_norm * change);
+        let limit = limit * (1.0 - inverse_norm * change);
         chord <= MAX_CHORD && left > 0.0 && largest_norm * inverse_norm <= limit
     }
 }
@@ -73,18 +73,18 @@ pub(super) struct RegularBalls {
 }
 
 impl RegularBalls {
-    /// Whether every pose within `reach`, a shift \[m\] and a turn \[rad\], of a pose is regular and keeps the limit of the
-    /// condition. `false` is no proof of the contrary.
-    pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2]) -> bool {
-        self.balls.iter().flatten().any(|ball| ball.covers(constants, pose, reach))
-            || self.cover_by_new(constants, pose, reach)
+    /// Whether every pose within `reach`, a shift \[m\] and a turn \[rad\], of a pose is regular and has at most a condition.
+    /// `false` is no proof of the contrary.
+    pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2], limit: f64) -> bool {
+        self.balls.iter().flatten().any(|ball| ball.covers(constants, pose, reach, limit))
+            || self.cover_by_new(constants, pose, reach, limit)
     }
 
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    fn cover_by_new(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2]) -> bool {
+    fn cover_by_new(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2], limit: f64) -> bool {
         let ball = Ball::new(constants, pose);
-        let is_covered = ball.covers(constants, pose, reach);
+        let is_covered = ball.covers(constants, pose, reach, limit);
         if is_covered {
             self.balls.rotate_right(1);
             if let Some(first) = self.balls.first_mut() {

@@ -1,0 +1,67 @@
+//! Stop of position and orientation at once.
+//!
+//! In base axes `v' = a` and `w' = al`: one stop of a vector serves both. Only attitude is not linear,
+//! `R <- exp(W) R` with `W = theta - dt^2/12 w0 x w1`, theta the integral of w (Magnus; the remainder is of order dt^5).
+
+use super::stop::{Stop, StopState};
+use crate::control::limits::Limits;
+use crate::model::rigid::{Motion, Pose, Twist};
+
+/// Stop that was verified.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum StopKind {
+    /// See [`super::stop`].
+    #[default]
+    ReleaseFirst,
+    /// See [`super::stop`].
+    Planar,
+}
+
+/// Stop of orientation and position.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PoseStop {
+    pub orientation: Stop,
+    pub position: Stop,
+}
+
+/// Motion parameters of a stop at one instant, relative to its start.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PoseStopState {
+    pub orientation: StopState,
+    pub position: StopState,
+}
+
+impl PoseStop {
+    /// The stop of a kind from a motion.
+    pub fn new(kind: StopKind, motion: &Motion, limits: &Limits) -> Self {
+        let of = match kind {
+            StopKind::ReleaseFirst => Stop::release_first,
+            StopKind::Planar => Stop::planar,
+        };
+        let Motion { twist, acceleration, .. } = motion;
+        Self {
+            orientation: of(&twist.angular, &acceleration.angular, &limits.orientation),
+            position: of(&twist.linear, &acceleration.linear, &limits.position),
+        }
+    }
+
+    /// Time to rest \[s\].
+    pub fn duration(&self) -> f64 {
+        self.orientation.duration.max(self.position.duration)
+    }
+
+    /// State `t` seconds after the start.
+    pub fn at(&self, t: f64) -> PoseStopState {
+        PoseStopState { orientation: self.orientation.at(t), position: self.position.at(t) }
+    }
+}
+
+/// Pose after the part of a stop from one state to the next, `dt` seconds later.
+pub(super) fn advanced(pose: &Pose, from: &PoseStopState, to: &PoseStopState, dt: f64) -> Pose {
+    let turn = to.orientation.displacement - from.orientation.displacement;
+    let commutator = from.orientation.velocity.cross(&to.orientation.velocity) * (dt * dt / 12.0);
+    pose.displaced(&Twist {
+        angular: turn - commutator,
+        linear: to.position.displacement - from.position.displacement,
+    })
+}
