@@ -10,6 +10,7 @@ mod reference {
     mod arrival;
     mod limits;
     mod observer;
+    mod rates;
     mod streams;
     mod walls;
 }

@@ -78,12 +78,13 @@ impl<'a> Precheck<'a> {
         let setpoint = |k: u64| SetpointMotion::new(Setpoint::motion(k * period_ns, at(self.time(from, k))));
         let mut reference = ReferenceGenerator::new(&constants);
         let mut now = setpoint(0);
+        let mut before = now;
         reference.start(&constants, 0, &now.motion);
         let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
         for k in 0..=steps {
             let SetpointCheck { active_limits, result } =
                 check_setpoint(self.machine, &self.parameters, &now);
-            let result = result.and_then(|()| check_deviation(&self.parameters, &reference, &now));
+            let result = result.and_then(|()| check_deviation(&self.parameters, &reference, &before, &now));
             if let Err(diagnostic) = result {
                 let active_limits = active_limits.union(reference.active_limits());
                 let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits };
@@ -93,7 +94,7 @@ impl<'a> Precheck<'a> {
                 reference.start(&constants, k * period_ns, &now.motion);
             }
             reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
-            now = setpoint(k + 1);
+            (before, now) = (now, setpoint(k + 1));
         }
     }
 

@@ -26,6 +26,9 @@ use crate::model::task::TaskState;
 /// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
 const ENVELOPE_ROUNDING: f64 = 1e-9;
 
+/// Deviation from the continuation of the setpoint before that is a jump, over the engage tolerance.
+const JUMP_RATIO: f64 = 0.5;
+
 /// A setpoint with the motion of the platform it describes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SetpointMotion {
@@ -186,38 +189,33 @@ fn check_continuation(
     let (Some(before), SetpointKind::Motion) = (followed, new.setpoint.kind) else { return Ok(()) };
     let parameters = &cycle.constants.parameters;
     if cycle.state == State::Active {
-        return check_deviation(parameters, reference, new);
+        return check_deviation(parameters, reference, before, new);
     }
-    let continued = before.motion_at(parameters, new.setpoint.time_ns);
-    let error = TrackingError::new(&new.motion, &continued.pose, &continued.twist);
-    deviation_result(parameters, &error, LimitSet::default())
+    let ratio = jump_ratio(parameters, before, new);
+    if ratio <= 1.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointJumped, ratio, 1.0)) }
 }
 
-/// Whether the reference is within the engage tolerance of a setpoint. If not, the diagnostic says what
-/// held the reference back.
+/// Whether the reference is within the engage tolerance of a setpoint. If not, either the setpoint has jumped from the one
+/// before, or the limits kept the reference from following.
 pub fn check_deviation(
     parameters: &Parameters,
     reference: &ReferenceGenerator,
+    before: &SetpointMotion,
     setpoint: &SetpointMotion,
 ) -> Result<(), Diagnostic> {
-    deviation_result(parameters, &reference.deviation_of(parameters, setpoint), reference.active_limits())
-}
-
-fn deviation_result(
-    parameters: &Parameters,
-    error: &TrackingError,
-    active_limits: LimitSet,
-) -> Result<(), Diagnostic> {
-    let ratio = error.tolerance_ratio(parameters);
+    let ratio = reference.deviation_of(parameters, setpoint).tolerance_ratio(parameters);
     if ratio <= 1.0 {
         return Ok(());
     }
-    let code = if active_limits.is_empty() {
-        DiagnosticCode::SetpointJumped
-    } else {
-        DiagnosticCode::SetpointBeyondLimits
-    };
+    let has_jumped = jump_ratio(parameters, before, setpoint) > JUMP_RATIO;
+    let code = if has_jumped { DiagnosticCode::SetpointJumped } else { DiagnosticCode::SetpointBeyondLimits };
     Err(Diagnostic::new(code, ratio, 1.0))
+}
+
+/// Deviation of a setpoint from the continuation of the one before, over the engage tolerance.
+fn jump_ratio(parameters: &Parameters, before: &SetpointMotion, setpoint: &SetpointMotion) -> f64 {
+    let continued = before.motion_at(parameters, setpoint.setpoint.time_ns);
+    TrackingError::new(&setpoint.motion, &continued.pose, &continued.twist).tolerance_ratio(parameters)
 }
 
 /// Result of the checks of one setpoint.
