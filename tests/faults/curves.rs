@@ -55,6 +55,7 @@ impl Curves {
         let window = Window { samples: all, begin_ns: all[0].time_ns, period_s };
         let at = |t: f64| all.partition_point(|sample| window.seconds(sample) < t);
         let window = Window { samples: &all[at(from)..at(to)], ..window };
+        let [first, last] = [window.samples.first(), window.samples.last()].map(Option::unwrap);
         let home = world.machine.home[5];
         let z_mm = |pose: &Pose| 1e3 * (pose.position.z - home);
         let course = |delay: f64, of: &dyn Fn(&Sample) -> Option<Motion>| Course {
@@ -66,7 +67,7 @@ impl Curves {
         let speed_up = |before: &Twist, now: &Twist| (now.linear - before.linear).norm() / period_s;
         let reference = |at: &Sample| at.output.reference.map(|reference| reference.acceleration.linear);
         Self {
-            window_s: [window.samples.first(), window.samples.last()].map(|at| window.seconds(at.unwrap())),
+            window_s: [window.seconds(first), window.seconds(last) + 1.5 * period_s],
             // Setpoints are of the begin of the cycle, the platform is of its end, references half a period later.
             setpoint: course(0.0, &|at| at.setpoint.map(|task| task.motion())),
             platform: course(1.0, &|at| Some(platform(at))),

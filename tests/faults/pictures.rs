@@ -21,7 +21,7 @@ pub struct Picture {
 }
 
 const PLATFORM_COLOR: usize = 0;
-const SETPOINT_COLOR: usize = 2;
+const SETPOINT_COLOR: usize = 5;
 const BRAKES_COLOR: usize = 6;
 const LIMIT_COLOR: usize = 3;
 const FEEDBACK_COLOR: usize = 1;

@@ -23,10 +23,10 @@ mod sources;
 
 /// Way of the motions, about and along the axes: 150 mm up, aside and turning \[rad, m\].
 const WAY: [f64; 6] = [0.0, 0.0, 0.1, 0.05, 0.0, 0.15];
-/// A third of the limit of velocity.
+/// Up to 0.2 m/s.
 const SLOW_S: f64 = 1.5;
-/// Nearly as fast as the limits allow.
-const FAST_S: f64 = 0.6;
+/// Up to 0.4 m/s. Faster, the policy `limit` slows down before the ends of the stroke.
+const FAST_S: f64 = 0.75;
 
 type Path = [(State, DiagnosticCode)];
 
@@ -54,14 +54,14 @@ fn moving(policy: ViolationPolicy, seconds: f64, cycles: u32) -> World {
     world
 }
 
-/// Past the middle of a slow motion, at about 0.13 m/s.
+/// Past the middle of a slow motion, at 0.18 m/s.
 fn moving_slowly() -> World {
     moving(ViolationPolicy::default(), SLOW_S, 900)
 }
 
-/// In the middle of a fast motion, at half a metre per second.
+/// In the middle of a fast motion, at 0.4 m/s.
 fn moving_fast(policy: ViolationPolicy) -> World {
-    moving(policy, FAST_S, 300)
+    moving(policy, FAST_S, 375)
 }
 
 fn still(x: Vector6<f64>) -> Source {

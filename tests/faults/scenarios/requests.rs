@@ -15,7 +15,7 @@ fn stop_in_motion() {
     let picture = Picture {
         name: "stop_in_motion",
         title: "stop in motion: to rest within the limits, then the brakes close",
-        window_s: [0.4, 0.75],
+        window_s: [0.5, 0.8],
     };
     assert_smooth(
         picture,
@@ -33,7 +33,7 @@ fn park_from_motion() {
     let picture = Picture {
         name: "park_from_motion",
         title: "park from motion: to rest, then home",
-        window_s: [0.2, 10.0],
+        window_s: [0.45, 10.0],
     };
     assert_smooth(picture, &world, &[&ENGAGES[..], &[STOPS, PARKS]].concat());
     assert_is_home(&world);

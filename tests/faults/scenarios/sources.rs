@@ -34,7 +34,7 @@ fn under_limit_a_source_in_motion_is_replaced_by_any_other() {
     let picture = Picture {
         name: "source_replaced_under_limit",
         title: "on_violation = limit: source replaced in motion by one 50 mm ahead that moves back",
-        window_s: [0.35, 1.15],
+        window_s: [0.5, 1.1],
     };
     assert_smooth(picture, &world, &ENGAGES);
     assert!((world.x() - home).norm() < 1e-5);
@@ -51,7 +51,7 @@ fn under_limit_a_source_that_dies_and_begins_elsewhere_is_no_fault() {
     let picture = Picture {
         name: "source_elsewhere",
         title: "on_violation = limit: the source is lost in motion, and back 50 mm below",
-        window_s: [0.35, 1.6],
+        window_s: [0.5, 1.6],
     };
     assert_smooth(picture, &world, &twice(&[(State::Engaging, DiagnosticCode::HoldingPose)]));
     assert!((world.x() - aside).norm() < 1e-5);
