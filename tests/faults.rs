@@ -9,6 +9,7 @@ mod faults {
     use super::*;
 
     mod cells;
+    mod curves;
     mod disturbances;
     mod pictures;
     mod recording;

@@ -23,13 +23,15 @@ const TITLE_SIZE: i32 = 15;
 const SERIES_POINTS: usize = 1500;
 const CHART_POINTS: usize = 22_000;
 
-/// Style of a line. Dashed lines lie on top, so both are seen where they coincide.
+/// Style of a line. Thin lines lie on solid ones, dashed lines on top, so all are seen where they coincide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LineStyle {
     /// A measured signal.
     Solid,
     /// A commanded signal.
     Dashed,
+    /// A bound of a signal, or one more signal.
+    Thin,
 }
 
 /// One line of a panel.
@@ -39,7 +41,7 @@ pub struct Series<'a> {
     pub label: &'a str,
     /// Points in drawing order. Those that are not finite are left out.
     pub points: &'a [(f64, f64)],
-    /// Solid or dashed: measured or commanded.
+    /// Measured or commanded signal, or a bound of it.
     pub style: LineStyle,
     /// Index into the palette, which repeats after its last.
     pub color: usize,
@@ -70,6 +72,7 @@ impl Series<'_> {
         match self.style {
             LineStyle::Solid => palette(self.color).stroke_width(28),
             LineStyle::Dashed => dashed_on_top(self.color).stroke_width(15),
+            LineStyle::Thin => palette(self.color).stroke_width(12),
         }
     }
 }
@@ -139,7 +142,7 @@ impl Panel<'_> {
             .x_desc(x_title)
             .y_desc(y_title)
             .draw()?;
-        for style in [LineStyle::Solid, LineStyle::Dashed] {
+        for style in [LineStyle::Solid, LineStyle::Thin, LineStyle::Dashed] {
             for series in self.series.iter().filter(|series| series.style == style) {
                 chart.draw_series(LineSeries::new(series.thinned(limit), series.stroke()))?;
             }

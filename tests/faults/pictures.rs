@@ -1,84 +1,32 @@
-//! A recording as a picture: position, acceleration and jerk of the platform with their limits, forces, state.
+//! A recording as a picture: position, speed, acceleration and jerk with their limits, and the state.
+//!
+//! Acceleration and speed are the platform's own, from the simulated plant. The jerk is the reference's.
 
 use std::path::Path;
 
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
-use hexad::model::rigid::Twist;
 use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
-use super::recording::Sample;
+use super::curves::{Curves, Line};
 use super::world::World;
 
-type Line = Vec<(f64, f64)>;
-
-/// Positions and forces change little from cycle to cycle: every fifth is drawn.
-const THINNED: usize = 5;
-
-/// Draws into the folder of `HEXAD_CHARTS`, if there is one.
-pub fn draw(name: &str, title: &str, world: &World) {
-    let Some(folder) = std::env::var_os("HEXAD_CHARTS") else { return };
-    let path = Path::new(&folder).join(name).with_extension("svg");
-    let curves = Curves::new(world);
-    let limits = &world.parameters.limits.position;
-    let end = curves.end;
-    let level = |value: f64| [(0.0, value), (end, value)];
-    let [acceleration, jerk, tolerance] =
-        [limits.acceleration, limits.jerk, 1e3 * world.parameters.engage_position].map(level);
-    let bound = |label, points| Series { label, points, style: LineStyle::Dashed, color: 0 };
-    let dashed = |label, points, color| Series { label, points, style: LineStyle::Dashed, color };
-    let setpoints = curves.setpoint.iter().enumerate().flat_map(|(color, axis)| {
-        // One word in the legend for all dashed lines.
-        let label = if color == 2 { "setpoint" } else { "" };
-        axis.iter().enumerate().map(move |(k, piece)| dashed(if k == 0 { label } else { "" }, piece, color))
-    });
-    let mut panels = vec![Panel {
-        y_label: "position [mm]",
-        series: lines(&["x", "y", "z"], &curves.position).into_iter().chain(setpoints).collect(),
-    }];
-    // Without forces there is no motion to show; what there is, is the reason.
-    if world.recording.samples.iter().any(|sample| sample.force.is_some()) {
-        panels.extend([
-            Panel {
-                y_label: "acceleration [m/s²]",
-                series: pieces("by the drives", &curves.acceleration, 0)
-                    .chain(pieces("in the brakes", &curves.braking, 3))
-                    .chain([bound("limit", &acceleration)])
-                    .collect(),
-            },
-            Panel {
-                y_label: "jerk [m/s³]",
-                series: pieces("by the drives", &curves.jerk, 0)
-                    .chain([bound("limit", &jerk), solid("", &ORIGIN, 0)])
-                    .collect(),
-            },
-            Panel { y_label: "force [kN]", series: lines(&LEGS, &curves.force) },
-        ]);
-    } else {
-        panels.push(Panel {
-            y_label: "position error [mm]",
-            series: pieces("setpoint to platform", &curves.error, 0)
-                .chain([bound("engage tolerance", &tolerance), solid("", &ORIGIN, 0)])
-                .collect(),
-        });
-    }
-    let states = curves.states.iter().zip(STATES);
-    let states = states.flat_map(|(lines, (label, color))| pieces(label, lines, color));
-    let refusal = curves.refusal.map(|t| [(t, FIRST_STATE), (t, LAST_STATE)]);
-    let refusal = refusal.iter().map(|line| dashed("engage refused", line, 0));
-    // Points without a line, so that every picture has room for all states.
-    let ends = [[(0.0, FIRST_STATE)], [(0.0, LAST_STATE)]];
-    panels.push(Panel {
-        y_label: "state",
-        series: ends.iter().map(|end| solid("", end, 0)).chain(states).chain(refusal).collect(),
-    });
-    write_svg(&path, title, "time [s]", &panels).unwrap();
+/// What a picture shows of a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct Picture {
+    /// File name without extension.
+    pub name: &'static str,
+    /// Lines after the first are a subtitle.
+    pub title: &'static str,
+    /// Begin and end in the recording \[s\].
+    pub window_s: [f64; 2],
 }
 
-/// A point without a line, so that an axis begins at zero.
-const ORIGIN: [(f64, f64); 1] = [(0.0, 0.0)];
-const LEGS: [&str; 6] = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
-/// Names and colours, by number.
+const PLATFORM_COLOR: usize = 0;
+const SETPOINT_COLOR: usize = 5;
+const BRAKES_COLOR: usize = 6;
+const LIMIT_COLOR: usize = 3;
+const FEEDBACK_COLOR: usize = 1;
+
+/// Names and colours of the states, by number.
 const STATES: [(&str, usize); 7] = [
     ("0 off", 6),
     ("1 standby", 1),
@@ -88,99 +36,146 @@ const STATES: [(&str, usize); 7] = [
     ("5 parking", 0),
     ("6 fault", 3),
 ];
-const FIRST_STATE: f64 = 0.0;
+/// A point without a line, so that an axis begins at zero.
+const ORIGIN: f64 = 0.0;
 const LAST_STATE: f64 = 6.0;
+
+/// Draws into the folder of `HEXAD_CHARTS`, if there is one.
+pub fn draw(picture: &Picture, world: &World) {
+    let Some(folder) = std::env::var_os("HEXAD_CHARTS") else { return };
+    let path = Path::new(&folder).join(picture.name).with_extension("svg");
+    let curves = Curves::new(world, picture.window_s);
+    let levels = Levels::new(world, curves.window_s);
+    let mut panels = vec![position(&curves)];
+    // A platform that never moves has nothing but the reason to show.
+    if curves.reference.speed.is_empty() {
+        panels.push(distance(&curves, &levels));
+    } else {
+        panels.extend([speed(&curves, &levels), acceleration(&curves, &levels), jerk(&curves, &levels)]);
+    }
+    panels.push(states(&curves, &levels));
+    write_svg(&path, picture.title, "time [s]", &panels).unwrap();
+}
+
+/// Horizontal lines over the whole picture.
+struct Levels {
+    origin: [(f64, f64); 1],
+    last_state: [(f64, f64); 1],
+    speed: [(f64, f64); 2],
+    acceleration: [(f64, f64); 2],
+    with_feedback: [(f64, f64); 2],
+    jerk: [(f64, f64); 2],
+    tolerance_mm: [(f64, f64); 2],
+}
+
+impl Levels {
+    fn new(world: &World, [begin, end]: [f64; 2]) -> Self {
+        let level = |value: f64| [(begin, value), (end, value)];
+        let limits = &world.parameters.limits.position;
+        Self {
+            origin: [(begin, ORIGIN)],
+            last_state: [(begin, LAST_STATE)],
+            speed: level(limits.velocity),
+            acceleration: level(limits.acceleration),
+            with_feedback: level((1.0 + world.parameters.feedback_scale) * limits.acceleration),
+            jerk: level(limits.jerk),
+            tolerance_mm: level(1e3 * world.parameters.engage_position),
+        }
+    }
+}
+
+fn position(curves: &Curves) -> Panel<'_> {
+    Panel {
+        y_label: "z from home [mm]",
+        series: thin("setpoint", &curves.setpoint.z_mm)
+            .chain(pieces("platform", &curves.platform.z_mm, PLATFORM_COLOR))
+            .chain(dashed("reference", &curves.reference.z_mm))
+            .collect(),
+    }
+}
+
+fn distance<'a>(curves: &'a Curves, levels: &'a Levels) -> Panel<'a> {
+    Panel {
+        y_label: "position error [mm]",
+        series: pieces("setpoint to platform", &curves.distance_mm, PLATFORM_COLOR)
+            .chain([limit("engage tolerance", &levels.tolerance_mm), solid("", &levels.origin, 0)])
+            .collect(),
+    }
+}
+
+fn speed<'a>(curves: &'a Curves, levels: &'a Levels) -> Panel<'a> {
+    Panel {
+        y_label: "speed [m/s]",
+        series: thin("setpoint", &curves.setpoint.speed)
+            .chain(pieces("platform", &curves.platform.speed, PLATFORM_COLOR))
+            .chain(dashed("reference", &curves.reference.speed))
+            .chain([limit("limit", &levels.speed), solid("", &levels.origin, 0)])
+            .collect(),
+    }
+}
+
+fn acceleration<'a>(curves: &'a Curves, levels: &'a Levels) -> Panel<'a> {
+    Panel {
+        y_label: "acceleration [m/s²]",
+        series: pieces("platform", &curves.acceleration, PLATFORM_COLOR)
+            .chain(pieces("in the brakes", &curves.braking, BRAKES_COLOR))
+            .chain(dashed("reference", &curves.wanted))
+            .chain([limit("limit", &levels.acceleration), solid("", &levels.origin, 0)])
+            .chain([bound("limit + feedback", &levels.with_feedback)])
+            .collect(),
+    }
+}
+
+fn jerk<'a>(curves: &'a Curves, levels: &'a Levels) -> Panel<'a> {
+    Panel {
+        y_label: "jerk [m/s³]",
+        series: pieces("reference", &curves.jerk, PLATFORM_COLOR)
+            .chain([limit("limit", &levels.jerk), solid("", &levels.origin, 0)])
+            .collect(),
+    }
+}
+
+fn states<'a>(curves: &'a Curves, levels: &'a Levels) -> Panel<'a> {
+    let states = curves.states.iter().zip(STATES);
+    let refusals = curves.refusals.iter().enumerate().map(|(k, line)| Series {
+        label: if k == 0 { "engage refused" } else { "" },
+        points: line,
+        style: LineStyle::Dashed,
+        color: 0,
+    });
+    // Every picture has room for all states.
+    let ends = [solid("", &levels.origin, 0), solid("", &levels.last_state, 0)];
+    Panel {
+        y_label: "state",
+        series: ends
+            .into_iter()
+            .chain(states.flat_map(|(lines, (label, color))| pieces(label, lines, color)))
+            .chain(refusals)
+            .collect(),
+    }
+}
 
 fn solid<'a>(label: &'a str, points: &'a [(f64, f64)], color: usize) -> Series<'a> {
     Series { label, points, style: LineStyle::Solid, color }
 }
 
-fn lines<'a>(names: &[&'a str], lines: &'a [Line]) -> Vec<Series<'a>> {
-    names.iter().zip(lines).enumerate().map(|(color, (name, line))| solid(name, line, color)).collect()
+fn limit<'a>(label: &'a str, points: &'a [(f64, f64)]) -> Series<'a> {
+    Series { label, points, style: LineStyle::Thin, color: LIMIT_COLOR }
 }
 
-/// One line with gaps.
+fn bound<'a>(label: &'a str, points: &'a [(f64, f64)]) -> Series<'a> {
+    Series { label, points, style: LineStyle::Thin, color: FEEDBACK_COLOR }
+}
+
+/// One line with gaps; the legend names it once.
 fn pieces<'a>(label: &'a str, pieces: &'a [Line], color: usize) -> impl Iterator<Item = Series<'a>> {
     pieces.iter().enumerate().map(move |(k, piece)| solid(if k == 0 { label } else { "" }, piece, color))
 }
 
-struct Curves {
-    end: f64,
-    position: [Line; 3],
-    setpoint: [Vec<Line>; 3],
-    /// Distance of the setpoint from the platform \[mm\].
-    error: Vec<Line>,
-    /// Time of the first refused request to engage \[s\].
-    refusal: Option<f64>,
-    acceleration: Vec<Line>,
-    braking: Vec<Line>,
-    jerk: Vec<Line>,
-    force: [Line; 6],
-    states: [Vec<Line>; 7],
+fn thin<'a>(label: &'a str, lines: &'a [Line]) -> impl Iterator<Item = Series<'a>> {
+    pieces(label, lines, SETPOINT_COLOR).map(|series| Series { style: LineStyle::Thin, ..series })
 }
 
-impl Curves {
-    fn new(world: &World) -> Self {
-        let samples = &world.recording.samples;
-        let begin_ns = samples[0].time_ns;
-        let period_s = world.parameters.period_ns as f64 * 1e-9;
-        let seconds = |sample: &Sample| (sample.time_ns - begin_ns) as f64 * 1e-9;
-        let [_, _, _, x, y, z] = world.machine.home;
-        let home = nalgebra::Vector3::new(x, y, z);
-        let thinned = |of: &dyn Fn(&Sample) -> f64| -> Line {
-            samples.iter().step_by(THINNED).map(|at| (seconds(at), of(at))).collect()
-        };
-        // Of each cycle and the one before it.
-        let pairwise = |of: &dyn Fn(&Sample, &Sample) -> Option<f64>| {
-            split(samples.windows(2).map(|pair| (seconds(&pair[1]), of(&pair[0], &pair[1]))))
-        };
-        let speed_up = |before: &Twist, now: &Twist| (now.linear - before.linear).norm() / period_s;
-        Self {
-            end: seconds(samples.last().unwrap()),
-            position: [0, 1, 2].map(|axis| thinned(&|at| (at.pose.position - home)[axis] * 1e3)),
-            setpoint: [0, 1, 2].map(|axis| {
-                let of = |at: &Sample| at.setpoint.map(|task| (task.x[3 + axis] - home[axis]) * 1e3);
-                split(samples.iter().step_by(THINNED).map(|at| (seconds(at), of(at))))
-            }),
-            error: pairwise(&|_, now| {
-                let setpoint = now.setpoint?.motion().pose.position;
-                Some(1e3 * (setpoint - now.pose.position).norm())
-            }),
-            refusal: samples
-                .iter()
-                .find(|sample| sample.output.request_diagnostic.code != DiagnosticCode::None)
-                .map(seconds),
-            acceleration: pairwise(&|_, now| now.acceleration.map(|a| a.linear.norm())),
-            braking: pairwise(&|before, now| {
-                now.acceleration.is_none().then(|| speed_up(&before.twist, &now.twist))
-            }),
-            jerk: pairwise(&|before, now| {
-                Some((now.acceleration?.linear - before.acceleration?.linear).norm() / period_s)
-            }),
-            force: core::array::from_fn(|leg| thinned(&|at| at.force.map_or(0.0, |force| force[leg] * 1e-3))),
-            states: State::ALL.map(|state| {
-                pairwise(&|_, now| (now.output.state == state).then_some(f64::from(state as u32)))
-                    .into_iter()
-                    // A state of a single cycle would have a name and no line.
-                    .filter(|piece| piece.len() > 1)
-                    .map(|piece| vec![piece[0], *piece.last().unwrap()])
-                    .collect()
-            }),
-        }
-    }
-}
-
-/// Runs of points that are there.
-fn split(points: impl Iterator<Item = (f64, Option<f64>)>) -> Vec<Line> {
-    let mut pieces: Vec<Line> = vec![];
-    let mut gap = true;
-    for (t, value) in points {
-        match value {
-            Some(value) if gap => pieces.push(vec![(t, value)]),
-            Some(value) => pieces.last_mut().unwrap().push((t, value)),
-            None => {}
-        }
-        gap = value.is_none();
-    }
-    pieces
+fn dashed<'a>(label: &'a str, lines: &'a [Line]) -> impl Iterator<Item = Series<'a>> {
+    pieces(label, lines, PLATFORM_COLOR).map(|series| Series { style: LineStyle::Dashed, ..series })
 }

@@ -2,9 +2,9 @@
 
 use hexad::control::controller::Output;
 use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::limits::Limits;
 use hexad::control::parameters::Parameters;
 use hexad::control::state::State;
-use hexad::model::machine::LEGS;
 use hexad::model::rigid::{Acceleration, Pose, Twist};
 use hexad::model::task::TaskState;
 
@@ -15,12 +15,12 @@ use super::common::largest;
 pub struct Sample {
     pub time_ns: u64,
     pub output: Output,
+    /// Without one the output is the default.
+    pub has_daemon: bool,
     pub pose: Pose,
     pub twist: Twist,
     /// X, if somebody says one.
     pub setpoint: Option<TaskState>,
-    /// On the platform; `None` while the brakes have it.
-    pub force: Option<[f64; LEGS]>,
     /// `None` while the brakes have the platform.
     pub acceleration: Option<Acceleration>,
 }
@@ -30,13 +30,15 @@ pub struct Recording {
     pub samples: Vec<Sample>,
 }
 
-/// Largest shares of their bounds while under control.
+/// Largest shares of their bounds while under control: of the forces, the platform's true motion, the reference.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Peaks {
     pub force: f64,
     pub force_rate: f64,
     pub acceleration: f64,
     pub jerk: f64,
+    pub reference_acceleration: f64,
+    pub reference_jerk: f64,
 }
 
 impl Recording {
@@ -52,10 +54,9 @@ impl Recording {
         path
     }
 
-    /// Forces and the platform's true motion, against their bounds.
+    /// Forces, the platform's true motion and the reference, against their bounds.
     pub fn peaks(&self, parameters: &Parameters, max_force: f64) -> Peaks {
         let period_s = parameters.period_ns as f64 * 1e-9;
-        let limits = [&parameters.limits.position, &parameters.limits.orientation];
         let mut peaks = Peaks::default();
         let mut before: Option<&Sample> = None;
         for sample in &self.samples {
@@ -63,10 +64,11 @@ impl Recording {
                 before = None;
                 continue;
             };
-            let over = |peak: &mut f64, share: f64| *peak = peak.max(share);
+            let wanted = |sample: &Sample| sample.output.reference.map(|reference| reference.acceleration);
             over(&mut peaks.force, largest(&sample.output.force) / max_force);
-            for (part, limit) in [now.linear, now.angular].iter().zip(limits) {
-                over(&mut peaks.acceleration, part.norm() / limit.acceleration);
+            over(&mut peaks.acceleration, acceleration_share(parameters, &now));
+            if let Some(wanted) = wanted(sample) {
+                over(&mut peaks.reference_acceleration, acceleration_share(parameters, &wanted));
             }
             if let Some(before) = before {
                 let change = |(now, before): (&f64, &f64)| (now - before).abs();
@@ -74,9 +76,9 @@ impl Recording {
                     sample.output.force.iter().zip(&before.output.force).map(change).fold(0.0, f64::max);
                 over(&mut peaks.force_rate, step / period_s / parameters.force_rate);
                 let then = before.acceleration.unwrap_or_default();
-                for (part, limit) in [now.linear - then.linear, now.angular - then.angular].iter().zip(limits)
-                {
-                    over(&mut peaks.jerk, part.norm() / period_s / limit.jerk);
+                over(&mut peaks.jerk, jerk_share(parameters, &then, &now));
+                if let Some((then, now)) = wanted(before).zip(wanted(sample)) {
+                    over(&mut peaks.reference_jerk, jerk_share(parameters, &then, &now));
                 }
             }
             before = Some(sample);
@@ -94,4 +96,22 @@ impl Recording {
             Some(last) => Some(seconds(self.samples.get(last + 1)?)),
         }
     }
+}
+
+fn over(peak: &mut f64, share: f64) {
+    *peak = peak.max(share);
+}
+
+/// The larger share of its limit, of position and orientation.
+fn acceleration_share(parameters: &Parameters, now: &Acceleration) -> f64 {
+    let Limits { position, orientation, .. } = &parameters.limits;
+    (now.linear.norm() / position.acceleration).max(now.angular.norm() / orientation.acceleration)
+}
+
+/// The same of the mean jerk over a period.
+fn jerk_share(parameters: &Parameters, then: &Acceleration, now: &Acceleration) -> f64 {
+    let Limits { position, orientation, .. } = &parameters.limits;
+    let linear = (now.linear - then.linear).norm() / position.jerk;
+    let angular = (now.angular - then.angular).norm() / orientation.jerk;
+    linear.max(angular) / (parameters.period_ns as f64 * 1e-9)
 }

@@ -97,7 +97,7 @@ fn complaints(cell: Cell, bounds: &Bounds, situation: Situation, outcome: &Outco
     if found != expected {
         wrong.push(format!("{found:?} instead of {expected:?}"));
     }
-    let Peaks { force, force_rate, acceleration, jerk } = outcome.peaks;
+    let Peaks { force, force_rate, acceleration, jerk, .. } = outcome.peaks;
     for (what, share, bound) in [
         ("force", force, 1.0),
         ("force rate", force_rate, 1.0 + 1e-9),
@@ -188,7 +188,7 @@ fn csv_line(
     let then: Vec<_> =
         outcome.changes.iter().map(|(state, cause)| format!("{} ({})", state.name(), cause.name())).collect();
     let then = if then.is_empty() { "goes on".into() } else { then.join(" > ") };
-    let Peaks { force, force_rate, acceleration, jerk } = outcome.peaks;
+    let Peaks { force, force_rate, acceleration, jerk, .. } = outcome.peaks;
     let policy = if policy == ViolationPolicy::Stop { "stop" } else { "limit" };
     let mut line = format!("{policy},{},\"{name}\",{situation:?},\"{then}\"", mode.name());
     for share in [force, force_rate, acceleration, jerk] {

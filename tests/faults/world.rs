@@ -111,7 +111,7 @@ impl World {
         let force = output.state.has_control().then_some(output.force);
         let applied = self.applied(force);
         self.rig.pass(applied);
-        self.record(now_ns, &output);
+        self.record(now_ns, Some(output));
         output
     }
 
@@ -150,7 +150,7 @@ impl World {
         for cycle in 0..cycles {
             let now_ns = self.rig.now_ns;
             self.rig.pass(self.rig.force.filter(|_| cycle < driven));
-            self.record(now_ns, &Output::default());
+            self.record(now_ns, None);
         }
     }
 
@@ -198,17 +198,17 @@ impl World {
         Some(force)
     }
 
-    fn record(&mut self, now_ns: u64, output: &Output) {
+    fn record(&mut self, now_ns: u64, output: Option<Output>) {
         let state = self.rig.simulator.state();
         let acceleration =
             self.rig.force.and_then(|force| self.dynamics.acceleration(&state.pose, &state.twist, &force));
         self.recording.push(Sample {
             time_ns: now_ns,
-            output: *output,
+            output: output.unwrap_or_default(),
+            has_daemon: output.is_some(),
             pose: state.pose,
             twist: state.twist,
             setpoint: self.task(now_ns),
-            force: self.rig.force,
             acceleration,
         });
     }

@@ -1,0 +1,109 @@
+//! Wrong, missing and noisy measurements.
+
+use hexad::control::controller::Measurement;
+use hexad::model::machine::LEGS;
+
+use super::{Moment, noise};
+
+pub fn end(m: &mut Moment) {
+    m.input.measurement = m.before.measurement;
+}
+
+/// The driver repeats itself with fresh stamps.
+pub fn freeze(m: &mut Moment) {
+    let Measurement { length, rate, .. } = m.before.measurement.unwrap();
+    *m.measured() = Measurement { length, rate, ..*m.measured() };
+}
+
+pub fn pause_10_ms(m: &mut Moment) {
+    if m.cycle < 10 {
+        end(m);
+    }
+}
+
+pub fn pause_30_ms(m: &mut Moment) {
+    if m.cycle < 30 {
+        end(m);
+    }
+}
+
+pub fn nan_length(m: &mut Moment) {
+    m.measured().length[2] = f64::NAN;
+}
+
+pub fn nan_rate_once(m: &mut Moment) {
+    if m.cycle == 0 {
+        m.measured().rate[5] = f64::NAN;
+    }
+}
+
+pub fn infinite_rate(m: &mut Moment) {
+    m.measured().rate[1] = f64::INFINITY;
+}
+
+/// An encoder that lost counts.
+pub fn jump_20_mm(m: &mut Moment) {
+    m.measured().length[3] += 0.02;
+}
+
+pub fn jump_20_mm_once(m: &mut Moment) {
+    if m.cycle == 0 {
+        jump_20_mm(m);
+    }
+}
+
+/// Too small to be called a jump, and it stays.
+pub fn slip_1_mm(m: &mut Moment) {
+    m.measured().length[3] += 0.001;
+}
+
+pub fn out_of_stroke(m: &mut Moment) {
+    m.measured().length[0] = 2.4;
+}
+
+pub fn rates_of_wrong_sign(m: &mut Moment) {
+    m.measured().rate.iter_mut().for_each(|rate| *rate = -*rate);
+}
+
+pub fn rates_in_mm(m: &mut Moment) {
+    m.measured().rate.iter_mut().for_each(|rate| *rate *= 1e3);
+}
+
+pub fn rates_zero(m: &mut Moment) {
+    m.measured().rate = [0.0; LEGS];
+}
+
+pub fn stamps_1_s_old(m: &mut Moment) {
+    m.measured().time_ns -= 1_000_000_000;
+}
+
+pub fn stamps_1_s_ahead(m: &mut Moment) {
+    m.measured().time_ns += 1_000_000_000;
+}
+
+pub fn stamps_of_nothing(m: &mut Moment) {
+    m.measured().time_ns = 0;
+}
+
+pub fn stamps_run_backward(m: &mut Moment) {
+    let before_ns = m.before.measurement.unwrap().time_ns;
+    m.measured().time_ns = before_ns - 100_000 * (m.cycle + 1);
+}
+
+/// Rates behind a filter of the first order, with a time constant of 5 ms.
+pub fn filtered_rates(m: &mut Moment) {
+    let before = m.world.last.measurement.unwrap().rate;
+    for (rate, before) in m.measured().rate.iter_mut().zip(before) {
+        *rate = before + 0.2 * (*rate - before);
+    }
+}
+
+/// What good encoders do: counts of a micrometre, rates with noise of a millimetre per second.
+pub fn noise_of_encoders(m: &mut Moment) {
+    let cycle = m.cycle;
+    let Measurement { length, rate, .. } = m.measured();
+    for (leg, (length, rate)) in length.iter_mut().zip(rate).enumerate() {
+        *length = (*length * 1e6).round() * 1e-6;
+        *rate += 1e-3 * noise(cycle * 6 + leg as u64);
+    }
+}
