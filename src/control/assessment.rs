@@ -26,7 +26,9 @@ pub(super) struct Evidence<'a> {
     pub feedback: &'a FeedbackBound,
 }
 
+// Out of line, as is `target` in the controller: jump tables inside `step` are beyond the proof on the machine code.
 /// The findings that decide the next state, and the limits that the platform is near to.
+#[inline(never)]
 pub(super) fn assess(
     cycle: &Cycle<'_>,
     evidence: &Evidence<'_>,
@@ -61,6 +63,7 @@ pub(super) fn assess(
 }
 
 /// Whether the motion of the state has come to its end.
+#[inline(never)]
 fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &ReferenceGenerator) -> bool {
     let parameters = &cycle.constants.parameters;
     let is_within = |target: &Target<'_>, ratio: f64| {

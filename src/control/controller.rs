@@ -11,7 +11,7 @@ use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
 use super::input_validation::{MeasurementValidator, SetpointValidator, ValidatedSetpoint};
 use super::limits::LimitSet;
-use super::localization::{Localization, PlatformState};
+use super::localization::{Localization, Located, PlatformState};
 use super::parameters::{Constants, Parameters};
 use super::reference::{ReferenceGenerator, Target};
 use super::state::{OperatorRequest, Request, State};
@@ -189,11 +189,7 @@ impl Controller {
         // Reference.
         let begins = next.has_control() && !cycle.state.has_control();
         if let Some(located) = located.as_ref().ok().filter(|_| begins) {
-            // Without force its acceleration is that of the brakes, which the drives take over from: it begins at zero.
-            let PlatformState { pose, twist, .. } = located.platform;
-            let measured = Motion { pose, twist, acceleration: Acceleration::default() };
-            reference.start(constants, cycle.release_ns, &measured);
-            sample = errors.restart(&cycle, reference, &setpoint, located);
+            sample = begin(&cycle, reference, errors, &setpoint, located);
         }
         if next.has_control() {
             let target = target(constants, next, &setpoint);
@@ -246,7 +242,25 @@ impl Controller {
     }
 }
 
+/// Begins the reference at the measured pose and twist. Without force the acceleration is that of the brakes, from which the
+/// drives take over: it begins at zero. Returns the error against it.
+// Out of line, as it is rare: the cycle stays short.
+#[inline(never)]
+fn begin(
+    cycle: &Cycle<'_>,
+    reference: &mut ReferenceGenerator,
+    errors: &mut ErrorTracker,
+    setpoint: &ValidatedSetpoint<'_>,
+    located: &Located<'_>,
+) -> Option<ErrorSample> {
+    let PlatformState { pose, twist, .. } = located.platform;
+    let measured = Motion { pose, twist, acceleration: Acceleration::default() };
+    reference.start(cycle.constants, cycle.release_ns, &measured);
+    errors.restart(cycle, reference, setpoint, located)
+}
+
 /// What the reference shall approach in a state; nothing where it follows its stop.
+#[inline(never)]
 fn target<'a>(
     constants: &'a Constants,
     state: State,

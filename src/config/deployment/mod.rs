@@ -69,9 +69,10 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     let limits = limits::read(root.section("limits"), machine);
+    let control = control::read(root.section("control"), &realtime, machine, &limits);
     let setpoint = setpoint(root.section("setpoint"));
     Deployment {
-        control: control::read(root.section("control"), &realtime, machine, &limits),
+        control,
         limits,
         timeouts: timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation),
         setpoint,

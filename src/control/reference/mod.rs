@@ -203,6 +203,7 @@ impl ReferenceGenerator {
     }
 
     /// Moves the reference to an instant, towards a target; without one along the stop.
+    #[inline(never)]
     pub fn advance(&mut self, constants: &Constants, to_ns: u64, target: Option<&Target<'_>>) {
         let duration_s = seconds_between(self.time_ns, to_ns);
         self.active_limits = LimitSet::default();

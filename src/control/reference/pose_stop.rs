@@ -3,8 +3,10 @@
 //! In base axes `v' = a` and `w' = al`: one stop of a vector serves both. Only attitude is not linear,
 //! `R <- exp(W) R` with `W = theta - dt^2/12 w0 x w1`, theta the integral of w (Magnus; the remainder is of order dt^5).
 
+use nalgebra::Vector3;
+
 use super::stop::{Stop, StopState};
-use crate::control::limits::Limits;
+use crate::control::limits::{DerivativeLimits, Limits};
 use crate::model::rigid::{Motion, Pose, Twist};
 
 /// Stop that was verified.
@@ -34,11 +36,12 @@ pub(super) struct PoseStopState {
 impl PoseStop {
     /// The stop of a kind from a motion.
     pub fn new(kind: StopKind, motion: &Motion, limits: &Limits) -> Self {
-        let of = match kind {
-            StopKind::ReleaseFirst => Stop::release_first,
-            StopKind::Planar => Stop::planar,
-        };
         let Motion { twist, acceleration, .. } = motion;
+        // No pointer to a function: the proof on the machine code does not follow calls through pointers.
+        let of = |v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits| match kind {
+            StopKind::ReleaseFirst => Stop::release_first(v, a, limits),
+            StopKind::Planar => Stop::planar(v, a, limits),
+        };
         Self {
             orientation: of(&twist.angular, &acceleration.angular, &limits.orientation),
             position: of(&twist.linear, &acceleration.linear, &limits.position),
