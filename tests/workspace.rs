@@ -7,6 +7,7 @@ mod common;
 mod workspace {
     use super::*;
 
+    mod cells;
     mod command;
     mod forces;
     mod regions;

@@ -56,6 +56,8 @@ mod regularity;
 mod samples;
 mod stop;
 mod target;
+#[cfg(test)]
+mod tests;
 mod verification;
 mod walls;
 

@@ -1,0 +1,90 @@
+//! The bound of the feedback, against its definition: the largest share within the bound, and the time of saturation.
+
+use nalgebra::Vector6;
+
+use super::*;
+use crate::control::controller::Cycle;
+use crate::control::feedback_bound::FeedbackBound;
+use crate::control::state::State;
+use crate::model::rigid::Acceleration;
+
+fn constants(mode: ControlMode) -> Constants {
+    let machine = machine(&mut Samples::new(41));
+    let mut parameters = parameters(&machine);
+    parameters.law.mode = mode;
+    parameters.law.saturation = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
+    Constants::new(&machine, parameters)
+}
+
+fn cycle(constants: &Constants) -> Cycle<'_> {
+    Cycle { constants, release_ns: 0, state: State::Active }
+}
+
+#[test]
+fn feedback_keeps_its_direction_and_takes_the_largest_share_within_the_bound() {
+    let constants = constants(ControlMode::ComputedTorque);
+    let mut samples = Samples::new(42);
+    let mut limited = 0;
+    for _ in 0..2000 {
+        let [angular, linear] = [LIMITS.orientation.acceleration, LIMITS.position.acceleration];
+        let desired = Acceleration { angular: samples.vector(angular), linear: samples.vector(linear) };
+        let scale = 10.0_f64.powf(2.0 * samples.uniform() - 1.0);
+        let added =
+            Acceleration { angular: samples.vector(angular * scale), linear: samples.vector(linear * scale) };
+        let mut bound = FeedbackBound::default();
+        let got = bound.limit(&cycle(&constants), &desired, &added.vector());
+        let got = Acceleration::from_vector(&got);
+        let mut is_saturated = false;
+        for (desired, added, got, limit) in [
+            (desired.angular, added.angular, got.angular, angular),
+            (desired.linear, added.linear, got.linear, linear),
+        ] {
+            let within = |share: f64| (desired + added * share).norm() <= 1.5 * limit;
+            let share = if within(1.0) { 1.0 } else { bisected(0.0, 1.0, within) };
+            is_saturated |= share < 1.0;
+            assert!((got - added * share).norm() <= 1e-9 * (1.0 + added.norm()), "{share}");
+        }
+        assert_eq!(bound.is_saturated(), is_saturated);
+        limited += u32::from(is_saturated);
+    }
+    assert!((500..1500).contains(&limited), "{limited}");
+}
+
+#[test]
+fn feedback_on_legs_is_scaled_by_the_leg_that_exceeds_its_bound_most() {
+    let constants = constants(ControlMode::JointPd);
+    let acceleration = LIMITS.position.acceleration + constants.arm * LIMITS.orientation.acceleration;
+    let bounds = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0).map(|saturation| 1.5 * acceleration + saturation);
+    for leg in 0..LEGS {
+        for (ratio, is_saturated) in [(0.999, false), (-0.999, false), (1.001, true), (-4.0, true)] {
+            let mut wanted = bounds * 0.3;
+            wanted[leg] = ratio * bounds[leg];
+            let mut bound = FeedbackBound::default();
+            let got = bound.limit(&cycle(&constants), &Acceleration::default(), &wanted);
+            let expected = if is_saturated { wanted / ratio.abs() } else { wanted };
+            assert!((got - expected).norm() < 1e-12 && bound.is_saturated() == is_saturated);
+        }
+    }
+}
+
+/// A tenth of a second, with cycles that are not saturated forgiven at 3 % of the speed.
+#[test]
+fn saturation_that_lasts_is_a_fault() {
+    let constants = constants(ControlMode::ComputedTorque);
+    let run = |pattern: &dyn Fn(u32) -> bool, cycles: u32| {
+        let mut bound = FeedbackBound::default();
+        (0..cycles).find(|k| {
+            let wanted = if pattern(*k) { Vector6::repeat(1e3) } else { Vector6::zeros() };
+            bound.limit(&cycle(&constants), &Acceleration::default(), &wanted);
+            bound.check().is_err()
+        })
+    };
+    // The period is 1 ms: the first cycle beyond 100 ms, or for the rounding of sums the one before.
+    assert!(matches!(run(&|_| true, 1000), Some(99 | 100)), "{:?}", run(&|_| true, 1000));
+    assert_eq!(run(&|k| k < 95, 1000), None);
+    // 90 ms, then 200 ms of which 6 ms are forgotten, then 16 ms at least until the fault.
+    let found = run(&|k| !(90..290).contains(&k), 1000);
+    assert!(matches!(found, Some(305..=307)), "{found:?}");
+    // One cycle in 20 is more than is forgotten, one in 50 is less.
+    assert!(run(&|k| k % 20 == 0, 20_000).is_some() && run(&|k| k % 50 == 0, 20_000).is_none());
+}

@@ -1,0 +1,124 @@
+//! Proofs of the reference generator against dense searches for a counterexample, next to what is just accepted.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::samples::Samples;
+use crate::control::gains::Gains;
+use crate::control::law::{ControlMode, Law};
+use crate::control::leg_masses::LegMasses;
+use crate::control::limits::{DerivativeLimits, Limits};
+use crate::control::parameters::{Constants, Parameters, ViolationPolicy};
+use crate::control::supervisor::AfterStop;
+use crate::model::fidelity::Fidelity;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::{
+    Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia, at_most_256_bits,
+};
+use crate::model::rigid::{Pose, exp};
+
+mod feedback;
+mod motion;
+mod regularity;
+mod verification;
+
+const LIMITS: Limits = Limits {
+    position: DerivativeLimits { velocity: 1.0, acceleration: 6.0, jerk: 150.0 },
+    orientation: DerivativeLimits { velocity: 1.2, acceleration: 8.0, jerk: 200.0 },
+    autonomous_scale: 0.3,
+};
+
+/// A machine of about two metres with pairs of joints, some of them scattered.
+fn machine(samples: &mut Samples) -> Machine {
+    let scatter = 0.1 * samples.uniform();
+    let mut ring = |radius: f64, offset: f64, spread: f64| {
+        core::array::from_fn(|leg| {
+            let side = if leg % 2 == 0 { -spread } else { spread };
+            let angle = (leg / 2) as f64 * core::f64::consts::TAU / 3.0 + offset + side;
+            let moved = Vector3::from_fn(|_, _| scatter * (2.0 * samples.uniform() - 1.0));
+            Vector3::new(radius * angle.cos(), radius * angle.sin(), 0.0) + moved
+        })
+    };
+    let base: [Vector3<f64>; LEGS] = ring(1.4, core::f64::consts::FRAC_PI_3, 0.9);
+    let platform: [Vector3<f64>; LEGS] = ring(0.8, core::f64::consts::FRAC_PI_3, 0.2);
+    let home = Pose { rotation: Matrix3::identity(), position: Vector3::new(0.0, 0.0, 1.5) };
+    let link = Link {
+        mass: 10.0,
+        center_of_mass: 0.4,
+        axial_inertia: 0.1,
+        transverse_inertia: TransverseInertia { constant: 1.0, quadratic: 0.0, reference_length: 0.0 },
+    };
+    Machine {
+        gravity: Vector3::new(0.0, 0.0, -9.81),
+        platform: Platform {
+            mass: 200.0,
+            center_of_mass: Vector3::zeros(),
+            inertia: Matrix3::identity() * 40.0,
+        },
+        joints: Joints::new(&base, &platform, &[Vector3::y(); LEGS], &home),
+        cylinder: link.clone(),
+        rod: link,
+        actuator: Actuator {
+            min_length: 0.9,
+            max_length: 2.6,
+            max_rate: 1.0,
+            max_force: 1e4,
+            reflected_mass: 0.0,
+            viscous_friction: 0.0,
+            coulomb_friction: 0.0,
+            coulomb_smoothing: Actuator::COULOMB_SMOOTHING_M_S,
+        },
+        home: [0.0, 0.0, 0.0, 0.0, 0.0, 1.5],
+        level: at_most_256_bits(fearless_simd::Level::new()),
+    }
+}
+
+fn parameters(machine: &Machine) -> Parameters {
+    let gains = [Gains::new(8.0, 1.0); 2];
+    Parameters {
+        period_ns: 1_000_000,
+        law: Law::new(machine, ControlMode::default(), gains, LegMasses::at_home(machine), 0.0, &LIMITS),
+        fidelity: Fidelity::Exact,
+        limits: LIMITS,
+        envelope: None,
+        condition: 60.0,
+        force_rate: 1e6,
+        on_violation: ViolationPolicy::Stop,
+        feedback_scale: 0.5,
+        stroke_margin: 0.0,
+        following_velocity: 0.3,
+        following_angular_velocity: 0.3,
+        after_loss: AfterStop::default(),
+        engage_position: 0.01,
+        engage_orientation: 0.01,
+        following_position: 0.05,
+        following_orientation: 0.05,
+        setpoint_timeout_ns: 20_000_000,
+        measured_timeout_ns: 10_000_000,
+    }
+}
+
+/// A pose around home whose legs are within the stroke and whose condition is below that of the limit.
+fn pose(samples: &mut Samples, constants: &Constants) -> Pose {
+    let Pose { rotation, position } = *constants.home.pose();
+    loop {
+        let pose =
+            Pose { rotation: exp(&samples.vector(0.6)) * rotation, position: position + samples.vector(0.4) };
+        let condition = KinematicState::new(constants.machine(), pose).sensitivity().condition;
+        let is_within = leg_lengths(constants.machine(), &pose)
+            .iter()
+            .all(|length| constants.machine().actuator.contains(*length));
+        if is_within && condition < constants.reference_condition {
+            return pose;
+        }
+    }
+}
+
+/// The last value at which a test holds, between one at which it does and one at which it does not.
+fn bisected(mut holds: f64, mut fails: f64, mut test: impl FnMut(f64) -> bool) -> f64 {
+    for _ in 0..40 {
+        let middle = 0.5 * (holds + fails);
+        if test(middle) { holds = middle } else { fails = middle }
+    }
+    holds
+}

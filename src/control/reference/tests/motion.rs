@@ -1,0 +1,198 @@
+//! The reference between the ends of its steps: against an integration of its own acceleration in short steps.
+
+use nalgebra::Vector6;
+
+use super::super::history::History;
+use super::super::pose_bounds::PoseBounds;
+use super::super::target::at_rest;
+use super::super::{ReferenceGenerator, Target};
+use super::*;
+use crate::control::controller::Setpoint;
+use crate::control::input_validation::SetpointMotion;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::task::TaskState;
+
+const MS: u64 = 1_000_000;
+
+/// A motion around home in every coordinate.
+fn moving(samples: &mut Samples, constants: &Constants) -> Motion {
+    let twist = Twist { angular: samples.vector(0.4), linear: samples.vector(0.4) };
+    let acceleration = Acceleration { angular: samples.vector(3.0), linear: samples.vector(3.0) };
+    Motion { twist, acceleration, ..at_rest(&pose(samples, constants)) }
+}
+
+/// Motion `dt` seconds after another with constant jerk, the attitude in short steps by the angular velocity in their middle.
+fn integrated(motion: &Motion, jerk: &Vector6<f64>, dt: f64) -> Motion {
+    let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
+    let twist = |t: f64| Twist::from_vector(&(v + a * t + jerk * (0.5 * t * t)));
+    let mut pose = motion.pose;
+    for k in 0..200 {
+        let h = dt / 200.0;
+        let middle = twist((f64::from(k) + 0.5) * h);
+        pose.rotation = exp(&(middle.angular * h)) * pose.rotation;
+        pose.position += middle.linear * h;
+    }
+    Motion { pose, twist: twist(dt), acceleration: Acceleration::from_vector(&(a + jerk * dt)) }
+}
+
+fn assert_near(a: &Motion, b: &Motion, tolerances: [f64; 3]) {
+    let apart = [
+        a.pose.displacement_to(&b.pose).vector().norm(),
+        (a.twist.vector() - b.twist.vector()).norm(),
+        (a.acceleration.vector() - b.acceleration.vector()).norm(),
+    ];
+    assert!(apart.iter().zip(tolerances).all(|(apart, tolerance)| *apart <= tolerance), "{apart:?}");
+}
+
+#[test]
+fn the_history_returns_the_motion_of_each_instant() {
+    let mut samples = Samples::new(31);
+    let machine = machine(&mut samples);
+    let constants = Constants::new(&machine, parameters(&machine));
+    let mut history = History::default();
+    assert!(history.motion_at(0).is_none());
+    let mut motion = moving(&mut samples, &constants);
+    let mut recorded = vec![];
+    for k in 0..150_u64 {
+        let next = Vector6::from_fn(|_, _| 6.0 * samples.uniform() - 3.0);
+        let jerk = (next - motion.acceleration.vector()) / 1e-3;
+        history.record(1000 * MS + k * MS, &motion, &Acceleration::from_vector(&next), 1e-3);
+        recorded.push((motion, jerk));
+        motion = integrated(&motion, &jerk, 1e-3);
+    }
+    // Of the newest 64 segments: their begins, within, and after the last.
+    for k in 86..150_usize {
+        let (motion, jerk) = &recorded[k];
+        let begin_ns = 1000 * MS + k as u64 * MS;
+        for part_ns in [0, 300_000, 999_999] {
+            let expected = integrated(motion, jerk, part_ns as f64 * 1e-9);
+            let found = history.motion_at(begin_ns + part_ns).unwrap();
+            assert_near(&found, &expected, [1e-8, 1e-12, 1e-9]);
+        }
+    }
+    let (last, jerk) = recorded[149];
+    let after = history.motion_at(1149 * MS + 1_500_000).unwrap();
+    assert_near(&after, &integrated(&last, &jerk, 1.5e-3), [1e-7, 1e-12, 1e-9]);
+    // Before the oldest: with its acceleration.
+    let before = history.motion_at(1085 * MS).unwrap();
+    assert_near(&before, &integrated(&recorded[86].0, &Vector6::zeros(), -1e-3), [1e-7, 1e-12, 1e-9]);
+    history.clear();
+    assert!(history.motion_at(1149 * MS).is_none());
+}
+
+/// `deviation_of` against the deviation from the motion that is extrapolated on its own: the rest is of second order.
+#[test]
+fn the_deviation_of_a_setpoint_is_right_to_first_order() {
+    let mut samples = Samples::new(32);
+    let machine = machine(&mut samples);
+    let constants = Constants::new(&machine, parameters(&machine));
+    for _ in 0..200 {
+        let motion = moving(&mut samples, &constants);
+        let mut reference = ReferenceGenerator::new(&constants);
+        reference.start(&constants, 1000 * MS, &motion);
+        let offset = Twist { angular: samples.vector(1e-3), linear: samples.vector(1e-2) };
+        let task = TaskState::at_rest(crate::model::task::task_coordinates(&motion.pose, &machine.home));
+        let mut setpoint = SetpointMotion::new(Setpoint::motion(0, task));
+        setpoint.motion = moving(&mut samples, &constants);
+        setpoint.motion.pose = motion.pose.displaced(&offset);
+        for dt_ns in [0, 4 * MS, 12 * MS] {
+            setpoint.setpoint.time_ns = 1000 * MS - dt_ns;
+            let dt = dt_ns as f64 * 1e-9;
+            let desired = integrated(&setpoint.motion, &Vector6::zeros(), dt);
+            let deviation = reference.deviation_of(&constants.parameters, &setpoint);
+            let expected = motion.pose.displacement_to(&desired.pose).vector();
+            // The rest: half of the product of the two turns.
+            let rest = offset.angular.norm() * 0.5 * dt + 0.5 * dt * dt * dt + 1e-9;
+            assert!((deviation.pose.vector() - expected).norm() <= rest, "{dt}");
+            let twist = desired.twist.vector() - motion.twist.vector();
+            assert!((deviation.twist.vector() - twist).norm() <= 1e-12);
+        }
+    }
+}
+
+/// A step of the generator, and a stop that it follows, against the integration of what it did.
+#[test]
+fn steps_and_stops_move_the_pose_as_their_twist_says() {
+    let mut samples = Samples::new(33);
+    let machine = machine(&mut samples);
+    let constants = Constants::new(&machine, parameters(&machine));
+    let mut steps = 0;
+    for k in 0..100 {
+        let mut motion = moving(&mut samples, &constants);
+        motion.acceleration = Acceleration::default();
+        let mut reference = ReferenceGenerator::new(&constants);
+        reference.start(&constants, 0, &motion);
+        let home = at_rest(constants.home.pose()).pose;
+        let target = Target::Pose(&home);
+        let mut expected = motion;
+        for step in 1..=200 {
+            let target = (k % 2 == 0).then_some(&target);
+            reference.advance(&constants, step * MS, target);
+            let next = reference.motion();
+            let jerk = (next.acceleration.vector() - expected.acceleration.vector()) / 1e-3;
+            let moved = integrated(&expected, &jerk, 1e-3);
+            // A stop may change its jerk within a step.
+            if (next.twist.vector() - moved.twist.vector()).norm() < 1e-12 {
+                assert_near(next, &moved, [1e-9, 1e-12, 1e-9]);
+                steps += 1;
+            }
+            let mean = reference.motion_of_hold(step * MS - MS / 2).acceleration.vector();
+            assert!((expected.twist.vector() + mean * 1e-3 - next.twist.vector()).norm() < 1e-12);
+            expected = *next;
+        }
+        if k % 2 == 1 {
+            assert_eq!(reference.is_at_rest(), reference.motion().twist.vector().norm() == 0.0);
+        }
+    }
+    assert!(steps > 15_000, "{steps}");
+}
+
+#[test]
+fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
+    let mut samples = Samples::new(34);
+    let machine = machine(&mut samples);
+    let mut parameters = parameters(&machine);
+    parameters.stroke_margin = 0.1;
+    parameters.envelope = Some(crate::control::parameters::Envelope {
+        lowest: [-0.1, -0.1, -0.1, -0.1, -0.1, 1.4],
+        highest: [0.1, 0.1, 0.1, 0.1, 0.1, 1.6],
+    });
+    let constants = Constants::new(&machine, parameters);
+    let nominal = PoseBounds::nominal(&constants);
+    let [shortest, longest] = [machine.actuator.min_length + 0.1, machine.actuator.max_length - 0.1];
+    assert_eq!((nominal.shortest, nominal.longest), ([shortest; LEGS], [longest; LEGS]));
+    let room = 2.5e-5 * machine.actuator.stroke();
+    let ends = |bounds: &PoseBounds| {
+        let envelope = bounds.envelope.unwrap();
+        [bounds.shortest, envelope.lowest, bounds.longest.map(|x| -x), envelope.highest.map(|x| -x)]
+    };
+    for sign in [-1.0, 1.0] {
+        let at = |share: f64| {
+            let turn = Vector3::new(0.3, 0.25, 0.2) * (share * sign);
+            let shift = Vector3::new(0.3, 0.2, 0.9) * (share * sign);
+            TaskState::at_rest([turn.x, turn.y, turn.z, shift.x, shift.y, 1.5 + shift.z]).motion().pose
+        };
+        let mut bounds = PoseBounds::around(&constants, &at(1.0));
+        let mut before = ends(&bounds);
+        for share in [1.0, 0.9, 0.95, 0.5, 0.7, 0.0] {
+            bounds.tighten(&constants, &at(share));
+            let now = ends(&bounds);
+            let lengths = leg_lengths(&machine, &at(share));
+            let x = crate::model::task::task_coordinates(&at(share), &machine.home);
+            let values = [lengths, x, lengths.map(|l| -l), x.map(|x| -x)];
+            for (kind, (now, (before, nominal))) in
+                now.iter().zip(before.iter().zip(ends(&nominal).iter())).enumerate()
+            {
+                for axis in 0..6 {
+                    let is_angle = kind % 2 == 1 && axis < 3;
+                    let room = if is_angle { room / machine.joints.radius } else { room };
+                    let expected = nominal[axis].min(values[kind][axis] - room).max(before[axis]);
+                    let expected = if values[kind][axis] < nominal[axis] { expected } else { nominal[axis] };
+                    assert!((now[axis] - expected).abs() < 1e-12, "{kind} {axis} {share}");
+                }
+            }
+            before = now;
+        }
+        assert_eq!(ends(&bounds), ends(&nominal));
+    }
+}

@@ -1,0 +1,310 @@
+//! Verified stops: each is played finely next to the bound with which it was just accepted.
+
+use super::super::pose_bounds::PoseBounds;
+use super::super::regularity::RegularBalls;
+use super::super::target::at_rest;
+use super::super::verification::{PoseStop, Step, StopKind, verify};
+use super::*;
+use crate::control::limits::Limit;
+use crate::control::parameters::Envelope;
+use crate::model::inverse_geometry::leg_lengths_and_rates;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::task::task_coordinates;
+
+/// Time between the poses that are examined \[s\].
+const PLAY_STEP_S: f64 = 2e-4;
+/// What a length may exceed its bound by between knots, over the stroke; and an angle at the outermost joint.
+const ROOM_RATIO: f64 = 2.6e-5;
+
+/// Largest values along a stop.
+#[derive(Clone, Copy, Debug)]
+struct Extremes {
+    shortest: [f64; LEGS],
+    longest: [f64; LEGS],
+    rate: f64,
+    lowest: [f64; 6],
+    highest: [f64; 6],
+    /// Smallest inverse condition, with the sign of the determinant.
+    inverse_condition: f64,
+    speeds: [f64; 2],
+    /// Speeds where the step begins.
+    begin: [f64; 2],
+}
+
+impl Extremes {
+    fn add(&mut self, constants: &Constants, pose: &Pose, twist: &Twist) {
+        let machine = constants.machine();
+        let (lengths, rates) = leg_lengths_and_rates(machine, pose, twist);
+        let x = task_coordinates(pose, &machine.home);
+        for leg in 0..LEGS {
+            self.shortest[leg] = self.shortest[leg].min(lengths[leg]);
+            self.longest[leg] = self.longest[leg].max(lengths[leg]);
+            self.rate = self.rate.max(rates[leg].abs());
+            self.lowest[leg] = self.lowest[leg].min(x[leg]);
+            self.highest[leg] = self.highest[leg].max(x[leg]);
+        }
+        let state = KinematicState::new(machine, *pose);
+        let sensitivity = state.sensitivity();
+        let side = (sensitivity.determinant * constants.home.sensitivity().determinant).signum();
+        self.inverse_condition = self.inverse_condition.min(side / sensitivity.condition);
+        let speeds = [twist.linear.norm(), twist.angular.norm()];
+        self.speeds = [self.speeds[0].max(speeds[0]), self.speeds[1].max(speeds[1])];
+    }
+}
+
+/// Plays a step backward and a stop forward, the attitude by the angular velocity in the middle of short steps.
+fn play(constants: &Constants, motion: &Motion, step: &PlayedStep, kind: StopKind) -> Extremes {
+    let infinite = [f64::INFINITY; 6];
+    let mut extremes = Extremes {
+        shortest: infinite,
+        longest: [0.0; 6],
+        rate: 0.0,
+        lowest: infinite,
+        highest: infinite.map(|x| -x),
+        inverse_condition: 1.0,
+        speeds: [0.0; 2],
+        begin: [0.0; 2],
+    };
+    let stop = PoseStop::new(kind, motion, &constants.parameters.limits);
+    let count = (stop.duration() / PLAY_STEP_S).ceil().max(1.0);
+    let dt = stop.duration() / count;
+    let mut pose = motion.pose;
+    extremes.add(constants, &pose, &motion.twist);
+    for k in 0..count as u32 {
+        let middle = stop.at((f64::from(k) + 0.5) * dt);
+        let end = stop.at(f64::from(k + 1) * dt);
+        pose = Pose {
+            rotation: exp(&(middle.orientation.velocity * dt)) * pose.rotation,
+            position: motion.pose.position + end.position.displacement,
+        };
+        let twist = Twist { angular: end.orientation.velocity, linear: end.position.velocity };
+        extremes.add(constants, &pose, &twist);
+    }
+    for k in 1..=16 {
+        let t = -step.duration * f64::from(k) / 16.0;
+        let along = |v: &Vector3<f64>, a: &Vector3<f64>, j: &Vector3<f64>| v + a * t + j * (0.5 * t * t);
+        let jerk = step.jerk;
+        let (twist, a) = (&motion.twist, &motion.acceleration);
+        let twist = Twist {
+            angular: along(&twist.angular, &a.angular, &jerk.angular),
+            linear: along(&twist.linear, &a.linear, &jerk.linear),
+        };
+        let speeds = [twist.linear.norm(), twist.angular.norm()];
+        if k == 16 {
+            extremes.begin = speeds;
+        } else {
+            extremes.speeds = [0, 1].map(|part| extremes.speeds[part].max(speeds[part]));
+        }
+    }
+    extremes
+}
+
+/// The step before the motion.
+struct PlayedStep {
+    duration: f64,
+    jerk: Acceleration,
+}
+
+impl PlayedStep {
+    fn step(&self) -> Step {
+        let change = [self.jerk.angular.norm() * self.duration, self.jerk.linear.norm() * self.duration];
+        Step { duration: self.duration, change }
+    }
+}
+
+/// A motion within the limits, often with a part of them only.
+fn motion(samples: &mut Samples, constants: &Constants) -> (Motion, PlayedStep) {
+    let Limits { position, orientation, .. } = constants.parameters.limits;
+    let part = 10.0_f64.powf(-samples.uniform());
+    let turning = if samples.below(3) == 0 { 0.0 } else { part };
+    let shifting = if samples.below(3) == 0 && turning > 0.0 { 0.0 } else { part };
+    let twist = Twist {
+        angular: samples.vector(0.95 * turning * orientation.velocity),
+        linear: samples.vector(0.95 * shifting * position.velocity),
+    };
+    let acceleration = Acceleration {
+        angular: samples.vector(turning * orientation.acceleration),
+        linear: samples.vector(shifting * position.acceleration),
+    };
+    let jerk = Acceleration {
+        angular: samples.vector(turning * orientation.jerk),
+        linear: samples.vector(shifting * position.jerk),
+    };
+    let pose = pose(samples, constants);
+    let step = PlayedStep { duration: if samples.below(3) == 0 { 0.01 } else { 1e-3 }, jerk };
+    (Motion { twist, acceleration, ..at_rest(&pose) }, step)
+}
+
+/// A scene: bounds so wide that any stop is accepted, but for one that is bisected.
+struct Scene {
+    constants: Constants,
+    bounds: PoseBounds,
+    motion: Motion,
+    step: PlayedStep,
+}
+
+impl Scene {
+    fn new(samples: &mut Samples) -> Self {
+        let mut machine = machine(samples);
+        machine.actuator.max_rate = 100.0;
+        let mut parameters = parameters(&machine);
+        parameters.envelope = Some(Envelope { lowest: [-10.0; 6], highest: [10.0; 6] });
+        let mut constants = Constants::new(&machine, parameters);
+        let (motion, step) = motion(samples, &constants);
+        constants.reference_condition = 1e4;
+        let mut bounds = PoseBounds::nominal(&constants);
+        (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
+        Self { constants, bounds, motion, step }
+    }
+
+    fn verify(&self) -> Result<StopKind, Limit> {
+        let mut balls = RegularBalls::default();
+        verify(&self.constants, &self.bounds, &mut balls, &self.motion, &self.step.step())
+    }
+
+    fn play(&self, kind: StopKind) -> Extremes {
+        play(&self.constants, &self.motion, &self.step, kind)
+    }
+
+    /// Moves a bound from one at which the stop is accepted towards one at which it is not, and back to the last at which
+    /// it is; the extremes of the stop there, and the bound.
+    fn tightened(&mut self, wide: f64, narrow: f64, set: impl Fn(&mut Self, f64)) -> Option<(Extremes, f64)> {
+        set(self, wide);
+        self.verify().ok()?;
+        let bound = bisected(wide, narrow, |bound| {
+            set(self, bound);
+            self.verify().is_ok()
+        });
+        set(self, bound);
+        self.verify().ok().map(|kind| (self.play(kind), bound))
+    }
+}
+
+/// Largest and mean use of a bound.
+#[derive(Debug, Default)]
+struct Uses {
+    largest: f64,
+    count: u32,
+    near: u32,
+}
+
+impl Uses {
+    /// `excess` is the distance beyond the bound, `near` how far short of it is near.
+    fn add(&mut self, excess: f64, near: f64) {
+        self.largest = if self.count == 0 { excess } else { self.largest.max(excess) };
+        self.count += 1;
+        self.near += u32::from(excess > -near);
+    }
+}
+
+#[test]
+fn lengths_stay_within_bounds_that_are_just_accepted() {
+    let mut samples = Samples::new(21);
+    let mut uses = Uses::default();
+    for k in 0..600 {
+        let mut scene = Scene::new(&mut samples);
+        let leg = k % LEGS;
+        let stroke = scene.constants.machine().actuator.stroke();
+        let excess = if samples.below(2) == 0 {
+            let set = |scene: &mut Scene, bound| scene.bounds.longest[leg] = bound;
+            scene.tightened(100.0, 0.0, set).map(|(extremes, bound)| extremes.longest[leg] - bound)
+        } else {
+            let set = |scene: &mut Scene, bound| scene.bounds.shortest[leg] = bound;
+            scene.tightened(0.0, 100.0, set).map(|(extremes, bound)| bound - extremes.shortest[leg])
+        };
+        let Some(excess) = excess else { continue };
+        assert!(excess <= ROOM_RATIO * stroke, "{excess} {:?}", scene.motion);
+        uses.add(excess, 1e-4);
+    }
+    assert!(uses.count > 400 && uses.near > 300, "{uses:?}");
+}
+
+#[test]
+fn rates_stay_within_a_limit_that_is_just_accepted() {
+    let mut samples = Samples::new(22);
+    let mut uses = Uses::default();
+    for _ in 0..400 {
+        let mut scene = Scene::new(&mut samples);
+        let set = |scene: &mut Scene, bound| {
+            let mut machine = scene.constants.machine().clone();
+            machine.actuator.max_rate = bound;
+            let condition = scene.constants.reference_condition;
+            scene.constants = Constants::new(&machine, scene.constants.parameters);
+            scene.constants.reference_condition = condition;
+        };
+        let Some((extremes, bound)) = scene.tightened(100.0, 0.0, set) else { continue };
+        assert!(extremes.rate <= bound * (1.0 + 1e-9), "{} {bound} {:?}", extremes.rate, scene.motion);
+        uses.add(extremes.rate / bound - 1.0, 0.02);
+    }
+    assert!(uses.count > 300 && uses.near > 200, "{uses:?}");
+}
+
+#[test]
+fn coordinates_stay_within_an_envelope_that_is_just_accepted() {
+    let mut samples = Samples::new(23);
+    let mut uses = [Uses::default(), Uses::default()];
+    for k in 0..900 {
+        let mut scene = Scene::new(&mut samples);
+        // Steep angles, where their rates are larger.
+        if samples.below(2) == 0 {
+            let tilt = Vector3::y() * (1.0 * samples.uniform());
+            scene.motion.pose.rotation = exp(&tilt);
+            scene.constants.reference_condition = 1e9;
+        }
+        let axis = k % 6;
+        let excess = if samples.below(2) == 0 {
+            let set =
+                |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().highest[axis] = bound;
+            scene.tightened(10.0, -9.0, set).map(|(extremes, bound)| extremes.highest[axis] - bound)
+        } else {
+            let set = |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().lowest[axis] = bound;
+            scene.tightened(-10.0, 9.0, set).map(|(extremes, bound)| bound - extremes.lowest[axis])
+        };
+        let Some(excess) = excess else { continue };
+        let stroke = scene.constants.machine().actuator.stroke();
+        let room = if axis < 3 { ROOM_RATIO * stroke / scene.constants.arm } else { 1e-9 };
+        assert!(excess <= room, "axis {axis}: {excess} {:?}", scene.motion);
+        uses[axis / 3].add(excess, 1e-4);
+    }
+    assert!(uses.iter().all(|uses| uses.count > 250 && uses.near > 150), "{uses:?}");
+}
+
+#[test]
+fn the_condition_stays_within_a_limit_that_is_just_accepted() {
+    let mut samples = Samples::new(24);
+    let mut uses = Uses::default();
+    for _ in 0..400 {
+        let mut scene = Scene::new(&mut samples);
+        let set = |scene: &mut Scene, bound: f64| scene.constants.reference_condition = bound;
+        let Some((extremes, bound)) = scene.tightened(1e4, 1.0, set) else { continue };
+        let worst = 1.0 / extremes.inverse_condition;
+        assert!(worst > 0.0 && worst <= bound * (1.0 + 1e-9), "{worst} {bound} {:?}", scene.motion);
+        uses.add(worst / bound - 1.0, 0.3);
+    }
+    assert!(uses.count > 300 && uses.near > 200, "{uses:?}");
+}
+
+#[test]
+fn velocities_stay_within_limits_that_are_just_accepted() {
+    let mut samples = Samples::new(25);
+    for part in 0..2 {
+        let mut uses = Uses::default();
+        for _ in 0..400 {
+            let mut scene = Scene::new(&mut samples);
+            let set = |scene: &mut Scene, bound: f64| {
+                let limits = &mut scene.constants.parameters.limits;
+                let limits = if part == 0 { &mut limits.position } else { &mut limits.orientation };
+                limits.velocity = bound;
+            };
+            let Some((extremes, bound)) = scene.tightened(100.0, 0.0, set) else { continue };
+            // Else the motion before exceeded the limit, which was not accepted.
+            if extremes.begin[part] > bound {
+                continue;
+            }
+            let speed = extremes.speeds[part];
+            assert!(speed <= bound * (1.0 + 2e-9), "{part}: {speed} {bound} {:?}", scene.motion);
+            uses.add(speed / bound - 1.0, 1e-3);
+        }
+        assert!(uses.count > 200 && uses.near > 100, "{uses:?}");
+    }
+}
