@@ -60,7 +60,7 @@ pub(super) struct Examination<'a> {
     needs_rates: bool,
     /// The pose from which the step leads. Where rounding left it beyond a bound, a stop may be as far beyond: or the
     /// reference could not return.
-    from: &'a Pose,
+    from: Option<&'a Pose>,
     length_excess: f64,
 }
 
@@ -115,7 +115,7 @@ impl<'a> Examination<'a> {
             position_slack: position_curvature * chord,
             needs_rates,
             from: step.from,
-            length_excess: bounds.length_excess(constants, step.from),
+            length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             stop,
         })
     }
@@ -151,7 +151,7 @@ impl<'a> Examination<'a> {
         let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
         // Between knots up to the limit of the platform: else a reference at its own limit could not leave it.
         let is_conditioned = balls.cover(constants, pose, [0.0; 2], constants.reference_condition)
-            || condition(constants, pose) <= condition(constants, self.from);
+            || self.from.is_some_and(|from| condition(constants, pose) <= condition(constants, from));
         let is_regular =
             is_conditioned && balls.cover(constants, pose, reach, constants.parameters.condition);
         if is_regular { Ok(()) } else { Err(Limit::Condition) }
@@ -193,7 +193,8 @@ impl<'a> Examination<'a> {
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
     fn is_nearer_than_start(&self, envelope: &Envelope, x: &[f64; 6]) -> bool {
-        let from = task_coordinates(self.from, &self.constants.machine().home);
+        let Some(from) = self.from else { return false };
+        let from = task_coordinates(from, &self.constants.machine().home);
         let excess = |x: f64, (low, high): (&f64, &f64)| (low - x).max(x - high);
         let mut axes = from.iter().zip(x).zip(ranges(envelope));
         axes.all(|((from, x), range)| excess(*x, range) <= excess(*from, range).max(0.0))

@@ -129,7 +129,7 @@ impl ReferenceGenerator {
     pub fn check_start(&mut self, constants: &Constants, pose: &Pose, twist: &Twist) -> Result<(), Limit> {
         let motion = Motion { twist: *twist, ..at_rest(pose) };
         let bounds = PoseBounds::around(constants, pose);
-        verify(constants, &bounds, &mut self.balls, &motion, &Step::none(pose)).map(drop)
+        verify(constants, &bounds, &mut self.balls, &motion, &Step::default()).map(drop)
     }
 
     /// Begins with a motion at an instant. A stop must exist for it.
@@ -138,8 +138,7 @@ impl ReferenceGenerator {
     pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
         (self.motion, self.time_ns) = (*motion, time_ns);
         self.bounds = PoseBounds::around(constants, &motion.pose);
-        let verified =
-            verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::none(&motion.pose));
+        let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::default());
         self.stop = HeldStop::Verified(verified.unwrap_or(StopKind::Planar));
         self.history.clear();
         self.closing_scale = 1.0;
@@ -215,7 +214,7 @@ impl ReferenceGenerator {
         let steps = (duration_s / MAX_STEP_S).max(1.0).min(MAX_STEPS);
         // Rounded up, but for the rounding of a period.
         let steps = (steps - 1e-6) as u32 + 1;
-        let step_ns = (to_ns - self.time_ns) / u64::from(steps);
+        let step_ns = (to_ns - self.time_ns) / u64::from(steps.max(1));
         let begin = self.motion.twist.vector();
         for k in 1..=steps {
             let end_ns = if k == steps { to_ns } else { self.time_ns + step_ns };
@@ -234,7 +233,7 @@ impl ReferenceGenerator {
         let verified = proposed.and_then(|motion| {
             let (now, next) = (&self.motion.acceleration, &motion.acceleration);
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
-            let step = Step { from: &self.motion.pose, duration: step_s, change };
+            let step = Step { from: Some(&self.motion.pose), duration: step_s, change };
             match verify(constants, &self.bounds, &mut self.balls, &motion, &step) {
                 Ok(kind) => Some((motion, HeldStop::Verified(kind))),
                 Err(limit) => {

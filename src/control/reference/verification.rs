@@ -18,10 +18,10 @@ use crate::model::rigid::{Motion, Pose};
 use crate::model::task::task_coordinates;
 
 /// The step of constant jerk that leads to the motion from which a stop is verified.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Step<'a> {
-    /// The pose from which it leads.
-    pub from: &'a Pose,
+    /// The pose from which it leads; `None` if the motion is the first.
+    pub from: Option<&'a Pose>,
     /// \[s\]
     pub duration: f64,
     /// Change of the acceleration: angular \[rad/s^2\], linear \[m/s^2\].
@@ -29,11 +29,6 @@ pub(super) struct Step<'a> {
 }
 
 impl Step<'_> {
-    /// No step: the motion is the present one.
-    pub fn none(from: &Pose) -> Step<'_> {
-        Step { from, duration: 0.0, change: [0.0; 2] }
-    }
-
     /// Largest velocities within the step beyond those at its ends.
     pub fn bulge(&self) -> [f64; 2] {
         self.change.map(|change| change * self.duration / 8.0)

@@ -56,11 +56,13 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
             let ratio = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
             // The ball that is asked about is beside the one that is kept.
             let mut balls = RegularBalls::default();
-            if !balls.cover(&constants, &near, [0.0; 2]) {
+            if !balls.cover(&constants, &near, [0.0; 2], constants.reference_condition) {
                 continue;
             }
             let reach = |size: f64| ratio.map(|ratio| ratio * size);
-            let size = bisected(0.0, 2.0, |size| { balls }.cover(&constants, &center, reach(size)));
+            let size = bisected(0.0, 2.0, |size| {
+                { balls }.cover(&constants, &center, reach(size), constants.reference_condition)
+            });
             let found = worst(&mut samples, &constants, &center, reach(size));
             let used = 1.0 / (found * constants.reference_condition);
             assert!(
@@ -99,7 +101,12 @@ fn a_ball_ends_where_its_equations_say() {
                     && norm * inverse / (1.0 - inverse * change) <= constants.reference_condition
             };
             let cover = |size: f64| {
-                RegularBalls::default().cover(&constants, &center, ratio.map(|ratio| ratio * size))
+                RegularBalls::default().cover(
+                    &constants,
+                    &center,
+                    ratio.map(|ratio| ratio * size),
+                    constants.reference_condition,
+                )
             };
             let (own, expected) = (bisected(0.0, 2.0, cover), bisected(0.0, 2.0, holds));
             assert!((own - expected).abs() < 1e-7, "{own} {expected}");

@@ -1,9 +1,10 @@
 //! Verified stops: each is played finely next to the bound with which it was just accepted.
 
 use super::super::pose_bounds::PoseBounds;
+use super::super::pose_stop::{PoseStop, StopKind};
 use super::super::regularity::RegularBalls;
 use super::super::target::at_rest;
-use super::super::verification::{PoseStop, Step, StopKind, verify};
+use super::super::verification::{Step, verify};
 use super::*;
 use crate::control::limits::Limit;
 use crate::control::parameters::Envelope;
@@ -106,9 +107,9 @@ struct PlayedStep {
 }
 
 impl PlayedStep {
-    fn step(&self) -> Step {
+    fn step(&self) -> Step<'static> {
         let change = [self.jerk.angular.norm() * self.duration, self.jerk.linear.norm() * self.duration];
-        Step { duration: self.duration, change }
+        Step { from: None, duration: self.duration, change }
     }
 }
 
@@ -275,7 +276,9 @@ fn the_condition_stays_within_a_limit_that_is_just_accepted() {
     let mut uses = Uses::default();
     for _ in 0..400 {
         let mut scene = Scene::new(&mut samples);
-        let set = |scene: &mut Scene, bound: f64| scene.constants.reference_condition = bound;
+        let set = |scene: &mut Scene, bound: f64| {
+            (scene.constants.reference_condition, scene.constants.parameters.condition) = (bound, bound);
+        };
         let Some((extremes, bound)) = scene.tightened(1e4, 1.0, set) else { continue };
         let worst = 1.0 / extremes.inverse_condition;
         assert!(worst > 0.0 && worst <= bound * (1.0 + 1e-9), "{worst} {bound} {:?}", scene.motion);
