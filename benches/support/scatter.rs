@@ -232,9 +232,9 @@ impl Line {
         let color = palette(self.color);
         match (self.style, self.width) {
             (LineStyle::Dashed, _) => rgb(DASHED_INK).stroke_width(15),
-            (LineStyle::Solid, Width::Band) => color.mix(0.35).stroke_width(60),
-            (LineStyle::Solid, Width::Curve) => color.stroke_width(20),
-            (LineStyle::Solid, Width::Hair) => color.mix(0.6).stroke_width(10),
+            (LineStyle::Solid | LineStyle::Thin, Width::Band) => color.mix(0.35).stroke_width(60),
+            (LineStyle::Solid | LineStyle::Thin, Width::Curve) => color.stroke_width(20),
+            (LineStyle::Solid | LineStyle::Thin, Width::Hair) => color.mix(0.6).stroke_width(10),
         }
     }
 }

@@ -85,7 +85,7 @@ fn share_within(desired: &Vector3<f64>, added: &Vector3<f64>, bound: f64) -> f64
     }
     let (square, mixed) = (added.norm_squared(), added.dot(desired));
     let room = (bound * bound - desired.norm_squared()).max(0.0);
-    (room / (mixed + (mixed * mixed + square * room).sqrt())).max(0.0).min(1.0)
+    (room / (mixed + (mixed * mixed + square * room).sqrt())).clamp(0.0, 1.0)
 }
 
 fn limit_legs(cycle: &Cycle<'_>, wanted: &Vector6<f64>) -> Vector6<f64> {

@@ -7,17 +7,16 @@
 const STEPS: u32 = 20;
 
 /// Components that approach the target; after so many accepted steps.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) enum Components {
+    #[default]
     Both,
-    Translation { steps: u32 },
-    Rotation { steps: u32 },
-}
-
-impl Default for Components {
-    fn default() -> Self {
-        Self::Both
-    }
+    Translation {
+        steps: u32,
+    },
+    Rotation {
+        steps: u32,
+    },
 }
 
 impl Components {

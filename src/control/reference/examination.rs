@@ -96,7 +96,7 @@ impl<'a> Examination<'a> {
             if needs_rates { rate_curvature / (RATE_DEPARTURE_RATIO * actuator.max_rate) } else { 0.0 };
         let density = (curvature / CHORD_DEPARTURE_M).max(rates);
         let knots = (stop.duration() * (density / 8.0).sqrt()).ceil();
-        let intervals = knots.max(MIN_INTERVALS).min(MAX_INTERVALS);
+        let intervals = knots.clamp(MIN_INTERVALS, MAX_INTERVALS);
         let dt = stop.duration() / intervals;
         let chord = dt.max(step.duration).powi(2) / 8.0;
         let room = ROOM_RATIO * actuator.stroke();

@@ -211,7 +211,7 @@ impl ReferenceGenerator {
         if !(duration_s > 0.0) {
             return;
         }
-        let steps = (duration_s / MAX_STEP_S).max(1.0).min(MAX_STEPS);
+        let steps = (duration_s / MAX_STEP_S).clamp(1.0, MAX_STEPS);
         // Rounded up, but for the rounding of a period.
         let steps = (steps - 1e-6) as u32 + 1;
         let step_ns = (to_ns - self.time_ns) / u64::from(steps.max(1));

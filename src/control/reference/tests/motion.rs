@@ -61,6 +61,7 @@ fn the_history_returns_the_motion_of_each_instant() {
         motion = integrated(&motion, &jerk, 1e-3);
     }
     // Of the newest 64 segments: their begins, within, and after the last.
+    #[allow(clippy::needless_range_loop, reason = "the index is the cycle")]
     for k in 86..150_usize {
         let (motion, jerk) = &recorded[k];
         let begin_ns = 1000 * MS + k as u64 * MS;

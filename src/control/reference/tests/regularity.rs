@@ -4,6 +4,7 @@ use nalgebra::Vector6;
 
 use super::super::regularity::RegularBalls;
 use super::*;
+use crate::model::rigid::Twist;
 
 /// The pose of a ball at six numbers: rotation and shift as parts of the largest.
 fn within(center: &Pose, [shift, turn]: [f64; 2], numbers: &Vector6<f64>) -> Pose {
@@ -84,31 +85,40 @@ fn a_ball_ends_where_its_equations_say() {
     for _ in 0..12 {
         let machine = machine(&mut samples);
         let constants = Constants::new(&machine, parameters(&machine));
+        let holds = |center: &Pose, [d, t]: [f64; 2]| {
+            let wrenches = scaled_wrenches(&machine, center);
+            let inverse = wrenches.try_inverse().map_or(f64::INFINITY, |inverse| inverse.norm());
+            let shortest = leg_lengths(&machine, center).into_iter().fold(f64::INFINITY, f64::min);
+            let s = d + constants.arm * t;
+            let q = s / (shortest * (shortest - s)).sqrt();
+            let change = (6.0 * q * q + 6.0 * (t + q) * (t + q)).sqrt();
+            let norm = (wrenches.norm() + change).min(12.0_f64.sqrt());
+            s < shortest
+                && inverse * change < 1.0
+                && norm * inverse / (1.0 - inverse * change) <= constants.reference_condition
+        };
         for _ in 0..30 {
             let center = pose(&mut samples, &constants);
             let ratio = [samples.uniform(), samples.uniform()];
-            let wrenches = scaled_wrenches(&machine, &center);
-            let inverse = wrenches.try_inverse().map_or(f64::INFINITY, |inverse| inverse.norm());
-            let shortest = leg_lengths(&machine, &center).into_iter().fold(f64::INFINITY, f64::min);
-            let holds = |size: f64| {
-                let [d, t] = ratio.map(|ratio| ratio * size);
-                let s = d + constants.arm * t;
-                let q = s / (shortest * (shortest - s)).sqrt();
-                let change = (6.0 * q * q + 6.0 * (t + q) * (t + q)).sqrt();
-                let norm = (wrenches.norm() + change).min(12.0_f64.sqrt());
-                s < shortest
-                    && inverse * change < 1.0
-                    && norm * inverse / (1.0 - inverse * change) <= constants.reference_condition
-            };
+            let reach = |size: f64| ratio.map(|ratio| ratio * size);
+            // Beside the centre of a ball that is kept: by this ball or by a new one.
+            let mut balls = RegularBalls::default();
+            assert!(balls.cover(&constants, &center, [0.0; 2], constants.reference_condition));
+            let offset = Twist { angular: samples.vector(0.05), linear: samples.vector(0.05) };
+            let beside = center.displaced(&offset);
+            let size = bisected(0.0, 2.0, |size| {
+                { balls }.cover(&constants, &beside, reach(size), constants.reference_condition)
+            });
+            if { balls }.cover(&constants, &beside, reach(size), constants.reference_condition) {
+                let [d, t] = reach(size * (1.0 - 1e-9));
+                let from_kept = [d + offset.linear.norm(), t + offset.angular.norm()];
+                assert!(holds(&center, from_kept) || holds(&beside, [d, t]), "{size}");
+            }
             let cover = |size: f64| {
-                RegularBalls::default().cover(
-                    &constants,
-                    &center,
-                    ratio.map(|ratio| ratio * size),
-                    constants.reference_condition,
-                )
+                RegularBalls::default().cover(&constants, &center, reach(size), constants.reference_condition)
             };
-            let (own, expected) = (bisected(0.0, 2.0, cover), bisected(0.0, 2.0, holds));
+            let expected = bisected(0.0, 2.0, |size| holds(&center, reach(size)));
+            let own = bisected(0.0, 2.0, cover);
             assert!((own - expected).abs() < 1e-7, "{own} {expected}");
         }
     }

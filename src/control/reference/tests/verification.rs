@@ -150,6 +150,13 @@ impl Scene {
         machine.actuator.max_rate = 100.0;
         let mut parameters = parameters(&machine);
         parameters.envelope = Some(Envelope { lowest: [-10.0; 6], highest: [10.0; 6] });
+        if samples.below(2) == 0 {
+            // Long stops, whose knots are far apart.
+            for limits in [&mut parameters.limits.position, &mut parameters.limits.orientation] {
+                limits.acceleration *= 0.2;
+                limits.jerk *= 0.1;
+            }
+        }
         let mut constants = Constants::new(&machine, parameters);
         let (motion, step) = motion(samples, &constants);
         constants.reference_condition = 1e4;
