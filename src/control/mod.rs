@@ -8,7 +8,7 @@
 //! | validate inputs | [`input_validation`] |
 //! | locate platform, tracking error | [`localization`], [`tracking_error`] |
 //! | decide state | `assessment`, [`supervisor`] with the states of [`state`] |
-//! | reference | [`reference`] |
+//! | reference | [`mod@reference`] |
 //! | control law | [`law`] with its [`gains`] and [`leg_masses`], [`disturbance_observer`] |
 //! | forces | `forces` |
 //! | checks | `feedback_bound`, `force_limits` |

@@ -14,9 +14,9 @@
 //! Between knots a length may exceed its bound by 2.5e-5 of the stroke, an angle by as much at the outermost joint.
 //! An axis of the envelope narrower than four times the bound between knots is examined at the knots only.
 
-use nalgebra::Vector3;
 #[cfg(not(feature = "client"))]
-use nalgebra::{ComplexField as _, RealField as _};
+use nalgebra::ComplexField as _;
+use nalgebra::Vector3;
 
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};

@@ -3,26 +3,26 @@
 //! The reference owns its state and moves only by steps of constant jerk, or along a verified stop. Setpoints are targets:
 //! never copied, only approached. So the limits hold whatever is sent, and whatever the state of the controller.
 //!
-//! Each step proposes a state a step later ([`approach`]) and verifies that the stop from there keeps every limit along its
-//! whole way ([`verification`]). If so, the state is taken, with its stop. Otherwise the reference follows the stop that was
+//! Each step proposes a state a step later (`approach`) and verifies that the stop from there keeps every limit along its
+//! whole way (`verification`). If so, the state is taken, with its stop. Otherwise the reference follows the stop that was
 //! verified before, which needs no check. By induction every limit holds at all times, also if every setpoint is lost.
 //! The assumptions and the proof: `docs/safety.md`.
 //!
 //! | file | content |
 //! | --- | --- |
-//! | [`stop`] | stop of a vector in closed form |
-//! | [`verification`] | whether a stop keeps the limits along its way |
-//! | [`examination`] | a stop near a bound, knot by knot |
-//! | [`pose_stop`] | stop of position and orientation |
-//! | [`regularity`] | balls of poses proved regular, for the limit of the condition |
-//! | [`pose_bounds`] | lengths of the legs and envelope |
-//! | [`approach`] | acceleration towards a moving target |
-//! | [`constant_jerk`] | step of a motion |
-//! | [`components`] | whether translation and rotation move at once |
-//! | [`walls`] | soft approach of bounds |
-//! | [`target`] | setpoint, samples of poses, or a pose |
+//! | `stop` | stop of a vector in closed form |
+//! | `verification` | whether a stop keeps the limits along its way |
+//! | `examination` | a stop near a bound, knot by knot |
+//! | `pose_stop` | stop of position and orientation |
+//! | `regularity` | balls of poses proved regular, for the limit of the condition |
+//! | `pose_bounds` | lengths of the legs and envelope |
+//! | `approach` | acceleration towards a moving target |
+//! | `constant_jerk` | step of a motion |
+//! | `components` | whether translation and rotation move at once |
+//! | `walls` | soft approach of bounds |
+//! | `target` | setpoint, samples of poses, or a pose |
 //! | [`pose_samples`] | target through poses without derivatives |
-//! | [`history`] | the reference of the last cycles |
+//! | `history` | the reference of the last cycles |
 
 use nalgebra::Vector6;
 

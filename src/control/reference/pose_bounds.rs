@@ -1,8 +1,5 @@
 //! Bounds of the pose that the reference keeps: the lengths of the legs and the envelope of X.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::{ComplexField as _, RealField as _};
-
 use crate::control::parameters::{Constants, Envelope};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::LEGS;

@@ -4,7 +4,7 @@
 //! examined knot by knot, see [`super::examination`].
 
 #[cfg(not(feature = "client"))]
-use nalgebra::{ComplexField as _, RealField as _};
+use nalgebra::ComplexField as _;
 
 use super::examination::{Examination, curvature};
 use super::pose_bounds::PoseBounds;
