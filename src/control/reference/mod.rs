@@ -328,7 +328,12 @@ impl ReferenceGenerator {
     #[inline(never)]
     fn stopped(&mut self, constants: &Constants, h: f64) -> Motion {
         if let HeldStop::AtRest = self.stop {
-            self.followed = FollowedStop::default();
+            let stop = PoseStop::new(
+                StopKind::ReleaseFirst,
+                &at_rest(&self.motion.pose),
+                &constants.parameters.limits,
+            );
+            self.followed = FollowedStop { stop, state: stop.at(0.0), elapsed_s: 0.0 };
         }
         if let HeldStop::Verified(kind) = self.stop {
             let stop = PoseStop::new(kind, &self.motion, &constants.parameters.limits);
