@@ -23,6 +23,7 @@ use crate::control::limits::{DerivativeLimits, Limit, LimitSet, Limits};
 use crate::control::parameters::{Constants, Envelope};
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
 use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::machine::LEGS;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::task_coordinates;
 
@@ -75,14 +76,14 @@ impl Walls {
         let kept = KEPT_RATIO * machine.actuator.stroke();
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
-        let wrenches = leg_wrenches(machine, &motion.pose);
+        let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
         let approach = Approach::new(limits.position, CLOSING_SHARE, step_s);
         let squared_time = stop_time_s(limits, led).powi(2) / 8.0;
         let ends = bounds.shortest.iter().zip(&bounds.longest);
         let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
-        for (column, ((length, (rate, curvature)), (shortest, longest))) in wrenches.column_iter().zip(legs) {
-            let moment: Vector3<f64> = column.fixed_rows::<3>(0).into();
-            let direction: Vector3<f64> = column.fixed_rows::<3>(3).into();
+        for (column, ((length, (rate, curvature)), (shortest, longest))) in wrenches.into_iter().zip(legs) {
+            let [mx, my, mz, nx, ny, nz] = column;
+            let (moment, direction) = (Vector3::new(mx, my, mz), Vector3::new(nx, ny, nz));
             let gradient = stacked(&(moment / radius), &direction);
             let next = length + rate * step_s;
             // A stop leads straight on: what the leg's length departs from its tangent on the way.
