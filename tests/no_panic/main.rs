@@ -51,6 +51,11 @@ const ALLOWED: &[(&str, Option<&str>)] = &[
     ("atan2", None),
     ("sincos", None),
     ("memcpy", None),
+    ("memmove", None),
+    ("memset", None),
+    ("sin", None),
+    ("cos", None),
+    ("hypot", None),
     // In the vDSO.
     ("clock_gettime", None),
     // The sleeps, until an instant or a message.

@@ -161,11 +161,12 @@ fn is_following(state: State) -> bool {
 }
 
 /// Whether the numbers are finite and the policy allows the kind.
+#[inline(never)]
 fn check_kind(parameters: &Parameters, setpoint: &Setpoint) -> Result<(), Diagnostic> {
     if !setpoint.task.is_finite() {
         return Err(DiagnosticCode::SetpointNotFinite.into());
     }
-    // No `match`: a jump table inside the cycle is beyond the proof on its machine code.
+    // Out of line, as is its table of kinds: inside `step` it is beyond the proof on the machine code.
     let is_pose_allowed = parameters.on_violation == ViolationPolicy::Limit;
     let is_allowed = setpoint.kind == SetpointKind::Motion
         || setpoint.kind == SetpointKind::Target
