@@ -324,7 +324,11 @@ impl Run {
     }
 }
 
-/// Daemon and plant have the same parameters, so what is off is what a period makes of a force, in both engines alike.
+/// Largest error \[m\], \[rad\] in MuJoCo. Its forces differ by up to 3e-4 from inverse dynamics, as its joints are held by
+/// constraints with a time constant: 3e-4 of gravity over the stiffness of the loop, 3948 / s^2, is 0.7e-6.
+const LARGEST_ERROR: f64 = 1.2e-6;
+
+/// Daemon and plant have the same parameters, so what is off is what a period makes of a force, and what the engine does.
 #[test]
 fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
     if python::is_lacking() {
@@ -342,10 +346,9 @@ fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
             ("orientation", mujoco.orientation, ours.orientation),
         ] {
             for (mujoco, ours) in [(mujoco.rms(), ours.rms()), (mujoco.max, ours.max)] {
-                let ratio = mujoco / ours;
                 assert!(
-                    (0.5..3.0).contains(&ratio),
-                    "{machine}, {what}: {ratio} times the error in our plant"
+                    mujoco > 0.5 * ours && mujoco < LARGEST_ERROR,
+                    "{machine}, {what}: {mujoco}, {ours} in our plant"
                 );
             }
         }
