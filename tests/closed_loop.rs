@@ -8,13 +8,14 @@ mod closed_loop {
     use super::*;
 
     mod built_in;
+    mod disturbances;
+    mod estimator;
     mod evidence;
     mod feedback;
     mod fidelities;
     mod inputs;
     mod limits;
     mod modes;
-    mod observer;
     mod policies;
     mod poses;
     mod replay;

@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 use core::fmt;
 
 use super::Config;
-use super::deployment::GAIN_MARGIN;
+use super::deployment::STABLE_MASSES;
 use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
 
 /// Control loop with the longest delay that the daemon may have.
@@ -38,24 +38,26 @@ pub fn loops(config: &Config) -> Vec<ControlLoop> {
         bandwidth_hz,
         rate_hz: deployment.realtime.rate_hz,
         sampled: SampledLoop {
-            observer: control.observer_bandwidth_hz / bandwidth_hz,
-            mass_ratio: 1.0 / gain,
-            ..deployment.realtime.sampled_loop(bandwidth_hz, damping_ratio)
-        },
+            estimator_ratio: control.estimator_bandwidth_hz / bandwidth_hz,
+            compensates_disturbance: control.compensate_disturbances,
+            ..deployment.realtime.sampled_loop(bandwidth_hz, damping_ratio, deployment.drive.total_delay_s())
+        }
+        .with_feedback_gain(gain),
     };
     each.into_iter().map(with).collect()
 }
 
 impl ControlLoop {
-    /// Warning where the gain margin is less than usual.
+    /// Warning where a mass that is plausible would make the loop unstable.
     pub fn warning(&self) -> Option<String> {
         let Self { name, sampled, .. } = self;
-        let (margin, delay) = (sampled.gain_margin(), sampled.delay);
-        (margin < GAIN_MARGIN).then(|| {
+        let (lightest, heaviest) = (1.0 / sampled.gain_margin(), 1.0 / sampled.least_gain());
+        let [light, heavy] = STABLE_MASSES;
+        (lightest > light || heaviest < heavy).then(|| {
             format!(
-                "{name} loop: with {delay:.2} periods of delay a platform of less than {:.2} of the modelled mass is \
-                 unstable; a gain margin of {GAIN_MARGIN} is usual",
-                1.0 / margin
+                "{name} loop: with {:.2} periods of delay it is stable with {lightest:.2} to {heaviest:.2} of the modelled \
+                 mass only; {light} to {heavy} is advisable: lower the bandwidths, or shorten the delay",
+                sampled.delay
             )
         })
     }

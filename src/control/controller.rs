@@ -4,22 +4,25 @@
 //! struct; none changes the memory of another. A cycle does a bounded amount of work.
 
 use super::assessment::{Evidence, assess};
-use super::diagnostic::{Diagnostic, DiagnosticCode};
-use super::disturbance_observer::{DisturbanceObserver, ObserverReset};
+use super::diagnostic::Diagnostic;
+use super::estimator::LegRateEstimator;
 use super::feedback_bound::FeedbackBound;
 use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
-use super::input_validation::{MeasurementValidator, SetpointValidator, ValidatedSetpoint};
+use super::input_validation::{
+    MeasurementValidator, SetpointValidator, ValidatedSetpoint, seconds_between,
+};
 use super::limits::LimitSet;
 use super::localization::{Localization, Located, PlatformState};
 use super::parameters::{Constants, Parameters};
 use super::reference::{ReferenceGenerator, Target};
 use super::state::{OperatorRequest, Request, State};
 use super::supervisor::Supervisor;
-use super::tracking_error::{ErrorSample, ErrorTracker, TrackingError};
+use super::tracking_error::{ErrorTracker, TrackingError, setpoint_error};
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion, Wrench};
 use crate::model::task::TaskState;
+use nalgebra::Vector6;
 
 /// Meaning of the numbers of a setpoint, as the messages carry it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,8 +69,8 @@ pub struct Measurement {
     pub time_ns: u64,
     /// Measured leg lengths L, from base joint to platform joint \[m\].
     pub length: [f64; LEGS],
-    /// Measured leg rates L' \[m/s\].
-    pub rate: [f64; LEGS],
+    /// Measured leg rates L' \[m/s\]; `None` if the driver does not measure them.
+    pub rate: Option<[f64; LEGS]>,
 }
 
 /// Inputs of one cycle: with the controller's own state they determine its output.
@@ -110,7 +113,7 @@ pub struct Output {
     pub platform: Option<PlatformState>,
     /// Reference minus measured under control; else setpoint minus measured, if both are known.
     pub error: Option<TrackingError>,
-    /// The reference at the end of this cycle's period, under control.
+    /// The reference at the end of the hold of this cycle's force, under control.
     pub reference: Option<Motion>,
 }
 
@@ -133,7 +136,7 @@ pub struct Controller {
     errors: ErrorTracker,
     supervisor: Supervisor,
     reference: ReferenceGenerator,
-    observer: DisturbanceObserver,
+    leg_rates: LegRateEstimator,
     feedback: FeedbackBound,
     limiter: ForceLimiter,
 }
@@ -150,7 +153,7 @@ impl Controller {
             setpoints: SetpointValidator::default(),
             errors: ErrorTracker::default(),
             supervisor: Supervisor::default(),
-            observer: DisturbanceObserver::default(),
+            leg_rates: LegRateEstimator::default(),
             feedback: FeedbackBound::default(),
             limiter: ForceLimiter::default(),
         }
@@ -159,7 +162,7 @@ impl Controller {
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
-        let Self { errors, observer, feedback, limiter, .. } = self;
+        let Self { errors, leg_rates, feedback, limiter, .. } = self;
         let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
         let parameters = &constants.parameters;
 
@@ -168,8 +171,17 @@ impl Controller {
         let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref(), reference);
 
         // Locate platform.
-        let located = measurement.and_then(|measurement| localization.locate(&cycle, measurement));
-        let mut sample = errors.update(&cycle, reference, &setpoint, located.as_ref().ok());
+        let mut located = measurement.and_then(|measurement| {
+            let rate = leg_rates.rates(&constants.leg_rates, measurement);
+            localization.locate(&cycle, measurement, rate)
+        });
+        let mut error = match &mut located {
+            Ok(located) if cycle.state.has_control() => {
+                Some(errors.update(&cycle, reference, localization, located))
+            }
+            Ok(located) => setpoint_error(&cycle, &setpoint, located),
+            Err(_) => None,
+        };
 
         // Decide state.
         let request = supervisor.new_request(input);
@@ -177,7 +189,7 @@ impl Controller {
             input,
             setpoint: &setpoint,
             located: located.as_ref().map_err(|diagnostic| *diagnostic),
-            error: sample.as_ref().map(|sample| &sample.error),
+            error: error.as_ref(),
             feedback,
         };
         let (findings, assessed_limits) = assess(&cycle, &evidence, localization, reference);
@@ -187,33 +199,33 @@ impl Controller {
         }
 
         // Reference.
+        let begin_ns = cycle.release_ns.saturating_add(parameters.force_delay_ns);
         let begins = next.has_control() && !cycle.state.has_control();
         if let Some(located) = located.as_ref().ok().filter(|_| begins) {
-            sample = begin(&cycle, reference, errors, &setpoint, located);
+            error = Some(begin(&cycle, begin_ns, reference, errors, located));
         }
         if next.has_control() {
             let target = target(constants, next, &setpoint);
             reference.set_closing_scale(closing_scale(parameters, next));
-            let end_ns = cycle.release_ns.saturating_add(parameters.period_ns);
-            reference.advance(constants, end_ns, target.as_ref());
+            reference.advance(constants, begin_ns.saturating_add(parameters.period_ns), target.as_ref());
         }
 
         // Control law, forces, checks.
-        let continuity = match begins {
-            true => ObserverReset::All,
-            false if limiter.is_limited || feedback.is_saturated() => ObserverReset::Prediction,
-            false => ObserverReset::Keep,
-        };
         let mut actuate = || {
-            let ErrorSample { error, deviation, .. } = sample.as_ref().ok_or(DiagnosticCode::SetpointLost)?;
-            // The force is held for one period from about the release on.
-            let middle_of_hold_ns = cycle.release_ns.saturating_add(parameters.period_ns / 2);
-            let desired = reference.motion_of_hold(middle_of_hold_ns);
-            let wanted = observer.update(&parameters.law, deviation, parameters.period_s(), continuity);
+            let desired = reference.motion_of_hold(begin_ns.saturating_add(parameters.period_ns / 2));
+            let at_begin = errors.predicted(begin_ns);
+            let wanted = parameters.law.acceleration(&at_begin, &constants.input_matrix);
             let acceleration = feedback.limit(&cycle, &desired.acceleration, &wanted);
-            let motion = parameters.law.dynamics_motion(desired, error, &acceleration);
+            let in_middle = at_begin.after(
+                0.5 * parameters.period_s(),
+                &constants.input_matrix.acceleration(&acceleration, &Vector6::zeros()),
+            );
+            let motion = parameters.law.dynamics_motion(desired, &in_middle.error(), &acceleration);
             let force = forces(constants, &motion, &acceleration)?;
-            limiter.limit(&cycle, &force, &motion)
+            let limited = limiter.limit(&cycle, &force, &motion)?;
+            let lost = Vector6::from(limited.force) - Vector6::from(force);
+            errors.record_sent(begin_ns, &constants.input_matrix.acceleration(&acceleration, &lost));
+            Ok(limited)
         };
         let limited = if next.has_control() { actuate() } else { Ok(LimitedForces::default()) };
         let LimitedForces { force, wrench_error, active_limits } = limited.unwrap_or_else(|diagnostic| {
@@ -236,7 +248,7 @@ impl Controller {
             missed_measurements: measurements.missed,
             missed_setpoints: setpoints.missed,
             platform,
-            error: sample.map(|sample| sample.error),
+            error,
             reference: None,
         };
         report_reference(&mut output, reference);
@@ -253,21 +265,22 @@ fn report_reference(output: &mut Output, reference: &ReferenceGenerator) {
     }
 }
 
-/// Begins the reference at the measured pose and twist. Without force the acceleration is that of the brakes, from which the
-/// drives take over: it begins at zero. Returns the error against it.
+/// Begins the reference at the measured pose and twist, where the platform is when the first force acts. Without force the
+/// acceleration is that of the brakes, from which the drives take over: it begins at zero. Returns the error against it.
 // Out of line, as it is rare: the cycle stays short.
 #[inline(never)]
 fn begin(
     cycle: &Cycle<'_>,
+    begin_ns: u64,
     reference: &mut ReferenceGenerator,
     errors: &mut ErrorTracker,
-    setpoint: &ValidatedSetpoint<'_>,
     located: &Located<'_>,
-) -> Option<ErrorSample> {
+) -> TrackingError {
     let PlatformState { pose, twist, .. } = located.platform;
     let measured = Motion { pose, twist, acceleration: Acceleration::default() };
-    reference.start(cycle.constants, cycle.release_ns, &measured);
-    errors.restart(cycle, reference, setpoint, located)
+    let dt = seconds_between(located.measurement.time_ns, begin_ns);
+    reference.start(cycle.constants, begin_ns, &measured.after(dt));
+    errors.start(cycle, reference, located)
 }
 
 /// What the reference shall approach in a state; nothing where it follows its stop.

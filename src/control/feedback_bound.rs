@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! computed torque:  |a_d + s a| <= (1 + feedback_scale) A      position and orientation each, largest s in [0, 1]
-//! modes on legs:    |s a_i| <= (1 + feedback_scale) (A + r Ar) + saturation_i of the observer
+//! modes on legs:    |s a_i| <= (1 + feedback_scale) (A + r Ar) + the largest disturbance
 //! ```
 //!
 //! The acceleration of feedback keeps its direction. A sensor that fails, a collision or a wrong payload then accelerates
@@ -29,15 +29,9 @@ const FORGETTING_RATIO: f64 = 0.03;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct FeedbackBound {
     saturated_s: f64,
-    is_saturated: bool,
 }
 
 impl FeedbackBound {
-    /// Whether the last cycle limited the feedback.
-    pub fn is_saturated(&self) -> bool {
-        self.is_saturated
-    }
-
     /// Whether saturation has not lasted too long.
     pub fn check(&self) -> Result<(), Diagnostic> {
         if self.saturated_s <= MAX_SATURATION_S {
@@ -58,8 +52,7 @@ impl FeedbackBound {
             true => limit_legs(cycle, wanted),
             false => limit_pose(parameters, desired, wanted),
         };
-        self.is_saturated = limited != *wanted;
-        let rate = if self.is_saturated { 1.0 } else { -FORGETTING_RATIO };
+        let rate = if limited != *wanted { 1.0 } else { -FORGETTING_RATIO };
         self.saturated_s = (self.saturated_s + rate * parameters.period_s()).max(0.0);
         limited
     }

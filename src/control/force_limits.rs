@@ -27,7 +27,7 @@ pub(super) struct ForceLimiter {
     /// Of the last cycle under control.
     last: [f64; LEGS],
     /// Whether that one was limited.
-    pub is_limited: bool,
+    is_limited: bool,
 }
 
 impl ForceLimiter {

@@ -1,7 +1,7 @@
 //! The control law: six accelerations from six errors, and the motion they command in each mode.
 //!
 //! ```text
-//! a = Kp e + Kd e' + d          e, e': errors and their rates; d: of the disturbance observer
+//! a = Kp e + Kd e' + B^-1 d      e, e', d: error, its rate and the disturbance, estimated; B: input matrix, mostly 1
 //! ```
 //!
 //! | mode | errors | force |
@@ -15,16 +15,16 @@
 //! Errors of the legs: desired lengths and rates, by inverse geometry, minus measured ones. No law on legs
 //! needs forward kinematics, weight included: it is taken at the desired pose, which has no noise. Supervision
 //! (following error, condition, stopping, parking) uses the measured pose in every mode. Legs have no angles:
-//! their gains are those of the position. `m_i`: see [`super::leg_masses`]; d: [`super::disturbance_observer`].
+//! their gains are those of the position. `m_i`: see [`super::leg_masses`]; d: [`super::estimator`].
 //!
-//! The law combines two instants. The error is taken at the instant of the measurement, where both sides are
-//! known. The force is needed for the middle of the interval in which it will be held, about a period
-//! later. Subtracting quantities of different instants would add speed times delay to the error. So the
-//! error of the measurement's instant is held, and the pose for the dynamics is the desired pose at the later instant minus
-//! that error.
+//! The law combines two instants. Feedback acts on the error at the instant at which the force begins; the dynamics are evaluated
+//! in the middle of the hold, at the reference minus the error there. Both errors are predictions of the estimator, from the
+//! instant of the measurement, where both sides are known: quantities of different instants are never subtracted.
 
 use nalgebra::Vector6;
 
+use super::estimator::ErrorState;
+use super::estimator::input_matrix::InputMatrix;
 use super::gains::Gains;
 use super::leg_masses::LegMasses;
 use super::limits::Limits;
@@ -79,30 +79,31 @@ pub struct Law {
     pub position: Gains,
     /// Gains of the orientation; not used in modes that act on the legs.
     pub orientation: Gains,
-    /// L of the disturbance observer \[1/s\]; 0 is without.
-    pub observer: f64,
+    /// Whether the estimated disturbance is compensated. If not, a payload unknown to the model needs an error, and the
+    /// platform yields to people as the gains let it.
+    pub compensates_disturbance: bool,
     /// Effective mass of each drive, and the loop gains that follow.
     pub leg_masses: LegMasses,
-    /// Largest acceleration of the observer: \[rad/s^2\] and \[m/s^2\], or of each leg.
+    /// Largest disturbance of the estimator: \[rad/s^2\] and \[m/s^2\], or of each leg.
     pub saturation: Vector6<f64>,
 }
 
-/// Saturation of the observer over the acceleration limit: it compensates a payload or friction unknown to the model;
-/// more than that is a collision.
-const OBSERVER_SATURATION_RATIO: f64 = 0.5;
+/// Largest disturbance over the acceleration limit: a payload or friction unknown to the model; more than that is a
+/// collision.
+const SATURATION_RATIO: f64 = 0.5;
 
 impl Law {
-    /// The law of a machine. `observer` as \[1/s\].
+    /// The law of a machine.
     pub fn new(
         machine: &Machine,
         mode: ControlMode,
         [position, orientation]: [Gains; 2],
         leg_masses: LegMasses,
-        observer: f64,
+        compensates_disturbance: bool,
         limits: &Limits,
     ) -> Self {
         let [angular, linear] = [&limits.orientation, &limits.position]
-            .map(|limits| OBSERVER_SATURATION_RATIO * limits.acceleration);
+            .map(|limits| SATURATION_RATIO * limits.acceleration);
         let mut saturation = Vector6::repeat(linear);
         match mode {
             ControlMode::ComputedTorque => saturation.fixed_rows_mut::<3>(0).fill(angular),
@@ -114,7 +115,7 @@ impl Law {
             }
             ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
         }
-        Self { mode, position, orientation, observer, leg_masses, saturation }
+        Self { mode, position, orientation, compensates_disturbance, leg_masses, saturation }
     }
 
     /// Kp and Kd of every deviation.
@@ -125,17 +126,14 @@ impl Law {
         (all(first.stiffness, position.stiffness), all(first.damping, position.damping))
     }
 
-    /// `Kp e + Kd e'`
-    pub fn feedback(&self, deviation: &FeedbackError) -> Vector6<f64> {
+    /// `Kp e + Kd e' + B^-1 d` of an estimate at the instant at which the force begins.
+    pub fn acceleration(&self, estimate: &ErrorState, input_matrix: &InputMatrix) -> Vector6<f64> {
         let (stiffness, damping) = self.gains();
-        deviation.value.component_mul(&stiffness) + deviation.rate.component_mul(&damping)
-    }
-
-    /// The deviation after `dt` seconds without a measurement, if the platform has the commanded acceleration:
-    /// `e'' = -Kd e' - Kp e`, by one step of the semi-implicit Euler method, stable at these gains.
-    pub fn predicted(&self, deviation: &FeedbackError, dt: f64) -> FeedbackError {
-        let rate = deviation.rate - self.feedback(deviation) * dt;
-        FeedbackError { value: deviation.value + rate * dt, rate }
+        let feedback = estimate.value.component_mul(&stiffness) + estimate.rate.component_mul(&damping);
+        if !self.compensates_disturbance {
+            return feedback;
+        }
+        feedback + input_matrix.command(&estimate.disturbance)
     }
 
     /// Pose, twist and acceleration at which computed torque evaluates the inverse dynamics: where the platform will be at the
@@ -160,10 +158,13 @@ impl Law {
     pub(super) fn dynamics_motion(
         &self,
         desired: Motion,
-        error: &TrackingError,
+        error: &FeedbackError,
         acceleration: &Vector6<f64>,
     ) -> Motion {
-        if self.mode.acts_on_legs() { desired } else { self.command(&desired, error, acceleration) }
+        if self.mode.acts_on_legs() {
+            return desired;
+        }
+        self.command(&desired, &TrackingError::from(error), acceleration)
     }
 
     /// Forces `m_i a_i` of the drives for accelerations of the legs.

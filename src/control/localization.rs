@@ -14,6 +14,7 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::LEGS;
 use crate::model::rigid::{Pose, Twist};
 use crate::model::sensitivity::Sensitivity;
+use nalgebra::Vector6;
 
 /// Most Newton steps per cycle under control. One step covers far more than a cycle's motion; after a gap in the
 /// measurements several may be needed.
@@ -40,6 +41,8 @@ pub struct PlatformState {
 /// A measurement with the state of the platform it stands for.
 pub(super) struct Located<'a> {
     pub measurement: &'a Measurement,
+    /// Rates of the legs, measured or estimated \[m/s\].
+    pub rate: [f64; LEGS],
     pub platform: PlatformState,
 }
 
@@ -79,6 +82,7 @@ impl Localization {
         &mut self,
         cycle: &Cycle<'_>,
         measurement: &'a Measurement,
+        rate: [f64; LEGS],
     ) -> Result<Located<'a>, Diagnostic> {
         self.assembly_mode_fault.map_or(Ok(()), Err)?;
         let Cycle { constants, state, .. } = *cycle;
@@ -112,11 +116,16 @@ impl Localization {
             }
         }
         let (pose, kinematic_state) = (self.tracker.pose, self.tracker.kinematic_state());
-        let twist = kinematic_state.twist(machine, &measurement.rate).ok_or(DiagnosticCode::SingularPose)?;
+        let twist = kinematic_state.twist(machine, &rate).ok_or(DiagnosticCode::SingularPose)?;
         let Sensitivity { condition, determinant, .. } = *kinematic_state.sensitivity();
         let time_to_singularity = self.time_to_singularity(measurement.time_ns, determinant);
         let platform = PlatformState { pose, twist, condition, time_to_singularity };
-        Ok(Located { measurement, platform })
+        Ok(Located { measurement, rate, platform })
+    }
+
+    /// The twist of the platform that gives these rates of the legs; `None` at a singular pose.
+    pub fn twist_of(&self, constants: &Constants, rate: &Vector6<f64>) -> Option<Twist> {
+        self.tracker.kinematic_state().twist(constants.machine(), &(*rate).into())
     }
 
     /// Ends an assembly mode fault: an operator has inspected the platform.

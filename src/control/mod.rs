@@ -6,10 +6,10 @@
 //! | stage | file |
 //! | --- | --- |
 //! | validate inputs | [`input_validation`] |
-//! | locate platform, tracking error | [`localization`], [`tracking_error`] |
+//! | locate platform, tracking error | [`localization`], [`tracking_error`] with its [`estimator`] |
 //! | decide state | `assessment`, [`supervisor`] with the states of [`state`] |
 //! | reference | [`mod@reference`] |
-//! | control law | [`law`] with its [`gains`] and [`leg_masses`], [`disturbance_observer`] |
+//! | control law | [`law`] with its [`gains`] and [`leg_masses`] |
 //! | forces | `forces` |
 //! | checks | `feedback_bound`, `force_limits` |
 //!
@@ -18,7 +18,7 @@
 mod assessment;
 pub mod controller;
 pub mod diagnostic;
-pub mod disturbance_observer;
+pub mod estimator;
 mod feedback_bound;
 mod force_limits;
 mod forces;

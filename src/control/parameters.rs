@@ -1,5 +1,8 @@
 //! Parameters of a controller, and all that stays constant while it runs.
 
+use super::estimator::EstimatorConstants;
+use super::estimator::covariance::NoiseModel;
+use super::estimator::input_matrix::InputMatrix;
 use super::law::Law;
 use super::limits::Limits;
 use super::supervisor::AfterStop;
@@ -7,14 +10,19 @@ use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
+use nalgebra::Vector6;
 
 /// Parameters that a deployment chooses for a controller. Times are in nanoseconds, like the clock.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
     /// Time from one cycle to the next \[ns\]; each force is held this long.
     pub period_ns: u64,
-    /// Control law with its gains and disturbance observer.
+    /// Control law with its gains.
     pub law: Law,
+    /// What the gains of the estimator follow from.
+    pub noise: NoiseModel,
+    /// From the release to the instant at which its force begins to act \[ns\].
+    pub force_delay_ns: u64,
     /// Which terms of the dynamics are evaluated. Inertia must be one of them: the law commands an
     /// acceleration, and without inertia there would be no feedback.
     pub fidelity: Fidelity,
@@ -97,6 +105,12 @@ pub struct Constants {
     pub home: KinematicState,
     /// Largest distance of a joint on the platform from C \[m\].
     pub arm: f64,
+    /// Acceleration of the platform by what the law commands.
+    pub input_matrix: InputMatrix,
+    /// Of the estimator under control.
+    pub estimator: EstimatorConstants,
+    /// Of the estimator of the rates of the legs.
+    pub leg_rates: EstimatorConstants,
     /// Largest condition of the reference: below that of the platform, for the following error.
     pub reference_condition: f64,
 }
@@ -109,7 +123,18 @@ impl Constants {
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
         let at_home = home.sensitivity().condition;
         let reference_condition = at_home + CONDITION_SHARE * (parameters.condition - at_home);
-        Self { dynamics: InverseDynamics::new(machine), parameters, home, arm, reference_condition }
+        let NoiseModel { bandwidth, period_s, .. } = parameters.noise;
+        let lengths_only = NoiseModel { bandwidth, period_s, rate_noise_ratio: None };
+        Self {
+            dynamics: InverseDynamics::new(machine),
+            input_matrix: InputMatrix::at_home(machine, &parameters.law, parameters.fidelity),
+            estimator: EstimatorConstants::new(parameters.noise, parameters.law.saturation),
+            leg_rates: EstimatorConstants::new(lengths_only, Vector6::repeat(f64::INFINITY)),
+            parameters,
+            home,
+            arm,
+            reference_condition,
+        }
     }
 
     /// The machine.

@@ -1,16 +1,16 @@
-//! Tracking error of the platform, and the deviation that feedback acts on.
+//! Tracking error of the platform: as measured for the checks, as estimated for feedback.
 //!
-//! The error is taken at the instant of the measurement, where both sides are known. Without a new measurement it
-//! continues by the error dynamics of the law.
+//! The error is taken at the instant of the measurement, where both sides are known; the [`estimator`](super::estimator) predicts
+//! it to the instant at which the force acts. Without a new measurement the checks use the prediction.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use super::controller::Cycle;
+use super::estimator::{ErrorState, Estimator};
 use super::input_validation::ValidatedSetpoint;
-use super::law::ControlMode;
-use super::localization::Located;
+use super::localization::{Localization, Located};
 use super::parameters::Parameters;
 use super::reference::ReferenceGenerator;
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
@@ -55,7 +55,7 @@ impl TrackingError {
     }
 }
 
-/// FeedbackError that feedback acts on, desired minus measured: angles and positions, or leg lengths.
+/// Error that feedback acts on, desired minus measured: of the pose, or in modes on legs of their lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedbackError {
     /// Desired minus measured: angles \[rad\] and position \[m\], or leg lengths \[m\].
@@ -87,82 +87,96 @@ impl From<&FeedbackError> for TrackingError {
     }
 }
 
-/// Tracking error and deviation of one cycle, and the instant of the measurement they come from.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ErrorSample {
-    time_ns: u64,
-    pub error: TrackingError,
-    pub deviation: FeedbackError,
+/// Error of the platform against the setpoint, without control; `None` unless the setpoint is valid and recent.
+pub(super) fn setpoint_error(
+    cycle: &Cycle<'_>,
+    setpoint: &ValidatedSetpoint<'_>,
+    Located { measurement, platform, .. }: &Located<'_>,
+) -> Option<TrackingError> {
+    let target = setpoint.target.as_ref().filter(|_| setpoint.status.is_ok())?;
+    let desired = target.motion_at(&cycle.constants.parameters, measurement.time_ns)?;
+    Some(TrackingError::new(&desired, &platform.pose, &platform.twist))
 }
 
-impl ErrorSample {
-    /// The error of the platform against the reference, without control against the setpoint; `None` if there is none.
-    fn measure(
-        cycle: &Cycle<'_>,
-        has_control: bool,
-        reference: &ReferenceGenerator,
-        setpoint: &ValidatedSetpoint<'_>,
-        Located { measurement, platform }: &Located<'_>,
-    ) -> Option<Self> {
-        let constants = cycle.constants;
-        let time_ns = measurement.time_ns;
-        let desired = match has_control {
-            true => reference.motion_at(time_ns),
-            false => setpoint.target.as_ref()?.motion_at(&constants.parameters, time_ns)?,
-        };
-        let error = TrackingError::new(&desired, &platform.pose, &platform.twist);
-        let deviation = match constants.parameters.law.mode {
-            ControlMode::ComputedTorque => FeedbackError::from(&error),
-            _ => {
-                FeedbackError::of_legs(constants.machine(), &desired, &measurement.length, &measurement.rate)
-            }
-        };
-        Some(Self { time_ns: measurement.time_ns, error, deviation })
-    }
-
-    /// A period later, without a new measurement.
-    fn predicted(&self, parameters: &Parameters) -> Self {
-        let after = |deviation: &FeedbackError| parameters.law.predicted(deviation, parameters.period_s());
-        let error = TrackingError::from(&after(&FeedbackError::from(&self.error)));
-        Self { error, deviation: after(&self.deviation), ..*self }
-    }
-}
-
-/// Keeps the error of the last measurement under control.
-#[derive(Clone, Copy, Debug, Default)]
+/// Error of the platform against the reference, under control.
+#[derive(Clone, Debug, Default)]
 pub(super) struct ErrorTracker {
-    last: Option<ErrorSample>,
+    estimator: Estimator,
+    /// Measured; while there is no new measurement, predicted.
+    error: TrackingError,
 }
 
 impl ErrorTracker {
-    /// The error against the reference followed so far; while there is no new measurement, its prediction. Without
-    /// control the result is `None` unless the setpoint is valid and recent.
+    /// Begins with the error against a reference that has just begun. Returns it.
+    pub fn start(
+        &mut self,
+        cycle: &Cycle<'_>,
+        reference: &ReferenceGenerator,
+        located: &Located<'_>,
+    ) -> TrackingError {
+        let (error, deviation) = measured(cycle, &reference.motion_at(located.measurement.time_ns), located);
+        self.estimator.start(&cycle.constants.estimator, located.measurement.time_ns, &deviation);
+        self.error = error;
+        error
+    }
+
+    /// Corrects the estimate by a measurement, if it is new. Returns the error. Where the driver sends no rates, the twist of
+    /// the platform becomes the estimated one.
     pub fn update(
         &mut self,
         cycle: &Cycle<'_>,
         reference: &ReferenceGenerator,
-        setpoint: &ValidatedSetpoint<'_>,
-        located: Option<&Located<'_>>,
-    ) -> Option<ErrorSample> {
-        let has_control = cycle.state.has_control();
-        let located = located.filter(|_| has_control || setpoint.status.is_ok())?;
-        let sample = match self.last.filter(|last| last.time_ns == located.measurement.time_ns) {
-            Some(last) => last.predicted(&cycle.constants.parameters),
-            None => ErrorSample::measure(cycle, has_control, reference, setpoint, located)?,
-        };
-        self.last = Some(sample).filter(|_| has_control);
-        Some(sample)
+        localization: &Localization,
+        located: &mut Located<'_>,
+    ) -> TrackingError {
+        let Self { estimator, .. } = self;
+        let constants = cycle.constants;
+        let time_ns = located.measurement.time_ns;
+        let desired = reference.motion_at(time_ns);
+        let (mut error, deviation) = measured(cycle, &desired, located);
+        let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
+        let is_new = estimator.correct(&constants.estimator, time_ns, &deviation).is_some();
+        if located.measurement.rate.is_none() {
+            let rate = &estimator.state().rate;
+            error.twist = if acts_on_legs {
+                localization.twist_of(constants, rate).unwrap_or(error.twist)
+            } else {
+                Twist::from_vector(rate)
+            };
+            let twist = &mut located.platform.twist;
+            twist.angular = desired.twist.angular - error.twist.angular;
+            twist.linear = desired.twist.linear - error.twist.linear;
+        }
+        if is_new {
+            self.error = error;
+        } else if !acts_on_legs {
+            self.error = TrackingError::from(&estimator.predicted(cycle.release_ns).error());
+        }
+        self.error
     }
 
-    /// The error against the reference that has just begun.
-    pub fn restart(
-        &mut self,
-        cycle: &Cycle<'_>,
-        reference: &ReferenceGenerator,
-        setpoint: &ValidatedSetpoint<'_>,
-        located: &Located<'_>,
-    ) -> Option<ErrorSample> {
-        self.last = ErrorSample::measure(cycle, true, reference, setpoint, located);
-        self.last
+    /// The estimate at the instant at which a force begins.
+    pub fn predicted(&self, begin_ns: u64) -> ErrorState {
+        self.estimator.predicted(begin_ns)
     }
+
+    /// Records the acceleration that feedback sends, after all limits, and the instant from which on it acts.
+    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
+        self.estimator.record_sent(begin_ns, acceleration);
+    }
+}
+
+/// The measured error against a desired motion: of the pose, and what feedback acts on.
+fn measured(
+    cycle: &Cycle<'_>,
+    desired: &Motion,
+    Located { measurement, rate, platform }: &Located<'_>,
+) -> (TrackingError, FeedbackError) {
+    let constants = cycle.constants;
+    let error = TrackingError::new(desired, &platform.pose, &platform.twist);
+    let deviation = match constants.parameters.law.mode.acts_on_legs() {
+        true => FeedbackError::of_legs(constants.machine(), desired, &measurement.length, rate),
+        false => FeedbackError::from(&error),
+    };
+    (error, deviation)
 }

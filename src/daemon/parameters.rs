@@ -5,6 +5,7 @@ use core::f64::consts::TAU;
 use nalgebra::Vector6;
 
 use crate::config::deployment::Deployment;
+use crate::control::estimator::covariance::NoiseModel;
 use crate::control::gains::Gains;
 use crate::control::law::Law;
 use crate::control::parameters::{Envelope, Parameters};
@@ -30,9 +31,15 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
                 Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
             ],
             control.leg_masses,
-            TAU * control.observer_bandwidth_hz,
+            control.compensate_disturbances,
             &limits.reference,
         ),
+        noise: NoiseModel {
+            bandwidth: TAU * control.estimator_bandwidth_hz,
+            rate_noise_ratio: deployment.noise.rate_m_s.map(|rate| rate / deployment.noise.length_m),
+            period_s: deployment.realtime.period_s(),
+        },
+        force_delay_ns: nanoseconds(deployment.drive.total_delay_s()),
         fidelity,
         engage_position: control.engage_position_m,
         engage_orientation: control.engage_orientation_rad,

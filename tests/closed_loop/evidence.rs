@@ -72,10 +72,10 @@ fn measurements_are_refused_with_leg_value_and_bound() {
             actuator.min_length - 0.02 * stroke,
             index,
         );
-        let output = ends(|input| input.measurement.as_mut().unwrap().rate[leg] = 1.0);
+        let output = ends(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[leg] = 1.0);
         assert_evidence(&output, DiagnosticCode::RateJumped, 1.0, 0.05 + 0.02 * actuator.max_rate, index);
         // Half the jump of rates that would be seen at once is seen by the lengths that do not follow.
-        let output = ends(|input| input.measurement.as_mut().unwrap().rate[leg] = 0.03);
+        let output = ends(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[leg] = 0.03);
         assert_eq!(
             (output.diagnostic.code, output.diagnostic.index),
             (DiagnosticCode::RateInconsistent, index)

@@ -161,7 +161,7 @@ fn feedback_of_the_legs_is_shortened_for_all_alike() {
             let length = hexad::model::inverse_geometry::leg_lengths(&config.machine, &home.motion().pose);
             let measured = still.measurement.unwrap();
             let wanted = (Vector6::from(length) - Vector6::from(measured.length)) * law.position.stiffness
-                - Vector6::from(measured.rate) * law.position.damping;
+                - Vector6::from(measured.rate.unwrap()) * law.position.damping;
             Vector6::from(rig.controller.clone().step(&still).force) - wanted.component_mul(&mass)
         };
         let mut saturated = 0;
@@ -173,7 +173,7 @@ fn feedback_of_the_legs_is_shortened_for_all_alike() {
             }
             let desired = hexad::model::inverse_geometry::leg_lengths(&config.machine, &home.motion().pose);
             let wanted = (Vector6::from(desired) - Vector6::from(measured.length)) * law.position.stiffness
-                - Vector6::from(measured.rate) * law.position.damping;
+                - Vector6::from(measured.rate.unwrap()) * law.position.damping;
             let excess = wanted.component_div(&bounds).amax().max(1.0);
             saturated += u32::from(excess > 1.0);
             let output = rig.controller.clone().step(&input);

@@ -118,7 +118,7 @@ fn one_number_that_is_not_finite_is_ridden_through_wherever_it_stands() {
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for k in 0..6 {
             wrong(|input| input.measurement.as_mut().unwrap().length[k] = value);
-            wrong(|input| input.measurement.as_mut().unwrap().rate[k] = value);
+            wrong(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[k] = value);
             wrong(|input| input.setpoint.as_mut().unwrap().task.x[k] = value);
             wrong(|input| input.setpoint.as_mut().unwrap().task.xd[k] = value);
             wrong(|input| input.setpoint.as_mut().unwrap().task.xdd[k] = value);
@@ -132,7 +132,7 @@ fn one_message_far_away_is_ridden_through() {
     for away in [0.05, 1.0, 1e3, 1e100, 1e300, f64::MAX, -1.0, -1e300] {
         for k in 0..6 {
             wrong(|input| input.measurement.as_mut().unwrap().length[k] += away);
-            wrong(|input| input.measurement.as_mut().unwrap().rate[k] += 20.0 * away);
+            wrong(|input| input.measurement.as_mut().unwrap().rate.as_mut().unwrap()[k] += 20.0 * away);
             wrong(|input| input.setpoint.as_mut().unwrap().task.x[k] += away);
             wrong(|input| input.setpoint.as_mut().unwrap().task.xd[k] += 10.0 * away);
             // Beyond the limit of acceleration, and above beyond the tolerance; what is within is followed, see below.

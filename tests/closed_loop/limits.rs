@@ -146,7 +146,7 @@ fn noise_gets_no_more_than_the_limit() {
             let mut input = rig.input(&task);
             let measurement = input.measurement.as_mut().unwrap();
             measurement.length.iter_mut().for_each(|length| *length += size * random());
-            measurement.rate.iter_mut().for_each(|rate| *rate += 100.0 * size * random());
+            measurement.rate.as_mut().unwrap().iter_mut().for_each(|rate| *rate += 100.0 * size * random());
             let output = rig.cycle(&input);
             assert!(largest(&output.force) <= limit);
             assert!(output.state.has_control() || output.force == [0.0; LEGS]);

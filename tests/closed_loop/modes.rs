@@ -1,5 +1,5 @@
 //! The control modes, all measured alike: what each leaves of the fast scene, with a right model and a wrong one,
-//! and what the observer makes of it.
+//! and what compensation makes of it.
 
 use hexad::config::Config;
 use hexad::control::diagnostic::DiagnosticCode;
@@ -10,20 +10,21 @@ use hexad::model::task::TaskState;
 
 use super::common::deployed;
 use super::common::fast::Fast;
+use super::common::hardware_loop::configured;
 use super::common::rig::{Rig, Tracking, parameters};
 
 /// Expected errors may be off by a fifth either way.
 const BAND: (f64, f64) = (0.8, 1.25);
 
-/// As fast as the loop, and what a machine carries whose legs are coupled as those of `fried2008`.
-const OBSERVER_HZ: f64 = 10.0;
-const LEG_OBSERVER_HZ: f64 = 0.5;
-
-fn in_mode(name: &str, mode: ControlMode, observer_hz: f64) -> Config {
-    let mut config = deployed(name);
-    config.deployment.control.mode = mode;
-    config.deployment.control.observer_bandwidth_hz = observer_hz;
-    config
+/// With the delay of the drives configured, as the loop of these tests has it.
+fn in_mode(name: &str, mode: ControlMode, is_compensating: bool) -> Config {
+    let mode = mode.name();
+    configured(
+        name,
+        &format!(
+            "[control]\nmode = \"{mode}\"\ncompensate_disturbances = {is_compensating}\n[drive]\ndelay_us = 100"
+        ),
+    )
 }
 
 /// The fast scene on a platform whose mass is `share` of the modelled one, once control has settled.
@@ -53,7 +54,7 @@ fn fast(config: &Config, share: f64) -> Tracking {
     tracking
 }
 
-/// RMS of the position error \[um\]: the right model; a fifth too light, without observer and with.
+/// RMS of the position error \[um\]: the right model; a fifth too light, without compensation and with.
 const EXPECTED: [(ControlMode, [f64; 3]); 4] = [
     (ControlMode::ComputedTorque, [0.495, 260.5, 4.867]),
     (ControlMode::FeedforwardJointPd, [0.582, 303.5, 7.326]),
@@ -62,8 +63,8 @@ const EXPECTED: [(ControlMode, [f64; 3]); 4] = [
 ];
 
 fn measured(name: &str, mode: ControlMode) -> [f64; 3] {
-    [(0.0, 1.0), (0.0, 1.2), (OBSERVER_HZ, 1.2)]
-        .map(|(observer_hz, share)| 1e6 * fast(&in_mode(name, mode, observer_hz), share).position.rms())
+    [(false, 1.0), (false, 1.2), (true, 1.2)]
+        .map(|(is_compensating, share)| 1e6 * fast(&in_mode(name, mode, is_compensating), share).position.rms())
 }
 
 #[test]
@@ -81,30 +82,29 @@ fn every_mode_leaves_what_it_does_not_know() {
     }
 }
 
-/// A platform a fifth heavier takes the advantage away; the observer gives it back.
+/// A platform a fifth heavier takes the advantage away; compensation gives it back.
 #[test]
 fn computed_torque_is_twenty_times_better_than_joint_pd() {
     for name in ["fried2008", "motion_base", "tsai2000"] {
-        let rms = |mode, observer_hz, share| fast(&in_mode(name, mode, observer_hz), share).position.rms();
-        let pd = rms(ControlMode::JointPd, 0.0, 1.0);
-        let [exact, heavy, observed] = [(0.0, 1.0), (0.0, 1.2), (OBSERVER_HZ, 1.2)]
-            .map(|(observer_hz, share)| rms(ControlMode::ComputedTorque, observer_hz, share));
-        println!("{name}: {exact:e} m, heavy {heavy:e} m, observed {observed:e} m, joint PD {pd:e} m");
-        assert!(pd > 20.0 * exact && pd > 20.0 * observed, "{name}: {pd} {exact} {observed}");
+        let rms = |mode, is_compensating, share| fast(&in_mode(name, mode, is_compensating), share).position.rms();
+        let pd = rms(ControlMode::JointPd, false, 1.0);
+        let [exact, heavy, compensated] = [(false, 1.0), (false, 1.2), (true, 1.2)]
+            .map(|(is_compensating, share)| rms(ControlMode::ComputedTorque, is_compensating, share));
+        println!("{name}: {exact:e} m, heavy {heavy:e} m, compensated {compensated:e} m, joint PD {pd:e} m");
+        assert!(pd > 20.0 * exact && pd > 20.0 * compensated, "{name}: {pd} {exact} {compensated}");
         // The observer leaves more than there was without the payload: it follows it as fast as the loop, no faster.
-        let ratio = observed / exact;
-        assert!(pd < 40.0 * heavy && (5.0..15.0).contains(&ratio), "{name}: {heavy} {observed} {exact}");
+        let ratio = compensated / exact;
+        assert!(pd < 40.0 * heavy && (5.0..15.0).contains(&ratio), "{name}: {heavy} {compensated} {exact}");
     }
 }
 
 /// Also where each leg is controlled for itself.
 #[test]
-fn with_the_observer_a_payload_leaves_nothing_at_rest() {
+fn compensated_a_payload_leaves_nothing_at_rest() {
     for name in ["fried2008", "motion_base", "tsai2000"] {
         for mode in ControlMode::ALL {
-            let hertz = if mode.acts_on_legs() { LEG_OBSERVER_HZ } else { OBSERVER_HZ };
-            let [without, with] = [0.0, hertz].map(|hertz| {
-                let config = in_mode(name, mode, hertz);
+            let [without, with] = [false, true].map(|is_compensating| {
+                let config = in_mode(name, mode, is_compensating);
                 let mut heavy = config.machine.clone();
                 heavy.platform.mass *= 1.2;
                 let mut rig = Rig::new(&config, &heavy);
@@ -115,7 +115,7 @@ fn with_the_observer_a_payload_leaves_nothing_at_rest() {
                 }
                 (rig.simulator.state().pose.position - home.motion().pose.position).norm()
             });
-            println!("{name}, {}: {without:e} m, with the observer {with:e} m", mode.name());
+            println!("{name}, {}: {without:e} m, compensated {with:e} m", mode.name());
             assert!(without > 1e-4 && with < 1e-6, "{name}, {}: {without} {with}", mode.name());
         }
     }
@@ -183,7 +183,7 @@ fn the_largest_bandwidth_is_stable_in_every_mode() {
 #[test]
 fn every_mode_rides_through_missing_measurements() {
     for mode in ControlMode::ALL {
-        let config = in_mode("motion_base", mode, 2.0);
+        let config = in_mode("motion_base", mode, true);
         let scene = Fast::new(&config);
         let rms = [1, 2].map(|every| {
             let mut rig = Rig::new(&config, &config.machine);
@@ -212,7 +212,7 @@ fn every_mode_rides_through_missing_measurements() {
 /// The forces of a law on legs come from the measured lengths and the setpoint, and change with no other pose.
 #[test]
 fn a_leg_pushes_for_its_own_error() {
-    let config = in_mode("motion_base", ControlMode::JointPd, 0.0);
+    let config = in_mode("motion_base", ControlMode::JointPd, false);
     let law = parameters(&config).law;
     let home = TaskState::at_rest(config.machine.home);
     let mut rig = Rig::new(&config, &config.machine);

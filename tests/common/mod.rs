@@ -13,6 +13,7 @@
 pub mod edited;
 pub mod extremes;
 pub mod fast;
+pub mod hardware_loop;
 pub mod limit_check;
 pub mod not_run;
 pub mod observed;

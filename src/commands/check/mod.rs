@@ -110,12 +110,13 @@ impl Check<'_> {
     /// Writes the stability margins of the control loops.
     fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let control = &self.config.deployment.control;
-        let observed = if control.observer_bandwidth_hz > 0.0 {
-            format!(", with an observer of {} Hz", control.observer_bandwidth_hz)
-        } else {
-            String::new()
-        };
-        writeln!(f, "control mode {}{observed}", control.mode.name())?;
+        let compensated = if control.compensate_disturbances { "" } else { ", disturbances not compensated" };
+        writeln!(
+            f,
+            "control mode {}, estimator {:.2} Hz{compensated}",
+            control.mode.name(),
+            control.estimator_bandwidth_hz
+        )?;
         if control.mode.acts_on_legs() {
             let legs = &control.leg_masses;
             let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;

@@ -7,7 +7,7 @@ use tracing::info;
 
 use super::SetpointError;
 use super::precheck::Precheck;
-use crate::analysis::sampled_loop::boundary;
+use crate::analysis::sampled_loop::edge;
 use crate::commands::offline_tables::{read_trajectory, task_state, time};
 use crate::config::Config;
 use crate::model::task::TaskState;
@@ -44,7 +44,7 @@ impl Trajectory {
         if let Some(refusal) = refusal(&smallest) {
             return Err(SetpointError::TooSmall { motion, seconds, refusal });
         }
-        let share = boundary(1.0, |share| refusal(&largest.smaller(share)).is_none());
+        let share = edge(0.0, 1.0, |share| refusal(&largest.smaller(share)).is_none());
         info!(
             "{} with {} of the amplitude that the drives carry: with more, at {too_large}",
             motion.name(),

@@ -187,7 +187,7 @@ impl DrivenPlant {
             pose_valid: 1,
             x: task_coordinates(&state.pose, &simulator.machine().home),
             twist: state.twist.vector().into(),
-            ..MeasuredMessage::from(&Measurement { time_ns: self.time_ns, length, rate })
+            ..MeasuredMessage::from(&Measurement { time_ns: self.time_ns, length, rate: Some(rate) })
         }
     }
 }

@@ -1,10 +1,11 @@
-//! The sections of the deployment: `[realtime]`, `[control]`, `[limits]`, `[setpoint]`,
+//! The sections of the deployment: `[realtime]`, `[control]`, `[measured]`, `[drive]`, `[limits]`, `[setpoint]`,
 //! `[timeouts]`, `[plant]`, `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
 //! timeouts. What is given is checked against the limits that follow from the rate.
 
-pub use self::control::{Control, FidelityChoice, GAIN_MARGIN};
+pub use self::control::{Control, FidelityChoice, STABLE_MASSES};
+pub use self::hardware::{Drive, SensorNoise};
 pub use self::limits::DeploymentLimits;
 pub use self::plant::Plant;
 pub use self::realtime::{Realtime, Scheduler};
@@ -16,6 +17,7 @@ use crate::control::parameters::ViolationPolicy;
 use crate::model::machine::Machine;
 
 mod control;
+mod hardware;
 mod limits;
 mod plant;
 mod realtime;
@@ -38,6 +40,10 @@ pub struct Deployment {
     pub control: Control,
     /// Limits of motions and forces.
     pub limits: DeploymentLimits,
+    /// Errors of the sensors.
+    pub noise: SensorNoise,
+    /// Delay of the drives.
+    pub drive: Drive,
     /// Largest ages of messages.
     pub timeouts: Timeouts,
     /// Treatment of setpoints.
@@ -69,11 +75,18 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
     let limits = limits::read(root.section("limits"), machine);
-    let control = control::read(root.section("control"), &realtime, machine, &limits);
+    let noise = hardware::read_noise(root.section("measured"));
+    let drive = hardware::read_drive(root.section("drive"));
+    let control = control::read(
+        root.section("control"),
+        &control::Plant { realtime: &realtime, machine, limits: &limits, noise: &noise, drive: &drive },
+    );
     let setpoint = setpoint(root.section("setpoint"));
     Deployment {
         control,
         limits,
+        noise,
+        drive,
         timeouts: timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation),
         setpoint,
         plant: plant::read(root.section("plant"), rate_hz, machine),

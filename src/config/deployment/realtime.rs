@@ -93,14 +93,20 @@ impl Realtime {
         }
     }
 
-    /// A loop with that delay, without observer.
-    pub fn sampled_loop(&self, bandwidth_hz: f64, damping_ratio: f64) -> SampledLoop {
+    /// Part of that delay that the estimator knows, in periods: the age of the measurement, by its stamp.
+    fn known_delay(&self) -> f64 {
+        self.longest_delay() - 1.0
+    }
+
+    /// A loop with that delay, and drives that take `drive_delay_s` more.
+    pub fn sampled_loop(&self, bandwidth_hz: f64, damping_ratio: f64, drive_delay_s: f64) -> SampledLoop {
+        let drive = drive_delay_s * self.rate_hz;
         SampledLoop {
             wn_t: TAU * bandwidth_hz * self.period_s(),
             damping_ratio,
-            observer: 0.0,
-            delay: self.longest_delay(),
-            mass_ratio: 1.0,
+            known_delay: self.known_delay() + drive,
+            delay: self.longest_delay() + drive,
+            ..SampledLoop::default()
         }
     }
 }

@@ -41,15 +41,20 @@ struct RateConsistency {
 }
 
 impl RateConsistency {
-    /// After the step from one measurement to the next.
-    fn updated(&self, now: &Measurement, before: &Measurement) -> Self {
+    /// After the step from one measurement to the next, with the rates of both.
+    fn updated(
+        &self,
+        now: &Measurement,
+        before: &Measurement,
+        [now_rate, before_rate]: [&[f64; LEGS]; 2],
+    ) -> Self {
         let dt = seconds_between(before.time_ns, now.time_ns);
         let decay = 1.0 - dt / RESIDUAL_TIME_CONSTANT_S;
         if !(decay > 0.0) {
             return Self::default();
         }
         let mut next = *self;
-        let rates = now.rate.iter().zip(&before.rate);
+        let rates = now_rate.iter().zip(before_rate);
         let lengths = now.length.iter().zip(&before.length);
         for ((residual, travel), ((now, before), (rate, rate_before))) in
             next.residual.iter_mut().zip(&mut next.travel).zip(lengths.zip(rates))
@@ -145,7 +150,7 @@ impl MeasurementValidator {
         window_s: f64,
     ) -> Result<RateConsistency, Diagnostic> {
         let actuator = &cycle.constants.machine().actuator;
-        if now.length.iter().chain(&now.rate).any(|value| !value.is_finite()) {
+        if now.length.iter().chain(now.rate.iter().flatten()).any(|value| !value.is_finite()) {
             return Err(DiagnosticCode::MeasurementNotFinite.into());
         }
         check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
@@ -157,15 +162,32 @@ impl MeasurementValidator {
         let noise = LENGTH_NOISE_RATIO * actuator.stroke();
         let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
         check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
-        let limit = cycle.constants.parameters.limits.position.acceleration;
-        let acceleration = MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limit);
-        let bound = acceleration * dt.min(window_s) + RATE_NOISE_RATIO * actuator.max_rate;
-        check_change(DiagnosticCode::RateJumped, &now.rate, &before.rate, bound)?;
-        let consistency = self.consistency.updated(now, before);
-        // J dt^3 / 12 per step, over the steps of the time constant.
+        match (&now.rate, &before.rate) {
+            (Some(rate), Some(before_rate)) => {
+                self.check_rates(cycle, [now, before], [rate, before_rate], dt.min(window_s))
+            }
+            _ => Ok(RateConsistency::default()),
+        }
+    }
+
+    /// Whether measured rates change as actuators can, and are the derivatives of the lengths.
+    fn check_rates(
+        &self,
+        cycle: &Cycle<'_>,
+        [now, before]: [&Measurement; 2],
+        [rate, before_rate]: [&[f64; LEGS]; 2],
+        plausible_s: f64,
+    ) -> Result<RateConsistency, Diagnostic> {
+        let actuator = &cycle.constants.machine().actuator;
         let limits = &cycle.constants.parameters.limits;
+        let acceleration =
+            MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
+        let bound = acceleration * plausible_s + RATE_NOISE_RATIO * actuator.max_rate;
+        check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
+        let consistency = self.consistency.updated(now, before, [rate, before_rate]);
+        // J dt^3 / 12 per step, over the steps of the time constant.
         let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
-        consistency.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * dt.min(window_s).powi(2) / 12.0)?;
+        consistency.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * plausible_s.powi(2) / 12.0)?;
         Ok(consistency)
     }
 }

@@ -9,6 +9,7 @@
 //! | velocity, acceleration, leg rates, stroke, envelope | a motion; of a target stroke and envelope; under "stop" |
 //! | deviation from the reference, or while engaging from the setpoint before, within the engage tolerance | a motion that is followed, under "stop" |
 
+use super::setpoint_motion::SetpointMotion;
 use super::{LastValid, check_stroke, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Setpoint, SetpointKind};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
@@ -21,48 +22,12 @@ use crate::control::tracking_error::TrackingError;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::machine::Machine;
 use crate::model::rigid::Motion;
-use crate::model::task::TaskState;
 
 /// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
 const ENVELOPE_ROUNDING: f64 = 1e-9;
 
 /// Deviation from the continuation of the setpoint before that is a jump, over the engage tolerance.
 const JUMP_RATIO: f64 = 0.5;
-
-/// A setpoint with the motion of the platform it describes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SetpointMotion {
-    /// The setpoint as received: time stamp and X, X', X''.
-    pub setpoint: Setpoint,
-    /// Pose, twist and acceleration of the platform at its time stamp, base axes.
-    pub motion: Motion,
-}
-
-impl SetpointMotion {
-    /// Evaluates the motion of a setpoint. Poses alone have no derivatives.
-    pub fn new(setpoint: Setpoint) -> Self {
-        let task = match setpoint.kind {
-            SetpointKind::Motion | SetpointKind::Unknown => setpoint.task,
-            SetpointKind::Pose | SetpointKind::Target => TaskState::at_rest(setpoint.task.x.into()),
-        };
-        Self { setpoint, motion: task.motion() }
-    }
-
-    /// The motion at another instant, extrapolated no further than a setpoint may be.
-    pub(in crate::control) fn motion_at(&self, parameters: &Parameters, instant_ns: u64) -> Motion {
-        if instant_ns == self.setpoint.time_ns {
-            return self.motion;
-        }
-        // Of the motion and not of X: rates of the angles are unbounded near gimbal lock.
-        self.motion.after(self.extrapolation_s(parameters, instant_ns))
-    }
-
-    /// Time from its instant to another \[s\], no longer than a setpoint may be extrapolated.
-    pub(in crate::control) fn extrapolation_s(&self, parameters: &Parameters, instant_ns: u64) -> f64 {
-        let longest = parameters.max_extrapolation_s();
-        seconds_between(self.setpoint.time_ns, instant_ns).max(-longest).min(longest)
-    }
-}
 
 /// The last valid setpoint, whether it may be followed, and the limits it is near to.
 pub(in crate::control) struct ValidatedSetpoint<'a> {
@@ -96,7 +61,11 @@ impl SetpointValidator {
     ) -> ValidatedSetpoint<'_> {
         let new =
             newest.filter(|newest| self.last.newest.as_ref().map(|last| &last.setpoint) != Some(newest));
-        let is_accepted = new.is_some_and(|new| self.accept(cycle, SetpointMotion::new(*new), reference));
+        let is_accepted = new.is_some_and(|new| {
+            let parameters = &cycle.constants.parameters;
+            let new = SetpointMotion::new(*new).after(parameters, self.last.valid.as_ref());
+            self.accept(cycle, new, reference)
+        });
         self.missed += u64::from(cycle.state.has_control() && !is_accepted);
         let valid = self.last.valid.as_ref();
         ValidatedSetpoint {
@@ -110,7 +79,7 @@ impl SetpointValidator {
     /// Whether the valid setpoint is young enough to be followed. One that holds without end stays valid while it is
     /// followed.
     fn check_age(&self, cycle: &Cycle<'_>) -> Result<(), Diagnostic> {
-        let Some(SetpointMotion { setpoint, motion }) = &self.last.valid else {
+        let Some(SetpointMotion { setpoint, motion, .. }) = &self.last.valid else {
             return Err(self.last.rejection_or(DiagnosticCode::NoSetpoint));
         };
         let is_followed = is_following(cycle.state);
@@ -242,7 +211,7 @@ pub fn check_setpoint(
 fn check_limits(
     machine: &Machine,
     parameters: &Parameters,
-    SetpointMotion { setpoint, motion }: &SetpointMotion,
+    SetpointMotion { setpoint, motion, .. }: &SetpointMotion,
     active: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
     check_velocity_and_acceleration(parameters, motion, active)?;

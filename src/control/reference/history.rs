@@ -3,9 +3,9 @@
 use crate::control::input_validation::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-/// Segments kept, a power of two: at 1 kHz those of 64 ms, longer than the oldest measurement under control as a rule. An
+/// Segments kept, a power of two: at 20 kHz those of 25 ms, the longest delay of the drives with the age of a measurement. An
 /// older instant is extrapolated.
-const SEGMENT_COUNT: usize = 64;
+const SEGMENT_COUNT: usize = 512;
 
 /// Motion of the reference from one instant to the next, with constant jerk.
 #[derive(Clone, Copy, Debug)]
@@ -48,14 +48,23 @@ impl History {
     /// The motion at an instant, extrapolated before the first and after the last segment.
     pub fn motion_at(&self, instant_ns: u64) -> Option<Motion> {
         let kept = self.count.min(SEGMENT_COUNT);
-        let mut found = None;
-        for age in 1..=kept {
-            found = self.segments.get((self.count - age) % SEGMENT_COUNT).and_then(Option::as_ref);
-            if found.is_some_and(|segment| segment.begin_ns <= instant_ns) {
-                break;
+        let recorded = |age: usize| self.segments.get((self.count - age) % SEGMENT_COUNT).and_then(Option::as_ref);
+        let contains = |age| recorded(age).is_some_and(|segment| segment.begin_ns <= instant_ns);
+        // The newest that begins no later: most often one of the last, else by bisection.
+        let (mut newer, mut older) = (0, 1);
+        while older < kept && !contains(older) {
+            (newer, older) = (older, 2 * older);
+        }
+        older = older.min(kept);
+        while newer + 1 < older {
+            let middle = newer.midpoint(older);
+            if contains(middle) {
+                older = middle;
+            } else {
+                newer = middle;
             }
         }
-        found.map(|segment| segment.motion_at(instant_ns))
+        recorded(older).filter(|_| kept > 0).map(|segment| segment.motion_at(instant_ns))
     }
 }
 

@@ -194,12 +194,11 @@ impl ReferenceGenerator {
     /// The motion of a setpoint minus the reference at the end of the last cycle, to first order in the time between.
     pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> TrackingError {
         let motion = &setpoint.motion;
-        let dt = setpoint.extrapolation_s(parameters, self.time_ns);
+        let continued = setpoint.continued(setpoint.extrapolation_s(parameters, self.time_ns));
         let error = TrackingError::new(motion, &self.motion.pose, &self.motion.twist);
-        let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
         TrackingError {
-            pose: Twist::from_vector(&(error.pose.vector() + (v + a * (0.5 * dt)) * dt)),
-            twist: Twist::from_vector(&(error.twist.vector() + a * dt)),
+            pose: Twist::from_vector(&(error.pose.vector() + continued.displacement)),
+            twist: Twist::from_vector(&(continued.twist - self.motion.twist.vector())),
         }
     }
 

@@ -51,11 +51,13 @@ impl<'a> Target<'a> {
     ) -> Option<(Motion, Vector6<f64>)> {
         match self {
             Self::Motion(setpoint) => {
-                let SetpointMotion { motion, .. } = setpoint;
-                let dt = setpoint.extrapolation_s(parameters, instant_ns);
-                let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
-                let led = Motion { twist: Twist::from_vector(&(v + a * dt)), ..*motion };
-                Some((led, (v + a * (0.5 * dt)) * dt))
+                let continued = setpoint.continued(setpoint.extrapolation_s(parameters, instant_ns));
+                let led = Motion {
+                    pose: setpoint.motion.pose,
+                    twist: Twist::from_vector(&continued.twist),
+                    acceleration: Acceleration::from_vector(&continued.acceleration),
+                };
+                Some((led, continued.displacement))
             }
             Self::Samples(_) | Self::Pose(_) => {
                 Some((self.motion_at(parameters, instant_ns)?, Vector6::zeros()))

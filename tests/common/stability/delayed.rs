@@ -9,6 +9,7 @@ use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
 use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::estimator::covariance::NoiseModel;
 use hexad::control::gains::Gains;
 use hexad::control::law::{ControlMode, Law};
 use hexad::control::state::{OperatorRequest, Request, State};
@@ -105,7 +106,7 @@ impl Delayed {
         let output = self.controller.step(&Input {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint::motion(time_ns, task)),
-            measurement: Some(Measurement { time_ns, length, rate }),
+            measurement: Some(Measurement { time_ns, length, rate: Some(rate) }),
             request: Some(OperatorRequest { request: Request::Engage, message: (START_NS, 1) }),
             deadline_missed: false,
         });
@@ -141,7 +142,7 @@ impl Delayed {
 fn parameters(config: &Config, setup: &Setup) -> Parameters {
     let FidelityChoice::Fixed(fidelity) = config.deployment.control.fidelity else { panic!("not fixed") };
     let parameters = daemon::parameters(&config.machine, &config.deployment, fidelity);
-    let SampledLoop { wn_t, damping_ratio, observer, .. } = setup.sampled;
+    let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise, .. } = setup.sampled;
     let wn = wn_t * config.deployment.realtime.rate_hz;
     let gains = Gains::new(wn / core::f64::consts::TAU, damping_ratio);
     Parameters {
@@ -150,9 +151,16 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             ControlMode::ComputedTorque,
             [gains; 2],
             config.deployment.control.leg_masses,
-            observer * wn,
+            setup.sampled.compensates_disturbance,
             &parameters.limits,
         ),
+        noise: NoiseModel {
+            bandwidth: estimator_ratio * wn,
+            rate_noise_ratio: rate_noise.map(|ratio| ratio * config.deployment.realtime.rate_hz),
+            period_s: parameters.noise.period_s,
+        },
+        // What the estimator knows beside the age of the measurement.
+        force_delay_ns: ((setup.sampled.known_delay - setup.age).max(0.0) * parameters.period_ns as f64) as u64,
         force_rate: UNLIMITED,
         feedback_scale: UNLIMITED,
         ..parameters

@@ -1,4 +1,4 @@
-//! The observer: it removes what a wrong payload leaves, and does not wind up.
+//! Compensation of disturbances: it removes what a wrong payload leaves, and does not wind up.
 
 use hexad::config::Config;
 use hexad::control::limits::Limit;
@@ -10,15 +10,12 @@ use hexad::model::task::TaskState;
 use super::common::deployed;
 use super::common::rig::{Rig, parameters};
 
-fn with_observer(hertz: f64) -> Config {
+fn compensating(is_compensating: bool) -> Config {
     let mut config = deployed("motion_base");
     config.deployment.plant.step_s = 1e-3;
-    config.deployment.control.observer_bandwidth_hz = hertz;
+    config.deployment.control.compensate_disturbances = is_compensating;
     config
 }
-
-/// The slowest that makes a difference within the seconds of a test.
-const HERTZ: f64 = 0.5;
 
 /// Position error after some seconds at home, with a platform a fifth heavier than the controller thinks.
 fn sag(config: &Config, seconds: u32) -> f64 {
@@ -33,8 +30,8 @@ fn sag(config: &Config, seconds: u32) -> f64 {
 
 #[test]
 fn a_payload_of_a_fifth_leaves_nothing() {
-    let without = sag(&with_observer(0.0), 4);
-    let with = sag(&with_observer(HERTZ), 4);
+    let without = sag(&compensating(false), 4);
+    let with = sag(&compensating(true), 4);
     println!("without {without:e} m, with {with:e} m");
     assert!(without > 1e-4);
     assert!(with < 1e-3 * without, "{with} of {without}");
@@ -71,8 +68,8 @@ fn overshoot(config: &Config) -> f64 {
 
 #[test]
 fn it_does_not_wind_up_while_forces_are_limited() {
-    let weak = |hertz| {
-        let mut config = with_observer(hertz);
+    let weak = |is_compensating| {
+        let mut config = compensating(is_compensating);
         // Enough for the platform, not for the load.
         config.machine.actuator.max_force = 4300.0;
         config.deployment.control.following_position_m = 10.0;
@@ -81,8 +78,8 @@ fn it_does_not_wind_up_while_forces_are_limited() {
         config.deployment.limits.feedback_scale = 100.0;
         config
     };
-    let config = weak(HERTZ);
-    let (without, with) = (overshoot(&weak(0.0)), overshoot(&config));
+    let config = weak(true);
+    let (without, with) = (overshoot(&weak(false)), overshoot(&config));
     // What it would lift the platform by if it had all that it may have: half of the limit of acceleration.
     let parameters = parameters(&config);
     let wound_up = 0.5 * parameters.limits.position.acceleration / parameters.law.position.stiffness;
@@ -93,7 +90,7 @@ fn it_does_not_wind_up_while_forces_are_limited() {
 /// Whoever engages again begins without what was learnt before: the payload may be another.
 #[test]
 fn it_begins_anew_with_each_engagement() {
-    let config = with_observer(HERTZ);
+    let config = compensating(true);
     let mut heavy = config.machine.clone();
     heavy.platform.mass *= 1.2;
     let mut rig = Rig::new(&config, &heavy);

@@ -1,0 +1,59 @@
+//! `[measured]` and `[drive]`: noise of the sensors, and time from a force message to the force.
+
+use crate::config::bound::Bound;
+use crate::config::reader::SectionReader;
+
+/// Default of `length_noise_m`: a good encoder, with its cable and its filter.
+const DEFAULT_LENGTH_NOISE_M: f64 = 1e-6;
+/// Standard deviation of the error of rounding to steps, over the step: `1 / sqrt(12)`.
+const STEP_DEVIATION: f64 = 0.288_675_134_594_812_9;
+/// Longest delay of drives \[us\]: with more, a platform a tenth lighter than modelled is unstable.
+const MAX_DELAY_US: f64 = 15_000.0;
+
+/// Section `[measured]`: errors of the sensors, as standard deviations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorNoise {
+    /// Of a length.
+    pub length_m: f64,
+    /// Of a rate; `None` if the rates that the driver sends are only checked.
+    pub rate_m_s: Option<f64>,
+}
+
+/// Section `[drive]`: time from the release of a cycle to the instant at which its force acts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    /// Dead time; `None` if it is not known.
+    pub delay_s: Option<f64>,
+    /// Time constant of the force.
+    pub lag_s: f64,
+}
+
+impl Drive {
+    /// Delay that the estimator takes into account: a lag is nearly a delay for errors much slower than it.
+    pub fn total_delay_s(&self) -> f64 {
+        self.delay_s.unwrap_or_default() + self.lag_s
+    }
+}
+
+pub(super) fn read_noise(mut section: SectionReader) -> SensorNoise {
+    let step = section.number_or("length_step_m", 0.0, Bound::NotNegative);
+    let default = if step > 0.0 { STEP_DEVIATION * step } else { DEFAULT_LENGTH_NOISE_M };
+    let noise = SensorNoise {
+        length_m: section.number_or("length_noise_m", default, Bound::Positive),
+        rate_m_s: finite(section.number_or("rate_noise_m_s", f64::INFINITY, Bound::Positive)),
+    };
+    section.finish();
+    noise
+}
+
+pub(super) fn read_drive(mut section: SectionReader) -> Drive {
+    let bound = Bound::Within(0.0, MAX_DELAY_US);
+    let delay_us = finite(section.number_or("delay_us", f64::INFINITY, bound));
+    let lag_us = section.number_or("lag_us", 0.0, bound);
+    section.finish();
+    Drive { delay_s: delay_us.map(|delay_us| delay_us / 1e6), lag_s: lag_us / 1e6 }
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}

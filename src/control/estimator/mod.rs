@@ -1,0 +1,177 @@
+//! Estimator: error of the platform, its rate, and the disturbance, at any instant near now.
+//!
+//! It works in error coordinates, reference minus platform, of the pose or in modes on legs of their lengths. There the
+//! reference cancels. With u the acceleration of the platform by what feedback has *sent*, after all limits
+//! ([`input_matrix`]), and d the disturbance, the sum of all
+//! accelerations that the model does not contain:
+//!
+//! ```text
+//! e' = w,  w' = d - u,  d' = 0                       prediction, between pieces of constant u
+//! nu = e_measured - e;   [e w d] += K nu             correction by a measurement, at its instant
+//! ```
+//!
+//! K: see [`covariance`]. Rates are measured too if the driver sends them and `[measured] rate_noise_m_s` says how good they
+//! are. The error at the instant at which a force begins is the prediction from the last measurement to there, over all that
+//! was sent meanwhile. So a dead time of the drives that is known costs no stability, a lost sample is bridged, and noise of the
+//! sensors is filtered.
+//!
+//! The disturbance takes what feedback would otherwise need an error for: a payload, friction, a force of the process. It stays
+//! within [`Law::saturation`](super::law::Law). Source of the structure: Luenberger (1971), Smith (1957) for the dead time.
+//!
+//! What it does not know: elastic legs, the lag of drives but as a dead time, and coloured noise.
+
+pub mod covariance;
+pub mod input_matrix;
+mod leg_rates;
+mod sent_accelerations;
+
+use nalgebra::Vector6;
+
+use self::covariance::{Covariance, NoiseModel};
+pub(super) use self::leg_rates::LegRateEstimator;
+use self::sent_accelerations::SentAccelerations;
+use super::input_validation::seconds_between;
+use super::tracking_error::FeedbackError;
+
+/// Estimate of one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ErrorState {
+    /// e, desired minus true: angles \[rad\] and position \[m\], or leg lengths \[m\].
+    pub value: Vector6<f64>,
+    /// w, its rate.
+    pub rate: Vector6<f64>,
+    /// d, the acceleration that nothing in the model explains.
+    pub disturbance: Vector6<f64>,
+}
+
+impl ErrorState {
+    /// Moves it over `dt` seconds in which feedback accelerates the platform by u.
+    pub fn advance(&mut self, dt: f64, u: &Vector6<f64>) {
+        let acceleration = self.disturbance - u;
+        self.value += (self.rate + acceleration * (0.5 * dt)) * dt;
+        self.rate += acceleration * dt;
+    }
+
+    /// It `dt` seconds later.
+    pub fn after(mut self, dt: f64, u: &Vector6<f64>) -> Self {
+        self.advance(dt, u);
+        self
+    }
+
+    /// Without the disturbance.
+    pub fn error(&self) -> FeedbackError {
+        FeedbackError { value: self.value, rate: self.rate }
+    }
+
+    /// Corrects it by gains times differences of a reading from the prediction.
+    fn correct(&mut self, [by_e, by_w, by_d]: covariance::Gains, period_s: f64, innovation: &Vector6<f64>) {
+        self.value += innovation * by_e;
+        self.rate += innovation * (by_w / period_s);
+        self.disturbance += innovation * (by_d / (period_s * period_s));
+    }
+}
+
+/// Filter of six axes: the estimate at the instant of the last measurement, and how certain it is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Filter {
+    state: ErrorState,
+    time_ns: u64,
+    covariance: Covariance,
+}
+
+impl Filter {
+    fn new(constants: &EstimatorConstants, time_ns: u64, error: &FeedbackError) -> Self {
+        let FeedbackError { value, rate } = *error;
+        let state = ErrorState { value, rate, disturbance: Vector6::zeros() };
+        Self { state, time_ns, covariance: constants.covariance }
+    }
+
+    /// Corrects a state, which is predicted for the instant of a measurement. Returns the innovation.
+    fn correct(
+        &mut self,
+        constants: &EstimatorConstants,
+        time_ns: u64,
+        measured: &FeedbackError,
+    ) -> Vector6<f64> {
+        let EstimatorConstants { noise, saturation, .. } = constants;
+        let Self { state, covariance, .. } = self;
+        covariance.advance(noise, seconds_between(self.time_ns, time_ns) / noise.period_s);
+        let innovation = measured.value - state.value;
+        state.correct(covariance.correct_length(), noise.period_s, &innovation);
+        if let Some(variance) = noise.rate_noise() {
+            let difference = (measured.rate - state.rate) * noise.period_s;
+            state.correct(covariance.correct_rate(variance), noise.period_s, &difference);
+        }
+        state.disturbance = state.disturbance.sup(&-saturation).inf(saturation);
+        self.time_ns = time_ns;
+        innovation
+    }
+}
+
+/// Estimator of the error under control.
+#[derive(Clone, Debug, Default)]
+pub struct Estimator {
+    filter: Filter,
+    sent: SentAccelerations,
+}
+
+/// The constants of an estimator.
+#[derive(Clone, Copy, Debug)]
+pub struct EstimatorConstants {
+    /// What the gains follow from.
+    pub noise: NoiseModel,
+    /// At first.
+    pub covariance: Covariance,
+    /// Largest disturbance of each axis.
+    pub saturation: Vector6<f64>,
+}
+
+impl EstimatorConstants {
+    /// Evaluates them.
+    pub fn new(noise: NoiseModel, saturation: Vector6<f64>) -> Self {
+        Self { noise, covariance: noise.steady().0, saturation }
+    }
+}
+
+impl Estimator {
+    /// Begins with an error at an instant; nothing was sent, and the disturbance is unknown: the payload may be another.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn start(&mut self, constants: &EstimatorConstants, time_ns: u64, error: &FeedbackError) {
+        self.filter = Filter::new(constants, time_ns, error);
+        self.sent.clear();
+    }
+
+    /// Corrects the estimate by the measured error at an instant; rates where they are used. Returns the innovation: measured
+    /// minus predicted. A measurement that is not newer changes nothing.
+    pub fn correct(
+        &mut self,
+        constants: &EstimatorConstants,
+        time_ns: u64,
+        measured: &FeedbackError,
+    ) -> Option<Vector6<f64>> {
+        let Self { filter, sent } = self;
+        if seconds_between(filter.time_ns, time_ns) <= 0.0 {
+            return None;
+        }
+        sent.advance(&mut filter.state, filter.time_ns, time_ns);
+        Some(filter.correct(constants, time_ns, measured))
+    }
+
+    /// The estimate at the instant of the last measurement.
+    pub fn state(&self) -> &ErrorState {
+        &self.filter.state
+    }
+
+    /// The estimate at a later instant.
+    pub fn predicted(&self, instant_ns: u64) -> ErrorState {
+        let mut state = self.filter.state;
+        self.sent.advance(&mut state, self.filter.time_ns, instant_ns);
+        state
+    }
+
+    /// Records the acceleration that feedback sends, after all limits, and the instant from which on it acts.
+    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
+        self.sent.record(begin_ns, acceleration);
+    }
+}

@@ -1,0 +1,111 @@
+//! The loop without threads on imperfect hardware, over the fast scene: measurement at k T, release at k T + T / 2, force on its
+//! way 0.1 T after the release.
+
+use hexad::config::Config;
+use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::model::machine::{LEGS, Machine};
+use hexad::model::task::TaskState;
+use hexad::plant::hardware::Hardware;
+use hexad::plant::imperfections::Imperfections;
+
+use super::fast::Fast;
+use super::rig::{Tracking, parameters};
+use super::angle_between;
+
+/// From the release to the force message, as a share of the period.
+pub const SENDING: f64 = 0.1;
+/// What the loop has to find its pose, engage, and estimate the disturbance \[s\].
+const SETTLING_S: f64 = 2.0;
+/// The clock of a computer that has been up for a while.
+const START_NS: u64 = 86_400_000_000_000;
+
+/// A deployable machine with additional lines of configuration.
+pub fn configured(machine: &str, lines: &str) -> Config {
+    let path = format!("{}/config/{machine}.toml", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    Config::parse(&format!("{text}\n{lines}\n"), machine).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A controller and imperfect hardware.
+pub struct HardwareLoop {
+    pub controller: Controller,
+    pub hardware: Hardware,
+    pub has_rates: bool,
+    pub now_ns: u64,
+    pub period_ns: u64,
+    force: Option<[f64; LEGS]>,
+}
+
+impl HardwareLoop {
+    pub fn new(config: &Config, platform: &Machine, imperfections: &Imperfections) -> Self {
+        let parameters = parameters(config);
+        let plant = &config.deployment.plant;
+        Self {
+            controller: Controller::new(&config.machine, parameters),
+            hardware: Hardware::new(
+                platform,
+                plant.brake_deceleration_m_s2,
+                plant.step_s,
+                plant.tolerance_m,
+                imperfections,
+            ),
+            has_rates: false,
+            now_ns: START_NS,
+            period_ns: parameters.period_ns,
+            force: None,
+        }
+    }
+
+    pub fn time_s(&self) -> f64 {
+        (self.now_ns - START_NS) as f64 * 1e-9
+    }
+
+    /// What the controller sees, everything in order.
+    pub fn input(&mut self, task: &TaskState) -> Input {
+        let (length, rate) = self.hardware.measure();
+        let rate = self.has_rates.then_some(rate);
+        Input {
+            release_ns: self.now_ns + self.period_ns / 2,
+            setpoint: Some(Setpoint::motion(self.now_ns, *task)),
+            measurement: Some(Measurement { time_ns: self.now_ns, length, rate }),
+            request: (self.now_ns > START_NS)
+                .then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
+            deadline_missed: false,
+        }
+    }
+
+    /// One cycle of the controller and one period of the hardware.
+    pub fn cycle(&mut self, input: &Input) -> Output {
+        let output = self.controller.step(input);
+        let delay_ns = self.period_ns / 2 + (SENDING * self.period_ns as f64) as u64;
+        self.hardware.advance(delay_ns, self.force);
+        self.force = output.state.has_control().then_some(output.force);
+        self.hardware.advance(self.period_ns - delay_ns, self.force);
+        self.now_ns += self.period_ns;
+        output
+    }
+
+    /// Plays the fast scene. Errors of the true platform against the setpoints; the cause if control was lost.
+    pub fn play(&mut self, config: &Config) -> Result<Tracking, DiagnosticCode> {
+        let scene = Fast::new(config);
+        let mut tracking = Tracking::default();
+        let mut output = Output::default();
+        while self.time_s() < SETTLING_S + scene.duration() {
+            let is_settled = self.time_s() >= SETTLING_S;
+            if is_settled && output.state != State::Active {
+                return Err(output.diagnostic.code);
+            }
+            let task = scene.at((self.time_s() - SETTLING_S).max(0.0));
+            if is_settled {
+                let (desired, actual) = (task.motion().pose, self.hardware.simulator().state().pose);
+                tracking.position.add((desired.position - actual.position).norm());
+                tracking.orientation.add(angle_between(&actual.rotation, &desired.rotation));
+            }
+            let input = self.input(&task);
+            output = self.cycle(&input);
+        }
+        Ok(tracking)
+    }
+}
