@@ -214,12 +214,12 @@ impl SampledLoop {
         sum.get((0, 0)).copied().unwrap_or(f64::NAN).sqrt()
     }
 
-    /// Error at each of so many measurements, the first with this rate times the period.
-    pub fn response(&self, rate: f64, cycles: usize) -> Vec<f64> {
+    /// Error at each of so many measurements, from this error and rate times the period that nothing has measured before.
+    pub fn response(&self, [error, rate]: [f64; 2], cycles: usize) -> Vec<f64> {
         let period = Period::new(self);
         let mut state = DVector::zeros(period.states());
-        if let Some(v) = state.get_mut(1) {
-            *v = rate;
+        for (state, value) in state.iter_mut().zip([error, rate]) {
+            *state = value;
         }
         (0..cycles)
             .map(|_| {
@@ -332,7 +332,7 @@ mod tests {
             let late = SampledLoop { delay: with.delay + share * (with.longest_delay() - with.delay), ..with };
             [(light, share < 1.0), (late, share < 1.0)]
         }) {
-            let response = each.response(1e-3, 4000);
+            let response = each.response([0.0, 1e-3], 4000);
             let peak = |part: &[f64]| part.iter().fold(0.0, |peak: f64, e| peak.max(e.abs()));
             let (early, late) = (peak(&response[..1000]), peak(&response[3000..]));
             assert_eq!(late < early, is_stable, "{each:?}: {early} {late}");

@@ -22,7 +22,6 @@ use super::tracking_error::{ErrorTracker, TrackingError, setpoint_error};
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Acceleration, Motion, Wrench};
 use crate::model::task::TaskState;
-use nalgebra::Vector6;
 
 /// Meaning of the numbers of a setpoint, as the messages carry it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -216,15 +215,16 @@ impl Controller {
             let at_begin = errors.predicted(begin_ns);
             let wanted = parameters.law.acceleration(&at_begin, &constants.input_matrix);
             let acceleration = feedback.limit(&cycle, &desired.acceleration, &wanted);
-            let in_middle = at_begin.after(
-                0.5 * parameters.period_s(),
-                &constants.input_matrix.acceleration(&acceleration, &Vector6::zeros()),
-            );
+            let mut sent = constants.input_matrix.acceleration(&acceleration);
+            let in_middle = at_begin.after(0.5 * parameters.period_s(), &sent);
             let motion = parameters.law.dynamics_motion(desired, &in_middle.error(), &acceleration);
             let force = forces(constants, &motion, &acceleration)?;
             let limited = limiter.limit(&cycle, &force, &motion)?;
-            let lost = Vector6::from(limited.force) - Vector6::from(force);
-            errors.record_sent(begin_ns, &constants.input_matrix.acceleration(&acceleration, &lost));
+            if limited.force != force {
+                let LimitedForces { wrench_error, .. } = &limited;
+                sent += constants.input_matrix.acceleration_of(constants.machine(), &motion.pose, wrench_error);
+            }
+            errors.record_sent(begin_ns, &sent);
             Ok(limited)
         };
         let limited = if next.has_control() { actuate() } else { Ok(LimitedForces::default()) };

@@ -125,10 +125,12 @@ impl Constants {
         let reference_condition = at_home + CONDITION_SHARE * (parameters.condition - at_home);
         let NoiseModel { bandwidth, period_s, .. } = parameters.noise;
         let lengths_only = NoiseModel { bandwidth, period_s, rate_noise_ratio: None };
+        let input_matrix = InputMatrix::at_home(machine, &parameters.law, parameters.fidelity);
+        let saturation = input_matrix.largest_disturbance(&parameters.law.saturation);
         Self {
             dynamics: InverseDynamics::new(machine),
-            input_matrix: InputMatrix::at_home(machine, &parameters.law, parameters.fidelity),
-            estimator: EstimatorConstants::new(parameters.noise, parameters.law.saturation),
+            input_matrix,
+            estimator: EstimatorConstants::new(parameters.noise, saturation),
             leg_rates: EstimatorConstants::new(lengths_only, Vector6::repeat(f64::INFINITY)),
             parameters,
             home,

@@ -51,6 +51,7 @@ fn with_the_models_parameters_sampling_leaves_next_to_nothing() {
     ] {
         let config = config(machine, rate_hz, TOLD);
         for has_rates in [false, true] {
+            println!("{:.2} Hz", config.deployment.control.position_bandwidth_hz);
             let found = rms_um(&config, 1.0, &Imperfections::default(), has_rates).unwrap();
             println!("{machine} {rate_hz} Hz, rates {has_rates}: {found:.4} um");
             assert!(found < bound_um, "{machine} at {rate_hz} Hz: {found} um");

@@ -3,6 +3,7 @@
 
 use core::f64::consts::TAU;
 
+use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::control::state::State;
 use hexad::model::rigid::{Motion, Twist};
 use hexad::model::task::TaskState;
@@ -20,34 +21,37 @@ const BAND: (f64, f64) = (0.8, 1.25);
 /// A machine, a motion, RMS and maximum of the position error \[um\], and of the orientation error \[urad\].
 type Expected = (&'static str, BuiltInMotion, [f64; 2], [f64; 2]);
 
+/// No rotation: less than this, which is not bounded below.
+const STILL: [f64; 2] = [1e-3; 2];
+
 /// What is left with equal parameters on both sides: the force is held over a period in which the motion
 /// goes on.
 const EQUAL: [Expected; 12] = [
-    ("fried2008", BuiltInMotion::MinimumJerk, [0.2350, 0.7351], [0.2427, 0.7544]),
-    ("fried2008", BuiltInMotion::Sines, [0.3123, 0.7788], [0.4157, 0.9757]),
-    ("fried2008", BuiltInMotion::Circle, [0.2315, 0.4661], [0.0241, 0.0392]),
-    ("fried2008", BuiltInMotion::Paper, [0.2339, 0.4778], [0.1928, 0.7916]),
-    ("motion_base", BuiltInMotion::MinimumJerk, [0.4658, 1.464], [0.2480, 0.7241]),
-    ("motion_base", BuiltInMotion::Sines, [0.3000, 0.7572], [0.2269, 0.4951]),
-    ("motion_base", BuiltInMotion::Circle, [0.4098, 0.9125], [0.0360, 0.0784]),
-    ("motion_base", BuiltInMotion::Paper, [0.1666, 0.3491], [0.0810, 0.2890]),
-    ("tsai2000", BuiltInMotion::MinimumJerk, [0.2969, 0.9124], [0.4674, 1.245]),
-    ("tsai2000", BuiltInMotion::Sines, [0.4045, 0.9297], [1.355, 2.898]),
-    ("tsai2000", BuiltInMotion::Circle, [0.3026, 0.5988], [0.2807, 0.5656]),
-    ("tsai2000", BuiltInMotion::Paper, [0.3534, 0.7533], [1.039, 3.187]),
+    ("fried2008", BuiltInMotion::MinimumJerk, [0.0182, 0.1319], [0.019, 0.1356]),
+    ("fried2008", BuiltInMotion::Sines, [0.0191, 0.0508], [0.0271, 0.0682]),
+    ("fried2008", BuiltInMotion::Circle, [0.0132, 0.0304], STILL),
+    ("fried2008", BuiltInMotion::Paper, [0.0134, 0.0336], [0.0127, 0.0961]),
+    ("motion_base", BuiltInMotion::MinimumJerk, [0.0367, 0.2693], [0.019, 0.1357]),
+    ("motion_base", BuiltInMotion::Sines, [0.0196, 0.052], [0.0137, 0.0344]),
+    ("motion_base", BuiltInMotion::Circle, [0.0266, 0.0612], STILL),
+    ("motion_base", BuiltInMotion::Paper, [0.0109, 0.0275], [0.0051, 0.0384]),
+    ("tsai2000", BuiltInMotion::MinimumJerk, [0.0226, 0.1641], [0.0189, 0.1354]),
+    ("tsai2000", BuiltInMotion::Sines, [0.0237, 0.063], [0.027, 0.0679]),
+    ("tsai2000", BuiltInMotion::Circle, [0.0164, 0.0377], STILL),
+    ("tsai2000", BuiltInMotion::Paper, [0.0166, 0.0416], [0.0126, 0.0958]),
 ];
 
-/// A platform that is a fifth heavier than the controller thinks sags by the missing force over Kp.
+/// A platform that is a fifth heavier than the model sags when control begins, until its weight is estimated.
 const HEAVY: [Expected; 3] = [
-    ("fried2008", BuiltInMotion::Paper, [170.7, 179.5], [4.727, 7.397]),
-    ("motion_base", BuiltInMotion::Paper, [253.8, 292.6], [45.69, 62.08]),
-    ("tsai2000", BuiltInMotion::Paper, [393.9, 471.2], [105.6, 164.4]),
+    ("fried2008", BuiltInMotion::Paper, [4.3854, 78.33], [0.1003, 0.2797]),
+    ("motion_base", BuiltInMotion::Paper, [6.4248, 116.39], [0.6731, 8.029]),
+    ("tsai2000", BuiltInMotion::Paper, [10.334, 181.71], [2.4984, 10.08]),
 ];
 
 fn within(found: &Errors, expected: [f64; 2], what: &str) -> bool {
     let [rms, max] = expected.map(|micro| micro * 1e-6);
     println!("    {what}: RMS {:.4}, max {:.4} millionths", found.rms() * 1e6, found.max * 1e6);
-    let (low, high) = BAND;
+    let (low, high) = if expected == STILL { (0.0, 1.0) } else { BAND };
     (low * rms..=high * rms).contains(&found.rms()) && (low * max..=high * max).contains(&found.max)
 }
 
@@ -70,8 +74,8 @@ fn assert_tracks((name, motion, position, orientation): Expected, share: f64) ->
 fn errors_are_what_sampling_leaves() {
     for expected in EQUAL {
         let tracking = assert_tracks(expected, 1.0);
-        // The promise to users; everything above is far within it.
-        assert!(tracking.position.rms() < 50e-6 && tracking.orientation.rms() < 50e-6);
+        // The promise to users.
+        assert!(tracking.position.rms() < 0.05e-6 && tracking.orientation.rms() < 0.05e-6);
     }
 }
 
@@ -91,14 +95,13 @@ fn a_heavier_platform_tracks_worse_by_what_it_weighs() {
         let heavy = assert_tracks(expected, 1.2);
         let config = deployed(name);
         let equal = track(&config, &config.machine, motion, SECONDS);
-        assert!(heavy.position.rms() > 50.0 * equal.position.rms(), "{name}");
+        assert!(heavy.position.rms() > 100.0 * equal.position.rms(), "{name}");
     }
 }
 
-/// The reference at the middle of the period that ends with a motion, from that motion and the one a period before: in
-/// between the jerk is constant.
-fn middle_of_period(before: &Motion, end: &Motion, period_s: f64) -> Motion {
-    let h = 0.5 * period_s;
+/// The reference 0.4 periods after a motion, from that motion and the one a period later: in between the jerk is constant.
+fn within_period(before: &Motion, end: &Motion, period_s: f64) -> Motion {
+    let h = 0.4 * period_s;
     let jerk = |a: nalgebra::Vector3<f64>, b: nalgebra::Vector3<f64>| (b - a) / period_s;
     let (by_jerk, by_angular_jerk) = (
         jerk(before.acceleration.linear, end.acceleration.linear),
@@ -120,14 +123,14 @@ fn the_error_reported_is_the_error_made() {
     let scene = hexad::motion::built_in::fit(&config.machine, BuiltInMotion::Sines, 4.0);
     let [mut position, mut orientation, mut apart] = [Errors::default(); 3];
     let period_s = rig.period_ns as f64 * 1e-9;
-    // The references at the ends of the last two cycles, the last half a period after the measurement.
+    // The references at the ends of the last two holds, the last 0.6 periods after the measurement.
     let mut ends: [Option<Motion>; 2] = [None; 2];
     let tracking = rig.play(&config.machine, &scene, |_, output| {
         let error = output.error.unwrap().pose;
         position.add(error.linear.norm());
         orientation.add(error.angular.norm());
         if let [Some(before), Some(end)] = ends {
-            let reference = middle_of_period(&before, &end, period_s).pose;
+            let reference = within_period(&before, &end, period_s).pose;
             let made = output.platform.unwrap().pose.displacement_to(&reference);
             apart.add((made.vector() - error.vector()).norm());
         }
@@ -148,8 +151,7 @@ fn the_error_reported_is_the_error_made() {
     }
 }
 
-/// An offset on one axis decays as the chosen double integrator does, critically damped, and leaves the
-/// other axes alone: `e = e0 (1 + wn t) exp(-wn t)`, but for the delay of the loop.
+/// An offset on one axis decays as the sampled loop of that axis does, and leaves the other axes alone.
 #[test]
 fn an_offset_decays_as_designed() {
     for name in ["fried2008", "motion_base", "tsai2000"] {
@@ -157,7 +159,14 @@ fn an_offset_decays_as_designed() {
             let mut config = deployed(name);
             config.deployment.control.orientation_bandwidth_hz = 6.0;
             let hertz = if axis < 3 { 6.0 } else { config.deployment.control.position_bandwidth_hz };
-            let wn = TAU * hertz;
+            let control = &config.deployment.control;
+            let sampled = SampledLoop {
+                wn_t: TAU * hertz * 1e-3,
+                estimator_ratio: control.estimator_bandwidth_hz / hertz,
+                known_delay: 0.6,
+                delay: 0.6,
+                ..SampledLoop::default()
+            };
             let mut rig = Rig::new(&config, &config.machine);
             let offset = 2e-4 * config.machine.joints.radius.min(1.0);
             let task = TaskState::at_rest(config.machine.home);
@@ -167,19 +176,16 @@ fn an_offset_decays_as_designed() {
             let mut aside = config.machine.clone();
             aside.home[axis] -= offset;
             rig.simulator = Rig::new(&config, &aside).simulator;
-            for k in 0..300 {
-                // The force acts from 0.6 ms after the first measurement on.
-                let t = (f64::from(k) - 0.6).max(0.0) * 1e-3;
+            for (k, predicted) in sampled.response([offset, 0.0], 300).into_iter().enumerate() {
                 let pose = rig.simulator.state().pose;
                 let angle = angle_between(&pose.rotation, &wanted.rotation);
                 let distance = (wanted.position - pose.position).norm();
                 let (own, other) = if axis < 3 { (angle, distance) } else { (distance, angle) };
-                let expected = offset * (1.0 + wn * t) * (-wn * t).exp();
                 assert!(
-                    (own - expected).abs() < 0.05 * offset,
-                    "{name} axis {axis} at {t}: {own} {expected}"
+                    (own - predicted.abs()).abs() < 0.04 * offset,
+                    "{name} axis {axis} at {k}: {own} {predicted}"
                 );
-                assert!(other < 0.01 * offset, "{name} axis {axis} at {t}: {other}");
+                assert!(other < 0.02 * offset, "{name} axis {axis} at {k}: {other}");
                 let input = rig.input(&task);
                 assert_eq!(rig.cycle(&input).state, State::Active);
             }

@@ -7,6 +7,8 @@ use hexad::control::parameters::Parameters;
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
 use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::estimator::ErrorState;
+use hexad::control::estimator::input_matrix::InputMatrix;
 use hexad::control::limits::Limit;
 use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon;
@@ -16,6 +18,7 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::motion::timeline::Timeline;
 use hexad::plant::simulator::Simulator;
+use nalgebra::Vector6;
 
 use super::{Errors, angle_between};
 
@@ -35,6 +38,22 @@ pub fn parameters(config: &Config) -> Parameters {
         FidelityChoice::Auto => Fidelity::Exact,
     };
     daemon::parameters(&config.machine, &config.deployment, fidelity)
+}
+
+/// Acceleration that the law answers a first measured error with, after rest without one: the gains of the estimator, its
+/// prediction to the force 0.6 periods after the measurement, and the law.
+pub fn answer(config: &Config, error: &Vector6<f64>) -> Vector6<f64> {
+    let parameters = parameters(config);
+    let (_, [[by_e, by_w, by_d], _]) = parameters.noise.steady();
+    let period_s = parameters.noise.period_s;
+    let input_matrix = InputMatrix::at_home(&config.machine, &parameters.law, parameters.fidelity);
+    let largest = input_matrix.largest_disturbance(&parameters.law.saturation);
+    let estimate = ErrorState {
+        value: error * by_e,
+        rate: error * (by_w / period_s),
+        disturbance: (error * (by_d / (period_s * period_s))).sup(&-largest).inf(&largest),
+    };
+    parameters.law.acceleration(&estimate.after(0.6 * period_s, &Vector6::zeros()), &input_matrix)
 }
 
 /// A controller, a platform, and what is between them.

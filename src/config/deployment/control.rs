@@ -26,7 +26,7 @@ pub const STABLE_MASSES: [f64; 2] = [0.7, 1.5];
 /// Bandwidth of the estimator over the lesser bandwidth of the loops, at most: with the delay of the drives configured, and
 /// without. What is faster only amplifies noise, and a delay that is not known would make it unstable.
 const ESTIMATOR_RATIO: f64 = 3.0;
-const ESTIMATOR_RATIO_DELAY_UNKNOWN: f64 = 1.0;
+const ESTIMATOR_RATIO_DELAY_UNKNOWN: f64 = 1.05;
 /// Steps in which an estimator is slowed down until the loops have their gain margin, each a fifth.
 const ESTIMATOR_STEPS: i32 = 20;
 /// Default of `disturbance_m_s2_per_sqrt_s`: with a reading noise of 10 um an estimator of 30 Hz at 1 kHz.

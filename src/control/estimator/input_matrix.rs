@@ -19,13 +19,14 @@ use crate::model::fidelity::Fidelity;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
-use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 
 /// Input matrix of one machine and law.
 #[derive(Clone, Copy, Debug)]
 pub struct InputMatrix {
-    /// Acceleration of the error coordinates per force of a leg \[1/kg\] or \[1/(kg m)\].
-    by_force: Matrix6<f64>,
+    /// `M^-1`.
+    mobility: Matrix6<f64>,
+    acts_on_legs: bool,
     /// B and its inverse; `None` if B is the identity.
     by_command: Option<[Matrix6<f64>; 2]>,
 }
@@ -36,23 +37,35 @@ impl InputMatrix {
         let home = machine.home_pose();
         let wrenches = leg_wrenches(machine, &home);
         let mobility = MassMatrix::new(machine).at(&home).try_inverse().unwrap_or_default();
-        let pose_by_force = mobility * wrenches;
-        if law.mode.acts_on_legs() {
-            let by_force = wrenches.transpose() * pose_by_force;
-            let by_command = by_force * Matrix6::from_diagonal(&law.leg_masses.mass);
-            return Self { by_force, by_command: with_inverse(by_command) };
-        }
-        let by_command = match fidelity {
-            Fidelity::Exact => None,
-            _ => with_inverse(pose_by_force * unit_forces(machine, fidelity)),
+        let by_force = mobility * wrenches;
+        let acts_on_legs = law.mode.acts_on_legs();
+        let by_command = if acts_on_legs {
+            with_inverse(wrenches.transpose() * by_force * Matrix6::from_diagonal(&law.leg_masses.mass))
+        } else if fidelity == Fidelity::Exact {
+            None
+        } else {
+            with_inverse(by_force * unit_forces(machine, fidelity))
         };
-        Self { by_force: pose_by_force, by_command }
+        Self { mobility, acts_on_legs, by_command }
     }
 
-    /// The acceleration of the platform for one of the law, and forces beside it \[N\].
-    pub fn acceleration(&self, commanded: &Vector6<f64>, lost: &Vector6<f64>) -> Vector6<f64> {
-        let direct = self.by_command.map_or(*commanded, |[matrix, _]| matrix * commanded);
-        if *lost == Vector6::zeros() { direct } else { direct + self.by_force * lost }
+    /// The acceleration of the platform for one of the law.
+    pub fn acceleration(&self, commanded: &Vector6<f64>) -> Vector6<f64> {
+        self.by_command.map_or(*commanded, |[matrix, _]| matrix * commanded)
+    }
+
+    /// Largest disturbance that a law with this bound of its acceleration can compensate, axis by axis.
+    pub fn largest_disturbance(&self, bound: &Vector6<f64>) -> Vector6<f64> {
+        self.by_command.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
+    }
+
+    /// The acceleration by a wrench beside that of the law, at a pose: the forces that limits took away. Near flat legs a force
+    /// moves the platform far less than at home, so N is that of the pose.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn acceleration_of(&self, machine: &Machine, pose: &Pose, wrench: &Wrench) -> Vector6<f64> {
+        let acceleration = self.mobility * wrench.vector();
+        if self.acts_on_legs { leg_wrenches(machine, pose).tr_mul(&acceleration) } else { acceleration }
     }
 
     /// The acceleration that the law must command for one of the platform.
