@@ -24,8 +24,8 @@ struct Hardware {
 }
 
 impl Hardware {
-    fn lengths_and_rates(&self) -> ([f64; 6], [f64; 6]) {
-        ([1.2033; 6], [0.0; 6])
+    fn lengths(&self) -> [f64; 6] {
+        [1.2033; 6]
     }
 
     fn set(&mut self, force: Option<[f64; 6]>) {
@@ -45,15 +45,16 @@ fn main() -> Result<(), PortError> {
     let mut measured = bus.publisher::<MeasuredMessage>()?;
     let (mut hardware, mut last_valid_ns) = (Hardware::default(), 0);
     loop {
-        let (length_m, length_rate_m_s) = hardware.lengths_and_rates();
-        measured
-            .publish(monotonic_ns(), MeasuredMessage { length_m, length_rate_m_s, ..Default::default() })?;
+        let measurement = MeasuredMessage { length_m: hardware.lengths(), ..Default::default() };
+        measured.publish(monotonic_ns(), measurement)?;
         sleep(PERIOD);
         let now_ns = monotonic_ns();
-        // A stamp in the future is that of another clock.
-        if let Some(message) = forces.receive_latest().filter(|it| it.header.time_ns <= now_ns) {
-            hardware.set(message.may_be_applied().then_some(message.force_n));
-            last_valid_ns = message.header.time_ns;
+        if let Some(message) = forces.receive_latest() {
+            let may_be_applied = message.may_be_applied(now_ns, WATCHDOG_NS);
+            hardware.set(may_be_applied.then_some(message.force_n));
+            if may_be_applied {
+                last_valid_ns = message.header.time_ns;
+            }
         }
         if now_ns - last_valid_ns > WATCHDOG_NS {
             hardware.set(None);

@@ -17,5 +17,4 @@ mod stability {
     mod random;
     mod sampled;
     mod sizes;
-    mod transition;
 }

@@ -102,6 +102,6 @@ fn at(machine: &Machine, path: &FittedMotion, time_ns: u64) -> (SetpointMessage,
         ..SetpointMessage::default()
     };
     let measured =
-        MeasuredMessage { length_m: legs.length, length_rate_m_s: legs.rate, ..MeasuredMessage::default() };
+        MeasuredMessage { length_m: legs.length, length_rate_m_s: legs.rate, rates_valid: 1, ..MeasuredMessage::default() };
     (setpoint, measured)
 }

@@ -125,8 +125,8 @@ impl<'a> Period<'a> {
         5 + self.pending
     }
 
-    /// The state a period later; `noise` of the readings of e and of T e'.
-    fn advance(&self, z: &DVector<f64>, noise: [f64; 2]) -> DVector<f64> {
+    /// The state a period later; `noise` of the readings of e and of T e', and what acts beside the commands of so many periods ago.
+    fn advance(&self, z: &DVector<f64>, noise: [f64; 2], push: impl Fn(usize) -> f64) -> DVector<f64> {
         let SampledLoop { wn_t, damping_ratio, compensates_disturbance, known_delay, delay, mass_ratio, .. } =
             *self.of;
         let at = |k: usize| z.get(k).copied().unwrap_or_default();
@@ -148,7 +148,7 @@ impl<'a> Period<'a> {
         }
         let u = |ago: usize| if ago == 0 { newest } else { at(4 + ago) };
         estimate.advance(1.0, known_delay, u);
-        platform.advance(1.0, delay, |ago| u(ago) / mass_ratio);
+        platform.advance(1.0, delay, |ago| (u(ago) + push(ago)) / mass_ratio);
         let head = [platform.e, platform.v, estimate.e, estimate.v, estimate.d];
         let commands = (0..self.pending).map(u);
         DVector::from_iterator(self.states(), head.into_iter().chain(commands))
@@ -157,7 +157,7 @@ impl<'a> Period<'a> {
     fn matrix(&self) -> DMatrix<f64> {
         let states = self.states();
         let unit = |k: usize| DVector::from_fn(states, |row, _| f64::from(u8::from(row == k)));
-        let columns: Vec<_> = (0..states).map(|k| self.advance(&unit(k), [0.0; 2])).collect();
+        let columns: Vec<_> = (0..states).map(|k| self.advance(&unit(k), [0.0; 2], |_| 0.0)).collect();
         DMatrix::from_columns(&columns)
     }
 }
@@ -204,7 +204,7 @@ impl SampledLoop {
         let period = Period::new(self);
         let still = DVector::zeros(period.states());
         let [of_length, of_rate] = [[deviations[0], 0.0], [0.0, deviations[1]]];
-        let inputs = [of_length, of_rate].map(|noise| period.advance(&still, noise));
+        let inputs = [of_length, of_rate].map(|noise| period.advance(&still, noise, |_| 0.0));
         let mut sum: DMatrix<f64> = inputs.iter().map(|input| input * input.transpose()).sum();
         let mut power = period.matrix();
         for _ in 0..LYAPUNOV_SQUARINGS {
@@ -214,16 +214,18 @@ impl SampledLoop {
         sum.get((0, 0)).copied().unwrap_or(f64::NAN).sqrt()
     }
 
-    /// Error at each of so many measurements, from this error and rate times the period that nothing has measured before.
-    pub fn response(&self, [error, rate]: [f64; 2], cycles: usize) -> Vec<f64> {
+    /// Error at each of so many measurements, from this error that nothing has measured before, and a push of one period beside
+    /// the first command, as an acceleration times `T^2`.
+    pub fn response(&self, error: f64, push: f64, cycles: usize) -> Vec<f64> {
         let period = Period::new(self);
         let mut state = DVector::zeros(period.states());
-        for (state, value) in state.iter_mut().zip([error, rate]) {
-            *state = value;
+        if let Some(e) = state.get_mut(0) {
+            *e = error;
         }
         (0..cycles)
-            .map(|_| {
-                let next = period.advance(&state, [0.0; 2]);
+            .map(|cycle| {
+                let beside = |ago| if ago == cycle { push } else { 0.0 };
+                let next = period.advance(&state, [0.0; 2], beside);
                 core::mem::replace(&mut state, next).get(0).copied().unwrap_or_default()
             })
             .collect()
@@ -332,7 +334,7 @@ mod tests {
             let late = SampledLoop { delay: with.delay + share * (with.longest_delay() - with.delay), ..with };
             [(light, share < 1.0), (late, share < 1.0)]
         }) {
-            let response = each.response([0.0, 1e-3], 4000);
+            let response = each.response(0.0, 1e-3, 4000);
             let peak = |part: &[f64]| part.iter().fold(0.0, |peak: f64, e| peak.max(e.abs()));
             let (early, late) = (peak(&response[..1000]), peak(&response[3000..]));
             assert_eq!(late < early, is_stable, "{each:?}: {early} {late}");

@@ -49,8 +49,15 @@ impl ForceMessage {
         }
     }
 
-    /// Whether a driver may apply the forces, provided that the message is recent and newer than the one before.
-    pub fn may_be_applied(&self) -> bool {
+    /// Whether a driver may apply the forces now, by a message that is not from the future and at most so old: a driver that was
+    /// stopped finds messages of the time before \[ns\]. In simulated time now is that of the measurement.
+    pub fn may_be_applied(&self, now_ns: u64, longest_age_ns: u64) -> bool {
+        let age_ns = now_ns.checked_sub(self.header.time_ns);
+        age_ns.is_some_and(|age_ns| age_ns <= longest_age_ns) && self.is_applicable()
+    }
+
+    /// Whether the content may be applied at any time: schema, checksum, valid, finite.
+    pub(crate) fn is_applicable(&self) -> bool {
         self.header.schema == Self::SCHEMA
             && self.is_intact()
             && self.valid == 1
@@ -90,6 +97,19 @@ mod tests {
             );
             assert_eq!((message.force_n, message.release_ns), (force, 91));
         }
+    }
+
+    #[test]
+    fn a_force_is_applied_only_while_it_is_recent_and_not_from_the_future() {
+        let output = Output { state: State::Active, ..Output::default() };
+        let mut message = ForceMessage::new(&output, 0);
+        (message.header.schema, message.header.time_ns) = (ForceMessage::SCHEMA, 1_000);
+        message.checksum = message.computed_checksum();
+        for (now_ns, may_be_applied) in [(999, false), (1_000, true), (1_020, true), (1_021, false), (u64::MAX, false)] {
+            assert_eq!(message.may_be_applied(now_ns, 20), may_be_applied, "{now_ns}");
+        }
+        message.force_n[3] = 1.0;
+        assert!(!message.may_be_applied(1_000, 20), "the checksum is that of other forces");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
     bus = Bus("fried2008")             # `name` of the configuration
     forces, measured = bus.subscriber(Force), bus.publisher(Measured)
-    measured.publish(monotonic_ns(), Measured(length_m=lengths, length_rate_m_s=rates))
+    measured.publish(monotonic_ns(), Measured(length_m=lengths))
     force = forces.receive_latest()    # None if nothing arrived
     if force is not None and force.may_be_applied(monotonic_ns()): ...
 """

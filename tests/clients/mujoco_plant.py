@@ -24,6 +24,7 @@ def measurement(machine):
     return Measured(
         length_m=tuple(machine.lengths),
         length_rate_m_s=tuple(velocities[machine.prismatic_dof]),
+        rates_valid=1,
         pose_valid=1,
         x=tuple(machine.coordinates()),
         twist=tuple(machine.twist(velocities)),

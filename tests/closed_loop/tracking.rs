@@ -176,7 +176,7 @@ fn an_offset_decays_as_designed() {
             let mut aside = config.machine.clone();
             aside.home[axis] -= offset;
             rig.simulator = Rig::new(&config, &aside).simulator;
-            for (k, predicted) in sampled.response([offset, 0.0], 300).into_iter().enumerate() {
+            for (k, predicted) in sampled.response(offset, 0.0, 300).into_iter().enumerate() {
                 let pose = rig.simulator.state().pose;
                 let angle = angle_between(&pose.rotation, &wanted.rotation);
                 let distance = (wanted.position - pose.position).norm();

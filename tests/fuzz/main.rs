@@ -100,9 +100,9 @@ fn random_cycles() {
             }
         }
         let mode = ControlMode::ALL[programs as usize % ControlMode::ALL.len()];
-        let observer_hz = if programs / 4 % 2 == 0 { 0.0 } else { properties::step::OBSERVER_HZ };
+        let has_rates = programs / 4 % 2 == 0;
         let policy = if programs / 8 % 2 == 0 { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
-        let (cycles, reached) = properties::step::run(&program, mode, observer_hz, policy);
+        let (cycles, reached) = properties::step::run(&program, mode, has_rates, policy);
         (done, programs, controlled) = (done + cycles, programs + 1, controlled + u64::from(reached));
     }
     println!("{done} cycles in {programs} programs, {controlled} of them reached control");

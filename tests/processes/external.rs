@@ -154,6 +154,7 @@ fn lock_step() {
         let message = MeasuredMessage {
             length_m: legs.length,
             length_rate_m_s: legs.rate,
+            rates_valid: 1,
             ..MeasuredMessage::default()
         };
         setpoints.publish(time_ns, peer::setpoint(time_ns)).expect("to send");

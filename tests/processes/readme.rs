@@ -35,7 +35,7 @@ fn with_machine<T>(act: impl FnOnce(&mut Driven) -> T) -> T {
 }
 
 /// Waits for the drives' next cycle.
-fn sensors() -> ([f64; LEGS], [f64; LEGS]) {
+fn lengths() -> [f64; LEGS] {
     while with_machine(|machine| machine.ends) {
         thread::park();
     }
@@ -45,8 +45,7 @@ fn sensors() -> ([f64; LEGS], [f64; LEGS]) {
         let next_ns = Grid::new(PERIOD_NS, 0).next_after(monotonic_ns());
         machine.simulator.advance((next_ns - tick_ns) as f64 * 1e-9, machine.force.as_ref());
         machine.tick_ns = next_ns;
-        let legs = machine.simulator.leg_motion();
-        (legs.length, legs.rate)
+        machine.simulator.leg_motion().length
     })
 }
 
@@ -80,7 +79,7 @@ fn the_driver_of_the_readme_connects_a_machine() {
     *MACHINE.lock().expect("not yet used") = Some(Driven { simulator, force: None, tick_ns, ends: false });
     let driver = thread::spawn(|| {
         let _ = scheduling::fifo_priority(1);
-        drive(sensors, push, brake)
+        drive(lengths, push, brake)
     });
 
     let daemon = start_daemon(&machine);

@@ -28,7 +28,7 @@ fn carried(rig: &mut Rig, task: &TaskState) -> Output {
     let legs = leg_motion(rig.simulator.machine(), &task.motion());
     let mut input = rig.input(task);
     let measurement = input.measurement.as_mut().unwrap();
-    (measurement.length, measurement.rate) = (legs.length, legs.rate);
+    (measurement.length, measurement.rate) = (legs.length, Some(legs.rate));
     rig.now_ns += rig.period_ns;
     rig.controller.step(&input)
 }

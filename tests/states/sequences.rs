@@ -20,7 +20,6 @@ use super::common::{deployed, largest};
 static CONFIG: LazyLock<Config> = LazyLock::new(|| {
     let mut config = deployed("motion_base");
     config.deployment.plant.step_s = 1e-3;
-    config.deployment.control.observer_bandwidth_hz = 0.3;
     config
 });
 static SCENE: LazyLock<FittedMotion> = LazyLock::new(|| fit(&CONFIG.machine, BuiltInMotion::Sines, 8.0));
@@ -144,7 +143,7 @@ impl Watched {
             Wrong::NoSetpoint => input.setpoint = self.last.setpoint,
             Wrong::NoMeasurement => input.measurement = self.last.measurement,
             Wrong::NanSetpoint => setpoint.task.xd[3] = f64::NAN,
-            Wrong::NanMeasurement => measured.rate[3] = f64::NAN,
+            Wrong::NanMeasurement => measured.rate.get_or_insert_default()[3] = f64::NAN,
             Wrong::OldSetpoint => setpoint.time_ns -= 1_000_000_000,
             Wrong::OldMeasurement => measured.time_ns -= 1_000_000_000,
             Wrong::FarSetpoint => setpoint.task.x[4] += 0.03,

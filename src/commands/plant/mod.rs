@@ -157,7 +157,7 @@ impl DrivenPlant {
         self.advance_to(message.header.time_ns);
         self.code = DiagnosticCode::from_number(message.diagnostic_code).unwrap_or_default();
         let is_under_control = State::from_number(message.state).is_some_and(State::has_control);
-        let is_valid = message.may_be_applied() && is_under_control;
+        let is_valid = message.is_applicable() && is_under_control;
         let expires_ns = message.header.time_ns.saturating_add(self.timeout_ns);
         self.force = is_valid.then_some((message.force_n, expires_ns));
     }

@@ -5,6 +5,11 @@ use hexad::model::machine::LEGS;
 
 use super::{Moment, noise};
 
+/// The driver of these tests sends rates.
+fn rates<'a>(m: &'a mut Moment<'_>) -> &'a mut [f64; LEGS] {
+    m.measured().rate.as_mut().unwrap()
+}
+
 pub fn end(m: &mut Moment) {
     m.input.measurement = m.before.measurement;
 }
@@ -33,12 +38,12 @@ pub fn nan_length(m: &mut Moment) {
 
 pub fn nan_rate_once(m: &mut Moment) {
     if m.cycle == 0 {
-        m.measured().rate[5] = f64::NAN;
+        rates(m)[5] = f64::NAN;
     }
 }
 
 pub fn infinite_rate(m: &mut Moment) {
-    m.measured().rate[1] = f64::INFINITY;
+    rates(m)[1] = f64::INFINITY;
 }
 
 /// An encoder that lost counts.
@@ -62,15 +67,15 @@ pub fn out_of_stroke(m: &mut Moment) {
 }
 
 pub fn rates_of_wrong_sign(m: &mut Moment) {
-    m.measured().rate.iter_mut().for_each(|rate| *rate = -*rate);
+    rates(m).iter_mut().for_each(|rate| *rate = -*rate);
 }
 
 pub fn rates_in_mm(m: &mut Moment) {
-    m.measured().rate.iter_mut().for_each(|rate| *rate *= 1e3);
+    rates(m).iter_mut().for_each(|rate| *rate *= 1e3);
 }
 
 pub fn rates_zero(m: &mut Moment) {
-    m.measured().rate = [0.0; LEGS];
+    *rates(m) = [0.0; LEGS];
 }
 
 pub fn stamps_1_s_old(m: &mut Moment) {
@@ -92,8 +97,8 @@ pub fn stamps_run_backward(m: &mut Moment) {
 
 /// Rates behind a filter of the first order, with a time constant of 5 ms.
 pub fn filtered_rates(m: &mut Moment) {
-    let before = m.world.last.measurement.unwrap().rate;
-    for (rate, before) in m.measured().rate.iter_mut().zip(before) {
+    let before = m.world.last.measurement.unwrap().rate.unwrap();
+    for (rate, before) in rates(m).iter_mut().zip(before) {
         *rate = before + 0.2 * (*rate - before);
     }
 }
@@ -102,7 +107,7 @@ pub fn filtered_rates(m: &mut Moment) {
 pub fn noise_of_encoders(m: &mut Moment) {
     let cycle = m.cycle;
     let Measurement { length, rate, .. } = m.measured();
-    for (leg, (length, rate)) in length.iter_mut().zip(rate).enumerate() {
+    for (leg, (length, rate)) in length.iter_mut().zip(rate.as_mut().unwrap()).enumerate() {
         *length = (*length * 1e6).round() * 1e-6;
         *rate += 1e-3 * noise(cycle * 6 + leg as u64);
     }

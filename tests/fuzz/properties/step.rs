@@ -23,9 +23,6 @@ static CONFIG: LazyLock<Config> = LazyLock::new(|| {
 
 const START_NS: u64 = 86_400_000_000_000;
 
-/// The observer of half of the runs.
-pub const OBSERVER_HZ: f64 = 5.0;
-
 /// Rounding of a force at its bound, and of the reference at its limits.
 const ROUNDING: f64 = 1e-9;
 
@@ -34,14 +31,14 @@ const KINDS: [SetpointKind; 4] =
 
 /// Whether control was reached; panics where an output is wrong, in any mode.
 pub fn hold(input: &[u8]) -> bool {
-    let others = ControlMode::ALL.map(|mode| run(input, mode, OBSERVER_HZ, ViolationPolicy::Stop).1);
-    let limited = run(input, ControlMode::default(), 0.0, ViolationPolicy::Limit).1;
-    run(input, ControlMode::default(), 0.0, ViolationPolicy::Stop).1 | limited | others.contains(&true)
+    let others = ControlMode::ALL.map(|mode| run(input, mode, true, ViolationPolicy::Stop).1);
+    let limited = run(input, ControlMode::default(), false, ViolationPolicy::Limit).1;
+    run(input, ControlMode::default(), false, ViolationPolicy::Stop).1 | limited | others.contains(&true)
 }
 
 /// How many cycles it was, and whether control was reached.
-pub fn run(input: &[u8], mode: ControlMode, observer_hz: f64, policy: ViolationPolicy) -> (u64, bool) {
-    let mut play = Play::new(input, mode, observer_hz, policy);
+pub fn run(input: &[u8], mode: ControlMode, has_rates: bool, policy: ViolationPolicy) -> (u64, bool) {
+    let mut play = Play::new(input, mode, has_rates, policy);
     while play.cycle() {}
     (play.cycles, play.controlled)
 }
@@ -49,6 +46,7 @@ pub fn run(input: &[u8], mode: ControlMode, observer_hz: f64, policy: ViolationP
 struct Play<'a> {
     bytes: &'a [u8],
     parameters: Parameters,
+    has_rates: bool,
     controller: Controller,
     now_ns: u64,
     /// Size of the source's motion.
@@ -60,14 +58,16 @@ struct Play<'a> {
 }
 
 impl<'a> Play<'a> {
-    fn new(bytes: &'a [u8], mode: ControlMode, observer_hz: f64, policy: ViolationPolicy) -> Self {
+    fn new(bytes: &'a [u8], mode: ControlMode, has_rates: bool, policy: ViolationPolicy) -> Self {
         let mut deployment = CONFIG.deployment.clone();
-        (deployment.control.mode, deployment.control.observer_bandwidth_hz) = (mode, observer_hz);
+        deployment.control.mode = mode;
+        deployment.noise.rate_m_s = has_rates.then_some(1e-4);
         deployment.setpoint.on_violation = policy;
         let parameters = daemon::parameters(&CONFIG.machine, &deployment, Fidelity::Exact);
         Self {
             bytes,
             parameters,
+            has_rates,
             controller: Controller::new(&CONFIG.machine, parameters),
             now_ns: START_NS,
             size: 0.0,
@@ -105,7 +105,7 @@ impl<'a> Play<'a> {
         Input {
             release_ns: self.now_ns + self.parameters.period_ns / 2,
             setpoint: Some(Setpoint::motion(self.now_ns, task)),
-            measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: Some(legs.rate) }),
+            measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: self.has_rates.then_some(legs.rate) }),
             request: self.asked,
             deadline_missed: false,
         }
@@ -153,7 +153,7 @@ impl<'a> Play<'a> {
             9 => setpoint.task.xd[place % 6] = value,
             10 => setpoint.task.xdd[place % 6] = value,
             11 => measurement.length[place % 6] = value,
-            12 => measurement.rate[place % 6] = value,
+            12 => measurement.rate.get_or_insert_default()[place % 6] = value,
             13 => match place % 4 {
                 0 => setpoint.time_ns = bits,
                 1 => measurement.time_ns = bits,
@@ -178,7 +178,7 @@ impl<'a> Play<'a> {
                     1 => setpoint.task.xd.iter_mut().for_each(|x| *x += 100.0 * small),
                     2 => setpoint.task.xdd.iter_mut().for_each(|x| *x += 10_000.0 * small),
                     3 => measurement.length[place % 6] += small,
-                    _ => measurement.rate[place % 6] += 100.0 * small,
+                    _ => measurement.rate.get_or_insert_default()[place % 6] += 100.0 * small,
                 }
             }
         }
