@@ -7,6 +7,7 @@ mod common;
 mod closed_loop {
     use super::*;
 
+    mod assessment;
     mod built_in;
     mod evidence;
     mod feedback;
