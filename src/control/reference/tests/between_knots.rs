@@ -71,6 +71,41 @@ fn coordinates_that_turn_back_between_knots_keep_the_envelope() {
     assert!(largest.iter().all(|excess| *excess > -1e-3), "{largest:?}");
 }
 
+/// An angle that turns back although the attitude does not: the axis of rotation leads around it.
+#[test]
+fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
+    let mut samples = Samples::new(87);
+    let mut count = 0;
+    for k in 0..300 {
+        let mut scene = scene(&mut samples, 0.05, 0.05);
+        let axis = 2 * (k % 2);
+        scene.motion.pose.rotation = exp(&(Vector3::y() * (0.5 + 0.4 * samples.uniform())));
+        let home = scene.constants.machine().home;
+        let of = |twist: Vector3<f64>| {
+            let twist = Twist { angular: twist, linear: Vector3::zeros() };
+            task_coordinates(&scene.motion.pose.displaced(&twist), &home)[axis]
+        };
+        let gradient =
+            Vector3::from_fn(|i, _| (of(Vector3::ith(i, 1e-6)) - of(Vector3::ith(i, -1e-6))) / 2e-6);
+        let turning = Vector3::from_fn(|_, _| 2.0 * samples.uniform() - 1.0).normalize();
+        let across = turning - gradient * (gradient.dot(&turning) / gradient.norm_squared());
+        scene.motion.twist.angular = across + gradient * (0.03 * samples.uniform());
+        scene.step.from =
+            Some(scene.motion.pose.displaced(&Twist { angular: gradient * -0.01, linear: Vector3::zeros() }));
+        let set = |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().highest[axis] = bound;
+        let Some((extremes, bound)) = scene.tightened(10.0, -9.0, set) else { continue };
+        // Not through gimbal lock, where the angles jump.
+        if extremes.highest[1].max(-extremes.lowest[1]) > 1.2 {
+            continue;
+        }
+        count += 1;
+        let excess = extremes.highest[axis] - bound;
+        let room = ROOM_RATIO * scene.constants.machine().actuator.stroke() / scene.constants.arm;
+        assert!(excess <= room, "axis {axis}: {excess} {:?}", scene.motion);
+    }
+    assert!(count > 50, "{count}");
+}
+
 /// A leg that turns back between two knots: its velocity is along it, against its acceleration.
 #[test]
 fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {

@@ -86,6 +86,7 @@ fn a_long_cycle_moves_as_several_short_ones() {
     let before = reference.clone();
     reference.advance(&constants, MS, Some(&target));
     assert_eq!((reference.motion(), reference.time_ns()), (before.motion(), MS));
+    assert_eq!(reference.motion_of_hold(MS), before.motion_of_hold(MS));
 }
 
 /// The largest rate of a leg is 97 % of its limit while the platform moves far.

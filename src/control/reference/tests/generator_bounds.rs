@@ -1,5 +1,6 @@
 //! The generator at its bounds: where it may begin, what it refuses, and that it comes back.
 
+use super::super::pose_stop::StopKind;
 use super::super::target::at_rest;
 use super::super::{HeldStop, ReferenceGenerator, Target};
 use super::generator::{MS, constants, run, standing, started, x};
@@ -118,7 +119,7 @@ fn a_reference_beyond_a_bound_by_rounding_only_returns() {
                 reference.bounds.envelope.as_mut().unwrap().highest = x.map(|x| x - 1e-8);
             }
             _ => {
-                constants.reference_condition = condition * (1.0 - 1e-9);
+                constants.reference_condition = condition * (1.0 - 1e-5);
                 constants.parameters.condition = condition * 1.1;
             }
         }
@@ -161,4 +162,44 @@ fn walls_keep_their_distance_under_limit_only() {
             assert_eq!(reference.active_limits().contains(Limit::Envelope), policy == ViolationPolicy::Limit);
         }
     }
+}
+
+/// The stop that is held from the start is the one that was verified.
+#[test]
+fn a_start_holds_the_stop_that_was_verified() {
+    for (half, expected) in [(1.0, StopKind::ReleaseFirst), (0.05, StopKind::Planar)] {
+        let constants = constants(|_, parameters| {
+            let [lowest, highest] = [-half, half]
+                .map(|size| core::array::from_fn(|axis| [0.0, 0.0, 0.0, 0.0, 0.0, 1.5][axis] + size));
+            parameters.envelope = Some(Envelope { lowest, highest });
+        });
+        let mut motion = at_rest(constants.home.pose());
+        motion.twist.linear = Vector3::new(-0.2, 0.0, 0.0);
+        motion.pose.position.x = if half < 1.0 { 0.047 } else { 0.0 };
+        let reference = started(&constants, &motion);
+        let HeldStop::Verified(kind) = reference.stop else { panic!("no stop is held") };
+        assert_eq!(kind == StopKind::Planar, expected == StopKind::Planar, "{half}");
+    }
+}
+
+/// An axis of the envelope without width does not hold the others.
+#[test]
+fn the_platform_moves_beside_locked_axes() {
+    let constants = constants(|_, parameters| {
+        let wide = [0.0, 0.0, 0.5, 0.0, 0.0, 0.5];
+        let home = [0.0, 0.0, 0.0, 0.0, 0.0, 1.5];
+        parameters.envelope = Some(Envelope {
+            lowest: core::array::from_fn(|axis| home[axis] - wide[axis]),
+            highest: core::array::from_fn(|axis| home[axis] + wide[axis]),
+        });
+        for limits in [&mut parameters.limits.position, &mut parameters.limits.orientation] {
+            (limits.acceleration, limits.jerk) = (0.2 * limits.acceleration, 0.1 * limits.jerk);
+        }
+    });
+    let there = standing(&constants, [0.0, 0.0, 0.3, 0.0, 0.0, 0.2]);
+    let mut reference = started(&constants, &at_rest(constants.home.pose()));
+    run(&constants, &mut reference, &Target::Motion(&there), 4000);
+    let found = x(&constants, &reference);
+    assert!((found[2] - 0.3).abs() < 1e-6 && (found[5] - 1.7).abs() < 1e-6, "{found:?}");
+    assert!([0, 1, 3, 4].iter().all(|axis| found[*axis].abs() < 2e-9), "{found:?}");
 }
