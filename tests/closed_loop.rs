@@ -20,6 +20,7 @@ mod closed_loop {
     mod poses;
     mod replay;
     mod ride;
+    mod setpoints;
     mod targets;
     mod tracking;
 }
