@@ -69,7 +69,9 @@ fn a_setpoint_that_is_not_newer_is_refused() {
         let mut setpoint = last;
         setpoint.task.x[3] += 1e-9 * f64::from(k + 1);
         input.setpoint = Some(setpoint);
+        let before = output.missed_setpoints;
         output = rig.cycle(&input);
+        assert_eq!(output.missed_setpoints, before + 1, "{k}");
         if output.state != State::Active {
             break;
         }
