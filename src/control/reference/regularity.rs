@@ -76,8 +76,19 @@ impl RegularBalls {
     /// Whether every pose within `reach`, a shift \[m\] and a turn \[rad\], of a pose is regular and has at most a condition.
     /// `false` is no proof of the contrary.
     pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2], limit: f64) -> bool {
-        self.balls.iter().flatten().any(|ball| ball.covers(constants, pose, reach, limit))
-            || self.cover_by_new(constants, pose, reach, limit)
+        let [last, others @ ..] = &mut self.balls;
+        let covers = |ball: &Option<Ball>| {
+            ball.as_ref().is_some_and(|ball| ball.covers(constants, pose, reach, limit))
+        };
+        if covers(last) {
+            return true;
+        }
+        // The next pose is near this one: its ball is tried first.
+        if let Some(ball) = others.iter_mut().find(|ball| covers(ball)) {
+            core::mem::swap(last, ball);
+            return true;
+        }
+        self.cover_by_new(constants, pose, reach, limit)
     }
 
     // Out of line, as it is rare: the cycle stays short.
