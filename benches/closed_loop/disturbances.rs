@@ -15,8 +15,6 @@ const FILE: &str = "closed_loop_disturbances.csv";
 
 const MACHINE: &str = "motion_base";
 const RATE_HZ: f64 = 1e3;
-/// As fast as the loop for computed torque and feedforward.
-const OBSERVER_HZ: f64 = 10.0;
 /// Noise of a rate that comes from lengths with the noise of 1 m: of a filter at 100 Hz or so \[1/s\].
 const RATE_NOISE: f64 = 300.0;
 
@@ -82,9 +80,9 @@ fn dead_time(milliseconds: f64) -> Imperfections {
     imperfections
 }
 
-/// Mode and observer of each line.
-fn variants() -> Vec<(ControlMode, f64)> {
-    [0.0, OBSERVER_HZ].into_iter().flat_map(|hertz| ControlMode::ALL.map(|mode| (mode, hertz))).collect()
+/// Mode of each line, and whether disturbances are compensated.
+fn variants() -> Vec<(ControlMode, bool)> {
+    [false, true].into_iter().flat_map(|is| ControlMode::ALL.map(|mode| (mode, is))).collect()
 }
 
 pub fn run(quick: bool) -> Result<(), Failure> {
@@ -92,12 +90,12 @@ pub fn run(quick: bool) -> Result<(), Failure> {
     let mut rows = vec![];
     for sweep in &SWEEPS {
         let levels: Vec<_> = sweep.levels.iter().copied().step_by(if quick { 4 } else { 1 }).collect();
-        let run = |(mode, observer_hz): &(ControlMode, f64), level: f64| Run {
+        let run = |(mode, compensates): &(ControlMode, bool), level: f64| Run {
             machine: MACHINE,
             mode: *mode,
             fidelity: Fidelity::Exact,
             rate_hz: RATE_HZ,
-            observer_hz: *observer_hz,
+            compensates: *compensates,
             imperfections: (sweep.imperfect)(level),
         };
         let runs: Vec<_> = variants
@@ -108,10 +106,10 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         for ((run, outcome), level) in runs.iter().zip(&outcomes).zip(levels.iter().cycle()) {
             let lost = if outcome.rms_um().is_finite() { "" } else { outcome.lost.name() };
             let [rms, max] = [outcome.rms_um(), outcome.max_um()].map(|error| format!("{error:.4}"));
-            rows.push(cells([&sweep.name, level, &run.mode.name(), &run.observer_hz, &rms, &max, &lost]));
+            rows.push(cells([&sweep.name, level, &run.mode.name(), &run.compensates, &rms, &max, &lost]));
         }
     }
-    let header = ["what", "level", "mode", "observer_hz", "position_rms_um", "position_max_um", "lost"];
+    let header = ["what", "level", "mode", "compensates", "position_rms_um", "position_max_um", "lost"];
     write_csv(FILE, &header, &rows)
 }
 
@@ -121,7 +119,7 @@ struct Figure {
     what: String,
     level: f64,
     mode: String,
-    observer_hz: f64,
+    compensates: bool,
     position_rms_um: f64,
 }
 
@@ -132,20 +130,20 @@ pub fn draw() -> Result<(), Failure> {
     fit_ranges(&mut charts, false);
     let mut legend: Vec<_> =
         MODES.iter().enumerate().map(|(k, name)| (Sample::Mark(Mark::Disc, k), *name)).collect();
-    legend.push((Sample::Mark(Mark::Ring, 0), "with observer"));
+    legend.push((Sample::Mark(Mark::Ring, 0), "disturbances compensated"));
     let title = figures.titled("What control a scene needs: motion base, fast scene, 1 kHz");
     Grid { title: &title, legend, columns: 2, charts }.write_svg(&chart("closed_loop_disturbances.svg"))?;
     Ok(())
 }
 
-/// A line per mode, with and without observer; where control is lost, it ends.
+/// A line per mode, with and without compensation; where control is lost, it ends.
 fn draw_sweep(rows: &[Figure]) -> Scatter<'static> {
     let (mut points, mut lines) = (vec![], vec![]);
-    for variant in rows.chunk_by(|a, b| (&a.mode, a.observer_hz) == (&b.mode, b.observer_hz)) {
+    for variant in rows.chunk_by(|a, b| (&a.mode, a.compensates) == (&b.mode, b.compensates)) {
         let color = ControlMode::ALL.iter().position(|mode| mode.name() == variant[0].mode).unwrap();
         let at = |row: &Figure| (row.level, row.position_rms_um);
         let line: Vec<_> = variant.iter().map(at).take_while(|(_, rms)| rms.is_finite()).collect();
-        let observed = variant[0].observer_hz > 0.0;
+        let observed = variant[0].compensates;
         let mark = if observed { Mark::Ring } else { Mark::Disc };
         points.extend(line.iter().map(|at| Point { at: *at, mark, color, label: Label::None }));
         let width = if observed { Width::Hair } else { Width::Curve };

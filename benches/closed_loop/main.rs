@@ -2,7 +2,7 @@
 //!
 //! The controller against the simulated hardware, in one process and in simulated time, on the fast scene of a
 //! machine: tracking error against compute time for every control mode, model and rate; and against payload,
-//! friction, noise and dead time, with and without the observer. Writes `benches/charts/closed_loop_*.csv` and
+//! friction, noise and dead time, with and without compensation of disturbances. Writes `benches/charts/closed_loop_*.csv` and
 //! `.svg`. `-- --quick` takes fewer of each; `-- --redraw` measures nothing and draws the charts from the CSV files.
 
 #![allow(

@@ -50,7 +50,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
             mode: method.mode,
             fidelity: method.fidelity,
             rate_hz,
-            observer_hz: 0.0,
+            compensates: true,
             imperfections: Imperfections::default(),
         };
         let steps: Vec<_> =

@@ -21,7 +21,7 @@ use super::common::{Errors, angle_between};
 /// From measurement to force, as a share of the period: release in its middle, then reading, computing, sending.
 const DELAY: f64 = 0.6;
 
-/// What the loop has to find its pose, engage, and let an observer learn \[s\].
+/// What the loop has to find its pose, engage, and estimate its disturbances \[s\].
 const SETTLING_S: f64 = 2.0;
 
 /// The clock of a computer that has been up for a while.
@@ -34,8 +34,8 @@ pub struct Run {
     pub mode: ControlMode,
     pub fidelity: Fidelity,
     pub rate_hz: f64,
-    /// 0 is without.
-    pub observer_hz: f64,
+    /// Whether disturbances are compensated.
+    pub compensates: bool,
     pub imperfections: Imperfections,
 }
 
@@ -66,11 +66,12 @@ impl Run {
     fn config(&self) -> Config {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("config").join(self.machine);
         let text = std::fs::read_to_string(path.with_extension("toml")).unwrap();
-        let Self { mode, rate_hz, observer_hz, .. } = self;
+        let Self { mode, rate_hz, compensates, .. } = self;
         let run = format!(
-            "\n[realtime]\nrate_hz = {rate_hz:?}\n[control]\nmode = \"{}\"\nobserver_bandwidth_hz = {observer_hz:?}\n\
-             following_position_m = 1.0\nfollowing_orientation_rad = 1.0\n",
-            mode.name()
+            "\n[realtime]\nrate_hz = {rate_hz:?}\n[control]\nmode = \"{}\"\ncompensate_disturbances = {compensates}\n\
+             following_position_m = 1.0\nfollowing_orientation_rad = 1.0\n[drive]\ndelay_us = {:?}\n",
+            mode.name(),
+            (DELAY - 0.5) * 1e6 / rate_hz + self.imperfections.drive.dead_time_ns as f64 * 1e-3,
         );
         Config::parse(&(text + &run), self.machine).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -111,7 +112,7 @@ impl Run {
             let input = Input {
                 release_ns: now_ns + period_ns / 2,
                 setpoint: Some(Setpoint::motion(now_ns, task)),
-                measurement: Some(Measurement { time_ns: now_ns, length, rate }),
+                measurement: Some(Measurement { time_ns: now_ns, length, rate: Some(rate) }),
                 request: (cycle > 0).then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
                 deadline_missed: false,
             };

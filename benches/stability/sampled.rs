@@ -35,9 +35,9 @@ fn loops() -> Vec<SampledLoop> {
     let of = |damping_ratio, mass_ratio| SampledLoop {
         wn_t: f64::NAN,
         damping_ratio,
-        observer: 0.0,
         delay: f64::NAN,
         mass_ratio,
+        ..SampledLoop::default()
     };
     let dampings = DAMPING_RATIOS.map(|ratio| of(ratio, 1.0));
     let masses = MASS_RATIOS.map(|ratio| of(1.0, ratio));

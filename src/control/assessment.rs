@@ -53,10 +53,14 @@ pub(super) fn assess(
             .check_start(cycle.constants, &platform.pose, &platform.twist)
             .map_err(|limit| Diagnostic::from(DiagnosticCode::PlatformMoving).at(limit as usize));
     }
-    let engagement = conditioned
-        .and(setpoint.status)
-        .and_then(|()| check_engage_tolerance(parameters, setpoint, *error))
-        .and(start);
+    // Nothing depends on it while the setpoint is followed.
+    let engagement = match cycle.state {
+        State::Engaging | State::Active => Ok(()),
+        _ => conditioned
+            .and(setpoint.status)
+            .and_then(|()| check_engage_tolerance(parameters, setpoint, *error))
+            .and(start),
+    };
     let has_ended = has_ended(cycle, setpoint, reference);
     let localization = located.map(drop);
     (Findings { localization, start, engagement, tracking, has_ended }, active_limits)

@@ -233,7 +233,7 @@ impl Controller {
             LimitedForces::default()
         });
         let platform = located.ok().map(|located| located.platform);
-        let mut output = Output {
+        Output {
             state: supervisor.mode.state,
             diagnostic: supervisor.mode.diagnostic,
             answered: supervisor.answered,
@@ -249,19 +249,8 @@ impl Controller {
             missed_setpoints: setpoints.missed,
             platform,
             error,
-            reference: None,
-        };
-        report_reference(&mut output, reference);
-        output
-    }
-}
-
-/// Adds the reference to an output under control.
-// Out of line, as the proof on the machine code does not follow copies through a pointer to memcpy.
-#[inline(never)]
-fn report_reference(output: &mut Output, reference: &ReferenceGenerator) {
-    if output.state.has_control() {
-        output.reference = Some(*reference.motion());
+            reference: supervisor.mode.state.has_control().then(|| *reference.motion()),
+        }
     }
 }
 

@@ -88,6 +88,13 @@ fn scale_into_bounds(
     end: &[f64; LEGS],
     bounds: impl Fn(f64) -> (f64, f64),
 ) -> [f64; LEGS] {
+    let is_within = |(start, end): (&f64, &f64)| {
+        let (low, high) = bounds(*start);
+        (low..=high).contains(end)
+    };
+    if start.iter().zip(end).all(is_within) {
+        return *end;
+    }
     let fraction = |(start, end): (&f64, &f64)| {
         let ((low, high), way) = (bounds(*start), end - start);
         let room = if way > 0.0 { high - start } else { low - start };

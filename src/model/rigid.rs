@@ -146,8 +146,21 @@ pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
         let (sin, cos) = angle.sin_cos();
         (sin / angle, (1.0 - cos) / x)
     };
-    let tilde = w.cross_matrix();
-    Matrix3::identity() + tilde * a + tilde * tilde * b
+    // I + a w~ + b w~^2 with w~^2 = w w^T - |w|^2 I.
+    let (u, v) = (w * a, w * b);
+    let (xy, xz, yz) = (v.x * w.y, v.x * w.z, v.y * w.z);
+    let (xx, yy, zz) = (v.x * w.x, v.y * w.y, v.z * w.z);
+    Matrix3::new(
+        1.0 - (yy + zz),
+        xy - u.z,
+        xz + u.y,
+        xy + u.z,
+        1.0 - (xx + zz),
+        yz - u.x,
+        xz - u.y,
+        yz + u.x,
+        1.0 - (xx + yy),
+    )
 }
 
 /// Rotation vector of a rotation matrix, angle in \[0, pi\]; inverse of [`exp`].
@@ -177,7 +190,12 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
 
 /// One step of Newton's iteration for the polar factor: `R (3 I - R^T R) / 2`.
 fn orthonormalized(r: &Matrix3<f64>) -> Matrix3<f64> {
-    r * (Matrix3::identity() * 3.0 - r.transpose() * r) * 0.5
+    let [a, b, c]: [Vector3<f64>; 3] = [r.column(0).into(), r.column(1).into(), r.column(2).into()];
+    // The factor is symmetric.
+    let diagonal = |v: &Vector3<f64>| 1.5 - 0.5 * v.norm_squared();
+    let (ab, ac, bc) = (-0.5 * a.dot(&b), -0.5 * a.dot(&c), -0.5 * b.dot(&c));
+    let factor = Matrix3::new(diagonal(&a), ab, ac, ab, diagonal(&b), bc, ac, bc, diagonal(&c));
+    r * factor
 }
 
 #[cfg(test)]

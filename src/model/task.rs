@@ -51,16 +51,21 @@ impl TaskState {
         let [alpha, beta, gamma, x, y, z] = self.x.into();
         let [alpha_rate, beta_rate, gamma_rate, vx, vy, vz] = self.xd.into();
         let [alpha_accel, beta_accel, gamma_accel, ax, ay, az] = self.xdd.into();
-        let rx = rotation_x(alpha);
-        let rx_ry = rx * rotation_y(beta);
+        let [(sa, ca), (sb, cb), (sg, cg)] = [alpha, beta, gamma].map(|angle| angle.sin_cos());
+        let (sa_sb, ca_sb) = (sa * sb, ca * sb);
         // Columns of E, and the angular velocity of each.
         let e1 = Vector3::x();
-        let e2: Vector3<f64> = rx.column(1).into();
-        let e3: Vector3<f64> = rx_ry.column(2).into();
+        let e2 = Vector3::new(0.0, ca, sa);
+        let e3 = Vector3::new(sb, -sa * cb, ca * cb);
         let omega_2 = e1 * alpha_rate;
         let omega_3 = omega_2 + e2 * beta_rate;
+        let rotation = Matrix3::from_columns(&[
+            Vector3::new(cb * cg, ca * sg + sa_sb * cg, sa * sg - ca_sb * cg),
+            Vector3::new(-cb * sg, ca * cg - sa_sb * sg, sa * cg + ca_sb * sg),
+            e3,
+        ]);
         Motion {
-            pose: Pose { rotation: rx_ry * rotation_z(gamma), position: Vector3::new(x, y, z) },
+            pose: Pose { rotation, position: Vector3::new(x, y, z) },
             twist: Twist { angular: omega_3 + e3 * gamma_rate, linear: Vector3::new(vx, vy, vz) },
             acceleration: Acceleration {
                 angular: e1 * alpha_accel
@@ -75,7 +80,8 @@ impl TaskState {
 
     /// Whether every number is finite.
     pub fn is_finite(&self) -> bool {
-        self.x.iter().chain(&self.xd).chain(&self.xdd).all(|value| value.is_finite())
+        // Zero times infinity is not a number: no branch per number.
+        (self.x * 0.0 + self.xd * 0.0 + self.xdd * 0.0).sum() == 0.0
     }
 }
 
@@ -122,10 +128,6 @@ fn rotation_x(angle: f64) -> Matrix3<f64> {
 
 fn rotation_y(angle: f64) -> Matrix3<f64> {
     Rotation3::from_axis_angle(&Vector3::y_axis(), angle).into_inner()
-}
-
-fn rotation_z(angle: f64) -> Matrix3<f64> {
-    Rotation3::from_axis_angle(&Vector3::z_axis(), angle).into_inner()
 }
 
 #[cfg(test)]

@@ -128,7 +128,7 @@ fn control_does_not_begin_without_a_verified_stop() {
             let motion = Motion { pose: task.motion().pose, twist, acceleration: Acceleration::default() };
             let legs = leg_motion(&config.machine, &motion);
             let measurement = input.measurement.as_mut().unwrap();
-            (measurement.length, measurement.rate) = (legs.length, legs.rate);
+            (measurement.length, measurement.rate) = (legs.length, Some(legs.rate));
             if k <= 3 {
                 output = Some(rig.controller.step(&input));
             }

@@ -82,7 +82,7 @@ impl RateConsistency {
 /// First stage of the cycle: validates each new measurement and keeps the last valid one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control) struct MeasurementValidator {
-    last: LastValid<Measurement>,
+    last: LastValid<Measurement, Measurement>,
     consistency: RateConsistency,
     /// Cycles under control without a new valid measurement.
     pub missed: u64,
@@ -137,7 +137,7 @@ impl MeasurementValidator {
             self.consistency = *consistency;
         }
         let result = result.map(drop);
-        self.last.record(*new, result, now_ns, has_control);
+        self.last.record(new, result.map(|()| new), now_ns, has_control);
         result
     }
 

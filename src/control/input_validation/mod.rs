@@ -22,24 +22,24 @@ const STROKE_TOLERANCE_RATIO: f64 = 0.02;
 /// so that a series of rejected inputs cannot widen it without limit. Two, as one message may get lost.
 const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
 
-/// The last valid input, and why the one after it was rejected.
+/// The last valid input, and why the one after it was rejected. `Valid` is what a valid input stands for.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LastValid<T> {
-    pub valid: Option<T>,
+pub(super) struct LastValid<Input, Valid> {
+    pub valid: Option<Valid>,
     /// The last input, valid or not: each is validated once.
-    pub newest: Option<T>,
+    pub newest: Option<Input>,
     /// Release of the cycle that validated it.
     newest_ns: u64,
     rejection: Option<Diagnostic>,
 }
 
-impl<T> Default for LastValid<T> {
+impl<Input, Valid> Default for LastValid<Input, Valid> {
     fn default() -> Self {
         Self { valid: None, newest: None, newest_ns: 0, rejection: None }
     }
 }
 
-impl<T: Copy> LastValid<T> {
+impl<Input: Copy, Valid: Copy> LastValid<Input, Valid> {
     /// Upper bound on the time used for the plausible change \[s\]; infinite if no input was rejected since the last
     /// valid one.
     pub fn plausibility_window_s(&self, now_ns: u64, period_ns: u64) -> f64 {
@@ -52,10 +52,16 @@ impl<T: Copy> LastValid<T> {
 
     /// Records an input with the result of its validation. With `keep_first` the first of several rejections stays:
     /// later ones may be rejected merely because the last valid input is old.
-    pub fn record(&mut self, input: T, result: Result<(), Diagnostic>, now_ns: u64, keep_first: bool) {
-        (self.newest, self.newest_ns) = (Some(input), now_ns);
+    pub fn record(
+        &mut self,
+        input: &Input,
+        result: Result<&Valid, Diagnostic>,
+        now_ns: u64,
+        keep_first: bool,
+    ) {
+        (self.newest, self.newest_ns) = (Some(*input), now_ns);
         match result {
-            Ok(()) => (self.valid, self.rejection) = (Some(input), None),
+            Ok(valid) => (self.valid, self.rejection) = (Some(*valid), None),
             Err(diagnostic) => self.rejection = self.rejection.filter(|_| keep_first).or(Some(diagnostic)),
         }
     }
@@ -95,15 +101,13 @@ fn check_stroke(
     code: DiagnosticCode,
     length: &[f64; LEGS],
 ) -> Result<(), Diagnostic> {
+    let (shortest, longest) = (actuator.min_length - tolerance, actuator.max_length + tolerance);
     for (leg, length) in length.iter().enumerate() {
-        for (bound, excess) in [
-            (actuator.min_length - tolerance, actuator.min_length - tolerance - length),
-            (actuator.max_length + tolerance, length - actuator.max_length - tolerance),
-        ] {
-            if excess > 0.0 || excess.is_nan() {
-                return Err(Diagnostic::new(code, *length, bound).at(leg));
-            }
+        if *length >= shortest && *length <= longest {
+            continue;
         }
+        let bound = if *length < shortest { shortest } else { longest };
+        return Err(Diagnostic::new(code, *length, bound).at(leg));
     }
     Ok(())
 }

@@ -43,7 +43,7 @@ pub(in crate::control) struct ValidatedSetpoint<'a> {
 /// First stage of the cycle: validates each new setpoint and keeps the last valid one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control) struct SetpointValidator {
-    last: LastValid<SetpointMotion>,
+    last: LastValid<Setpoint, SetpointMotion>,
     samples: PoseSamples,
     /// Of the newest setpoint.
     active_limits: LimitSet,
@@ -59,12 +59,11 @@ impl SetpointValidator {
         newest: Option<&Setpoint>,
         reference: &ReferenceGenerator,
     ) -> ValidatedSetpoint<'_> {
-        let new =
-            newest.filter(|newest| self.last.newest.as_ref().map(|last| &last.setpoint) != Some(newest));
+        let new = newest.filter(|newest| self.last.newest.as_ref() != Some(newest));
         let is_accepted = new.is_some_and(|new| {
             let parameters = &cycle.constants.parameters;
             let new = SetpointMotion::new(*new).after(parameters, self.last.valid.as_ref());
-            self.accept(cycle, new, reference)
+            self.accept(cycle, &new, reference)
         });
         self.missed += u64::from(cycle.state.has_control() && !is_accepted);
         let valid = self.last.valid.as_ref();
@@ -98,7 +97,7 @@ impl SetpointValidator {
     }
 
     /// Validates a new setpoint and records it. True if it is accepted.
-    fn accept(&mut self, cycle: &Cycle<'_>, new: SetpointMotion, reference: &ReferenceGenerator) -> bool {
+    fn accept(&mut self, cycle: &Cycle<'_>, new: &SetpointMotion, reference: &ReferenceGenerator) -> bool {
         let (constants, now_ns) = (cycle.constants, cycle.release_ns);
         let parameters = &constants.parameters;
         let followed = self.last.valid.as_ref().filter(|_| is_following(cycle.state));
@@ -107,20 +106,20 @@ impl SetpointValidator {
         let result =
             check_time_stamp(DiagnosticCode::SetpointStampInvalid, new.setpoint.time_ns, now_ns, timeout_ns)
                 .and_then(|()| check_kind(parameters, &new.setpoint))
-                .and_then(|()| check_order(&new, followed))
+                .and_then(|()| check_order(new, followed))
                 .and_then(|()| match parameters.on_violation {
                     ViolationPolicy::Limit => Ok(()),
                     ViolationPolicy::Stop => {
                         let SetpointCheck { active_limits, result } =
-                            check_setpoint(constants.machine(), parameters, &new);
+                            check_setpoint(constants.machine(), parameters, new);
                         self.active_limits = active_limits;
-                        result.and_then(|()| check_continuation(cycle, &new, followed, reference))
+                        result.and_then(|()| check_continuation(cycle, new, followed, reference))
                     }
                 });
         if result.is_ok() && new.setpoint.kind == SetpointKind::Pose {
             self.samples.push(now_ns, new.setpoint.time_ns, &new.motion.pose);
         }
-        self.last.record(new, result, now_ns, is_following(cycle.state));
+        self.last.record(&new.setpoint, result.map(|()| new), now_ns, is_following(cycle.state));
         result.is_ok()
     }
 }

@@ -114,8 +114,8 @@ impl Approach {
         let DerivativeLimits { velocity: limit, acceleration, jerk } = self.closing;
         let a = BRAKING_SHARE * acceleration;
         let linear = self.outer_s + a / (2.0 * jerk);
-        let v = 2.0 * distance / (linear + (linear * linear + 2.0 * distance / a).sqrt());
-        let (v, slope) = if v * jerk >= a * a {
+        let (v, slope) = if distance * jerk >= a * a * (self.outer_s + a / jerk) {
+            let v = 2.0 * distance / (linear + (linear * linear + 2.0 * distance / a).sqrt());
             (v, 1.0 / (linear + v / a))
         } else {
             let root_jerk = jerk.sqrt();

@@ -21,6 +21,7 @@ use nalgebra::Vector3;
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
 use super::regularity::RegularBalls;
+use super::stop::Stop;
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
@@ -37,6 +38,9 @@ const RATE_DEPARTURE_RATIO: f64 = 0.01;
 /// Bounds on the number of intervals between knots: the last bounds the work of a cycle.
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: f64 = 24.0;
+/// Most knots of a stop for which a pose is factorized: bounds the work of a cycle. The balls that were found remain for the
+/// next one.
+const MAX_FACTORIZATIONS: u32 = 8;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;
@@ -56,12 +60,17 @@ pub(super) struct Examination<'a> {
     length_slack: f64,
     rate_slack: f64,
     position_slack: Vector3<f64>,
-    /// Whether rates could exceed their limit.
+    /// Whether rates could exceed their limit, and angles leave the envelope.
     needs_rates: bool,
+    needs_angles: bool,
     /// The pose from which the step leads. Where rounding left it beyond a bound, a stop may be as far beyond: or the
     /// reference could not return.
     from: Option<&'a Pose>,
     length_excess: f64,
+    /// Its condition, once it is needed.
+    start_condition: Option<f64>,
+    /// Knots so far that no ball of earlier ones covers.
+    factorizations: u32,
 }
 
 impl<'a> Examination<'a> {
@@ -114,14 +123,19 @@ impl<'a> Examination<'a> {
             rate_slack: rate_curvature * chord,
             position_slack: position_curvature * chord,
             needs_rates,
+            needs_angles: bounds.envelope.as_ref().is_some_and(|envelope| {
+                !have_angles_room(constants, envelope, &motion.pose, &stop.orientation)
+            }),
             from: step.from,
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
+            start_condition: None,
+            factorizations: 0,
             stop,
         })
     }
 
     /// Examines every knot.
-    pub fn run(&self, balls: &mut RegularBalls, start: &Pose) -> Result<(), Limit> {
+    pub fn run(&mut self, balls: &mut RegularBalls, start: &Pose) -> Result<(), Limit> {
         let mut pose = *start;
         let mut state = self.stop.at(0.0);
         self.check(balls, &pose, &state)?;
@@ -134,9 +148,9 @@ impl<'a> Examination<'a> {
         Ok(())
     }
 
-    fn check(&self, balls: &mut RegularBalls, pose: &Pose, state: &PoseStopState) -> Result<(), Limit> {
+    fn check(&mut self, balls: &mut RegularBalls, pose: &Pose, state: &PoseStopState) -> Result<(), Limit> {
         let lengths = self.check_rates(pose, state)?;
-        let Self { constants, bounds, length_slack, length_excess, .. } = self;
+        let Self { bounds, length_slack, length_excess, .. } = *self;
         let legs = lengths.iter().zip(bounds.shortest.iter().zip(&bounds.longest));
         for (length, (shortest, longest)) in legs {
             if !((length - shortest).min(longest - length) >= length_slack - length_excess) {
@@ -146,15 +160,38 @@ impl<'a> Examination<'a> {
         if let Some(envelope) = &bounds.envelope {
             self.check_envelope(envelope, pose, state)?;
         }
+        self.check_condition(balls, pose)
+    }
+
+    /// Whether the poses around a knot are regular and keep the limit of the condition.
+    fn check_condition(&mut self, balls: &mut RegularBalls, pose: &Pose) -> Result<(), Limit> {
+        let constants = self.constants;
         // Half of an interval on either side.
         let (v, w) = (self.stop.position.peak_velocity, self.stop.orientation.peak_velocity);
         let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
         // Between knots up to the limit of the platform: else a reference at its own limit could not leave it.
-        let is_conditioned = balls.cover(constants, pose, [0.0; 2], constants.reference_condition)
-            || self.from.is_some_and(|from| condition(constants, pose) <= condition(constants, from));
-        let is_regular =
-            is_conditioned && balls.cover(constants, pose, reach, constants.parameters.condition);
-        if is_regular { Ok(()) } else { Err(Limit::Condition) }
+        let (at_knot, around) = (constants.reference_condition, constants.parameters.condition);
+        let is_conditioned = balls.cover_by_known(constants, pose, [0.0; 2], at_knot);
+        if is_conditioned && balls.cover_by_known(constants, pose, reach, around) {
+            return Ok(());
+        }
+        self.factorizations += 1;
+        if self.factorizations > MAX_FACTORIZATIONS {
+            return Err(Limit::Condition);
+        }
+        let condition = balls.cover_by_new(constants, pose, reach, around).ok_or(Limit::Condition)?;
+        if is_conditioned || condition <= at_knot || condition <= self.condition_of_start() {
+            return Ok(());
+        }
+        Err(Limit::Condition)
+    }
+
+    /// The condition at the start of the step; 0 if there is none.
+    fn condition_of_start(&mut self) -> f64 {
+        let Self { constants, from, .. } = *self;
+        *self.start_condition.get_or_insert_with(|| {
+            from.map_or(0.0, |from| KinematicState::new(constants.machine(), *from).sensitivity().condition)
+        })
     }
 
     /// The lengths at a knot, if the rates keep their limit.
@@ -170,6 +207,13 @@ impl<'a> Examination<'a> {
     }
 
     fn check_envelope(&self, envelope: &Envelope, pose: &Pose, state: &PoseStopState) -> Result<(), Limit> {
+        let p = &self.position_slack;
+        let slacks = [p.x, p.y, p.z];
+        let mut axes = pose.position.iter().zip(slacks).zip(ranges(envelope).skip(3));
+        let is_within = axes.all(|((x, slack), range)| is_inside(*x, slack, range));
+        if is_within && !self.needs_angles {
+            return Ok(());
+        }
         let x = task_coordinates(pose, &self.constants.machine().home);
         let [_, beta, ..] = x;
         let (s, c) = (beta.sin().abs(), beta.cos().abs());
@@ -181,11 +225,8 @@ impl<'a> Examination<'a> {
         let curvature = alpha / c + angular * angular * (1.0 + c + 3.0 * s) / (c * c);
         let room = ROOM_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
         let turned = if is_turning { (curvature * self.dt * self.dt / 8.0 - room).max(0.0) } else { 0.0 };
-        let p = &self.position_slack;
-        let slacks = [turned, turned, turned, p.x, p.y, p.z];
-        let is_within = x.iter().zip(slacks).zip(ranges(envelope)).all(|((x, slack), (low, high))| {
-            (x - low).min(high - x) >= slack.min(MAX_SLACK_RATIO * (high - low))
-        });
+        let is_within = is_within
+            && x.iter().zip(ranges(envelope)).take(3).all(|(x, range)| is_inside(*x, turned, range));
         if is_within || self.is_nearer_than_start(envelope, &x) { Ok(()) } else { Err(Limit::Envelope) }
     }
 
@@ -202,12 +243,22 @@ impl<'a> Examination<'a> {
     }
 }
 
-fn ranges(Envelope { lowest, highest }: &Envelope) -> impl Iterator<Item = (&f64, &f64)> {
-    lowest.iter().zip(highest)
+/// Whether the angles have room for every rotation of a stop, in any direction.
+fn have_angles_room(constants: &Constants, envelope: &Envelope, pose: &Pose, stop: &Stop) -> bool {
+    let x = task_coordinates(pose, &constants.machine().home);
+    let [_, beta, ..] = x;
+    let turn = stop.peak_velocity * stop.duration;
+    let need = turn / (beta.abs() + turn).min(core::f64::consts::FRAC_PI_2).cos();
+    x.iter().zip(ranges(envelope)).take(3).all(|(x, (low, high))| (x - low).min(high - x) >= need)
 }
 
-fn condition(constants: &Constants, pose: &Pose) -> f64 {
-    KinematicState::new(constants.machine(), *pose).sensitivity().condition
+/// Whether a coordinate has a distance from both ends of its range, or a part of the range that is narrower.
+fn is_inside(x: f64, slack: f64, (low, high): (&f64, &f64)) -> bool {
+    (x - low).min(high - x) >= slack.min(MAX_SLACK_RATIO * (high - low))
+}
+
+fn ranges(Envelope { lowest, highest }: &Envelope) -> impl Iterator<Item = (&f64, &f64)> {
+    lowest.iter().zip(highest)
 }
 
 /// Largest second derivative of a leg's length at peak velocities.

@@ -14,6 +14,7 @@
 //! | `verification` | whether a stop keeps the limits along its way |
 //! | `examination` | a stop near a bound, knot by knot |
 //! | `pose_stop` | stop of position and orientation |
+//! | `held_stop` | the stop that is held ready, and followed |
 //! | `regularity` | balls of poses proved regular, for the limit of the condition |
 //! | `pose_bounds` | lengths of the legs and envelope |
 //! | `approach` | acceleration towards a moving target |
@@ -29,9 +30,10 @@ use nalgebra::Vector6;
 use self::approach::{Approach, TargetOffset, limit_leg_rates};
 use self::components::Components;
 use self::constant_jerk::moved;
+use self::held_stop::HeldStop;
 use self::history::History;
 use self::pose_bounds::PoseBounds;
-use self::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
+use self::pose_stop::StopKind;
 use self::regularity::RegularBalls;
 pub use self::target::Target;
 use self::target::at_rest;
@@ -47,6 +49,7 @@ mod approach;
 mod components;
 mod constant_jerk;
 mod examination;
+mod held_stop;
 mod history;
 mod pose_bounds;
 pub mod pose_samples;
@@ -66,26 +69,6 @@ const MAX_STEP_S: f64 = 1e-3;
 /// Most steps in a cycle: after missed cycles they are longer, which is as safe and less smooth.
 const MAX_STEPS: f64 = 32.0;
 
-/// The stop that may be followed from the present state on.
-#[derive(Clone, Copy, Debug, Default)]
-enum HeldStop {
-    /// The platform does not move.
-    #[default]
-    AtRest,
-    /// From the present state.
-    Verified(StopKind),
-    /// The one in [`FollowedStop`].
-    Followed,
-}
-
-/// Stop that is followed.
-#[derive(Clone, Copy, Debug, Default)]
-struct FollowedStop {
-    stop: PoseStop,
-    state: PoseStopState,
-    elapsed_s: f64,
-}
-
 /// Reference generator.
 #[derive(Clone, Debug)]
 pub struct ReferenceGenerator {
@@ -95,7 +78,6 @@ pub struct ReferenceGenerator {
     /// Over the last cycle.
     mean_acceleration: Acceleration,
     stop: HeldStop,
-    followed: FollowedStop,
     bounds: PoseBounds,
     balls: RegularBalls,
     history: History,
@@ -113,8 +95,7 @@ impl ReferenceGenerator {
             motion: at_rest(constants.home.pose()),
             time_ns: 0,
             mean_acceleration: Acceleration::default(),
-            stop: HeldStop::AtRest,
-            followed: FollowedStop::default(),
+            stop: HeldStop::default(),
             bounds: PoseBounds::nominal(constants),
             balls: RegularBalls::default(),
             history: History::default(),
@@ -139,7 +120,7 @@ impl ReferenceGenerator {
         (self.motion, self.time_ns) = (*motion, time_ns);
         self.bounds = PoseBounds::around(constants, &motion.pose);
         let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::default());
-        self.stop = HeldStop::Verified(verified.unwrap_or(StopKind::Planar));
+        self.stop.hold(verified.unwrap_or(StopKind::Planar));
         self.history.clear();
     }
 
@@ -177,11 +158,7 @@ impl ReferenceGenerator {
 
     /// Whether the reference has come to rest along its stop.
     pub fn is_at_rest(&self) -> bool {
-        match &self.stop {
-            HeldStop::AtRest => true,
-            HeldStop::Verified(_) => false,
-            HeldStop::Followed => self.followed.elapsed_s >= self.followed.stop.duration(),
-        }
+        self.stop.is_at_rest()
     }
 
     /// Target minus reference at the end of the last cycle.
@@ -214,8 +191,8 @@ impl ReferenceGenerator {
         let steps = (steps - 1e-6) as u32 + 1;
         let step_ns = (to_ns - self.time_ns) / u64::from(steps.max(1));
         let begin = self.motion.twist.vector();
-        for k in 1..=steps {
-            let end_ns = if k == steps { to_ns } else { self.time_ns + step_ns };
+        for k in 0..steps {
+            let end_ns = if k + 1 == steps { to_ns } else { self.time_ns + step_ns };
             self.step(constants, end_ns, target);
         }
         let change = self.motion.twist.vector() - begin;
@@ -223,6 +200,8 @@ impl ReferenceGenerator {
         self.bounds.tighten(constants, &self.motion.pose);
     }
 
+    // Out of line: in the loop over the steps the limits would be kept in memory beside themselves.
+    #[inline(never)]
     fn step(&mut self, constants: &Constants, end_ns: u64, target: Option<&Target<'_>>) {
         let step_s = seconds_between(self.time_ns, end_ns);
         let proposed = target
@@ -233,7 +212,7 @@ impl ReferenceGenerator {
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
             let step = Step { from: Some(&self.motion.pose), duration: step_s, change };
             match verify(constants, &self.bounds, &mut self.balls, &motion, &step) {
-                Ok(kind) => Some((motion, HeldStop::Verified(kind))),
+                Ok(kind) => Some((motion, kind)),
                 Err(limit) => {
                     self.active_limits = self.active_limits.with(limit, true);
                     None
@@ -241,12 +220,15 @@ impl ReferenceGenerator {
             }
         });
         self.components = self.components.after(verified.is_some());
-        let (next, stop) = match verified {
-            Some(verified) => verified,
-            None => (self.stopped(constants, step_s), HeldStop::Followed),
+        let next = match verified {
+            Some((motion, kind)) => {
+                self.stop.hold(kind);
+                motion
+            }
+            None => self.stop.follow(&self.motion, &constants.parameters.limits, step_s),
         };
         self.history.record(self.time_ns, &self.motion, &next.acceleration, step_s);
-        (self.motion, self.stop, self.time_ns) = (next, stop, end_ns);
+        (self.motion, self.time_ns) = (next, end_ns);
     }
 
     /// A step of constant jerk towards the desired motion of the next instant.
@@ -293,10 +275,11 @@ impl ReferenceGenerator {
         }
         let (angular, turn_limits) = turning.acceleration(&turn, &led.angular, &acceleration.angular);
         let (linear, shift_limits) = shifting.acceleration(&shift, &led.linear, &acceleration.linear);
+        let stopping = || self.stop.acceleration(&self.motion, &constants.parameters.limits, h);
         let (angular, linear) = match self.components {
             Components::Both => (angular, linear),
-            Components::Translation { .. } => (self.stop_acceleration(constants, h).angular, linear),
-            Components::Rotation { .. } => (angular, self.stop_acceleration(constants, h).linear),
+            Components::Translation { .. } => (stopping().angular, linear),
+            Components::Rotation { .. } => (angular, stopping().linear),
         };
         let [by_acceleration, by_jerk] = [turn_limits, shift_limits]
             .into_iter()
@@ -307,46 +290,5 @@ impl ReferenceGenerator {
             .with(Limit::Acceleration, by_acceleration)
             .with(Limit::Jerk, by_jerk);
         moved(&self.motion, &angular, &linear, h)
-    }
-
-    /// The acceleration a step later along the stop.
-    // Out of line, as it is rare: the cycle stays short.
-    #[inline(never)]
-    fn stop_acceleration(&self, constants: &Constants, h: f64) -> Acceleration {
-        let PoseStopState { orientation, position } = match self.stop {
-            HeldStop::AtRest => PoseStopState::default(),
-            HeldStop::Verified(kind) => PoseStop::new(kind, &self.motion, &constants.parameters.limits).at(h),
-            HeldStop::Followed => self.followed.stop.at(self.followed.elapsed_s + h),
-        };
-        Acceleration { angular: orientation.acceleration, linear: position.acceleration }
-    }
-
-    /// The motion a step later along the stop.
-    // Out of line, as it is rare: the cycle stays short.
-    #[inline(never)]
-    fn stopped(&mut self, constants: &Constants, h: f64) -> Motion {
-        if let HeldStop::AtRest = self.stop {
-            let stop = PoseStop::new(
-                StopKind::ReleaseFirst,
-                &at_rest(&self.motion.pose),
-                &constants.parameters.limits,
-            );
-            self.followed = FollowedStop { stop, state: stop.at(0.0), elapsed_s: 0.0 };
-        }
-        if let HeldStop::Verified(kind) = self.stop {
-            let stop = PoseStop::new(kind, &self.motion, &constants.parameters.limits);
-            self.followed = FollowedStop { stop, state: stop.at(0.0), elapsed_s: 0.0 };
-        }
-        let FollowedStop { stop, state, elapsed_s } = &mut self.followed;
-        *elapsed_s += h;
-        let next = stop.at(*elapsed_s);
-        let pose = advanced(&self.motion.pose, state, &next, h);
-        *state = next;
-        let PoseStopState { orientation, position } = next;
-        Motion {
-            pose,
-            twist: Twist { angular: orientation.velocity, linear: position.velocity },
-            acceleration: Acceleration { angular: orientation.acceleration, linear: position.acceleration },
-        }
     }
 }

@@ -22,7 +22,7 @@ use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
 
 /// Balls kept: those along one stop.
-const BALL_COUNT: usize = 4;
+const BALL_COUNT: usize = 16;
 
 /// Square of the largest Frobenius norm of N: six directions, and six arms whose mean square is 1.
 const MAX_WRENCH_NORM_SQUARED: f64 = 12.0;
@@ -76,21 +76,51 @@ impl RegularBalls {
     /// Whether every pose within `reach`, a shift \[m\] and a turn \[rad\], of a pose is regular and has at most a condition.
     /// `false` is no proof of the contrary.
     pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2], limit: f64) -> bool {
-        self.balls.iter().flatten().any(|ball| ball.covers(constants, pose, reach, limit))
-            || self.cover_by_new(constants, pose, reach, limit)
+        self.cover_by_known(constants, pose, reach, limit)
+            || self.cover_by_new(constants, pose, reach, limit).is_some()
     }
 
+    /// The same by the balls that are kept.
+    pub fn cover_by_known(
+        &mut self,
+        constants: &Constants,
+        pose: &Pose,
+        reach: [f64; 2],
+        limit: f64,
+    ) -> bool {
+        let [last, others @ ..] = &mut self.balls;
+        let covers = |ball: &Option<Ball>| {
+            ball.as_ref().is_some_and(|ball| ball.covers(constants, pose, reach, limit))
+        };
+        if covers(last) {
+            return true;
+        }
+        // The next pose is near this one: its ball is tried first.
+        if let Some(ball) = others.iter_mut().find(|ball| covers(ball)) {
+            core::mem::swap(last, ball);
+            return true;
+        }
+        false
+    }
+
+    /// The same by a new ball around the pose. Returns the condition of the pose.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    fn cover_by_new(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2], limit: f64) -> bool {
+    pub fn cover_by_new(
+        &mut self,
+        constants: &Constants,
+        pose: &Pose,
+        reach: [f64; 2],
+        limit: f64,
+    ) -> Option<f64> {
         let ball = Ball::new(constants, pose);
-        let is_covered = ball.covers(constants, pose, reach, limit);
-        if is_covered {
-            self.balls.rotate_right(1);
-            if let Some(first) = self.balls.first_mut() {
-                *first = Some(ball);
-            }
+        if !ball.covers(constants, pose, reach, limit) {
+            return None;
         }
-        is_covered
+        self.balls.rotate_right(1);
+        if let Some(first) = self.balls.first_mut() {
+            *first = Some(ball);
+        }
+        Some(ball.norm * ball.inverse_norm)
     }
 }

@@ -182,9 +182,10 @@ impl Stop {
     pub fn at(&self, t: f64) -> StopState {
         let mut present = &Piece::default();
         for piece in self.pieces.iter().take(self.count) {
-            if piece.begin <= t {
-                present = piece;
+            if piece.begin > t {
+                break;
             }
+            present = piece;
         }
         present.state.after(&present.jerk, t - present.begin)
     }

@@ -56,7 +56,7 @@ pub(super) fn verify(
     if is_free {
         return Ok(StopKind::ReleaseFirst);
     }
-    let examination = Examination::new(constants, bounds, motion, step)?;
+    let mut examination = Examination::new(constants, bounds, motion, step)?;
     examination.run(balls, pose)?;
     Ok(StopKind::Planar)
 }

@@ -8,6 +8,7 @@
 //! G V' = -phi'(g) G V - G' V            where this bound is active
 //! ```
 //!
+//! where both ends of a leg or of a coordinate are one wall with two sides,
 //! by Hildreth's method (C. Hildreth, "A quadratic programming procedure", 1957), a few sweeps over all walls. The walls prove
 //! nothing: the verified stop keeps the bounds. Without them it would do so at the limits of jerk.
 //!
@@ -36,20 +37,42 @@ const SWEEPS: u32 = 8;
 /// Slowness of the return from a gap that is negative, over that of the approach.
 const RETURN_RATIO: f64 = 4.0;
 
-/// Both ends of every leg and of every coordinate.
-const WALL_COUNT: usize = 24;
+/// Every leg and every coordinate.
+const WALL_COUNT: usize = 12;
 
-/// One wall, in coordinates in which rotations are multiplied by the radius of the joints.
+/// One end of a leg or of a coordinate.
+#[derive(Clone, Copy, Debug, Default)]
+struct Side {
+    /// Largest closing rate \[m/s\].
+    rate: f64,
+    /// Its derivative if the end is approached at that rate, less the curvature \[m/s^2\].
+    derivative: f64,
+}
+
+impl Side {
+    /// `curvature`: of the leg or coordinate towards this end.
+    fn new(approach: &Approach, gap: f64, curvature: f64) -> Self {
+        let (rate, slope) = if gap > 0.0 {
+            approach.closing_velocity(gap)
+        } else {
+            let slope = approach.slowest_slope() / RETURN_RATIO;
+            (gap * slope, slope)
+        };
+        Self { rate, derivative: -slope * rate - curvature }
+    }
+}
+
+/// Both ends of a leg or of a coordinate, in coordinates in which rotations are multiplied by the radius of the joints.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wall {
     /// Bit of the limit that it stands for.
     limit: LimitSet,
     gradient: Vector6<f64>,
-    norm_squared: f64,
-    /// Largest closing rate \[m/s\].
-    rate: f64,
-    /// Its derivative if the wall is approached at that rate, less the curvature \[m/s^2\].
-    derivative: f64,
+    /// Of the square of its norm.
+    inverse_square: f64,
+    /// Against the gradient, along it.
+    sides: [Side; 2],
+    /// Positive where the end along the gradient is active, negative at the other.
     multiplier: f64,
 }
 
@@ -90,8 +113,8 @@ impl Walls {
             let departure = curvature * squared_time;
             let gaps = [longest - next - departure.max(0.0), next - shortest + departure.min(0.0)];
             let [long, short] = gaps.map(|gap| gap - kept);
-            walls.push(Limit::Stroke, &approach, gradient, long, *curvature);
-            walls.push(Limit::Stroke, &approach, -gradient, short, -curvature);
+            let sides = [Side::new(&approach, short, -curvature), Side::new(&approach, long, *curvature)];
+            walls.push(Limit::Stroke, gradient, sides);
         }
         if let Some(envelope) = &bounds.envelope {
             walls.push_envelope(constants, envelope, motion, led, step_s, kept);
@@ -133,25 +156,18 @@ impl Walls {
             let (approach, kept) = if axis < 3 { (&turning, kept / radius) } else { (&shifting, kept) };
             let kept = kept.min(0.05 * (high - low));
             let next = x + gradient.dot(&velocity) * step_s;
-            self.push(Limit::Envelope, approach, gradient, high - next - kept, 0.0);
-            self.push(Limit::Envelope, approach, -gradient, next - low - kept, 0.0);
+            let gaps = [next - low - kept, high - next - kept];
+            self.push(Limit::Envelope, gradient, gaps.map(|gap| Side::new(approach, gap, 0.0)));
         }
     }
 
-    fn push(&mut self, limit: Limit, approach: &Approach, gradient: Vector6<f64>, gap: f64, curvature: f64) {
-        let (rate, slope) = if gap > 0.0 {
-            approach.closing_velocity(gap)
-        } else {
-            let slope = approach.slowest_slope() / RETURN_RATIO;
-            (gap * slope, slope)
-        };
+    fn push(&mut self, limit: Limit, gradient: Vector6<f64>, sides: [Side; 2]) {
         if let Some(wall) = self.walls.get_mut(self.count) {
             *wall = Wall {
                 limit: LimitSet::default().with(limit, true),
-                norm_squared: gradient.norm_squared().max(f64::MIN_POSITIVE),
+                inverse_square: 1.0 / gradient.norm_squared().max(f64::MIN_POSITIVE),
                 gradient,
-                rate,
-                derivative: -slope * rate - curvature,
+                sides,
                 multiplier: 0.0,
             };
             self.count += 1;
@@ -164,14 +180,23 @@ impl Walls {
         let mut velocity = stacked(&(turn.velocity * self.radius), &shift.velocity);
         let mut active = LimitSet::default();
         for _ in 0..SWEEPS {
+            let mut is_changed = false;
             for wall in self.walls.iter_mut().take(self.count) {
-                let excess = (wall.gradient.dot(&velocity) - wall.rate) / wall.norm_squared;
-                let multiplier = (wall.multiplier + excess).max(0.0);
+                let [against, along] = &wall.sides;
+                // The closing rate without this wall, and what of it is beyond the ends.
+                let rate = wall.gradient.dot(&velocity) * wall.inverse_square + wall.multiplier;
+                let allowed =
+                    rate.min(along.rate * wall.inverse_square).max(-against.rate * wall.inverse_square);
+                let multiplier = rate - allowed;
                 velocity -= wall.gradient * (multiplier - wall.multiplier);
+                is_changed |= multiplier != wall.multiplier;
                 wall.multiplier = multiplier;
             }
+            if !is_changed {
+                break;
+            }
         }
-        for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier > 0.0) {
+        for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier != 0.0) {
             active = active.union(wall.limit);
         }
         if active.is_empty() {
@@ -179,8 +204,10 @@ impl Walls {
         }
         let mut derivative = stacked(&(turn.derivative * self.radius), &shift.derivative);
         for _ in 0..SWEEPS {
-            for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier > 0.0) {
-                let excess = (wall.gradient.dot(&derivative) - wall.derivative) / wall.norm_squared;
+            for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier != 0.0) {
+                let [against, along] = &wall.sides;
+                let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
+                let excess = (wall.gradient.dot(&derivative) - wanted) * wall.inverse_square;
                 derivative -= wall.gradient * excess;
             }
         }

@@ -4,7 +4,8 @@ use super::super::components::Components;
 use super::super::pose_samples::PoseSamples;
 use super::super::pose_stop::{PoseStop, StopKind};
 use super::super::target::at_rest;
-use super::super::{HeldStop, ReferenceGenerator, Target};
+use super::super::held_stop::Phase;
+use super::super::{ReferenceGenerator, Target};
 use super::*;
 use crate::control::controller::{Setpoint, SetpointKind};
 use crate::control::input_validation::SetpointMotion;
@@ -216,10 +217,10 @@ fn a_component_that_waits_follows_the_stop() {
     let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
     for is_followed in [false, true] {
         if is_followed {
-            (reference.followed.stop, reference.followed.elapsed_s) = (stop, elapsed_s);
-            reference.stop = HeldStop::Followed;
+            (reference.stop.stop, reference.stop.elapsed_s) = (stop, elapsed_s);
+            reference.stop.phase = Phase::Followed;
         } else {
-            reference.stop = HeldStop::Verified(StopKind::Planar);
+            reference.stop.hold(StopKind::Planar);
         }
         let expected = stop.at(h + if is_followed { elapsed_s } else { 0.0 });
         let mut accelerations = |components| {
@@ -306,7 +307,7 @@ fn without_a_target_the_reference_ends_where_its_stop_does() {
     motion.twist.linear = Vector3::new(0.1, 0.2, 0.3);
     motion.acceleration.linear = Vector3::new(1.0, 0.0, -2.0);
     let mut reference = started(&constants, &motion);
-    let HeldStop::Verified(kind) = reference.stop else { panic!("not verified") };
+    let Phase::Verified(kind) = reference.stop.phase else { panic!("not verified") };
     let stop = PoseStop::new(kind, &motion, &LIMITS);
     let mut at_rest_after = None;
     for k in 1..=400_u64 {

@@ -2,7 +2,8 @@
 
 use super::super::pose_stop::StopKind;
 use super::super::target::at_rest;
-use super::super::{HeldStop, ReferenceGenerator, Target};
+use super::super::held_stop::Phase;
+use super::super::{ReferenceGenerator, Target};
 use super::generator::{MS, constants, run, standing, started, x};
 use super::*;
 use crate::control::limits::Limit;
@@ -87,7 +88,7 @@ fn a_step_that_exceeds_the_velocity_between_its_ends_is_refused() {
             let mut reference = started(&constants, &motion);
             let setpoint = standing(&constants, [0.0; 6]);
             reference.advance(&constants, MS, Some(&Target::Motion(&setpoint)));
-            assert_eq!(!matches!(reference.stop, HeldStop::Followed), is_accepted, "{part} {excess}");
+            assert_eq!(!matches!(reference.stop.phase, Phase::Followed), is_accepted, "{part} {excess}");
             assert_eq!(reference.active_limits().contains(Limit::Velocity), !is_accepted);
         }
     }
@@ -177,7 +178,7 @@ fn a_start_holds_the_stop_that_was_verified() {
         motion.twist.linear = Vector3::new(-0.2, 0.0, 0.0);
         motion.pose.position.x = if half < 1.0 { 0.047 } else { 0.0 };
         let reference = started(&constants, &motion);
-        let HeldStop::Verified(kind) = reference.stop else { panic!("no stop is held") };
+        let Phase::Verified(kind) = reference.stop.phase else { panic!("no stop is held") };
         assert_eq!(kind == StopKind::Planar, expected == StopKind::Planar, "{half}");
     }
 }

@@ -54,16 +54,16 @@ fn the_history_returns_the_motion_of_each_instant() {
     assert!(history.motion_at(0).is_none());
     let mut motion = moving(&mut samples, &constants);
     let mut recorded = vec![];
-    for k in 0..150_u64 {
+    for k in 0..700_u64 {
         let next = Vector6::from_fn(|_, _| 6.0 * samples.uniform() - 3.0);
         let jerk = (next - motion.acceleration.vector()) / 1e-3;
         history.record(1000 * MS + k * MS, &motion, &Acceleration::from_vector(&next), 1e-3);
         recorded.push((motion, jerk));
         motion = integrated(&motion, &jerk, 1e-3);
     }
-    // Of the newest 64 segments: their begins, within, and after the last.
+    // Of the newest 512 segments: their begins, within, and after the last.
     #[allow(clippy::needless_range_loop, reason = "the index is the cycle")]
-    for k in 86..150_usize {
+    for k in 188..700_usize {
         let (motion, jerk) = &recorded[k];
         let begin_ns = 1000 * MS + k as u64 * MS;
         for part_ns in [0, 300_000, 999_999] {
@@ -72,14 +72,14 @@ fn the_history_returns_the_motion_of_each_instant() {
             assert_near(&found, &expected, [1e-8, 1e-12, 1e-9]);
         }
     }
-    let (last, jerk) = recorded[149];
-    let after = history.motion_at(1149 * MS + 1_500_000).unwrap();
+    let (last, jerk) = recorded[699];
+    let after = history.motion_at(1699 * MS + 1_500_000).unwrap();
     assert_near(&after, &integrated(&last, &jerk, 1.5e-3), [1e-7, 1e-12, 1e-9]);
     // Before the oldest: with its acceleration.
-    let before = history.motion_at(1085 * MS).unwrap();
-    assert_near(&before, &integrated(&recorded[86].0, &Vector6::zeros(), -1e-3), [1e-7, 1e-12, 1e-9]);
+    let before = history.motion_at(1187 * MS).unwrap();
+    assert_near(&before, &integrated(&recorded[188].0, &Vector6::zeros(), -1e-3), [1e-7, 1e-12, 1e-9]);
     history.clear();
-    assert!(history.motion_at(1149 * MS).is_none());
+    assert!(history.motion_at(1699 * MS).is_none());
 }
 
 /// `deviation_of` against the deviation from the motion that is extrapolated on its own: the rest is of second order.

@@ -1,0 +1,82 @@
+//! The stop that is held ready: verified in an earlier step, it may be followed from the present motion on.
+
+use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
+use super::target::at_rest;
+use crate::control::limits::Limits;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+
+/// Where the stop begins.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Phase {
+    /// The platform does not move.
+    #[default]
+    AtRest,
+    /// At the present motion.
+    Verified(StopKind),
+    /// Before it: the stop is followed.
+    Followed,
+}
+
+/// The stop that may be followed from the present motion on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct HeldStop {
+    pub(super) phase: Phase,
+    /// While it is followed.
+    pub(super) stop: PoseStop,
+    state: PoseStopState,
+    pub(super) elapsed_s: f64,
+}
+
+impl HeldStop {
+    /// Holds the stop of a kind, verified from the present motion on.
+    pub fn hold(&mut self, kind: StopKind) {
+        self.phase = Phase::Verified(kind);
+    }
+
+    /// Whether the platform is at rest at its end.
+    pub fn is_at_rest(&self) -> bool {
+        match self.phase {
+            Phase::AtRest => true,
+            Phase::Verified(_) => false,
+            Phase::Followed => self.elapsed_s >= self.stop.duration(),
+        }
+    }
+
+    /// The acceleration a step later along the stop.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn acceleration(&self, motion: &Motion, limits: &Limits, h: f64) -> Acceleration {
+        let PoseStopState { orientation, position } = match self.phase {
+            Phase::AtRest => PoseStopState::default(),
+            Phase::Verified(kind) => PoseStop::new(kind, motion, limits).at(h),
+            Phase::Followed => self.stop.at(self.elapsed_s + h),
+        };
+        Acceleration { angular: orientation.acceleration, linear: position.acceleration }
+    }
+
+    /// The motion a step later along the stop, which is followed from now on.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn follow(&mut self, motion: &Motion, limits: &Limits, h: f64) -> Motion {
+        if let Phase::AtRest = self.phase {
+            self.begin(PoseStop::new(StopKind::ReleaseFirst, &at_rest(&motion.pose), limits));
+        }
+        if let Phase::Verified(kind) = self.phase {
+            self.begin(PoseStop::new(kind, motion, limits));
+        }
+        self.elapsed_s += h;
+        let next = self.stop.at(self.elapsed_s);
+        let pose = advanced(&motion.pose, &self.state, &next, h);
+        self.state = next;
+        let PoseStopState { orientation, position } = next;
+        Motion {
+            pose,
+            twist: Twist { angular: orientation.velocity, linear: position.velocity },
+            acceleration: Acceleration { angular: orientation.acceleration, linear: position.acceleration },
+        }
+    }
+
+    fn begin(&mut self, stop: PoseStop) {
+        *self = Self { phase: Phase::Followed, state: stop.at(0.0), elapsed_s: 0.0, stop };
+    }
+}
