@@ -24,4 +24,5 @@ mod closed_loop {
     mod setpoints;
     mod targets;
     mod tracking;
+    mod trust;
 }

@@ -24,6 +24,8 @@ pub(super) struct Evidence<'a> {
     pub located: Result<&'a Located<'a>, Diagnostic>,
     pub error: Option<&'a TrackingError>,
     pub feedback: &'a FeedbackBound,
+    /// Whether the measurements agree with the prediction.
+    pub trust: Result<(), Diagnostic>,
 }
 
 // Out of line, as is `target` in the controller: jump tables inside `step` are beyond the proof on the machine code.
@@ -36,11 +38,12 @@ pub(super) fn assess(
     reference: &mut ReferenceGenerator,
 ) -> (Findings, LimitSet) {
     let parameters = &cycle.constants.parameters;
-    let Evidence { input, setpoint, located, error, feedback } = evidence;
+    let Evidence { input, setpoint, located, error, feedback, trust } = evidence;
     let (mut active_limits, conditioned) = localization.check_condition(parameters.condition);
     let (mut tracking, mut start) = (conditioned, Ok(()));
     if cycle.state.has_control() {
-        tracking = check_following_error(parameters, *error, &mut active_limits)
+        tracking = trust
+            .and_then(|()| check_following_error(parameters, *error, &mut active_limits))
             .and_then(|()| feedback.check())
             .and_then(|()| check_deadline(input))
             .and(match cycle.state {

@@ -190,6 +190,7 @@ impl Controller {
             located: located.as_ref().map_err(|diagnostic| *diagnostic),
             error: error.as_ref(),
             feedback,
+            trust: errors.check_trust(),
         };
         let (findings, assessed_limits) = assess(&cycle, &evidence, localization, reference);
         let next = supervisor.decide(request, &findings, parameters.after_loss);

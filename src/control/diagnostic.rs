@@ -196,6 +196,10 @@ codes! {
     SetpointKindInvalid = 121, Stop, absolute("kind", "", "exceeds", "the largest that [setpoint] on_violation allows,"), "kind of the setpoint not allowed", "send X, X' and X'', or set [setpoint] on_violation to limit";
     /// The limits kept the reference from following the setpoint within the tolerance `control.engage_*`.
     SetpointBeyondLimits = 124, Stop, ratio("the distance of the reference from the setpoint", "the tolerance control.engage_*"), "setpoint beyond the limits of a motion that can be stopped", "correct the trajectory, or [limits], or set [setpoint] on_violation to limit";
+    /// The readings of a leg stayed the same to the last bit while its reference moved.
+    SensorFrozen = 125, Brake, absolute("motion of the reference since the reading changed last", "m", "exceeds", "the bound for a sensor that is alive,"), "sensor frozen", "check the encoder of this leg and the driver";
+    /// The length of a leg is not where the model, the forces and the measurements before have it.
+    MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "what noise and disturbances explain,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.

@@ -28,7 +28,7 @@ use super::estimator::input_matrix::InputMatrix;
 use super::gains::Gains;
 use super::leg_masses::LegMasses;
 use super::limits::Limits;
-use super::tracking_error::{FeedbackError, TrackingError};
+use super::tracking_error::FeedbackError;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Gravity;
 use crate::model::machine::{LEGS, Machine};
@@ -70,7 +70,7 @@ impl ControlMode {
     }
 }
 
-/// Control law of one deployment: mode, gains, observer.
+/// Control law of one deployment: mode and gains.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
     /// Errors that feedback acts on and terms of the dynamics that are added.
@@ -136,25 +136,9 @@ impl Law {
         feedback + input_matrix.command(&estimate.disturbance)
     }
 
-    /// Pose, twist and acceleration at which computed torque evaluates the inverse dynamics: where the platform will be at the
-    /// instant of `desired` if `error` stays as it is, with `acceleration` added.
-    pub fn command(&self, desired: &Motion, error: &TrackingError, acceleration: &Vector6<f64>) -> Motion {
-        let (e, e_rate) = (&error.pose, &error.twist);
-        let Acceleration { angular, linear } = Acceleration::from_vector(acceleration);
-        Motion {
-            pose: desired.pose.extrapolated(&Twist { angular: -e.angular, linear: -e.linear }),
-            twist: Twist {
-                angular: desired.twist.angular - e_rate.angular,
-                linear: desired.twist.linear - e_rate.linear,
-            },
-            acceleration: Acceleration {
-                angular: desired.acceleration.angular + angular,
-                linear: desired.acceleration.linear + linear,
-            },
-        }
-    }
-
-    /// The motion whose forces the mode commands: in a mode on legs the desired one.
+    /// The motion whose forces the mode commands. Computed torque: the pose where the platform will be at the instant of `desired`
+    /// with an error, the acceleration with that of feedback, and the twist of the reference, as friction of estimated rates
+    /// would shake a platform at rest. A mode on legs: the desired motion.
     pub(super) fn dynamics_motion(
         &self,
         desired: Motion,
@@ -164,7 +148,15 @@ impl Law {
         if self.mode.acts_on_legs() {
             return desired;
         }
-        self.command(&desired, &TrackingError::from(error), acceleration)
+        let Acceleration { angular, linear } = Acceleration::from_vector(acceleration);
+        Motion {
+            pose: desired.pose.extrapolated(&Twist::from_vector(&-error.value)),
+            twist: desired.twist,
+            acceleration: Acceleration {
+                angular: desired.acceleration.angular + angular,
+                linear: desired.acceleration.linear + linear,
+            },
+        }
     }
 
     /// Forces `m_i a_i` of the drives for accelerations of the legs.

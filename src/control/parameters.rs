@@ -1,6 +1,6 @@
 //! Parameters of a controller, and all that stays constant while it runs.
 
-use super::estimator::EstimatorConstants;
+use super::estimator::{EstimatorConstants, Readings};
 use super::estimator::covariance::NoiseModel;
 use super::estimator::input_matrix::InputMatrix;
 use super::law::Law;
@@ -21,6 +21,8 @@ pub struct Parameters {
     pub law: Law,
     /// What the gains of the estimator follow from.
     pub noise: NoiseModel,
+    /// Errors of the readings of lengths.
+    pub readings: Readings,
     /// From the release to the instant at which its force begins to act \[ns\].
     pub force_delay_ns: u64,
     /// Which terms of the dynamics are evaluated. Inertia must be one of them: the law commands an
@@ -130,8 +132,18 @@ impl Constants {
         Self {
             dynamics: InverseDynamics::new(machine),
             input_matrix,
-            estimator: EstimatorConstants::new(parameters.noise, saturation),
-            leg_rates: EstimatorConstants::new(lengths_only, Vector6::repeat(f64::INFINITY)),
+            estimator: EstimatorConstants::new(
+                parameters.noise,
+                parameters.readings,
+                saturation,
+                parameters.limits.position.acceleration,
+            ),
+            leg_rates: EstimatorConstants::new(
+                lengths_only,
+                parameters.readings,
+                Vector6::repeat(f64::INFINITY),
+                f64::INFINITY,
+            ),
             parameters,
             home,
             arm,

@@ -8,12 +8,14 @@ use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use super::controller::Cycle;
-use super::estimator::{ErrorState, Estimator};
+use super::diagnostic::{Diagnostic, DiagnosticCode};
+use super::estimator::{ErrorState, Estimator, FrozenSensors};
 use super::input_validation::ValidatedSetpoint;
 use super::localization::{Localization, Located};
-use super::parameters::Parameters;
+use super::parameters::{Constants, Parameters};
 use super::reference::ReferenceGenerator;
-use crate::model::inverse_geometry::{LegMotion, leg_motion};
+use crate::model::inverse_geometry::{LegMotion, leg_lengths, leg_motion};
+use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Motion, Pose, Twist};
 
@@ -102,8 +104,11 @@ pub(super) fn setpoint_error(
 #[derive(Clone, Debug, Default)]
 pub(super) struct ErrorTracker {
     estimator: Estimator,
+    sensors: FrozenSensors,
     /// Measured; while there is no new measurement, predicted.
     error: TrackingError,
+    /// Whether the measurements agree with the prediction.
+    trust: Option<Diagnostic>,
 }
 
 impl ErrorTracker {
@@ -116,6 +121,7 @@ impl ErrorTracker {
     ) -> TrackingError {
         let (error, deviation) = measured(cycle, &reference.motion_at(located.measurement.time_ns), located);
         self.estimator.start(&cycle.constants.estimator, located.measurement.time_ns, &deviation);
+        (self.sensors, self.trust) = (FrozenSensors::default(), None);
         self.error = error;
         error
     }
@@ -129,13 +135,22 @@ impl ErrorTracker {
         localization: &Localization,
         located: &mut Located<'_>,
     ) -> TrackingError {
-        let Self { estimator, .. } = self;
+        let Self { estimator, sensors, .. } = self;
         let constants = cycle.constants;
         let time_ns = located.measurement.time_ns;
         let desired = reference.motion_at(time_ns);
         let (mut error, deviation) = measured(cycle, &desired, located);
         let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
-        let is_new = estimator.correct(&constants.estimator, time_ns, &deviation).is_some();
+        let interval_s = estimator.interval_s(time_ns);
+        let innovation = estimator.correct(&constants.estimator, time_ns, &deviation);
+        let is_new = innovation.is_some();
+        if let Some(innovation) = innovation {
+            let lengths = || leg_lengths(constants.machine(), &desired.pose);
+            self.trust = sensors
+                .check(&located.measurement.length, &constants.estimator.readings, lengths)
+                .and_then(|()| check_innovation(constants, &innovation, interval_s, located))
+                .err();
+        }
         if located.measurement.rate.is_none() {
             let rate = &estimator.state().rate;
             error.twist = if acts_on_legs {
@@ -155,6 +170,11 @@ impl ErrorTracker {
         self.error
     }
 
+    /// Whether the last measurement agrees with the prediction, and the sensors are alive.
+    pub fn check_trust(&self) -> Result<(), Diagnostic> {
+        self.trust.map_or(Ok(()), Err)
+    }
+
     /// The estimate at the instant at which a force begins.
     pub fn predicted(&self, begin_ns: u64) -> ErrorState {
         self.estimator.predicted(begin_ns)
@@ -164,6 +184,38 @@ impl ErrorTracker {
     pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
         self.estimator.record_sent(begin_ns, acceleration);
     }
+}
+
+/// Whether each leg is where the prediction has it. Its innovation is `N^T nu`, at most `|nu_p| + r |nu_R|`.
+fn check_innovation(
+    constants: &Constants,
+    innovation: &Vector6<f64>,
+    interval_s: f64,
+    located: &Located<'_>,
+) -> Result<(), Diagnostic> {
+    let bound = constants.estimator.innovation_bound(interval_s);
+    let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
+    let Twist { angular, linear } = Twist::from_vector(innovation);
+    let largest = if acts_on_legs {
+        innovation.amax()
+    } else {
+        linear.norm() + constants.arm * angular.norm()
+    };
+    if largest <= bound {
+        return Ok(());
+    }
+    let of_legs = if acts_on_legs {
+        *innovation
+    } else {
+        leg_wrenches(constants.machine(), &located.platform.pose).tr_mul(innovation)
+    };
+    let (leg, largest) = of_legs.iter().map(|value| value.abs()).enumerate().fold((0, 0.0), |most, next| {
+        if next.1 > most.1 { next } else { most }
+    });
+    if largest <= bound {
+        return Ok(());
+    }
+    Err(Diagnostic::new(DiagnosticCode::MeasurementImplausible, largest, bound).at(leg))
 }
 
 /// The measured error against a desired motion: of the pose, and what feedback acts on.

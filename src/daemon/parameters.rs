@@ -5,6 +5,7 @@ use core::f64::consts::TAU;
 use nalgebra::Vector6;
 
 use crate::config::deployment::Deployment;
+use crate::control::estimator::Readings;
 use crate::control::estimator::covariance::NoiseModel;
 use crate::control::gains::Gains;
 use crate::control::law::Law;
@@ -39,6 +40,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
             rate_noise_ratio: deployment.noise.rate_m_s.map(|rate| rate / deployment.noise.length_m),
             period_s: deployment.realtime.period_s(),
         },
+        readings: Readings { noise: deployment.noise.length_m, step: deployment.noise.length_step_m },
         force_delay_ns: nanoseconds(deployment.drive.total_delay_s()),
         fidelity,
         engage_position: control.engage_position_m,

@@ -15,6 +15,8 @@ const MAX_DELAY_US: f64 = 15_000.0;
 pub struct SensorNoise {
     /// Of a length.
     pub length_m: f64,
+    /// Resolution of a length; 0 if it is not known.
+    pub length_step_m: f64,
     /// Of a rate; `None` if the rates that the driver sends are only checked.
     pub rate_m_s: Option<f64>,
 }
@@ -39,6 +41,7 @@ pub(super) fn read_noise(mut section: SectionReader) -> SensorNoise {
     let step = section.number_or("length_step_m", 0.0, Bound::NotNegative);
     let default = if step > 0.0 { STEP_DEVIATION * step } else { DEFAULT_LENGTH_NOISE_M };
     let noise = SensorNoise {
+        length_step_m: step,
         length_m: section.number_or("length_noise_m", default, Bound::Positive),
         rate_m_s: finite(section.number_or("rate_noise_m_s", f64::INFINITY, Bound::Positive)),
     };

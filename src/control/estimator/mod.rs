@@ -21,6 +21,7 @@
 //! What it does not know: elastic legs, the lag of drives but as a dead time, and coloured noise.
 
 pub mod covariance;
+mod frozen_sensors;
 pub mod input_matrix;
 mod leg_rates;
 mod sent_accelerations;
@@ -28,6 +29,7 @@ mod sent_accelerations;
 use nalgebra::Vector6;
 
 use self::covariance::{Covariance, NoiseModel};
+pub(super) use self::frozen_sensors::FrozenSensors;
 pub(super) use self::leg_rates::LegRateEstimator;
 use self::sent_accelerations::SentAccelerations;
 use super::input_validation::seconds_between;
@@ -124,12 +126,40 @@ pub struct EstimatorConstants {
     pub covariance: Covariance,
     /// Largest disturbance of each axis.
     pub saturation: Vector6<f64>,
+    /// Noise of a reading of a length, and its resolution \[m\].
+    pub readings: Readings,
+    /// Largest plausible acceleration of the platform that the model does not contain \[m/s^2\].
+    pub largest_disturbance: f64,
 }
+
+/// Errors of the readings of lengths.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Readings {
+    /// Standard deviation \[m\].
+    pub noise: f64,
+    /// Resolution \[m\]; 0 if it is not known.
+    pub step: f64,
+}
+
+/// Innovations beyond the disturbance that are noise, over its standard deviation: once in years.
+const NOISE_DEVIATIONS: f64 = 10.0;
 
 impl EstimatorConstants {
     /// Evaluates them.
-    pub fn new(noise: NoiseModel, saturation: Vector6<f64>) -> Self {
-        Self { noise, covariance: noise.steady().0, saturation }
+    pub fn new(
+        noise: NoiseModel,
+        readings: Readings,
+        saturation: Vector6<f64>,
+        largest_disturbance: f64,
+    ) -> Self {
+        Self { noise, covariance: noise.steady().0, saturation, readings, largest_disturbance }
+    }
+
+    /// Largest plausible innovation of a leg, `dt` after the last measurement \[m\]: noise, and the way of a disturbance that the
+    /// estimate does not know yet, `a (1 / we^2 + dt^2 / 2)`.
+    pub fn innovation_bound(&self, dt: f64) -> f64 {
+        let lag = 1.0 / self.noise.bandwidth;
+        NOISE_DEVIATIONS * self.readings.noise + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
     }
 }
 
@@ -156,6 +186,11 @@ impl Estimator {
         }
         sent.advance(&mut filter.state, filter.time_ns, time_ns);
         Some(filter.correct(constants, time_ns, measured))
+    }
+
+    /// Time since the last measurement \[s\].
+    pub fn interval_s(&self, time_ns: u64) -> f64 {
+        seconds_between(self.filter.time_ns, time_ns)
     }
 
     /// The estimate at the instant of the last measurement.

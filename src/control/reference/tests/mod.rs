@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::samples::Samples;
+use crate::control::estimator::Readings;
 use crate::control::estimator::covariance::NoiseModel;
 use crate::control::gains::Gains;
 use crate::control::law::{ControlMode, Law};
@@ -84,6 +85,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         period_ns: 1_000_000,
         law: Law::new(machine, ControlMode::default(), gains, LegMasses::at_home(machine), false, &LIMITS),
         noise: NoiseModel { bandwidth: 50.0, rate_noise_ratio: None, period_s: 1e-3 },
+        readings: Readings::default(),
         force_delay_ns: 0,
         fidelity: Fidelity::Exact,
         limits: LIMITS,
