@@ -88,12 +88,13 @@ pub fn request_of(signal: RequestSignal) -> Request {
 /// Runs the daemon until `stop`.
 pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, DaemonError> {
     let mut claim = Claim::take(&config.name)?;
-    let socket = location::open(&config.name, &config.deployment.operator)?;
-    info!("control socket: {}", socket.path.display());
     // It lives as long as the process: signals may come until its end.
     let word: &'static RequestWord = Box::leak(Box::default());
     let requests = [RequestSignal::User1, RequestSignal::User2].map(|signal| request_of(signal) as u32);
     post_on_signals(word, requests).map_err(DaemonError::Signals)?;
+    // Not before the signals: who finds it may send them.
+    let socket = location::open(&config.name, &config.deployment.operator)?;
+    info!("control socket: {}", socket.path.display());
     claim.record(&socket.path)?;
     let (report, counts_csv) = threads::run(config, files.faults.as_deref(), socket, word, stop)?;
     if let Some(path) = &files.report {

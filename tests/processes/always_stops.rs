@@ -21,8 +21,8 @@ use crate::support::socket::{path_of, status, stops};
 use crate::support::trio::{start_daemon, start_plant};
 use crate::support::turns;
 
-/// Connections that mean no good: as many as the daemon serves.
-const HOSTILE: usize = 64;
+/// Connections that mean no good: twice as many as the daemon serves, most of which only take a place.
+const HOSTILE: usize = 128;
 
 /// Emergency stops under them.
 const TRIALS: usize = 10;
@@ -215,10 +215,10 @@ impl Hostile {
                     let Ok(mut stream) = UnixStream::connect(&path) else { continue };
                     let _ = stream.set_read_timeout(Some(Duration::from_millis(500)));
                     let _ = stream.set_write_timeout(Some(Duration::from_millis(500)));
-                    let chunk = match number % 4 {
-                        0 => vec![],
-                        1 => b"{\"version\": 1, \"requ".to_vec(),
-                        2 => vec![b'x'; 1 << 16],
+                    let chunk = match number % 8 {
+                        0..3 => vec![],
+                        3..6 => b"{\"version\": 1, \"requ".to_vec(),
+                        6 => vec![b'x'; 1 << 16],
                         _ => b"{\"version\": 1, \"request\": \"status\"}\n".repeat(100),
                     };
                     // No more than a gigabyte.
@@ -227,7 +227,7 @@ impl Hostile {
                             break;
                         }
                         sent.fetch_add(chunk.len() as u64, Ordering::Relaxed);
-                        if number % 4 < 2 && stream.read(&mut [0; 64]).is_ok_and(|count| count == 0) {
+                        if number % 8 < 6 && stream.read(&mut [0; 64]).is_ok_and(|count| count == 0) {
                             break;
                         }
                     }

@@ -78,8 +78,7 @@ fn poses(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
             None => writeln!(f, "{:>11}", "unknown")?,
             Some(numbers) => {
                 for (k, number) in numbers.iter().enumerate() {
-                    // No negative zero.
-                    write!(f, "{:>11.digits$}", number * axis_unit(k).0 + 0.0)?;
+                    write!(f, "{:>11}", fixed(number * axis_unit(k).0, digits))?;
                 }
                 writeln!(f)?;
             }
@@ -104,12 +103,12 @@ fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
         let share = (length_m * 1e3 - shortest) / (longest - shortest);
         writeln!(
             f,
-            "{:>3}{:>11.3}  {}{:>8.1}{:>9.1}  {}",
+            "{:>3}{:>11.3}  {}{:>8}{:>9}  {}",
             k + 1,
             length_m * 1e3,
             bar(share, BAR, '#'),
-            rate_m_s * 1e3 + 0.0,
-            force_n + 0.0,
+            fixed(rate_m_s * 1e3, 1),
+            fixed(*force_n, 1),
             bar(force_n.abs() / report.max_force_n, BAR / 2, if *force_n < 0.0 { '-' } else { '+' }),
         )?;
     }
@@ -148,6 +147,13 @@ fn source_line(source: &SourceReport) -> String {
         .collect();
     let from = if processes.is_empty() { "no process".into() } else { processes.join(", ") };
     format!("{:.80}", format!("{:10}{age}, from {from}", source.topic))
+}
+
+/// A number with so many digits after the point, and no negative zero.
+fn fixed(number: f64, digits: usize) -> String {
+    let text = format!("{number:.digits$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    if is_zero { text.trim_start_matches('-').into() } else { text }
 }
 
 fn microseconds(time_ns: u64) -> String {

@@ -20,6 +20,9 @@ pub enum SocketError {
     /// The configured group does not exist.
     #[error("operator.group = \"{0}\": no such group; create it, or correct the machine file")]
     NoGroup(String),
+    /// The daemon may not give its socket to the configured group.
+    #[error("operator.group = \"{0}\": the user of the daemon must be a member of that group")]
+    NotMember(String),
     /// A folder or socket could not be made.
     #[error("cannot open the control socket {path}: {cause}")]
     Open {
@@ -68,19 +71,24 @@ pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, Soc
     };
     let bind = |folder: &Path| bind(&socket_path(folder, machine), access.mode, group_id);
     let system = Path::new(SYSTEM_FOLDER);
-    if system.is_dir()
-        && let Ok(socket) = bind(system)
-    {
-        return Ok(socket);
+    let failed = |path: PathBuf, cause: io::Error| match &access.group {
+        // Not EACCES: to change the group is not permitted.
+        Some(name) if cause.raw_os_error() == Some(libc::EPERM) => SocketError::NotMember(name.clone()),
+        _ => SocketError::Open { path, cause },
+    };
+    if system.is_dir() {
+        match bind(system).map_err(|cause| failed(system.into(), cause)) {
+            Err(SocketError::Open { .. }) => {}
+            result => return result,
+        }
     }
     let folder = user_folder(access);
-    let failed = |cause| SocketError::Open { path: folder.clone(), cause };
-    make_private(&folder, access, group_id).map_err(failed)?;
-    let owner = fs::symlink_metadata(&folder).map_err(failed)?;
+    make_private(&folder, access, group_id).map_err(|cause| failed(folder.clone(), cause))?;
+    let owner = fs::symlink_metadata(&folder).map_err(|cause| failed(folder.clone(), cause))?;
     if !owner.is_dir() || owner.uid() != geteuid().as_raw() || owner.mode() & 0o022 != 0 {
         return Err(SocketError::Folder(folder));
     }
-    bind(&folder).map_err(|cause| SocketError::Open { path: socket_path(&folder, machine), cause })
+    bind(&folder).map_err(|cause| failed(socket_path(&folder, machine), cause))
 }
 
 /// The user's runtime folder, if nobody else has to enter it, else one in the folder for temporary files.
