@@ -112,15 +112,13 @@ pub(super) fn run(
     scope(|threads| {
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop(flags);
+        let run_control = || control_socket::run(config, control_links, &flags.stop_control);
+        let control = spawn(threads, "hexad-control", run_control)?;
         let log = spawn(threads, "hexad-log", || log_thread::run(log_links, &flags.stop_log))?;
         let cyclic = spawn(threads, REALTIME_THREAD, || {
             run_realtime(config, controller, realtime_links, &flags.stop_loop)
         })?;
         let io = spawn(threads, "hexad-io", move || run_io(config, io_links, &io_ready, &flags.stop_io))?;
-
-        let control = spawn(threads, "hexad-control", || {
-            control_socket::run(config, control_links, &flags.stop_control)
-        })?;
 
         let started = start(&config.deployment.realtime, &ready, &go);
         if started.is_ok() {
@@ -129,10 +127,15 @@ pub(super) fn run(
         drop(go);
         let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
-        let (cyclic, io, mut log) = reports?;
-        let counts_csv = mem::take(&mut log.counts_csv);
-        Ok((Report::new(config, &cyclic, &io, log), counts_csv))
+        let (cyclic, io, log) = reports?;
+        Ok(report(config, &cyclic, &io, log))
     })
+}
+
+/// The report of a run, and the histograms as CSV.
+fn report(config: &Config, cyclic: &LoopReport, io: &IoReport, mut log: LogReport) -> (Report, String) {
+    let counts_csv = mem::take(&mut log.counts_csv);
+    (Report::new(config, cyclic, io, log), counts_csv)
 }
 
 /// Controller of a configuration. Logs which of its loops are close to unstable.

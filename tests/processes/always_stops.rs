@@ -3,13 +3,13 @@
 use std::fs;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
 use std::process::Stdio;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
+use hexad::messages::claim::running_daemons;
 use hexad::messages::{Bus, CommandMessage, Publisher, StatusMessage, Subscriber};
 
 use crate::support::children::{Ended, HANG, hexad};
@@ -168,8 +168,7 @@ fn with_a_log_that_nobody_reads() {
     let plant = start_plant(&machine);
     let _peer = peer::start(&machine);
     engage(&machine);
-    let path = PathBuf::from(format!("/tmp/hexad-0/{}.sock", machine.name));
-    let path = if path.exists() { path } else { socket_of(daemon.id()) };
+    let path = running_daemons(&machine.name).pop().expect("a record").socket;
     let mut stream = UnixStream::connect(path).expect("a connection");
     stream.set_write_timeout(Some(Duration::from_millis(300))).expect("a limit");
     stream.set_read_timeout(Some(Duration::from_millis(300))).expect("a limit");
@@ -188,14 +187,6 @@ fn with_a_log_that_nobody_reads() {
     assert_eq!((status.code(), stdout.trim_end()), (Some(0), "fault"), "{stderr}");
     assert!(stderr.contains("confirmed by the status messages"), "after {answered} answers: {stderr}");
     plant.stops_on("TERM", HANG);
-}
-
-/// The socket that a process listens at, by the kernel.
-fn socket_of(process_id: u32) -> PathBuf {
-    let text = fs::read_to_string(format!("/proc/{process_id}/net/unix")).expect("sockets");
-    let path =
-        text.lines().filter_map(|line| line.split_whitespace().nth(7)).find(|path| path.ends_with(".sock"));
-    path.expect("a control socket").into()
 }
 
 /// Clients that stay silent, send half a line, send without end, or never read; each connects again when it is closed.

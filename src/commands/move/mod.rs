@@ -180,7 +180,11 @@ fn run_in_lockstep(
     while let Some(measurement) = poll_until(|| stop.is_requested(), || measured.receive()) {
         let time_ns = measurement.header.time_ns;
         let setpoint = match last {
-            Some((last_ns, setpoint)) if last_ns == time_ns => setpoint,
+            Some((last_ns, setpoint)) if last_ns == time_ns => {
+                // A plant without a response repeats its message: the daemon may have ended.
+                playback.receive(time_ns)?;
+                setpoint
+            }
             _ => match playback.step(time_ns)? {
                 PlaybackStep::Silent => SetpointMessage::from(&TaskState::at_rest(config.machine.home)),
                 PlaybackStep::Setpoint(setpoint) => (&setpoint).into(),

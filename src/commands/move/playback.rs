@@ -62,6 +62,8 @@ pub(super) struct Playback<'a> {
     last_active_ns: u64,
     /// Why it waits, as last logged.
     reason: String,
+    /// Whether the platform is to come to rest for good.
+    is_ending: bool,
 }
 
 impl<'a> Playback<'a> {
@@ -83,24 +85,32 @@ impl<'a> Playback<'a> {
             status: None,
             last_active_ns: 0,
             reason: String::new(),
+            is_ending: false,
         }
     }
 
-    /// Reads every new status and returns the setpoint of an instant.
-    pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
+    /// Reads every new status; an error if control has ended.
+    pub fn receive(&mut self, now_ns: u64) -> Result<(), MoveError> {
         while let Some(status) = self.statuses.receive() {
             self.update(now_ns, &status)?;
             self.status = Some(status);
         }
+        Ok(())
+    }
+
+    /// Reads every new status and returns the setpoint of an instant.
+    pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
+        self.receive(now_ns)?;
         let is_followed = matches!(self.phase, Phase::Playing(..) | Phase::Slowing(..));
         if is_followed && now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
-            self.start_over();
+            self.start_over()?;
         }
         self.setpoint(now_ns)
     }
 
     /// Brings the platform to rest along its path and holds it there; true if there is nothing to bring to rest.
     pub fn slow_down(&mut self, now_ns: u64) -> bool {
+        self.is_ending = true;
         match &self.phase {
             Phase::Waiting => true,
             Phase::Standing(timeline) => {
@@ -129,7 +139,7 @@ impl<'a> Playback<'a> {
         let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
         let is_restarted = self.status.as_ref().is_some_and(|last| last.header.epoch != status.header.epoch);
         if is_restarted && !matches!(self.phase, Phase::Waiting | Phase::Standing(_)) {
-            self.start_over();
+            self.start_over()?;
         }
         match &self.phase {
             Phase::Waiting | Phase::Standing(_) => self.prepare(now_ns, status, state),
@@ -179,9 +189,16 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    fn start_over(&mut self) {
+    /// Begins anew; an error if the platform was to come to rest under control.
+    fn start_over(&mut self) -> Result<(), MoveError> {
+        if self.is_ending {
+            let status = self.status.unwrap_or_default();
+            let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+            return Err(MoveError::Ended(status.state().unwrap_or_default(), diagnostic));
+        }
         warn!("the daemon gave up control or is gone: starting over from where the platform stands");
         self.phase = Phase::Waiting;
+        Ok(())
     }
 
     fn setpoint(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {

@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::process;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::connection::user_name;
 use super::protocol::{AnswerLine, DiagnosticReport, RequestResult, VERSION};
@@ -29,7 +29,7 @@ pub struct StatusReport {
     pub timing: TimingReport,
     /// Measured X; `None` if the pose is unknown.
     pub pose: Option<[f64; 6]>,
-    /// X of the newest setpoint.
+    /// X of the newest setpoint; `None` if none ever arrived, or if it is not finite.
     pub setpoint: Option<[f64; 6]>,
     /// Reference minus measured under control, else setpoint minus measured \[m\].
     pub position_error_m: Option<[f64; 3]>,
@@ -73,12 +73,19 @@ pub struct TimingReport {
 /// One leg.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LegReport {
-    /// Measured length \[m\].
+    /// Measured length \[m\]; null in JSON if the driver sent no number.
+    #[serde(deserialize_with = "number_or_nan")]
     pub length_m: f64,
-    /// Measured rate \[m/s\].
+    /// Measured rate \[m/s\], likewise.
+    #[serde(deserialize_with = "number_or_nan")]
     pub rate_m_s: f64,
     /// Commanded force \[N\]; 0 without control.
     pub force_n: f64,
+}
+
+/// JSON has no number that is none.
+fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Option::deserialize(deserializer).map(|number| number.unwrap_or(f64::NAN))
 }
 
 /// Sender of an input.
@@ -159,7 +166,10 @@ impl<'a> StatusSource<'a> {
             active_limits: limits.map(|limit| limit.name().into()).collect(),
             timing: timing(snapshot, deployment.realtime.rate_hz),
             pose: is_known.then_some(status.x),
-            setpoint: snapshot.setpoint.map(|setpoint| setpoint.task.x.into()),
+            setpoint: snapshot
+                .setpoint
+                .filter(|setpoint| setpoint.task.is_finite())
+                .map(|setpoint| setpoint.task.x.into()),
             position_error_m: has_error.then_some(status.position_error_m),
             orientation_error_rad: has_error.then_some(status.orientation_error_rad),
             condition: is_known.then_some(status.condition),
@@ -226,4 +236,31 @@ fn process_report(process_id: u32) -> ProcessReport {
     let command = fs::read_to_string(format!("{folder}/comm")).unwrap_or_default().trim_end().into();
     let user = fs::metadata(folder).map(|found| user_name(found.uid())).unwrap_or_default();
     ProcessReport { process_id, command, user }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+    use crate::control::controller::{Measurement, Setpoint};
+    use crate::model::task::TaskState;
+
+    #[test]
+    fn what_is_no_number_survives_json() {
+        let config = Config::parse(include_str!("../../../config/fried2008.toml"), "a test").unwrap();
+        let mut snapshot = Snapshot {
+            setpoint: Some(Setpoint::motion(1, TaskState::at_rest([f64::NAN; 6]))),
+            measurement: Some(Measurement { length: [f64::NAN; 6], ..Measurement::default() }),
+            ..Snapshot::default()
+        };
+        snapshot.status.pose_valid = 1;
+        (snapshot.status.condition, snapshot.status.time_to_singularity_s) = (f64::INFINITY, f64::INFINITY);
+        // Topics of nobody: the processes stay unknown.
+        let mut source = StatusSource { config: &config, topics: Some(None) };
+        let line = source.answer(&snapshot, 2).to_line();
+        let answer: AnswerLine = serde_json::from_str(&line).unwrap();
+        let report = answer.status.unwrap();
+        assert!(report.legs.len() == 6 && report.legs.iter().all(|leg| leg.length_m.is_nan()));
+        assert_eq!((report.setpoint, report.condition, report.time_to_singularity_s), (None, None, None));
+    }
 }
