@@ -15,7 +15,7 @@
 //! | `realtime` | threads, clock, cyclic loop, exchange between threads | `daemon` |
 //! | `output` | charts, tables, CSV and JSON files | `daemon` |
 //! | `config` | machine and deployment files | `daemon` |
-//! | `daemon` | the three threads, translation between messages and controller, reports | `daemon` |
+//! | `daemon` | the four threads, translation between messages and controller, reports | `daemon` |
 //! | `commands` | one file or folder for each command of the command line | `daemon` |
 //!
 //! A folder uses folders above it in this table and no other; `tests/wall.rs` checks that. `output` stands above

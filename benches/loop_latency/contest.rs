@@ -5,7 +5,7 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::commands::operate::Operator;
+use hexad::commands::in_step::Operator;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
 use hexad::daemon::report::Report;

@@ -136,7 +136,7 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
     let report = scope(|threads| -> Result<_, Failure> {
         let thread = threads.spawn(|| {
             prepare(rig)?;
-            let step = |_: &Input| fleet.next_cycle();
+            let step = |_: &mut Input, _: u64| fleet.next_cycle();
             let report =
                 cyclic::run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop);
             fleet.all_were_active().map(|()| report)

@@ -57,6 +57,6 @@ impl CommandError for FileError {
 
 impl CommandError for OperatorError {
     fn has_begun(&self) -> bool {
-        !matches!(self, Self::Port(_) | Self::NoStatus(_))
+        !matches!(self, Self::Port(_) | Self::NoDaemon(_) | Self::Forbidden { .. })
     }
 }

@@ -19,6 +19,7 @@ use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
 use self::operate::Order;
 use self::run::RunArguments;
+use self::status::StatusArguments;
 use self::workspace::WorkspaceArguments;
 use crate::control::state::Request;
 use crate::output::files::print;
@@ -33,6 +34,7 @@ pub mod export;
 mod failure;
 pub mod faults;
 pub mod forward_kinematics;
+pub mod in_step;
 pub mod inverse_dynamics;
 pub mod messages;
 pub mod r#move;
@@ -41,6 +43,7 @@ pub mod operate;
 pub mod plant;
 mod progress;
 mod run;
+pub mod status;
 pub mod workspace;
 
 /// Hard real-time computed-torque controller for Gough-Stewart platforms.
@@ -73,6 +76,8 @@ enum CommandArguments {
     Off(RequestArguments),
     /// Disable the forces at once, until cleared; the brakes close
     Estop(RequestArguments),
+    /// Show state, diagnostic, pose, legs, timing and sources of a running daemon
+    Status(StatusArguments),
     /// Show what the numbers of states, faults and limits mean, and what to do
     Faults,
     /// Print the declarations of the messages for a driver in another language
@@ -108,6 +113,7 @@ impl CommandLine {
             Is::Clear(arguments) => send(&arguments, Request::Clear, false),
             Is::Off(arguments) => send(&arguments, Request::Off, false),
             Is::Estop(arguments) => send(&arguments, Request::Estop, false),
+            Is::Status(arguments) => arguments.execute(),
             Is::Faults => Ok(print(FaultTables)?),
             Is::Messages(arguments) => arguments.execute(),
             Is::Check(arguments) => arguments.execute(),
@@ -121,10 +127,13 @@ impl CommandLine {
     }
 }
 
-/// Sends an operator's request and prints the state that it led to.
+/// Sends an operator's request and prints the state that it led to, and on standard error what it waits for.
 fn send(arguments: &RequestArguments, request: Request, waits: bool) -> Result<(), Failure> {
     let (config, stop) = (arguments.machine.load()?, Stop::on_signals()?);
     let order = Order { request, is_patient: waits, timeout: arguments.timeout() };
-    let state = operate::run(&config, &order, &stop)?;
-    Ok(print(format_args!("{}\n", state.name()))?)
+    let outcome = operate::carry_out(&config, &order, &stop, |reason| eprintln!("hexad: waiting: {reason}"))?;
+    if let Some(way) = outcome.confirmed {
+        eprintln!("hexad: {way}");
+    }
+    Ok(print(format_args!("{}\n", outcome.state))?)
 }

@@ -128,13 +128,13 @@ impl<'t> SectionReader<'t> {
 
     /// A required name of letters, digits, `_` and `-`.
     pub fn name(&mut self, key: &'static str, longest: usize) -> String {
-        let bound = format!("a name of 1 to {longest} characters, each one of A-Z a-z 0-9 _ -");
-        let name = self.required(key, &bound).map(|value| value.get_ref().as_str().unwrap_or_default());
-        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-        if name.is_some_and(|name| name.is_empty() || name.len() > longest || !name.chars().all(plain)) {
-            self.reject(key, format!("must be {bound}"));
-        }
-        name.unwrap_or_default().into()
+        let found = self.required(key, name_bound(longest));
+        found.map(|value| self.checked_name(key, value, longest)).unwrap_or_default()
+    }
+
+    /// An optional name of letters, digits, `_` and `-`.
+    pub fn optional_name(&mut self, key: &'static str, longest: usize) -> Option<String> {
+        self.find(key, None).map(|value| self.checked_name(key, value, longest))
     }
 
     /// `N` required finite numbers.
@@ -250,6 +250,15 @@ impl<'t> SectionReader<'t> {
         f64::NAN
     }
 
+    fn checked_name(&self, key: &str, value: &Spanned<DeValue>, longest: usize) -> String {
+        let name = value.get_ref().as_str().unwrap_or_default();
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if name.is_empty() || name.len() > longest || !name.chars().all(plain) {
+            self.reject(key, format!("must be {}", name_bound(longest)));
+        }
+        name.into()
+    }
+
     fn checked_integer(&self, key: &str, value: &Spanned<DeValue>, low: i32, high: i32) -> Option<i32> {
         let x = integer(value.get_ref()).filter(|x| (low..=high).contains(x));
         if x.is_none() {
@@ -292,4 +301,8 @@ impl<'t> SectionReader<'t> {
     fn add(&self, line: usize, key: String, value: Option<String>, bound: String) {
         self.log.violations.borrow_mut().push(Violation { line, key, value, bound });
     }
+}
+
+fn name_bound(longest: usize) -> String {
+    format!("a name of 1 to {longest} characters, each one of A-Z a-z 0-9 _ -")
 }

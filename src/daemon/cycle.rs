@@ -1,9 +1,10 @@
 //! The generic cyclic loop with the controller's input and output.
 
 use crate::control::controller::{Input, Output};
-use crate::control::state::State;
+use crate::control::state::{OperatorRequest, Request, State};
 use crate::realtime::cyclic::{self, CyclicInput};
 use crate::realtime::exchange;
+use crate::realtime::request_word;
 
 /// One cycle of the controller, for statistics and log.
 pub type CycleRecord = cyclic::CycleRecord<Input, Output>;
@@ -26,6 +27,60 @@ impl CyclicInput for Input {
     }
 }
 
+/// Epoch of a request over the control socket or by a signal; no publisher begins then. Its sequence is the request word.
+pub const WORD_EPOCH: u64 = u64::MAX;
+
+/// A request that may begin control and is older than this is not carried out: its sender has long stopped waiting \[ns\].
+pub const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
+
+/// Request of each cycle: from the request word or from the command topic, each once.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RequestIntake {
+    /// The last word that was seen.
+    word: u64,
+    /// The last message of the command topic that was seen.
+    message: (u64, u64),
+}
+
+impl RequestIntake {
+    /// The request of a cycle that wakes at `now_ns`. Of two new ones that of higher precedence counts, of two equal
+    /// ones the word. The other is lost if it may begin control or comes from the topic; a stop in the word counts in the
+    /// next cycle.
+    #[inline(never)]
+    pub fn next(
+        &mut self,
+        from_topic: Option<OperatorRequest>,
+        word: u64,
+        now_ns: u64,
+    ) -> Option<OperatorRequest> {
+        let from_topic = from_topic.filter(|request| request.message != self.message);
+        if let Some(request) = &from_topic {
+            self.message = request.message;
+        }
+        let from_word = if word == self.word { None } else { of_word(word, now_ns) };
+        match (from_topic, from_word) {
+            (Some(topic), Some(new)) if topic.request > new.request => {
+                if new.request.can_begin_control() {
+                    self.word = word;
+                }
+                Some(topic)
+            }
+            (topic, new) => {
+                self.word = word;
+                new.or(topic)
+            }
+        }
+    }
+}
+
+/// The request of a word; `None` if there is none, or if it may begin control and is too old.
+pub fn of_word(word: u64, now_ns: u64) -> Option<OperatorRequest> {
+    let request = Request::from_number(request_word::number(word))?;
+    let is_too_old = now_ns.saturating_sub(request_word::time_ns(word)) > MAX_REQUEST_AGE_NS;
+    let is_lost = request.can_begin_control() && is_too_old;
+    (!is_lost).then_some(OperatorRequest { request, message: (WORD_EPOCH, word) })
+}
+
 /// Age of the measurement at the release \[ns\], if there is one.
 pub fn measured_age_ns(record: &CycleRecord) -> Option<u64> {
     record.input.measured_ns().map(|time_ns| record.input.release_ns.saturating_sub(time_ns))
@@ -35,4 +90,60 @@ pub fn measured_age_ns(record: &CycleRecord) -> Option<u64> {
 pub fn tracking_error(record: &CycleRecord) -> Option<(f64, f64)> {
     let error = record.output.error.filter(|_| record.output.state == State::Active)?;
     Some((error.pose.linear.norm(), error.pose.angular.norm()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::realtime::request_word::RequestWord;
+
+    const NOW_NS: u64 = 5_000_000_000;
+
+    fn word(request: Request, age_ns: u64) -> u64 {
+        RequestWord::default().post(request as u32, NOW_NS - age_ns).unwrap()
+    }
+
+    fn topic(request: Request, sequence: u64) -> Option<OperatorRequest> {
+        Some(OperatorRequest { request, message: (7, sequence) })
+    }
+
+    fn chosen(intake: &mut RequestIntake, from_topic: Option<OperatorRequest>, word: u64) -> Option<Request> {
+        intake.next(from_topic, word, NOW_NS).map(|request| request.request)
+    }
+
+    #[test]
+    fn each_request_counts_once_also_one_of_the_topic_behind_a_word() {
+        let mut intake = RequestIntake::default();
+        let engage = topic(Request::Engage, 1);
+        assert_eq!(chosen(&mut intake, engage, 0), Some(Request::Engage));
+        assert_eq!(chosen(&mut intake, engage, 0), None);
+        let off = word(Request::Off, 0);
+        assert_eq!(chosen(&mut intake, engage, off), Some(Request::Off));
+        assert_eq!(chosen(&mut intake, engage, off), None, "an old engage must not follow an off");
+        // One that comes in the same cycle is lost.
+        let estop = word(Request::Estop, 0);
+        assert_eq!(chosen(&mut intake, topic(Request::Engage, 2), estop), Some(Request::Estop));
+        assert_eq!(chosen(&mut intake, topic(Request::Engage, 2), estop), None);
+    }
+
+    #[test]
+    fn a_stop_in_the_word_outlives_a_higher_request_and_an_engage_does_not() {
+        let mut intake = RequestIntake::default();
+        let stop = word(Request::Stop, 0);
+        assert_eq!(chosen(&mut intake, topic(Request::Off, 1), stop), Some(Request::Off));
+        assert_eq!(chosen(&mut intake, topic(Request::Off, 1), stop), Some(Request::Stop));
+        let engage = word(Request::Engage, 1000);
+        assert_eq!(chosen(&mut intake, topic(Request::Off, 2), engage), Some(Request::Off));
+        assert_eq!(chosen(&mut intake, topic(Request::Off, 2), engage), None);
+    }
+
+    #[test]
+    fn an_old_word_stops_and_does_not_begin_control() {
+        for request in Request::ALL {
+            let old = of_word(word(request, MAX_REQUEST_AGE_NS + 1_000_000), NOW_NS);
+            assert_eq!(old.is_none(), request.can_begin_control(), "{request:?}");
+            assert_eq!(of_word(word(request, 0), NOW_NS).map(|found| found.request), Some(request));
+        }
+        assert_eq!(of_word(0, NOW_NS), None);
+    }
 }

@@ -7,13 +7,20 @@
 use std::io;
 use std::path::PathBuf;
 
+use tracing::info;
+
+use self::control_socket::location::{self, SocketError};
 use self::report::Report;
 use crate::config::Config;
-use crate::messages::{Bus, PortError};
+use crate::control::state::Request;
+use crate::messages::{Claim, PortError};
 use crate::output::files::{FileError, write_whole};
+use crate::realtime::request_signal::{RequestSignal, post_on_signals};
+use crate::realtime::request_word::RequestWord;
 use crate::realtime::setup::Shortfall;
 use crate::realtime::stop_request::Stop;
 
+pub mod control_socket;
 pub mod cycle;
 mod fault_dump;
 mod first_pose;
@@ -22,6 +29,7 @@ mod io_thread;
 mod log_thread;
 mod parameters;
 pub mod report;
+mod snapshot;
 pub mod start;
 mod statistics;
 mod threads;
@@ -38,6 +46,12 @@ pub enum DaemonError {
     /// A call to the shared memory failed, such as opening a topic.
     #[error(transparent)]
     Port(#[from] PortError),
+    /// The control socket could not be opened.
+    #[error(transparent)]
+    Socket(#[from] SocketError),
+    /// The signals by which a request may come could not be installed.
+    #[error("cannot handle SIGUSR1 and SIGUSR2: {0}")]
+    Signals(io::Error),
     /// The operating system refused to start a thread.
     #[error("cannot start a thread: {0}")]
     Thread(#[from] io::Error),
@@ -63,10 +77,26 @@ pub struct Files {
     pub faults: Option<PathBuf>,
 }
 
+/// Request that a signal to the daemon posts.
+pub fn request_of(signal: RequestSignal) -> Request {
+    match signal {
+        RequestSignal::User1 => Request::Estop,
+        RequestSignal::User2 => Request::Stop,
+    }
+}
+
 /// Runs the daemon until `stop`.
 pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, DaemonError> {
-    let _claim = Bus::claim(&config.name)?;
-    let (report, counts_csv) = threads::run(config, files.faults.as_deref(), stop)?;
+    let mut claim = Claim::take(&config.name)?;
+    // It lives as long as the process: signals may come until its end.
+    let word: &'static RequestWord = Box::leak(Box::default());
+    let requests = [RequestSignal::User1, RequestSignal::User2].map(|signal| request_of(signal) as u32);
+    post_on_signals(word, requests).map_err(DaemonError::Signals)?;
+    // Not before the signals: who finds it may send them.
+    let socket = location::open(&config.name, &config.deployment.operator)?;
+    info!("control socket: {}", socket.path.display());
+    claim.record(&socket.path)?;
+    let (report, counts_csv) = threads::run(config, files.faults.as_deref(), socket, word, stop)?;
     if let Some(path) = &files.report {
         report.write(path)?;
     }

@@ -1,4 +1,4 @@
-//! The three threads of the daemon: start, supervision, end.
+//! The four threads of the daemon: start, supervision, end.
 
 use core::mem;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -13,7 +13,9 @@ use heapless::spsc::{Producer, Queue};
 use sd_notify::NotifyState;
 use tracing::{info, warn};
 
-use super::cycle::{CycleRecord, RealtimeSide};
+use super::control_socket::location::ControlSocket;
+use super::control_socket::{self, ControlLinks};
+use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
 use super::fault_dump::FaultDump;
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
@@ -21,6 +23,7 @@ use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
 use super::log_thread::{self, LogLinks, LogReport};
 use super::parameters::{nanoseconds, parameters, timing};
 use super::report::Report;
+use super::snapshot::Snapshot;
 use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use super::{DaemonError, REALTIME_THREAD};
 use crate::config::control_loops::{ControlLoop, loops};
@@ -33,6 +36,7 @@ use crate::realtime::cyclic::{self, LoopReport, RECORDS};
 use crate::realtime::event::Event;
 use crate::realtime::exchange::exchange;
 use crate::realtime::process::block_signals;
+use crate::realtime::request_word::RequestWord;
 use crate::realtime::setup::memory;
 use crate::realtime::stop_request::Stop;
 use crate::realtime::triple_buffer::triple_buffer;
@@ -50,6 +54,7 @@ const REST_POLL_INTERVAL: Duration = Duration::from_millis(2);
 struct Flags {
     stop_loop: AtomicBool,
     stop_io: AtomicBool,
+    stop_control: AtomicBool,
     stop_log: AtomicBool,
     /// The daemon is to end: the platform comes to rest.
     is_ending: AtomicBool,
@@ -61,6 +66,8 @@ struct Flags {
 pub(super) fn run(
     config: &Config,
     faults: Option<&Path>,
+    socket: ControlSocket,
+    word: &'static RequestWord,
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
     let controller = controller(config);
@@ -71,6 +78,7 @@ pub(super) fn run(
     let mut delay_queue = Box::new(Queue::<u64, DELAYS>::new());
     let (delay_producer, delays) = delay_queue.split();
     let (statistics_writer, statistics) = triple_buffer(Statistics::default());
+    let (snapshot_writer, snapshots) = triple_buffer(Snapshot::default());
     let (flags, files) = (&Flags::default(), &OnceLock::new());
     let ((io_ready, ready), (go, go_ahead)) = (channel(), channel());
     memory::keep_heap();
@@ -86,6 +94,7 @@ pub(super) fn run(
     let realtime_links = RealtimeLinks {
         exchange: realtime_side,
         records: record_producer,
+        word,
         files,
         ready: io_ready.clone(),
         go_ahead,
@@ -94,12 +103,17 @@ pub(super) fn run(
         exchange: io_side,
         delays: delay_producer,
         statistics,
+        snapshots: snapshot_writer,
+        word,
         is_ending: &flags.is_ending,
         may_end: &flags.may_end,
     };
+    let control_links = ControlLinks { socket, snapshots, word, is_ending: &flags.is_ending };
     scope(|threads| {
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop(flags);
+        let run_control = || control_socket::run(config, control_links, &flags.stop_control);
+        let control = spawn(threads, "hexad-control", run_control)?;
         let log = spawn(threads, "hexad-log", || log_thread::run(log_links, &flags.stop_log))?;
         let cyclic = spawn(threads, REALTIME_THREAD, || {
             run_realtime(config, controller, realtime_links, &flags.stop_loop)
@@ -111,12 +125,17 @@ pub(super) fn run(
             supervise(config, flags, stop);
         }
         drop(go);
-        let reports = join(flags, &event, cyclic, io, log);
+        let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
-        let (cyclic, io, mut log) = reports?;
-        let counts_csv = mem::take(&mut log.counts_csv);
-        Ok((Report::new(config, &cyclic, &io, log), counts_csv))
+        let (cyclic, io, log) = reports?;
+        Ok(report(config, &cyclic, &io, log))
     })
+}
+
+/// The report of a run, and the histograms as CSV.
+fn report(config: &Config, cyclic: &LoopReport, io: &IoReport, mut log: LogReport) -> (Report, String) {
+    let counts_csv = mem::take(&mut log.counts_csv);
+    (Report::new(config, cyclic, io, log), counts_csv)
 }
 
 /// Controller of a configuration. Logs which of its loops are close to unstable.
@@ -132,6 +151,8 @@ fn controller(config: &Config) -> Controller {
 struct RealtimeLinks<'a> {
     exchange: RealtimeSide,
     records: Producer<'a, CycleRecord>,
+    /// Requests of operators.
+    word: &'static RequestWord,
     /// Receives the kernel's files about this thread.
     files: &'a OnceLock<ThreadFiles>,
     ready: Sender<Ready>,
@@ -154,7 +175,11 @@ fn run_realtime(
     let _ = ThreadFiles::of_this_thread().map(|found| links.files.set(found));
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
-    let step = |input: &Input| controller.step(input);
+    let (word, mut intake) = (links.word, RequestIntake::default());
+    let step = |input: &mut Input, woke_ns: u64| {
+        input.request = intake.next(input.request, word.load(), woke_ns);
+        controller.step(input)
+    };
     let last = Output { diagnostic: DiagnosticCode::DaemonEnding.into(), ..Output::default() };
     let timing = timing(&config.deployment);
     Some(cyclic::run(&mut Monotonic, &timing, step, last, links.exchange, links.records, stop))
@@ -204,14 +229,18 @@ fn join(
     cyclic: ScopedJoinHandle<'_, Option<LoopReport>>,
     io: ScopedJoinHandle<'_, Option<IoReport>>,
     log: ScopedJoinHandle<'_, LogReport>,
+    control: ScopedJoinHandle<'_, ()>,
 ) -> Result<(LoopReport, IoReport, LogReport), DaemonError> {
     flags.stop_loop.store(true, Ordering::Relaxed);
     event.signal();
     let cyclic = cyclic.join().map_err(|_| DaemonError::Died("real-time"));
     flags.stop_io.store(true, Ordering::Relaxed);
     let io = io.join().map_err(|_| DaemonError::Died("io"));
+    flags.stop_control.store(true, Ordering::Relaxed);
+    let control = control.join().map_err(|_| DaemonError::Died("control"));
     flags.stop_log.store(true, Ordering::Relaxed);
     let log = log.join().map_err(|_| DaemonError::Died("log"));
+    control?;
     Ok((cyclic?.unwrap_or_default(), io?.unwrap_or_default(), log?))
 }
 
@@ -220,8 +249,10 @@ struct StopOnDrop<'a>(&'a Flags);
 
 impl Drop for StopOnDrop<'_> {
     fn drop(&mut self) {
-        let Flags { stop_loop, stop_io, stop_log, .. } = self.0;
-        [stop_loop, stop_io, stop_log].into_iter().for_each(|flag| flag.store(true, Ordering::Relaxed));
+        let Flags { stop_loop, stop_io, stop_control, stop_log, .. } = self.0;
+        [stop_loop, stop_io, stop_control, stop_log]
+            .into_iter()
+            .for_each(|flag| flag.store(true, Ordering::Relaxed));
     }
 }
 

@@ -7,20 +7,18 @@
 //! system calls, up to 0.1 ms. No real-time thread may own a port.
 
 use core::time::Duration;
-use std::fs::{File, TryLockError, create_dir_all, metadata};
+use std::fs::metadata;
 use std::os::unix::fs::MetadataExt;
-use std::path::PathBuf;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::*;
+use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::clock::monotonic_ns;
 use super::{Message, Publisher, Subscriber};
 
-/// One life of a publisher is meant; one more may be stopped (SIGSTOP) or dying, two are reserve.
-pub(super) const MAX_PUBLISHERS: usize = 4;
 /// Daemon, plant, recorder, monitors.
 const MAX_SUBSCRIBERS: usize = 16;
 const MAX_NODES: usize = 32;
@@ -37,13 +35,19 @@ pub struct PortError {
     cause: String,
 }
 
+impl PortError {
+    pub(super) fn new(what: String, cause: String) -> Self {
+        Self { what, cause }
+    }
+}
+
 pub(super) fn port_error<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
     move |cause| PortError { what, cause: format!("{cause:?}") }
 }
 
 /// Location of the shared memory: iceoryx2's usual one, or, where that belongs to another user, one of this user's
 /// own with a sentence about it. Another user's could not be opened, and root and others may use one host.
-fn location() -> Result<(Config, Option<String>), PortError> {
+pub(super) fn location() -> Result<(Config, Option<String>), PortError> {
     let bad_name = || port_error::<SemanticStringError>("cannot name the shared memory".into());
     let mut config = Config::default();
     config.global.creation_timeout = CREATION_TIMEOUT;
@@ -109,26 +113,6 @@ impl Bus {
         location().ok()?.1
     }
 
-    /// Makes this process the only one that controls a machine, until the result is dropped or the process dies,
-    /// however it dies.
-    ///
-    /// Topics alone would let a second daemon take over, and leave the first one's forces ignored for good.
-    pub fn claim(machine: &str) -> Result<File, PortError> {
-        let (config, _) = location()?;
-        let folder = config.global.root_path().to_string();
-        let path = PathBuf::from(&folder).join(format!("hexad-{machine}.lock"));
-        let file = create_dir_all(&folder).and_then(|()| File::create(&path));
-        let file = file.map_err(port_error(format!("cannot open {}", path.display())))?;
-        match file.try_lock() {
-            Ok(()) => Ok(file),
-            Err(TryLockError::WouldBlock) => Err(PortError {
-                what: format!("cannot control {machine}"),
-                cause: format!("another daemon does ({} is locked)", path.display()),
-            }),
-            Err(error) => Err(port_error(format!("cannot lock {}", path.display()))(error)),
-        }
-    }
-
     /// A publisher of `T`.
     pub fn publisher<T: Message>(&self) -> Result<Publisher<T>, PortError> {
         let port = self.service::<T>()?.publisher_builder().create();
@@ -144,6 +128,11 @@ impl Bus {
         Ok(Subscriber::new(service, port, self.is_simulated))
     }
 
+    /// Observer of the publishers of `T`, which takes none of the topic's ports.
+    pub fn topic<T: Message>(&self) -> Result<TopicObserver<T>, PortError> {
+        Ok(TopicObserver(self.service::<T>()?))
+    }
+
     fn service<T: Message>(&self) -> Result<PortFactory<ipc::Service, T, ()>, PortError> {
         let prefix = if self.is_simulated { "hexad-simulated" } else { "hexad" };
         let name = format!("{prefix}/{}/{}", self.machine, T::TOPIC);
@@ -151,7 +140,7 @@ impl Bus {
         self.node
             .service_builder(&service_name)
             .publish_subscribe::<T>()
-            .max_publishers(MAX_PUBLISHERS)
+            .max_publishers(T::MAX_PUBLISHERS)
             .max_subscribers(MAX_SUBSCRIBERS)
             .max_nodes(MAX_NODES)
             .subscriber_max_buffer_size(BUFFER)
@@ -159,5 +148,20 @@ impl Bus {
             .history_size(0)
             .open_or_create()
             .map_err(port_error(format!("cannot open topic {name}")))
+    }
+}
+
+/// Observer of the publishers of one topic.
+pub struct TopicObserver<T: Message>(PortFactory<ipc::Service, T, ()>);
+
+impl<T: Message> TopicObserver<T> {
+    /// Process numbers of the publishers, the latest last. A killed one is there until a participant notices its end.
+    pub fn publisher_process_ids(&self) -> Vec<u32> {
+        let mut found = vec![];
+        self.0.dynamic_config().list_publishers(|details| {
+            found.extend(u32::try_from(details.node_id.pid().value()));
+            CallbackProgression::Continue
+        });
+        found
     }
 }

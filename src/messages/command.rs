@@ -6,8 +6,8 @@ use super::layout::message;
 use crate::control::state::{OperatorRequest, Request};
 
 message! {
-    /// Operator request, one per message.
-    CommandMessage = "hexad_command" on "command" schema 5 {
+    /// Request of a program that sends it in step with its setpoints, one per message. Operators use the control socket.
+    CommandMessage = "hexad_command" on "command" schema 5 publishers 16 {
         /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// Number of the `Request`.

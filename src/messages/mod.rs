@@ -14,7 +14,7 @@
 //! | iceoryx2 | 0.9.3 exactly, publish-subscribe, IPC service, no user header |
 //! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status` |
 //! | type name | `hexad_<last part>` |
-//! | settings | open or create with `max_publishers` 4, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: the first participant sets them for all |
+//! | settings | open or create with `max_publishers` 4, of `command` 16, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: the first participant sets them for all |
 //! | location | iceoryx2's defaults. If its root path belongs to another user: that path and `-<user ID>`, and the prefix `iox2_<user ID>_` |
 //! | user | all participants of a machine run as one user |
 //! | signals | the daemon's node installs no handlers (`SignalHandlingMode::Disabled`) |
@@ -22,6 +22,9 @@
 //! A publisher fills in the header and numbers its messages from 1. A subscriber accepts a message of its schema that is
 //! intact and follows all before in the order of (epoch, sequence): the last message of a publisher that died may still
 //! arrive.
+//!
+//! Operators send requests over the control socket (`docs/operator.md`). The topic `command` is for programs whose requests
+//! belong to an instant of their setpoints.
 //!
 //! # In simulated time
 //!
@@ -35,6 +38,7 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 mod bus;
+pub mod claim;
 pub mod clock;
 mod command;
 mod force;
@@ -48,7 +52,8 @@ mod statistics;
 mod status;
 mod subscriber;
 
-pub use self::bus::{Bus, PortError};
+pub use self::bus::{Bus, PortError, TopicObserver};
+pub use self::claim::Claim;
 pub use self::command::CommandMessage;
 pub use self::force::ForceMessage;
 pub use self::header::Header;
@@ -79,6 +84,10 @@ pub trait Message: Copy + core::fmt::Debug + ZeroCopySend + 'static {
 
     /// Version of the message. Any change of layout or meaning raises it, also of a struct that it contains.
     const SCHEMA: u32;
+
+    /// Most publishers of the topic at once: one life is meant; one more may be stopped (SIGSTOP) or dying, two are
+    /// reserve.
+    const MAX_PUBLISHERS: usize = 4;
 
     /// Schema version, publisher, sequence number and time stamp of the message.
     fn header(&self) -> &Header;

@@ -5,12 +5,9 @@ use iceoryx2::prelude::ipc;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::bus::{BUFFER, MAX_PUBLISHERS};
+use super::bus::BUFFER;
 use super::clock::monotonic_ns;
 use super::{Message, RejectionCounts};
-
-/// Most messages that the buffers of all publishers hold: bounds the time of one call, however fast they publish.
-const MAX_PENDING: usize = MAX_PUBLISHERS * BUFFER;
 
 /// Subscriber of one topic, which gives precedence to the latest life of the publisher.
 pub struct Subscriber<T: Message> {
@@ -24,6 +21,9 @@ pub struct Subscriber<T: Message> {
 }
 
 impl<T: Message> Subscriber<T> {
+    /// Most messages that the buffers of all publishers hold: bounds the time of one call, however fast they publish.
+    const MAX_PENDING: usize = T::MAX_PUBLISHERS * BUFFER;
+
     pub(super) fn new(
         service: PortFactory<ipc::Service, T, ()>,
         port: Port<ipc::Service, T, ()>,
@@ -36,7 +36,7 @@ impl<T: Message> Subscriber<T> {
     /// The next message in order, if any. Rejects other schemas, wrong checksums, older lives of the publisher and
     /// messages received before: after a publisher dies, its last message may still arrive.
     pub fn receive(&mut self) -> Option<T> {
-        for _ in 0..MAX_PENDING {
+        for _ in 0..Self::MAX_PENDING {
             let message = self.receive_unchecked()?;
             if self.accept(&message) {
                 return Some(message);
@@ -48,7 +48,7 @@ impl<T: Message> Subscriber<T> {
     /// The next message of any publisher that is alive or was, each once: for messages none of which may be lost
     /// because another publisher began later.
     pub fn receive_from_any(&mut self) -> Option<T> {
-        for _ in 0..MAX_PENDING {
+        for _ in 0..Self::MAX_PENDING {
             let message = self.receive_unchecked()?;
             if message.header().schema == T::SCHEMA {
                 return Some(message);
@@ -61,7 +61,7 @@ impl<T: Message> Subscriber<T> {
     /// The newest message that arrived since the last call, if any.
     pub fn receive_latest(&mut self) -> Option<T> {
         let mut latest = None;
-        for _ in 0..MAX_PENDING {
+        for _ in 0..Self::MAX_PENDING {
             match self.receive() {
                 Some(message) => latest = Some(message),
                 None => break,

@@ -120,11 +120,12 @@ pub struct LoopReport {
 /// Runs cycles until `stop`, then writes `last`, an output that is not valid.
 ///
 /// This is the real-time path: nothing below the first release allocates, locks, logs or calls the system,
-/// but for the sleep. `step` is the controller's; a test may burn time in it.
+/// but for the sleep. `step` is the controller's, called with the input, to which it may add, and with the instant at
+/// which the cycle woke \[ns\]; a test may burn time in it.
 pub fn run<I: CyclicInput, O: Copy>(
     clock: &mut impl Clock,
     timing: &Timing,
-    step: impl FnMut(&I) -> O,
+    step: impl FnMut(&mut I, u64) -> O,
     last: O,
     side: RealtimeSide<I, O>,
     records: Producer<'_, CycleRecord<I, O>>,
@@ -143,7 +144,7 @@ pub fn run<I: CyclicInput, O: Copy>(
 
 /// All cycles, in a function that the machine code has under this name: `tests/no_panic` begins here.
 #[inline(never)]
-fn run_cycles<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O>(
+fn run_cycles<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&mut I, u64) -> O>(
     cycles: &mut Cycles<'_, C, I, O, S>,
     stop: &AtomicBool,
 ) -> Begin {
@@ -183,7 +184,7 @@ struct Cycles<'a, C, I, O, S> {
     allocations: u64,
 }
 
-impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O> Cycles<'_, C, I, O, S> {
+impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&mut I, u64) -> O> Cycles<'_, C, I, O, S> {
     fn run_on_grid(&mut self, mut waiter: Waiter, stop: &AtomicBool) -> Begin {
         let Timing { phase_ns, on_overrun, .. } = *self.timing;
         let period_ns = self.timing.period_ns.max(1);
@@ -252,7 +253,7 @@ impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&I) -> O> Cycles<'_, C, I, O, S
         let Timing { period_ns, on_overrun, late_wakeup_ns, .. } = *self.timing;
         let mut input = self.side.inputs.value().input;
         input.begin_cycle(release_ns, missed && on_overrun == OverrunPolicy::Fault);
-        let output = (self.step)(&input);
+        let output = (self.step)(&mut input, woke_ns);
 
         let counters = &mut self.counters;
         counters.cycles += 1;

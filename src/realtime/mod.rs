@@ -17,6 +17,8 @@ pub mod exchange;
 pub mod futex;
 pub mod overrun;
 pub mod process;
+pub mod request_signal;
+pub mod request_word;
 pub mod setup;
 pub mod stop_request;
 pub mod sync;

@@ -61,7 +61,8 @@ class Bus:
     def _service(self, message):
         """The first participant creates the topic, so all use these numbers."""
         builder = self.node.service_builder(iox2.ServiceName.new(self.prefix + message.topic))
-        builder = builder.publish_subscribe(message).max_publishers(4).max_subscribers(16).max_nodes(32)
+        builder = builder.publish_subscribe(message).max_publishers(16 if message.topic == "command" else 4)
+        builder = builder.max_subscribers(16).max_nodes(32)
         builder = builder.subscriber_max_buffer_size(256).enable_safe_overflow(True).history_size(0)
         return builder.open_or_create()
 

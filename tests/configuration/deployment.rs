@@ -51,6 +51,14 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
             ],
         );
     }
+    refused(
+        "[operator]\nmode = \"0777\"\ngroup = \"a b\"",
+        &[
+            "operator.mode = \"0777\": must be one of \"0600\", \"0660\", \"0666\"",
+            "operator.group = \"a b\": must be a name of 1 to 32 characters, each one of A-Z a-z 0-9 _ -",
+        ],
+    );
+    refused("[operator]\ngroup = \"operators\"\nmode = \"0600\"", &[]);
     refused("[realtime]\nmax_catch_up = 0", &["realtime.max_catch_up = 0: must be an integer in [1, 100]"]);
     refused(
         "[realtime]\nmax_lead_us = 501",

@@ -62,7 +62,7 @@ impl Loop {
             let mut queue = Queue::<CycleRecord, RECORDS>::new();
             let (records_in, mut records) = queue.split();
             let mut seen = vec![];
-            let step = |input: &Input| {
+            let step = |input: &mut Input, _: u64| {
                 seen.push((input.release_ns, input.deadline_missed));
                 Output::default()
             };

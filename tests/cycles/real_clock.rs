@@ -69,7 +69,7 @@ fn perform(release: ReleaseMode, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<
         late_wakeup_ns: 100_000,
     };
     let mut seen = Vec::with_capacity(CYCLES as usize);
-    let step = |input: &Input| {
+    let step = |input: &mut Input, _: u64| {
         let began_ns = monotonic_ns();
         if burns(seen.len() as u64 + 1) {
             while monotonic_ns() < began_ns + PERIOD_NS * 5 / 2 {}

@@ -86,7 +86,7 @@ pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Ve
     let stop = AtomicBool::new(false);
     let mut begun: Vec<Seen> = vec![];
     let mut written: Vec<CycleRecord> = vec![];
-    let step = |input: &Input| {
+    let step = |input: &mut Input, _: u64| {
         // The record of the cycle before; the queue never fills.
         written.extend(records.dequeue());
         let (due_ns, began_ns, told_of_miss) = (input.release_ns, now_ns.get(), input.deadline_missed);

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use hexad::commands::operate::Operator;
+use hexad::commands::in_step::Operator;
 use hexad::config::Config;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};

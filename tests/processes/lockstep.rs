@@ -17,6 +17,7 @@ use hexad::realtime::setup::scheduling;
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PERIOD_NS};
 use crate::support::recorder::Recorder;
+use crate::support::trio::player_ended;
 use crate::support::{operator, turns};
 
 const LOCKSTEP: &str = "[realtime]\nrelease = \"lockstep\"";
@@ -183,14 +184,17 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     let daemon = Hexad::start::<&str>(&machine, "run", &[]);
     let plant = Hexad::start::<&str>(&machine, "plant", &[]);
     let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "10000"]);
-    // Before that it checks the whole motion, and no status is published without it.
-    source.says("waiting until the daemon knows");
+    // Before that it checks the whole motion, and the daemon would engage onto home, where it has no setpoint yet.
+    source.says("the setpoints stand where the platform stands");
     operator::engage(&machine);
     operator::does(&machine, "stop", &[], &["standby"]);
+    player_ended(source);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "10000"]);
+    source.says("the setpoints stand where the platform stands");
     operator::engage(&machine);
     let ended = daemon.stops_on("TERM", HANG);
     assert!(!ended.stderr.contains("did not come to rest"), "{}", ended.stderr);
-    source.stops_on("TERM", HANG);
+    player_ended(source);
     plant.stops_on("TERM", HANG);
 }
 

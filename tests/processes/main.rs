@@ -20,8 +20,10 @@
 mod common;
 mod support;
 
+mod always_stops;
 mod churn;
 mod command_line;
+mod control_socket;
 mod demo;
 mod doctor;
 mod doubted;
@@ -36,11 +38,13 @@ mod modes;
 mod orderly_stop;
 mod overruns;
 mod paused;
+mod players;
 mod readme;
 mod refusals;
 mod released;
 mod requests;
 mod rounds;
+mod stale;
 mod system_calls;
 mod trajectory;
 mod unprivileged;

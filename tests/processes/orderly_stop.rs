@@ -10,7 +10,7 @@ use hexad::daemon::report::Report;
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::recorder::Recorder;
-use crate::support::trio::{Trio, fastest, start_daemon, start_setpoints};
+use crate::support::trio::{Trio, fastest, player_ended, start_daemon, start_setpoints};
 use crate::support::{operator, rules, turns};
 
 /// A person waits no longer.
@@ -35,7 +35,7 @@ fn stops_in_motion(signal: &str) {
     assert!(ended.stderr.contains("stopping"), "{}", ended.stderr);
     // At rest the daemon says why it does not engage: of two such messages the plant reads the newest.
     plant.says("): brakes closing");
-    setpoints.stops_on(signal, SOON);
+    player_ended(setpoints);
     recorder.until("the platform stands", |recording| {
         recording.measured.last().filter(|m| rules::stands(m)).map(drop)
     });
@@ -80,7 +80,7 @@ fn a_second_daemon_of_the_same_machine_is_refused() {
     let third = start_daemon(&machine);
     operator::engage(&machine);
     third.stops_on("TERM", SOON);
-    setpoints.stops_on("TERM", SOON);
+    player_ended(setpoints);
     plant.stops_on("TERM", SOON);
     rules::hold(&recorder.finish());
 }
@@ -92,7 +92,7 @@ fn processes_that_wait_for_others_stop_as_well() {
     let daemon = start_daemon(&machine);
     daemon.says("off: no measurement");
     let setpoints = start_setpoints(&machine);
-    setpoints.says("waiting until the daemon knows");
+    setpoints.says("waiting: the pose of the platform is not known: no measurement");
     setpoints.stops_on("INT", SOON);
     daemon.stops_on("TERM", SOON);
     let report = fs::read_to_string(machine.path("report.json")).expect("the report");

@@ -89,6 +89,10 @@ fn after_any_blow_one_engage_engages() {
         sleep(Duration::from_millis(random.below(BEFORE_MS)));
         strike(&mut trio, blow, &mut random);
         let struck = Instant::now();
+        // An operator's request that ends control ends the player.
+        if blow.0 == Victim::Operator && !trio.setpoints.runs() {
+            trio.setpoints = start_setpoints(&trio.machine);
+        }
         let (faults, again) = recover(&trio, &format!("round {round}, {blow:?}"));
         stalls += again;
         assert!(stalls <= 1 + round / STALLS_IN, "{stalls} times in {round} rounds");

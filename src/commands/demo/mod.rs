@@ -13,7 +13,7 @@ use self::recording::{Recording, TopicRecorder};
 use self::summary::Summary;
 use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, duration};
 use super::failure::{CommandError, Failure};
-use super::operate::Operator;
+use super::in_step::Operator;
 use super::progress::time_bar;
 use crate::config::text::read_file;
 use crate::config::{Config, ConfigError};

@@ -1,22 +1,27 @@
 //! `hexad move`: a setpoint source, in real time or in lock-step.
 //!
 //! It starts where the platform stands (the daemon's status contains the pose), moves the platform gently to the start
-//! of the trajectory, plays it and ends at rest. If the daemon gives up control on the way, it starts over from
-//! wherever the platform stands then.
+//! of the trajectory, plays it and ends at rest. When an operator ends control it ends, too; after a fault or a restart of
+//! the daemon it starts over from wherever the platform stands then. A signal slows the platform down along its path, to
+//! rest under control.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 use tracing::info;
 
+use self::engagement::Engagement;
 use self::playback::{Playback, PlaybackStep};
 use self::precheck::SetpointRefusal;
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
 use super::arguments::{MachineFile, duration};
 use super::failure::{CommandError, Failure};
-use super::operate::Operator;
+use super::operate::OperatorError;
 use super::plant::prepare_thread;
 use crate::config::Config;
+use crate::control::diagnostic::Diagnostic;
+use crate::control::state::State;
 use crate::daemon::nanoseconds;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::poll_until;
@@ -29,8 +34,10 @@ use crate::output::numbers::percent;
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::stop_request::Stop;
 
+mod engagement;
 mod playback;
 mod precheck;
+mod slowdown;
 pub mod trajectory;
 
 #[derive(Debug, Args)]
@@ -42,9 +49,12 @@ pub struct MoveArguments {
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
-    /// Also request control, once, as soon as the daemon can give it
+    /// Also request control, once, as soon as the setpoints stand where the platform stands
     #[arg(long)]
     engage: bool,
+    /// Longest to wait for control [s]
+    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
+    within: f64,
 }
 
 #[derive(Debug, Args)]
@@ -67,7 +77,8 @@ impl MoveArguments {
                 Trajectory::built_in(&config, motion.unwrap_or(BuiltInMotion::Settle), self.seconds)?
             }
         };
-        Ok(run(&config, &trajectory, self.engage, &Stop::on_signals()?)?)
+        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
+        Ok(run(&config, &trajectory, within, &Stop::on_signals()?)?)
     }
 }
 
@@ -84,18 +95,52 @@ pub enum SetpointError {
 
 impl CommandError for SetpointError {}
 
-/// Plays the trajectory once, or until `stop`. With `engage` it also requests control, once.
-fn run(config: &Config, trajectory: &Trajectory, engage: bool, stop: &Stop) -> Result<(), SetpointError> {
+/// Error that ends a motion.
+#[derive(Debug, thiserror::Error)]
+pub enum MoveError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error(transparent)]
+    Operator(#[from] OperatorError),
+    #[error("not engaged within {0} s: {1}")]
+    NotEngaged(f64, String),
+    #[error("the motion has ended: the daemon is in {state}: {reason}", state = .0.name(), reason = .1)]
+    Ended(State, Diagnostic),
+}
+
+impl CommandError for MoveError {
+    fn has_begun(&self) -> bool {
+        match self {
+            Self::Port(_) => false,
+            Self::Operator(error) => error.has_begun(),
+            Self::NotEngaged(..) | Self::Ended(..) => true,
+        }
+    }
+}
+
+/// Plays the trajectory once. After the first signal of `stop` the platform comes to rest along its path; the second ends
+/// at once. With a time to wait it also requests control.
+fn run(
+    config: &Config,
+    trajectory: &Trajectory,
+    engage_within: Option<Duration>,
+    stop: &Stop,
+) -> Result<(), MoveError> {
     let bus = config.join()?;
     let setpoints = bus.publisher()?;
-    let playback = Playback::new(config, trajectory, Operator::new(&bus)?, engage);
-    info!(name = %config.name, seconds = trajectory.duration(), "waiting until the daemon knows the pose of the platform");
+    let engagement = match engage_within {
+        None => Engagement::None,
+        Some(_) if bus.is_simulated() => Engagement::in_step(&bus)?,
+        Some(within) => Engagement::over_socket(config, within, stop),
+    };
+    info!(name = %config.name, seconds = trajectory.duration(), "setpoint source");
+    // Every status counts: a state may last one cycle.
+    let playback = Playback::new(config, trajectory, bus.subscriber(usize::MAX)?, engagement);
     if bus.is_simulated() {
-        run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?;
+        run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)
     } else {
-        run_in_real_time(config, playback, setpoints, stop)?;
+        run_in_real_time(config, playback, setpoints, stop)
     }
-    Ok(())
 }
 
 fn run_in_real_time(
@@ -103,15 +148,18 @@ fn run_in_real_time(
     mut playback: Playback,
     mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
-) -> Result<(), PortError> {
+) -> Result<(), MoveError> {
     prepare_thread(config);
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
-    while !stop.is_requested() {
+    while !stop.is_repeated() {
         sleep_until(tick_ns);
+        if stop.is_requested() && playback.slow_down(tick_ns) {
+            break;
+        }
         match playback.step(tick_ns)? {
             PlaybackStep::Silent => {}
-            PlaybackStep::Setpoint(state) => setpoints.publish(tick_ns, SetpointMessage::from(&state))?,
+            PlaybackStep::Setpoint(setpoint) => setpoints.publish(tick_ns, (&setpoint).into())?,
             PlaybackStep::Finished => break,
         }
         tick_ns = grid.next_after(tick_ns.max(monotonic_ns()));
@@ -126,15 +174,20 @@ fn run_in_lockstep(
     mut playback: Playback,
     mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
-) -> Result<(), PortError> {
+) -> Result<(), MoveError> {
     let mut last = None;
+    // Without measurements time stands still: nothing can be slowed down.
     while let Some(measurement) = poll_until(|| stop.is_requested(), || measured.receive()) {
         let time_ns = measurement.header.time_ns;
         let setpoint = match last {
-            Some((last_ns, setpoint)) if last_ns == time_ns => setpoint,
+            Some((last_ns, setpoint)) if last_ns == time_ns => {
+                // A plant without a response repeats its message: the daemon may have ended.
+                playback.receive(time_ns)?;
+                setpoint
+            }
             _ => match playback.step(time_ns)? {
                 PlaybackStep::Silent => SetpointMessage::from(&TaskState::at_rest(config.machine.home)),
-                PlaybackStep::Setpoint(state) => SetpointMessage::from(&state),
+                PlaybackStep::Setpoint(setpoint) => (&setpoint).into(),
                 PlaybackStep::Finished => break,
             },
         };

@@ -3,14 +3,16 @@
 use nalgebra::Vector6;
 use tracing::{info, warn};
 
+use super::MoveError;
+use super::engagement::Engagement;
+use super::slowdown::Slowdown;
 use super::trajectory::Trajectory;
-use crate::commands::operate::Operator;
 use crate::config::Config;
-use crate::control::diagnostic::DiagnosticCode;
+use crate::control::controller::{Setpoint, SetpointKind};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::limits::{DerivativeLimits, Limits};
-use crate::control::state::{Request, State};
-use crate::messages::PortError;
-use crate::messages::StatusMessage;
+use crate::control::state::State;
+use crate::messages::{StatusMessage, Subscriber};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::motion::minimum_jerk::shortest_duration;
@@ -22,11 +24,28 @@ const APPROACH_SHARE: f64 = 0.5;
 /// Longest time without a status of a daemon in control, after which the approach starts over \[ns\].
 const CONTROL_TIMEOUT_NS: u64 = 200_000_000;
 
+/// Time for which the last pose is published as a target \[ns\]: the daemon reads many of these messages.
+const HOLD_TIME_NS: u64 = 100_000_000;
+
 /// Output of the playback at one instant.
 pub(super) enum PlaybackStep {
     Silent,
-    Setpoint(TaskState),
+    Setpoint(Setpoint),
     Finished,
+}
+
+/// Where the playback is.
+enum Phase {
+    /// Until the pose is known and no other source is followed.
+    Waiting,
+    /// At the pose where the platform stands, until the daemon takes control.
+    Standing(Timeline),
+    /// Since this instant \[ns\].
+    Playing(Timeline, u64),
+    /// To rest along the path, since this instant \[ns\].
+    Slowing(Timeline, Slowdown, u64),
+    /// At this pose, since this instant \[ns\].
+    Holding(TaskState, u64),
 }
 
 /// State of the playback of one trajectory.
@@ -34,77 +53,226 @@ pub(super) struct Playback<'a> {
     machine: &'a Machine,
     limits: &'a Limits,
     trajectory: &'a Trajectory,
-    operator: Operator,
-    /// Whether to request control, until the daemon has taken it.
-    engage: bool,
-    /// Approach and trajectory, from the pose at which the platform stands, or stood when the daemon took control.
-    timeline: Option<Timeline>,
-    /// Instant since which the daemon is in control \[ns\].
-    engaged_ns: Option<u64>,
+    statuses: Subscriber<StatusMessage>,
+    engagement: Engagement,
+    phase: Phase,
+    /// The newest status.
+    status: Option<StatusMessage>,
     /// Instant of the last status of a daemon in control \[ns\].
     last_active_ns: u64,
+    /// Why it waits, as last logged.
+    reason: String,
+    /// Whether the platform is to come to rest for good.
+    is_ending: bool,
 }
 
 impl<'a> Playback<'a> {
-    pub fn new(config: &'a Config, trajectory: &'a Trajectory, operator: Operator, engage: bool) -> Self {
+    pub fn new(
+        config: &'a Config,
+        trajectory: &'a Trajectory,
+        statuses: Subscriber<StatusMessage>,
+        engagement: Engagement,
+    ) -> Self {
         let Config { machine, deployment, .. } = config;
         let limits = &deployment.limits.reference;
         Self {
             machine,
             limits,
             trajectory,
-            operator,
-            engage,
-            timeline: None,
-            engaged_ns: None,
+            statuses,
+            engagement,
+            phase: Phase::Waiting,
+            status: None,
             last_active_ns: 0,
+            reason: String::new(),
+            is_ending: false,
         }
     }
 
-    /// Reads the newest status and returns the setpoint of an instant.
-    pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, PortError> {
-        if let Some(status) = self.operator.status() {
-            self.update(now_ns, &status);
-            if self.engage && status.diagnostic.code == DiagnosticCode::ReadyToEngage as u32 {
-                self.operator.send(Request::Engage)?;
+    /// Reads every new status; an error if control has ended.
+    pub fn receive(&mut self, now_ns: u64) -> Result<(), MoveError> {
+        while let Some(status) = self.statuses.receive() {
+            self.update(now_ns, &status)?;
+            self.status = Some(status);
+        }
+        Ok(())
+    }
+
+    /// Reads every new status and returns the setpoint of an instant.
+    pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
+        self.receive(now_ns)?;
+        let is_followed = matches!(self.phase, Phase::Playing(..) | Phase::Slowing(..));
+        if is_followed && now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
+            self.start_over()?;
+        }
+        self.setpoint(now_ns)
+    }
+
+    /// Brings the platform to rest along its path and holds it there; true if there is nothing to bring to rest.
+    pub fn slow_down(&mut self, now_ns: u64) -> bool {
+        self.is_ending = true;
+        match &self.phase {
+            Phase::Waiting => true,
+            Phase::Standing(timeline) => {
+                let has_control =
+                    self.status.as_ref().and_then(StatusMessage::state).is_some_and(State::has_control);
+                self.phase = Phase::Holding(timeline.at(0.0, |t| self.trajectory.at(t)), now_ns);
+                !has_control
+            }
+            Phase::Playing(timeline, engaged_ns) => {
+                let t = seconds(*engaged_ns, now_ns);
+                let slowdown =
+                    Slowdown::shortest(t, self.limits, |t| timeline.at(t, |t| self.trajectory.at(t)));
+                info!(
+                    "slowing down along the path, within {:.1} s; once more ends at once",
+                    slowdown.duration_s
+                );
+                self.phase = Phase::Slowing(*timeline, slowdown, now_ns);
+                false
+            }
+            Phase::Slowing(..) | Phase::Holding(..) => false,
+        }
+    }
+
+    fn update(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
+        let state = status.state().unwrap_or_default();
+        let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+        let is_restarted = self.status.as_ref().is_some_and(|last| last.header.epoch != status.header.epoch);
+        if is_restarted && !matches!(self.phase, Phase::Waiting | Phase::Standing(_)) {
+            self.start_over()?;
+        }
+        match &self.phase {
+            Phase::Waiting | Phase::Standing(_) => self.prepare(now_ns, status, state),
+            Phase::Playing(..) | Phase::Slowing(..) | Phase::Holding(..) => {
+                self.follow(now_ns, state, diagnostic)
             }
         }
-        if self.engaged_ns.is_some() && now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
-            warn!("the daemon gave up control or is gone: starting over from where the platform stands");
-            (self.engaged_ns, self.timeline) = (None, None);
-        }
-        let Some(timeline) = &self.timeline else { return Ok(PlaybackStep::Silent) };
-        // Until the daemon engages, the setpoint is the pose at which the platform stands.
-        let t = self.engaged_ns.map_or(0.0, |engaged_ns| now_ns.saturating_sub(engaged_ns) as f64 * 1e-9);
-        Ok(if t > timeline.end() {
-            PlaybackStep::Finished
-        } else {
-            PlaybackStep::Setpoint(timeline.at(t, |t| self.trajectory.at(t)))
-        })
     }
 
-    fn update(&mut self, now_ns: u64, status: &StatusMessage) {
-        let state = State::from_number(status.state).unwrap_or_default();
-        // If an operator ends the control, no further request follows.
-        self.engage &= !state.has_control();
-        if state == State::Active && self.timeline.is_some() {
+    /// Before the daemon is in control: setpoints where the platform stands, unless it follows another source.
+    fn prepare(&mut self, now_ns: u64, status: &StatusMessage, state: State) -> Result<(), MoveError> {
+        if let (Phase::Standing(timeline), State::Active) = (&self.phase, state) {
+            info!("the daemon is in control: moving");
+            (self.phase, self.last_active_ns) = (Phase::Playing(*timeline, now_ns), now_ns);
+            return Ok(());
+        }
+        // While the daemon engages, the setpoint must not change.
+        if !state.has_control() {
+            self.phase = match status.pose_valid {
+                1 => Phase::Standing(self.timeline(&Vector6::from(status.x))),
+                _ => Phase::Waiting,
+            };
+        }
+        Ok(())
+    }
+
+    fn timeline(&self, from: &Vector6<f64>) -> Timeline {
+        let to = self.trajectory.at(0.0).x;
+        let timeline = Timeline::new(self.machine, from, &to, self.trajectory.duration());
+        timeline.with_shortest_approach(approach_s(self.limits, from, &to))
+    }
+
+    /// While the daemon follows: ends with an operator's request, starts over after a fault.
+    fn follow(&mut self, now_ns: u64, state: State, diagnostic: Diagnostic) -> Result<(), MoveError> {
+        let by_operator =
+            matches!(diagnostic.code, DiagnosticCode::OperatorRequest | DiagnosticCode::EmergencyStop);
+        let is_ended = !matches!(state, State::Active | State::Engaging);
+        if is_ended && by_operator {
+            return Err(MoveError::Ended(state, diagnostic));
+        }
+        if state == State::Active {
             self.last_active_ns = now_ns;
-            if self.engaged_ns.is_none() {
-                info!("the daemon is in control: moving");
-                self.engaged_ns = Some(now_ns);
-            }
         } else if !state.has_control() {
             // The status reports the end of control: no need to wait for the timeout.
             self.last_active_ns = 0;
-            if self.engaged_ns.is_none() && status.pose_valid == 1 {
-                let (from, to) = (Vector6::from(status.x), self.trajectory.at(0.0).x);
-                let timeline = Timeline::new(self.machine, &from, &to, self.trajectory.duration());
-                self.timeline = Some(timeline.with_shortest_approach(approach_s(self.limits, &from, &to)));
+        }
+        Ok(())
+    }
+
+    /// Begins anew; an error if the platform was to come to rest under control.
+    fn start_over(&mut self) -> Result<(), MoveError> {
+        if self.is_ending {
+            let status = self.status.unwrap_or_default();
+            let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+            return Err(MoveError::Ended(status.state().unwrap_or_default(), diagnostic));
+        }
+        warn!("the daemon gave up control or is gone: starting over from where the platform stands");
+        self.phase = Phase::Waiting;
+        Ok(())
+    }
+
+    fn setpoint(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
+        let motion = |task| Ok(PlaybackStep::Setpoint(Setpoint::motion(now_ns, task)));
+        match &self.phase {
+            Phase::Waiting => {
+                self.wait()?;
+                Ok(PlaybackStep::Silent)
+            }
+            Phase::Standing(timeline) => {
+                let task = timeline.at(0.0, |t| self.trajectory.at(t));
+                if let Some(status) = &self.status {
+                    self.engagement.request(now_ns, status)?;
+                }
+                self.log_reason(
+                    "the setpoints stand where the platform stands: waiting for control (hexad engage)",
+                );
+                motion(task)
+            }
+            Phase::Playing(timeline, engaged_ns) => {
+                let t = seconds(*engaged_ns, now_ns);
+                if t > timeline.end() {
+                    return Ok(PlaybackStep::Finished);
+                }
+                motion(timeline.at(t, |t| self.trajectory.at(t)))
+            }
+            Phase::Slowing(timeline, slowdown, since_ns) => {
+                let since_s = seconds(*since_ns, now_ns);
+                let task = slowdown.at(since_s, |t| timeline.at(t, |t| self.trajectory.at(t)));
+                if slowdown.has_ended(since_s) {
+                    self.phase = Phase::Holding(task, now_ns);
+                }
+                motion(task)
+            }
+            Phase::Holding(task, since_ns) => {
+                if now_ns.saturating_sub(*since_ns) > HOLD_TIME_NS {
+                    info!("the platform stands under control; hexad stop or park ends it");
+                    return Ok(PlaybackStep::Finished);
+                }
+                let kind = SetpointKind::Target;
+                let task = TaskState::at_rest(task.x.into());
+                Ok(PlaybackStep::Setpoint(Setpoint { kind, time_ns: now_ns, task }))
             }
         }
-        // While the daemon engages, the setpoint must not change. While the platform follows the setpoints of another
-        // source, this one publishes none.
     }
+
+    /// Logs why there is no setpoint yet; an error if that takes too long.
+    fn wait(&mut self) -> Result<(), MoveError> {
+        let reason = match &self.status {
+            None => "no status of a daemon".into(),
+            Some(status) if status.state().is_some_and(State::has_control) => {
+                let state = status.state().unwrap_or_default();
+                format!("the platform follows another source or a stop: the daemon is in {}", state.name())
+            }
+            Some(status) => {
+                let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
+                format!("the pose of the platform is not known: {diagnostic}")
+            }
+        };
+        self.engagement.check_time(&reason)?;
+        self.log_reason(&format!("waiting: {reason}"));
+        Ok(())
+    }
+
+    fn log_reason(&mut self, reason: &str) {
+        if self.reason != reason {
+            info!("{reason}");
+            self.reason = reason.into();
+        }
+    }
+}
+
+fn seconds(from_ns: u64, to_ns: u64) -> f64 {
+    to_ns.saturating_sub(from_ns) as f64 * 1e-9
 }
 
 /// Duration \[s\] of an approach that keeps the limits, in any direction.

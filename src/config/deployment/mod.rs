@@ -1,5 +1,5 @@
 //! The sections of the deployment: `[realtime]`, `[control]`, `[measured]`, `[drive]`, `[limits]`, `[setpoint]`,
-//! `[timeouts]`, `[plant]`, `[envelope]`.
+//! `[timeouts]`, `[operator]`, `[plant]`, `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
 //! timeouts. What is given is checked against the limits that follow from the rate.
@@ -7,6 +7,7 @@
 pub use self::control::{Control, FidelityChoice, STABLE_MASSES};
 pub use self::hardware::{Drive, SensorNoise};
 pub use self::limits::DeploymentLimits;
+pub use self::operator::OperatorAccess;
 pub use self::plant::Plant;
 pub use self::realtime::{Realtime, Scheduler};
 use super::bound::Bound;
@@ -19,6 +20,7 @@ use crate::model::machine::Machine;
 mod control;
 mod hardware;
 mod limits;
+mod operator;
 mod plant;
 mod realtime;
 
@@ -48,6 +50,8 @@ pub struct Deployment {
     pub timeouts: Timeouts,
     /// Treatment of setpoints.
     pub setpoint: SetpointPolicy,
+    /// Access to the control socket.
+    pub operator: OperatorAccess,
     /// Simulated hardware.
     pub plant: Plant,
     /// Ranges of the motions that the machine is used for, if configured.
@@ -89,6 +93,7 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
         drive,
         timeouts: timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation),
         setpoint,
+        operator: operator::read(root.section("operator")),
         plant: plant::read(root.section("plant"), rate_hz, machine),
         envelope: envelope(root.section("envelope")),
         realtime,

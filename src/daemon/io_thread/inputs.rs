@@ -1,15 +1,12 @@
 //! Inputs of the controller: the newest message of each topic, and the request that is pending.
 
-use crate::control::controller::{Measurement, Setpoint};
+use crate::control::controller::{Input, Measurement, Setpoint};
 use crate::control::state::{OperatorRequest, Request};
-use crate::daemon::cycle::CycleInput;
+use crate::daemon::cycle::{CycleInput, MAX_REQUEST_AGE_NS};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{
     Bus, CommandMessage, MeasuredMessage, PortError, RejectionCounts, SetpointMessage, Subscriber,
 };
-
-/// A request for force that is older than this is not carried out: its sender has long stopped waiting \[ns\].
-const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
 
 /// The daemon's own request before it ends; no message has this epoch.
 const STOP_BEFORE_END: OperatorRequest = OperatorRequest { request: Request::Stop, message: (0, 1) };
@@ -23,6 +20,8 @@ pub struct Inputs {
     measured: Subscriber<MeasuredMessage>,
     commands: Subscriber<CommandMessage>,
     cycle: CycleInput,
+    /// The request word of the last call.
+    word: u64,
 }
 
 /// Which requests are accepted.
@@ -32,6 +31,10 @@ pub struct RequestFilter {
     pub answered: (u64, u64),
     /// The daemon is to end: no request may start control, and the platform is to come to rest.
     pub is_ending: bool,
+    /// The request word. A new one replaces what is pending: it came later, or has precedence.
+    pub word: u64,
+    /// Instant of the word on the clock of the commands \[ns\]: a request for control that was sent before is overtaken.
+    pub word_ns: u64,
 }
 
 impl Inputs {
@@ -42,6 +45,7 @@ impl Inputs {
             measured: bus.subscriber(DEPTH)?,
             commands: bus.subscriber(usize::MAX)?,
             cycle: CycleInput::default(),
+            word: 0,
         })
     }
 
@@ -49,6 +53,11 @@ impl Inputs {
     pub fn cycle_input(&mut self) -> CycleInput {
         self.cycle.handed_ns = monotonic_ns();
         self.cycle
+    }
+
+    /// The newest inputs.
+    pub fn input(&self) -> &Input {
+        &self.cycle.input
     }
 
     /// Receives the newest message of each topic; true if a measurement is among them.
@@ -90,12 +99,16 @@ impl Inputs {
 
     /// Of the requests that are not yet answered the one of highest precedence counts.
     pub fn receive_requests(&mut self, now_ns: u64, filter: RequestFilter) {
-        let RequestFilter { answered, is_ending } = filter;
+        let RequestFilter { answered, is_ending, word, word_ns } = filter;
+        if word != self.word {
+            (self.word, self.cycle.input.request) = (word, None);
+        }
         let is_pending = |request: &OperatorRequest| request.message != answered;
         while let Some(message) = self.commands.receive_from_any() {
             let Some(request) = message.request() else { continue };
             let is_too_old = now_ns.abs_diff(message.header.time_ns) > MAX_REQUEST_AGE_NS;
-            if request.request.can_begin_control() && (is_ending || is_too_old) {
+            let is_overtaken = message.header.time_ns < word_ns;
+            if request.request.can_begin_control() && (is_ending || is_too_old || is_overtaken) {
                 continue;
             }
             let pending = self.cycle.input.request.filter(is_pending);

@@ -11,13 +11,15 @@ use heapless::spsc::Producer;
 
 use self::inputs::{Inputs, RequestFilter};
 use self::outputs::{OutputSettings, Outputs};
-use super::cycle::{CycleOutput, IoSide};
+use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
+use super::snapshot::Snapshot;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::poll_until;
 use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, Statistics};
 use crate::realtime::clock::{Clock, Grid, Monotonic, sleep_until};
 use crate::realtime::cyclic::{ReleaseMode, Timing};
-use crate::realtime::triple_buffer::Reader;
+use crate::realtime::request_word::{self, RequestWord};
+use crate::realtime::triple_buffer::{Reader, Writer};
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
 
@@ -47,6 +49,10 @@ pub struct IoLinks<'a> {
     pub delays: Producer<'a, u64>,
     /// From the log thread.
     pub statistics: Reader<Statistics>,
+    /// To the control thread, every cycle.
+    pub snapshots: Writer<Snapshot>,
+    /// Requests of the control thread and of signals.
+    pub word: &'static RequestWord,
     /// Set when the daemon is to end: the platform comes to rest.
     pub is_ending: &'a AtomicBool,
     /// Set here when the daemon is to end and the platform is not under control.
@@ -86,8 +92,9 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
     let at_start = ThreadUsage::of_this_thread();
     let Ports { inputs, outputs } = ports;
     let allocations_at_start = at_start.allocations;
+    let (published, answered, snapshot) = (0, (0, 0), Snapshot::default());
     let mut io =
-        IoThread { settings, inputs, outputs, links, published: 0, answered: (0, 0), allocations_at_start };
+        IoThread { settings, inputs, outputs, links, published, answered, snapshot, allocations_at_start };
     let is_stopped = || stop.load(Ordering::Relaxed);
     match settings.timing.release {
         ReleaseMode::Lockstep => io.run_in_lockstep(is_stopped),
@@ -111,6 +118,8 @@ struct IoThread<'a> {
     published: u64,
     /// The last request that the controller has carried out or refused.
     answered: (u64, u64),
+    /// What the control thread received last.
+    snapshot: Snapshot,
     /// Of this thread, before the first cycle.
     allocations_at_start: u64,
 }
@@ -192,7 +201,10 @@ impl IoThread<'_> {
 
     fn request_filter(&self) -> RequestFilter {
         let is_ending = self.links.is_ending.load(Ordering::Relaxed);
-        RequestFilter { answered: self.answered, is_ending }
+        let word = self.links.word.load();
+        let is_simulated = self.settings.timing.release == ReleaseMode::Lockstep;
+        let word_ns = if is_simulated { 0 } else { request_word::time_ns(word) };
+        RequestFilter { answered: self.answered, is_ending, word, word_ns }
     }
 
     fn hand_over_inputs(&mut self) {
@@ -203,6 +215,10 @@ impl IoThread<'_> {
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
         self.answered = output.answered;
+        if let (WORD_EPOCH, word) = output.answered {
+            (self.snapshot.answered, self.snapshot.refusal) = (word, output.request_diagnostic);
+            self.links.word.set_seen(word);
+        }
         if self.links.is_ending.load(Ordering::Relaxed) && !output.state.has_control() {
             self.links.may_end.store(true, Ordering::Relaxed);
         }
@@ -219,9 +235,20 @@ impl IoThread<'_> {
             allocations: ThreadUsage::allocations_of_this_thread() - self.allocations_at_start,
             rejected: self.inputs.rejections(),
         };
-        let IoLinks { exchange, statistics, delays, .. } = &mut self.links;
+        let IoLinks { exchange, statistics, delays, snapshots, .. } = &mut self.links;
         let settings = OutputSettings { home, max_force_age_ns };
-        self.outputs.publish(&settings, *exchange.outputs.value(), counters, statistics, delays);
+        let cycle = *exchange.outputs.value();
+        let status = self.outputs.publish(&settings, cycle, counters, statistics, delays);
+        let input = self.inputs.input();
+        self.snapshot = Snapshot {
+            status,
+            force: cycle.output.force,
+            time_ns: monotonic_ns(),
+            setpoint: input.setpoint,
+            measurement: input.measurement,
+            ..self.snapshot
+        };
+        snapshots.write(self.snapshot);
     }
 }
 

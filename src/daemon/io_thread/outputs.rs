@@ -3,7 +3,7 @@
 use heapless::spsc::Producer;
 
 use crate::control::controller::Output;
-use crate::control::diagnostic::DiagnosticCode;
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
 use crate::daemon::cycle::CycleOutput;
 use crate::messages::clock::monotonic_ns;
@@ -40,7 +40,7 @@ impl Outputs {
         })
     }
 
-    /// Publishes force and status of a cycle, and records the delay from its release to the force sent.
+    /// Publishes force and status of a cycle, and records the delay from its release to the force sent. Returns the status.
     pub fn publish(
         &mut self,
         settings: &OutputSettings,
@@ -48,19 +48,20 @@ impl Outputs {
         io: IoCounters,
         statistics: &mut Reader<Statistics>,
         delays: &mut Producer<'_, u64>,
-    ) {
+    ) -> StatusMessage {
         if !self.is_simulated {
             let now_ns = monotonic_ns();
             invalidate_if_held(&mut cycle, now_ns, settings.max_force_age_ns);
             self.publish_force(&cycle, now_ns, delays);
             let status = status(settings, &cycle, io, statistics);
             self.send_failures += u64::from(self.statuses.publish(now_ns, status).is_err());
-            return;
+            return status;
         }
         // The status first: a source that responds to the next measurement then has the status of this one.
         let status = status(settings, &cycle, io, statistics);
         self.send_failures += u64::from(self.statuses.publish(cycle.release_ns, status).is_err());
         self.publish_force(&cycle, cycle.release_ns, delays);
+        status
     }
 
     /// Messages that could not be sent.
@@ -94,9 +95,36 @@ fn status(
 
 /// The loop finds the same at its next cycle, by the age of its last measurement.
 fn invalidate_if_held(cycle: &mut CycleOutput, now_ns: u64, max_force_age_ns: u64) {
-    let output = &mut cycle.output;
-    if now_ns.saturating_sub(cycle.due_ns) > max_force_age_ns && output.state.has_control() {
-        (output.state, output.diagnostic, output.force) =
-            (State::Fault, DiagnosticCode::MeasurementLost.into(), Output::default().force);
+    let (output, age_ns) = (&mut cycle.output, now_ns.saturating_sub(cycle.due_ns));
+    if age_ns > max_force_age_ns && output.state.has_control() {
+        let [age_s, bound_s] = [age_ns, max_force_age_ns].map(|time_ns| time_ns as f64 * 1e-9);
+        let diagnostic = Diagnostic::new(DiagnosticCode::MeasurementLost, age_s, bound_s);
+        (output.state, output.diagnostic, output.force) = (State::Fault, diagnostic, Output::default().force);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const DUE_NS: u64 = 7_000_000_000;
+    const MAX_AGE_NS: u64 = 20_000_000;
+
+    #[test]
+    fn a_force_that_was_held_too_long_is_a_fault_with_its_age() {
+        for state in State::ALL {
+            for (age_ns, is_held) in [(MAX_AGE_NS, false), (MAX_AGE_NS + 1_000_000, true)] {
+                let output = Output { state, force: [5.0; 6], ..Output::default() };
+                let mut cycle = CycleOutput { due_ns: DUE_NS, output, ..CycleOutput::default() };
+                invalidate_if_held(&mut cycle, DUE_NS + age_ns, MAX_AGE_NS);
+                let expected = if is_held && state.has_control() {
+                    let diagnostic = Diagnostic::new(DiagnosticCode::MeasurementLost, 0.021, 0.02);
+                    Output { state: State::Fault, diagnostic, ..Output::default() }
+                } else {
+                    output
+                };
+                assert_eq!(cycle.output, expected, "{state:?} after {age_ns} ns");
+            }
+        }
     }
 }

@@ -9,6 +9,7 @@ pub mod peer;
 pub mod random;
 pub mod recorder;
 pub mod rules;
+pub mod socket;
 pub mod steps;
 pub mod threads;
 pub mod trio;

@@ -5,11 +5,13 @@ use std::sync::{Arc, Mutex, MutexGuard, mpsc};
 use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
+use hexad::daemon::cycle::WORD_EPOCH;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, PortError, RejectionCounts, Subscriber};
 use hexad::messages::{
-    CommandMessage, ForceMessage, MeasuredMessage, Message, SetpointMessage, StatusMessage,
+    CommandMessage, ForceMessage, Header, MeasuredMessage, Message, SetpointMessage, StatusMessage,
 };
+use hexad::realtime::request_word;
 use hexad::realtime::setup::scheduling;
 
 use super::children::HANG;
@@ -28,7 +30,7 @@ pub struct Recording {
     pub measured: Vec<MeasuredMessage>,
     pub forces: Vec<ForceMessage>,
     pub statuses: Vec<StatusMessage>,
-    /// Of every operator.
+    /// Of every operator: of the topic, and as the status answers them of the control socket and of signals.
     pub commands: Vec<CommandMessage>,
     /// Forces that were said and are not here.
     pub passed_over: RejectionCounts,
@@ -128,6 +130,8 @@ struct Listener {
     forces: Subscriber<ForceMessage>,
     statuses: Subscriber<StatusMessage>,
     commands: Subscriber<CommandMessage>,
+    /// The last request that did not come by the topic.
+    word: u64,
 }
 
 impl Listener {
@@ -138,18 +142,31 @@ impl Listener {
             forces: sink(bus),
             statuses: sink(bus),
             commands: sink(bus),
+            word: 0,
         }
     }
 
     fn take(&mut self, recording: &mut Recording) {
         // Answers before questions: what a force was computed from is then in the recording with it.
-        recording.statuses.extend(std::iter::from_fn(|| self.statuses.receive()));
+        while let Some(status) = self.statuses.receive() {
+            if status.request_epoch == WORD_EPOCH && status.request_sequence != self.word {
+                self.word = status.request_sequence;
+                recording.commands.push(command_of(self.word));
+            }
+            recording.statuses.push(status);
+        }
         recording.forces.extend(std::iter::from_fn(|| self.forces.receive()));
         recording.measured.extend(std::iter::from_fn(|| self.measured.receive()));
         recording.setpoints.extend(std::iter::from_fn(|| self.setpoints.receive()));
         recording.commands.extend(std::iter::from_fn(|| self.commands.receive_from_any()));
         recording.passed_over = self.forces.rejections();
     }
+}
+
+/// A request of the control socket or of a signal, as a message.
+fn command_of(word: u64) -> CommandMessage {
+    let header = Header { time_ns: request_word::time_ns(word), ..Header::default() };
+    CommandMessage { header, request: request_word::number(word), reserved: 0 }
 }
 
 fn forget<T: Message>(messages: &mut Vec<T>, until_ns: u64) {

@@ -6,7 +6,7 @@ use hexad::control::diagnostic::DiagnosticCode;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{ForceMessage, MeasuredMessage};
 
-use super::children::{HANG, Hexad};
+use super::children::{Ended, HANG, Hexad};
 use super::machine::Machine;
 use super::recorder::{Recorder, Recording};
 use super::{operator, rules};
@@ -50,6 +50,12 @@ impl Trio {
         });
     }
 
+    /// An operator has ended control, and with it the player, which says so. Another one begins.
+    pub fn replay(&mut self) {
+        let ended = std::mem::replace(&mut self.setpoints, start_setpoints(&self.machine));
+        player_ended(ended);
+    }
+
     /// Waits until no force is valid any more, for this reason.
     pub fn loses_force_for(&self, cause: DiagnosticCode) {
         self.recorder.until("the daemon marks its forces as not valid", |recording| {
@@ -78,13 +84,20 @@ impl Trio {
             process.must_run();
         }
         self.daemon.stops_on("TERM", HANG);
-        self.setpoints.stops_on("TERM", HANG);
+        player_ended(self.setpoints);
         self.plant.stops_on("TERM", HANG);
         let recording = self.recorder.finish();
         rules::hold(&recording);
         rules::ends_at_rest(&recording);
         recording
     }
+}
+
+/// A player whose control an operator has ended, or the end of the daemon, which is a stop.
+pub fn player_ended(player: Hexad) {
+    let Ended { status, stderr, .. } = player.ends_within(HANG);
+    let words = "hexad: the motion has ended: the daemon is in ";
+    assert!(status.code() == Some(1) && stderr.contains(words), "{status}: {stderr}");
 }
 
 pub fn start_plant(machine: &Machine) -> Hexad {

@@ -1,0 +1,93 @@
+//! Request for control by a setpoint source, beside its setpoints: once they are published, not before.
+
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tracing::info;
+
+use super::MoveError;
+use crate::commands::operate::{OperatorError, Order, carry_out};
+use crate::config::Config;
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::Request;
+use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage};
+use crate::realtime::stop_request::Stop;
+
+/// Request for control on its way.
+pub enum Engagement {
+    /// Somebody else engages.
+    None,
+    /// Over the control socket, by a thread.
+    Socket { config: Box<Config>, began: Instant, within: Duration, stop: Stop, result: Option<Outcome> },
+    /// In step with the setpoints, in simulated time; the last request.
+    InStep { commands: Publisher<CommandMessage>, sent: Option<(u64, u64)> },
+}
+
+type Outcome = Receiver<Result<(), OperatorError>>;
+
+impl Engagement {
+    /// Over the control socket.
+    pub fn over_socket(config: &Config, within: Duration, stop: &Stop) -> Self {
+        let (config, stop) = (Box::new(config.clone()), stop.clone());
+        Self::Socket { config, began: Instant::now(), within, stop, result: None }
+    }
+
+    /// In step with the setpoints.
+    pub fn in_step(bus: &Bus) -> Result<Self, PortError> {
+        Ok(Self::InStep { commands: bus.publisher()?, sent: None })
+    }
+
+    /// An error if the time is over before the request could be sent, for this reason.
+    pub fn check_time(&self, reason: &str) -> Result<(), MoveError> {
+        match self {
+            Self::Socket { began, within, result: None, .. } if began.elapsed() > *within => {
+                Err(MoveError::NotEngaged(within.as_secs_f64(), reason.into()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Sends the request while the setpoints stand where the platform stands; an error if it was refused.
+    pub fn request(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
+        match self {
+            Self::None => Ok(()),
+            Self::Socket { config, began, within, stop, result } => {
+                let result = result.get_or_insert_with(|| {
+                    let rest = within.saturating_sub(began.elapsed());
+                    start(config.clone(), rest, stop.clone())
+                });
+                match result.try_recv() {
+                    Ok(outcome) => Ok(outcome?),
+                    Err(TryRecvError::Empty | TryRecvError::Disconnected) => Ok(()),
+                }
+            }
+            Self::InStep { commands, sent } => {
+                let refusal = status.request_diagnostic.diagnostic().unwrap_or_default();
+                let is_answer = *sent == Some((status.request_epoch, status.request_sequence));
+                if is_answer && refusal.code == DiagnosticCode::InvalidInState {
+                    let state = status.state().unwrap_or_default().name();
+                    let reason = format!("not possible in state {state}");
+                    return Err(OperatorError::Refused(Request::Engage, reason).into());
+                }
+                if sent.is_none() || is_answer {
+                    *sent = Some(commands.next_message());
+                    commands.publish(now_ns, Request::Engage.into())?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Sends the request in a thread: the setpoints must not wait.
+fn start(config: Box<Config>, timeout: Duration, stop: Stop) -> Outcome {
+    let (send, result) = channel();
+    thread::spawn(move || {
+        let order = Order { request: Request::Engage, is_patient: true, timeout };
+        let outcome = carry_out(&config, &order, &stop, |reason| info!("engage waits: {reason}"));
+        // Nobody receives it when the player has ended.
+        let _ = send.send(outcome.map(drop));
+    });
+    result
+}

@@ -1,0 +1,124 @@
+//! Slowdown along the path: the rate of a motion's own time falls from one to zero, so that the platform comes to rest on
+//! the way that was checked, and not beside it.
+
+use crate::control::limits::{DerivativeLimits, Limits};
+use crate::model::task::TaskState;
+use crate::motion::minimum_jerk::{Profile, rise};
+
+/// Shortest slowdown \[s\], the factor to the next longer one, and how many are tried: up to half a minute.
+const SHORTEST_S: f64 = 0.1;
+const FACTOR: f64 = 1.4;
+const CANDIDATES: i32 = 17;
+
+/// Instants at which a candidate is compared with the limits.
+const SAMPLES: u32 = 100;
+
+/// Share of each limit that a slowdown may use. Instants between the samples have the rest.
+const USABLE_SHARE: f64 = 0.98;
+
+/// Rate of time that falls from one to zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slowdown {
+    /// Beginning, in the motion's own time \[s\].
+    pub began_s: f64,
+    /// Duration \[s\]; the motion's own time advances by half of it.
+    pub duration_s: f64,
+}
+
+impl Slowdown {
+    /// The shortest slowdown of a motion that keeps the limits of velocity, acceleration and jerk; the longest that is
+    /// tried, where none does.
+    pub fn shortest(began_s: f64, limits: &Limits, at: impl Fn(f64) -> TaskState) -> Self {
+        let candidates = (0..CANDIDATES).map(|k| Self { began_s, duration_s: SHORTEST_S * FACTOR.powi(k) });
+        let longest = Self { began_s, duration_s: SHORTEST_S * FACTOR.powi(CANDIDATES) };
+        candidates.into_iter().find(|slowdown| slowdown.keeps(limits, &at)).unwrap_or(longest)
+    }
+
+    /// X, X', X'' so long after the beginning \[s\].
+    pub fn at(&self, since_s: f64, at: impl FnOnce(f64) -> TaskState) -> TaskState {
+        let Self { began_s, duration_s } = *self;
+        let u = (since_s / duration_s).clamp(0.0, 1.0);
+        // Integral of 1 - s(u).
+        let advance = u - u * u * u * u * (2.5 + u * (-3.0 + u));
+        let Profile { value, rate, .. } = rise(since_s, duration_s);
+        let (time_rate, time_accel) = (1.0 - value, -rate);
+        let TaskState { x, xd, xdd } = at(began_s + duration_s * advance);
+        TaskState { x, xd: xd * time_rate, xdd: xdd * (time_rate * time_rate) + xd * time_accel }
+    }
+
+    /// Whether the platform is at rest.
+    pub fn has_ended(&self, since_s: f64) -> bool {
+        since_s >= self.duration_s
+    }
+
+    fn keeps(&self, limits: &Limits, at: &impl Fn(f64) -> TaskState) -> bool {
+        let dt = self.duration_s / f64::from(SAMPLES);
+        let motions = (0..=SAMPLES).map(|k| self.at(f64::from(k) * dt, at).motion());
+        let mut before = None;
+        motions.into_iter().all(|motion| {
+            let (twist, acceleration) = (motion.twist, motion.acceleration);
+            let (linear, angular) = before.unwrap_or((acceleration.linear, acceleration.angular));
+            let linear_jerk = (acceleration.linear - linear).norm() / dt;
+            let angular_jerk = (acceleration.angular - angular).norm() / dt;
+            before = Some((acceleration.linear, acceleration.angular));
+            let linear = [twist.linear.norm(), acceleration.linear.norm(), linear_jerk];
+            let angular = [twist.angular.norm(), acceleration.angular.norm(), angular_jerk];
+            is_within(linear, &limits.position) && is_within(angular, &limits.orientation)
+        })
+    }
+}
+
+fn is_within([velocity, acceleration, jerk]: [f64; 3], limits: &DerivativeLimits) -> bool {
+    velocity <= USABLE_SHARE * limits.velocity
+        && acceleration <= USABLE_SHARE * limits.acceleration
+        && jerk <= USABLE_SHARE * limits.jerk
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::arguments::DEFAULT_CONFIG;
+    use crate::commands::r#move::precheck::Precheck;
+    use crate::commands::r#move::trajectory::Trajectory;
+    use crate::config::Config;
+    use crate::motion::built_in::BuiltInMotion;
+
+    /// At every instant of a motion near its limits: the daemon's own rules accept the way to rest.
+    #[test]
+    fn the_daemon_follows_a_slowdown_from_anywhere() {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let seconds = 4.0;
+        let trajectory = Trajectory::built_in(&config, BuiltInMotion::Sines, seconds).unwrap();
+        let at = |t: f64| trajectory.at(t.min(seconds));
+        let limits = &config.deployment.limits.reference;
+        let mut longest: f64 = 0.0;
+        for k in 1..40 {
+            let began_s = seconds * f64::from(k) / 40.0;
+            let slowdown = Slowdown::shortest(began_s, limits, at);
+            longest = longest.max(slowdown.duration_s);
+            let path = |t: f64| if t < began_s { at(t) } else { slowdown.at(t - began_s, at) };
+            let end_s = began_s + slowdown.duration_s;
+            let refusal = Precheck::new(&config).refusal(path, [0.0, end_s + 0.1]);
+            assert!(refusal.is_none(), "from {began_s}: {refusal:?}");
+            let rest = slowdown.at(slowdown.duration_s, at);
+            assert!(rest.xd.amax() == 0.0 && rest.xdd.amax() < 1e-12, "{rest:?}");
+            assert!((rest.x - at(began_s + 0.5 * slowdown.duration_s).x).amax() < 1e-12, "on the path");
+        }
+        assert!(longest < 3.0, "{longest} s");
+    }
+
+    #[test]
+    fn derivatives_belong_to_the_path() {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let trajectory = Trajectory::built_in(&config, BuiltInMotion::Sines, 4.0).unwrap();
+        let slowdown = Slowdown { began_s: 1.0, duration_s: 1.5 };
+        let path = |t: f64| slowdown.at(t, |t| trajectory.at(t));
+        let h = 1e-5;
+        for k in 1..30 {
+            let t = 0.05 * f64::from(k);
+            let (a, b, c) = (path(t - h), path(t), path(t + h));
+            assert!(((c.x - a.x) / (2.0 * h) - b.xd).amax() < 1e-6);
+            assert!(((c.xd - a.xd) / (2.0 * h) - b.xdd).amax() < 1e-4);
+        }
+    }
+}

@@ -1,0 +1,267 @@
+//! `hexad engage | stop | park | clear | off | estop`: an operator's request and its outcome.
+//!
+//! The request goes over the control socket, and the daemon's answer comes back. A command that ends with 0 has reached
+//! its state. What stops the platform falls back on a signal where the socket does not answer ([`signal`]).
+
+use core::fmt;
+use std::io;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use self::endpoint::{Attempt, Connection, Endpoint, endpoints};
+use self::signal::Signalled;
+use crate::config::Config;
+use crate::control::state::Request;
+pub use crate::daemon::control_socket::protocol::AnswerLine as Answer;
+use crate::daemon::control_socket::protocol::{AnswerLine, RequestLine, RequestResult};
+use crate::daemon::cycle::MAX_REQUEST_AGE_NS;
+use crate::messages::PortError;
+use crate::realtime::stop_request::Stop;
+
+pub mod endpoint;
+pub mod signal;
+
+/// Longest wait for the first line of the daemon. A stop then goes by signal.
+const FIRST_LINE_LIMIT: Duration = Duration::from_millis(500);
+/// The same for requests that have no other way: longer than the daemon waits for its loop.
+const PATIENT_FIRST_LINE_LIMIT: Duration = Duration::from_secs(3);
+
+/// Time beyond that of the request in which the daemon must have answered.
+const ANSWER_GRACE: Duration = Duration::from_secs(2);
+
+/// Longest wait of a patient request for a daemon that is about to start.
+const DAEMON_START_LIMIT: Duration = Duration::from_secs(2);
+/// Time between two attempts.
+const RETRY_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Attempts of a request whose connection the daemon has closed, as it does when too many clients connect.
+const ATTEMPTS: u32 = 5;
+
+/// Why a request was not carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum OperatorError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error("no daemon runs for {0}: none listens in /run/hexad, and no user's is recorded")]
+    NoDaemon(String),
+    #[error("this user may not send requests for {machine} ({socket}): {allowed}")]
+    Forbidden { machine: String, socket: String, allowed: String },
+    #[error("{request} was refused: {reason}", request = .0.name(), reason = .1)]
+    Refused(Request, String),
+    #[error("{request} was not completed: {reason}", request = .0.name(), reason = .1)]
+    NotCompleted(Request, String),
+    #[error("{request} was not completed within {1} s: {reason}", request = .0.name(), reason = .2)]
+    Timeout(Request, f64, String),
+    #[error("{request} is not confirmed: {reason}", request = .0.name(), reason = .1)]
+    NotConfirmed(Request, String),
+    #[error("{request} was not carried out: {reason}", request = .0.name(), reason = .1)]
+    Stale(Request, String),
+    #[error("the daemon does not answer: {0}")]
+    NoStatus(String),
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// A request that is to be carried out.
+#[derive(Clone, Copy, Debug)]
+pub struct Order {
+    pub request: Request,
+    /// Whether to wait for measurements and setpoint where they are missing, instead of being refused.
+    pub is_patient: bool,
+    pub timeout: Duration,
+}
+
+/// How a request was carried out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    /// Name of the state that it led to.
+    pub state: String,
+    /// How it was confirmed, if not over the socket that it was sent to.
+    pub confirmed: Option<String>,
+}
+
+/// Result of one connection.
+enum Exchange {
+    Answer(AnswerLine),
+    /// The daemon has closed the connection.
+    Closed,
+    /// The daemon has sent nothing in time.
+    Silent,
+}
+
+/// Sends the request and waits for its outcome. `waits` receives why it waits, each reason once. A patient request also
+/// waits for a daemon that is about to start.
+pub fn carry_out(
+    config: &Config,
+    order: &Order,
+    stop: &Stop,
+    mut waits: impl FnMut(&str),
+) -> Result<Outcome, OperatorError> {
+    let began = Instant::now();
+    loop {
+        let outcome = attempt(config, order, stop, &mut waits);
+        let limit = match &outcome {
+            Err(OperatorError::NoDaemon(_)) if order.is_patient => DAEMON_START_LIMIT.min(order.timeout),
+            // Only what this command has just sent itself is not old.
+            Err(OperatorError::Stale(..)) => Duration::from_nanos(MAX_REQUEST_AGE_NS),
+            _ => return outcome,
+        };
+        if began.elapsed() > limit || stop.is_requested() {
+            return outcome;
+        }
+        sleep(RETRY_INTERVAL);
+    }
+}
+
+/// Sends the request to each daemon that may be there, until one answers.
+fn attempt(
+    config: &Config,
+    order: &Order,
+    stop: &Stop,
+    waits: &mut impl FnMut(&str),
+) -> Result<Outcome, OperatorError> {
+    let machine = &config.name;
+    let places = endpoints(machine);
+    let mut forbidden = None;
+    for endpoint in &places {
+        let mut process_id = endpoint.daemon.as_ref().map(|daemon| daemon.process_id);
+        let mut exchange = Exchange::Silent;
+        for _ in 0..ATTEMPTS {
+            let mut connection = match endpoint.connect().map_err(|error| failed(order, error))? {
+                Attempt::Connected(connection) => connection,
+                Attempt::Forbidden => {
+                    forbidden = forbidden.or(Some(endpoint));
+                    process_id = None;
+                    break;
+                }
+                Attempt::Absent => break,
+            };
+            process_id = connection.process_id().or(process_id);
+            exchange = converse(&mut connection, order, stop, waits)?;
+            if !matches!(exchange, Exchange::Closed) {
+                break;
+            }
+        }
+        match (exchange, process_id) {
+            (Exchange::Answer(answer), _) => return conclude(order, &answer),
+            (_, Some(process_id)) => return without_socket(config, order, endpoint, process_id),
+            (_, None) => {}
+        }
+    }
+    Err(unreachable_daemon(machine, forbidden))
+}
+
+/// The status of the daemon of a machine.
+pub fn status(config: &Config) -> Result<AnswerLine, OperatorError> {
+    let places = endpoints(&config.name);
+    let mut forbidden = None;
+    for endpoint in &places {
+        match endpoint.connect() {
+            Ok(Attempt::Connected(mut connection)) => {
+                let until = Instant::now() + PATIENT_FIRST_LINE_LIMIT;
+                let line = RequestLine::new("status");
+                let answer = connection.send(&line).and_then(|()| connection.receive(until, || false));
+                return match answer {
+                    Ok(Some(answer)) => Ok(answer),
+                    Ok(None) => {
+                        Err(OperatorError::NoStatus(format!("nothing within {PATIENT_FIRST_LINE_LIMIT:?}")))
+                    }
+                    Err(error) => Err(OperatorError::NoStatus(error.to_string())),
+                };
+            }
+            Ok(Attempt::Forbidden) => forbidden = forbidden.or(Some(endpoint)),
+            Ok(Attempt::Absent) | Err(_) => {}
+        }
+    }
+    Err(unreachable_daemon(&config.name, forbidden))
+}
+
+/// Why no daemon was reached: it may not be, or there is none.
+fn unreachable_daemon(machine: &str, forbidden: Option<&Endpoint>) -> OperatorError {
+    forbidden.map_or_else(
+        || OperatorError::NoDaemon(machine.into()),
+        |endpoint| OperatorError::Forbidden {
+            machine: machine.into(),
+            socket: endpoint.socket.display().to_string(),
+            allowed: endpoint.allowed(),
+        },
+    )
+}
+
+/// Sends the request and reads until its answer.
+fn converse(
+    connection: &mut Connection,
+    order: &Order,
+    stop: &Stop,
+    waits: &mut impl FnMut(&str),
+) -> Result<Exchange, OperatorError> {
+    let line = RequestLine {
+        wait: true,
+        until_ready: order.is_patient,
+        progress: true,
+        within_s: order.timeout.as_secs_f64(),
+        ..RequestLine::new(order.request.name())
+    };
+    if connection.send(&line).is_err() {
+        return Ok(Exchange::Closed);
+    }
+    let first_limit = if is_stop(order.request) { FIRST_LINE_LIMIT } else { PATIENT_FIRST_LINE_LIMIT };
+    let mut until = Instant::now() + first_limit;
+    loop {
+        match connection.receive(until, || stop.is_requested()) {
+            Ok(Some(answer)) if answer.result == RequestResult::Waiting => waits(&answer.text),
+            Ok(Some(answer)) if answer.result == RequestResult::Accepted => {}
+            Ok(Some(answer)) => return Ok(Exchange::Answer(answer)),
+            Ok(None) if stop.is_requested() => return Err(OperatorError::Interrupted),
+            Ok(None) => return Ok(Exchange::Silent),
+            Err(error) if error.kind() == io::ErrorKind::InvalidData => return Err(failed(order, error)),
+            Err(_) => return Ok(Exchange::Closed),
+        }
+        until = Instant::now() + order.timeout + ANSWER_GRACE;
+    }
+}
+
+/// The outcome that an answer means.
+fn conclude(order: &Order, answer: &AnswerLine) -> Result<Outcome, OperatorError> {
+    let (request, text) = (order.request, answer.text.clone());
+    match answer.result {
+        RequestResult::Done => Ok(Outcome { state: answer.state.clone(), confirmed: None }),
+        RequestResult::Refused | RequestResult::Invalid => Err(OperatorError::Refused(request, text)),
+        RequestResult::TimedOut => Err(OperatorError::Timeout(request, order.timeout.as_secs_f64(), text)),
+        RequestResult::Stale => Err(OperatorError::Stale(request, text)),
+        RequestResult::Unanswered => Err(OperatorError::NotConfirmed(request, text)),
+        RequestResult::Failed
+        | RequestResult::Superseded
+        | RequestResult::Accepted
+        | RequestResult::Waiting => Err(OperatorError::NotCompleted(request, text)),
+    }
+}
+
+/// What stops the platform goes by signal; everything else has failed.
+fn without_socket(
+    config: &Config,
+    order: &Order,
+    endpoint: &Endpoint,
+    process_id: u32,
+) -> Result<Outcome, OperatorError> {
+    let request = order.request;
+    if !is_stop(request) {
+        let reason = format!(
+            "process {process_id} does not answer at {}: is it stopped, or its log blocked?",
+            endpoint.socket.display()
+        );
+        return Err(OperatorError::NotConfirmed(request, reason));
+    }
+    match signal::send(config, request, endpoint, process_id, order.timeout) {
+        Signalled::Confirmed { state, way } => Ok(Outcome { state, confirmed: Some(way) }),
+        Signalled::Unconfirmed(reason) => Err(OperatorError::NotConfirmed(request, reason)),
+    }
+}
+
+fn is_stop(request: Request) -> bool {
+    matches!(request, Request::Stop | Request::Off | Request::Estop)
+}
+
+fn failed(order: &Order, error: impl fmt::Display) -> OperatorError {
+    OperatorError::NotCompleted(order.request, format!("control socket: {error}"))
+}

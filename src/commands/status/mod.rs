@@ -1,0 +1,72 @@
+//! `hexad status`: the state of a running daemon, once or again and again.
+
+use std::io::{self, IsTerminal};
+use std::thread::sleep;
+use std::time::Duration;
+
+use clap::Args;
+
+use self::screen::Screen;
+use super::arguments::MachineFile;
+use super::failure::Failure;
+use super::operate;
+use crate::output::files::print;
+use crate::realtime::stop_request::Stop;
+
+mod screen;
+
+/// Time between two screens: a person reads no faster.
+const INTERVAL: Duration = Duration::from_millis(200);
+
+/// To the first column of the first line.
+const HOME: &str = "\x1b[H";
+/// Clears the rest of a line, and everything below.
+const CLEAR_LINE: &str = "\x1b[K";
+const CLEAR_BELOW: &str = "\x1b[J";
+
+#[derive(Debug, Args)]
+pub struct StatusArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    /// Show it again and again, until Ctrl-C
+    #[arg(long)]
+    watch: bool,
+    /// Print the daemon's answer as JSON, one line for each
+    #[arg(long)]
+    json: bool,
+}
+
+impl StatusArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let config = self.machine.load()?;
+        if !self.watch {
+            return self.show(&operate::status(&config)?, false);
+        }
+        let stop = Stop::on_signals()?;
+        let is_terminal = io::stdout().is_terminal();
+        while !stop.is_requested() {
+            match operate::status(&config) {
+                Ok(answer) => self.show(&answer, is_terminal)?,
+                // The daemon may be about to start again.
+                Err(error) if is_terminal && !self.json => {
+                    print(format_args!("{HOME}hexad: {error}{CLEAR_LINE}\n{CLEAR_BELOW}"))?;
+                }
+                Err(error) => return Err(error.into()),
+            }
+            sleep(INTERVAL);
+        }
+        Ok(())
+    }
+
+    fn show(&self, answer: &operate::Answer, in_place: bool) -> Result<(), Failure> {
+        if self.json {
+            return Ok(print(answer.to_line())?);
+        }
+        let text = Screen(answer).to_string();
+        if !in_place {
+            return Ok(print(text)?);
+        }
+        let lines: String = text.lines().map(|line| format!("{line}{CLEAR_LINE}\n")).collect();
+        Ok(print(format_args!("{HOME}{}{CLEAR_BELOW}", lines.trim_end()))?)
+    }
+}

@@ -1,0 +1,253 @@
+//! Status as text for a terminal of 80 columns and 24 lines.
+
+use core::fmt;
+
+use crate::daemon::control_socket::protocol::AnswerLine;
+use crate::daemon::control_socket::status::{LegReport, SourceReport, StatusReport};
+use crate::output::numbers::{AXES, axis_unit, significant};
+use crate::output::text_table::paragraph;
+
+/// Columns of the screen.
+const WIDTH: usize = 80;
+/// Lines that a diagnostic may take.
+const DIAGNOSTIC_LINES: usize = 2;
+/// Characters of a bar.
+const BAR: usize = 26;
+/// Longest time to a singular pose that is shown \[s\]: beyond, the motion will be another.
+const MAX_TIME_TO_SINGULARITY_S: f64 = 100.0;
+
+/// Status as it is shown.
+pub struct Screen<'a>(pub &'a AnswerLine);
+
+impl fmt::Display for Screen<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(answer) = self;
+        let Some(report) = &answer.status else { return writeln!(f, "{}", answer.text) };
+        let age = report
+            .age_s
+            .map_or_else(|| "no cycle yet".into(), |age_s| format!("cycle {} ago", age_text(age_s)));
+        let right = format!("process {}, {age}", report.process_id);
+        let left = format!("{}   {}", report.machine, answer.state.to_uppercase());
+        writeln!(f, "{left}{right:>width$}", width = WIDTH.saturating_sub(left.chars().count()))?;
+        let code = answer.diagnostic.code;
+        let head = if code == 0 { String::new() } else { format!("{code} ") };
+        let text = if code == 0 { "no diagnostic" } else { &answer.diagnostic.text };
+        let lines = paragraph(&head, text, WIDTH);
+        for k in 0..DIAGNOSTIC_LINES {
+            writeln!(f, "{}", lines.lines().nth(k).unwrap_or_default())?;
+        }
+        timing(f, report)?;
+        poses(f, report)?;
+        legs(f, report)?;
+        singularity(f, report)?;
+        report.sources.iter().try_for_each(|source| writeln!(f, "{}", source_line(source)))
+    }
+}
+
+fn timing(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
+    let timing = &report.timing;
+    let limits =
+        if report.active_limits.is_empty() { "none".into() } else { report.active_limits.join(", ") };
+    writeln!(f, "{:.80}", format!("limits    {limits}"))?;
+    writeln!(
+        f,
+        "cycles    {} at {} Hz; late {}, overruns {}, skipped {}",
+        timing.cycles, timing.rate_hz, timing.late_wakeups, timing.overruns, timing.skipped
+    )?;
+    let [wake_99, wake_max] = timing.wakeup_ns.map(microseconds);
+    let [compute_99, compute_max] = timing.compute_ns.map(microseconds);
+    writeln!(
+        f,
+        "last s    wake-up p99 {wake_99} us, max {wake_max} us; compute p99 {compute_99} us, max {compute_max} us"
+    )
+}
+
+fn poses(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
+    write!(f, "\n{:10}", "")?;
+    for (k, axis) in AXES.iter().enumerate() {
+        write!(f, "{:>11}", format!("{axis} {}", axis_unit(k).1))?;
+    }
+    writeln!(f)?;
+    let error = report.orientation_error_rad.zip(report.position_error_m);
+    let error = error.map(|([a, b, c], [x, y, z])| [a, b, c, x, y, z]);
+    for (name, numbers, digits) in
+        [("pose", report.pose, 3), ("setpoint", report.setpoint, 3), ("error", error, 4)]
+    {
+        write!(f, "{name:10}")?;
+        match numbers {
+            None => writeln!(f, "{:>11}", "unknown")?,
+            Some(numbers) => {
+                for (k, number) in numbers.iter().enumerate() {
+                    write!(f, "{:>11}", fixed(number * axis_unit(k).0, digits))?;
+                }
+                writeln!(f)?;
+            }
+        }
+    }
+    writeln!(f)
+}
+
+fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
+    let [shortest, longest] = report.stroke_m.map(|length_m| length_m * 1e3);
+    let strokes = format!(
+        "{shortest:.1}{:>width$}",
+        format!("{longest:.1}"),
+        width = BAR - format!("{shortest:.1}").len() + 2
+    );
+    writeln!(f, "leg  length mm  {strokes}    mm/s  force N")?;
+    if report.legs.is_empty() {
+        return writeln!(f, "{}no measurement{}", " ".repeat(5), "\n".repeat(5));
+    }
+    for (k, leg) in report.legs.iter().enumerate() {
+        let LegReport { length_m, rate_m_s, force_n } = leg;
+        let share = (length_m * 1e3 - shortest) / (longest - shortest);
+        writeln!(
+            f,
+            "{:>3}{:>11.3}  {}{:>8}{:>9}  {}",
+            k + 1,
+            length_m * 1e3,
+            bar(share, BAR, '#'),
+            fixed(rate_m_s * 1e3, 1),
+            fixed(*force_n, 1),
+            bar(force_n.abs() / report.max_force_n, BAR / 2, if *force_n < 0.0 { '-' } else { '+' }),
+        )?;
+    }
+    Ok(())
+}
+
+/// A bar filled up to a share of its width.
+fn bar(share: f64, width: usize, full: char) -> String {
+    let filled = (share.clamp(0.0, 1.0) * width as f64).round() as usize;
+    let bar: String = (0..width).map(|k| if k < filled { full } else { '.' }).collect();
+    format!("[{bar}]")
+}
+
+fn singularity(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
+    let condition = report.condition.map_or_else(|| "unknown".into(), significant);
+    let ahead = match report.time_to_singularity_s {
+        Some(time_s) if time_s < MAX_TIME_TO_SINGULARITY_S => format!("in {} s", significant(time_s)),
+        _ => "none ahead".into(),
+    };
+    writeln!(
+        f,
+        "\ncondition {condition}, limit {}; singular pose {ahead}",
+        significant(report.condition_limit)
+    )
+}
+
+fn source_line(source: &SourceReport) -> String {
+    let age = source.age_s.map_or_else(|| "never".into(), |age_s| format!("{} old", age_text(age_s)));
+    let processes: Vec<_> = source
+        .processes
+        .iter()
+        .map(|process| match process.command.as_str() {
+            "" => format!("{} (ended)", process.process_id),
+            command => format!("{command} {} of {}", process.process_id, process.user),
+        })
+        .collect();
+    let from = if processes.is_empty() { "no process".into() } else { processes.join(", ") };
+    format!("{:.80}", format!("{:10}{age}, from {from}", source.topic))
+}
+
+/// A number with so many digits after the point, and no negative zero.
+fn fixed(number: f64, digits: usize) -> String {
+    let text = format!("{number:.digits$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    if is_zero { text.trim_start_matches('-').into() } else { text }
+}
+
+fn microseconds(time_ns: u64) -> String {
+    significant(time_ns as f64 * 1e-3)
+}
+
+fn age_text(age_s: f64) -> String {
+    match age_s {
+        _ if age_s < 1.0 => format!("{:.1} ms", age_s * 1e3),
+        _ if age_s < 600.0 => format!("{age_s:.1} s"),
+        _ => format!("{:.0} min", age_s / 60.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+    use crate::daemon::control_socket::protocol::{RequestResult, VERSION};
+    use crate::daemon::control_socket::status::{ProcessReport, TimingReport};
+
+    /// Every field as long as it gets.
+    fn answer() -> AnswerLine {
+        let process =
+            ProcessReport { process_id: 4_194_304, command: "a".repeat(15), user: "operator".into() };
+        let source = |topic: &str| SourceReport {
+            topic: topic.into(),
+            age_s: Some(0.0123),
+            processes: vec![process.clone(), process.clone()],
+        };
+        let report = StatusReport {
+            machine: "m".repeat(20),
+            process_id: 4_194_304,
+            age_s: Some(0.0011),
+            active_limits: [
+                "force",
+                "force rate",
+                "stroke",
+                "leg rate",
+                "envelope",
+                "velocity",
+                "acceleration",
+            ]
+            .map(Into::into)
+            .into(),
+            timing: TimingReport { rate_hz: 1000.0, cycles: 1_000_000_000, ..TimingReport::default() },
+            pose: Some([-3.1, 3.1, -0.0, -1.2345678, 1.1, 0.0]),
+            setpoint: Some([0.1; 6]),
+            position_error_m: Some([-1e-6, 2e-3, 0.0]),
+            orientation_error_rad: Some([1e-5; 3]),
+            condition: Some(6.789),
+            condition_limit: 100.0,
+            time_to_singularity_s: Some(0.5),
+            legs: vec![LegReport { length_m: 1.225, rate_m_s: -0.123, force_n: -250.0 }; 6],
+            stroke_m: [0.85, 1.6],
+            max_force_n: 500.0,
+            sources: vec![source("setpoint"), source("measured")],
+        };
+        let diagnostic = Diagnostic::new(DiagnosticCode::SetpointTooFar, 5.0, 1.0);
+        AnswerLine {
+            version: VERSION,
+            result: RequestResult::Done,
+            request: "status".into(),
+            state: "stopping".into(),
+            diagnostic: diagnostic.into(),
+            text: diagnostic.to_string(),
+            status: Some(Box::new(report)),
+        }
+    }
+
+    #[test]
+    fn it_fits_the_smallest_terminal() {
+        let mut answer = answer();
+        for known in [true, false] {
+            let text = Screen(&answer).to_string();
+            let widest = text.lines().map(|line| line.chars().count()).max();
+            assert!(text.lines().count() <= 24 && widest <= Some(WIDTH), "{text}");
+            if !known {
+                assert!(text.contains("unknown") && text.contains("no measurement"), "{text}");
+            }
+            let report = answer.status.as_mut().unwrap();
+            **report = StatusReport { stroke_m: report.stroke_m, ..StatusReport::default() };
+        }
+    }
+
+    #[test]
+    fn numbers_are_in_millimetres_and_degrees_and_bars_in_proportion() {
+        let text = Screen(&answer()).to_string();
+        let line = |name: &str| text.lines().find(|line| line.starts_with(name)).unwrap().to_owned();
+        let pose: Vec<_> = line("pose").split_whitespace().map(String::from).collect();
+        assert_eq!(pose, ["pose", "-177.617", "177.617", "0.000", "-1234.568", "1100.000", "0.000"]);
+        assert!(line("error").contains("-0.0010     2.0000"), "{text}");
+        let leg = line("  1");
+        assert_eq!((leg.matches('#').count(), leg.matches('-').count()), (13, 7 + 2), "{leg}");
+        assert!(text.contains("singular pose in 0.500 s"), "{text}");
+    }
+}

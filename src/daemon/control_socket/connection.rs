@@ -1,0 +1,203 @@
+//! One connection of the control socket: lines in, answers out, without ever blocking.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream;
+
+use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
+use nix::unistd::{Uid, User};
+
+use super::order::{PendingOrder, is_stop};
+use super::protocol::AnswerLine;
+
+/// Longest line \[bytes\]: many times the longest request.
+pub const MAX_LINE_BYTES: usize = 4096;
+
+/// Longest time for the first line, and for the rest of a line that has begun \[ns\].
+pub const LINE_LIMIT_NS: u64 = 2_000_000_000;
+
+/// User and process at the other end, from the kernel.
+#[derive(Clone, Debug)]
+pub struct Peer {
+    pub user: String,
+    pub process_id: i32,
+}
+
+impl Peer {
+    fn of(stream: &UnixStream) -> Self {
+        let found = getsockopt(&stream.as_fd(), PeerCredentials);
+        let (user_id, process_id) = found.map_or((None, 0), |found| (Some(found.uid()), found.pid()));
+        let user = user_id.map_or_else(|| "unknown".into(), user_name);
+        Self { user, process_id }
+    }
+}
+
+/// Name of a user, or its number.
+pub fn user_name(user_id: u32) -> String {
+    let found = User::from_uid(Uid::from_raw(user_id)).ok().flatten();
+    found.map_or_else(|| user_id.to_string(), |user| user.name)
+}
+
+/// Connection of a client.
+#[derive(Debug)]
+pub struct Connection {
+    pub stream: UnixStream,
+    pub peer: Peer,
+    /// The request that is not answered yet.
+    pub pending: Option<PendingOrder>,
+    /// Whether its client wants lines before the answer.
+    pub wants_progress: bool,
+    buffer: Vec<u8>,
+    /// Beginning of the line that is incomplete; `None` after a complete line \[ns\].
+    line_since_ns: Option<u64>,
+    /// The last line, or the beginning \[ns\].
+    used_ns: u64,
+    has_requested: bool,
+    /// Nothing more will be read.
+    pub has_ended: bool,
+}
+
+/// Input of a connection.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Received {
+    Nothing,
+    Line(String),
+    /// The line is too long, or no text: the connection is of no use.
+    Garbage(&'static str),
+}
+
+impl Connection {
+    /// A connection that was just accepted.
+    pub fn new(stream: UnixStream, now_ns: u64) -> io::Result<Self> {
+        stream.set_nonblocking(true)?;
+        let peer = Peer::of(&stream);
+        Ok(Self {
+            stream,
+            peer,
+            pending: None,
+            wants_progress: false,
+            buffer: Vec::new(),
+            line_since_ns: Some(now_ns),
+            used_ns: now_ns,
+            has_requested: false,
+            has_ended: false,
+        })
+    }
+
+    /// Reads what there is, up to one line's length, and returns the next complete line.
+    pub fn receive(&mut self, now_ns: u64) -> Received {
+        let mut bytes = [0; MAX_LINE_BYTES];
+        if !self.has_ended && !self.buffer.contains(&b'\n') {
+            match self.stream.read(&mut bytes) {
+                Ok(0) => self.has_ended = true,
+                Ok(count) => self.buffer.extend(bytes.iter().take(count)),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
+                Err(_) => self.has_ended = true,
+            }
+        }
+        self.next_line(now_ns)
+    }
+
+    /// Whether a line that was read waits to be returned.
+    pub fn has_line(&self) -> bool {
+        self.buffer.contains(&b'\n')
+    }
+
+    fn next_line(&mut self, now_ns: u64) -> Received {
+        let Some(end) = self.buffer.iter().position(|byte| *byte == b'\n') else {
+            if self.buffer.len() >= MAX_LINE_BYTES {
+                return Received::Garbage("the line is too long");
+            }
+            if !self.buffer.is_empty() && self.line_since_ns.is_none() {
+                self.line_since_ns = Some(now_ns);
+            }
+            return Received::Nothing;
+        };
+        let line: Vec<u8> = self.buffer.drain(..=end).collect();
+        (self.line_since_ns, self.used_ns, self.has_requested) = (None, now_ns, true);
+        if !self.buffer.is_empty() {
+            self.line_since_ns = Some(now_ns);
+        }
+        if line.len() > MAX_LINE_BYTES {
+            return Received::Garbage("the line is too long");
+        }
+        String::from_utf8(line).map_or(Received::Garbage("the line is not UTF-8"), Received::Line)
+    }
+
+    /// Whether the client has taken too long for a line, or has left and waits for nothing.
+    pub fn is_done(&self, now_ns: u64) -> bool {
+        let is_slow = self.line_since_ns.is_some_and(|since| now_ns.saturating_sub(since) > LINE_LIMIT_NS);
+        self.pending.is_none() && (self.has_ended || is_slow) && !self.has_line()
+    }
+
+    /// Sends a line; false if the client does not read its answers or has left.
+    pub fn send(&mut self, answer: &AnswerLine) -> bool {
+        let line = answer.to_line();
+        matches!(self.stream.write(line.as_bytes()), Ok(count) if count == line.len())
+    }
+
+    /// Order in which connections are closed to make room: the smallest first. Those that have requested nothing, then
+    /// the longest unused, then those that wait, those that stop last.
+    pub fn rank(&self) -> (bool, bool, bool, u64) {
+        let stops = self.pending.as_ref().is_some_and(|pending| is_stop(pending.request()));
+        (stops, self.pending.is_some(), self.has_requested, self.used_ns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair() -> (UnixStream, Connection) {
+        let (client, server) = UnixStream::pair().unwrap();
+        (client, Connection::new(server, 0).unwrap())
+    }
+
+    #[test]
+    fn lines_come_one_by_one_however_they_are_cut() {
+        let (mut client, mut connection) = pair();
+        assert_eq!(connection.peer.process_id, std::process::id() as i32);
+        client.write_all(b"one\ntw").unwrap();
+        assert_eq!(connection.receive(1), Received::Line("one\n".into()));
+        assert_eq!(connection.receive(2), Received::Nothing);
+        client.write_all(b"o\nthree\n").unwrap();
+        assert_eq!(connection.receive(3), Received::Line("two\n".into()));
+        assert!(connection.has_line());
+        drop(client);
+        assert_eq!(connection.receive(4), Received::Line("three\n".into()));
+        assert!(!connection.is_done(5));
+        assert_eq!(connection.receive(5), Received::Nothing);
+        assert!(connection.is_done(5));
+    }
+
+    #[test]
+    fn a_line_without_end_and_one_of_other_bytes_are_garbage() {
+        let (mut client, mut connection) = pair();
+        client.write_all(&[b'x'; MAX_LINE_BYTES + 10]).unwrap();
+        assert_eq!(connection.receive(1), Received::Garbage("the line is too long"));
+        let (mut client, mut connection) = pair();
+        client.write_all(b"\xff\xfe\n").unwrap();
+        assert_eq!(connection.receive(1), Received::Garbage("the line is not UTF-8"));
+    }
+
+    #[test]
+    fn silence_and_half_a_line_have_a_limit_and_a_quiet_client_has_none() {
+        let (mut client, mut connection) = pair();
+        assert!(!connection.is_done(LINE_LIMIT_NS));
+        assert!(connection.is_done(LINE_LIMIT_NS + 1), "silent from the beginning");
+        client.write_all(b"one\n").unwrap();
+        assert_eq!(connection.receive(10), Received::Line("one\n".into()));
+        assert!(!connection.is_done(100 * LINE_LIMIT_NS), "it may ask again later");
+        client.write_all(b"ha").unwrap();
+        assert_eq!(connection.receive(20), Received::Nothing);
+        assert!(connection.is_done(LINE_LIMIT_NS + 21));
+    }
+
+    #[test]
+    fn a_client_that_does_not_read_is_not_waited_for() {
+        let (_client, mut connection) = pair();
+        let answer = AnswerLine::invalid("x".repeat(1000));
+        let sent = (0..10_000).take_while(|_| connection.send(&answer)).count();
+        assert!((1..10_000).contains(&sent), "{sent}");
+    }
+}

@@ -1,0 +1,261 @@
+//! The control thread: requests of operators over a Unix socket, one JSON object per line.
+//!
+//! It is neither the real-time thread nor the I/O thread and has ordinary priority. Requests reach the real-time thread
+//! through the request word, answers come from the snapshot that the I/O thread writes in every cycle. Number of
+//! connections, length of a line and time for it are bounded, and nothing here waits for a client.
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::os::fd::AsFd;
+
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use tracing::{debug, info, warn};
+
+pub use self::connection::user_name;
+use self::connection::{Connection, Received};
+use self::location::ControlSocket;
+use self::order::{Order, PendingOrder, Step};
+use self::protocol::{AnswerLine, RequestLine, RequestResult, VERSION};
+use self::status::StatusSource;
+use super::cycle::MAX_REQUEST_AGE_NS;
+use super::snapshot::Snapshot;
+use crate::config::Config;
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::Request;
+use crate::messages::clock::monotonic_ns;
+use crate::realtime::request_word::RequestWord;
+use crate::realtime::triple_buffer::Reader;
+
+mod connection;
+pub mod location;
+mod order;
+pub mod protocol;
+pub mod status;
+
+/// Most connections. One more closes the one that is missed least.
+const MAX_CONNECTIONS: usize = 64;
+
+/// Wait for clients while nothing is pending \[ms\]: how late the thread notices that the daemon ends.
+const IDLE_WAIT_MS: u8 = 50;
+/// The same while a request is pending \[ms\]: a period of the usual loop.
+const PENDING_WAIT_MS: u8 = 1;
+
+/// Time after the process was held in which no request may begin control \[ns\]: it may have been sent before. Enough
+/// rounds to read what every connection has buffered.
+const STALE_TIME_NS: u64 = 200_000_000;
+
+/// Least time between two warnings of clients that misbehave \[ns\]: they must not fill the log.
+const WARNING_INTERVAL_NS: u64 = 1_000_000_000;
+
+/// Longest that a request may wait \[s\].
+const MAX_WITHIN_S: f64 = 86_400.0;
+
+/// Links of the control thread to the other threads.
+pub(super) struct ControlLinks<'a> {
+    pub socket: ControlSocket,
+    /// From the I/O thread.
+    pub snapshots: Reader<Snapshot>,
+    /// To the real-time thread.
+    pub word: &'static RequestWord,
+    /// Set when the daemon is to end.
+    pub is_ending: &'a AtomicBool,
+}
+
+/// Serves clients until `stop`.
+pub(super) fn run(config: &Config, links: ControlLinks<'_>, stop: &AtomicBool) {
+    let ControlLinks { socket, snapshots, word, is_ending } = links;
+    let mut server = Server {
+        socket,
+        snapshots,
+        word,
+        is_ending,
+        connections: Vec::with_capacity(MAX_CONNECTIONS),
+        status: StatusSource::new(config),
+        woke_ns: monotonic_ns(),
+        stale_until_ns: 0,
+        warned_ns: 0,
+        closed: 0,
+    };
+    while !stop.load(Ordering::Relaxed) {
+        server.wait();
+        server.accept();
+        server.read();
+        server.advance();
+    }
+    server.advance();
+}
+
+struct Server<'a> {
+    socket: ControlSocket,
+    snapshots: Reader<Snapshot>,
+    word: &'static RequestWord,
+    is_ending: &'a AtomicBool,
+    connections: Vec<Connection>,
+    status: StatusSource<'a>,
+    /// End of the last wait \[ns\].
+    woke_ns: u64,
+    /// Until then a request may have been sent before the process was held \[ns\].
+    stale_until_ns: u64,
+    /// The last warning \[ns\], and the connections closed without one since then.
+    warned_ns: u64,
+    closed: u64,
+}
+
+impl Server<'_> {
+    /// Waits for something to read, or a short time. Closes connections whose client has left.
+    fn wait(&mut self) {
+        let is_busy = |connection: &Connection| connection.pending.is_some() || connection.has_line();
+        let is_pending = self.connections.iter().any(is_busy);
+        let timeout = PollTimeout::from(if is_pending { PENDING_WAIT_MS } else { IDLE_WAIT_MS });
+        let mut events = vec![PollFd::new(self.socket.listener.as_fd(), PollFlags::POLLIN)];
+        events.extend(self.connections.iter().map(|connection| {
+            let events = if connection.has_ended { PollFlags::empty() } else { PollFlags::POLLIN };
+            PollFd::new(connection.stream.as_fd(), events)
+        }));
+        // Fails only if a signal interrupts it.
+        let _ = poll(&mut events, timeout);
+        let left = PollFlags::POLLHUP | PollFlags::POLLERR;
+        let has_left = |event: &PollFd<'_>| {
+            event.revents().is_some_and(|seen| seen.intersects(left) && !seen.contains(PollFlags::POLLIN))
+        };
+        let mut gone: Vec<bool> = events.iter().skip(1).map(has_left).collect();
+        drop(events);
+        let word = self.word;
+        let mut gone = gone.drain(..);
+        self.connections.retain(|connection| {
+            let is_gone = gone.next().unwrap_or_default() && !connection.has_line();
+            if let Some(pending) = connection.pending.as_ref().filter(|_| is_gone) {
+                pending.cancel(word);
+            }
+            !is_gone
+        });
+        let now_ns = monotonic_ns();
+        if now_ns.saturating_sub(self.woke_ns) > MAX_REQUEST_AGE_NS {
+            self.stale_until_ns = now_ns + STALE_TIME_NS;
+        }
+        self.woke_ns = now_ns;
+    }
+
+    /// Accepts what waits, and makes room for it.
+    fn accept(&mut self) {
+        for _ in 0..MAX_CONNECTIONS {
+            let Ok((stream, _)) = self.socket.listener.accept() else { return };
+            if self.connections.len() >= MAX_CONNECTIONS {
+                let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
+                if let Some((_, least)) = ranks.min() {
+                    let closed = self.connections.swap_remove(least);
+                    closed.pending.iter().for_each(|pending| pending.cancel(self.word));
+                }
+            }
+            self.connections.extend(Connection::new(stream, self.woke_ns));
+        }
+    }
+
+    /// Reads at most one line of each connection.
+    fn read(&mut self) {
+        let snapshot = *self.snapshots.read();
+        let mut connections = core::mem::take(&mut self.connections);
+        connections.retain_mut(|connection| match connection.receive(self.woke_ns) {
+            Received::Nothing => !connection.is_done(self.woke_ns),
+            Received::Line(line) => self.respond(connection, &line, &snapshot),
+            Received::Garbage(reason) => {
+                connection.send(&AnswerLine::invalid(reason.into()));
+                self.warn_of(connection, reason);
+                false
+            }
+        });
+        self.connections = connections;
+    }
+
+    fn warn_of(&mut self, connection: &Connection, reason: &str) {
+        self.closed += 1;
+        if self.woke_ns.saturating_sub(self.warned_ns) > WARNING_INTERVAL_NS {
+            let (peer, count) = (&connection.peer, self.closed);
+            warn!(user = %peer.user, process = peer.process_id, count, "control socket: closed: {reason}");
+            (self.warned_ns, self.closed) = (self.woke_ns, 0);
+        }
+    }
+
+    /// Responds to a line; false if the connection is of no more use.
+    fn respond(&mut self, connection: &mut Connection, line: &str, snapshot: &Snapshot) -> bool {
+        let line = match parse(line) {
+            Ok(line) => line,
+            Err(reason) => return connection.send(&AnswerLine::invalid(reason)),
+        };
+        if line.request == "status" {
+            let answer = self.status.answer(snapshot, self.woke_ns);
+            debug!(user = %connection.peer.user, process = connection.peer.process_id, "status");
+            return connection.send(&answer);
+        }
+        let requested = Request::ALL.into_iter().find(|request| request.name() == line.request);
+        let Some(request) = requested else {
+            let names = Request::ALL.map(Request::name).join(", ");
+            let text = format!("unknown request {:?}; must be one of status, {names}", line.request);
+            return connection.send(&AnswerLine::invalid(text));
+        };
+        // Before anything else, also before the log, which may block.
+        let answer = self.begin(connection, request, &line, snapshot);
+        info!(user = %connection.peer.user, process = connection.peer.process_id, "request: {}", request.name());
+        answer.is_none_or(|answer| connection.send(&answer))
+    }
+
+    /// Posts a request, or returns why not.
+    fn begin(
+        &mut self,
+        connection: &mut Connection,
+        request: Request,
+        line: &RequestLine,
+        snapshot: &Snapshot,
+    ) -> Option<AnswerLine> {
+        let replaced = connection.pending.take();
+        if request.can_begin_control() {
+            let state = snapshot.status.state().unwrap_or_default();
+            let answer = |result, code: DiagnosticCode, text: String| {
+                Some(AnswerLine::new(result, request, state, code.into(), text))
+            };
+            if self.is_ending.load(Ordering::Relaxed) {
+                let code = DiagnosticCode::DaemonEnding;
+                return answer(RequestResult::Refused, code, code.name().into());
+            }
+            if self.woke_ns < self.stale_until_ns {
+                let text = "the daemon was held and the request may be old; send it again";
+                return answer(RequestResult::Stale, DiagnosticCode::None, text.into());
+            }
+        }
+        let within_ns = (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64;
+        let order = Order {
+            request,
+            waits: line.wait,
+            is_patient: line.until_ready,
+            deadline_ns: self.woke_ns + within_ns,
+        };
+        connection.wants_progress = line.progress;
+        let pending = PendingOrder::post(order, snapshot, self.word, monotonic_ns());
+        connection.pending = Some(pending);
+        replaced.map(|replaced| replaced.superseded(snapshot))
+    }
+
+    /// Looks at every pending request and answers.
+    fn advance(&mut self) {
+        let (snapshot, now_ns, word) = (*self.snapshots.read(), monotonic_ns(), self.word);
+        self.connections.retain_mut(|connection| {
+            let Some(pending) = &mut connection.pending else { return true };
+            match pending.step(&snapshot, word, now_ns) {
+                Step::Wait => true,
+                Step::Progress(line) => !connection.wants_progress || connection.send(&line),
+                Step::Answer(line) => {
+                    connection.pending = None;
+                    connection.send(&line)
+                }
+            }
+        });
+    }
+}
+
+/// Reads a line.
+fn parse(line: &str) -> Result<RequestLine, String> {
+    let line: RequestLine = serde_json::from_str(line).map_err(|error| format!("no request: {error}"))?;
+    if line.version != VERSION {
+        return Err(format!("version {} of the protocol; this daemon has version {VERSION}", line.version));
+    }
+    Ok(line)
+}

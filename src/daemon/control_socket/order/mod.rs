@@ -1,0 +1,261 @@
+//! Progress of one request: posted, answered by the controller, completed.
+
+use nalgebra::Vector3;
+
+use super::protocol::{AnswerLine, RequestResult};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::state::{Request, State};
+use crate::daemon::cycle::MAX_REQUEST_AGE_NS;
+use crate::daemon::snapshot::Snapshot;
+use crate::realtime::request_word::RequestWord;
+
+/// Interval between two attempts of a request that waits until it is possible \[ns\].
+const RETRY_INTERVAL_NS: u64 = 100_000_000;
+
+/// Longest wait for the controller to answer \[ns\]: no longer does a request for control stay valid.
+const ANSWER_LIMIT_NS: u64 = MAX_REQUEST_AGE_NS + 200_000_000;
+
+/// What a client has requested.
+#[derive(Clone, Copy, Debug)]
+pub struct Order {
+    pub request: Request,
+    /// Whether the answer comes when the request is completed.
+    pub waits: bool,
+    /// Whether to wait for measurements and setpoint where they are missing, instead of being refused.
+    pub is_patient: bool,
+    /// Instant of the end of all waiting \[ns\].
+    pub deadline_ns: u64,
+}
+
+/// An order on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct PendingOrder {
+    order: Order,
+    stage: Stage,
+    /// Beginning of the stage \[ns\].
+    since_ns: u64,
+    /// Diagnostic that the client was last informed of.
+    reported: DiagnosticCode,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// A request of higher precedence is waiting for the controller, or no cycle has run yet.
+    Posting,
+    /// This word waits for the controller.
+    Posted(u64),
+    /// The controller has refused it for now.
+    Retrying,
+    /// The controller has accepted it.
+    Accepted,
+}
+
+/// Result of a look at a pending order.
+#[derive(Debug)]
+pub enum Step {
+    /// Nothing new.
+    Wait,
+    /// Something new on the way.
+    Progress(AnswerLine),
+    /// The order has ended.
+    Answer(AnswerLine),
+}
+
+impl PendingOrder {
+    /// Posts an order at once, if nothing of higher precedence waits.
+    pub fn post(order: Order, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Self {
+        let mut pending =
+            Self { order, stage: Stage::Posting, since_ns: now_ns, reported: DiagnosticCode::None };
+        pending.try_post(snapshot, word, now_ns);
+        pending
+    }
+
+    /// The request.
+    pub fn request(&self) -> Request {
+        self.order.request
+    }
+
+    /// Looks at the newest cycle.
+    pub fn step(&mut self, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Step {
+        let age_ns = now_ns.saturating_sub(self.since_ns);
+        match self.stage {
+            Stage::Posting if age_ns > ANSWER_LIMIT_NS && !self.order.is_patient => {
+                return self.unanswered(snapshot);
+            }
+            Stage::Posting => self.try_post(snapshot, word, now_ns),
+            Stage::Retrying if age_ns > RETRY_INTERVAL_NS => self.try_post(snapshot, word, now_ns),
+            Stage::Posted(posted) if posted == snapshot.answered => return self.answered(snapshot, now_ns),
+            Stage::Posted(posted) if word.load() != posted => {
+                return self.answer(
+                    RequestResult::Superseded,
+                    snapshot,
+                    "a later request has replaced it".into(),
+                );
+            }
+            Stage::Posted(posted) if age_ns > ANSWER_LIMIT_NS => {
+                self.cancel_posted(posted, word);
+                return self.unanswered(snapshot);
+            }
+            Stage::Accepted => return self.completion(snapshot, now_ns),
+            Stage::Posted(_) | Stage::Retrying => {}
+        }
+        self.check_deadline(snapshot, now_ns)
+    }
+
+    /// Withdraws what the controller has not seen, as its sender has left. A stop remains.
+    pub fn cancel(&self, word: &RequestWord) {
+        if let Stage::Posted(posted) = self.stage {
+            self.cancel_posted(posted, word);
+        }
+    }
+
+    /// Answer to the client whose later line replaces this order.
+    pub fn superseded(&self, snapshot: &Snapshot) -> AnswerLine {
+        self.line(
+            RequestResult::Superseded,
+            snapshot,
+            diagnostic(snapshot),
+            "a later request has replaced it".into(),
+        )
+    }
+
+    /// No control begins before the first cycle was published.
+    fn try_post(&mut self, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) {
+        if snapshot.time_ns == 0 && self.order.request.can_begin_control() {
+            return;
+        }
+        if let Some(posted) = word.post(self.order.request as u32, now_ns) {
+            (self.stage, self.since_ns) = (Stage::Posted(posted), now_ns);
+        }
+    }
+
+    fn cancel_posted(&self, posted: u64, word: &RequestWord) {
+        if !is_stop(self.order.request) {
+            word.withdraw(posted);
+        }
+    }
+
+    /// The controller has answered.
+    fn answered(&mut self, snapshot: &Snapshot, now_ns: u64) -> Step {
+        let refusal = snapshot.refusal;
+        if refusal.code == DiagnosticCode::None {
+            self.stage = Stage::Accepted;
+            let text = "accepted".into();
+            return match self.completion(snapshot, now_ns) {
+                Step::Wait if self.order.waits => {
+                    Step::Progress(self.line(RequestResult::Accepted, snapshot, diagnostic(snapshot), text))
+                }
+                Step::Wait => self.answer(RequestResult::Accepted, snapshot, text),
+                step => step,
+            };
+        }
+        let text = refusal_text(snapshot);
+        // Only an operator ends a fault.
+        if self.order.is_patient && may_resolve(refusal.code) && state(snapshot) != State::Fault {
+            (self.stage, self.since_ns) = (Stage::Retrying, now_ns);
+            if self.reported == refusal.code || now_ns > self.order.deadline_ns {
+                return self.check_deadline(snapshot, now_ns);
+            }
+            self.reported = refusal.code;
+            return Step::Progress(self.line(RequestResult::Waiting, snapshot, refusal, text));
+        }
+        Step::Answer(self.line(RequestResult::Refused, snapshot, refusal, text))
+    }
+
+    /// Whether the state that the accepted request leads to is reached.
+    fn completion(&self, snapshot: &Snapshot, now_ns: u64) -> Step {
+        match outcome(self.order.request, state(snapshot)) {
+            Some(true) => self.answer(RequestResult::Done, snapshot, state(snapshot).name().into()),
+            Some(false) => self.answer(RequestResult::Failed, snapshot, state_text(snapshot)),
+            None => self.check_deadline(snapshot, now_ns),
+        }
+    }
+
+    fn check_deadline(&self, snapshot: &Snapshot, now_ns: u64) -> Step {
+        if now_ns > self.order.deadline_ns {
+            return self.answer(RequestResult::TimedOut, snapshot, state_text(snapshot));
+        }
+        Step::Wait
+    }
+
+    fn unanswered(&self, snapshot: &Snapshot) -> Step {
+        let text = if is_stop(self.order.request) {
+            "the control loop runs no cycle; the request remains posted until it does"
+        } else {
+            "the control loop runs no cycle; the request was withdrawn"
+        };
+        self.answer(RequestResult::Unanswered, snapshot, text.into())
+    }
+
+    fn answer(&self, result: RequestResult, snapshot: &Snapshot, text: String) -> Step {
+        Step::Answer(self.line(result, snapshot, diagnostic(snapshot), text))
+    }
+
+    fn line(
+        &self,
+        result: RequestResult,
+        snapshot: &Snapshot,
+        diagnostic: Diagnostic,
+        text: String,
+    ) -> AnswerLine {
+        AnswerLine::new(result, self.order.request, state(snapshot), diagnostic, text)
+    }
+}
+
+/// Whether a request ends control or force; it is never withdrawn.
+pub fn is_stop(request: Request) -> bool {
+    matches!(request, Request::Stop | Request::Off | Request::Estop)
+}
+
+/// Whether a state is the one that an accepted request leads to; `None` on the way there.
+fn outcome(request: Request, state: State) -> Option<bool> {
+    match (request, state) {
+        (Request::Engage, State::Engaging) => None,
+        (Request::Engage, state) => Some(state == State::Active),
+        (Request::Stop | Request::Park, State::Stopping) | (Request::Park, State::Parking) => None,
+        (Request::Stop, state) => Some(!state.has_control() && state != State::Fault),
+        (Request::Park, state) => Some(state == State::Off),
+        // A fault stays one, and has no force either.
+        (Request::Off, state) => Some(!state.has_control()),
+        (Request::Clear, state) => Some(state != State::Fault),
+        (Request::Estop, state) => Some(state == State::Fault),
+    }
+}
+
+/// Whether the reason of a refusal may disappear without a correction: a source that was lost may be about to return.
+fn may_resolve(code: DiagnosticCode) -> bool {
+    !code.is_fault() || matches!(code, DiagnosticCode::SetpointLost | DiagnosticCode::MeasurementLost)
+}
+
+fn state(snapshot: &Snapshot) -> State {
+    snapshot.status.state().unwrap_or_default()
+}
+
+fn diagnostic(snapshot: &Snapshot) -> Diagnostic {
+    snapshot.status.diagnostic.diagnostic().unwrap_or_default()
+}
+
+fn state_text(snapshot: &Snapshot) -> String {
+    format!("the daemon is in {}: {}", state(snapshot).name(), diagnostic(snapshot))
+}
+
+/// Why the last request was refused, with what an operator needs to correct it.
+fn refusal_text(snapshot: &Snapshot) -> String {
+    let Snapshot { status, refusal, .. } = snapshot;
+    let norm = |v: [f64; 3]| Vector3::from(v).norm();
+    match (refusal.code, state(snapshot)) {
+        (DiagnosticCode::InvalidInState, State::Fault) => {
+            format!("not possible in state fault ({}); hexad clear first", diagnostic(snapshot).code.name())
+        }
+        (DiagnosticCode::InvalidInState, state) => format!("not possible in state {}", state.name()),
+        (DiagnosticCode::SetpointTooFar, _) if status.error_valid == 1 => format!(
+            "{refusal} ({:.3} mm and {:.3} mrad away)",
+            norm(status.position_error_m) * 1e3,
+            norm(status.orientation_error_rad) * 1e3
+        ),
+        _ => refusal.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

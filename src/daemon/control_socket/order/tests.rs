@@ -1,0 +1,95 @@
+//! Orders on their way, against snapshots as the I/O thread writes them.
+
+use super::*;
+
+fn order(request: Request, is_patient: bool) -> Order {
+    Order { request, waits: true, is_patient, deadline_ns: u64::MAX }
+}
+
+fn snapshot(state: State, answered: u64, refusal: Diagnostic) -> Snapshot {
+    let mut snapshot = Snapshot { answered, refusal, time_ns: 1, ..Snapshot::default() };
+    snapshot.status.state = state as u32;
+    snapshot
+}
+
+fn first_cycle() -> Snapshot {
+    snapshot(State::Standby, 0, Diagnostic::default())
+}
+
+#[test]
+fn no_control_begins_before_the_first_cycle_and_a_stop_is_posted_at_once() {
+    for request in Request::ALL {
+        let word = RequestWord::default();
+        let mut pending = PendingOrder::post(order(request, true), &Snapshot::default(), &word, 1000);
+        assert_eq!(word.load() == 0, request.can_begin_control(), "{request:?}");
+        pending.step(&first_cycle(), &word, 2000);
+        assert_ne!(word.load(), 0);
+    }
+}
+
+fn result(step: &Step) -> Option<RequestResult> {
+    match step {
+        Step::Wait => None,
+        Step::Progress(line) | Step::Answer(line) => Some(line.result),
+    }
+}
+
+#[test]
+fn an_engage_is_accepted_and_then_done() {
+    let word = RequestWord::default();
+    let mut pending = PendingOrder::post(order(Request::Engage, false), &first_cycle(), &word, 1000);
+    let posted = word.load();
+    let none = Diagnostic::default();
+    assert_eq!(result(&pending.step(&snapshot(State::Standby, 0, none), &word, 2000)), None);
+    let accepted = pending.step(&snapshot(State::Engaging, posted, none), &word, 3000);
+    assert!(matches!(&accepted, Step::Progress(line) if line.result == RequestResult::Accepted));
+    assert_eq!(result(&pending.step(&snapshot(State::Engaging, posted, none), &word, 4000)), None);
+    let done = pending.step(&snapshot(State::Active, posted, none), &word, 5000);
+    assert_eq!(result(&done), Some(RequestResult::Done));
+}
+
+#[test]
+fn a_stop_of_another_supersedes_an_engage_and_does_not_wait_for_it() {
+    let word = RequestWord::default();
+    let mut engage = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 1000);
+    let _estop = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 2000);
+    let step = engage.step(&snapshot(State::Standby, 0, Diagnostic::default()), &word, 3000);
+    assert_eq!(result(&step), Some(RequestResult::Superseded));
+    engage.cancel(&word);
+    assert_eq!(crate::realtime::request_word::number(word.load()), Request::Estop as u32);
+}
+
+#[test]
+fn what_the_loop_does_not_answer_is_withdrawn_unless_it_stops() {
+    for request in Request::ALL {
+        let word = RequestWord::default();
+        let mut pending = PendingOrder::post(order(request, false), &first_cycle(), &word, 1000);
+        let held = snapshot(State::Active, 0, Diagnostic::default());
+        assert_eq!(result(&pending.step(&held, &word, ANSWER_LIMIT_NS)), None);
+        let step = pending.step(&held, &word, ANSWER_LIMIT_NS + 1001);
+        assert_eq!(result(&step), Some(RequestResult::Unanswered));
+        assert_eq!(word.load() != 0, is_stop(request), "{request:?}");
+    }
+}
+
+#[test]
+fn a_patient_order_says_once_why_it_waits_and_tries_again() {
+    let word = RequestWord::default();
+    let mut pending = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 0);
+    let first = word.load();
+    let refused = snapshot(State::Standby, first, DiagnosticCode::NoSetpoint.into());
+    let step = pending.step(&refused, &word, 1000);
+    assert!(
+        matches!(&step, Step::Progress(line) if line.result == RequestResult::Waiting
+        && line.text == "no setpoint; start a setpoint source, then engage"),
+        "{step:?}"
+    );
+    word.set_seen(first);
+    assert_eq!(result(&pending.step(&refused, &word, RETRY_INTERVAL_NS + 2000)), None);
+    assert_ne!(word.load(), first);
+    let again = snapshot(State::Standby, word.load(), DiagnosticCode::NoSetpoint.into());
+    assert_eq!(result(&pending.step(&again, &word, RETRY_INTERVAL_NS + 3000)), None, "the same reason");
+    let fault = snapshot(State::Fault, word.load(), DiagnosticCode::InvalidInState.into());
+    let mut impatient = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 0);
+    assert_eq!(result(&impatient.step(&fault, &word, 1)), Some(RequestResult::Refused));
+}

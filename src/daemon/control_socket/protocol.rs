@@ -1,0 +1,164 @@
+//! Lines of the control socket: one JSON object per line, in both directions. `docs/operator.md` describes them.
+
+use serde::{Deserialize, Serialize};
+
+use super::status::StatusReport;
+use crate::control::diagnostic::Diagnostic;
+use crate::control::state::{Request, State};
+
+/// Version of the protocol. It changes only if a client of an older one would misunderstand.
+pub const VERSION: u32 = 1;
+
+/// Longest time that `wait` waits where the request names none \[s\].
+const DEFAULT_WITHIN_S: f64 = 30.0;
+
+/// Line of a client.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RequestLine {
+    /// Version of the protocol.
+    pub version: u32,
+    /// `engage`, `stop`, `park`, `clear`, `off`, `estop` or `status`.
+    pub request: String,
+    /// Whether the answer comes only when the request is completed: its state reached, or another.
+    #[serde(default)]
+    pub wait: bool,
+    /// Whether a refusal whose reason may disappear by itself (no measurement, no setpoint) is waited out.
+    #[serde(default)]
+    pub until_ready: bool,
+    /// Whether lines with result `accepted` and `waiting` come before the answer.
+    #[serde(default)]
+    pub progress: bool,
+    /// Longest time to wait \[s\].
+    #[serde(default = "default_within_s")]
+    pub within_s: f64,
+}
+
+fn default_within_s() -> f64 {
+    DEFAULT_WITHIN_S
+}
+
+impl RequestLine {
+    /// A request that is answered at once.
+    pub fn new(request: &str) -> Self {
+        let (wait, until_ready, progress) = (false, false, false);
+        Self {
+            version: VERSION,
+            request: request.into(),
+            wait,
+            until_ready,
+            progress,
+            within_s: DEFAULT_WITHIN_S,
+        }
+    }
+}
+
+/// What became of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RequestResult {
+    /// The controller has accepted it. The answer, or progress if the request waits.
+    Accepted,
+    /// Progress: why it waits.
+    Waiting,
+    /// Its state is reached, or the status is here.
+    Done,
+    /// The controller has refused it.
+    Refused,
+    /// It was accepted, and control went elsewhere.
+    Failed,
+    /// It was not completed in its time.
+    TimedOut,
+    /// A later request, or one of higher precedence, has replaced it.
+    Superseded,
+    /// The control loop has run no cycle. A stop remains posted, everything else is withdrawn.
+    Unanswered,
+    /// The daemon was held and a request that may begin control may have been sent before: send it again.
+    Stale,
+    /// The line was not understood.
+    Invalid,
+}
+
+/// Diagnostic with its number, value, bound and sentence.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DiagnosticReport {
+    /// Number of the code; 0 for none.
+    pub code: u32,
+    /// Name of the code.
+    pub name: String,
+    /// In the unit of the code; `None` if it is not a finite number.
+    pub value: Option<f64>,
+    /// What the value is compared with.
+    pub bound: Option<f64>,
+    /// Leg or axis, from 1; 0 if it concerns neither.
+    pub index: u32,
+    /// Sentence with unit and remedy.
+    pub text: String,
+}
+
+impl From<Diagnostic> for DiagnosticReport {
+    fn from(diagnostic: Diagnostic) -> Self {
+        let finite = |number: f64| Some(number).filter(|number| number.is_finite());
+        let Diagnostic { code, value, bound, index } = diagnostic;
+        Self {
+            code: code as u32,
+            name: code.name().into(),
+            value: finite(value),
+            bound: finite(bound),
+            index,
+            text: diagnostic.to_string(),
+        }
+    }
+}
+
+/// Line of the daemon.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AnswerLine {
+    /// Version of the protocol.
+    pub version: u32,
+    /// What became of the request.
+    pub result: RequestResult,
+    /// The request; empty if the line was not understood.
+    pub request: String,
+    /// Name of the present state.
+    pub state: String,
+    /// Of the refusal, else of the state.
+    pub diagnostic: DiagnosticReport,
+    /// The answer as a sentence.
+    pub text: String,
+    /// Answer to `status`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub status: Option<Box<StatusReport>>,
+}
+
+impl AnswerLine {
+    /// Answer to a request in a state.
+    pub fn new(
+        result: RequestResult,
+        request: Request,
+        state: State,
+        diagnostic: Diagnostic,
+        text: String,
+    ) -> Self {
+        let (request, state) = (request.name().into(), state.name().into());
+        Self { version: VERSION, result, request, state, diagnostic: diagnostic.into(), text, status: None }
+    }
+
+    /// Answer to a line that was not understood.
+    pub fn invalid(text: String) -> Self {
+        Self {
+            version: VERSION,
+            result: RequestResult::Invalid,
+            request: String::new(),
+            state: String::new(),
+            diagnostic: DiagnosticReport::default(),
+            text,
+            status: None,
+        }
+    }
+
+    /// The line with its end; of finite numbers only, so it cannot fail.
+    pub fn to_line(&self) -> String {
+        serde_json::to_string(self).unwrap_or_default() + "\n"
+    }
+}

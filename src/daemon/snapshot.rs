@@ -1,0 +1,25 @@
+//! Snapshot of the daemon for the control thread: what the I/O thread has after each cycle.
+
+use crate::control::controller::{Measurement, Setpoint};
+use crate::control::diagnostic::Diagnostic;
+use crate::messages::StatusMessage;
+use crate::model::machine::LEGS;
+
+/// Newest cycle as the I/O thread published it, with its inputs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Snapshot {
+    /// Status of the cycle; its header is empty.
+    pub status: StatusMessage,
+    /// Forces \[N\]; zero unless the state has control.
+    pub force: [f64; LEGS],
+    /// CLOCK_MONOTONIC instant at which it was published \[ns\]; 0 before the first cycle.
+    pub time_ns: u64,
+    /// The newest setpoint; `None` if none ever arrived.
+    pub setpoint: Option<Setpoint>,
+    /// The newest measurement; `None` if none ever arrived.
+    pub measurement: Option<Measurement>,
+    /// The last request word that was carried out or refused; 0 if none ever was.
+    pub answered: u64,
+    /// Why that one was refused; code `None` if it was not.
+    pub refusal: Diagnostic,
+}

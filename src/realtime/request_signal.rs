@@ -1,0 +1,77 @@
+//! Signals that post a request: the way to stop that needs no socket and no shared memory.
+
+use core::ffi::c_int;
+use core::ptr;
+use core::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
+use std::io;
+
+use super::request_word::RequestWord;
+use crate::messages::clock::monotonic_ns;
+
+/// Word that the handlers post to.
+static WORD: AtomicPtr<RequestWord> = AtomicPtr::new(ptr::null_mut());
+/// Numbers of the requests of SIGUSR1 and SIGUSR2.
+static REQUESTS: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];
+
+/// Signal that posts a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RequestSignal {
+    /// SIGUSR1.
+    User1,
+    /// SIGUSR2.
+    User2,
+}
+
+impl RequestSignal {
+    /// Name for people and for `kill -s`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::User1 => "USR1",
+            Self::User2 => "USR2",
+        }
+    }
+
+    fn number(self) -> c_int {
+        match self {
+            Self::User1 => libc::SIGUSR1,
+            Self::User2 => libc::SIGUSR2,
+        }
+    }
+
+    /// Sends it to a process; the error of the system where this user may not.
+    pub fn send(self, process_id: u32) -> io::Result<()> {
+        // SAFETY: plain numbers. A process that has ended makes the call fail.
+        let result = unsafe { libc::kill(process_id as libc::pid_t, self.number()) };
+        if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+    }
+}
+
+/// Makes SIGUSR1 and SIGUSR2 of this process post the requests with these numbers to `word`.
+pub fn post_on_signals(word: &'static RequestWord, requests: [u32; 2]) -> io::Result<()> {
+    REQUESTS.iter().zip(requests).for_each(|(stored, request)| stored.store(request, Ordering::Relaxed));
+    WORD.store(ptr::from_ref(word).cast_mut(), Ordering::Release);
+    for signal in [RequestSignal::User1, RequestSignal::User2] {
+        // SAFETY: an all-zero `sigaction` is valid and is filled before use. The handler calls only what may be called in
+        // one: atomic operations and clock_gettime. A null pointer for the old action is allowed.
+        let result = unsafe {
+            let mut action: libc::sigaction = core::mem::zeroed();
+            action.sa_sigaction = handle as extern "C" fn(c_int) as libc::sighandler_t;
+            action.sa_flags = libc::SA_RESTART;
+            libc::sigemptyset(&mut action.sa_mask);
+            libc::sigaction(signal.number(), &action, ptr::null_mut())
+        };
+        if result != 0 {
+            return Err(io::Error::last_os_error());
+        }
+    }
+    Ok(())
+}
+
+extern "C" fn handle(signal: c_int) {
+    let [first, second] = &REQUESTS;
+    let request = if signal == libc::SIGUSR1 { first } else { second };
+    // SAFETY: null, or a reference that lives as long as the process.
+    if let Some(word) = unsafe { WORD.load(Ordering::Acquire).as_ref() } {
+        let _ = word.post(request.load(Ordering::Relaxed), monotonic_ns());
+    }
+}

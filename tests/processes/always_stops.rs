@@ -1,0 +1,246 @@
+//! `estop`, `off` and `stop` reach the daemon whatever else happens to its shared memory, its socket and its log.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::os::unix::net::UnixStream;
+use std::process::Stdio;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::{JoinHandle, sleep, spawn};
+use std::time::{Duration, Instant};
+
+use hexad::messages::claim::running_daemons;
+use hexad::messages::{Bus, CommandMessage, Publisher, StatusMessage, Subscriber};
+
+use crate::support::children::{Ended, HANG, hexad};
+use crate::support::machine::Machine;
+use crate::support::operator::{ask, clear, does, engage};
+use crate::support::peer::{self, Controlled};
+use crate::support::recorder::Recorder;
+use crate::support::socket::{path_of, status, stops};
+use crate::support::trio::{start_daemon, start_plant};
+use crate::support::turns;
+
+/// Connections that mean no good: twice as many as the daemon serves, most of which only take a place.
+const HOSTILE: usize = 128;
+
+/// Emergency stops under them.
+const TRIALS: usize = 10;
+
+/// What fills every slot of the shared memory.
+struct Slots {
+    _commands: Vec<Publisher<CommandMessage>>,
+    _statuses: Vec<Subscriber<StatusMessage>>,
+    _nodes: Vec<Bus>,
+}
+
+impl Slots {
+    fn fill(machine: &str) -> Self {
+        let bus = Bus::join(machine).expect("to join");
+        let _commands: Vec<_> = std::iter::from_fn(|| bus.publisher::<CommandMessage>().ok()).collect();
+        let _statuses: Vec<_> = std::iter::from_fn(|| bus.subscriber::<StatusMessage>(8).ok()).collect();
+        assert!(_commands.len() >= 16 && _statuses.len() >= 12, "room for others");
+        // A node takes its place in a topic with its first port, and with that of the topic's own limit.
+        let mut _nodes = vec![bus];
+        while let Some(node) =
+            Bus::join(machine).ok().filter(|node| node.publisher::<CommandMessage>().is_ok())
+        {
+            _nodes.push(node);
+        }
+        Self { _commands, _statuses, _nodes }
+    }
+}
+
+#[test]
+fn with_every_slot_of_the_shared_memory_taken() {
+    let _turn = turns::beside_others();
+    let Controlled { peer: _peer, daemon, plant, machine } = Controlled::start(Machine::patient("slots"));
+    let _slots = Slots::fill(&machine.name);
+    for (request, states) in [("estop", &["fault"] as &[_]), ("off", &["off"]), ("stop", &["standby"])] {
+        // From control, and from the state that it leads to.
+        for _ in 0..2 {
+            stops(&machine, request, states);
+        }
+        if request == "estop" {
+            clear(&machine);
+        }
+        engage(&machine);
+    }
+    does(&machine, "park", &[], &["off"]);
+    assert_eq!(status(&machine)["state"], "off");
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+}
+
+#[test]
+fn under_hostile_connections_and_four_that_wait() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("hostile");
+    let daemon = start_daemon(&machine);
+    let path = path_of(&daemon);
+    // Four operators wait to engage: there are no setpoints.
+    let waiting: Vec<_> = (0..4)
+        .map(|_| crate::support::children::Hexad::start(&machine, "engage", &["--wait", "--within", "60"]))
+        .collect();
+    waiting.iter().for_each(|one| one.says("waiting: no measurement"));
+    stops(&machine, "estop", &["fault"]);
+    clear(&machine);
+    drop(waiting);
+    let plant = start_plant(&machine);
+    let _peer = peer::start(&machine);
+    let hostile = Hostile::start(&path);
+    hostile.must_have_sent(10_000_000);
+    let (mut by_socket, mut longest) = (0, Duration::ZERO);
+    for trial in 0..TRIALS {
+        // Not under control each time.
+        if trial % 2 == 0 {
+            let is_engaged = || ask(&machine, "engage", &["--wait"]).status.success();
+            assert!((0..5).any(|_| is_engaged()), "trial {trial}");
+        }
+        let began = Instant::now();
+        by_socket += usize::from(stops(&machine, "estop", &["fault"]));
+        longest = longest.max(began.elapsed());
+        let is_cleared = || ask(&machine, "clear", &[]).status.success();
+        assert!((0..5).any(|_| is_cleared()), "trial {trial}");
+    }
+    let sent = hostile.finish();
+    println!(
+        "{TRIALS} emergency stops under {HOSTILE} connections that sent {sent} bytes: {by_socket} by socket, longest {longest:?}"
+    );
+    assert!(by_socket > TRIALS / 2, "{by_socket} of {TRIALS}");
+    let timing = &status(&machine)["status"]["timing"];
+    println!("{timing}");
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+}
+
+#[test]
+fn without_its_socket_by_signal() {
+    let _turn = turns::beside_others();
+    let Controlled { peer: _peer, daemon, plant, machine } = Controlled::start(Machine::patient("signal"));
+    fs::remove_file(path_of(&daemon)).expect("a socket");
+    let by_signal = |request: &str, signal: &str, state: &str| {
+        let Ended { status, stdout, stderr } = ask(&machine, request, &[]);
+        assert_eq!((status.code(), stdout.trim_end()), (Some(0), state), "{stderr}");
+        let words =
+            format!("did not answer; {signal} to process {}, confirmed by the status messages", daemon.id());
+        assert!(stderr.contains(&words), "{words:?} must be in {stderr}");
+    };
+    by_signal("stop", "stop by SIGUSR2", "standby");
+    by_signal("off", "estop by SIGUSR1", "fault");
+    by_signal("estop", "estop by SIGUSR1", "fault");
+    let Ended { status, stderr, .. } = ask(&machine, "clear", &[]);
+    assert_eq!(status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains(&format!("clear is not confirmed: process {} does not answer", daemon.id())));
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+}
+
+/// Nothing confirms that a held daemon stops; when it goes on it must have stopped.
+#[test]
+fn a_held_daemon_is_not_called_stopped_and_stops_when_it_goes_on() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("held");
+    let recorder = Recorder::start(&machine.name);
+    let Controlled { peer: _peer, daemon, plant, machine } = Controlled::start(machine);
+    daemon.hold();
+    let Ended { status, stdout, stderr } = ask(&machine, "estop", &[]);
+    assert_eq!((status.code(), stdout.as_str()), (Some(1), ""), "{stderr}");
+    for words in ["estop is not confirmed: ", "by SIGUSR1 to process", "has not reported the result"] {
+        assert!(stderr.contains(words), "{words:?} must be in {stderr}");
+    }
+    daemon.signal("CONT");
+    recorder.until("it is in fault by the emergency stop, or by what it missed", |recording| {
+        recording.forces.last().filter(|force| force.state == 6 && force.valid == 0).map(drop)
+    });
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+}
+
+/// The control thread hangs in its log: nobody reads standard error.
+#[test]
+fn with_a_log_that_nobody_reads() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("unread");
+    let mut command = hexad();
+    command.arg("run").arg("--config").arg(&machine.file).stderr(Stdio::piped()).stdout(Stdio::null());
+    let mut daemon = command.spawn().expect("a daemon");
+    let plant = start_plant(&machine);
+    let _peer = peer::start(&machine);
+    engage(&machine);
+    let path = running_daemons(&machine.name).pop().expect("a record").socket;
+    let mut stream = UnixStream::connect(path).expect("a connection");
+    stream.set_write_timeout(Some(Duration::from_millis(300))).expect("a limit");
+    stream.set_read_timeout(Some(Duration::from_millis(300))).expect("a limit");
+    // Until it answers no more.
+    let line = b"{\"version\": 1, \"request\": \"engage\"}\n";
+    let mut answer = [0; 4096];
+    let answered = (0..5000)
+        .take_while(|_| {
+            stream.write_all(line).is_ok() && stream.read(&mut answer).is_ok_and(|count| count > 0)
+        })
+        .count();
+    assert!(answered < 5000, "its log never fills");
+    let Ended { status, stdout, stderr } = ask(&machine, "estop", &[]);
+    daemon.kill().expect("a signal");
+    daemon.wait().expect("its end");
+    assert_eq!((status.code(), stdout.trim_end()), (Some(0), "fault"), "{stderr}");
+    assert!(stderr.contains("confirmed by the status messages"), "after {answered} answers: {stderr}");
+    plant.stops_on("TERM", HANG);
+}
+
+/// Clients that stay silent, send half a line, send without end, or never read; each connects again when it is closed.
+struct Hostile {
+    stop: Arc<AtomicBool>,
+    sent: Arc<AtomicU64>,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Hostile {
+    fn start(path: &std::path::Path) -> Self {
+        let (stop, sent) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
+        let start = |number: usize| {
+            let (stop, sent, path) = (stop.clone(), sent.clone(), path.to_owned());
+            spawn(move || {
+                while !stop.load(Ordering::Relaxed) {
+                    let Ok(mut stream) = UnixStream::connect(&path) else { continue };
+                    let _ = stream.set_read_timeout(Some(Duration::from_millis(500)));
+                    let _ = stream.set_write_timeout(Some(Duration::from_millis(500)));
+                    let chunk = match number % 8 {
+                        0..3 => vec![],
+                        3..6 => b"{\"version\": 1, \"requ".to_vec(),
+                        6 => vec![b'x'; 1 << 16],
+                        _ => b"{\"version\": 1, \"request\": \"status\"}\n".repeat(100),
+                    };
+                    // No more than a gigabyte.
+                    for _ in 0..1 << 14 {
+                        if stop.load(Ordering::Relaxed) || stream.write_all(&chunk).is_err() {
+                            break;
+                        }
+                        sent.fetch_add(chunk.len() as u64, Ordering::Relaxed);
+                        if number % 8 < 6 && stream.read(&mut [0; 64]).is_ok_and(|count| count == 0) {
+                            break;
+                        }
+                    }
+                    sleep(Duration::from_millis(1));
+                }
+            })
+        };
+        let threads = (0..HOSTILE).map(start).collect();
+        Self { stop, sent, threads }
+    }
+
+    fn must_have_sent(&self, bytes: u64) {
+        let began = Instant::now();
+        while self.sent.load(Ordering::Relaxed) < bytes {
+            assert!(began.elapsed() < HANG, "{} bytes", self.sent.load(Ordering::Relaxed));
+            sleep(Duration::from_millis(10));
+        }
+    }
+
+    fn finish(self) -> u64 {
+        self.stop.store(true, Ordering::Relaxed);
+        self.threads.into_iter().for_each(|thread| thread.join().expect("a client"));
+        self.sent.load(Ordering::Relaxed)
+    }
+}
