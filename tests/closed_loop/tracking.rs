@@ -168,7 +168,7 @@ fn an_offset_decays_as_designed() {
                 ..SampledLoop::default()
             };
             let mut rig = Rig::new(&config, &config.machine);
-            let offset = 2e-4 * config.machine.joints.radius.min(1.0);
+            let offset = 5e-5 * config.machine.joints.radius.min(1.0);
             let task = TaskState::at_rest(config.machine.home);
             let wanted = task.motion().pose;
             rig.engage(&task);

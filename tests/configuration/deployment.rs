@@ -76,12 +76,12 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
         &["realtime.cpu_dma_latency_us = -1: must be an integer in [0, 1000000]"],
     );
     refused(
-        "[control]\nobserver_bandwidth_hz = 20.1",
-        &[
-            "control.observer_bandwidth_hz = 20.1: must be at most 20 at realtime.rate_hz = 1000 and these bandwidths (gain margin of 2, and 2 times the lesser bandwidth)",
-        ],
+        "[control]\ndisturbance_m_s2_per_sqrt_s = 0",
+        &["control.disturbance_m_s2_per_sqrt_s = 0: must be greater than 0"],
     );
-    refused("[control]\nposition_bandwidth_hz = 5\nobserver_bandwidth_hz = 10", &[]);
+    refused("[measured]\nlength_noise_m = 0", &["measured.length_noise_m = 0: must be greater than 0"]);
+    refused("[drive]\ndelay_us = 15001", &["drive.delay_us = 15001: must be in [0, 15000]"]);
+    refused("[drive]\ndelay_us = 15000\nlag_us = 300", &[]);
     refused(
         "[control]\nmode = \"pid\"",
         &[
@@ -91,7 +91,7 @@ fn deployment_is_refused_beyond_what_the_rate_carries() {
     refused("[control]\nmode = \"joint_pd\"", &[]);
     // What follows from a refused number is not said again.
     let found =
-        violations(&format!("{FRIED}[control]\nposition_bandwidth_hz = 300\nobserver_bandwidth_hz = 5"));
+        violations(&format!("{FRIED}[control]\nposition_bandwidth_hz = 300\ncompensate_disturbances = true"));
     let keys: Vec<_> = found.iter().map(|violation| violation.key.as_str()).collect();
     assert_eq!(keys, ["control.position_bandwidth_hz"]);
     refused(

@@ -107,7 +107,7 @@ fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
             k + 1,
             length_m * 1e3,
             bar(share, BAR, '#'),
-            fixed(rate_m_s * 1e3, 1),
+            rate_m_s.map_or_else(|| "-".to_owned(), |rate| fixed(rate * 1e3, 1)),
             fixed(*force_n, 1),
             bar(force_n.abs() / report.max_force_n, BAR / 2, if *force_n < 0.0 { '-' } else { '+' }),
         )?;
@@ -207,7 +207,7 @@ mod tests {
             condition: Some(6.789),
             condition_limit: 100.0,
             time_to_singularity_s: Some(0.5),
-            legs: vec![LegReport { length_m: 1.225, rate_m_s: -0.123, force_n: -250.0 }; 6],
+            legs: vec![LegReport { length_m: 1.225, rate_m_s: Some(-0.123), force_n: -250.0 }; 6],
             stroke_m: [0.85, 1.6],
             max_force_n: 500.0,
             sources: vec![source("setpoint"), source("measured")],

@@ -143,6 +143,8 @@ pub struct Readings {
 
 /// Innovations beyond the disturbance that are noise, over its standard deviation: once in years.
 const NOISE_DEVIATIONS: f64 = 10.0;
+/// Innovation of a leg that is plausible whatever its noise \[m\]: of friction, play and impacts.
+const MIN_INNOVATION_BOUND_M: f64 = 1e-4;
 
 impl EstimatorConstants {
     /// Evaluates them.
@@ -159,7 +161,7 @@ impl EstimatorConstants {
     /// estimate does not know yet, `a (1 / we^2 + dt^2 / 2)`.
     pub fn innovation_bound(&self, dt: f64) -> f64 {
         let lag = 1.0 / self.noise.bandwidth;
-        NOISE_DEVIATIONS * self.readings.noise + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
+        MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.readings.noise) + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
     }
 }
 

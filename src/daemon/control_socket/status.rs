@@ -76,9 +76,8 @@ pub struct LegReport {
     /// Measured length \[m\]; null in JSON if the driver sent no number.
     #[serde(deserialize_with = "number_or_nan")]
     pub length_m: f64,
-    /// Measured rate \[m/s\], likewise.
-    #[serde(deserialize_with = "number_or_nan")]
-    pub rate_m_s: f64,
+    /// Measured rate \[m/s\]; null if the driver sends none.
+    pub rate_m_s: Option<f64>,
     /// Commanded force \[N\]; 0 without control.
     pub force_n: f64,
 }
@@ -225,9 +224,10 @@ fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
 
 fn legs(snapshot: &Snapshot) -> Vec<LegReport> {
     let Some(measurement) = &snapshot.measurement else { return vec![] };
-    let numbers = measurement.length.iter().zip(&measurement.rate).zip(&snapshot.force).take(LEGS);
+    let rates = measurement.rate.map_or([None; LEGS], |rate| rate.map(Some));
+    let numbers = measurement.length.iter().zip(rates).zip(&snapshot.force).take(LEGS);
     numbers
-        .map(|((length, rate), force)| LegReport { length_m: *length, rate_m_s: *rate, force_n: *force })
+        .map(|((length, rate), force)| LegReport { length_m: *length, rate_m_s: rate, force_n: *force })
         .collect()
 }
 

@@ -61,9 +61,9 @@ fn the_history_returns_the_motion_of_each_instant() {
         recorded.push((motion, jerk));
         motion = integrated(&motion, &jerk, 1e-3);
     }
-    // Of the newest 512 segments: their begins, within, and after the last.
+    // Of the newest 128 segments: their begins, within, and after the last.
     #[allow(clippy::needless_range_loop, reason = "the index is the cycle")]
-    for k in 188..700_usize {
+    for k in 572..700_usize {
         let (motion, jerk) = &recorded[k];
         let begin_ns = 1000 * MS + k as u64 * MS;
         for part_ns in [0, 300_000, 999_999] {
@@ -76,8 +76,8 @@ fn the_history_returns_the_motion_of_each_instant() {
     let after = history.motion_at(1699 * MS + 1_500_000).unwrap();
     assert_near(&after, &integrated(&last, &jerk, 1.5e-3), [1e-7, 1e-12, 1e-9]);
     // Before the oldest: with its acceleration.
-    let before = history.motion_at(1187 * MS).unwrap();
-    assert_near(&before, &integrated(&recorded[188].0, &Vector6::zeros(), -1e-3), [1e-7, 1e-12, 1e-9]);
+    let before = history.motion_at(1571 * MS).unwrap();
+    assert_near(&before, &integrated(&recorded[572].0, &Vector6::zeros(), -1e-3), [1e-7, 1e-12, 1e-9]);
     history.clear();
     assert!(history.motion_at(1699 * MS).is_none());
 }
