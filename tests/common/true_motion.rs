@@ -222,8 +222,12 @@ impl Meter {
         };
         let angle = ENVELOPE_ALLOWANCE_RAD + held(&limits.orientation, &law.orientation);
         let distance = ENVELOPE_ALLOWANCE_M + held(&limits.position, &law.position);
+        let room_m = ROOM_RATIO * self.machine.actuator.stroke();
         let farther = excess.iter().enumerate().map(|(axis, excess)| {
-            (excess - self.beyond.envelope[axis]) / if axis < 3 { angle } else { distance }
+            let (allowed, room) =
+                if axis < 3 { (angle, room_m / self.machine.joints.radius) } else { (distance, room_m) };
+            let began = self.beyond.envelope[axis];
+            (excess - began - if began > 0.0 { room } else { 0.0 }) / allowed
         });
         farther.fold(f64::NEG_INFINITY, f64::max)
     }
