@@ -60,8 +60,8 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
     let feedback_scale = section.number_or("feedback_scale", 0.5, Bound::Positive);
     let stroke_margin_m = stroke_margin_m(&mut section, machine);
-    let acceleration = (1.0 + feedback_scale) * position.acceleration;
-    let condition = condition(&mut section, machine, held_condition(machine, realtime, acceleration));
+    let held = held_condition(machine, realtime, &position, feedback_scale);
+    let condition = condition(&mut section, machine, held);
     section.finish();
     DeploymentLimits {
         reference: ReferenceLimits { position, orientation, autonomous_scale },
@@ -88,16 +88,26 @@ fn stroke_margin_m(section: &mut SectionReader, machine: &Machine) -> f64 {
     margin
 }
 
-/// Condition up to which held forces let a tracking error grow slowly enough for the rate.
+/// Condition up to which forces that are held turn little enough with the legs.
 ///
 /// Forces F that carry a load `m a` are at most `condition m a / |N|`. Held, they turn with the legs: a displacement s of the
-/// joints changes their wrench by at most `|N| F s / L`. So the error grows with `s'' <= condition a / L s` until a force
-/// computed from it acts.
-fn held_condition(machine: &Machine, realtime: &Realtime, acceleration: f64) -> f64 {
-    let delay_s = (realtime.longest_delay() + MIDDLE_OF_HOLD) * realtime.period_s();
+/// joints changes their wrench by at most `|N| F s / L`, the acceleration by `condition a / L s`. So a tracking error s grows
+/// with `s'' <= condition a / L s` until a force computed from it acts, and within half of a period the acceleration departs
+/// from its mean, on a way of half a period at the largest velocity: by no more than feedback may add.
+fn held_condition(
+    machine: &Machine,
+    realtime: &Realtime,
+    position: &DerivativeLimits,
+    feedback_scale: f64,
+) -> f64 {
+    let middle_s = MIDDLE_OF_HOLD * realtime.period_s();
+    let delay_s = realtime.longest_delay() * realtime.period_s() + middle_s;
+    let of_error = (MAX_GROWTH_EXPONENT / delay_s).powi(2);
+    let of_hold = feedback_scale * position.acceleration / (position.velocity * middle_s);
     let lengths = leg_lengths(machine, &machine.home_pose());
     let shortest = lengths.into_iter().fold(f64::INFINITY, f64::min);
-    (MAX_GROWTH_EXPONENT / delay_s).powi(2) * shortest / (machine.gravity.norm() + acceleration)
+    let load = machine.gravity.norm() + (1.0 + feedback_scale) * position.acceleration;
+    of_error.min(of_hold) * shortest / load
 }
 
 /// Largest condition. The default is less where the rate is slow, and leaves room around a home that is badly conditioned;
