@@ -225,7 +225,8 @@ fn timing(snapshot: &Snapshot, rate_hz: f64) -> TimingReport {
 
 fn legs(snapshot: &Snapshot) -> Vec<LegReport> {
     let Some(measurement) = &snapshot.measurement else { return vec![] };
-    let numbers = measurement.length.iter().zip(&measurement.rate).zip(&snapshot.force).take(LEGS);
+    let rates = measurement.rate.unwrap_or([f64::NAN; LEGS]);
+    let numbers = measurement.length.iter().zip(&rates).zip(&snapshot.force).take(LEGS);
     numbers
         .map(|((length, rate), force)| LegReport { length_m: *length, rate_m_s: *rate, force_n: *force })
         .collect()
