@@ -160,7 +160,8 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             period_s: parameters.noise.period_s,
         },
         // What the estimator knows beside the age of the measurement.
-        force_delay_ns: ((setup.sampled.known_delay - setup.age).max(0.0) * parameters.period_ns as f64) as u64,
+        force_delay_ns: ((setup.sampled.known_delay - setup.age).max(0.0) * parameters.period_ns as f64)
+            as u64,
         force_rate: UNLIMITED,
         feedback_scale: UNLIMITED,
         ..parameters
