@@ -101,7 +101,11 @@ fn at(machine: &Machine, path: &FittedMotion, time_ns: u64) -> (SetpointMessage,
         x_accel: state.xdd.into(),
         ..SetpointMessage::default()
     };
-    let measured =
-        MeasuredMessage { length_m: legs.length, length_rate_m_s: legs.rate, rates_valid: 1, ..MeasuredMessage::default() };
+    let measured = MeasuredMessage {
+        length_m: legs.length,
+        length_rate_m_s: legs.rate,
+        rates_valid: 1,
+        ..MeasuredMessage::default()
+    };
     (setpoint, measured)
 }

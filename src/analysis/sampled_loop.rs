@@ -127,8 +127,9 @@ impl<'a> Period<'a> {
 
     /// The state a period later; `noise` of the readings of e and of T e', and what acts beside the commands of so many periods ago.
     fn advance(&self, z: &DVector<f64>, noise: [f64; 2], push: impl Fn(usize) -> f64) -> DVector<f64> {
-        let SampledLoop { wn_t, damping_ratio, compensates_disturbance, known_delay, delay, mass_ratio, .. } =
-            *self.of;
+        let SampledLoop {
+            wn_t, damping_ratio, compensates_disturbance, known_delay, delay, mass_ratio, ..
+        } = *self.of;
         let at = |k: usize| z.get(k).copied().unwrap_or_default();
         let mut platform = Axis { e: at(0), v: at(1), d: 0.0 };
         let mut estimate = Axis { e: at(2), v: at(3), d: at(4) };
@@ -247,14 +248,19 @@ impl SampledLoop {
     /// stable.
     pub fn gain_margin(&self) -> f64 {
         let none = 16.0 * self.mass_ratio * (1.0 + 1.0 / (self.wn_t * self.damping_ratio));
-        let stable = (0..GAIN_STEPS).map(|step| 0.9_f64.powi(step)).find(|gain| self.is_stable_with_gain(*gain));
+        let stable =
+            (0..GAIN_STEPS).map(|step| 0.9_f64.powi(step)).find(|gain| self.is_stable_with_gain(*gain));
         stable.map_or(0.0, |inside| edge(inside, none, |gain| self.is_stable_with_gain(gain)))
     }
 
     /// The factor to which the loop gain may fall, or the inverse of that by which the mass may grow. Compensation of
     /// disturbances needs some gain.
     pub fn least_gain(&self) -> f64 {
-        if self.is_stable() { edge(1.0, 0.0, |gain| gain > 0.0 && self.is_stable_with_gain(gain)) } else { 1.0 }
+        if self.is_stable() {
+            edge(1.0, 0.0, |gain| gain > 0.0 && self.is_stable_with_gain(gain))
+        } else {
+            1.0
+        }
     }
 
     /// The longest stable delay, in periods, of which the estimator knows as much as of the present one; no longer than
@@ -308,7 +314,10 @@ mod tests {
             let masses = [1.0 / each.gain_margin(), 1.0 / each.least_gain()];
             let delay = each.longest_delay() - each.delay;
             println!("{estimator_hz} Hz, {told_ms} ms: {masses:.3?}, {delay:.3}");
-            assert!((masses[0] - lightest).abs() < 0.006 && (masses[1] - heaviest).abs() < 0.06, "{masses:?}");
+            assert!(
+                (masses[0] - lightest).abs() < 0.006 && (masses[1] - heaviest).abs() < 0.06,
+                "{masses:?}"
+            );
             assert!((delay - further).abs() < 0.06, "{delay}");
         }
     }
@@ -331,7 +340,8 @@ mod tests {
             let with = at_10_hz(30.0, 2.0);
             let gain = share * with.gain_margin();
             let light = SampledLoop { mass_ratio: 1.0 / gain, ..with };
-            let late = SampledLoop { delay: with.delay + share * (with.longest_delay() - with.delay), ..with };
+            let late =
+                SampledLoop { delay: with.delay + share * (with.longest_delay() - with.delay), ..with };
             [(light, share < 1.0), (late, share < 1.0)]
         }) {
             let response = each.response(0.0, 1e-3, 4000);
@@ -346,7 +356,12 @@ mod tests {
     fn what_is_stable_is_one_interval_of_bandwidths_and_of_delays() {
         for compensates_disturbance in [true, false] {
             for delay in [0.6, 2.1, 5.3] {
-                let each = SampledLoop { compensates_disturbance, known_delay: delay - 0.5, delay, ..at_10_hz(10.0, 0.0) };
+                let each = SampledLoop {
+                    compensates_disturbance,
+                    known_delay: delay - 0.5,
+                    delay,
+                    ..at_10_hz(10.0, 0.0)
+                };
                 let limit = each.largest_wn_t();
                 for percent in (5..300).step_by(5).filter(|percent| *percent != 100) {
                     let share = 0.01 * f64::from(percent);

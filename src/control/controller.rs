@@ -9,18 +9,17 @@ use super::estimator::LegRateEstimator;
 use super::feedback_bound::FeedbackBound;
 use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
-use super::input_validation::{
-    MeasurementValidator, SetpointValidator, ValidatedSetpoint, seconds_between,
-};
+use super::free_motion::FreeMotion;
+use super::input_validation::{MeasurementValidator, SetpointValidator, ValidatedSetpoint};
 use super::limits::LimitSet;
-use super::localization::{Localization, Located, PlatformState};
+use super::localization::{Localization, PlatformState};
 use super::parameters::{Constants, Parameters};
 use super::reference::{ReferenceGenerator, Target};
 use super::state::{OperatorRequest, Request, State};
 use super::supervisor::Supervisor;
 use super::tracking_error::{ErrorTracker, TrackingError, setpoint_error};
 use crate::model::machine::{LEGS, Machine};
-use crate::model::rigid::{Acceleration, Motion, Wrench};
+use crate::model::rigid::{Motion, Wrench};
 use crate::model::task::TaskState;
 
 /// Meaning of the numbers of a setpoint, as the messages carry it.
@@ -132,6 +131,7 @@ pub struct Controller {
     measurements: MeasurementValidator,
     setpoints: SetpointValidator,
     localization: Localization,
+    free_motion: FreeMotion,
     errors: ErrorTracker,
     supervisor: Supervisor,
     reference: ReferenceGenerator,
@@ -150,6 +150,7 @@ impl Controller {
             constants,
             measurements: MeasurementValidator::default(),
             setpoints: SetpointValidator::default(),
+            free_motion: FreeMotion::default(),
             errors: ErrorTracker::default(),
             supervisor: Supervisor::default(),
             leg_rates: LegRateEstimator::default(),
@@ -161,7 +162,7 @@ impl Controller {
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
-        let Self { errors, leg_rates, feedback, limiter, .. } = self;
+        let Self { free_motion, errors, leg_rates, feedback, limiter, .. } = self;
         let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
         let parameters = &constants.parameters;
 
@@ -174,6 +175,7 @@ impl Controller {
             let rate = leg_rates.rates(&constants.leg_rates, measurement);
             localization.locate(&cycle, measurement, rate)
         });
+        let free_motion = free_motion.update(&cycle, located.as_ref().ok());
         let mut error = match &mut located {
             Ok(located) if cycle.state.has_control() => {
                 Some(errors.update(&cycle, reference, localization, located))
@@ -191,6 +193,7 @@ impl Controller {
             error: error.as_ref(),
             feedback,
             trust: errors.check_trust(),
+            free_motion: free_motion.as_ref(),
         };
         let (findings, assessed_limits) = assess(&cycle, &evidence, localization, reference);
         let next = supervisor.decide(request, &findings, parameters.after_loss);
@@ -201,8 +204,9 @@ impl Controller {
         // Reference.
         let begin_ns = cycle.release_ns.saturating_add(parameters.force_delay_ns);
         let begins = next.has_control() && !cycle.state.has_control();
-        if let Some(located) = located.as_ref().ok().filter(|_| begins) {
-            error = Some(begin(&cycle, begin_ns, reference, errors, located));
+        if let Some(motion) = free_motion.as_ref().filter(|_| begins) {
+            reference.start(constants, begin_ns, motion);
+            error = Some(errors.start(constants, begin_ns));
         }
         if next.has_control() {
             let target = target(constants, next, &setpoint);
@@ -223,7 +227,8 @@ impl Controller {
             let limited = limiter.limit(&cycle, &force, &motion)?;
             if limited.force != force {
                 let LimitedForces { wrench_error, .. } = &limited;
-                sent += constants.input_matrix.acceleration_of(constants.machine(), &motion.pose, wrench_error);
+                sent +=
+                    constants.input_matrix.acceleration_of(constants.machine(), &motion.pose, wrench_error);
             }
             errors.record_sent(begin_ns, &sent);
             Ok(limited)
@@ -253,24 +258,6 @@ impl Controller {
             reference: supervisor.mode.state.has_control().then(|| *reference.motion()),
         }
     }
-}
-
-/// Begins the reference at the measured pose and twist, where the platform is when the first force acts. Without force the
-/// acceleration is that of the brakes, from which the drives take over: it begins at zero. Returns the error against it.
-// Out of line, as it is rare: the cycle stays short.
-#[inline(never)]
-fn begin(
-    cycle: &Cycle<'_>,
-    begin_ns: u64,
-    reference: &mut ReferenceGenerator,
-    errors: &mut ErrorTracker,
-    located: &Located<'_>,
-) -> TrackingError {
-    let PlatformState { pose, twist, .. } = located.platform;
-    let measured = Motion { pose, twist, acceleration: Acceleration::default() };
-    let dt = seconds_between(located.measurement.time_ns, begin_ns);
-    reference.start(cycle.constants, begin_ns, &measured.after(dt));
-    errors.start(cycle, reference, located)
 }
 
 /// What the reference shall approach in a state; nothing where it follows its stop.

@@ -102,8 +102,8 @@ impl Law {
         compensates_disturbance: bool,
         limits: &Limits,
     ) -> Self {
-        let [angular, linear] = [&limits.orientation, &limits.position]
-            .map(|limits| SATURATION_RATIO * limits.acceleration);
+        let [angular, linear] =
+            [&limits.orientation, &limits.position].map(|limits| SATURATION_RATIO * limits.acceleration);
         let mut saturation = Vector6::repeat(linear);
         match mode {
             ControlMode::ComputedTorque => saturation.fixed_rows_mut::<3>(0).fill(angular),

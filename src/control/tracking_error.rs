@@ -112,18 +112,13 @@ pub(super) struct ErrorTracker {
 }
 
 impl ErrorTracker {
-    /// Begins with the error against a reference that has just begun. Returns it.
-    pub fn start(
-        &mut self,
-        cycle: &Cycle<'_>,
-        reference: &ReferenceGenerator,
-        located: &Located<'_>,
-    ) -> TrackingError {
-        let (error, deviation) = measured(cycle, &reference.motion_at(located.measurement.time_ns), located);
-        self.estimator.start(&cycle.constants.estimator, located.measurement.time_ns, &deviation);
+    /// Begins without an error at an instant: the reference begins there with the motion that the platform has then. Returns
+    /// the error.
+    pub fn start(&mut self, constants: &Constants, time_ns: u64) -> TrackingError {
+        self.estimator.start(&constants.estimator, time_ns, &FeedbackError::default());
         (self.sensors, self.trust) = (FrozenSensors::default(), None);
-        self.error = error;
-        error
+        self.error = TrackingError::default();
+        self.error
     }
 
     /// Corrects the estimate by a measurement, if it is new. Returns the error. Where the driver sends no rates, the twist of
@@ -151,7 +146,8 @@ impl ErrorTracker {
                 .and_then(|()| check_innovation(constants, &innovation, interval_s, located))
                 .err();
         }
-        if located.measurement.rate.is_none() {
+        // A measurement from before control began shows another motion.
+        if located.measurement.rate.is_none() && interval_s >= 0.0 {
             let rate = &estimator.state().rate;
             error.twist = if acts_on_legs {
                 localization.twist_of(constants, rate).unwrap_or(error.twist)
@@ -196,11 +192,8 @@ fn check_innovation(
     let bound = constants.estimator.innovation_bound(interval_s);
     let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
     let Twist { angular, linear } = Twist::from_vector(innovation);
-    let largest = if acts_on_legs {
-        innovation.amax()
-    } else {
-        linear.norm() + constants.arm * angular.norm()
-    };
+    let largest =
+        if acts_on_legs { innovation.amax() } else { linear.norm() + constants.arm * angular.norm() };
     if largest <= bound {
         return Ok(());
     }
@@ -209,9 +202,11 @@ fn check_innovation(
     } else {
         leg_wrenches(constants.machine(), &located.platform.pose).tr_mul(innovation)
     };
-    let (leg, largest) = of_legs.iter().map(|value| value.abs()).enumerate().fold((0, 0.0), |most, next| {
-        if next.1 > most.1 { next } else { most }
-    });
+    let (leg, largest) = of_legs
+        .iter()
+        .map(|value| value.abs())
+        .enumerate()
+        .fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most });
     if largest <= bound {
         return Ok(());
     }

@@ -105,7 +105,9 @@ mod tests {
         let mut message = ForceMessage::new(&output, 0);
         (message.header.schema, message.header.time_ns) = (ForceMessage::SCHEMA, 1_000);
         message.checksum = message.computed_checksum();
-        for (now_ns, may_be_applied) in [(999, false), (1_000, true), (1_020, true), (1_021, false), (u64::MAX, false)] {
+        for (now_ns, may_be_applied) in
+            [(999, false), (1_000, true), (1_020, true), (1_021, false), (u64::MAX, false)]
+        {
             assert_eq!(message.may_be_applied(now_ns, 20), may_be_applied, "{now_ns}");
         }
         message.force_n[3] = 1.0;

@@ -16,14 +16,19 @@ struct Delay {
 const TOLD: Delay = Delay { told: Some(0.0), truth: 0.0 };
 
 fn config(machine: &str, rate_hz: f64, delay: Delay) -> Config {
-    let drive = delay.told.map_or_else(String::new, |told| {
-        format!("delay_us = {:?}", 1e3 * told + 1e6 * SENDING / rate_hz)
-    });
+    let drive = delay
+        .told
+        .map_or_else(String::new, |told| format!("delay_us = {:?}", 1e3 * told + 1e6 * SENDING / rate_hz));
     configured(machine, &format!("[realtime]\nrate_hz = {rate_hz:?}\n[drive]\n{drive}\n"))
 }
 
 /// RMS of the true position error over the fast scene \[um\].
-fn rms_um(config: &Config, mass: f64, imperfections: &Imperfections, has_rates: bool) -> Result<f64, DiagnosticCode> {
+fn rms_um(
+    config: &Config,
+    mass: f64,
+    imperfections: &Imperfections,
+    has_rates: bool,
+) -> Result<f64, DiagnosticCode> {
     let mut platform = config.machine.clone();
     platform.platform.mass *= mass;
     let mut control = HardwareLoop::new(config, &platform, imperfections);

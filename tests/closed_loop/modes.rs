@@ -64,8 +64,9 @@ const EXPECTED: [(ControlMode, [f64; 3]); 4] = [
 ];
 
 fn measured(name: &str, mode: ControlMode) -> [f64; 3] {
-    [(false, 1.0), (false, 1.2), (true, 1.2)]
-        .map(|(is_compensating, share)| 1e6 * fast(&in_mode(name, mode, is_compensating), share).position.rms())
+    [(false, 1.0), (false, 1.2), (true, 1.2)].map(|(is_compensating, share)| {
+        1e6 * fast(&in_mode(name, mode, is_compensating), share).position.rms()
+    })
 }
 
 #[test]
@@ -87,7 +88,8 @@ fn every_mode_leaves_what_it_does_not_know() {
 #[test]
 fn computed_torque_is_twenty_times_better_than_joint_pd() {
     for name in ["fried2008", "motion_base", "tsai2000"] {
-        let rms = |mode, is_compensating, share| fast(&in_mode(name, mode, is_compensating), share).position.rms();
+        let rms =
+            |mode, is_compensating, share| fast(&in_mode(name, mode, is_compensating), share).position.rms();
         let pd = rms(ControlMode::JointPd, false, 1.0);
         let [exact, heavy, compensated] = [(false, 1.0), (false, 1.2), (true, 1.2)]
             .map(|(is_compensating, share)| rms(ControlMode::ComputedTorque, is_compensating, share));

@@ -30,7 +30,8 @@ fn scene(config: &Config, share: f64) -> impl Fn(f64) -> TaskState {
         // Two seconds at rest to engage, then the speed rises within one.
         let (t, rise) = ((t - 2.0).max(0.0), 1.0);
         let part = (t / rise).min(1.0);
-        let (speed, slope) = (share * part * part * (3.0 - 2.0 * part), share * 6.0 * part * (1.0 - part) / rise);
+        let (speed, slope) =
+            (share * part * part * (3.0 - 2.0 * part), share * 6.0 * part * (1.0 - part) / rise);
         let way = share * (if t < rise { rise * part.powi(3) * (1.0 - 0.5 * part) } else { t - 0.5 * rise });
         let TaskState { x, xd, xdd } = fast.at(way);
         TaskState { x, xd: xd * speed, xdd: xdd * (speed * speed) + xd * slope }
@@ -46,8 +47,11 @@ fn freeze(config: &Config, share: f64, legs: &[usize], noise: f64, from_s: f64) 
     }
     let config = &config;
     let sensor = SensorErrors { length_noise: noise, length_step: 1e-6, ..SensorErrors::default() };
-    let mut control =
-        HardwareLoop::new(config, &config.machine, &Imperfections { seed: 1, sensor, ..Imperfections::default() });
+    let mut control = HardwareLoop::new(
+        config,
+        &config.machine,
+        &Imperfections { seed: 1, sensor, ..Imperfections::default() },
+    );
     let scene = scene(config, share);
     let (mut frozen, mut farthest, mut output) = (None::<[f64; LEGS]>, 0.0_f64, Output::default());
     while control.time_s() < from_s + 4.0 {
@@ -147,7 +151,10 @@ fn friction_shakes_no_platform_at_rest() {
         [(0.05, 0.05, 0.0, 1e-6), (0.04, 0.05, 0.0, 10e-6), (0.05, 0.035, 0.015, 10e-6)]
     {
         let found = settled(model, plant, stiction);
-        println!("friction {model} in the model, {plant} + {stiction} in the plant: {:.3} um at rest", 1e6 * found);
+        println!(
+            "friction {model} in the model, {plant} + {stiction} in the plant: {:.3} um at rest",
+            1e6 * found
+        );
         assert!(found < bound, "{model} {plant} {stiction}: {found} m");
     }
 }

@@ -9,10 +9,11 @@ use hexad::model::machine::{LEGS, Machine};
 use hexad::model::task::TaskState;
 use hexad::plant::hardware::Hardware;
 use hexad::plant::imperfections::Imperfections;
+use toml::Table;
 
 use super::fast::Fast;
 use super::rig::{Tracking, parameters};
-use super::angle_between;
+use super::{angle_between, edited};
 
 /// From the release to the force message, as a share of the period.
 pub const SENDING: f64 = 0.1;
@@ -21,11 +22,15 @@ const SETTLING_S: f64 = 2.0;
 /// The clock of a computer that has been up for a while.
 const START_NS: u64 = 86_400_000_000_000;
 
-/// A deployable machine with additional lines of configuration.
+/// A deployable machine with other values of the keys in these lines.
 pub fn configured(machine: &str, lines: &str) -> Config {
-    let path = format!("{}/config/{machine}.toml", env!("CARGO_MANIFEST_DIR"));
-    let text = std::fs::read_to_string(path).unwrap();
-    Config::parse(&format!("{text}\n{lines}\n"), machine).unwrap_or_else(|error| panic!("{error}"))
+    let mut table = edited::deployed_table(machine);
+    for (section, keys) in lines.parse::<Table>().unwrap() {
+        for (key, value) in keys.as_table().unwrap() {
+            edited::set(&mut table, &section, key, value.clone());
+        }
+    }
+    edited::config(&table)
 }
 
 /// A controller and imperfect hardware.

@@ -114,7 +114,11 @@ impl Rig {
         Input {
             release_ns: self.now_ns + self.period_ns / 2,
             setpoint: Some(Setpoint::motion(self.now_ns, *task)),
-            measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: Some(legs.rate) }),
+            measurement: Some(Measurement {
+                time_ns: self.now_ns,
+                length: legs.length,
+                rate: Some(legs.rate),
+            }),
             request: self.asked,
             deadline_missed: false,
         }

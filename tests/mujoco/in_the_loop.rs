@@ -172,7 +172,8 @@ impl Stage {
             let (length_m, length_rate_m_s) = hardware.measure();
             let state = *hardware.simulator().state();
             let x = task_coordinates(&state.pose, &self.config.machine.home);
-            let message = MeasuredMessage { length_m, length_rate_m_s, rates_valid: 1, ..MeasuredMessage::default() };
+            let message =
+                MeasuredMessage { length_m, length_rate_m_s, rates_valid: 1, ..MeasuredMessage::default() };
             let force = ask(&mut measured, &mut forces, time_ns, message);
             let force = force.may_be_applied(force.header.time_ns, 0).then_some(force.force_n);
             periods.push(Period { time_ns, x: x.into(), twist: state.twist.vector(), force });

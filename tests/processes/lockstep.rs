@@ -81,7 +81,12 @@ impl Build {
             let mut began = Instant::now();
             for time_ns in (0..).step_by(PERIOD_NS as usize) {
                 let (length_m, length_rate_m_s) = hardware.measure();
-                let message = MeasuredMessage { length_m, length_rate_m_s, rates_valid: 1, ..MeasuredMessage::default() };
+                let message = MeasuredMessage {
+                    length_m,
+                    length_rate_m_s,
+                    rates_valid: 1,
+                    ..MeasuredMessage::default()
+                };
                 let asked = Instant::now();
                 measured.publish(time_ns, message).expect("to send");
                 let mut times = 1;
@@ -97,7 +102,10 @@ impl Build {
                     }
                 };
                 assert_eq!((force.release_ns, force.header.time_ns), (time_ns, time_ns), "one answer each");
-                hardware.advance(PERIOD_NS, force.may_be_applied(force.header.time_ns, 0).then_some(force.force_n));
+                hardware.advance(
+                    PERIOD_NS,
+                    force.may_be_applied(force.header.time_ns, 0).then_some(force.force_n),
+                );
                 let ended = force.valid == 0 && said.last().is_some_and(|last| last.valid == 1);
                 said.push(force);
                 if ended {

@@ -197,7 +197,9 @@ impl Plant<'_> {
         let has_margins = |estimator_hz: &f64| {
             loops.iter().all(|(hertz, sampled, gain)| {
                 let (wn_t, estimator_ratio) = (TAU * hertz * period_s, estimator_hz / hertz);
-                is_stable_with_masses(&SampledLoop { wn_t, estimator_ratio, ..*sampled }.with_feedback_gain(*gain))
+                is_stable_with_masses(
+                    &SampledLoop { wn_t, estimator_ratio, ..*sampled }.with_feedback_gain(*gain),
+                )
             })
         };
         let slower = (0..ESTIMATOR_STEPS).map(|step| largest_hz * 0.8_f64.powi(step));
@@ -221,9 +223,8 @@ fn gains(
     let Realtime { rate_hz, .. } = *plant.realtime;
     let damping_ratio = section.number_or(damping_key, 1.0, DAMPING_RATIO_BOUND);
     let sampled = of(damping_ratio);
-    let with = |hertz: f64| {
-        SampledLoop { wn_t: TAU * hertz / rate_hz, ..sampled }.with_feedback_gain(stiffest)
-    };
+    let with =
+        |hertz: f64| SampledLoop { wn_t: TAU * hertz / rate_hz, ..sampled }.with_feedback_gain(stiffest);
     let default_hz = if is_stable_with_masses(&with(DEFAULT_BANDWIDTH_HZ)) {
         DEFAULT_BANDWIDTH_HZ
     } else {

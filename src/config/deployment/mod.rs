@@ -78,7 +78,7 @@ pub struct Timeouts {
 pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
-    let limits = limits::read(root.section("limits"), machine);
+    let limits = limits::read(root.section("limits"), machine, &realtime);
     let noise = hardware::read_noise(root.section("measured"));
     let drive = hardware::read_drive(root.section("drive"));
     let control = control::read(

@@ -56,7 +56,8 @@ impl NoiseModel {
             gains[0] = covariance.correct_length();
             gains[1] = self.rate_noise().map_or(Gains::default(), |noise| covariance.correct_rate(noise));
             let [e, _, d] = gains[0];
-            if (e - before[0]).abs() <= STEADY_CHANGE * e && (d - before[2]).abs() <= STEADY_CHANGE * d.abs() {
+            if (e - before[0]).abs() <= STEADY_CHANGE * e && (d - before[2]).abs() <= STEADY_CHANGE * d.abs()
+            {
                 break;
             }
         }

@@ -133,7 +133,10 @@ mod tests {
         for k in 0..20_000 {
             let reference = [1.0 + 2e-8 * f64::from(k); LEGS];
             let length = reference.map(|length| (length * 1e6).round() * 1e-6);
-            assert!(sensors.check(&length, &Readings { noise: 0.0, step: 1e-6 }, || reference).is_ok(), "{k}");
+            assert!(
+                sensors.check(&length, &Readings { noise: 0.0, step: 1e-6 }, || reference).is_ok(),
+                "{k}"
+            );
         }
     }
 }

@@ -20,13 +20,12 @@ use nalgebra::Vector3;
 
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
-use super::regularity::RegularBalls;
+use super::regularity::{RegularBalls, Regularity};
 use super::stop::Stop;
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
 use crate::model::inverse_geometry::{leg_lengths, leg_lengths_and_rates};
-use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::LEGS;
 use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
@@ -67,8 +66,8 @@ pub(super) struct Examination<'a> {
     /// reference could not return.
     from: Option<&'a Pose>,
     length_excess: f64,
-    /// Its condition, once it is needed.
-    start_condition: Option<f64>,
+    /// Its regularity, once it is needed.
+    start_regularity: Option<Regularity>,
     /// Knots so far that no ball of earlier ones covers.
     factorizations: u32,
 }
@@ -128,7 +127,7 @@ impl<'a> Examination<'a> {
             }),
             from: step.from,
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
-            start_condition: None,
+            start_regularity: None,
             factorizations: 0,
             stop,
         })
@@ -170,8 +169,8 @@ impl<'a> Examination<'a> {
         let (v, w) = (self.stop.position.peak_velocity, self.stop.orientation.peak_velocity);
         let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
         // Between knots up to the limit of the platform: else a reference at its own limit could not leave it.
-        let (at_knot, around) = (constants.reference_condition, constants.parameters.condition);
-        let is_conditioned = balls.cover_by_known(constants, pose, [0.0; 2], at_knot);
+        let is_conditioned = balls.cover_by_known(constants, pose, [0.0; 2], constants.reference_condition);
+        let around = constants.parameters.condition;
         if is_conditioned && balls.cover_by_known(constants, pose, reach, around) {
             return Ok(());
         }
@@ -179,19 +178,22 @@ impl<'a> Examination<'a> {
         if self.factorizations > MAX_FACTORIZATIONS {
             return Err(Limit::Condition);
         }
-        let condition = balls.cover_by_new(constants, pose, reach, around).ok_or(Limit::Condition)?;
-        if is_conditioned || condition <= at_knot || condition <= self.condition_of_start() {
+        let regularity = balls.cover_by_new(constants, pose, reach, around).ok_or(Limit::Condition)?;
+        let at_knot = Regularity::of_reference(constants);
+        if is_conditioned || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
         }
         Err(Limit::Condition)
     }
 
-    /// The condition at the start of the step; 0 if there is none.
-    fn condition_of_start(&mut self) -> f64 {
+    /// Whether a pose is as regular as the reference must be, or no less so than the start of the step.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> bool {
         let Self { constants, from, .. } = *self;
-        *self.start_condition.get_or_insert_with(|| {
-            from.map_or(0.0, |from| KinematicState::new(constants.machine(), *from).sensitivity().condition)
-        })
+        let Some(from) = from else { return false };
+        let start = *self.start_regularity.get_or_insert_with(|| Regularity::at(constants, from));
+        Regularity::of_reference(constants).or_less(&start).is_kept_by(regularity)
     }
 
     /// The lengths at a knot, if the rates keep their limit.

@@ -48,7 +48,8 @@ impl History {
     /// The motion at an instant, extrapolated before the first and after the last segment.
     pub fn motion_at(&self, instant_ns: u64) -> Option<Motion> {
         let kept = self.count.min(SEGMENT_COUNT);
-        let recorded = |age: usize| self.segments.get((self.count - age) % SEGMENT_COUNT).and_then(Option::as_ref);
+        let recorded =
+            |age: usize| self.segments.get((self.count - age) % SEGMENT_COUNT).and_then(Option::as_ref);
         let contains = |age| recorded(age).is_some_and(|segment| segment.begin_ns <= instant_ns);
         // The newest that begins no later: most often one of the last, else by bisection.
         let (mut newer, mut older) = (0, 1);

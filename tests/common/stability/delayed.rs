@@ -44,9 +44,9 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// Half of the delay, half a period at most, before the release; perfect sensors.
+    /// What the estimator knows of the delay, half a period at most, before the release; perfect sensors.
     pub fn of(sampled: SampledLoop) -> Self {
-        Self { sampled, age: (0.5 * sampled.delay).min(0.5), sensor: SensorErrors::default() }
+        Self { sampled, age: sampled.known_delay.min(0.5), sensor: SensorErrors::default() }
     }
 }
 
@@ -160,7 +160,8 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             period_s: parameters.noise.period_s,
         },
         // What the estimator knows beside the age of the measurement.
-        force_delay_ns: ((setup.sampled.known_delay - setup.age).max(0.0) * parameters.period_ns as f64) as u64,
+        force_delay_ns: ((setup.sampled.known_delay - setup.age).max(0.0) * parameters.period_ns as f64)
+            as u64,
         force_rate: UNLIMITED,
         feedback_scale: UNLIMITED,
         ..parameters

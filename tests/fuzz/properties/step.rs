@@ -105,7 +105,11 @@ impl<'a> Play<'a> {
         Input {
             release_ns: self.now_ns + self.parameters.period_ns / 2,
             setpoint: Some(Setpoint::motion(self.now_ns, task)),
-            measurement: Some(Measurement { time_ns: self.now_ns, length: legs.length, rate: self.has_rates.then_some(legs.rate) }),
+            measurement: Some(Measurement {
+                time_ns: self.now_ns,
+                length: legs.length,
+                rate: self.has_rates.then_some(legs.rate),
+            }),
             request: self.asked,
             deadline_missed: false,
         }

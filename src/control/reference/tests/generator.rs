@@ -1,10 +1,10 @@
 //! The generator as a whole: what it does in one step, and where it leads.
 
 use super::super::components::Components;
+use super::super::held_stop::Phase;
 use super::super::pose_samples::PoseSamples;
 use super::super::pose_stop::{PoseStop, StopKind};
 use super::super::target::at_rest;
-use super::super::held_stop::Phase;
 use super::super::{ReferenceGenerator, Target};
 use super::*;
 use crate::control::controller::{Setpoint, SetpointKind};

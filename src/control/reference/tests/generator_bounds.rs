@@ -1,8 +1,8 @@
 //! The generator at its bounds: where it may begin, what it refuses, and that it comes back.
 
+use super::super::held_stop::Phase;
 use super::super::pose_stop::StopKind;
 use super::super::target::at_rest;
-use super::super::held_stop::Phase;
 use super::super::{ReferenceGenerator, Target};
 use super::generator::{MS, constants, run, standing, started, x};
 use super::*;

@@ -26,6 +26,7 @@ mod generator;
 mod generator_bounds;
 mod motion;
 mod regularity;
+mod universal;
 mod verification;
 
 const LIMITS: Limits = Limits {

@@ -133,7 +133,11 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
             // To second order in the step.
             assert!((wall.side.rate - rate).abs() < 2e-4, "{k}: {} not {rate}, gap {gap}", wall.side.rate);
             let derivative = -slope * rate - curvature;
-            assert!((wall.side.derivative - derivative).abs() < 2e-2, "{k}: {} not {derivative}", wall.side.derivative);
+            assert!(
+                (wall.side.derivative - derivative).abs() < 2e-2,
+                "{k}: {} not {derivative}",
+                wall.side.derivative
+            );
         }
     }
     assert!(outside > 100, "{outside}");
