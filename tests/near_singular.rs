@@ -25,6 +25,8 @@ use near_singular::scenes::{Scene, scenes};
 
 /// What the errors may be, over those of partial pivoting.
 const WORST_RATIO: f64 = 2.0;
+/// Of the largest of thousands of errors, a matter of chance.
+const WORST_RATIO_OF_LARGEST: f64 = 2.5;
 
 /// The guard of `model::balance`, to see that both sides of it are tested.
 const LEAST_DA: f64 = 0.2;
@@ -46,7 +48,7 @@ impl Both {
     fn assert_comparable(&self, what: &str) {
         let (max, rms) = (self.ours.max / self.lu.max, self.ours.rms() / self.lu.rms());
         println!("{what}: partial pivoting RMS {:.1e}, ratio max {max:.2}, RMS {rms:.2}", self.lu.rms());
-        assert!(max < WORST_RATIO && rms < WORST_RATIO, "{what}: ratio max {max}, RMS {rms}");
+        assert!(max < WORST_RATIO_OF_LARGEST && rms < WORST_RATIO, "{what}: ratio max {max}, RMS {rms}");
     }
 }
 

@@ -41,8 +41,11 @@ fn run(
     situation: Situation,
     disturbance: Disturbance,
 ) -> Outcome {
-    static WORLDS: LazyLock<Vec<[World; 7]>> = LazyLock::new(|| {
-        let of = |(policy, mode)| Situation::ALL.map(|situation| situation.world(mode, policy));
+    static WORLDS: LazyLock<Vec<Vec<World>>> = LazyLock::new(|| {
+        let of = |(policy, mode)| {
+            // One by one: all together are too many for the stack of a thread.
+            Situation::ALL.iter().map(|situation| situation.world(mode, policy)).collect()
+        };
         let modes = |policy| ControlMode::ALL.into_iter().map(move |mode| (policy, mode));
         POLICIES.into_iter().flat_map(modes).map(of).collect()
     });

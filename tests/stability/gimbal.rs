@@ -24,8 +24,8 @@ const TIMES_S: [f64; 2] = [2.0, 0.3];
 /// Angles beside the lock at which it is passed \[rad\].
 const BESIDE: [f64; 9] = [0.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 
-/// Between the two machines forces differ by rounding, amplified by the loop, as a share of the largest force.
-const ROUNDING: f64 = 1e-10;
+/// Between the two machines forces differ by rounding, amplified by the estimator, as a share of the largest force.
+const ROUNDING: f64 = 5e-9;
 
 /// A rotation about y, then by `d` about x, then the rest of it.
 #[derive(Clone, Copy)]

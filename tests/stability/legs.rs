@@ -4,6 +4,7 @@ use core::f64::consts::TAU;
 
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
 use hexad::control::state::State;
 use hexad::model::active_forces::InverseDynamics;
@@ -103,6 +104,11 @@ fn through_the_axis_of_a_joint_forces_are_cut_or_know_nothing_of_it() {
                 *value += Vector6::new(0.0, 0.0, 0.0, along.x, along.y, along.z) * (0.08 * share);
             }
             let output = rig.cycle(&rig.input(&task));
+            if output.diagnostic.code == DiagnosticCode::MeasurementImplausible {
+                // The cut forces leave the platform where no disturbance of the model's size explains it.
+                assert!(fidelity == Fidelity::Exact && cut > 0, "{fidelity:?} {beside:e} {cut}");
+                break;
+            }
             assert_eq!(output.state, State::Active, "{fidelity:?} {beside:e}: {:?}", output.diagnostic.code);
             cut += u32::from(
                 output.active_limits.contains(Limit::Force)

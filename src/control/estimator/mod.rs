@@ -161,7 +161,8 @@ impl EstimatorConstants {
     /// estimate does not know yet, `a (1 / we^2 + dt^2 / 2)`.
     pub fn innovation_bound(&self, dt: f64) -> f64 {
         let lag = 1.0 / self.noise.bandwidth;
-        MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.readings.noise) + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
+        MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.readings.noise)
+            + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
     }
 }
 
