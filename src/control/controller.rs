@@ -222,7 +222,8 @@ impl Controller {
             let acceleration = feedback.limit(&cycle, &desired.acceleration, &wanted);
             let mut sent = constants.input_matrix.acceleration(&acceleration);
             let in_middle = at_begin.after(0.5 * parameters.period_s(), &sent);
-            let motion = parameters.law.dynamics_motion(desired, &in_middle.error(), &acceleration);
+            let motion =
+                parameters.law.dynamics_motion(desired, &errors.without_lag(&in_middle), &acceleration);
             let force = forces(constants, &motion, &acceleration)?;
             let limited = limiter.limit(&cycle, &force, &motion)?;
             if limited.force != force {

@@ -107,6 +107,8 @@ pub(super) struct ErrorTracker {
     sensors: FrozenSensors,
     /// Measured; while there is no new measurement, predicted.
     error: TrackingError,
+    /// Measured minus estimated, after the last measurement has corrected the estimate.
+    residual: Vector6<f64>,
     /// Whether the measurements agree with the prediction.
     trust: Option<Diagnostic>,
 }
@@ -117,7 +119,7 @@ impl ErrorTracker {
     pub fn start(&mut self, constants: &Constants, time_ns: u64) -> TrackingError {
         self.estimator.start(&constants.estimator, time_ns, &FeedbackError::default());
         (self.sensors, self.trust) = (FrozenSensors::default(), None);
-        self.error = TrackingError::default();
+        (self.error, self.residual) = (TrackingError::default(), Vector6::zeros());
         self.error
     }
 
@@ -140,6 +142,7 @@ impl ErrorTracker {
         let innovation = estimator.correct(&constants.estimator, time_ns, &deviation);
         let is_new = innovation.is_some();
         if let Some(innovation) = innovation {
+            self.residual = deviation.value - estimator.state().value;
             let lengths = || leg_lengths(constants.machine(), &desired.pose);
             self.trust = sensors
                 .check(&located.measurement.length, &constants.estimator.readings, lengths)
@@ -174,6 +177,12 @@ impl ErrorTracker {
     /// The estimate at the instant at which a force begins.
     pub fn predicted(&self, begin_ns: u64) -> ErrorState {
         self.estimator.predicted(begin_ns)
+    }
+
+    /// A predicted error with the value that was measured: where the legs are, by which forces act. The estimate follows it
+    /// with a lag, and forces for a pose that lags are a negative stiffness, which grows with the condition.
+    pub fn without_lag(&self, predicted: &ErrorState) -> FeedbackError {
+        FeedbackError { value: predicted.value + self.residual, rate: predicted.rate }
     }
 
     /// Records the acceleration that feedback sends, after all limits, and the instant from which on it acts.
