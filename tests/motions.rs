@@ -15,6 +15,7 @@ mod motions {
     mod frozen_sensors;
     mod heave;
     mod lost_source;
+    mod old_measurements;
     mod old_setpoints;
     mod released_in_motion;
     mod replaced_source;

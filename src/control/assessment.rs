@@ -11,6 +11,7 @@ use super::reference::{ReferenceGenerator, Target};
 use super::state::State;
 use super::supervisor::Findings;
 use super::tracking_error::TrackingError;
+use crate::model::rigid::Motion;
 
 /// Deviation of the reference from a target at which it counts as reached, over the engage tolerance: near enough to a
 /// setpoint in motion, and at home almost at rest.
@@ -24,6 +25,8 @@ pub(super) struct Evidence<'a> {
     pub located: Result<&'a Located<'a>, Diagnostic>,
     pub error: Option<&'a TrackingError>,
     pub feedback: &'a FeedbackBound,
+    /// The motion with which control would begin, if it is known.
+    pub free_motion: Option<&'a Motion>,
 }
 
 // Out of line, as is `target` in the controller: jump tables inside `step` are beyond the proof on the machine code.
@@ -36,7 +39,7 @@ pub(super) fn assess(
     reference: &mut ReferenceGenerator,
 ) -> (Findings, LimitSet) {
     let parameters = &cycle.constants.parameters;
-    let Evidence { input, setpoint, located, error, feedback } = evidence;
+    let Evidence { input, setpoint, located, error, feedback, free_motion } = evidence;
     let (mut active_limits, conditioned) = localization.check_condition(parameters.condition);
     let (mut tracking, mut start) = (conditioned, Ok(()));
     if cycle.state.has_control() {
@@ -48,10 +51,8 @@ pub(super) fn assess(
                 _ => Ok(()),
             })
             .and(conditioned);
-    } else if let Ok(Located { platform, .. }) = located {
-        start = reference
-            .check_start(cycle.constants, &platform.pose, &platform.twist)
-            .map_err(|limit| Diagnostic::from(DiagnosticCode::PlatformMoving).at(limit as usize));
+    } else if located.is_ok() {
+        start = check_start(cycle, reference, *free_motion);
     }
     let engagement = conditioned
         .and(setpoint.status)
@@ -92,6 +93,19 @@ fn check_engage_tolerance(
         return Ok(());
     }
     Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))
+}
+
+/// Control may begin if the motion without force is known and a stop from it was verified.
+fn check_start(
+    cycle: &Cycle<'_>,
+    reference: &mut ReferenceGenerator,
+    free_motion: Option<&Motion>,
+) -> Result<(), Diagnostic> {
+    let moving = Diagnostic::from(DiagnosticCode::PlatformMoving);
+    let motion = free_motion.ok_or(moving)?;
+    reference
+        .check_start(cycle.constants, &motion.pose, &motion.twist)
+        .map_err(|limit| moving.at(limit as usize))
 }
 
 fn check_following_error(

@@ -9,16 +9,17 @@ use super::disturbance_observer::{DisturbanceObserver, ObserverReset};
 use super::feedback_bound::FeedbackBound;
 use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
+use super::free_motion::FreeMotion;
 use super::input_validation::{MeasurementValidator, SetpointValidator, ValidatedSetpoint};
 use super::limits::LimitSet;
-use super::localization::{Localization, Located, PlatformState};
+use super::localization::{Localization, PlatformState};
 use super::parameters::{Constants, Parameters};
 use super::reference::{ReferenceGenerator, Target};
 use super::state::{OperatorRequest, Request, State};
 use super::supervisor::Supervisor;
 use super::tracking_error::{ErrorSample, ErrorTracker, TrackingError};
 use crate::model::machine::{LEGS, Machine};
-use crate::model::rigid::{Acceleration, Motion, Wrench};
+use crate::model::rigid::{Motion, Wrench};
 use crate::model::task::TaskState;
 
 /// Meaning of the numbers of a setpoint, as the messages carry it.
@@ -130,6 +131,7 @@ pub struct Controller {
     measurements: MeasurementValidator,
     setpoints: SetpointValidator,
     localization: Localization,
+    free_motion: FreeMotion,
     errors: ErrorTracker,
     supervisor: Supervisor,
     reference: ReferenceGenerator,
@@ -148,6 +150,7 @@ impl Controller {
             constants,
             measurements: MeasurementValidator::default(),
             setpoints: SetpointValidator::default(),
+            free_motion: FreeMotion::default(),
             errors: ErrorTracker::default(),
             supervisor: Supervisor::default(),
             observer: DisturbanceObserver::default(),
@@ -159,7 +162,7 @@ impl Controller {
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
-        let Self { errors, observer, feedback, limiter, .. } = self;
+        let Self { free_motion, errors, observer, feedback, limiter, .. } = self;
         let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
         let parameters = &constants.parameters;
 
@@ -169,6 +172,7 @@ impl Controller {
 
         // Locate platform.
         let located = measurement.and_then(|measurement| localization.locate(&cycle, measurement));
+        let free_motion = free_motion.update(&cycle, located.as_ref().ok());
         let mut sample = errors.update(&cycle, reference, &setpoint, located.as_ref().ok());
 
         // Decide state.
@@ -179,6 +183,7 @@ impl Controller {
             located: located.as_ref().map_err(|diagnostic| *diagnostic),
             error: sample.as_ref().map(|sample| &sample.error),
             feedback,
+            free_motion: free_motion.as_ref(),
         };
         let (findings, assessed_limits) = assess(&cycle, &evidence, localization, reference);
         let next = supervisor.decide(request, &findings, parameters.after_loss);
@@ -188,8 +193,9 @@ impl Controller {
 
         // Reference.
         let begins = next.has_control() && !cycle.state.has_control();
-        if let Some(located) = located.as_ref().ok().filter(|_| begins) {
-            sample = begin(&cycle, reference, errors, &setpoint, located);
+        if let Some(motion) = free_motion.as_ref().filter(|_| begins) {
+            reference.start(constants, cycle.release_ns, motion);
+            sample = Some(errors.restart(cycle.release_ns));
         }
         if next.has_control() {
             let target = target(constants, next, &setpoint);
@@ -251,23 +257,6 @@ fn report_reference(output: &mut Output, reference: &ReferenceGenerator) {
     if output.state.has_control() {
         output.reference = Some(*reference.motion());
     }
-}
-
-/// Begins the reference at the measured pose and twist. Without force the acceleration is that of the brakes, from which the
-/// drives take over: it begins at zero. Returns the error against it.
-// Out of line, as it is rare: the cycle stays short.
-#[inline(never)]
-fn begin(
-    cycle: &Cycle<'_>,
-    reference: &mut ReferenceGenerator,
-    errors: &mut ErrorTracker,
-    setpoint: &ValidatedSetpoint<'_>,
-    located: &Located<'_>,
-) -> Option<ErrorSample> {
-    let PlatformState { pose, twist, .. } = located.platform;
-    let measured = Motion { pose, twist, acceleration: Acceleration::default() };
-    reference.start(cycle.constants, cycle.release_ns, &measured);
-    errors.restart(cycle, reference, setpoint, located)
 }
 
 /// What the reference shall approach in a state; nothing where it follows its stop.

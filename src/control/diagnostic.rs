@@ -145,7 +145,7 @@ codes! {
     /// The request cannot be carried out in this state.
     InvalidInState = 9, None, NO_NUMBER, "not possible in this state", "see the table of states";
     /// The platform moves so that it could not be brought to rest within every limit.
-    PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and no stop within every limit was found", "wait until the platform stands";
+    PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and its motion or a stop within every limit is not known", "wait until the platform stands";
     /// Without setpoints the platform holds its pose, as `[setpoint] on_violation` is `limit`.
     HoldingPose = 11, None, absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"), "no setpoints: the platform holds its pose", "start a setpoint source";
     /// Setpoints stopped arriving while the setpoint was in motion.

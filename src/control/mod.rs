@@ -22,6 +22,7 @@ pub mod disturbance_observer;
 mod feedback_bound;
 mod force_limits;
 mod forces;
+mod free_motion;
 pub mod gains;
 pub mod input_validation;
 pub mod law;

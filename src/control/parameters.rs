@@ -5,6 +5,7 @@ use super::limits::Limits;
 use super::supervisor::AfterStop;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
+use crate::model::inverse_geometry::universal_sine;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 
@@ -85,6 +86,12 @@ pub struct Envelope {
 
 /// Part of the way from the condition at home to its limit that the reference uses.
 const CONDITION_SHARE: f64 = 0.85;
+/// Least sine of the angle between a leg and the first axis of its universal joint, 6 degrees: fewer than any joint leaves.
+/// The moment of the leg's spin grows with the inverse of the third power; there it still changes by less than itself in a
+/// cycle of 10 ms.
+const MIN_UNIVERSAL_SINE: f64 = 0.1;
+/// The same as a ratio of that at home, for machines whose legs are as near to the axes there.
+const MIN_UNIVERSAL_SINE_PER_HOME: f64 = 0.5;
 
 /// Machine model, parameters and home pose: constant while the controller runs.
 #[derive(Clone, Debug)]
@@ -99,6 +106,8 @@ pub struct Constants {
     pub arm: f64,
     /// Largest condition of the reference: below that of the platform, for the following error.
     pub reference_condition: f64,
+    /// Least sine of the angle between a leg and the first axis of its universal joint, of the reference.
+    pub universal_sine: f64,
 }
 
 impl Constants {
@@ -109,7 +118,10 @@ impl Constants {
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
         let at_home = home.sensitivity().condition;
         let reference_condition = at_home + CONDITION_SHARE * (parameters.condition - at_home);
-        Self { dynamics: InverseDynamics::new(machine), parameters, home, arm, reference_condition }
+        let sine_at_home = universal_sine(machine, home.pose());
+        let universal_sine = MIN_UNIVERSAL_SINE.min(MIN_UNIVERSAL_SINE_PER_HOME * sine_at_home);
+        let dynamics = InverseDynamics::new(machine);
+        Self { dynamics, parameters, home, arm, reference_condition, universal_sine }
     }
 
     /// The machine.

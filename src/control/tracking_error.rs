@@ -146,7 +146,8 @@ impl ErrorTracker {
     ) -> Option<ErrorSample> {
         let has_control = cycle.state.has_control();
         let located = located.filter(|_| has_control || setpoint.status.is_ok())?;
-        let sample = match self.last.filter(|last| last.time_ns == located.measurement.time_ns) {
+        // A measurement from before control began shows another motion.
+        let sample = match self.last.filter(|last| last.time_ns >= located.measurement.time_ns) {
             Some(last) => last.predicted(&cycle.constants.parameters),
             None => ErrorSample::measure(cycle, has_control, reference, setpoint, located)?,
         };
@@ -154,15 +155,9 @@ impl ErrorTracker {
         Some(sample)
     }
 
-    /// The error against the reference that has just begun.
-    pub fn restart(
-        &mut self,
-        cycle: &Cycle<'_>,
-        reference: &ReferenceGenerator,
-        setpoint: &ValidatedSetpoint<'_>,
-        located: &Located<'_>,
-    ) -> Option<ErrorSample> {
-        self.last = ErrorSample::measure(cycle, true, reference, setpoint, located);
-        self.last
+    /// The error against the reference that begins at an instant, with the motion that the platform has then.
+    pub fn restart(&mut self, time_ns: u64) -> ErrorSample {
+        let (error, deviation) = (TrackingError::default(), FeedbackError::default());
+        *self.last.insert(ErrorSample { time_ns, error, deviation })
     }
 }

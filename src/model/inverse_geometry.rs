@@ -153,3 +153,12 @@ pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
         machine.joints.triples.unpack_vectors(&legs.direction.store())
     })
 }
+
+/// Least sine of the angle between a leg and the first axis of its universal joint, over the six legs: 0 where one is in
+/// line with it.
+pub fn universal_sine(machine: &Machine, pose: &Pose) -> f64 {
+    let axes = machine.joints.triples.unpack_vectors(&machine.joints.universal_axis);
+    let sines =
+        leg_directions(machine, pose).into_iter().zip(axes).map(|(leg, axis)| leg.cross(&axis).norm());
+    sines.fold(1.0, f64::min)
+}

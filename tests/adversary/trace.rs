@@ -2,6 +2,10 @@
 
 use hexad::control::controller::{Input, Output};
 use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::tracking_error::TrackingError;
+use hexad::model::inverse_geometry::universal_sine;
+use hexad::model::kinematic_state::KinematicState;
+use hexad::plant::simulator::Brakes;
 
 use super::common::extremes::{Extremes, Quantity};
 use super::common::observed::Observed;
@@ -26,6 +30,12 @@ pub fn print(observed: &Observed, input: &Input, output: &Output, before: &mut E
         let [omega, alpha] = [motion.twist.angular.norm(), motion.acceleration.angular.norm()];
         format!("v {v:.4} a {a:.3} omega {omega:.4} alpha {alpha:.3}")
     });
+    let condition = KinematicState::new(&observed.machine, state.pose).sensitivity().condition;
+    let sine = universal_sine(&observed.machine, &state.pose);
+    let force = output.force.iter().fold(0.0_f64, |largest, force| largest.max(force.abs()));
+    let (away, away_rate) = output.error.map_or((f64::NAN, f64::NAN), |TrackingError { pose, twist }| {
+        (pose.vector().norm(), twist.vector().norm())
+    });
     let age_ms =
         |time_ns: Option<u64>| time_ns.map(|ns| (input.release_ns - ns.min(input.release_ns)) as f64 * 1e-6);
     let code = match output.diagnostic.code {
@@ -33,9 +43,10 @@ pub fn print(observed: &Observed, input: &Input, output: &Output, before: &mut E
         code => format!("{code:?} {:.3}", output.diagnostic.value),
     };
     println!(
-        "{:.5} {} {code} | true v {v:.4} omega {omega:.4} | reference {} | setpoint age {:?} ms, measured {:?} ms | limits {:?} {:?} | {}",
+        "{:.5} {} {code} | true v {v:.4} omega {omega:.4} condition {condition:.1} sine {sine:.3} {} | force {force:.0} error {away:.1e} {away_rate:.1e} | reference {} | setpoint age {:.2?} ms, measured {:.2?} ms | limits {:?} {:?} | {}",
         observed.time_s(),
         output.state.name(),
+        if observed.simulator.brakes() == Brakes::Open { "" } else { "brakes" },
         planned.unwrap_or_default(),
         age_ms(input.setpoint.map(|setpoint| setpoint.time_ns)),
         age_ms(input.measurement.map(|measurement| measurement.time_ns)),

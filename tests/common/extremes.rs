@@ -7,9 +7,6 @@ pub const MOTION_ALLOWANCE: f64 = 0.02;
 pub const ACCELERATION_ALLOWANCE: f64 = 0.025;
 /// Part by which the reference may exceed a limit: rounding.
 pub const REFERENCE_ALLOWANCE: f64 = 1e-6;
-/// Part of the stroke margin that the reference may use: control may begin where a brake has left the platform, and the rest
-/// is for the following error.
-pub const START_IN_MARGIN: f64 = 0.5;
 
 /// A quantity of which the largest value counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +23,7 @@ pub enum Quantity {
     AngularAcceleration,
     /// Part of the stroke margin that the true platform used; 1 is the end stop, above it is the speed of the impact.
     Stroke,
-    /// Distance of the true pose beyond the envelope, over what is allowed.
+    /// Distance of the true pose beyond the envelope, or beyond where control began outside of it, over what is allowed.
     Envelope,
     /// True condition over its limit.
     Condition,
@@ -40,7 +37,7 @@ pub enum Quantity {
     ReferenceAcceleration,
     /// Jerk or angular jerk of the reference over its limit.
     ReferenceJerk,
-    /// Part of the stroke margin that the reference used.
+    /// Part of the stroke margin that the reference used, beyond where control began.
     ReferenceStroke,
     /// Faults for what was asked, under the policy that has none.
     Fault,
@@ -78,7 +75,7 @@ impl Quantity {
             Self::ReferenceVelocity | Self::ReferenceAcceleration | Self::ReferenceJerk => {
                 1.0 + REFERENCE_ALLOWANCE
             }
-            Self::ReferenceStroke => START_IN_MARGIN,
+            Self::ReferenceStroke => REFERENCE_ALLOWANCE,
             Self::Fault => 0.0,
         }
     }

@@ -8,7 +8,7 @@ use hexad::control::gains::Gains;
 use hexad::control::limits::DerivativeLimits;
 use hexad::control::parameters::Parameters;
 use hexad::control::state::State;
-use hexad::model::inverse_geometry::leg_motion;
+use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Pose};
@@ -29,6 +29,8 @@ pub const ENVELOPE_ALLOWANCE_RAD: f64 = 100e-6;
 /// Longest period whose acceleration is measured at its beginning alone: it changes by what a few millimetres per second
 /// change of the velocity terms.
 const LONGEST_EVEN_HOLD_NS: u64 = 1_000_000;
+/// Part of the stroke by which the reference may be farther beyond a bound than where control began, or between knots.
+const ROOM_RATIO: f64 = 5e-5;
 /// Unit of the margin of a machine whose stroke margin is smaller \[m\].
 const SMALLEST_MARGIN_M: f64 = 1e-4;
 
@@ -55,6 +57,17 @@ pub struct Meter {
     expected: Option<Motion>,
     state: State,
     last_leg_rate: f64,
+    beyond: Beyond,
+}
+
+/// How far the platform is beyond its bounds since control began: brakes may have left it there, and from then on it may
+/// only come nearer.
+#[derive(Clone, Copy, Debug, Default)]
+struct Beyond {
+    /// Of each coordinate of X.
+    envelope: [f64; 6],
+    /// Of the stroke less its margin \[m\].
+    stroke_m: f64,
 }
 
 impl Meter {
@@ -72,13 +85,20 @@ impl Meter {
             expected: None,
             state: State::Off,
             last_leg_rate: 0.0,
+            beyond: Beyond::default(),
         }
     }
 
     /// The true motion at a release, under the force of the cycle before.
     pub fn at_release(&mut self, simulator: &Simulator, force: Option<&[f64; LEGS]>, now_ns: u64) {
         self.check_end_stop(simulator, now_ns);
-        let (Some(force), Brakes::Open) = (force, simulator.brakes()) else { return };
+        let (Some(force), Brakes::Open) = (force, simulator.brakes()) else {
+            let pose = &simulator.state().pose;
+            let envelope = self.envelope_excess(pose).map(|excess| excess.max(0.0));
+            let stroke_m = self.margin_excess(&leg_lengths(&self.machine, pose)).max(0.0);
+            self.beyond = Beyond { envelope, stroke_m };
+            return;
+        };
         self.cycles += 1;
         let state = simulator.state();
         let still = Motion { pose: state.pose, twist: state.twist, acceleration: Acceleration::default() };
@@ -93,7 +113,9 @@ impl Meter {
         let condition = KinematicState::new(&self.machine, state.pose).sensitivity().condition;
         self.extremes.add(Quantity::Condition, condition / self.parameters.condition, now_ns);
         if self.parameters.envelope.is_some() {
-            self.extremes.add(Quantity::Envelope, self.envelope_excess(&state.pose), now_ns);
+            let excess = self.envelope_excess(&state.pose);
+            self.extremes.add(Quantity::Envelope, self.farther_beyond(&excess), now_ns);
+            self.come_nearer(&excess);
         }
         if let Some(expected) = self.expected {
             self.check_distance(&expected.pose, &state.pose, now_ns);
@@ -164,8 +186,9 @@ impl Meter {
             );
             self.extremes.add(Quantity::ReferenceJerk, jerk / period_s, at_ns);
         }
-        let used = self.margin_used(&leg_motion(&self.machine, next).length);
-        self.extremes.add(Quantity::ReferenceStroke, used, at_ns);
+        let room_m = self.beyond.stroke_m + ROOM_RATIO * self.machine.actuator.stroke();
+        let excess_m = self.margin_excess(&leg_lengths(&self.machine, &next.pose));
+        self.extremes.add(Quantity::ReferenceStroke, (excess_m - room_m) / self.margin_unit_m(), at_ns);
     }
 
     fn check_distance(&mut self, expected: &Pose, actual: &Pose, now_ns: u64) {
@@ -183,31 +206,51 @@ impl Meter {
         }
     }
 
-    /// Largest distance beyond the envelope over what is allowed; negative inside.
-    fn envelope_excess(&self, pose: &Pose) -> f64 {
-        let Parameters { envelope, limits, law, .. } = &self.parameters;
-        let Some(envelope) = envelope else { return f64::NEG_INFINITY };
+    /// Distance of each coordinate beyond the envelope; negative inside.
+    fn envelope_excess(&self, pose: &Pose) -> [f64; 6] {
+        let Some(envelope) = &self.parameters.envelope else { return [f64::NEG_INFINITY; 6] };
+        let x = task_coordinates(pose, &self.machine.home);
+        core::array::from_fn(|axis| (envelope.lowest[axis] - x[axis]).max(x[axis] - envelope.highest[axis]))
+    }
+
+    /// Largest distance beyond the envelope, or beyond where control began, over what is allowed.
+    fn farther_beyond(&self, excess: &[f64; 6]) -> f64 {
+        let Parameters { limits, law, .. } = &self.parameters;
         // A difference of velocity goes on for the time constant of the loop.
         let held = |limits: &DerivativeLimits, gains: &Gains| {
             held_velocity(&self.parameters, limits) / gains.stiffness.sqrt()
         };
         let angle = ENVELOPE_ALLOWANCE_RAD + held(&limits.orientation, &law.orientation);
         let distance = ENVELOPE_ALLOWANCE_M + held(&limits.position, &law.position);
-        let x = task_coordinates(pose, &self.machine.home);
-        let ranges = envelope.lowest.iter().zip(&envelope.highest);
-        let excess = x.iter().zip(ranges).enumerate().map(|(axis, (x, (low, high)))| {
-            let allowed = if axis < 3 { angle } else { distance };
-            (low - x).max(x - high) / allowed
+        let room_m = ROOM_RATIO * self.machine.actuator.stroke();
+        let farther = excess.iter().enumerate().map(|(axis, excess)| {
+            let (allowed, room) =
+                if axis < 3 { (angle, room_m / self.machine.joints.radius) } else { (distance, room_m) };
+            let began = self.beyond.envelope[axis];
+            (excess - began - if began > 0.0 { room } else { 0.0 }) / allowed
         });
-        excess.fold(f64::NEG_INFINITY, f64::max)
+        farther.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn come_nearer(&mut self, excess: &[f64; 6]) {
+        for (began, excess) in self.beyond.envelope.iter_mut().zip(excess) {
+            *began = began.min(excess.max(0.0));
+        }
     }
 
     /// 0 at the margin that the reference keeps, 1 at the end of the stroke.
     fn margin_used(&self, lengths: &[f64; LEGS]) -> f64 {
+        self.margin_excess(lengths) / self.margin_unit_m()
+    }
+
+    /// Part of the margin that is used \[m\]; negative outside of it.
+    fn margin_excess(&self, lengths: &[f64; LEGS]) -> f64 {
         let margins = lengths.map(|length| self.machine.actuator.margin(length));
-        let least = margins.into_iter().fold(f64::INFINITY, f64::min);
-        let kept = self.parameters.stroke_margin.max(SMALLEST_MARGIN_M);
-        (self.parameters.stroke_margin - least) / kept
+        self.parameters.stroke_margin - margins.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    fn margin_unit_m(&self) -> f64 {
+        self.parameters.stroke_margin.max(SMALLEST_MARGIN_M)
     }
 }
 

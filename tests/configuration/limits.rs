@@ -4,6 +4,7 @@ use hexad::config::deployment::Deployment;
 use hexad::config::{Config, Violation};
 use hexad::control::parameters::ViolationPolicy;
 use hexad::model::inverse_geometry::leg_lengths;
+use hexad::model::kinematic_state::KinematicState;
 
 use super::{FRIED, violations};
 
@@ -109,4 +110,32 @@ fn a_home_near_the_end_of_the_stroke_has_a_smaller_default_and_one_beyond_is_rep
     assert!(found.iter().all(|it| it.key.starts_with("leg[")) && found.len() == 6, "{found:#?}");
     // Nor is a margin that is given.
     assert_eq!(violations(&format!("{beyond}[limits]\nstroke_margin_m = 0.001\n")).len(), 6);
+}
+
+/// With the delay of a slow loop an error near a singular pose grows faster than feedback acts.
+#[test]
+fn the_default_condition_is_less_at_slow_rates_and_leaves_room_around_home() {
+    let condition = |text: &str| deployment(text).limits.condition;
+    let at_rate = |rate_hz: f64| condition(&format!("[realtime]\nrate_hz = {rate_hz}\n"));
+    for rate_hz in [500.0, 1000.0, 20_000.0] {
+        assert_eq!(at_rate(rate_hz), 100.0, "{rate_hz} Hz");
+    }
+    let machine = Config::parse(FRIED, "test.toml").unwrap().machine;
+    let home = KinematicState::new(&machine, machine.home_pose());
+    let at_home = home.sensitivity().condition;
+    let shortest = home.lengths(&machine).into_iter().fold(f64::INFINITY, f64::min);
+    let load = machine.gravity.norm() + 1.5 * 5.0;
+    let slowest_hz = [80.0, 100.0, 120.0].map(|rate_hz: f64| {
+        // Growth of an error in two periods, the 100 us of the I/O thread and half of the hold.
+        let growth = (0.7 / (2.5 / rate_hz + 100e-6)).powi(2) * shortest / load;
+        // Half of 5 m/s^2 in half of a period at 1 m/s.
+        let hold = 2.5 / (0.5 / rate_hz) * shortest / load;
+        let largest = at_rate(rate_hz);
+        assert!(largest < 100.0 && largest > 1.5 * at_home, "{rate_hz} Hz: {largest}, home {at_home}");
+        assert!((largest / growth.min(hold) - 1.0).abs() < 1e-9, "{rate_hz} Hz: {largest}, {growth}, {hold}");
+        largest
+    });
+    assert!(slowest_hz.is_sorted());
+    assert_eq!(at_rate(20.0), 1.5 * at_home);
+    assert_eq!(condition("[realtime]\nrate_hz = 100\n[limits]\ncondition = 90\n"), 90.0);
 }

@@ -1,5 +1,6 @@
 //! `[limits]`: limits of motions and forces.
 
+use super::realtime::Realtime;
 use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
@@ -14,6 +15,13 @@ const FORCE_RISE_S: f64 = 0.01;
 /// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
 /// a load needs leg forces of up to a hundred times its size.
 const DEFAULT_CONDITION: f64 = 100.0;
+/// Largest exponent of the growth of a tracking error under held forces, until a force computed from it acts. With it the growth
+/// takes about half of the damping from a loop with the default gains of a slow rate.
+const MAX_GROWTH_EXPONENT: f64 = 0.7;
+/// From the beginning of a hold to its middle, in periods.
+const MIDDLE_OF_HOLD: f64 = 0.5;
+/// Least default of the condition over that of home: else the platform could not leave it.
+const MIN_CONDITION_PER_HOME: f64 = 1.5;
 /// Default of the distance from the ends of the stroke, as a ratio of the stroke: many times the following error of a
 /// machine in order.
 const DEFAULT_STROKE_MARGIN_RATIO: f64 = 0.005;
@@ -35,7 +43,7 @@ pub struct DeploymentLimits {
 
 /// Reads the section. The defaults are motions that a standing person tolerates: half of gravity, a tenth of a second to
 /// build it up. Autonomous motions use a fifth of them.
-pub(super) fn read(mut section: SectionReader, machine: &Machine) -> DeploymentLimits {
+pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Realtime) -> DeploymentLimits {
     let mut positive = |key, default| section.number_or(key, default, Bound::Positive);
     let position = DerivativeLimits {
         velocity: positive("velocity_m_s", 1.0),
@@ -52,7 +60,8 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine) -> DeploymentL
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
     let feedback_scale = section.number_or("feedback_scale", 0.5, Bound::Positive);
     let stroke_margin_m = stroke_margin_m(&mut section, machine);
-    let condition = condition(&mut section, machine);
+    let held = held_condition(machine, realtime, &position, feedback_scale);
+    let condition = condition(&mut section, machine, held);
     section.finish();
     DeploymentLimits {
         reference: ReferenceLimits { position, orientation, autonomous_scale },
@@ -79,11 +88,35 @@ fn stroke_margin_m(section: &mut SectionReader, machine: &Machine) -> f64 {
     margin
 }
 
-/// Largest condition. The default leaves room around a home that is badly conditioned; home must keep the limit.
-fn condition(section: &mut SectionReader, machine: &Machine) -> f64 {
+/// Condition up to which forces that are held turn little enough with the legs.
+///
+/// Forces F that carry a load `m a` are at most `condition m a / |N|`. Held, they turn with the legs: a displacement s of the
+/// joints changes their wrench by at most `|N| F s / L`, the acceleration by `condition a / L s`. So a tracking error s grows
+/// with `s'' <= condition a / L s` until a force computed from it acts, and within half of a period the acceleration departs
+/// from its mean, on a way of half a period at the largest velocity: by no more than feedback may add.
+fn held_condition(
+    machine: &Machine,
+    realtime: &Realtime,
+    position: &DerivativeLimits,
+    feedback_scale: f64,
+) -> f64 {
+    let middle_s = MIDDLE_OF_HOLD * realtime.period_s();
+    let delay_s = realtime.longest_delay() * realtime.period_s() + middle_s;
+    let of_error = (MAX_GROWTH_EXPONENT / delay_s).powi(2);
+    let of_hold = feedback_scale * position.acceleration / (position.velocity * middle_s);
+    let lengths = leg_lengths(machine, &machine.home_pose());
+    let shortest = lengths.into_iter().fold(f64::INFINITY, f64::min);
+    let load = machine.gravity.norm() + (1.0 + feedback_scale) * position.acceleration;
+    of_error.min(of_hold) * shortest / load
+}
+
+/// Largest condition. The default is less where the rate is slow, and leaves room around a home that is badly conditioned;
+/// home must keep the limit.
+fn condition(section: &mut SectionReader, machine: &Machine, held: f64) -> f64 {
     let home = machine.home_pose();
     let at_home = KinematicState::new(machine, home).sensitivity().condition;
-    let limit = section.number_or("condition", DEFAULT_CONDITION.max(2.0 * at_home), Bound::Positive);
+    let default = DEFAULT_CONDITION.max(2.0 * at_home).min(held.max(MIN_CONDITION_PER_HOME * at_home));
+    let limit = section.number_or("condition", default, Bound::Positive);
     if limit < at_home {
         let bound = format!("must be at least {} (that of home)", rounded(at_home));
         section.reject("condition", bound);

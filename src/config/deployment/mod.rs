@@ -72,7 +72,7 @@ pub struct Timeouts {
 pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
     let realtime = realtime::read(root.section("realtime"));
     let rate_hz = realtime.rate_hz;
-    let limits = limits::read(root.section("limits"), machine);
+    let limits = limits::read(root.section("limits"), machine, &realtime);
     let control = control::read(root.section("control"), &realtime, machine, &limits);
     let setpoint = setpoint(root.section("setpoint"));
     Deployment {

@@ -20,12 +20,11 @@ use nalgebra::Vector3;
 
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
-use super::regularity::RegularBalls;
+use super::regularity::{RegularBalls, is_regular_or_nearer};
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
 use crate::model::inverse_geometry::{leg_lengths, leg_lengths_and_rates};
-use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::LEGS;
 use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
@@ -151,7 +150,7 @@ impl<'a> Examination<'a> {
         let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
         // Between knots up to the limit of the platform: else a reference at its own limit could not leave it.
         let is_conditioned = balls.cover(constants, pose, [0.0; 2], constants.reference_condition)
-            || self.from.is_some_and(|from| condition(constants, pose) <= condition(constants, from));
+            || self.from.is_some_and(|from| is_regular_or_nearer(constants, pose, from));
         let is_regular =
             is_conditioned && balls.cover(constants, pose, reach, constants.parameters.condition);
         if is_regular { Ok(()) } else { Err(Limit::Condition) }
@@ -204,10 +203,6 @@ impl<'a> Examination<'a> {
 
 fn ranges(Envelope { lowest, highest }: &Envelope) -> impl Iterator<Item = (&f64, &f64)> {
     lowest.iter().zip(highest)
-}
-
-fn condition(constants: &Constants, pose: &Pose) -> f64 {
-    KinematicState::new(constants.machine(), *pose).sensitivity().condition
 }
 
 /// Largest second derivative of a leg's length at peak velocities.

@@ -1,4 +1,5 @@
-//! Balls of poses in which no pose is singular and none has a condition beyond the limit.
+//! Balls of poses in which no pose is singular and none has a condition beyond the limit, and no leg comes near the first
+//! axis of its universal joint: in line with it the joint has lost a freedom, and the leg's spin is unbounded.
 //!
 //! With N the wrenches of the legs at the centre of a ball, `F = |N|`, `B = |N^-1|` (Frobenius norms, torques about the mean
 //! of the joints and divided by the radius r), a pose displaced by at most d and turned by at most t, the arms `a` of the
@@ -9,6 +10,7 @@
 //! q = s / sqrt(L (L - s))               change of a leg's direction, L the shortest leg at the centre
 //! |N - N0| <= D = sqrt(6 q^2 + 6 (t + q)^2)                      as the mean of (a'/r)^2 is 1
 //! condition <= min(F + D, sqrt 12) B / (1 - B D)                 where B D < 1
+//! sine of the angle between a leg and that axis >= that at the centre - q
 //! ```
 //!
 //! The same bounds as those of a cell in the search for the workspace. A ball found once holds for many cycles.
@@ -17,6 +19,7 @@
 use nalgebra::ComplexField as _;
 
 use crate::control::parameters::Constants;
+use crate::model::inverse_geometry::universal_sine;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
@@ -39,6 +42,8 @@ struct Ball {
     norm: f64,
     inverse_norm: f64,
     shortest: f64,
+    /// Least sine of the angle between a leg and the first axis of its universal joint.
+    universal_sine: f64,
 }
 
 impl Ball {
@@ -47,22 +52,28 @@ impl Ball {
         let kinematic_state = KinematicState::new(machine, *center);
         let Sensitivity { condition, norm, .. } = *kinematic_state.sensitivity();
         let shortest = kinematic_state.lengths(machine).into_iter().fold(f64::INFINITY, f64::min);
-        Self { center: *center, norm, inverse_norm: condition / norm, shortest }
+        let universal_sine = universal_sine(machine, center);
+        Self { center: *center, norm, inverse_norm: condition / norm, shortest, universal_sine }
     }
 
     /// Whether every pose within `shift` \[m\] and `turn` \[rad\] of a pose is regular and has at most a condition.
     fn covers(&self, constants: &Constants, pose: &Pose, [shift, turn]: [f64; 2], limit: f64) -> bool {
-        let Self { center, norm, inverse_norm, shortest } = self;
+        let Self { center, norm, inverse_norm, shortest, universal_sine } = self;
         let chord = ((pose.rotation - center.rotation).norm_squared() * 0.5).sqrt();
         let turn = ANGLE_PER_CHORD * chord + turn;
         let moved = (pose.position - center.position).norm() + shift + constants.arm * turn;
         let left = shortest - moved;
         let turned_squared = moved * moved / (shortest * left);
-        let turned_arm = turn + turned_squared.sqrt();
+        let turned_leg = turned_squared.sqrt();
+        let turned_arm = turn + turned_leg;
         let change = (6.0 * (turned_squared + turned_arm * turned_arm)).sqrt();
         let largest_norm = (norm + change).min(MAX_WRENCH_NORM_SQUARED.sqrt());
+        let least_sine = least_universal_sine(constants, limit);
         let limit = limit * (1.0 - inverse_norm * change);
-        chord <= MAX_CHORD && left > 0.0 && largest_norm * inverse_norm <= limit
+        chord <= MAX_CHORD
+            && left > 0.0
+            && universal_sine - turned_leg >= least_sine
+            && largest_norm * inverse_norm <= limit
     }
 }
 
@@ -93,4 +104,23 @@ impl RegularBalls {
         }
         is_covered
     }
+}
+
+/// Least part of the sine of the reference that is allowed between knots, whatever the limits of the condition.
+const LEAST_SINE_SHARE: f64 = 0.5;
+
+/// The least sine that goes with a limit of the condition: that of the reference, or as much less as the limit is looser.
+fn least_universal_sine(constants: &Constants, condition: f64) -> f64 {
+    constants.universal_sine * (constants.reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0)
+}
+
+/// Whether a pose is as regular as the reference must be, or no less so than the one from which a step leads.
+// Out of line, as it is rare: the cycle stays short.
+#[inline(never)]
+pub(super) fn is_regular_or_nearer(constants: &Constants, pose: &Pose, from: &Pose) -> bool {
+    let machine = constants.machine();
+    let condition = |pose: &Pose| KinematicState::new(machine, *pose).sensitivity().condition;
+    let sine = |pose: &Pose| universal_sine(machine, pose);
+    condition(pose) <= condition(from).max(constants.reference_condition)
+        && sine(pose) >= sine(from).min(constants.universal_sine)
 }

@@ -20,6 +20,7 @@ use crate::model::rigid::{Pose, exp};
 mod feedback;
 mod motion;
 mod regularity;
+mod universal;
 mod verification;
 
 const LIMITS: Limits = Limits {

@@ -7,7 +7,7 @@ use super::*;
 use crate::model::rigid::Twist;
 
 /// The pose of a ball at six numbers: rotation and shift as parts of the largest.
-fn within(center: &Pose, [shift, turn]: [f64; 2], numbers: &Vector6<f64>) -> Pose {
+pub(super) fn within(center: &Pose, [shift, turn]: [f64; 2], numbers: &Vector6<f64>) -> Pose {
     let part = |k: usize| {
         let v: Vector3<f64> = numbers.fixed_rows::<3>(k).into();
         v / v.norm().max(1.0)
