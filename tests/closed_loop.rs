@@ -7,6 +7,7 @@ mod common;
 mod closed_loop {
     use super::*;
 
+    mod assessment;
     mod built_in;
     mod evidence;
     mod feedback;
@@ -19,6 +20,7 @@ mod closed_loop {
     mod poses;
     mod replay;
     mod ride;
+    mod setpoints;
     mod targets;
     mod tracking;
 }

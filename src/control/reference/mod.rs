@@ -141,7 +141,6 @@ impl ReferenceGenerator {
         let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::default());
         self.stop = HeldStop::Verified(verified.unwrap_or(StopKind::Planar));
         self.history.clear();
-        self.closing_scale = 1.0;
     }
 
     /// Sets the share of the limits with which the distance to a target is closed.

@@ -209,3 +209,6 @@ fn upper(v: &Vector6<f64>) -> Vector3<f64> {
 fn lower(v: &Vector6<f64>) -> Vector3<f64> {
     v.fixed_rows::<3>(3).into()
 }
+
+#[cfg(test)]
+mod tests;

@@ -17,7 +17,11 @@ use crate::model::machine::{
 };
 use crate::model::rigid::{Pose, exp};
 
+mod approach;
+mod between_knots;
 mod feedback;
+mod generator;
+mod generator_bounds;
 mod motion;
 mod regularity;
 mod universal;
@@ -30,7 +34,7 @@ const LIMITS: Limits = Limits {
 };
 
 /// A machine of about two metres with pairs of joints, some of them scattered.
-fn machine(samples: &mut Samples) -> Machine {
+pub(super) fn machine(samples: &mut Samples) -> Machine {
     let scatter = 0.1 * samples.uniform();
     let mut ring = |radius: f64, offset: f64, spread: f64| {
         core::array::from_fn(|leg| {
@@ -74,7 +78,7 @@ fn machine(samples: &mut Samples) -> Machine {
     }
 }
 
-fn parameters(machine: &Machine) -> Parameters {
+pub(super) fn parameters(machine: &Machine) -> Parameters {
     let gains = [Gains::new(8.0, 1.0); 2];
     Parameters {
         period_ns: 1_000_000,
@@ -100,7 +104,7 @@ fn parameters(machine: &Machine) -> Parameters {
 }
 
 /// A pose around home whose legs are within the stroke and whose condition is below that of the limit.
-fn pose(samples: &mut Samples, constants: &Constants) -> Pose {
+pub(super) fn pose(samples: &mut Samples, constants: &Constants) -> Pose {
     let Pose { rotation, position } = *constants.home.pose();
     loop {
         let pose =

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector6;
 
+use super::super::constant_jerk::moved;
 use super::super::history::History;
 use super::super::pose_bounds::PoseBounds;
 use super::super::target::at_rest;
@@ -175,6 +176,9 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
         };
         let mut bounds = PoseBounds::around(&constants, &at(1.0));
         let mut before = ends(&bounds);
+        let x = crate::model::task::task_coordinates(&at(1.0), &machine.home);
+        let end = if sign < 0.0 { before[1][0] - x[0] } else { before[3][0] + x[0] };
+        assert!((end + room / machine.joints.radius).abs() < 1e-12, "{end}");
         for share in [1.0, 0.9, 0.95, 0.5, 0.7, 0.0] {
             bounds.tighten(&constants, &at(share));
             let now = ends(&bounds);
@@ -195,5 +199,20 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
             before = now;
         }
         assert_eq!(ends(&bounds), ends(&nominal));
+    }
+}
+
+/// With the axis of rotation turning meanwhile: to fourth order in the step.
+#[test]
+fn a_long_step_turns_as_its_angular_velocity_says() {
+    let mut samples = Samples::new(35);
+    let machine = machine(&mut samples);
+    let constants = Constants::new(&machine, parameters(&machine));
+    for _ in 0..200 {
+        let motion = moving(&mut samples, &constants);
+        let h = 0.02;
+        let Acceleration { angular, linear } = motion.acceleration;
+        let found = moved(&motion, &angular, &linear, h);
+        assert_near(&found, &integrated(&motion, &Vector6::zeros(), h), [6e-8, 1e-12, 1e-9]);
     }
 }

@@ -19,15 +19,15 @@ const ROOM_RATIO: f64 = 2.6e-5;
 
 /// Largest values along a stop.
 #[derive(Clone, Copy, Debug)]
-struct Extremes {
-    shortest: [f64; LEGS],
-    longest: [f64; LEGS],
-    rate: f64,
-    lowest: [f64; 6],
-    highest: [f64; 6],
+pub(super) struct Extremes {
+    pub shortest: [f64; LEGS],
+    pub longest: [f64; LEGS],
+    pub rate: f64,
+    pub lowest: [f64; 6],
+    pub highest: [f64; 6],
     /// Smallest inverse condition, with the sign of the determinant.
-    inverse_condition: f64,
-    speeds: [f64; 2],
+    pub inverse_condition: f64,
+    pub speeds: [f64; 2],
     /// Speeds where the step begins.
     begin: [f64; 2],
 }
@@ -101,15 +101,16 @@ fn play(constants: &Constants, motion: &Motion, step: &PlayedStep, kind: StopKin
 }
 
 /// The step before the motion.
-struct PlayedStep {
-    duration: f64,
-    jerk: Acceleration,
+pub(super) struct PlayedStep {
+    pub from: Option<Pose>,
+    pub duration: f64,
+    pub jerk: Acceleration,
 }
 
 impl PlayedStep {
-    fn step(&self) -> Step<'static> {
+    fn step(&self) -> Step<'_> {
         let change = [self.jerk.angular.norm() * self.duration, self.jerk.linear.norm() * self.duration];
-        Step { from: None, duration: self.duration, change }
+        Step { from: self.from.as_ref(), duration: self.duration, change }
     }
 }
 
@@ -132,20 +133,22 @@ fn motion(samples: &mut Samples, constants: &Constants) -> (Motion, PlayedStep) 
         linear: samples.vector(shifting * position.jerk),
     };
     let pose = pose(samples, constants);
-    let step = PlayedStep { duration: if samples.below(3) == 0 { 0.01 } else { 1e-3 }, jerk };
+    let step = PlayedStep { from: None, duration: if samples.below(3) == 0 { 0.01 } else { 1e-3 }, jerk };
     (Motion { twist, acceleration, ..at_rest(&pose) }, step)
 }
 
 /// A scene: bounds so wide that any stop is accepted, but for one that is bisected.
-struct Scene {
-    constants: Constants,
-    bounds: PoseBounds,
-    motion: Motion,
-    step: PlayedStep,
+pub(super) struct Scene {
+    pub constants: Constants,
+    pub bounds: PoseBounds,
+    pub motion: Motion,
+    pub step: PlayedStep,
+    /// Whether only stops in free space are accepted, which are not examined at knots.
+    pub is_free: bool,
 }
 
 impl Scene {
-    fn new(samples: &mut Samples) -> Self {
+    pub fn new(samples: &mut Samples) -> Self {
         let mut machine = machine(samples);
         machine.actuator.max_rate = 100.0;
         let mut parameters = parameters(&machine);
@@ -162,21 +165,29 @@ impl Scene {
         constants.reference_condition = 1e4;
         let mut bounds = PoseBounds::nominal(&constants);
         (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
-        Self { constants, bounds, motion, step }
+        Self { constants, bounds, motion, step, is_free: samples.below(3) == 0 }
     }
 
-    fn verify(&self) -> Result<StopKind, Limit> {
+    pub fn verify(&self) -> Result<StopKind, Limit> {
         let mut balls = RegularBalls::default();
-        verify(&self.constants, &self.bounds, &mut balls, &self.motion, &self.step.step())
+        match verify(&self.constants, &self.bounds, &mut balls, &self.motion, &self.step.step())? {
+            StopKind::Planar if self.is_free => Err(Limit::Stroke),
+            kind => Ok(kind),
+        }
     }
 
-    fn play(&self, kind: StopKind) -> Extremes {
+    pub fn play(&self, kind: StopKind) -> Extremes {
         play(&self.constants, &self.motion, &self.step, kind)
     }
 
     /// Moves a bound from one at which the stop is accepted towards one at which it is not, and back to the last at which
     /// it is; the extremes of the stop there, and the bound.
-    fn tightened(&mut self, wide: f64, narrow: f64, set: impl Fn(&mut Self, f64)) -> Option<(Extremes, f64)> {
+    pub fn tightened(
+        &mut self,
+        wide: f64,
+        narrow: f64,
+        set: impl Fn(&mut Self, f64),
+    ) -> Option<(Extremes, f64)> {
         set(self, wide);
         self.verify().ok()?;
         let bound = bisected(wide, narrow, |bound| {
@@ -244,7 +255,7 @@ fn rates_stay_within_a_limit_that_is_just_accepted() {
         assert!(extremes.rate <= bound * (1.0 + 1e-9), "{} {bound} {:?}", extremes.rate, scene.motion);
         uses.add(extremes.rate / bound - 1.0, 0.02);
     }
-    assert!(uses.count > 300 && uses.near > 200, "{uses:?}");
+    assert!(uses.count > 300 && uses.near > 150, "{uses:?}");
 }
 
 #[test]

@@ -1,0 +1,148 @@
+//! The braking curves against their equations, derivatives against differences.
+
+use super::super::approach::{Approach, TargetOffset, WantedVelocity, limit_leg_rates};
+use super::*;
+use crate::model::inverse_geometry::leg_lengths_and_rates;
+use crate::model::rigid::Twist;
+
+const P: DerivativeLimits = LIMITS.position;
+
+/// `tau1` and `a` of the module's equations.
+fn constants_of(scale: f64, step_s: f64) -> (f64, f64) {
+    let outer_s = (0.4 * P.acceleration / P.jerk).max(4.0 * step_s);
+    (outer_s, 0.95 * scale * P.acceleration)
+}
+
+/// `d(v)`, the way on which a velocity can be stopped.
+fn braking_way(v: f64, scale: f64, step_s: f64) -> f64 {
+    let ((outer_s, a), jerk) = (constants_of(scale, step_s), scale * P.jerk);
+    if v >= a * a / jerk {
+        outer_s * v + 0.5 * v * v / a + 0.5 * v * a / jerk
+    } else {
+        outer_s * v + v.powf(1.5) / jerk.sqrt()
+    }
+}
+
+#[test]
+fn the_closing_velocity_is_the_inverse_of_the_braking_way() {
+    for (scale, step_s) in [(1.0, 1e-3), (0.3, 1e-3), (1.0, 0.02), (0.05, 1e-4)] {
+        let approach = Approach::new(P, scale, step_s);
+        let top = scale * P.velocity;
+        let (outer_s, a) = constants_of(scale, step_s);
+        let corner = a * a / (scale * P.jerk);
+        for k in 1..1000 {
+            let v = top * f64::from(k) / 1000.0;
+            let way = braking_way(v, scale, step_s);
+            let (found, slope) = approach.closing_velocity(way);
+            assert!((found / v - 1.0).abs() < 1e-4, "{scale} {step_s}: {found}, not {v}");
+            if (v - corner).abs() > 1e-3 * top {
+                let [after, before] =
+                    [1.0, -1.0].map(|sign| approach.closing_velocity(way * (1.0 + sign * 1e-6)).0);
+                let difference = (after - before) / (2e-6 * way);
+                assert!((slope / difference - 1.0).abs() < 1e-3, "{scale} {v}: {slope}, not {difference}");
+            }
+        }
+        assert_eq!(approach.closing_velocity(2.0 * braking_way(top, scale, step_s)), (top, 0.0));
+        assert!((approach.slowest_slope() * outer_s - 1.0).abs() < 1e-12);
+    }
+}
+
+/// Also on the sphere of the limit of velocity, where it can only turn.
+#[test]
+fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
+    let mut samples = Samples::new(51);
+    let mut limited = 0;
+    for _ in 0..2000 {
+        let approach = Approach::new(P, 0.9, 1e-3);
+        let distance = 10.0_f64.powf(-3.0 * samples.uniform());
+        let offset = samples.vector(distance);
+        let [velocity, ahead, acceleration] = [0.8, 0.8, 5.0].map(|size| samples.vector(size));
+        let at = |dt: f64| {
+            let offset = offset + (velocity - ahead) * dt + acceleration * (0.5 * dt * dt);
+            let target = TargetOffset { offset, velocity: velocity + acceleration * dt, acceleration };
+            approach.wanted(&target, &ahead)
+        };
+        if distance < 1e-3 || offset.norm() < 1e-3 {
+            continue;
+        }
+        let (now, dt) = (at(0.0), 1e-7);
+        let [after, before] = [at(dt), at(-dt)];
+        if [after.is_limited, before.is_limited] != [now.is_limited; 2] {
+            continue;
+        }
+        let difference = (after.velocity - before.velocity) / (2.0 * dt);
+        let scale = 1.0 + difference.norm();
+        assert!((now.derivative - difference).norm() < 1e-3 * scale, "{now:?}, not {difference}");
+        assert!(now.velocity.norm() <= 0.999 * P.velocity * (1.0 + 1e-12));
+        assert!(!now.is_limited || (now.velocity.norm() - 0.999 * P.velocity).abs() < 1e-12);
+        limited += u32::from(now.is_limited);
+    }
+    assert!((100..1500).contains(&limited), "{limited}");
+}
+
+/// The curve of the last equation, limited in magnitude and in its change.
+#[test]
+fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
+    let mut samples = Samples::new(52);
+    let step_s = 1e-3;
+    let approach = Approach::new(P, 1.0, step_s);
+    let time = 0.5 * constants_of(1.0, step_s).0;
+    let mut seen = [0; 3];
+    for _ in 0..2000 {
+        let wanted = WantedVelocity {
+            velocity: samples.vector(0.3),
+            derivative: samples.vector(6.0),
+            is_limited: false,
+        };
+        let ahead = wanted.velocity - samples.vector(0.1);
+        let x = wanted.velocity - ahead;
+        let scale = 0.7 * P.jerk * time * time;
+        let free = wanted.derivative + x * (2.0 / (time * (1.0 + (1.0 + 2.0 * x.norm() / scale).sqrt())));
+        let aim = free * (P.acceleration / free.norm()).min(1.0);
+        let near = aim + samples.vector(0.9 * P.jerk * step_s);
+        let present = if samples.below(2) == 0 { near } else { samples.vector(P.acceleration) };
+        let (found, is_limited) = approach.acceleration(&wanted, &ahead, &present);
+        let change = aim - present;
+        let expected = present + change * (P.jerk * step_s / change.norm()).min(1.0);
+        assert!((found - expected).norm() < 1e-9, "{found}, not {expected}");
+        let limits = [free.norm() > P.acceleration, change.norm() > P.jerk * step_s];
+        assert_eq!(is_limited, limits);
+        let kinds = [limits[0], limits[1], limits == [false; 2]];
+        seen = core::array::from_fn(|kind| seen[kind] + u32::from(kinds[kind]));
+    }
+    assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
+}
+
+#[test]
+fn wanted_velocities_are_reduced_by_one_factor_until_no_leg_moves_too_fast() {
+    let mut samples = Samples::new(53);
+    let machine = machine(&mut samples);
+    let constants = Constants::new(&machine, parameters(&machine));
+    let limit = 0.97 * machine.actuator.max_rate;
+    let mut reduced = 0;
+    for _ in 0..500 {
+        let pose = pose(&mut samples, &constants);
+        let mut wanted = || WantedVelocity {
+            velocity: samples.vector(1.5),
+            derivative: samples.vector(3.0),
+            is_limited: false,
+        };
+        let [turn, shift] = [wanted(), wanted()];
+        let fastest = |turn: &WantedVelocity, shift: &WantedVelocity| {
+            let twist = Twist { angular: turn.velocity, linear: shift.velocity };
+            let (_, rates) = leg_lengths_and_rates(&machine, &pose, &twist);
+            rates.iter().fold(0.0_f64, |fastest, rate| fastest.max(rate.abs()))
+        };
+        let before = fastest(&turn, &shift);
+        let (mut new_turn, mut new_shift) = (turn, shift);
+        let is_reduced = limit_leg_rates(&constants, &pose, &mut new_turn, &mut new_shift);
+        assert_eq!(is_reduced, before > limit);
+        let factor = (limit / before).min(1.0);
+        for (new, old) in [(new_turn, turn), (new_shift, shift)] {
+            assert!((new.velocity - old.velocity * factor).norm() < 1e-12);
+            assert!((new.derivative - old.derivative * factor).norm() < 1e-12);
+        }
+        reduced += u32::from(is_reduced);
+    }
+    assert!((50..450).contains(&reduced), "{reduced}");
+}

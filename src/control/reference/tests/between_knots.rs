@@ -1,0 +1,283 @@
+//! Quantities whose extremes lie between the knots of an examined stop, or within the step before it.
+
+use super::super::examination::curvature;
+use super::verification::{PlayedStep, Scene};
+use super::*;
+use crate::model::inverse_geometry::leg_motion;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+use crate::model::task::task_coordinates;
+
+/// What a length may exceed its bound by between knots, over the stroke; and an angle at the outermost joint.
+const ROOM_RATIO: f64 = 2.6e-5;
+
+/// Standing at home with limits of acceleration and jerk times factors, every bound wide.
+fn scene(samples: &mut Samples, acceleration: f64, jerk: f64) -> Scene {
+    let mut scene = Scene::new(samples);
+    let limits = &mut scene.constants.parameters.limits;
+    *limits = LIMITS;
+    for limits in [&mut limits.position, &mut limits.orientation] {
+        limits.acceleration *= acceleration;
+        limits.jerk *= jerk;
+    }
+    scene.constants.reference_condition = 1e9;
+    scene.constants.parameters.condition = 1e9;
+    scene.motion = Motion {
+        pose: *scene.constants.home.pose(),
+        twist: Twist::default(),
+        acceleration: Acceleration::default(),
+    };
+    let still = Acceleration { angular: Vector3::zeros(), linear: Vector3::zeros() };
+    scene.step = PlayedStep { from: None, duration: 1e-3, jerk: still };
+    scene.is_free = false;
+    scene
+}
+
+/// A coordinate that turns back early in a long stop: a small velocity against the acceleration, a large one across.
+#[test]
+fn coordinates_that_turn_back_between_knots_keep_the_envelope() {
+    let mut samples = Samples::new(81);
+    let mut largest = [f64::NEG_INFINITY; 2];
+    for k in 0..600 {
+        let [acceleration, jerk] = [[1.0, 1.0], [0.2, 0.1], [0.05, 0.05]][k % 3];
+        let mut scene = scene(&mut samples, acceleration, jerk);
+        let axis = [0, 2, 3, 4][k / 3 % 4];
+        let limits = scene.constants.parameters.limits;
+        let part = if axis < 3 { limits.orientation } else { limits.position };
+        let along: Vector3<f64> = Vector3::ith(axis % 3, 1.0);
+        let across: Vector3<f64> = Vector3::ith((axis + 1) % 3, 1.0);
+        let size = 0.5 * part.acceleration * part.acceleration / part.jerk * samples.uniform();
+        let velocity = along * size + across * (0.6 * part.velocity * samples.uniform());
+        let acceleration = along * -part.acceleration;
+        let Motion { twist, acceleration: a, pose } = &mut scene.motion;
+        if axis < 3 {
+            // Steep: angles change faster than the attitude turns.
+            pose.rotation = exp(&(Vector3::y() * samples.uniform()));
+            (twist.angular, a.angular) = (velocity, acceleration);
+        } else {
+            (twist.linear, a.linear) = (velocity, acceleration);
+        }
+        // From within: where the start of a step is beyond a bound, the stop may be as far beyond.
+        let way = along * -0.01;
+        let way = if axis < 3 { [way, Vector3::zeros()] } else { [Vector3::zeros(), way] };
+        scene.step.from = Some(scene.motion.pose.displaced(&Twist { angular: way[0], linear: way[1] }));
+        let set = |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().highest[axis] = bound;
+        let Some((extremes, bound)) = scene.tightened(10.0, -9.0, set) else { continue };
+        let excess = extremes.highest[axis] - bound;
+        let stroke = scene.constants.machine().actuator.stroke();
+        let room = if axis < 3 { ROOM_RATIO * stroke / scene.constants.arm } else { 1e-9 };
+        assert!(excess <= room, "axis {axis}: {excess} {:?}", scene.motion);
+        largest[axis / 3] = largest[axis / 3].max(excess);
+    }
+    assert!(largest.iter().all(|excess| *excess > -1e-3), "{largest:?}");
+}
+
+/// An angle that turns back although the attitude does not: the axis of rotation leads around it.
+#[test]
+fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
+    let mut samples = Samples::new(87);
+    let mut count = 0;
+    for k in 0..300 {
+        let mut scene = scene(&mut samples, 0.05, 0.05);
+        let axis = 2 * (k % 2);
+        scene.motion.pose.rotation = exp(&(Vector3::y() * (0.5 + 0.4 * samples.uniform())));
+        let home = scene.constants.machine().home;
+        let of = |twist: Vector3<f64>| {
+            let twist = Twist { angular: twist, linear: Vector3::zeros() };
+            task_coordinates(&scene.motion.pose.displaced(&twist), &home)[axis]
+        };
+        let gradient =
+            Vector3::from_fn(|i, _| (of(Vector3::ith(i, 1e-6)) - of(Vector3::ith(i, -1e-6))) / 2e-6);
+        let turning = Vector3::from_fn(|_, _| 2.0 * samples.uniform() - 1.0).normalize();
+        let across = turning - gradient * (gradient.dot(&turning) / gradient.norm_squared());
+        scene.motion.twist.angular = across + gradient * (0.03 * samples.uniform());
+        scene.step.from =
+            Some(scene.motion.pose.displaced(&Twist { angular: gradient * -0.01, linear: Vector3::zeros() }));
+        let set = |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().highest[axis] = bound;
+        let Some((extremes, bound)) = scene.tightened(10.0, -9.0, set) else { continue };
+        // Not through gimbal lock, where the angles jump.
+        if extremes.highest[1].max(-extremes.lowest[1]) > 1.2 {
+            continue;
+        }
+        count += 1;
+        let excess = extremes.highest[axis] - bound;
+        let room = ROOM_RATIO * scene.constants.machine().actuator.stroke() / scene.constants.arm;
+        assert!(excess <= room, "axis {axis}: {excess} {:?}", scene.motion);
+    }
+    assert!(count > 50, "{count}");
+}
+
+/// A leg that turns back between two knots: its velocity is along it, against its acceleration.
+#[test]
+fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {
+    let mut samples = Samples::new(82);
+    let mut largest = [f64::NEG_INFINITY; 2];
+    for k in 0..400 {
+        let [acceleration, jerk] = [[1.0, 1.0], [0.2, 0.1]][k % 2];
+        let mut scene = scene(&mut samples, acceleration, jerk);
+        let leg = k % LEGS;
+        let machine = scene.constants.machine();
+        let moved = |axis| {
+            let mut moved = scene.motion;
+            moved.twist.linear = Vector3::ith(axis, 1.0);
+            leg_motion(machine, &moved).rate[leg]
+        };
+        let direction = Vector3::from_fn(|axis, _| moved(axis));
+        let across = direction.cross(&Vector3::z()).normalize();
+        let limits = scene.constants.parameters.limits.position;
+        let size = 0.5 * limits.acceleration * limits.acceleration / limits.jerk;
+        let stroke = machine.actuator.stroke();
+        if k % 4 < 2 {
+            let velocity = direction * (size * samples.uniform()) + across * (0.5 * samples.uniform());
+            scene.motion.twist.linear = velocity;
+            scene.motion.acceleration.linear = direction * -limits.acceleration;
+            let set = |scene: &mut Scene, bound| scene.bounds.longest[leg] = bound;
+            let Some((extremes, bound)) = scene.tightened(100.0, 0.0, set) else { continue };
+            let excess = extremes.longest[leg] - bound;
+            assert!(excess <= ROOM_RATIO * stroke, "{excess} {:?}", scene.motion);
+            largest[0] = largest[0].max(excess / stroke);
+        } else {
+            scene.motion.twist.linear = direction * (0.5 * samples.uniform());
+            scene.motion.acceleration.linear = direction * (limits.acceleration * samples.uniform());
+            let set = |scene: &mut Scene, bound| {
+                let mut machine = scene.constants.machine().clone();
+                machine.actuator.max_rate = bound;
+                let condition = scene.constants.reference_condition;
+                scene.constants = Constants::new(&machine, scene.constants.parameters);
+                scene.constants.reference_condition = condition;
+            };
+            let Some((extremes, bound)) = scene.tightened(100.0, 0.0, set) else { continue };
+            assert!(extremes.rate <= bound * (1.0 + 1e-9), "{} {bound} {:?}", extremes.rate, scene.motion);
+            largest[1] = largest[1].max(extremes.rate / bound - 1.0);
+        }
+    }
+    assert!(largest[0] > -1e-4 && largest[1] > -0.02, "{largest:?}");
+}
+
+/// A step that ends where it began, and turns in its middle: speeds, lengths and coordinates are larger there.
+#[test]
+fn the_middle_of_a_long_step_keeps_every_bound() {
+    let mut samples = Samples::new(83);
+    for (part, duration) in [(0, 0.3), (1, 0.3), (0, 0.02), (1, 0.02)] {
+        let mut scene = scene(&mut samples, 1.0, 1.0);
+        scene.step.duration = duration;
+        let limits = LIMITS;
+        let size = [limits.orientation, limits.position][part].acceleration;
+        let (v, a) = (Vector3::z() * (-0.5 * size * duration), Vector3::z() * -size);
+        let Motion { twist, acceleration, pose } = &mut scene.motion;
+        if part == 0 {
+            (twist.angular, acceleration.angular) = (v, a);
+        } else {
+            (twist.linear, acceleration.linear) = (v, a);
+        }
+        scene.constants.parameters.limits.position.velocity = 10.0;
+        scene.constants.parameters.limits.orientation.velocity = 10.0;
+        // Backward from the end.
+        let middle = pose.displaced(&Twist {
+            angular: twist.angular * (-0.25 * duration),
+            linear: twist.linear * (-0.25 * duration),
+        });
+        let axis = [2, 5][part];
+        let machine = scene.constants.machine().clone();
+        let of = |pose: &Pose| (leg_lengths(&machine, pose), task_coordinates(pose, &machine.home)[axis]);
+        let (lengths, x) = of(&middle);
+        for leg in 0..LEGS {
+            let set = |scene: &mut Scene, bound| scene.bounds.longest[leg] = bound;
+            let (_, bound) = scene.tightened(100.0, 0.0, set).unwrap();
+            let excess = lengths[leg] - bound;
+            assert!(excess <= ROOM_RATIO * machine.actuator.stroke(), "{part} {duration} {leg}: {excess}");
+            scene.bounds.longest[leg] = 100.0;
+        }
+        // Of the angles only for steps no longer than the time between knots.
+        if part == 1 {
+            let set =
+                |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().highest[axis] = bound;
+            let (_, bound) = scene.tightened(10.0, -9.0, set).unwrap();
+            assert!(x - bound <= 1e-9, "{duration}: {}", x - bound);
+        }
+    }
+}
+
+/// The speed in the middle of a step exceeds that at both ends by an eighth of the change of acceleration times the step.
+#[test]
+fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
+    let mut samples = Samples::new(84);
+    for (part, is_free) in [(0, false), (1, false), (0, true), (1, true)] {
+        let mut scene = scene(&mut samples, 1.0, 1.0);
+        scene.is_free = is_free;
+        if !is_free {
+            // No room in any direction: examined.
+            scene.bounds.envelope.as_mut().unwrap().lowest =
+                task_coordinates(&scene.motion.pose, &scene.constants.machine().home).map(|x| x - 1e-3);
+        }
+        let (speed, h) = (0.5, 1e-2);
+        let jerk = [LIMITS.orientation, LIMITS.position][part].jerk;
+        let vectors = [speed, -0.5 * jerk * h, -jerk].map(|size| Vector3::x() * size);
+        let Motion { twist, acceleration, .. } = &mut scene.motion;
+        let pairs = if part == 0 {
+            (&mut twist.angular, &mut acceleration.angular, &mut scene.step.jerk.angular)
+        } else {
+            (&mut twist.linear, &mut acceleration.linear, &mut scene.step.jerk.linear)
+        };
+        (*pairs.0, *pairs.1, *pairs.2) = (vectors[0], vectors[1], vectors[2]);
+        scene.step.duration = h;
+        let set = |scene: &mut Scene, bound: f64| {
+            let limits = &mut scene.constants.parameters.limits;
+            let limits = if part == 0 { &mut limits.orientation } else { &mut limits.position };
+            limits.velocity = bound;
+        };
+        let (extremes, bound) = scene.tightened(100.0, 0.0, set).unwrap();
+        let middle = speed + jerk * h * h / 8.0;
+        let found = extremes.speeds[if part == 0 { 1 } else { 0 }];
+        assert!(
+            (found / middle - 1.0).abs() < 1e-9 && (bound / middle - 1.0).abs() < 1e-8,
+            "{part}: {bound}"
+        );
+    }
+}
+
+/// The largest second derivative of a length, for one limit or velocity at a time: each term is needed.
+#[test]
+fn no_length_is_curved_more_than_its_bound() {
+    let mut samples = Samples::new(85);
+    let mut used = [0.0_f64; 3];
+    for k in 0..6000 {
+        let (term, mut scene) = (k % 3, scene(&mut samples, 1.0, 1.0));
+        scene.motion.pose = pose(&mut samples, &scene.constants);
+        let limits = &mut scene.constants.parameters.limits;
+        let sizes = [[1.0, 1.0, 0.0, 0.0], [1e-3, 1e-3, 0.0, 1.0], [1e-3, 1e-3, 1.0, 0.0]][term];
+        limits.position.acceleration *= sizes[0];
+        limits.orientation.acceleration *= sizes[1];
+        let [a, alpha] = [limits.position.acceleration, limits.orientation.acceleration];
+        let unit = |samples: &mut Samples| samples.vector(1.0);
+        scene.motion.twist =
+            Twist { angular: unit(&mut samples) * sizes[3], linear: unit(&mut samples) * sizes[2] };
+        scene.motion.acceleration =
+            Acceleration { angular: unit(&mut samples) * alpha, linear: unit(&mut samples) * a };
+        let bound = curvature(&scene.constants, sizes[2], sizes[3]);
+        let legs = leg_motion(scene.constants.machine(), &scene.motion);
+        let largest = legs.accel.iter().fold(0.0_f64, |largest, accel| largest.max(accel.abs()));
+        used[term] = used[term].max(largest / bound);
+    }
+    assert!(used.iter().all(|used| (0.4..=1.0).contains(used)), "{used:?}");
+}
+
+/// At knots the condition keeps the limit of the reference, whatever that of the platform.
+#[test]
+fn the_condition_at_knots_keeps_the_limit_of_the_reference() {
+    let mut samples = Samples::new(86);
+    let mut count = [0; 2];
+    for _ in 0..300 {
+        let mut scene = Scene::new(&mut samples);
+        scene.constants.parameters.condition = 1e9;
+        let set = |scene: &mut Scene, bound: f64| scene.constants.reference_condition = bound;
+        let before =
+            KinematicState::new(scene.constants.machine(), scene.motion.pose).sensitivity().condition;
+        let Some((extremes, bound)) = scene.tightened(1e4, 1.0, set) else { continue };
+        let worst = 1.0 / extremes.inverse_condition;
+        // Where the step began beyond the limit it may go as far.
+        let allowed = bound.max(before) * if scene.is_free { 1.0 + 1e-9 } else { 1.01 };
+        assert!(worst > 0.0 && worst <= allowed, "{worst} {bound}");
+        count[usize::from(scene.is_free)] += 1;
+    }
+    assert!(count.iter().all(|count| *count > 50), "{count:?}");
+}

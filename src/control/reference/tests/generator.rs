@@ -1,0 +1,329 @@
+//! The generator as a whole: what it does in one step, and where it leads.
+
+use super::super::components::Components;
+use super::super::pose_samples::PoseSamples;
+use super::super::pose_stop::{PoseStop, StopKind};
+use super::super::target::at_rest;
+use super::super::{HeldStop, ReferenceGenerator, Target};
+use super::*;
+use crate::control::controller::{Setpoint, SetpointKind};
+use crate::control::input_validation::SetpointMotion;
+use crate::control::limits::Limit;
+use crate::model::inverse_geometry::leg_lengths_and_rates;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::task::{TaskState, task_coordinates};
+
+pub(super) const MS: u64 = 1_000_000;
+
+pub(super) fn constants(change: impl FnOnce(&mut Machine, &mut Parameters)) -> Constants {
+    let mut machine = machine(&mut Samples::new(61));
+    let mut parameters = parameters(&machine);
+    change(&mut machine, &mut parameters);
+    Constants::new(&machine, parameters)
+}
+
+/// A setpoint at rest at an offset from home, with the time stamp 0.
+pub(super) fn standing(constants: &Constants, offset: [f64; 6]) -> SetpointMotion {
+    let home = constants.machine().home;
+    let x = core::array::from_fn::<f64, 6, _>(|axis| home[axis] + offset[axis]);
+    SetpointMotion::new(Setpoint::motion(0, TaskState::at_rest(x)))
+}
+
+pub(super) fn started(constants: &Constants, motion: &Motion) -> ReferenceGenerator {
+    let mut reference = ReferenceGenerator::new(constants);
+    reference.start(constants, 0, motion);
+    reference
+}
+
+/// Steps of 1 ms towards a setpoint; the largest speeds of translation and rotation.
+pub(super) fn run(
+    constants: &Constants,
+    reference: &mut ReferenceGenerator,
+    target: &Target<'_>,
+    steps: u64,
+) -> [f64; 2] {
+    let mut speeds = [0.0_f64; 2];
+    for _ in 0..steps {
+        reference.advance(constants, reference.time_ns() + MS, Some(target));
+        let twist = reference.motion().twist;
+        speeds = [speeds[0].max(twist.linear.norm()), speeds[1].max(twist.angular.norm())];
+    }
+    speeds
+}
+
+pub(super) fn x(constants: &Constants, reference: &ReferenceGenerator) -> [f64; 6] {
+    task_coordinates(&reference.motion().pose, &constants.machine().home)
+}
+
+/// In steps of 1 ms, and no more than 32 of them.
+#[test]
+fn a_long_cycle_moves_as_several_short_ones() {
+    let constants = constants(|_, _| ());
+    let setpoint = standing(&constants, [0.1, -0.1, 0.05, 0.1, 0.1, -0.1]);
+    let target = Target::Motion(&setpoint);
+    // Steps of any length, each one.
+    let after_steps = |step_ns: u64, count: u64| {
+        let mut reference = started(&constants, &at_rest(constants.home.pose()));
+        for k in 1..=count {
+            reference.step(&constants, k * step_ns, Some(&target));
+        }
+        *reference.motion()
+    };
+    let after = |cycle_ns: u64, count: u64| {
+        let mut reference = started(&constants, &at_rest(constants.home.pose()));
+        for k in 1..=count {
+            reference.advance(&constants, k * cycle_ns, Some(&target));
+        }
+        *reference.motion()
+    };
+    assert_eq!(after(10 * MS, 12), after(MS, 120));
+    assert_eq!(after(3 * MS / 2, 64), after(3 * MS / 4, 128));
+    assert_eq!(after(32 * MS, 4), after(MS, 128));
+    assert_eq!(after(128 * MS, 1), after_steps(4 * MS, 32));
+    assert_ne!(after(MS, 120), after(MS / 2, 240));
+    let mut reference = started(&constants, &at_rest(constants.home.pose()));
+    reference.advance(&constants, MS, Some(&target));
+    let before = reference.clone();
+    reference.advance(&constants, MS, Some(&target));
+    assert_eq!((reference.motion(), reference.time_ns()), (before.motion(), MS));
+    assert_eq!(reference.motion_of_hold(MS), before.motion_of_hold(MS));
+}
+
+/// The largest rate of a leg is 97 % of its limit while the platform moves far.
+#[test]
+fn the_reference_cruises_at_the_limit_of_leg_rates() {
+    let constants = constants(|machine, _| machine.actuator.max_rate = 0.4);
+    let setpoint = standing(&constants, [0.0, 0.0, 0.0, 0.0, 0.0, 0.6]);
+    let mut reference = started(&constants, &at_rest(constants.home.pose()));
+    let (mut fastest, mut cruising) = (0.0_f64, 0);
+    for _ in 0..2000 {
+        run(&constants, &mut reference, &Target::Motion(&setpoint), 1);
+        let Motion { pose, twist, .. } = reference.motion();
+        let (_, rates) = leg_lengths_and_rates(constants.machine(), pose, twist);
+        let rate = rates.iter().fold(0.0_f64, |fastest, rate| fastest.max(rate.abs()));
+        fastest = fastest.max(rate);
+        if (rate / 0.4 - 0.97).abs() < 0.003 {
+            assert!(reference.active_limits().contains(Limit::LegRate));
+            cruising += 1;
+        }
+    }
+    let left = (setpoint.motion.pose.position - reference.motion().pose.position).norm();
+    assert!((0.965..0.985).contains(&(fastest / 0.4)) && cruising > 800, "{fastest} {cruising}");
+    assert!(left < 1e-6, "{left}");
+}
+
+/// A start forgets the reference before it.
+#[test]
+fn a_start_clears_the_history() {
+    let constants = constants(|_, _| ());
+    let aside = standing(&constants, [0.0, 0.0, 0.0, 0.1, 0.0, 0.0]);
+    let mut reference = started(&constants, &at_rest(constants.home.pose()));
+    run(&constants, &mut reference, &Target::Motion(&aside), 50);
+    reference.start(&constants, 50 * MS, &aside.motion);
+    assert_eq!(reference.motion_at(50 * MS), aside.motion);
+    assert_eq!(reference.motion_at(49 * MS).pose, aside.motion.pose);
+}
+
+/// 0.3 of the limits: of a pose by itself, of a setpoint where the closing scale says so.
+#[test]
+fn the_way_to_a_target_takes_its_share_of_the_limits() {
+    let constants = constants(|_, _| ());
+    let there = standing(&constants, [0.35, 0.0, 0.0, 0.0, 0.0, 0.35]);
+    let cruise = |target: &Target<'_>, scale: f64| {
+        let mut reference = started(&constants, &at_rest(constants.home.pose()));
+        reference.set_closing_scale(scale);
+        let [shift, turn] = run(&constants, &mut reference, target, 4000);
+        assert!((reference.motion().pose.position - there.motion.pose.position).norm() < 1e-6);
+        [shift / LIMITS.position.velocity, turn / LIMITS.orientation.velocity]
+    };
+    let scaled = Target::Motion(&there);
+    let pose = Target::Pose(&there.motion.pose);
+    for (found, share) in [
+        (cruise(&scaled, 0.3), 0.3),
+        (cruise(&pose, 1.0), 0.3 * 0.999),
+        (cruise(&pose, 0.3), 0.3 * 0.999),
+        (cruise(&scaled, 0.2), 0.2),
+    ] {
+        assert!(found.iter().all(|found| (found / share - 1.0).abs() < 5e-3), "{found:?}, not {share}");
+    }
+}
+
+#[test]
+fn each_kind_of_setpoint_has_its_target() {
+    let constants = constants(|_, _| ());
+    let samples = PoseSamples::default();
+    let mut setpoint = standing(&constants, [0.0; 6]);
+    for kind in SetpointKind::ALL {
+        setpoint.setpoint.kind = kind;
+        let target = Target::of_setpoint(&setpoint, &samples);
+        assert_eq!(matches!(target, Target::Motion(_)), kind == SetpointKind::Motion);
+        assert_eq!(matches!(target, Target::Samples(_)), kind == SetpointKind::Pose);
+        assert_eq!(matches!(target, Target::Pose(_)), kind == SetpointKind::Target);
+    }
+}
+
+/// A sine whose setpoints are of now or 3 ms old, in both kinds of coordinates: 3 um and 20 um.
+#[test]
+fn old_setpoints_of_a_sine_are_followed_as_their_extrapolation() {
+    let constants = constants(|_, _| ());
+    let w = core::f64::consts::TAU;
+    let at = |t: f64| {
+        let mut task = TaskState::at_rest(constants.machine().home);
+        for (axis, size) in [(1, 0.1), (3, 0.1)] {
+            task.x[axis] += size * ((w * t).cos() - 1.0);
+            task.xd[axis] = -size * w * (w * t).sin();
+            task.xdd[axis] = -size * w * w * (w * t).cos();
+        }
+        task
+    };
+    for (age, bounds) in [(0, [6e-6, 3e-5]), (3, [4e-5, 2e-4])] {
+        let mut reference = started(&constants, &at(0.0).motion());
+        let mut largest = [0.0_f64; 4];
+        for k in 0..3000_u64 {
+            let sent = k.saturating_sub(age);
+            let setpoint = SetpointMotion::new(Setpoint::motion(sent * MS, at(sent as f64 * 1e-3)));
+            reference.advance(&constants, (k + 1) * MS, Some(&Target::Motion(&setpoint)));
+            if k > 1000 {
+                let desired = at((k + 1) as f64 * 1e-3).motion();
+                let motion = reference.motion();
+                let errors = [
+                    (motion.pose.position - desired.pose.position).norm(),
+                    (motion.pose.rotation - desired.pose.rotation).norm(),
+                    (motion.twist.linear - desired.twist.linear).norm(),
+                    (motion.twist.angular - desired.twist.angular).norm(),
+                ];
+                largest = core::array::from_fn(|kind| largest[kind].max(errors[kind]));
+            }
+        }
+        assert!(largest[..2].iter().all(|error| *error < bounds[0]), "{largest:?}");
+        assert!(largest[2..].iter().all(|error| *error < bounds[1]), "{largest:?}");
+    }
+}
+
+/// While one component waits, its acceleration a step later is that of the stop.
+#[test]
+fn a_component_that_waits_follows_the_stop() {
+    let constants = constants(|_, _| ());
+    let mut motion = at_rest(constants.home.pose());
+    motion.twist = Twist { angular: Vector3::new(0.3, 0.1, 0.0), linear: Vector3::new(0.1, 0.3, 0.1) };
+    motion.acceleration =
+        Acceleration { angular: Vector3::new(1.0, 0.0, 2.0), linear: Vector3::new(0.0, 2.0, 1.0) };
+    let (h, elapsed_s) = (1e-3, 7e-3);
+    let setpoint = standing(&constants, [0.2, 0.2, 0.0, 0.2, 0.2, 0.2]);
+    let target = Target::Motion(&setpoint);
+    let desired = target.displaced_at(&constants.parameters, MS).unwrap();
+    let mut reference = started(&constants, &motion);
+    let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
+    for is_followed in [false, true] {
+        if is_followed {
+            (reference.followed.stop, reference.followed.elapsed_s) = (stop, elapsed_s);
+            reference.stop = HeldStop::Followed;
+        } else {
+            reference.stop = HeldStop::Verified(StopKind::Planar);
+        }
+        let expected = stop.at(h + if is_followed { elapsed_s } else { 0.0 });
+        let mut accelerations = |components| {
+            reference.components = components;
+            reference.proposed(&constants, &target, &desired, h).acceleration
+        };
+        let both = accelerations(Components::Both);
+        let shifting = accelerations(Components::Translation { steps: 0 });
+        let turning = accelerations(Components::Rotation { steps: 0 });
+        assert_eq!((shifting.linear, turning.angular), (both.linear, both.angular));
+        assert_eq!(shifting.angular, expected.orientation.acceleration);
+        assert_eq!(turning.linear, expected.position.acceleration);
+        assert!(
+            (shifting.angular - both.angular).norm() > 0.1 && (turning.linear - both.linear).norm() > 0.1
+        );
+    }
+}
+
+/// At most a timeout and a period, before and after its instant.
+#[test]
+fn a_setpoint_is_extrapolated_no_further_than_its_timeout() {
+    let constants = constants(|_, _| ());
+    let mut setpoint = standing(&constants, [0.0; 6]);
+    setpoint.setpoint.time_ns = 1000 * MS;
+    for (dt_ms, expected) in [(0, 0.0), (20, 0.02), (-20, -0.02), (500, 0.021), (-500, -0.021)] {
+        let instant_ns = (1000 * MS).wrapping_add_signed(dt_ms * 1_000_000);
+        let found = setpoint.extrapolation_s(&constants.parameters, instant_ns);
+        assert!((found - expected).abs() < 1e-12, "{dt_ms}: {found}");
+    }
+}
+
+/// After a refusal translation alone for 20 steps, or if that is refused rotation alone.
+#[test]
+fn components_take_turns_after_refusals() {
+    let name = |components: Components| match components {
+        Components::Both => 'b',
+        Components::Translation { .. } => 't',
+        Components::Rotation { .. } => 'r',
+    };
+    let play = |accepted: &str| {
+        let mut components = Components::default();
+        let after = accepted.chars().map(|is_accepted| {
+            components = components.after(is_accepted == '1');
+            name(components)
+        });
+        after.collect::<String>()
+    };
+    let twenty = "1".repeat(20);
+    assert_eq!(play("110"), "bbt");
+    assert_eq!(play(&format!("0{twenty}11")), format!("{}bb", "t".repeat(21)));
+    assert_eq!(play(&format!("00{twenty}11")), format!("t{}bb", "r".repeat(21)));
+    assert_eq!(play("000"), "trb");
+}
+
+/// What held the reference back in a cycle, of either component.
+#[test]
+fn the_limits_that_hold_the_reference_back_are_reported() {
+    let constants = constants(|_, _| ());
+    for offset in [[0.5, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.5, 0.0, 0.0]] {
+        let setpoint = standing(&constants, offset);
+        let mut reference = started(&constants, &at_rest(constants.home.pose()));
+        let mut first = [None; 3];
+        for k in 0..3000 {
+            run(&constants, &mut reference, &Target::Motion(&setpoint), 1);
+            for (first, limit) in first.iter_mut().zip([Limit::Jerk, Limit::Acceleration, Limit::Velocity]) {
+                if first.is_none() && reference.active_limits().contains(limit) {
+                    *first = Some(k);
+                }
+            }
+        }
+        // At once; A / J = 40 ms.
+        let [jerk, acceleration, velocity] = first;
+        assert_eq!(jerk, Some(0), "{offset:?}");
+        assert!(acceleration.is_some() && velocity.is_some(), "{offset:?} {first:?}");
+        assert!(reference.active_limits().is_empty() && !reference.is_at_rest());
+    }
+}
+
+/// Along its stop, without a target, the reference ends at rest where the stop does, and says so there only.
+#[test]
+fn without_a_target_the_reference_ends_where_its_stop_does() {
+    let constants = constants(|_, _| ());
+    let mut motion = at_rest(constants.home.pose());
+    motion.twist.linear = Vector3::new(0.1, 0.2, 0.3);
+    motion.acceleration.linear = Vector3::new(1.0, 0.0, -2.0);
+    let mut reference = started(&constants, &motion);
+    let HeldStop::Verified(kind) = reference.stop else { panic!("not verified") };
+    let stop = PoseStop::new(kind, &motion, &LIMITS);
+    let mut at_rest_after = None;
+    for k in 1..=400_u64 {
+        assert!(!reference.is_at_rest() || at_rest_after.is_some());
+        reference.advance(&constants, k * MS, None);
+        let expected = stop.at(k as f64 * 1e-3).position;
+        let found = reference.motion();
+        assert!((found.twist.linear - expected.velocity).norm() < 1e-9);
+        assert!((found.pose.position - motion.pose.position - expected.displacement).norm() < 1e-9, "{k}");
+        if reference.is_at_rest() {
+            at_rest_after.get_or_insert(k);
+        }
+    }
+    assert_eq!(at_rest_after, Some((stop.duration() * 1e3).ceil() as u64));
+    // One that never began is at rest, and stays where it is.
+    let mut reference = ReferenceGenerator::new(&constants);
+    assert!(reference.is_at_rest());
+    reference.advance(&constants, MS, None);
+    assert!(reference.is_at_rest() && reference.motion() == &at_rest(constants.home.pose()));
+}

@@ -1,0 +1,205 @@
+//! The generator at its bounds: where it may begin, what it refuses, and that it comes back.
+
+use super::super::pose_stop::StopKind;
+use super::super::target::at_rest;
+use super::super::{HeldStop, ReferenceGenerator, Target};
+use super::generator::{MS, constants, run, standing, started, x};
+use super::*;
+use crate::control::limits::Limit;
+use crate::control::parameters::Envelope;
+use crate::model::rigid::Twist;
+use crate::model::task::task_coordinates;
+
+/// A platform that is beyond the envelope when control begins comes back, and does not go there again.
+#[test]
+fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
+    let constants = constants(|_, parameters| {
+        let half = [0.3, 0.3, 0.3, 0.1, 0.1, 0.1];
+        parameters.envelope = Some(Envelope {
+            lowest: core::array::from_fn(|axis| [0.0, 0.0, 0.0, 0.0, 0.0, 1.5][axis] - half[axis]),
+            highest: core::array::from_fn(|axis| [0.0, 0.0, 0.0, 0.0, 0.0, 1.5][axis] + half[axis]),
+        });
+    });
+    let beyond = standing(&constants, [0.0, 0.0, 0.0, 0.12, 0.0, 0.0]);
+    let home = standing(&constants, [0.0; 6]);
+    let mut reference = started(&constants, &at_rest(&beyond.motion.pose));
+    assert_eq!(reference.check_start(&constants, &beyond.motion.pose, &Twist::default()), Ok(()));
+    run(&constants, &mut reference, &Target::Motion(&beyond), 200);
+    assert!((x(&constants, &reference)[3] - 0.12).abs() < 1e-4);
+    // At some millimetres per second, as the bounds follow closely.
+    run(&constants, &mut reference, &Target::Motion(&home), 10_000);
+    assert!(x(&constants, &reference)[3].abs() < 1e-6, "{:?}", x(&constants, &reference));
+    run(&constants, &mut reference, &Target::Motion(&beyond), 2000);
+    assert!((0.09..=0.1 + 2e-9).contains(&x(&constants, &reference)[3]), "{:?}", x(&constants, &reference));
+    // Also where control begins anew within the envelope before the bounds have followed the platform back.
+    let mut reference = started(&constants, &at_rest(&beyond.motion.pose));
+    reference.start(&constants, 0, &home.motion);
+    run(&constants, &mut reference, &Target::Motion(&beyond), 2000);
+    assert!((0.09..=0.1 + 2e-9).contains(&x(&constants, &reference)[3]), "{:?}", x(&constants, &reference));
+}
+
+#[test]
+fn a_start_is_refused_with_the_limit_that_no_stop_keeps() {
+    let change = |limit: Limit| {
+        move |machine: &mut Machine, parameters: &mut Parameters| match limit {
+            Limit::Stroke => parameters.stroke_margin = 0.82,
+            Limit::LegRate => machine.actuator.max_rate = 0.2,
+            Limit::Envelope => {
+                let [lowest, highest] = [-1.0, 1.0].map(|sign| {
+                    core::array::from_fn(|axis| [0.0, 0.0, 0.0, 0.0, 0.0, 1.5][axis] + sign * 0.01)
+                });
+                parameters.envelope = Some(Envelope { lowest, highest });
+            }
+            Limit::Velocity => parameters.limits.position.velocity = 0.2,
+            _ => parameters.condition = 1.0,
+        }
+    };
+    let twist = Twist { angular: Vector3::zeros(), linear: Vector3::new(0.1, 0.1, 0.4) };
+    for limit in [Limit::Stroke, Limit::LegRate, Limit::Envelope, Limit::Velocity, Limit::Condition] {
+        let constants = constants(change(limit));
+        let mut reference = ReferenceGenerator::new(&constants);
+        assert_eq!(reference.check_start(&constants, constants.home.pose(), &twist), Err(limit));
+    }
+    let constants = constants(|_, _| ());
+    let mut reference = ReferenceGenerator::new(&constants);
+    assert_eq!(reference.check_start(&constants, constants.home.pose(), &twist), Ok(()));
+}
+
+/// Both ends of the step keep the limit of velocity, its middle exceeds it by `J h^2 / 8`.
+#[test]
+fn a_step_that_exceeds_the_velocity_between_its_ends_is_refused() {
+    for part in 0..2 {
+        for (excess, is_accepted) in [(0.9, false), (1.1, true)] {
+            let (h, speed) = (1e-3, 0.5);
+            let limits = [LIMITS.orientation, LIMITS.position][part];
+            let constants = constants(|_, parameters| {
+                let limits = &mut parameters.limits;
+                let limits = if part == 0 { &mut limits.orientation } else { &mut limits.position };
+                limits.velocity = speed + excess * limits.jerk * h * h / 8.0;
+            });
+            let mut motion = at_rest(constants.home.pose());
+            let vectors = [Vector3::x() * speed, Vector3::x() * (0.5 * limits.jerk * h)];
+            if part == 0 {
+                (motion.twist.angular, motion.acceleration.angular) = (vectors[0], vectors[1]);
+            } else {
+                (motion.twist.linear, motion.acceleration.linear) = (vectors[0], vectors[1]);
+            }
+            let mut reference = started(&constants, &motion);
+            let setpoint = standing(&constants, [0.0; 6]);
+            reference.advance(&constants, MS, Some(&Target::Motion(&setpoint)));
+            assert_eq!(!matches!(reference.stop, HeldStop::Followed), is_accepted, "{part} {excess}");
+            assert_eq!(reference.active_limits().contains(Limit::Velocity), !is_accepted);
+        }
+    }
+}
+
+/// Where rounding has left the reference a little beyond a bound it may return, and not go farther.
+#[test]
+fn a_reference_beyond_a_bound_by_rounding_only_returns() {
+    let home = [0.0, 0.0, 0.0, 0.0, 0.0, 1.5];
+    let wide = |axis: usize, sign: f64| home[axis] + sign;
+    for limit in [Limit::Stroke, Limit::Envelope, Limit::Condition] {
+        let mut constants = constants(|_, parameters| {
+            parameters.envelope = (limit == Limit::Envelope).then(|| Envelope {
+                lowest: core::array::from_fn(|axis| wide(axis, -1.0)),
+                highest: core::array::from_fn(|axis| wide(axis, 1.0)),
+            });
+        });
+        let aside = [0.0, 0.0, 0.0, 0.2, 0.1, 0.2];
+        let pose = standing(&constants, aside).motion.pose;
+        let condition = KinematicState::new(constants.machine(), pose).sensitivity().condition;
+        let mut reference = started(&constants, &at_rest(&pose));
+        match limit {
+            Limit::Stroke => {
+                let longest = leg_lengths(constants.machine(), &pose).into_iter().fold(0.0, f64::max);
+                reference.bounds.longest = [longest - 1e-7; LEGS];
+            }
+            Limit::Envelope => {
+                let x = task_coordinates(&pose, &constants.machine().home);
+                reference.bounds.envelope.as_mut().unwrap().highest = x.map(|x| x - 1e-8);
+            }
+            _ => {
+                constants.reference_condition = condition * (1.0 - 1e-5);
+                constants.parameters.condition = condition * 1.1;
+            }
+        }
+        let mut away = reference.clone();
+        let there = standing(&constants, aside.map(|x| 1.5 * x));
+        run(&constants, &mut away, &Target::Motion(&there), 300);
+        let moved = (away.motion().pose.position - pose.position).norm();
+        assert!(moved < 1e-5, "{limit:?}: {moved}");
+        let home = standing(&constants, [0.0; 6]);
+        run(&constants, &mut reference, &Target::Motion(&home), 1500);
+        let left = (reference.motion().pose.position - home.motion.pose.position).norm();
+        assert!(left < 1e-6, "{limit:?}: {left}");
+    }
+}
+
+/// Under "limit" the walls keep 0.5 % of the stroke from a bound, under "stop" a trajectory may go as near as it can stop.
+#[test]
+fn walls_keep_their_distance_under_limit_only() {
+    for policy in [ViolationPolicy::Stop, ViolationPolicy::Limit] {
+        let constants = constants(|_, parameters| {
+            parameters.on_violation = policy;
+            let [lowest, highest] = [-1.0, 1.0].map(|sign| {
+                core::array::from_fn(|axis| {
+                    [0.0, 0.0, 0.0, 0.0, 0.0, 1.5][axis] + sign * if axis < 3 { 0.4 } else { 0.2 }
+                })
+            });
+            parameters.envelope = Some(Envelope { lowest, highest });
+        });
+        let kept = 5e-3 * constants.machine().actuator.stroke();
+        for (axis, end, kept) in [(3, 0.2_f64, kept), (2, -0.4, kept / constants.machine().joints.radius)] {
+            let near = 0.3 * kept;
+            let mut offset = [0.0; 6];
+            offset[axis] = end - near * end.signum();
+            let setpoint = standing(&constants, offset);
+            let mut reference = started(&constants, &at_rest(constants.home.pose()));
+            run(&constants, &mut reference, &Target::Motion(&setpoint), 3000);
+            let left = end.abs() - x(&constants, &reference)[axis].abs();
+            let expected = if policy == ViolationPolicy::Stop { near } else { kept };
+            assert!((left - expected).abs() < 1e-6, "{policy:?} {axis}: {left}, not {expected}");
+            assert_eq!(reference.active_limits().contains(Limit::Envelope), policy == ViolationPolicy::Limit);
+        }
+    }
+}
+
+/// The stop that is held from the start is the one that was verified.
+#[test]
+fn a_start_holds_the_stop_that_was_verified() {
+    for (half, expected) in [(1.0, StopKind::ReleaseFirst), (0.05, StopKind::Planar)] {
+        let constants = constants(|_, parameters| {
+            let [lowest, highest] = [-half, half]
+                .map(|size| core::array::from_fn(|axis| [0.0, 0.0, 0.0, 0.0, 0.0, 1.5][axis] + size));
+            parameters.envelope = Some(Envelope { lowest, highest });
+        });
+        let mut motion = at_rest(constants.home.pose());
+        motion.twist.linear = Vector3::new(-0.2, 0.0, 0.0);
+        motion.pose.position.x = if half < 1.0 { 0.047 } else { 0.0 };
+        let reference = started(&constants, &motion);
+        let HeldStop::Verified(kind) = reference.stop else { panic!("no stop is held") };
+        assert_eq!(kind == StopKind::Planar, expected == StopKind::Planar, "{half}");
+    }
+}
+
+/// An axis of the envelope without width does not hold the others.
+#[test]
+fn the_platform_moves_beside_locked_axes() {
+    let constants = constants(|_, parameters| {
+        let wide = [0.0, 0.0, 0.5, 0.0, 0.0, 0.5];
+        let home = [0.0, 0.0, 0.0, 0.0, 0.0, 1.5];
+        parameters.envelope = Some(Envelope {
+            lowest: core::array::from_fn(|axis| home[axis] - wide[axis]),
+            highest: core::array::from_fn(|axis| home[axis] + wide[axis]),
+        });
+        for limits in [&mut parameters.limits.position, &mut parameters.limits.orientation] {
+            (limits.acceleration, limits.jerk) = (0.2 * limits.acceleration, 0.1 * limits.jerk);
+        }
+    });
+    let there = standing(&constants, [0.0, 0.0, 0.3, 0.0, 0.0, 0.2]);
+    let mut reference = started(&constants, &at_rest(constants.home.pose()));
+    run(&constants, &mut reference, &Target::Motion(&there), 4000);
+    let found = x(&constants, &reference);
+    assert!((found[2] - 0.3).abs() < 1e-6 && (found[5] - 1.7).abs() < 1e-6, "{found:?}");
+    assert!([0, 1, 3, 4].iter().all(|axis| found[*axis].abs() < 2e-9), "{found:?}");
+}

@@ -1,0 +1,191 @@
+//! Each wall against differences of lengths and coordinates, and the restricted velocities against their conditions.
+
+use nalgebra::Matrix3;
+
+use super::*;
+use crate::control::reference::samples::Samples;
+use crate::control::reference::target::at_rest;
+use crate::control::reference::tests::{machine, parameters, pose};
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::rigid::Pose;
+
+const STEP_S: f64 = 1e-3;
+
+struct Scene {
+    constants: Constants,
+    bounds: PoseBounds,
+    motion: Motion,
+}
+
+impl Scene {
+    fn new(samples: &mut Samples) -> Self {
+        let machine = machine(samples);
+        let mut parameters = parameters(&machine);
+        parameters.envelope = Some(Envelope {
+            lowest: [-0.3, -0.3, -0.3, -0.2, -0.2, 1.3],
+            highest: [0.3, 0.3, 0.3, 0.2, 0.2, 1.7],
+        });
+        let constants = Constants::new(&machine, parameters);
+        let twist = Twist { angular: samples.vector(0.8), linear: samples.vector(0.8) };
+        let motion = Motion { twist, ..at_rest(&pose(samples, &constants)) };
+        Self { bounds: PoseBounds::nominal(&constants), constants, motion }
+    }
+
+    fn walls(&self) -> Walls {
+        Walls::new(&self.constants, &self.bounds, &self.motion, &self.motion.twist, STEP_S)
+    }
+
+    /// Lengths and coordinates of a pose.
+    fn quantities(&self, pose: &Pose) -> [f64; 12] {
+        let machine = self.constants.machine();
+        let (lengths, x) = (leg_lengths(machine, pose), task_coordinates(pose, &machine.home));
+        core::array::from_fn(|k| if k < LEGS { lengths[k] } else { x[k - LEGS] })
+    }
+}
+
+/// The approach of a wall: 0.6 of the limits.
+fn approach(constants: &Constants, is_angle: bool) -> Approach {
+    let limits = &constants.parameters.limits;
+    Approach::new(if is_angle { limits.orientation } else { limits.position }, 0.6, STEP_S)
+}
+
+#[test]
+fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
+    let mut samples = Samples::new(71);
+    let mut outside = 0;
+    for _ in 0..300 {
+        let scene = Scene::new(&mut samples);
+        let Scene { constants, bounds, motion } = &scene;
+        let walls = scene.walls();
+        assert_eq!(walls.count, 24);
+        let radius = constants.machine().joints.radius;
+        let moved = |twist: &Twist, t: f64| {
+            let turned = Twist { angular: twist.angular * t, linear: twist.linear * t };
+            scene.quantities(&motion.pose.displaced(&turned))
+        };
+        let now = scene.quantities(&motion.pose);
+        let next = moved(&motion.twist, STEP_S);
+        let (limits, twist) = (&constants.parameters.limits, &motion.twist);
+        let stop_s = (twist.linear.norm() / limits.position.acceleration
+            + limits.position.acceleration / limits.position.jerk)
+            .max(
+                twist.angular.norm() / limits.orientation.acceleration
+                    + limits.orientation.acceleration / limits.orientation.jerk,
+            );
+        let envelope = bounds.envelope.unwrap();
+        let stroke = constants.machine().actuator.stroke();
+        for (k, wall) in walls.walls.iter().enumerate() {
+            let (quantity, sign) = (k / 2, if k % 2 == 0 { 1.0 } else { -1.0 });
+            let is_angle = (6..9).contains(&quantity);
+            // The gradient, along every axis.
+            for axis in 0..6 {
+                let unit = Twist::from_vector(&Vector6::ith(axis, 1.0));
+                let t = 1e-5;
+                let rate = (moved(&unit, t)[quantity] - moved(&unit, -t)[quantity]) / (2.0 * t);
+                let scaled = wall.gradient[axis] * if axis < 3 { radius } else { 1.0 };
+                assert!((scaled - sign * rate).abs() < 1e-6, "{k} {axis}: {scaled}, not {rate}");
+            }
+            let t = 1e-4;
+            let curvature = if quantity < LEGS {
+                let [after, before] = [t, -t].map(|t| moved(&motion.twist, t)[quantity]);
+                sign * (after - 2.0 * now[quantity] + before) / (t * t)
+            } else {
+                0.0
+            };
+            let departure = (curvature * stop_s * stop_s / 8.0).max(0.0);
+            let bound = match (quantity, k % 2) {
+                (leg @ 0..6, 0) => bounds.longest[leg],
+                (leg @ 0..6, _) => -bounds.shortest[leg],
+                (other, 0) => envelope.highest[other - LEGS],
+                (other, _) => -envelope.lowest[other - LEGS],
+            };
+            let kept = 5e-3 * stroke / if is_angle { radius } else { 1.0 };
+            let gap = bound - sign * next[quantity] - departure - kept;
+            let approach = approach(constants, is_angle);
+            let (rate, slope) = if gap > 0.0 {
+                approach.closing_velocity(gap)
+            } else {
+                outside += 1;
+                (gap * approach.slowest_slope() / 4.0, approach.slowest_slope() / 4.0)
+            };
+            // To second order in the step.
+            assert!((wall.rate - rate).abs() < 2e-4, "{k}: {} not {rate}, gap {gap}", wall.rate);
+            let derivative = -slope * rate - curvature;
+            assert!((wall.derivative - derivative).abs() < 2e-2, "{k}: {} not {derivative}", wall.derivative);
+        }
+    }
+    assert!(outside > 100, "{outside}");
+}
+
+/// The conditions of the nearest velocity: no wall is approached too fast, and the change is a sum of multiples of the
+/// gradients that are active, none of them negative.
+#[test]
+fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
+    let mut samples = Samples::new(72);
+    let (mut several, mut free) = (0, 0);
+    for _ in 0..500 {
+        let scene = Scene::new(&mut samples);
+        let mut walls = scene.walls();
+        let mut wanted = |size| WantedVelocity {
+            velocity: samples.vector(size),
+            derivative: samples.vector(5.0),
+            is_limited: false,
+        };
+        let [turn, shift] = [wanted(1.2), wanted(1.2)];
+        let (mut new_turn, mut new_shift) = (turn, shift);
+        let limits = walls.restrict(&mut new_turn, &mut new_shift);
+        let of = |first: &Vector3<f64>, second: &Vector3<f64>| stacked(&(first * walls.radius), second);
+        let [before, after] = [(&turn, &shift), (&new_turn, &new_shift)]
+            .map(|(turn, shift)| of(&turn.velocity, &shift.velocity));
+        let active: Vec<&Wall> = walls.walls.iter().filter(|wall| wall.multiplier > 0.0).collect();
+        for wall in &walls.walls {
+            let excess = wall.gradient.dot(&after) - wall.rate;
+            assert!(wall.multiplier >= 0.0);
+            if active.len() <= 1 {
+                assert!(excess < 1e-9, "{excess}");
+            }
+        }
+        let change: Vector6<f64> = active.iter().map(|wall| wall.gradient * wall.multiplier).sum();
+        assert!((before - change - after).norm() < 1e-9);
+        let expected = active.iter().fold(LimitSet::default(), |set, wall| set.union(wall.limit));
+        assert_eq!(limits, expected);
+        let derivative = of(&new_turn.derivative, &new_shift.derivative);
+        match active.as_slice() {
+            [] => {
+                assert_eq!((new_turn.derivative, new_shift.derivative), (turn.derivative, shift.derivative));
+                free += 1;
+            }
+            [wall] => {
+                assert!((wall.gradient.dot(&after) - wall.rate).abs() < 1e-9);
+                assert!((wall.gradient.dot(&derivative) - wall.derivative).abs() < 1e-6);
+            }
+            _ => several += 1,
+        }
+    }
+    assert!(several > 50 && free > 10, "{several} {free}");
+}
+
+/// Two walls at 60 degrees, as the faces of a wedge: 8 sweeps leave 1e-4 of the excess.
+#[test]
+fn two_walls_at_60_degrees_converge() {
+    let mut samples = Samples::new(73);
+    let scene = Scene::new(&mut samples);
+    let mut walls = scene.walls();
+    walls.count = 2;
+    let directions =
+        [Vector3::x(), Matrix3::new(0.5, 0.0, 0.0, 0.75_f64.sqrt(), 0.0, 0.0, 0.0, 0.0, 1.0) * Vector3::x()];
+    for (wall, direction) in walls.walls.iter_mut().zip(directions) {
+        let gradient = stacked(&Vector3::zeros(), &direction);
+        *wall = Wall { gradient, norm_squared: 1.0, limit: LimitSet(4), ..Wall::default() };
+    }
+    let still =
+        WantedVelocity { velocity: Vector3::zeros(), derivative: Vector3::zeros(), is_limited: false };
+    let along = directions[0] + directions[1];
+    let (mut turn, mut shift) = (still, WantedVelocity { velocity: along, derivative: along * 3.0, ..still });
+    walls.restrict(&mut turn, &mut shift);
+    for direction in directions {
+        assert!(direction.dot(&shift.velocity).abs() < 1e-4, "{}", shift.velocity);
+        assert!(direction.dot(&shift.derivative).abs() < 1e-4, "{}", shift.derivative);
+    }
+    assert_eq!(turn.velocity, Vector3::zeros());
+}
