@@ -180,10 +180,10 @@ fn the_middle_of_a_long_step_keeps_every_bound() {
         let machine = scene.constants.machine().clone();
         let of = |pose: &Pose| (leg_lengths(&machine, pose), task_coordinates(pose, &machine.home)[axis]);
         let (lengths, x) = of(&middle);
-        for leg in 0..LEGS {
+        for (leg, length) in lengths.iter().enumerate() {
             let set = |scene: &mut Scene, bound| scene.bounds.longest[leg] = bound;
             let (_, bound) = scene.tightened(100.0, 0.0, set).unwrap();
-            let excess = lengths[leg] - bound;
+            let excess = length - bound;
             assert!(excess <= ROOM_RATIO * machine.actuator.stroke(), "{part} {duration} {leg}: {excess}");
             scene.bounds.longest[leg] = 100.0;
         }
