@@ -115,7 +115,6 @@ impl Meter {
         if self.parameters.envelope.is_some() {
             let excess = self.envelope_excess(&state.pose);
             self.extremes.add(Quantity::Envelope, self.farther_beyond(&excess), now_ns);
-            self.come_nearer(&excess);
         }
         if let Some(expected) = self.expected {
             self.check_distance(&expected.pose, &state.pose, now_ns);
@@ -230,12 +229,6 @@ impl Meter {
             (excess - began - if began > 0.0 { room } else { 0.0 }) / allowed
         });
         farther.fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    fn come_nearer(&mut self, excess: &[f64; 6]) {
-        for (began, excess) in self.beyond.envelope.iter_mut().zip(excess) {
-            *began = began.min(excess.max(0.0));
-        }
     }
 
     /// 0 at the margin that the reference keeps, 1 at the end of the stroke.
