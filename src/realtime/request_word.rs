@@ -6,7 +6,7 @@
 //! | bits | content |
 //! | --- | --- |
 //! | 60 to 63 | number of the request, 0 for none |
-//! | 52 to 59 | ticket: tells requests of one microsecond apart |
+//! | 52 to 59 | ticket: distinguishes requests of the same microsecond |
 //! | 0 to 51 | CLOCK_MONOTONIC instant of the request \[us\]: 142 years |
 
 use core::sync::atomic::{AtomicU8, AtomicU64, Ordering};

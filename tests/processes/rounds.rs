@@ -89,9 +89,12 @@ fn after_any_blow_one_engage_engages() {
         sleep(Duration::from_millis(random.below(BEFORE_MS)));
         strike(&mut trio, blow, &mut random);
         let struck = Instant::now();
-        // An operator's request that ends control ends the player.
-        if blow.0 == Victim::Operator && !trio.setpoints.runs() {
-            trio.setpoints = start_setpoints(&trio.machine);
+        // An operator's request that ends control ends the player, as soon as the daemon has carried it out.
+        if blow.0 == Victim::Operator {
+            settled(&trio);
+            if !trio.setpoints.runs() {
+                trio.setpoints = start_setpoints(&trio.machine);
+            }
         }
         let (faults, again) = recover(&trio, &format!("round {round}, {blow:?}"));
         stalls += again;

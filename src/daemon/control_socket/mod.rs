@@ -31,7 +31,7 @@ mod order;
 pub mod protocol;
 pub mod status;
 
-/// Most connections. One more closes the one that is missed least.
+/// Most connections. One more closes the first in the order of [`Connection::rank`].
 const MAX_CONNECTIONS: usize = 64;
 
 /// Wait for clients while nothing is pending \[ms\]: how late the thread notices that the daemon ends.
