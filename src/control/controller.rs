@@ -206,7 +206,8 @@ impl Controller {
         let begins = next.has_control() && !cycle.state.has_control();
         if let Some(motion) = free_motion.as_ref().filter(|_| begins) {
             reference.start(constants, begin_ns, motion);
-            error = Some(errors.start(constants, begin_ns));
+            let measured_ns = located.as_ref().map_or(begin_ns, |located| located.measurement.time_ns);
+            error = Some(errors.start(constants, measured_ns, begin_ns));
         }
         if next.has_control() {
             let target = target(constants, next, &setpoint);

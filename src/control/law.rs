@@ -68,6 +68,11 @@ impl ControlMode {
     pub fn acts_on_legs(self) -> bool {
         self != Self::ComputedTorque
     }
+
+    /// Whether its forces include those that accelerate the platform along the reference.
+    pub fn includes_inertia(self) -> bool {
+        matches!(self, Self::ComputedTorque | Self::FeedforwardJointPd)
+    }
 }
 
 /// Control law of one deployment: mode and gains.
@@ -116,6 +121,20 @@ impl Law {
             ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
         }
         Self { mode, position, orientation, compensates_disturbance, leg_masses, saturation }
+    }
+
+    /// Largest acceleration of a leg that a mode without inertia leaves to feedback: all of the reference's, and the largest
+    /// disturbance.
+    pub(super) fn acceleration_left_to_feedback(
+        &self,
+        limits: &Limits,
+        arm: f64,
+        disturbance: &Vector6<f64>,
+    ) -> f64 {
+        if self.mode.includes_inertia() {
+            return 0.0;
+        }
+        limits.position.acceleration + arm * limits.orientation.acceleration + disturbance.amax()
     }
 
     /// Kp and Kd of every deviation.

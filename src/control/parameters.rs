@@ -139,22 +139,20 @@ impl Constants {
         let NoiseModel { bandwidth, period_s, .. } = parameters.noise;
         let lengths_only = NoiseModel { bandwidth, period_s, rate_noise_ratio: None };
         let input_matrix = InputMatrix::at_home(machine, &parameters.law, parameters.fidelity);
-        let saturation = input_matrix.largest_disturbance(&parameters.law.saturation);
+        let Law { saturation, compensates_disturbance, .. } = &parameters.law;
+        let disturbance = input_matrix.largest_disturbance(saturation);
+        let unbounded = Vector6::repeat(f64::INFINITY);
         Self {
             dynamics: InverseDynamics::new(machine),
             input_matrix,
             estimator: EstimatorConstants::new(
                 parameters.noise,
                 parameters.readings,
-                saturation,
-                parameters.limits.position.acceleration,
+                if *compensates_disturbance { disturbance } else { unbounded },
+                parameters.limits.position.acceleration
+                    + parameters.law.acceleration_left_to_feedback(&parameters.limits, arm, &disturbance),
             ),
-            leg_rates: EstimatorConstants::new(
-                lengths_only,
-                parameters.readings,
-                Vector6::repeat(f64::INFINITY),
-                f64::INFINITY,
-            ),
+            leg_rates: EstimatorConstants::new(lengths_only, parameters.readings, unbounded, f64::INFINITY),
             parameters,
             home,
             arm,

@@ -114,10 +114,10 @@ pub(super) struct ErrorTracker {
 }
 
 impl ErrorTracker {
-    /// Begins without an error at an instant: the reference begins there with the motion that the platform has then. Returns
-    /// the error.
-    pub fn start(&mut self, constants: &Constants, time_ns: u64) -> TrackingError {
-        self.estimator.start(&constants.estimator, time_ns, &FeedbackError::default());
+    /// Begins without an error at an instant after a measurement: the reference begins there with the motion that the platform
+    /// has then. Returns the error.
+    pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> TrackingError {
+        self.estimator.start(&constants.estimator, measured_ns, begin_ns, &FeedbackError::default());
         (self.sensors, self.trust) = (FrozenSensors::default(), None);
         (self.error, self.residual) = (TrackingError::default(), Vector6::zeros());
         self.error

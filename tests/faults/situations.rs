@@ -114,6 +114,7 @@ impl Situation {
 pub fn machine(mode: ControlMode) -> (Config, Parameters) {
     let mut config = deployed("motion_base");
     config.deployment.control.mode = mode;
+    config.deployment.control.compensate_disturbances = mode.includes_inertia();
     config.deployment.plant.step_s = 1e-3;
     let wide = [0.5, 0.5, GAMMA_RANGE, 1.0, 1.0, 1.0];
     config.deployment.envelope = Some(envelope::EnvelopeBounds {

@@ -81,7 +81,7 @@ fn beside_the_axis_of_its_joint_a_leg_spins_as_predicted() {
 }
 
 /// The drives cannot do that. From a home that is so near to the axis the exact fidelity asks for it and is cut, and says so; the
-/// rigid-legs fidelity does not know. The reference leads no leg through the axis, whatever the fidelity: it comes to rest.
+/// rigid-legs fidelity does not know, and feedback asks. The reference leads no leg through the axis, whatever the fidelity: it comes to rest.
 #[test]
 fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
     for (fidelity, beside) in
@@ -107,7 +107,8 @@ fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
             let output = rig.cycle(&rig.input(&task));
             if output.diagnostic.code == DiagnosticCode::MeasurementImplausible {
                 // The cut forces leave the platform where no disturbance of the model's size explains it.
-                assert!(fidelity == Fidelity::Exact && cut > 0, "{fidelity:?} {beside:e} {cut}");
+                assert!(cut > 0, "{fidelity:?} {beside:e}");
+                has_stopped = true;
                 break;
             }
             if output.state != State::Active {
@@ -124,10 +125,9 @@ fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
             );
             most = most.max(largest(&output.force));
         }
-        println!("{fidelity:?} {beside:e}: {cut} cycles cut, {most:.0} N");
+        println!("{fidelity:?} {beside:e}: {cut} cycles cut, {most:.0} N, stopped {has_stopped}");
         assert!(most <= config.machine.actuator.max_force);
-        let is_cut = fidelity == Fidelity::Exact && beside < 1e-2;
-        assert_eq!((cut > 0, has_stopped), (is_cut, beside < 1e-2), "{fidelity:?} {beside:e}: {cut} cycles");
+        assert_eq!([cut > 0, has_stopped], [beside < 1e-2; 2], "{fidelity:?} {beside:e}: {cut} cycles");
     }
 }
 

@@ -27,6 +27,13 @@ fn in_space() -> Config {
     config
 }
 
+/// The same, with less than a period known. Measurements before the first force do not count: with more the gains would not yet
+/// be steady at the push.
+fn steady(damping_ratio: f64, delay: f64) -> SampledLoop {
+    let sampled = sampled_loop(damping_ratio, delay);
+    SampledLoop { known_delay: sampled.known_delay.min(0.9), ..sampled }
+}
+
 fn at(share: f64, sampled: SampledLoop) -> SampledLoop {
     SampledLoop { wn_t: share * sampled.largest_wn_t(), ..sampled }
 }
@@ -62,7 +69,7 @@ fn as_predicted(sampled: SampledLoop, factor: f64) -> [DiagnosticCode; 2] {
     let period_s = config.deployment.realtime.period_s();
     let cycles = (factor.ln() / sampled.spectral_radius().ln().abs()) as usize + 5;
     let predicted = sampled.response(0.0, PUSH * period_s, cycles);
-    [0.0, sampled.known_delay.min(1.0)].map(|age| {
+    [0.0, sampled.known_delay].map(|age| {
         let mut delayed = Delayed::new(&config, &Setup { age, ..Setup::of(sampled) });
         let (found, cause) = delayed.run(cycles);
         assert_eq!((cause, found.len()), (DiagnosticCode::None, cycles), "{sampled:?}");
@@ -84,7 +91,7 @@ const STRETCH: usize = 20;
 fn below_the_limit_errors_fade_as_predicted() {
     for delay in DELAYS {
         for (share, damping_ratio) in [(0.2, 0.7), (0.2, 1.0), (0.9, 0.7), (0.9, 1.0)] {
-            let sampled = at(share, sampled_loop(damping_ratio, delay));
+            let sampled = at(share, steady(damping_ratio, delay));
             assert_eq!(as_predicted(sampled, 1e3), [DiagnosticCode::None; 2]);
         }
     }
@@ -104,7 +111,7 @@ const LETS_GO: [DiagnosticCode; 5] = [
 fn above_the_limit_errors_grow_as_predicted_until_the_controller_lets_go() {
     for delay in DELAYS {
         for share in [1.1, 2.0] {
-            let causes = as_predicted(at(share, sampled_loop(1.0, delay)), 10.0);
+            let causes = as_predicted(at(share, steady(1.0, delay)), 10.0);
             println!("{share} of the limit, delay {delay}: {causes:?}");
             assert!(causes.iter().all(|cause| LETS_GO.contains(cause)), "{causes:?}");
         }
@@ -137,7 +144,9 @@ fn the_bound_of_the_configuration_is_the_limit_with_the_longest_delay() {
 /// Without compensation: what is missing of the weight, as the law gives it. With it: nothing.
 #[test]
 fn a_mass_that_is_wrong_is_stable_and_sags_as_predicted() {
-    let config = deployed("fried2008");
+    let mut config = deployed("fried2008");
+    // With little weight: whatever the mass, the following limits are far.
+    config.machine.gravity *= 0.1;
     let home = TaskState::at_rest(config.machine.home).motion();
     let falls = ForwardDynamics::new(&config.machine)
         .acceleration(&home.pose, &home.twist, &[0.0; LEGS])
@@ -149,7 +158,9 @@ fn a_mass_that_is_wrong_is_stable_and_sags_as_predicted() {
         println!("stable from {lightest:.3} to {heaviest:.3} of the mass");
         for mass_ratio in [0.9 * lightest, 1.1 * lightest, 0.7, 0.9, 1.1, 0.9 * heaviest, 1.1 * heaviest] {
             let sampled = SampledLoop { mass_ratio, ..model };
-            let (cycles, cause) = Delayed::new(&config, &Setup::of(sampled)).run(4000);
+            // Until what is left of the beginning is next to nothing, or everything.
+            let most = (12.0 / sampled.spectral_radius().ln().abs()) as usize + 1000;
+            let (cycles, cause) = Delayed::new(&config, &Setup::of(sampled)).run(most);
             let stable = (lightest..heaviest).contains(&mass_ratio);
             let at_rest = cycles.last().unwrap().error;
             assert_eq!(cause == DiagnosticCode::None, stable, "{mass_ratio}: {cause:?}");

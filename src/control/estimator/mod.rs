@@ -15,8 +15,8 @@
 //! was sent meanwhile. So a dead time of the drives that is known costs no stability, a lost sample is bridged, and noise of the
 //! sensors is filtered.
 //!
-//! The disturbance takes what feedback would otherwise need an error for: a payload, friction, a force of the process. It stays
-//! within [`Law::saturation`](super::law::Law). Source of the structure: Luenberger (1971), Smith (1957) for the dead time.
+//! The disturbance takes what feedback would otherwise need an error for: a payload, friction, a force of the process. Where it
+//! is compensated it stays within [`Law::saturation`](super::law::Law), so that a long contact is forgotten at once. Source of the structure: Luenberger (1971), Smith (1957) for the dead time.
 //!
 //! What it does not know: elastic legs, the lag of drives but as a dead time, and coloured noise.
 
@@ -124,7 +124,8 @@ pub struct EstimatorConstants {
     pub noise: NoiseModel,
     /// At first.
     pub covariance: Covariance,
-    /// Largest disturbance of each axis.
+    /// Largest estimate of the disturbance of each axis: what is compensated at most. Without compensation it has no bound, or
+    /// the estimated error would be wrong by what is beyond.
     pub saturation: Vector6<f64>,
     /// Noise of a reading of a length, and its resolution \[m\].
     pub readings: Readings,
@@ -167,11 +168,20 @@ impl EstimatorConstants {
 }
 
 impl Estimator {
-    /// Begins with an error at an instant; nothing was sent, and the disturbance is unknown: the payload may be another.
+    /// Begins with an error at an instant, predicted from a measurement before it; nothing was sent, and the disturbance is
+    /// unknown: the payload may be another.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    pub fn start(&mut self, constants: &EstimatorConstants, time_ns: u64, error: &FeedbackError) {
-        self.filter = Filter::new(constants, time_ns, error);
+    pub fn start(
+        &mut self,
+        constants: &EstimatorConstants,
+        measured_ns: u64,
+        begin_ns: u64,
+        error: &FeedbackError,
+    ) {
+        let NoiseModel { period_s, .. } = constants.noise;
+        self.filter = Filter::new(constants, begin_ns, error);
+        self.filter.covariance.advance(&constants.noise, seconds_between(measured_ns, begin_ns) / period_s);
         self.sent.clear();
     }
 

@@ -9,6 +9,7 @@ use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
 use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::estimator::Readings;
 use hexad::control::estimator::covariance::NoiseModel;
 use hexad::control::gains::Gains;
 use hexad::control::law::{ControlMode, Law};
@@ -145,15 +146,16 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
     let SampledLoop { wn_t, damping_ratio, estimator_ratio, rate_noise, .. } = setup.sampled;
     let wn = wn_t * config.deployment.realtime.rate_hz;
     let gains = Gains::new(wn / core::f64::consts::TAU, damping_ratio);
+    let law = Law::new(
+        &config.machine,
+        ControlMode::ComputedTorque,
+        [gains; 2],
+        config.deployment.control.leg_masses,
+        setup.sampled.compensates_disturbance,
+        &parameters.limits,
+    );
     Parameters {
-        law: Law::new(
-            &config.machine,
-            ControlMode::ComputedTorque,
-            [gains; 2],
-            config.deployment.control.leg_masses,
-            setup.sampled.compensates_disturbance,
-            &parameters.limits,
-        ),
+        law: Law { saturation: Vector6::repeat(UNLIMITED), ..law },
         noise: NoiseModel {
             bandwidth: estimator_ratio * wn,
             rate_noise_ratio: rate_noise.map(|ratio| ratio * config.deployment.realtime.rate_hz),
@@ -164,6 +166,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             as u64,
         force_rate: UNLIMITED,
         feedback_scale: UNLIMITED,
+        readings: Readings { noise: UNLIMITED, step: 0.0 },
         ..parameters
     }
 }
