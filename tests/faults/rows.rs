@@ -1,27 +1,25 @@
 //! The rows of the table: every fault, and what becomes of it in every state.
 
 use hexad::control::diagnostic::DiagnosticCode::{
-    self, DeadlineMissed, EmergencyStop, FeedbackSaturated, HoldingPose, LengthOutOfStroke,
+    self, DeadlineMissed, EmergencyStop, HoldingPose, LengthOutOfStroke, MeasurementImplausible,
     MeasurementJumped, MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest,
-    RateInconsistent, RateJumped, ReadyToEngage, SetpointBeyondLimits, SetpointEnded, SetpointJumped,
-    SetpointLost, SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid,
-    SetpointTooFast, VelocityError,
+    RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointEnded,
+    SetpointJumped, SetpointLost, SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach,
+    SetpointStampInvalid, SetpointTooFast, VelocityError,
 };
 use hexad::control::state::State;
 
-use super::cells::Cell::{self, Brake, End, Full, Idle, On, Path, Stop, Unseen};
+use super::cells::Cell::{self, Brake, End, Full, Idle, On, Path, Stop};
 use super::cells::{
-    ACCELERATED, AT_FORCE_LIMIT, Bounds, ENDLESS, EVERYWHERE, FILTERED, FROZEN, FULL_STOP, GENTLE, LATE,
-    LATE_STOP, LIE, LOAD, LONG, MISSED, NOISE, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED,
-    Row, SWITCHED_OFF, TOO_FAR, UNSEEN, unusable_measurement, unusable_setpoint, wrong_in_motion,
+    ACCELERATED, AT_FORCE_LIMIT, Bounds, ENDLESS, EVERYWHERE, FULL_STOP, GENTLE, LATE, LATE_STOP, LOAD, LONG,
+    MISSED, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED, Row, SWITCHED_OFF, TOO_FAR, UNSEEN,
+    unusable_measurement, unusable_setpoint, wrong_in_motion,
 };
 use super::disturbances::{host, machine, measurements, operator, setpoints, together};
 use super::sequences;
 
 /// Engaged, without a fault, and never on the setpoint.
 const NEVER_ACTIVE: Cell = Path(&[]);
-/// The platform must move before its rates can be seen to be wrong.
-const SEEN_LATE: Cell = Path(&[(State::Active, DiagnosticCode::None), (State::Fault, RateInconsistent)]);
 const ENGAGES: Cell = Full(&[(State::Engaging, DiagnosticCode::None), (State::Active, DiagnosticCode::None)]);
 const OFF_TO_THE_END: Cell = Full(&[(State::Off, OperatorRequest)]);
 const PARKS_AGAIN: Cell = Full(&[
@@ -49,18 +47,18 @@ pub const ROWS: &[Row] = &[
     ("rates infinite", measurements::infinite_rate, GENTLE, unusable_measurement(MeasurementNotFinite)),
     ("a leg's length jumps by 20 mm", measurements::jump_20_mm, GENTLE, [TOO_FAR, Brake(MeasurementJumped), Brake(MeasurementJumped), Brake(MeasurementJumped), Brake(MeasurementJumped), Brake(MeasurementJumped), On]),
     ("a leg's length jumps by 20 mm, once", measurements::jump_20_mm_once, LONG, EVERYWHERE),
-    ("a leg's length slips by 1 mm", measurements::slip_1_mm, UNSEEN, [On, Brake(RateInconsistent), Brake(RateInconsistent), On, On, On, On]),
-    ("lengths and rates frozen", measurements::freeze, FROZEN, [On, Unseen, On, Brake(RateInconsistent), Brake(RateInconsistent), Brake(RateInconsistent), On]),
+    ("a leg's length slips by 1 mm", measurements::slip_1_mm, UNSEEN, [On, Brake(RateInconsistent), Brake(RateInconsistent), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), On]),
+    ("lengths and rates frozen", measurements::freeze, GENTLE, [On, Brake(SensorFrozen), On, Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), On]),
     ("a length beyond the stroke", measurements::out_of_stroke, GENTLE, unusable_measurement(LengthOutOfStroke)),
-    ("rates of the wrong sign", measurements::rates_of_wrong_sign, Bounds { rest_s: 0.7, ..LIE }, [On, Brake(RateInconsistent), Brake(RateInconsistent), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("rates in mm/s", measurements::rates_in_mm, LIE, [On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("rates zero", measurements::rates_zero, Bounds { jerk: 6.4, rest_s: 1.1, ..LIE }, [On, SEEN_LATE, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("rates of the wrong sign", measurements::rates_of_wrong_sign, LONG, [On, On, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("rates in mm/s", measurements::rates_in_mm, GENTLE, [On, Brake(RateJumped), On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("rates zero", measurements::rates_zero, LONG, [On, On, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
     ("measurements stamped 1 s ago", measurements::stamps_1_s_old, GENTLE, unusable_measurement(MeasurementStampInvalid)),
     ("measurements stamped 1 s ahead", measurements::stamps_1_s_ahead, GENTLE, unusable_measurement(MeasurementStampInvalid)),
     ("measurements stamped 0", measurements::stamps_of_nothing, GENTLE, unusable_measurement(MeasurementStampInvalid)),
     ("measurements' stamps run backward", measurements::stamps_run_backward, GENTLE, unusable_measurement(MeasurementStampInvalid)),
-    ("counts of 1 um, noise of 1 mm/s", measurements::noise_of_encoders, NOISE, EVERYWHERE),
-    ("rates filtered with 5 ms", measurements::filtered_rates, FILTERED, EVERYWHERE),
+    ("counts of 1 um, noise of 1 mm/s", measurements::noise_of_encoders, ENDLESS, EVERYWHERE),
+    ("rates filtered with 5 ms", measurements::filtered_rates, LONG, EVERYWHERE),
     // Setpoints.
     ("setpoints end", setpoints::end, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Stop(SetpointLost), On, On, On]),
     ("setpoints pause for 30 ms", setpoints::pause_30_ms, LONG, EVERYWHERE),
@@ -97,11 +95,11 @@ pub const ROWS: &[Row] = &[
     ("engage", operator::engage, LONG, [Path(&[(State::Engaging, DiagnosticCode::None), (State::Active, DiagnosticCode::None)]), On, On, On, On, On, On]),
     ("engage far away", operator::engage_far_away, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), On, On, On, On]),
     // The machine.
-    ("collision", machine::collision, GENTLE, [On, On, On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake by themselves", machine::braked, GENTLE, [On, On, On, Brake(VelocityError), On, Brake(FeedbackSaturated), On]),
-    ("a leg without force", machine::leg_without_force, Bounds { rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On, Brake(VelocityError), On]),
+    ("collision", machine::collision, GENTLE, [On, Brake(SensorFrozen), On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("the drives brake by themselves", machine::braked, GENTLE, [On, Brake(SensorFrozen), On, Brake(MeasurementImplausible), Brake(SensorFrozen), Brake(MeasurementImplausible), On]),
+    ("a leg without force", machine::leg_without_force, Bounds { jerk: 1.12, rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On, Brake(VelocityError), On]),
     ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, EVERYWHERE),
-    ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On]),
+    ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), On]),
     // The host.
     ("deadline missed", host::deadline_missed, GENTLE, [On, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
     ("daemon held for 1 s", host::held_1_s, GENTLE, [On, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
@@ -114,8 +112,8 @@ pub const ROWS: &[Row] = &[
     ("X jumps and a deadline is missed", together::setpoint_jumps_and_deadline_missed, GENTLE, [TOO_FAR, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
     ("estop without measurements", together::estop_without_measurement, GENTLE, [FULL_STOP; 7]),
     ("off without measurements", together::off_without_measurement, GENTLE, [SWITCHED_OFF, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
-    ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Brake(VelocityError), On, Brake(FeedbackSaturated), On]),
+    ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
+    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), Brake(MeasurementImplausible), Brake(SensorFrozen), Brake(MeasurementImplausible), On]),
     ("stop every 10 ms", together::stop_every_10_ms, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
     ("estop, then engage", together::estop_then_engage, GENTLE, [FULL_STOP; 7]),
     // One after the other.
