@@ -12,6 +12,9 @@ use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, W
 use super::{Failure, MODES, cells, chart, common, play, write_csv};
 
 const FILE: &str = "closed_loop_disturbances.csv";
+/// What a disturbance observer of 10 Hz, which the estimator has replaced, did for computed torque; measured rates, and setpoints
+/// continued without jerk. Its code is gone: this file is not written again.
+const OBSERVER_FILE: &str = "closed_loop_observer.csv";
 
 const MACHINE: &str = "motion_base";
 const RATE_HZ: f64 = 1e3;
@@ -119,36 +122,51 @@ struct Figure {
     what: String,
     level: f64,
     mode: String,
+    #[serde(default)]
     compensates: bool,
     position_rms_um: f64,
 }
 
+impl Figure {
+    fn at(&self) -> (f64, f64) {
+        (self.level, self.position_rms_um)
+    }
+}
+
 pub fn draw() -> Result<(), Failure> {
     let figures = Figures::<Figure>::read(FILE)?;
+    let observer = Figures::<Figure>::read(OBSERVER_FILE)?.rows;
     let sweeps = figures.rows.chunk_by(|a, b| a.what == b.what);
-    let mut charts: Vec<_> = sweeps.map(draw_sweep).collect();
+    let mut charts: Vec<_> = sweeps.map(|rows| draw_sweep(rows, &observer)).collect();
     fit_ranges(&mut charts, false);
     let mut legend: Vec<_> =
         MODES.iter().enumerate().map(|(k, name)| (Sample::Mark(Mark::Disc, k), *name)).collect();
     legend.push((Sample::Mark(Mark::Ring, 0), "disturbances compensated"));
+    legend.push((Sample::Line(LineStyle::Dashed, Width::Curve, 0), "observer of 10 Hz, replaced"));
     let title = figures.titled("What control a scene needs: motion base, fast scene, 1 kHz");
     Grid { title: &title, legend, columns: 2, charts }.write_svg(&chart("closed_loop_disturbances.svg"))?;
     Ok(())
 }
 
-/// A line per mode, with and without compensation; where control is lost, it ends.
-fn draw_sweep(rows: &[Figure]) -> Scatter<'static> {
+/// A line per mode, with and without compensation, and that of the observer; where control is lost, it ends.
+fn draw_sweep(rows: &[Figure], observer: &[Figure]) -> Scatter<'static> {
     let (mut points, mut lines) = (vec![], vec![]);
     for variant in rows.chunk_by(|a, b| (&a.mode, a.compensates) == (&b.mode, b.compensates)) {
         let color = ControlMode::ALL.iter().position(|mode| mode.name() == variant[0].mode).unwrap();
-        let at = |row: &Figure| (row.level, row.position_rms_um);
-        let line: Vec<_> = variant.iter().map(at).take_while(|(_, rms)| rms.is_finite()).collect();
+        let line: Vec<_> = variant.iter().map(Figure::at).take_while(|(_, rms)| rms.is_finite()).collect();
         let observed = variant[0].compensates;
         let mark = if observed { Mark::Ring } else { Mark::Disc };
         points.extend(line.iter().map(|at| Point { at: *at, mark, color, label: Label::None }));
         let width = if observed { Width::Hair } else { Width::Curve };
         lines.push(Line { points: line, style: LineStyle::Solid, color, width });
     }
+    let before = observer.iter().filter(|row| row.what == rows[0].what).map(Figure::at);
+    lines.push(Line {
+        points: before.take_while(|(_, rms)| rms.is_finite()).collect(),
+        style: LineStyle::Dashed,
+        color: 0,
+        width: Width::Curve,
+    });
     let sweep = SWEEPS.iter().find(|sweep| sweep.name == rows[0].what).unwrap();
     Scatter {
         x_label: sweep.x_label,

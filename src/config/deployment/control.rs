@@ -122,6 +122,13 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     } else {
         [position(1.0), orientation]
     };
+    let estimator_bandwidth_hz =
+        plant.estimator_hz(disturbance_m_s2_per_sqrt_s, &loops).unwrap_or_else(|| {
+            let bound =
+                "must be lower, or the damping ratios: no bandwidth of the estimator makes the loops stable";
+            section.reject("position_bandwidth_hz", bound);
+            f64::NAN
+        });
     let control = Control {
         mode,
         position_bandwidth_hz,
@@ -154,7 +161,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
         compensate_disturbances,
         disturbance_m_s2_per_sqrt_s,
-        estimator_bandwidth_hz: plant.estimator_hz(disturbance_m_s2_per_sqrt_s, &loops),
+        estimator_bandwidth_hz,
         on_setpoint_lost: section.choice_or(
             "on_setpoint_lost",
             AfterStop::Fault,
@@ -183,8 +190,8 @@ impl Plant<'_> {
     }
 
     /// Bandwidth of the estimator \[Hz\]: what noise and disturbances ask for, no more than the delay lets it be, and slower where a
-    /// loop would not be stable with [`STABLE_MASSES`].
-    fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> f64 {
+    /// loop would not be stable with [`STABLE_MASSES`]. `None` if a loop is stable with none.
+    fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> Option<f64> {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();
         let intensity = disturbance * disturbance / (noise.length_m * noise.length_m * period_s);
@@ -192,18 +199,17 @@ impl Plant<'_> {
         let ratio = if drive.delay_s.is_some() { ESTIMATOR_RATIO } else { ESTIMATOR_RATIO_DELAY_UNKNOWN };
         let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(asked_hz, f64::min);
         if !largest_hz.is_finite() {
-            return f64::NAN;
+            return Some(f64::NAN);
         }
-        let has_margins = |estimator_hz: &f64| {
-            loops.iter().all(|(hertz, sampled, gain)| {
-                let (wn_t, estimator_ratio) = (TAU * hertz * period_s, estimator_hz / hertz);
-                is_stable_with_masses(
-                    &SampledLoop { wn_t, estimator_ratio, ..*sampled }.with_feedback_gain(*gain),
-                )
+        let first = |is_stable: fn(&SampledLoop) -> bool| {
+            (0..ESTIMATOR_STEPS).map(|step| largest_hz * 0.8_f64.powi(step)).find(|estimator_hz| {
+                loops.iter().all(|(hertz, sampled, gain)| {
+                    let (wn_t, estimator_ratio) = (TAU * hertz * period_s, estimator_hz / hertz);
+                    is_stable(&SampledLoop { wn_t, estimator_ratio, ..*sampled }.with_feedback_gain(*gain))
+                })
             })
         };
-        let slower = (0..ESTIMATOR_STEPS).map(|step| largest_hz * 0.8_f64.powi(step));
-        slower.into_iter().find(has_margins).unwrap_or(largest_hz)
+        first(is_stable_with_masses).or_else(|| first(SampledLoop::is_stable))
     }
 }
 
