@@ -53,10 +53,11 @@
 //! | demand | accelerations that a task requires in every direction |
 //! | deployment | how a machine is run: rate, processors, gains, limits, timeouts, topics |
 //! | diagnostic | result of a check: code, value, bound, index |
-//! | disturbance observer | estimate of the acceleration that cancels unmodelled forces |
+//! | disturbance | acceleration of the platform that the model does not contain: payload, friction, process forces |
 //! | driver | process that measures the legs and applies the forces |
 //! | engage | operator request to take the platform under control |
 //! | envelope | range of pose, velocity and acceleration of a task |
+//! | estimator | filter that gives error, its rate and the disturbance at the instant at which a force acts |
 //! | estop, off | operator requests that disable forces at once; after estop until `clear` |
 //! | fault | state without valid forces until an operator clears it |
 //! | fidelity | which terms of the dynamics the model evaluates, from `gravity` to `exact`, see [`model::fidelity`] |

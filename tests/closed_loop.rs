@@ -12,6 +12,7 @@ mod closed_loop {
     mod disturbances;
     mod estimator;
     mod evidence;
+    mod false_alarms;
     mod feedback;
     mod fidelities;
     mod inputs;

@@ -24,7 +24,7 @@ fn config(machine: &str) -> Config {
 }
 
 /// The fast scene played at a share of its speed, from rest.
-fn scene(config: &Config, share: f64) -> impl Fn(f64) -> TaskState {
+pub fn scene(config: &Config, share: f64) -> impl Fn(f64) -> TaskState {
     let fast = Fast::new(config);
     move |t: f64| {
         // Two seconds at rest to engage, then the speed rises within one.

@@ -1,0 +1,82 @@
+//! No false alarm: realistic noise, friction, payload and delays, at rest, slow and fast, by chance.
+//!
+//! `HEXAD_HOURS=10` makes it ten hours of simulated motion.
+
+use hexad::control::controller::Output;
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::State;
+use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfections, SensorErrors};
+use hexad::plant::random::Random;
+use rayon::prelude::*;
+
+use super::common::hardware_loop::{HardwareLoop, configured};
+use super::trust::scene;
+
+const MACHINES: [&str; 3] = ["motion_base", "fried2008", "tsai2000"];
+/// Simulated time of an episode \[s\], and in all without `HEXAD_HOURS`.
+const EPISODE_S: f64 = 20.0;
+const TOTAL_S: f64 = 240.0;
+/// Two seconds to engage and to estimate the disturbance, one more with the setpoint at rest.
+const SETTLED_S: f64 = 2.0;
+
+/// A world by chance, played for an episode. The first cycle that was no longer active.
+fn episode(seed: u64) -> Result<(), String> {
+    let mut random = Random::new(seed);
+    let mut between = |least: f64, most: f64| least + (most - least) * random.uniform();
+    let machine = MACHINES[seed as usize % MACHINES.len()];
+    let share = [0.02, 0.05, 0.3, 1.0][(seed / 3) as usize % 4];
+    let (noise, step) = (10.0_f64.powf(between(-7.0, -5.0)), 10.0_f64.powf(between(-8.0, -5.3)));
+    let delay_us = between(100.0, 5000.0).round();
+    // Shares of the largest force: what the model has, and what the drive has.
+    let (modelled, friction, stiction) = (between(0.0, 0.02), between(0.8, 1.2), between(0.0, 0.005));
+    let mut config = configured(
+        machine,
+        &format!(
+            "[drive]\ndelay_us = {delay_us}\n[measured]\nlength_noise_m = {noise:e}\nlength_step_m = {step:e}"
+        ),
+    );
+    let most = config.machine.actuator.max_force;
+    config.machine.actuator.coulomb_friction = modelled * most;
+    let mut platform = config.machine.clone();
+    platform.actuator.coulomb_friction = 0.0;
+    let imperfections = Imperfections {
+        seed,
+        drive: DriveErrors { dead_time_ns: (1e3 * (delay_us - 100.0)) as u64, ..DriveErrors::default() },
+        friction: Friction {
+            coulomb: modelled * friction * most,
+            stiction: stiction * most,
+            ..Friction::default()
+        },
+        sensor: SensorErrors { length_step: step, length_noise: noise, ..SensorErrors::default() },
+        build: BuildErrors {
+            payload: between(0.0, 0.2) * platform.platform.mass,
+            payload_at: platform.platform.center_of_mass,
+            ..BuildErrors::default()
+        },
+        ..Imperfections::default()
+    };
+    let scene = scene(&config, share);
+    let mut control = HardwareLoop::new(&config, &platform, &imperfections);
+    while control.time_s() < EPISODE_S {
+        let input = control.input(&scene(control.time_s()));
+        let Output { state, diagnostic, .. } = control.cycle(&input);
+        if control.time_s() > SETTLED_S && (state, diagnostic.code) != (State::Active, DiagnosticCode::None) {
+            return Err(format!(
+                "{machine}, seed {seed}, speed {share}, after {:.3} s: {state:?}, {diagnostic:?}; noise {noise:.1e} m, step \
+                 {step:.1e} m, delay {delay_us} us, friction {modelled:.4} x {friction:.2} + {stiction:.4}",
+                control.time_s()
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn realistic_hardware_gives_no_alarm() {
+    let hours = std::env::var("HEXAD_HOURS").ok().map(|hours| hours.parse::<f64>().unwrap());
+    let episodes = (hours.map_or(TOTAL_S, |hours| hours * 3600.0) / EPISODE_S).ceil() as u64;
+    let alarms: Vec<String> = (0..episodes).into_par_iter().filter_map(|seed| episode(seed).err()).collect();
+    println!("{episodes} episodes of {EPISODE_S} s, {} alarms", alarms.len());
+    let shown: Vec<_> = alarms.iter().take(20).cloned().collect();
+    assert!(alarms.is_empty(), "{} of {episodes}:\n{}", alarms.len(), shown.join("\n"));
+}
