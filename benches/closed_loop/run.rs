@@ -114,7 +114,7 @@ impl Run {
                 setpoint: Some(Setpoint::motion(now_ns, task)),
                 measurement: Some(Measurement { time_ns: now_ns, length, rate: Some(rate) }),
                 request: (cycle > 0).then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
-                deadline_missed: false,
+                ..Input::default()
             };
             watch(&input);
             let output = controller.step(&input);

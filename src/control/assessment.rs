@@ -1,6 +1,6 @@
 //! Assessment of a cycle: whether the platform is located, may be engaged, and can follow its reference further.
 
-use super::controller::{Cycle, Input, SetpointKind};
+use super::controller::{Cycle, Input, Publishers, SetpointKind};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::feedback_bound::FeedbackBound;
 use super::input_validation::ValidatedSetpoint;
@@ -55,12 +55,15 @@ pub(super) fn assess(
             })
             .and(conditioned);
     } else if located.is_ok() {
-        start = check_start(cycle, reference, *free_motion);
+        start = check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)
+            .and_then(|()| check_start(cycle, reference, *free_motion));
     }
     // Nothing depends on it while the setpoint is followed.
     let engagement = match cycle.state {
         State::Engaging | State::Active => Ok(()),
-        _ => conditioned
+        _ => check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)
+            .and_then(|()| check_publishers(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers))
+            .and(conditioned)
             .and(setpoint.status)
             .and_then(|()| check_engage_tolerance(parameters, setpoint, *error))
             .and(start),
@@ -100,6 +103,12 @@ fn check_engage_tolerance(
         return Ok(());
     }
     Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))
+}
+
+/// Control begins only with one publisher of each input: nobody knows which of two is the true one.
+fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
+    let Publishers { counting, ignored } = publishers;
+    if ignored == 0 { Ok(()) } else { Err(Diagnostic::new(code, counting.into(), ignored.into())) }
 }
 
 /// Control may begin if the motion without force is known and a stop from it was verified.

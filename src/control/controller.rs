@@ -71,6 +71,15 @@ pub struct Measurement {
     pub rate: Option<[f64; LEGS]>,
 }
 
+/// Processes that publish an input: of the publisher that counts, and of another one that lives beside it. 0: none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Publishers {
+    /// Process whose messages count.
+    pub counting: u32,
+    /// Process whose messages are ignored.
+    pub ignored: u32,
+}
+
 /// Inputs of one cycle: with the controller's own state they determine its output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Input {
@@ -82,6 +91,10 @@ pub struct Input {
     pub measurement: Option<Measurement>,
     /// The newest request; `None` if none ever arrived. Each is carried out once.
     pub request: Option<OperatorRequest>,
+    /// Processes that publish setpoints.
+    pub setpoint_publishers: Publishers,
+    /// Processes that publish measurements.
+    pub measured_publishers: Publishers,
     /// Whether cycles were missed since the last one, and the deployment makes that a fault.
     pub deadline_missed: bool,
 }

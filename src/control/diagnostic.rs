@@ -32,6 +32,8 @@ pub enum BoundDescription {
         /// Source of the bound: a key of the configuration, or words.
         bound: &'static str,
     },
+    /// Value and bound are the numbers of two processes: of the one that counts, and of the other.
+    Processes,
     /// A quantity as a multiple of its bound.
     Ratio {
         /// Name of the quantity.
@@ -148,6 +150,10 @@ codes! {
     PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and its motion or a stop within every limit is not known", "wait until the platform stands";
     /// Without setpoints the platform holds its pose, as `[setpoint] on_violation` is `limit`.
     HoldingPose = 11, None, absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"), "no setpoints: the platform holds its pose", "start a setpoint source";
+    /// Two processes publish measurements; control does not begin before one of them ends.
+    TwoMeasuredSources = 12, None, BoundDescription::Processes, "two sources of measurements", "end one of them";
+    /// Two processes publish setpoints; control does not begin before one of them ends.
+    TwoSetpointSources = 13, None, BoundDescription::Processes, "two sources of setpoints", "end one of them";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
     /// Measurements stopped arriving.
@@ -263,6 +269,9 @@ impl fmt::Display for Diagnostic {
             let (value, bound) = (Rounded(*value), Rounded(*bound));
             match code.comparison() {
                 BoundDescription::None => {}
+                BoundDescription::Processes => {
+                    write!(f, ": process {value} counts, process {bound} does not")?;
+                }
                 BoundDescription::Absolute { quantity, unit, relation, bound: source } => {
                     let space = if unit.is_empty() { "" } else { " " };
                     write!(f, ": {quantity} {value}{space}{unit}")?;

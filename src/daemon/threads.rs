@@ -19,7 +19,7 @@ use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
 use super::fault_dump::FaultDump;
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
-use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
+use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports, Silence};
 use super::log_thread::{self, LogLinks, LogReport};
 use super::parameters::{nanoseconds, parameters, timing};
 use super::report::Report;
@@ -190,7 +190,9 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     let Config { machine, deployment, .. } = config;
     let realtime = &deployment.realtime;
     // Ports belong to the thread that opens them.
-    let ports = config.join().and_then(|bus| Ports::open(&bus));
+    let timeouts = &deployment.timeouts;
+    let [setpoint_ns, measured_ns] = [timeouts.setpoint_s, timeouts.measured_s].map(nanoseconds);
+    let ports = config.join().and_then(|bus| Ports::open(&bus, Silence { setpoint_ns, measured_ns }));
     let (ports, opened) = ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
     let shortfalls = opened.map(|()| if realtime.is_simulated() { vec![] } else { prepare_io(realtime) });
     // There is no receiver only if the other thread failed first.
@@ -198,7 +200,7 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     let settings = IoSettings {
         timing: timing(deployment),
         lead_ns: nanoseconds(realtime.io_lead_s),
-        max_force_age_ns: nanoseconds(deployment.timeouts.measured_s),
+        max_force_age_ns: measured_ns,
         home: machine.home,
     };
     Some(io_thread::run(&settings, ports?, links, stop))

@@ -77,7 +77,7 @@ impl HardwareLoop {
             measurement: Some(Measurement { time_ns: self.now_ns, length, rate }),
             request: (self.now_ns > START_NS)
                 .then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 

@@ -126,7 +126,7 @@ impl Observed {
             setpoint,
             measurement: Some(self.measurement()),
             request: self.asked,
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 

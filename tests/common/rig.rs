@@ -120,7 +120,7 @@ impl Rig {
                 rate: Some(legs.rate),
             }),
             request: self.asked,
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::status::StatusReport;
 use crate::control::diagnostic::Diagnostic;
+use crate::daemon::process_names::sentence;
 use crate::control::state::{Request, State};
 
 /// Version of the protocol. It changes only if a client of an older one would misunderstand.
@@ -106,7 +107,7 @@ impl From<Diagnostic> for DiagnosticReport {
             value: finite(value),
             bound: finite(bound),
             index,
-            text: diagnostic.to_string(),
+            text: sentence(&diagnostic),
         }
     }
 }

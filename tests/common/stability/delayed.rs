@@ -108,7 +108,7 @@ impl Delayed {
             setpoint: Some(Setpoint::motion(time_ns, task)),
             measurement: Some(Measurement { time_ns, length, rate: Some(rate) }),
             request: Some(OperatorRequest { request: Request::Engage, message: (START_NS, 1) }),
-            deadline_missed: false,
+            ..Input::default()
         });
         self.hardware.advance(self.age_ns, self.force);
         self.force = output.state.has_control().then_some(output.force);

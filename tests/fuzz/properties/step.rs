@@ -111,7 +111,7 @@ impl<'a> Play<'a> {
                 rate: self.has_rates.then_some(legs.rate),
             }),
             request: self.asked,
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 
