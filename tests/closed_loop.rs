@@ -7,6 +7,7 @@ mod common;
 mod closed_loop {
     use super::*;
 
+    mod ages;
     mod assessment;
     mod built_in;
     mod disturbances;
@@ -22,6 +23,7 @@ mod closed_loop {
     mod replay;
     mod ride;
     mod setpoints;
+    mod stamps;
     mod targets;
     mod tracking;
     mod trust;

@@ -192,7 +192,7 @@ codes! {
     /// A setpoint whose time stamp is too old, in the future, or not after that of the setpoint before.
     SetpointStampInvalid = 117, Stop, absolute("age", "s", "is outside", "the range of timeouts.setpoint_ms around now,"), "setpoint with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
     /// A measurement whose time stamp is too old, in the future, or before that of the measurement before.
-    MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range of timeouts.measured_ms around now,"), "measurement with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
+    MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range from a tenth of a period ahead to timeouts.measured_ms, whose bound is"), "measurement with an invalid time stamp", "stamp with the CLOCK_MONOTONIC instant of sampling";
     /// The pose is so near a singular one that `limits.condition` is exceeded, or a setpoint could only be stopped
     /// where it would be.
     NearSingular = 119, Stop, absolute("condition", "", "exceeds", "limits.condition"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
@@ -206,6 +206,8 @@ codes! {
     SensorFrozen = 125, Brake, absolute("motion of the reference since the reading changed last", "m", "exceeds", "the bound for a sensor that is alive,"), "sensor frozen", "check the encoder of this leg and the driver";
     /// The length of a leg is not where the model, the forces and the measurements before have it.
     MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "what noise and disturbances explain,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
+    /// A measurement arrived that is so old that the loop would not be stable if all were.
+    MeasurementTooOld = 127, Brake, absolute("age", "s", "exceeds", "what the loop stands (hexad check),"), "measurement too old for the loop", "shorten the way from the sensors to the daemon, or lower the bandwidths";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.

@@ -61,6 +61,8 @@ pub struct Parameters {
     pub setpoint_timeout_ns: u64,
     /// Age from which on a measurement counts as lost.
     pub measured_timeout_ns: u64,
+    /// Largest age of a measurement that arrives: the loop is stable if all are as old.
+    pub max_measured_age_ns: u64,
 }
 
 impl Parameters {

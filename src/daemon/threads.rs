@@ -26,7 +26,7 @@ use super::report::Report;
 use super::snapshot::Snapshot;
 use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use super::{DaemonError, REALTIME_THREAD};
-use crate::config::control_loops::{ControlLoop, loops};
+use crate::config::control_loops::{ControlLoop, loops, timeout_warning};
 use crate::config::{Config, fidelity};
 use crate::control::controller::{Controller, Input, Output};
 use crate::control::diagnostic::DiagnosticCode;
@@ -140,7 +140,9 @@ fn report(config: &Config, cyclic: &LoopReport, io: &IoReport, mut log: LogRepor
 
 /// Controller of a configuration. Logs which of its loops are close to unstable.
 fn controller(config: &Config) -> Controller {
-    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+    let of_loops = loops(&config.deployment);
+    let warnings = of_loops.iter().filter_map(ControlLoop::warning);
+    for warning in warnings.chain(timeout_warning(&config.deployment)) {
         warn!("{warning}");
     }
     let fidelity = fidelity::fidelity(config);

@@ -75,22 +75,28 @@ impl<Id: Copy> Lease<Id> {
     /// A free place, or that of the publisher that was silent for longest and does not count.
     fn place_to_forget(&self) -> usize {
         let rank = |known: &Option<Known<Id>>| {
-            known.as_ref().map_or((0, 0), |known| (1 + u8::from(Some(known.epoch) == self.holder), known.seen_ns))
+            known
+                .as_ref()
+                .map_or((0, 0), |known| (1 + u8::from(Some(known.epoch) == self.holder), known.seen_ns))
         };
         let places = self.known.iter().enumerate();
         places.min_by_key(|(_, known)| rank(known)).map_or(0, |(place, _)| place)
     }
 
     /// Decides which publisher counts; returns its place.
-    pub fn decide(&mut self, now_ns: u64, has_control: bool, is_listed: impl Fn(Id) -> bool) -> Option<usize> {
+    pub fn decide(
+        &mut self,
+        now_ns: u64,
+        has_control: bool,
+        is_listed: impl Fn(Id) -> bool,
+    ) -> Option<usize> {
         let holder = self.holding();
         let others = self.others(now_ns).count();
         if others == 0 || holder.is_some_and(|holder| self.is_alive(holder, now_ns, &is_listed)) {
             return self.place(self.holder);
         }
-        let may_follow = |next: &&Known<Id>| {
-            !has_control || holder.is_none_or(|holder| next.epoch > holder.seen_ns)
-        };
+        let may_follow =
+            |next: &&Known<Id>| !has_control || holder.is_none_or(|holder| next.epoch > holder.seen_ns);
         let alive = self.others(now_ns).filter(|next| is_listed(next.id)).filter(may_follow);
         let next = alive.map(|next| next.epoch).max();
         self.holder = next.or(self.holder);
@@ -105,7 +111,9 @@ impl<Id: Copy> Lease<Id> {
     }
 
     fn place(&self, epoch: Option<u64>) -> Option<usize> {
-        self.known.iter().position(|known| known.as_ref().map(|known| known.epoch) == epoch && epoch.is_some())
+        self.known
+            .iter()
+            .position(|known| known.as_ref().map(|known| known.epoch) == epoch && epoch.is_some())
     }
 
     fn holding(&self) -> Option<&Known<Id>> {

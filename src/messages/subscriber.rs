@@ -172,7 +172,8 @@ impl<T: Message> LeasedSubscriber<T> {
         let mut arrived = [const { None }; PUBLISHERS];
         for _ in 0..Subscriber::<T>::MAX_PENDING {
             let Some((place, after, message)) = self.receive_any() else { break };
-            if let Some((count, newest)) = arrived.get_mut(place).map(|slot| slot.get_or_insert((0, message))) {
+            if let Some((count, newest)) = arrived.get_mut(place).map(|slot| slot.get_or_insert((0, message)))
+            {
                 (*count, *newest) = (*count + after, message);
             }
         }

@@ -76,7 +76,8 @@ fn processes(machine: &Machine, topic: &str) -> Vec<(u64, bool)> {
 }
 
 fn words(what: &str, counts: u32, ignored: u32) -> [String; 2] {
-    let name = |id: u32| std::fs::read_to_string(format!("/proc/{id}/comm")).expect("a name").trim_end().to_owned();
+    let name =
+        |id: u32| std::fs::read_to_string(format!("/proc/{id}/comm")).expect("a name").trim_end().to_owned();
     let [first, second] = [counts, ignored].map(|id| format!("process {id} ({})", name(id)));
     [format!("two sources of {what}: {first} counts"), format!("{second} does not; end one of them")]
 }
@@ -162,6 +163,7 @@ fn a_plant_does_not_join_where_a_driver_lives() {
     assert!(stderr.contains(&words) && stderr.contains(&end), "{stderr}");
     drop(driver);
     let plant = crate::support::trio::start_plant(&machine);
+    plant.says("plant at rest at home");
     plant.stops_on("TERM", HANG);
     daemon.stops_on("TERM", HANG);
 }

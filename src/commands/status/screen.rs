@@ -178,8 +178,7 @@ mod tests {
 
     /// Every field as long as it gets.
     fn answer() -> AnswerLine {
-        let process =
-            ProcessReport {
+        let process = ProcessReport {
             process_id: 4_194_304,
             command: "a".repeat(15),
             user: "operator".into(),

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::status::StatusReport;
 use crate::control::diagnostic::Diagnostic;
-use crate::daemon::process_names::sentence;
 use crate::control::state::{Request, State};
+use crate::daemon::process_names::sentence;
 
 /// Version of the protocol. It changes only if a client of an older one would misunderstand.
 pub const VERSION: u32 = 1;

@@ -5,8 +5,8 @@ use nalgebra::Vector3;
 use super::protocol::{AnswerLine, RequestResult};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::{Request, State};
-use crate::daemon::process_names::sentence;
 use crate::daemon::cycle::MAX_REQUEST_AGE_NS;
+use crate::daemon::process_names::sentence;
 use crate::daemon::snapshot::Snapshot;
 use crate::realtime::request_word::RequestWord;
 
