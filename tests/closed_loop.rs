@@ -23,6 +23,7 @@ mod closed_loop {
     mod replay;
     mod ride;
     mod setpoints;
+    mod stamp_clock;
     mod stamps;
     mod targets;
     mod tracking;

@@ -15,6 +15,7 @@ use super::limits::LimitSet;
 use super::localization::{Localization, PlatformState};
 use super::parameters::{Constants, Parameters};
 use super::reference::{ReferenceGenerator, Target};
+use super::stamp_clock::StampClock;
 use super::state::{OperatorRequest, Request, State};
 use super::supervisor::Supervisor;
 use super::tracking_error::{ErrorTracker, TrackingError, setpoint_error};
@@ -85,6 +86,8 @@ pub struct Publishers {
 pub struct Input {
     /// The instant of release of this cycle, on the grid.
     pub release_ns: u64,
+    /// The clock of the releases less the daemon's \[ns\]: not zero where measurements release the cycles.
+    pub clock_offset_ns: i64,
     /// The newest setpoint; `None` if none ever arrived.
     pub setpoint: Option<Setpoint>,
     /// The newest measurement; `None` if none ever arrived.
@@ -141,6 +144,7 @@ pub(super) struct Cycle<'a> {
 #[derive(Clone, Debug)]
 pub struct Controller {
     constants: Constants,
+    stamp_clock: StampClock,
     measurements: MeasurementValidator,
     setpoints: SetpointValidator,
     localization: Localization,
@@ -161,6 +165,7 @@ impl Controller {
             localization: Localization::new(&constants),
             reference: ReferenceGenerator::new(&constants),
             constants,
+            stamp_clock: StampClock::default(),
             measurements: MeasurementValidator::default(),
             setpoints: SetpointValidator::default(),
             free_motion: FreeMotion::default(),
@@ -175,12 +180,13 @@ impl Controller {
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
-        let Self { free_motion, errors, leg_rates, feedback, limiter, .. } = self;
+        let Self { stamp_clock, free_motion, errors, leg_rates, feedback, limiter, .. } = self;
         let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
         let parameters = &constants.parameters;
 
         // Validate inputs.
-        let measurement = measurements.validate(&cycle, input.measurement.as_ref());
+        let clock = stamp_clock.check(&cycle, input.clock_offset_ns);
+        let measurement = clock.and(measurements.validate(&cycle, input.measurement.as_ref()));
         let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref(), reference);
 
         // Locate platform.

@@ -208,6 +208,8 @@ codes! {
     MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "what noise and disturbances explain,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
     /// A measurement arrived that is so old that the loop would not be stable if all were.
     MeasurementTooOld = 127, Brake, absolute("age", "s", "exceeds", "what the loop stands (hexad check),"), "measurement too old for the loop", "shorten the way from the sensors to the daemon, or lower the bandwidths";
+    /// The time stamps of the measurements, which release the cycles, do not advance as the daemon's clock does.
+    StampClockInvalid = 128, Brake, absolute("deviation of the clock of the stamps", "s", "is outside", "timeouts.measured_ms, ahead or behind:"), "time stamps do not advance with the clock", "stamp each measurement with the instant of sampling; check the clock of the drives";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.

@@ -31,6 +31,7 @@ pub mod limits;
 pub mod localization;
 pub mod parameters;
 pub mod reference;
+mod stamp_clock;
 pub mod state;
 pub mod supervisor;
 pub mod tracking_error;
