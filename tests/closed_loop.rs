@@ -11,8 +11,10 @@ mod closed_loop {
     mod assessment;
     mod built_in;
     mod disturbances;
+    mod drive_status;
     mod estimator;
     mod evidence;
+    mod external_pose;
     mod feedback;
     mod fidelities;
     mod inputs;

@@ -112,7 +112,12 @@ impl Run {
             let input = Input {
                 release_ns: now_ns + period_ns / 2,
                 setpoint: Some(Setpoint::motion(now_ns, task)),
-                measurement: Some(Measurement { time_ns: now_ns, length, rate: Some(rate) }),
+                measurement: Some(Measurement {
+                    time_ns: now_ns,
+                    length,
+                    rate: Some(rate),
+                    ..Measurement::default()
+                }),
                 request: (cycle > 0).then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
                 ..Input::default()
             };

@@ -210,6 +210,14 @@ codes! {
     MeasurementTooOld = 127, Brake, absolute("age", "s", "exceeds", "what the loop stands (hexad check),"), "measurement too old for the loop", "shorten the way from the sensors to the daemon, or lower the bandwidths";
     /// The time stamps of the measurements, which release the cycles, do not advance as the daemon's clock does.
     StampClockInvalid = 128, Brake, absolute("deviation of the clock of the stamps", "s", "is outside", "timeouts.measured_ms, ahead or behind:"), "time stamps do not advance with the clock", "stamp each measurement with the instant of sampling; check the clock of the drives";
+    /// A length is not that of the pose that another sensor measures.
+    ExternalPoseMismatch = 129, Brake, absolute("difference between the length and that of the external pose", "m", "exceeds", "measured.pose_tolerance_m"), "lengths not those of the external pose", "home this leg again; check its scale, the machine file and the external sensor";
+    /// A drive did not become ready after control began, or does not stay so.
+    DriveNotReady = 130, Brake, absolute("time without enabled drive and open brake", "s", "exceeds", "drive.ready_timeout_ms, or once it was ready 20 ms:"), "drive not ready", "enable the drive and check its brake";
+    /// A drive reports a fault.
+    DriveFault = 131, Brake, NO_NUMBER, "drive reports a fault", "see the display of the drive";
+    /// The actual force of a drive is not the commanded one.
+    DriveForceMissing = 132, Brake, absolute("difference of the actual force from the commanded one", "N", "exceeds", "a fifth of the command and a fiftieth of actuator.max_force_n,"), "actual force not as commanded", "check the drive of this leg";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.
@@ -264,6 +272,9 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { code, value, bound, index } = self;
         write!(f, "{}", code.name())?;
+        if *code == DiagnosticCode::DriveFault && *index != 0 {
+            write!(f, ": leg {index}")?;
+        }
         if *value != 0.0 || *bound != 0.0 {
             let part = if *code == DiagnosticCode::SetpointOutOfEnvelope { "axis" } else { "leg" };
             let place = |f: &mut fmt::Formatter<'_>| match index {

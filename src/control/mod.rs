@@ -18,7 +18,9 @@
 mod assessment;
 pub mod controller;
 pub mod diagnostic;
+pub mod drive_monitor;
 pub mod estimator;
+mod external_pose;
 mod feedback_bound;
 mod force_limits;
 mod forces;

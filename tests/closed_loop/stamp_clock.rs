@@ -21,11 +21,8 @@ fn end(rate: f64, jitter_ns: u64, cycles: u64) -> Option<(u64, DiagnosticCode)> 
         let arrived_ns = rig.now_ns + cycle * 7919 % (jitter_ns + 1);
         let good = rig.input(&home);
         let time_ns = stamp_ns as u64;
-        let mut input = Input {
-            release_ns: time_ns,
-            clock_offset_ns: time_ns.wrapping_sub(arrived_ns) as i64,
-            ..good
-        };
+        let mut input =
+            Input { release_ns: time_ns, clock_offset_ns: time_ns.wrapping_sub(arrived_ns) as i64, ..good };
         input.setpoint.as_mut().unwrap().time_ns = time_ns;
         input.measurement.as_mut().unwrap().time_ns = time_ns;
         if cycle == 200 {

@@ -118,6 +118,7 @@ impl Rig {
                 time_ns: self.now_ns,
                 length: legs.length,
                 rate: Some(legs.rate),
+                ..Measurement::default()
             }),
             request: self.asked,
             ..Input::default()

@@ -136,7 +136,8 @@ fn stamps_that_stand_still_end_control() {
     // In a thread of its own, whose priority ends with it.
     let valid = thread::spawn(move || drive_with_frozen_stamps(&name, &config)).join().expect("the driver");
     println!("{valid} valid forces after the stamps stood still");
-    daemon.says("fault: time stamps do not advance with the clock: deviation of the clock of the stamps -0.4");
+    daemon
+        .says("fault: time stamps do not advance with the clock: deviation of the clock of the stamps -0.4");
     let bound = (TIMEOUT_NS / PERIOD_NS) as usize;
     assert!(valid > bound / 2 && valid < 2 * bound, "{valid} valid forces");
     daemon.stops_on("TERM", HANG);
@@ -157,6 +158,7 @@ fn drive_with_frozen_stamps(name: &str, config: &Config) -> usize {
     let (mut tick_ns, mut time_ns, mut force) = (began_ns, BEGINS_NS, None);
     let (mut under_control, mut after, mut valid_after) = (0, 0, 0);
     while after < CYCLES_AFTER {
+        assert!(monotonic_ns() < began_ns + HANG.as_nanos() as u64, "{under_control} cycles under control");
         let next_ns = grid.next_after(monotonic_ns());
         sleep_until(next_ns);
         simulator.advance((next_ns - tick_ns) as f64 * 1e-9, force.as_ref());
@@ -174,7 +176,10 @@ fn drive_with_frozen_stamps(name: &str, config: &Config) -> usize {
         force = is_valid.then_some(message.force_n);
         under_control += usize::from(is_valid);
         valid_after += usize::from(is_valid && after > 0);
-        if message.diagnostic_code == DiagnosticCode::ReadyToEngage as u32 {
+        // The host may have held somebody.
+        if after == 0 && message.state == State::Fault as u32 {
+            operator.send(Request::Clear).expect("to send");
+        } else if message.diagnostic_code == DiagnosticCode::ReadyToEngage as u32 {
             operator.send(Request::Engage).expect("to send");
         }
     }

@@ -202,10 +202,15 @@ impl DrivenPlant {
         let simulator = self.hardware.simulator();
         let state = simulator.state();
         MeasuredMessage {
-            pose_valid: 1,
+            pose_valid: 2,
             x: task_coordinates(&state.pose, &simulator.machine().home),
             twist: state.twist.vector().into(),
-            ..MeasuredMessage::from(&Measurement { time_ns: self.time_ns, length, rate: Some(rate) })
+            ..MeasuredMessage::from(&Measurement {
+                time_ns: self.time_ns,
+                length,
+                rate: Some(rate),
+                ..Measurement::default()
+            })
         }
     }
 }

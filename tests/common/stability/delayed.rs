@@ -106,7 +106,7 @@ impl Delayed {
         let output = self.controller.step(&Input {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint::motion(time_ns, task)),
-            measurement: Some(Measurement { time_ns, length, rate: Some(rate) }),
+            measurement: Some(Measurement { time_ns, length, rate: Some(rate), ..Measurement::default() }),
             request: Some(OperatorRequest { request: Request::Engage, message: (START_NS, 1) }),
             ..Input::default()
         });

@@ -109,6 +109,7 @@ impl<'a> Play<'a> {
                 time_ns: self.now_ns,
                 length: legs.length,
                 rate: self.has_rates.then_some(legs.rate),
+                ..Measurement::default()
             }),
             request: self.asked,
             ..Input::default()
