@@ -70,7 +70,7 @@ impl DriveMonitor {
     /// Checks the status of a measurement.
     #[inline(never)]
     pub fn check(&mut self, cycle: &Cycle<'_>, measurement: Option<&Measurement>) -> Result<(), Diagnostic> {
-        let dt = seconds_between(self.clock_ns, cycle.release_ns).max(0.0).min(FORCE_TIME_CONSTANT_S);
+        let dt = seconds_between(self.clock_ns, cycle.release_ns).clamp(0.0, FORCE_TIME_CONSTANT_S);
         self.clock_ns = cycle.release_ns;
         let Some(Measurement { drives, .. }) = measurement else { return Ok(()) };
         let unready = drives.unready();
