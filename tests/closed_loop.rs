@@ -7,11 +7,14 @@ mod common;
 mod closed_loop {
     use super::*;
 
+    mod ages;
     mod assessment;
     mod built_in;
     mod disturbances;
+    mod drive_status;
     mod estimator;
     mod evidence;
+    mod external_pose;
     mod false_alarms;
     mod feedback;
     mod fidelities;
@@ -23,6 +26,8 @@ mod closed_loop {
     mod replay;
     mod ride;
     mod setpoints;
+    mod stamp_clock;
+    mod stamps;
     mod targets;
     mod tracking;
     mod trust;

@@ -11,6 +11,7 @@ mod mujoco {
     mod in_the_loop;
     mod layouts;
     pub mod python;
+    mod verdicts;
 }
 
 use std::ffi::OsStr;

@@ -112,9 +112,14 @@ impl Run {
             let input = Input {
                 release_ns: now_ns + period_ns / 2,
                 setpoint: Some(Setpoint::motion(now_ns, task)),
-                measurement: Some(Measurement { time_ns: now_ns, length, rate: Some(rate) }),
+                measurement: Some(Measurement {
+                    time_ns: now_ns,
+                    length,
+                    rate: Some(rate),
+                    ..Measurement::default()
+                }),
                 request: (cycle > 0).then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
-                deadline_missed: false,
+                ..Input::default()
             };
             watch(&input);
             let output = controller.step(&input);

@@ -95,7 +95,12 @@ impl Fleet {
             last = controller.step(&Input {
                 release_ns,
                 setpoint: Some(Setpoint::motion(release_ns, *task)),
-                measurement: Some(Measurement { time_ns: release_ns, length: *length, rate: Some(*rate) }),
+                measurement: Some(Measurement {
+                    time_ns: release_ns,
+                    length: *length,
+                    rate: Some(*rate),
+                    ..Measurement::default()
+                }),
                 request,
                 ..Input::default()
             });

@@ -11,6 +11,7 @@ pub mod clearance;
 pub mod envelope;
 pub mod fidelity_choice;
 pub mod fidelity_error;
+mod known_delay;
 pub mod pose_quality;
 pub mod reachable_envelope;
 pub mod region_search;

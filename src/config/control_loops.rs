@@ -3,9 +3,9 @@
 use core::f64::consts::TAU;
 use core::fmt;
 
-use super::Config;
-use super::deployment::STABLE_MASSES;
+use super::deployment::{Deployment, STABLE_MASSES};
 use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
+use crate::control::estimator::SENT_ACCELERATIONS;
 
 /// Control loop with the longest delay that the daemon may have.
 #[derive(Clone, Copy, Debug)]
@@ -21,8 +21,7 @@ pub struct ControlLoop {
 }
 
 /// The loops of position and orientation, or that of the stiffest mode of the legs.
-pub fn loops(config: &Config) -> Vec<ControlLoop> {
-    let deployment = &config.deployment;
+pub fn loops(deployment: &Deployment) -> Vec<ControlLoop> {
     let control = &deployment.control;
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
@@ -45,6 +44,34 @@ pub fn loops(config: &Config) -> Vec<ControlLoop> {
         .with_feedback_gain(gain),
     };
     each.into_iter().map(with).collect()
+}
+
+/// Masses of the platform over that of the model with which the loop must stand the age of its measurements. Less than
+/// [`STABLE_MASSES`]: a driver so slow is rare, and so is a model so wrong.
+const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
+
+/// Largest constant age of the measurements with which all loops are stable, and the estimator knows what was sent since \[s\].
+/// No less than the age that the measurements have in any case.
+pub fn longest_age_s(deployment: &Deployment) -> f64 {
+    let period_s = deployment.realtime.period_s();
+    let drive = deployment.drive.total_delay_s() / period_s;
+    let recorded = SENT_ACCELERATIONS as f64 - 1.0 - drive;
+    let ages = loops(deployment).into_iter().map(|ControlLoop { sampled, .. }| {
+        let longest = sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay);
+        longest - drive
+    });
+    ages.fold(recorded, f64::min) * period_s
+}
+
+/// Warning if control without measurements may last longer than the loop stands measurements of that age.
+pub fn timeout_warning(deployment: &Deployment) -> Option<String> {
+    let [timeout_ms, age_ms] = [deployment.timeouts.measured_s, longest_age_s(deployment)].map(|s| 1e3 * s);
+    (timeout_ms > age_ms).then(|| {
+        format!(
+            "timeouts.measured_ms = {timeout_ms} is more than {age_ms:.1} ms, the largest age of measurements with which the \
+             loop is stable: older ones are refused when they arrive, and without any the platform is not controlled for so long"
+        )
+    })
 }
 
 impl ControlLoop {

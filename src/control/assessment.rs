@@ -1,6 +1,6 @@
 //! Assessment of a cycle: whether the platform is located, may be engaged, and can follow its reference further.
 
-use super::controller::{Cycle, Input, SetpointKind};
+use super::controller::{Cycle, Input, Publishers, SetpointKind};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::feedback_bound::FeedbackBound;
 use super::input_validation::ValidatedSetpoint;
@@ -27,6 +27,10 @@ pub(super) struct Evidence<'a> {
     pub feedback: &'a FeedbackBound,
     /// Whether the measurements agree with the prediction.
     pub trust: Result<(), Diagnostic>,
+    /// Whether drives and external sensors report nothing that contradicts.
+    pub reports: Result<(), Diagnostic>,
+    /// Whether the drives are ready, or nothing else is reported.
+    pub is_ready: bool,
     /// The motion with which control would begin, if it is known.
     pub free_motion: Option<&'a Motion>,
 }
@@ -41,11 +45,13 @@ pub(super) fn assess(
     reference: &mut ReferenceGenerator,
 ) -> (Findings, LimitSet) {
     let parameters = &cycle.constants.parameters;
-    let Evidence { input, setpoint, located, error, feedback, trust, free_motion } = evidence;
+    let Evidence { input, setpoint, located, error, feedback, trust, reports, is_ready, free_motion } =
+        evidence;
     let (mut active_limits, conditioned) = localization.check_condition(parameters.condition);
     let (mut tracking, mut start) = (conditioned, Ok(()));
     if cycle.state.has_control() {
-        tracking = trust
+        tracking = reports
+            .and(*trust)
             .and_then(|()| check_following_error(parameters, *error, &mut active_limits))
             .and_then(|()| feedback.check())
             .and_then(|()| check_deadline(input))
@@ -55,17 +61,23 @@ pub(super) fn assess(
             })
             .and(conditioned);
     } else if located.is_ok() {
-        start = check_start(cycle, reference, *free_motion);
+        start = check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)
+            .and(*reports)
+            .and_then(|()| check_start(cycle, reference, *free_motion));
     }
     // Nothing depends on it while the setpoint is followed.
     let engagement = match cycle.state {
         State::Engaging | State::Active => Ok(()),
-        _ => conditioned
+        _ => check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)
+            .and_then(|()| check_publishers(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers))
+            .and(*reports)
+            .and(conditioned)
             .and(setpoint.status)
             .and_then(|()| check_engage_tolerance(parameters, setpoint, *error))
             .and(start),
     };
-    let has_ended = has_ended(cycle, setpoint, reference);
+    let is_waiting = cycle.state == State::Engaging && !is_ready;
+    let has_ended = !is_waiting && has_ended(cycle, setpoint, reference);
     let localization = located.map(drop);
     (Findings { localization, start, engagement, tracking, has_ended }, active_limits)
 }
@@ -100,6 +112,12 @@ fn check_engage_tolerance(
         return Ok(());
     }
     Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))
+}
+
+/// Control begins only with one publisher of each input: nobody knows which of two is the true one.
+fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
+    let Publishers { counting, ignored } = publishers;
+    if ignored == 0 { Ok(()) } else { Err(Diagnostic::new(code, counting.into(), ignored.into())) }
 }
 
 /// Control may begin if the motion without force is known and a stop from it was verified.

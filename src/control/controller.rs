@@ -5,7 +5,9 @@
 
 use super::assessment::{Evidence, assess};
 use super::diagnostic::Diagnostic;
+use super::drive_monitor::{DriveMonitor, DriveStatus};
 use super::estimator::LegRateEstimator;
+use super::external_pose::ExternalPose;
 use super::feedback_bound::FeedbackBound;
 use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
@@ -15,6 +17,7 @@ use super::limits::LimitSet;
 use super::localization::{Localization, PlatformState};
 use super::parameters::{Constants, Parameters};
 use super::reference::{ReferenceGenerator, Target};
+use super::stamp_clock::StampClock;
 use super::state::{OperatorRequest, Request, State};
 use super::supervisor::Supervisor;
 use super::tracking_error::{ErrorTracker, TrackingError, setpoint_error};
@@ -69,6 +72,19 @@ pub struct Measurement {
     pub length: [f64; LEGS],
     /// Measured leg rates L' \[m/s\]; `None` if the driver does not measure them.
     pub rate: Option<[f64; LEGS]>,
+    /// X by another sensor at the same instant; `None` if there is none.
+    pub pose: Option<[f64; 6]>,
+    /// Status of the drives.
+    pub drives: DriveStatus,
+}
+
+/// Processes that publish an input: of the publisher that counts, and of another one that lives beside it. 0: none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Publishers {
+    /// Process whose messages count.
+    pub counting: u32,
+    /// Process whose messages are ignored.
+    pub ignored: u32,
 }
 
 /// Inputs of one cycle: with the controller's own state they determine its output.
@@ -76,12 +92,18 @@ pub struct Measurement {
 pub struct Input {
     /// The instant of release of this cycle, on the grid.
     pub release_ns: u64,
+    /// The clock of the releases less the daemon's \[ns\]: not zero where measurements release the cycles.
+    pub clock_offset_ns: i64,
     /// The newest setpoint; `None` if none ever arrived.
     pub setpoint: Option<Setpoint>,
     /// The newest measurement; `None` if none ever arrived.
     pub measurement: Option<Measurement>,
     /// The newest request; `None` if none ever arrived. Each is carried out once.
     pub request: Option<OperatorRequest>,
+    /// Processes that publish setpoints.
+    pub setpoint_publishers: Publishers,
+    /// Processes that publish measurements.
+    pub measured_publishers: Publishers,
     /// Whether cycles were missed since the last one, and the deployment makes that a fault.
     pub deadline_missed: bool,
 }
@@ -128,6 +150,9 @@ pub(super) struct Cycle<'a> {
 #[derive(Clone, Debug)]
 pub struct Controller {
     constants: Constants,
+    stamp_clock: StampClock,
+    drives: DriveMonitor,
+    external_pose: ExternalPose,
     measurements: MeasurementValidator,
     setpoints: SetpointValidator,
     localization: Localization,
@@ -148,6 +173,9 @@ impl Controller {
             localization: Localization::new(&constants),
             reference: ReferenceGenerator::new(&constants),
             constants,
+            stamp_clock: StampClock::default(),
+            drives: DriveMonitor::default(),
+            external_pose: ExternalPose::default(),
             measurements: MeasurementValidator::default(),
             setpoints: SetpointValidator::default(),
             free_motion: FreeMotion::default(),
@@ -162,13 +190,26 @@ impl Controller {
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
-        let Self { free_motion, errors, leg_rates, feedback, limiter, .. } = self;
+        let Self {
+            stamp_clock,
+            drives,
+            external_pose,
+            free_motion,
+            errors,
+            leg_rates,
+            feedback,
+            limiter,
+            ..
+        } = self;
         let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
         let parameters = &constants.parameters;
 
         // Validate inputs.
-        let measurement = measurements.validate(&cycle, input.measurement.as_ref());
+        let clock = stamp_clock.check(&cycle, input.clock_offset_ns);
+        let measurement = clock.and(measurements.validate(&cycle, input.measurement.as_ref()));
         let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref(), reference);
+        let reported = measurement.as_ref().ok().copied();
+        let reports = drives.check(&cycle, reported).and(external_pose.check(&cycle, reported));
 
         // Locate platform.
         let mut located = measurement.and_then(|measurement| {
@@ -193,6 +234,8 @@ impl Controller {
             error: error.as_ref(),
             feedback,
             trust: errors.check_trust(),
+            reports,
+            is_ready: drives.is_ready,
             free_motion: free_motion.as_ref(),
         };
         let (findings, assessed_limits) = assess(&cycle, &evidence, localization, reference);
@@ -210,7 +253,9 @@ impl Controller {
             error = Some(errors.start(constants, measured_ns, begin_ns));
         }
         if next.has_control() {
-            let target = target(constants, next, &setpoint);
+            // Until the drives are ready it stays where it is, or comes to rest.
+            let is_waiting = next == State::Engaging && !drives.is_ready;
+            let target = target(constants, next, &setpoint).filter(|_| !is_waiting);
             reference.set_closing_scale(closing_scale(parameters, next));
             reference.advance(constants, begin_ns.saturating_add(parameters.period_ns), target.as_ref());
         }
@@ -240,6 +285,7 @@ impl Controller {
             supervisor.fail(diagnostic);
             LimitedForces::default()
         });
+        drives.record_sent(&force);
         let platform = located.ok().map(|located| located.platform);
         Output {
             state: supervisor.mode.state,

@@ -32,6 +32,8 @@ pub enum BoundDescription {
         /// Source of the bound: a key of the configuration, or words.
         bound: &'static str,
     },
+    /// Value and bound are the numbers of two processes: of the one that counts, and of the other.
+    Processes,
     /// A quantity as a multiple of its bound.
     Ratio {
         /// Name of the quantity.
@@ -148,6 +150,10 @@ codes! {
     PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and its motion or a stop within every limit is not known", "wait until the platform stands";
     /// Without setpoints the platform holds its pose, as `[setpoint] on_violation` is `limit`.
     HoldingPose = 11, None, absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"), "no setpoints: the platform holds its pose", "start a setpoint source";
+    /// Two processes publish measurements; control does not begin before one of them ends.
+    TwoMeasuredSources = 12, None, BoundDescription::Processes, "two sources of measurements", "end one of them";
+    /// Two processes publish setpoints; control does not begin before one of them ends.
+    TwoSetpointSources = 13, None, BoundDescription::Processes, "two sources of setpoints", "end one of them";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
     /// Measurements stopped arriving.
@@ -186,7 +192,7 @@ codes! {
     /// A setpoint whose time stamp is too old, in the future, or not after that of the setpoint before.
     SetpointStampInvalid = 117, Stop, absolute("age", "s", "is outside", "the range of timeouts.setpoint_ms around now,"), "setpoint with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
     /// A measurement whose time stamp is too old, in the future, or before that of the measurement before.
-    MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range of timeouts.measured_ms around now,"), "measurement with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
+    MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range from a tenth of a period ahead to timeouts.measured_ms, whose bound is"), "measurement with an invalid time stamp", "stamp with the CLOCK_MONOTONIC instant of sampling";
     /// The pose is so near a singular one that `limits.condition` is exceeded, or a setpoint could only be stopped
     /// where it would be.
     NearSingular = 119, Stop, absolute("condition", "", "exceeds", "limits.condition"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
@@ -200,6 +206,18 @@ codes! {
     SensorFrozen = 125, Brake, absolute("motion of the reference since the reading changed last", "m", "exceeds", "the bound for a sensor that is alive,"), "sensor frozen", "check the encoder of this leg and the driver";
     /// The length of a leg is not where the model, the forces and the measurements before have it.
     MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "what noise and disturbances explain,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
+    /// A measurement arrived that is so old that the loop would not be stable if all were.
+    MeasurementTooOld = 127, Brake, absolute("age", "s", "exceeds", "what the loop stands (hexad check),"), "measurement too old for the loop", "shorten the way from the sensors to the daemon, or lower the bandwidths";
+    /// The time stamps of the measurements, which release the cycles, do not advance as the daemon's clock does.
+    StampClockInvalid = 128, Brake, absolute("deviation of the clock of the stamps", "s", "is outside", "timeouts.measured_ms, ahead or behind:"), "time stamps do not advance with the clock", "stamp each measurement with the instant of sampling; check the clock of the drives";
+    /// A length is not that of the pose that another sensor measures.
+    ExternalPoseMismatch = 129, Brake, absolute("difference between the length and that of the external pose", "m", "exceeds", "measured.pose_tolerance_m"), "lengths not those of the external pose", "home this leg again; check its scale, the machine file and the external sensor";
+    /// A drive did not become ready after control began, or does not stay so.
+    DriveNotReady = 130, Brake, absolute("time without enabled drive and open brake", "s", "exceeds", "drive.ready_timeout_ms, or once it was ready 20 ms:"), "drive not ready", "enable the drive and check its brake";
+    /// A drive reports a fault.
+    DriveFault = 131, Brake, NO_NUMBER, "drive reports a fault", "see the display of the drive";
+    /// The actual force of a drive is not the commanded one.
+    DriveForceMissing = 132, Brake, absolute("difference of the actual force from the commanded one", "N", "exceeds", "a fifth of the command and a fiftieth of actuator.max_force_n,"), "actual force not as commanded", "check the drive of this leg";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.
@@ -254,6 +272,9 @@ impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { code, value, bound, index } = self;
         write!(f, "{}", code.name())?;
+        if *code == DiagnosticCode::DriveFault && *index != 0 {
+            write!(f, ": leg {index}")?;
+        }
         if *value != 0.0 || *bound != 0.0 {
             let part = if *code == DiagnosticCode::SetpointOutOfEnvelope { "axis" } else { "leg" };
             let place = |f: &mut fmt::Formatter<'_>| match index {
@@ -263,6 +284,9 @@ impl fmt::Display for Diagnostic {
             let (value, bound) = (Rounded(*value), Rounded(*bound));
             match code.comparison() {
                 BoundDescription::None => {}
+                BoundDescription::Processes => {
+                    write!(f, ": process {value} counts, process {bound} does not")?;
+                }
                 BoundDescription::Absolute { quantity, unit, relation, bound: source } => {
                     let space = if unit.is_empty() { "" } else { " " };
                     write!(f, ": {quantity} {value}{space}{unit}")?;

@@ -18,7 +18,9 @@
 mod assessment;
 pub mod controller;
 pub mod diagnostic;
+pub mod drive_monitor;
 pub mod estimator;
+mod external_pose;
 mod feedback_bound;
 mod force_limits;
 mod forces;
@@ -31,6 +33,7 @@ pub mod limits;
 pub mod localization;
 pub mod parameters;
 pub mod reference;
+mod stamp_clock;
 pub mod state;
 pub mod supervisor;
 pub mod tracking_error;

@@ -61,6 +61,12 @@ pub struct Parameters {
     pub setpoint_timeout_ns: u64,
     /// Age from which on a measurement counts as lost.
     pub measured_timeout_ns: u64,
+    /// Longest wait for drives that are not ready when control begins \[ns\].
+    pub ready_timeout_ns: u64,
+    /// Largest difference of a length from that of a pose measured by another sensor \[m\].
+    pub pose_tolerance: f64,
+    /// Largest age of a measurement that arrives: the loop is stable if all are as old.
+    pub max_measured_age_ns: u64,
 }
 
 impl Parameters {

@@ -18,8 +18,9 @@ pub type IoSide = exchange::IoSide<Input, Output>;
 pub type RealtimeSide = exchange::RealtimeSide<Input, Output>;
 
 impl CyclicInput for Input {
-    fn begin_cycle(&mut self, release_ns: u64, deadline_missed: bool) {
+    fn begin_cycle(&mut self, release_ns: u64, clock_ns: u64, deadline_missed: bool) {
         (self.release_ns, self.deadline_missed) = (release_ns, deadline_missed);
+        self.clock_offset_ns = release_ns.wrapping_sub(clock_ns) as i64;
     }
 
     fn measured_ns(&self) -> Option<u64> {

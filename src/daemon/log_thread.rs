@@ -13,10 +13,11 @@ use super::cycle::{CycleRecord, tracking_error};
 use super::fault_dump::FaultDump;
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
+use super::process_names::sentence;
 use super::report::{Fault, TrackingSum};
 use super::statistics::Collector;
-use crate::control::controller::Output;
-use crate::control::diagnostic::DiagnosticCode;
+use crate::control::controller::{Input, Output, Publishers};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
 use crate::messages::Statistics;
 use crate::realtime::triple_buffer::Writer;
@@ -85,6 +86,8 @@ struct Log {
     report: LogReport,
     /// Of the last cycle.
     state: (State, DiagnosticCode),
+    /// The last two at once, of the measurements and of the setpoints.
+    publishers: [Publishers; 2],
     hints: Hints,
 }
 
@@ -97,6 +100,7 @@ impl Log {
             if let Some((position, orientation)) = tracking_error(&record) {
                 self.report.tracking.add(position, orientation);
             }
+            self.log_publishers(&record);
             let state = (record.output.state, record.output.diagnostic.code);
             if state != self.state {
                 self.log_state(&record);
@@ -110,6 +114,21 @@ impl Log {
             let hints = files.read();
             self.collector.add_hints(&hints.since(&self.hints));
             self.hints = hints;
+        }
+    }
+
+    /// Also under control, where a second publisher changes nothing.
+    fn log_publishers(&mut self, record: &CycleRecord) {
+        let Input { measured_publishers, setpoint_publishers, .. } = record.input;
+        let now = [measured_publishers, setpoint_publishers];
+        let codes = [DiagnosticCode::TwoMeasuredSources, DiagnosticCode::TwoSetpointSources];
+        for ((before, now), code) in self.publishers.iter_mut().zip(now).zip(codes) {
+            // Once for each pair, also if one of them is silent now and then.
+            if now.ignored != 0 && now != *before {
+                *before = now;
+                let two = Diagnostic::new(code, now.counting.into(), now.ignored.into());
+                warn!(cycle = record.cycle, number = code as u32, "{}", sentence(&two));
+            }
         }
     }
 
@@ -128,7 +147,7 @@ impl Log {
             State::Stopping if code.is_fault() => {
                 warn!(cycle, number = code as u32, "stopping: {diagnostic}")
             }
-            _ => info!(cycle, "{}: {diagnostic}", state.name()),
+            _ => info!(cycle, "{}: {}", state.name(), sentence(&diagnostic)),
         }
     }
 }

@@ -28,6 +28,7 @@ mod hints;
 mod io_thread;
 mod log_thread;
 mod parameters;
+pub mod process_names;
 pub mod report;
 mod snapshot;
 pub mod start;

@@ -4,6 +4,7 @@ use core::f64::consts::TAU;
 
 use nalgebra::Vector6;
 
+use crate::config::control_loops::longest_age_s;
 use crate::config::deployment::Deployment;
 use crate::control::estimator::Readings;
 use crate::control::estimator::covariance::NoiseModel;
@@ -49,6 +50,9 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         following_orientation: control.following_orientation_rad,
         setpoint_timeout_ns: nanoseconds(timeouts.setpoint_s),
         measured_timeout_ns: nanoseconds(timeouts.measured_s),
+        ready_timeout_ns: nanoseconds(deployment.drive.ready_timeout_s),
+        pose_tolerance: deployment.noise.pose_tolerance_m,
+        max_measured_age_ns: nanoseconds(longest_age_s(deployment)),
         limits: limits.reference,
         force_rate: limits.force_rate_n_s,
         condition: limits.condition,

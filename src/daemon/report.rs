@@ -132,7 +132,10 @@ fn warn_of_losses(cyclic: &LoopReport, io: &IoReport) {
         (cyclic.counters.records_lost, "cycle records lost: the log thread was too slow"),
         (io.send_failures, "messages could not be sent"),
         (io.rejected.schema, "messages rejected: another schema; build all participants alike"),
-        (io.rejected.older_publisher, "messages rejected: an older publisher; were there two at once?"),
+        (
+            io.rejected.other_publisher,
+            "messages rejected: of another publisher than the one that counts; were there two at once?",
+        ),
         (io.rejected.repeated, "messages rejected: received before, or unreadable"),
         (io.rejected.damaged, "messages rejected: wrong checksum, or a publisher that begins in the future"),
     ] {

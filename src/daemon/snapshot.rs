@@ -1,6 +1,6 @@
 //! Snapshot of the daemon for the control thread: what the I/O thread has after each cycle.
 
-use crate::control::controller::{Measurement, Setpoint};
+use crate::control::controller::{Measurement, Publishers, Setpoint};
 use crate::control::diagnostic::Diagnostic;
 use crate::messages::StatusMessage;
 use crate::model::machine::LEGS;
@@ -18,6 +18,10 @@ pub struct Snapshot {
     pub setpoint: Option<Setpoint>,
     /// The newest measurement; `None` if none ever arrived.
     pub measurement: Option<Measurement>,
+    /// Processes that publish setpoints.
+    pub setpoint_publishers: Publishers,
+    /// Processes that publish measurements.
+    pub measured_publishers: Publishers,
     /// The last request word that was carried out or refused; 0 if none ever was.
     pub answered: u64,
     /// Why that one was refused; code `None` if it was not.

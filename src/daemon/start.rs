@@ -106,9 +106,8 @@ pub(super) fn warm_up(mut controller: Controller, machine: &Machine) {
     let input = Input {
         release_ns: 1,
         setpoint: Some(Setpoint::motion(1, task)),
-        measurement: Some(Measurement { time_ns: 1, length, rate: Some([0.0; 6]) }),
-        request: None,
-        deadline_missed: false,
+        measurement: Some(Measurement { time_ns: 1, length, rate: Some([0.0; 6]), ..Measurement::default() }),
+        ..Input::default()
     };
     for _ in 0..WARM_UP_CYCLES {
         core::hint::black_box(controller.step(core::hint::black_box(&input)));

@@ -19,14 +19,14 @@ use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
 use super::fault_dump::FaultDump;
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
-use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
+use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports, Silence};
 use super::log_thread::{self, LogLinks, LogReport};
 use super::parameters::{nanoseconds, parameters, timing};
 use super::report::Report;
 use super::snapshot::Snapshot;
 use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use super::{DaemonError, REALTIME_THREAD};
-use crate::config::control_loops::{ControlLoop, loops};
+use crate::config::control_loops::{ControlLoop, loops, timeout_warning};
 use crate::config::{Config, fidelity};
 use crate::control::controller::{Controller, Input, Output};
 use crate::control::diagnostic::DiagnosticCode;
@@ -140,7 +140,9 @@ fn report(config: &Config, cyclic: &LoopReport, io: &IoReport, mut log: LogRepor
 
 /// Controller of a configuration. Logs which of its loops are close to unstable.
 fn controller(config: &Config) -> Controller {
-    for warning in loops(config).iter().filter_map(ControlLoop::warning) {
+    let of_loops = loops(&config.deployment);
+    let warnings = of_loops.iter().filter_map(ControlLoop::warning);
+    for warning in warnings.chain(timeout_warning(&config.deployment)) {
         warn!("{warning}");
     }
     let fidelity = fidelity::fidelity(config);
@@ -190,7 +192,9 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     let Config { machine, deployment, .. } = config;
     let realtime = &deployment.realtime;
     // Ports belong to the thread that opens them.
-    let ports = config.join().and_then(|bus| Ports::open(&bus));
+    let timeouts = &deployment.timeouts;
+    let [setpoint_ns, measured_ns] = [timeouts.setpoint_s, timeouts.measured_s].map(nanoseconds);
+    let ports = config.join().and_then(|bus| Ports::open(&bus, Silence { setpoint_ns, measured_ns }));
     let (ports, opened) = ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
     let shortfalls = opened.map(|()| if realtime.is_simulated() { vec![] } else { prepare_io(realtime) });
     // There is no receiver only if the other thread failed first.
@@ -198,7 +202,7 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     let settings = IoSettings {
         timing: timing(deployment),
         lead_ns: nanoseconds(realtime.io_lead_s),
-        max_force_age_ns: nanoseconds(deployment.timeouts.measured_s),
+        max_force_age_ns: measured_ns,
         home: machine.home,
     };
     Some(io_thread::run(&settings, ports?, links, stop))

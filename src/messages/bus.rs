@@ -17,7 +17,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::clock::monotonic_ns;
-use super::{Message, Publisher, Subscriber};
+use super::{LeasedSubscriber, Message, Publisher, Subscriber};
 
 /// Daemon, plant, recorder, monitors.
 const MAX_SUBSCRIBERS: usize = 16;
@@ -126,6 +126,17 @@ impl Bus {
         let port = service.subscriber_builder().buffer_size(depth.min(BUFFER)).create();
         let port = port.map_err(port_error(format!("cannot subscribe to {}", T::TOPIC)))?;
         Ok(Subscriber::new(service, port, self.is_simulated))
+    }
+
+    /// A subscriber to `T` for which one publisher counts until it has left, or was silent for so long \[ns\].
+    pub fn leased_subscriber<T: Message>(
+        &self,
+        depth: usize,
+        timeout_ns: u64,
+    ) -> Result<LeasedSubscriber<T>, PortError> {
+        // In simulated time nobody is silent for long.
+        let timeout_ns = if self.is_simulated { u64::MAX } else { timeout_ns };
+        Ok(LeasedSubscriber::new(self.subscriber(depth)?, timeout_ns))
     }
 
     /// Observer of the publishers of `T`, which takes none of the topic's ports.

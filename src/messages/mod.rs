@@ -44,6 +44,7 @@ mod command;
 mod force;
 mod header;
 pub mod layout;
+mod lease;
 pub mod lockstep;
 mod measured;
 mod publisher;
@@ -64,7 +65,7 @@ pub use self::statistics::{
     IoCounters, LoopCounters, LoopTimes, RejectionCounts, Statistics, Times, WORST_CYCLES, WorstCycle,
 };
 pub use self::status::{DiagnosticRecord, StatusMessage};
-pub use self::subscriber::Subscriber;
+pub use self::subscriber::{LeasedSubscriber, Subscriber};
 
 use self::layout::{Declared, Layout};
 

@@ -95,8 +95,8 @@ message! {
     RejectionCounts = "hexad_rejection_counts" {
         /// Of another schema.
         schema: u64,
-        /// Of an older life of the publisher: its last ones, or of one that still publishes beside a newer one.
-        older_publisher: u64,
+        /// Of another publisher than the one that counts: its last ones, or of one that publishes beside it.
+        other_publisher: u64,
         /// Received before, or unreadable.
         repeated: u64,
         /// With a wrong checksum, or of a publisher that begins in the future.
@@ -110,7 +110,7 @@ impl core::ops::Add for RejectionCounts {
     fn add(self, other: Self) -> Self {
         Self {
             schema: self.schema + other.schema,
-            older_publisher: self.older_publisher + other.older_publisher,
+            other_publisher: self.other_publisher + other.other_publisher,
             repeated: self.repeated + other.repeated,
             damaged: self.damaged + other.damaged,
         }

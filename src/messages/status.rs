@@ -25,7 +25,7 @@ message! {
 
 message! {
     /// State of the daemon, published every cycle.
-    StatusMessage = "hexad_status" on "status" schema 5 {
+    StatusMessage = "hexad_status" on "status" schema 6 {
         /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// Number of the `State`.

@@ -82,8 +82,9 @@ impl ReleaseMode {
 
 /// Input of a cycle: the part that the loop reads and writes.
 pub trait CyclicInput: Copy {
-    /// Begins a cycle: its release instant \[ns\], and whether missed cycles are to be treated as a fault.
-    fn begin_cycle(&mut self, release_ns: u64, deadline_missed: bool);
+    /// Begins a cycle: its release instant, the same instant on the daemon's clock \[ns\], and whether missed cycles are to be
+    /// treated as a fault.
+    fn begin_cycle(&mut self, release_ns: u64, clock_ns: u64, deadline_missed: bool);
 
     /// Instant of the measured message in it \[ns\], if there is one.
     fn measured_ns(&self) -> Option<u64>;
@@ -252,7 +253,9 @@ impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&mut I, u64) -> O> Cycles<'_, C
         let Begin { due_ns, release_ns, woke_ns, wakeup_ns, waited, missed, io_late } = *begin;
         let Timing { period_ns, on_overrun, late_wakeup_ns, .. } = *self.timing;
         let mut input = self.side.inputs.value().input;
-        input.begin_cycle(release_ns, missed && on_overrun == OverrunPolicy::Fault);
+        // Simulated time is compared with no clock.
+        let clock_ns = if self.timing.release == ReleaseMode::Lockstep { release_ns } else { due_ns };
+        input.begin_cycle(release_ns, clock_ns, missed && on_overrun == OverrunPolicy::Fault);
         let output = (self.step)(&mut input, woke_ns);
 
         let counters = &mut self.counters;

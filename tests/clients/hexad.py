@@ -26,8 +26,9 @@ FORCE_TIMEOUT_NS = 50_000_000
 class Force(hexad_messages.Force):
     def may_be_applied(self, now_ns, timeout_ns=FORCE_TIMEOUT_NS):
         """Whether the actuators may apply the forces. If not, and when no message arrives for too long: brake."""
-        is_recent = self.header.time_ns <= now_ns <= self.header.time_ns + timeout_ns
-        return is_recent and self.is_intact() and self.valid == 1 and all(map(math.isfinite, self.force_n))
+        is_recent = 0 <= now_ns - self.header.time_ns <= timeout_ns
+        is_intact = self.header.schema == self.schema and self.is_intact()
+        return is_recent and is_intact and self.valid == 1 and all(map(math.isfinite, self.force_n))
 
 
 def monotonic_ns():

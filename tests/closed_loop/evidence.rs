@@ -97,6 +97,8 @@ fn ages_and_stamps_are_told_in_seconds() {
     assert_evidence(&output, DiagnosticCode::SetpointEnded, 0.0505, 0.05, 0);
     let output = ends(|input| input.measurement.as_mut().unwrap().time_ns += 2_000_500_000);
     assert_evidence(&output, DiagnosticCode::MeasurementStampInvalid, -2.0, 0.02, 0);
+    let output = ends(|input| input.measurement.as_mut().unwrap().time_ns += 19_000_000);
+    assert_evidence(&output, DiagnosticCode::MeasurementStampInvalid, -0.0185, -1e-4, 0);
     let output = ends(|input| input.setpoint.as_mut().unwrap().time_ns -= 999_500_000);
     assert_evidence(&output, DiagnosticCode::SetpointStampInvalid, 1.0, 0.05, 0);
 }

@@ -74,10 +74,10 @@ impl HardwareLoop {
         Input {
             release_ns: self.now_ns + self.period_ns / 2,
             setpoint: Some(Setpoint::motion(self.now_ns, *task)),
-            measurement: Some(Measurement { time_ns: self.now_ns, length, rate }),
+            measurement: Some(Measurement { time_ns: self.now_ns, length, rate, ..Measurement::default() }),
             request: (self.now_ns > START_NS)
                 .then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 

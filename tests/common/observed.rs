@@ -112,7 +112,12 @@ impl Observed {
 
     pub fn measurement(&self) -> Measurement {
         let legs = self.simulator.leg_motion();
-        Measurement { time_ns: self.now_ns, length: legs.length, rate: Some(legs.rate) }
+        Measurement {
+            time_ns: self.now_ns,
+            length: legs.length,
+            rate: Some(legs.rate),
+            ..Measurement::default()
+        }
     }
 
     /// What the controller sees in this cycle, everything in order.
@@ -126,7 +131,7 @@ impl Observed {
             setpoint,
             measurement: Some(self.measurement()),
             request: self.asked,
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 

@@ -118,9 +118,10 @@ impl Rig {
                 time_ns: self.now_ns,
                 length: legs.length,
                 rate: Some(legs.rate),
+                ..Measurement::default()
             }),
             request: self.asked,
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use hexad::commands::in_step::Operator;
 use hexad::config::Config;
@@ -13,6 +13,7 @@ use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use hexad::plant::simulator::Simulator;
+use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;
 
 use crate::support::children::HANG;
@@ -116,84 +117,71 @@ fn every_message_is_counted(recording: &Recording, steps: &[Step]) {
     assert!(silent >= 1 && steps.len() > 500, "{silent} of {}", steps.len());
 }
 
-/// Cycles of the lock-step, at 1 kHz of simulated time.
-const CYCLES: usize = 4000;
-
-/// When simulated time begins: it has nothing to do with ours.
+/// When the clock of the drives began: it has nothing to do with ours.
 const BEGINS_NS: u64 = 7_000_000;
 
-/// A simulator that waits for each force and then goes on at once: simulated time runs as fast as the
-/// daemon answers, and nothing is missed.
-#[test]
-fn in_lock_step_simulated_time_is_faster_than_real_time() {
-    let _turn = turns::alone();
-    // In a thread of its own, whose priority ends with it.
-    thread::spawn(lock_step).join().expect("the simulator");
-}
+/// Cycles under control before the stamps stand still, and for which the driver goes on after it.
+const CYCLES: usize = 1000;
+const CYCLES_AFTER: usize = 3000;
 
-fn lock_step() {
-    // Or a busy machine makes it late, and with it simulated time.
-    let _ = scheduling::fifo_priority(1);
-    let machine = external("lock-step");
+/// A driver and a source whose stamps stand still: all ages stay zero, and forces would be valid for ever.
+#[test]
+fn stamps_that_stand_still_end_control() {
+    let _turn = turns::beside_others();
+    let machine = external("frozen-stamps");
     let daemon = start_daemon(&machine);
     daemon.says("running");
+    let name = machine.name.clone();
     let config = Config::load(&machine.file).expect("the machine file");
+    // In a thread of its own, whose priority ends with it.
+    let valid = thread::spawn(move || drive_with_frozen_stamps(&name, &config)).join().expect("the driver");
+    println!("{valid} valid forces after the stamps stood still");
+    daemon
+        .says("fault: time stamps do not advance with the clock: deviation of the clock of the stamps -0.4");
+    let bound = (TIMEOUT_NS / PERIOD_NS) as usize;
+    assert!(valid > bound / 2 && valid < 2 * bound, "{valid} valid forces");
+    daemon.stops_on("TERM", HANG);
+}
+
+/// Number of valid forces after the stamps stood still.
+fn drive_with_frozen_stamps(name: &str, config: &Config) -> usize {
+    // Or a busy machine makes it late.
+    let _ = scheduling::fifo_priority(1);
     let plant = &config.deployment.plant;
     let mut simulator = Simulator::new(&config.machine, plant.brake_deceleration_m_s2, plant.step_s);
-    let bus = Bus::join(&machine.name).expect("to join");
+    let bus = Bus::join(name).expect("to join");
     let mut measured = bus.publisher::<MeasuredMessage>().expect("to publish");
     let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
     let mut forces = bus.subscriber::<ForceMessage>(8).expect("to subscribe");
     let mut operator = Operator::new(&bus).expect("to ask");
-    let mut took = vec![];
-    let mut under_control = 0;
-    let began = Instant::now();
-    for time_ns in (BEGINS_NS..).step_by(PERIOD_NS as usize) {
-        let asked = Instant::now();
-        let legs = simulator.leg_motion();
-        let message = MeasuredMessage {
-            length_m: legs.length,
-            length_rate_m_s: legs.rate,
-            rates_valid: 1,
-            ..MeasuredMessage::default()
-        };
+    let (began_ns, grid) = (monotonic_ns(), Grid::new(PERIOD_NS, 0));
+    let (mut tick_ns, mut time_ns, mut force) = (began_ns, BEGINS_NS, None);
+    let (mut under_control, mut after, mut valid_after) = (0, 0, 0);
+    while after < CYCLES_AFTER {
+        assert!(monotonic_ns() < began_ns + HANG.as_nanos() as u64, "{under_control} cycles under control");
+        let next_ns = grid.next_after(monotonic_ns());
+        sleep_until(next_ns);
+        simulator.advance((next_ns - tick_ns) as f64 * 1e-9, force.as_ref());
+        tick_ns = next_ns;
+        if under_control < CYCLES {
+            time_ns = BEGINS_NS + tick_ns - began_ns;
+        } else {
+            after += 1;
+        }
+        let length_m = simulator.leg_motion().length;
         setpoints.publish(time_ns, peer::setpoint(time_ns)).expect("to send");
-        measured.publish(time_ns, message).expect("to send");
-        let force = loop {
-            match forces.receive_latest().filter(|force| force.release_ns == time_ns) {
-                Some(force) => break force,
-                None => std::hint::spin_loop(),
-            }
-            assert!(asked.elapsed() < HANG, "no force for {time_ns}");
-        };
-        simulator.advance(PERIOD_NS as f64 * 1e-9, (force.valid == 1).then_some(&force.force_n));
-        under_control += usize::from(force.valid == 1);
-        took.push(asked.elapsed());
-        match (took.len() < CYCLES, force.valid) {
-            (true, 0) if force.diagnostic_code == DiagnosticCode::ReadyToEngage as u32 => {
-                operator.send(Request::Engage).expect("to send");
-            }
-            (false, 0) => break,
-            (false, _) => operator.send(Request::Stop).expect("to send"),
-            _ => {}
+        measured.publish(time_ns, MeasuredMessage { length_m, ..Default::default() }).expect("to send");
+        let Some(message) = forces.receive_latest() else { continue };
+        let is_valid = message.valid == 1;
+        force = is_valid.then_some(message.force_n);
+        under_control += usize::from(is_valid);
+        valid_after += usize::from(is_valid && after > 0);
+        // The host may have held somebody.
+        if after == 0 && message.state == State::Fault as u32 {
+            operator.send(Request::Clear).expect("to send");
+        } else if message.diagnostic_code == DiagnosticCode::ReadyToEngage as u32 {
+            operator.send(Request::Engage).expect("to send");
         }
     }
-    let speed = took.len() as f64 * PERIOD_NS as f64 * 1e-9 / began.elapsed().as_secs_f64();
-    daemon.stops_on("TERM", HANG);
-    let report = Report::read(&machine.path("report.json")).expect("the report");
-    took.sort_unstable();
-    let median = took[CYCLES / 2];
-    println!(
-        "lock-step: {speed:.1} times real time, median {median:?}; {:?}; {:?}",
-        report.tracking, report.end_to_end_ns
-    );
-    // More only before the first message, should that be late.
-    assert!(report.cycles >= CYCLES as u64 && report.deadline_misses.skipped == 0, "{report:#?}");
-    assert!(
-        report.faults.is_empty() && under_control > CYCLES - 20,
-        "under control in {under_control} cycles: {report:#?}"
-    );
-    let tracking = &report.tracking;
-    assert!((1e-9..50e-6).contains(&tracking.position_rms_m), "{tracking:#?}");
-    assert!(median < Duration::from_nanos(PERIOD_NS), "slower than real time: {median:?} for a cycle");
+    valid_after
 }

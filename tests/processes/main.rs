@@ -47,4 +47,5 @@ mod rounds;
 mod stale;
 mod system_calls;
 mod trajectory;
+mod two_sources;
 mod unprivileged;

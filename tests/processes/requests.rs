@@ -14,9 +14,8 @@ use hexad::messages::clock::monotonic_ns;
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::{ask, clear, does, engage, is_refused};
-use crate::support::peer::Controlled;
 use crate::support::recorder::{Recorder, Recording};
-use crate::support::trio::{Trio, let_pass, start_daemon, start_plant};
+use crate::support::trio::{Trio, start_daemon, start_plant};
 use crate::support::{peer, rules, turns};
 
 /// Limits with which the daemon's own motions take one to three seconds: time to do something during them.
@@ -203,29 +202,6 @@ fn estop_in(machine: &Machine, recorder: &Recorder, state: State, requests: &[&s
     }
     clear(machine);
     before.state == state as u32
-}
-
-#[test]
-fn of_two_setpoint_sources_the_newer_counts_and_the_other_is_counted() {
-    let _turn = turns::beside_others();
-    let machine = Machine::patient("two-sources");
-    let recorder = Recorder::start(&machine.name);
-    let Controlled { peer: older, daemon, plant, machine } = Controlled::start(machine);
-    let counted = || recorder.so_far().statuses.last().expect("a status").io.rejected.older_publisher;
-    let before = counted();
-    let_pass(Duration::from_millis(200));
-    assert_eq!(counted(), before, "one source");
-    let newer = peer::start(&machine);
-    let enough = |recording: &Recording| {
-        recording.statuses.last().filter(|status| status.io.rejected.older_publisher > before + 200).copied()
-    };
-    let status = recorder.until("the setpoints of the older source are counted", enough);
-    assert_eq!(State::from_number(status.state), Some(State::Active), "both say the same: {status:#?}");
-    drop((older, newer));
-    let words = daemon.stops_on("TERM", HANG).stderr;
-    assert!(words.contains("messages rejected: an older publisher; were there two at once?"), "{words}");
-    plant.stops_on("TERM", HANG);
-    rules::hold(&recorder.finish());
 }
 
 /// A setpoint source that stands so far from home along x \[m\].

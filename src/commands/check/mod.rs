@@ -7,7 +7,7 @@ use crate::analysis::assembly_modes::{OtherMode, other_modes};
 use crate::commands::arguments::MachineFile;
 use crate::commands::failure::Failure;
 use crate::config::Config;
-use crate::config::control_loops::loops;
+use crate::config::control_loops::{longest_age_s, loops, timeout_warning};
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
@@ -127,13 +127,15 @@ impl Check<'_> {
                 root(legs.stiffest)
             )?;
         }
-        for control_loop in loops(self.config) {
+        let deployment = &self.config.deployment;
+        for control_loop in loops(deployment) {
             writeln!(f, "{control_loop}")?;
             if let Some(warning) = control_loop.warning() {
                 writeln!(f, "WARNING: {warning}")?;
             }
         }
-        Ok(())
+        writeln!(f, "measurements stable to an age of {:.1} ms", 1e3 * longest_age_s(deployment))?;
+        timeout_warning(deployment).map_or(Ok(()), |warning| writeln!(f, "WARNING: {warning}"))
     }
 
     /// Writes within which bounds start-up and the loop know the pose.

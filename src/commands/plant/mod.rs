@@ -9,7 +9,9 @@ use std::time::Instant;
 
 use tracing::{debug, info, warn};
 
+use self::other_driver::other_driver;
 use self::validation::ForceValidation;
+use crate::commands::failure::CommandError;
 use crate::config::Config;
 use crate::control::controller::Measurement;
 use crate::control::diagnostic::DiagnosticCode;
@@ -29,6 +31,7 @@ use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::setup::scheduling;
 use crate::realtime::stop_request::Stop;
 
+mod other_driver;
 mod validation;
 
 /// Forces kept between two ticks: 12.8 ms at 20 kHz, so that a late plant still applies each in its turn.
@@ -38,14 +41,29 @@ const FORCE_DEPTH: usize = 256;
 /// that all participants would wait for.
 const MAX_PAUSE_NS: u64 = 1_000_000_000;
 
+/// Error that prevents or ends a plant.
+#[derive(Debug, thiserror::Error)]
+pub enum PlantError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error("{driver} already publishes measurements of {machine}: end it first")]
+    DriverLives { driver: String, machine: String },
+}
+
+impl CommandError for PlantError {}
+
 /// Runs the plant until `stop`.
-pub fn run(config: &Config, stop: &Stop) -> Result<(), PortError> {
+pub fn run(config: &Config, stop: &Stop) -> Result<(), PlantError> {
     let bus = config.join()?;
-    if bus.is_simulated() {
-        run_in_lockstep(config, &bus, stop)
-    } else {
-        run_in_real_time(config, &bus, stop)
+    if let Some(driver) = other_driver(config, &bus)? {
+        return Err(PlantError::DriverLives { driver, machine: config.name.clone() });
     }
+    if bus.is_simulated() {
+        run_in_lockstep(config, &bus, stop)?;
+    } else {
+        run_in_real_time(config, &bus, stop)?;
+    }
+    Ok(())
 }
 
 fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
@@ -184,10 +202,15 @@ impl DrivenPlant {
         let simulator = self.hardware.simulator();
         let state = simulator.state();
         MeasuredMessage {
-            pose_valid: 1,
+            pose_valid: 2,
             x: task_coordinates(&state.pose, &simulator.machine().home),
             twist: state.twist.vector().into(),
-            ..MeasuredMessage::from(&Measurement { time_ns: self.time_ns, length, rate: Some(rate) })
+            ..MeasuredMessage::from(&Measurement {
+                time_ns: self.time_ns,
+                length,
+                rate: Some(rate),
+                ..Measurement::default()
+            })
         }
     }
 }

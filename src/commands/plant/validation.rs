@@ -38,9 +38,9 @@ impl ForceValidation {
 
     /// Takes over the counts of the port, and logs reasons that are new.
     pub fn update(&mut self, rejected: RejectionCounts) {
-        let RejectionCounts { schema, older_publisher, repeated, damaged } = rejected;
+        let RejectionCounts { schema, other_publisher, repeated, damaged } = rejected;
         let [of_schema, of_damaged, of_older, of_repeated, ..] = &mut self.counts;
-        (*of_schema, *of_damaged, *of_older, *of_repeated) = (schema, damaged, older_publisher, repeated);
+        (*of_schema, *of_damaged, *of_older, *of_repeated) = (schema, damaged, other_publisher, repeated);
         for ((count, logged), reason) in self.counts.iter().zip(&mut self.logged).zip(REASONS) {
             if *count > 0 && !*logged {
                 warn!("rejected: a force {reason}");

@@ -142,6 +142,7 @@ fn source_line(source: &SourceReport) -> String {
         .iter()
         .map(|process| match process.command.as_str() {
             "" => format!("{} (ended)", process.process_id),
+            command if process.is_ignored => format!("ignored: {command} {}", process.process_id),
             command => format!("{command} {} of {}", process.process_id, process.user),
         })
         .collect();
@@ -177,8 +178,12 @@ mod tests {
 
     /// Every field as long as it gets.
     fn answer() -> AnswerLine {
-        let process =
-            ProcessReport { process_id: 4_194_304, command: "a".repeat(15), user: "operator".into() };
+        let process = ProcessReport {
+            process_id: 4_194_304,
+            command: "a".repeat(15),
+            user: "operator".into(),
+            is_ignored: false,
+        };
         let source = |topic: &str| SourceReport {
             topic: topic.into(),
             age_s: Some(0.0123),

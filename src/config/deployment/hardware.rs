@@ -7,6 +7,12 @@ use crate::config::reader::SectionReader;
 const DEFAULT_LENGTH_NOISE_M: f64 = 1e-6;
 /// Standard deviation of the error of rounding to steps, over the step: `1 / sqrt(12)`.
 const STEP_DEVIATION: f64 = 0.288_675_134_594_812_9;
+/// Default of `pose_tolerance_m`: half of a homing error that matters, several times the noise of a good tracker.
+const DEFAULT_POSE_TOLERANCE_M: f64 = 5e-4;
+/// Default of `ready_timeout_ms`: a drive that enables and a brake that opens take 50 to 200 ms.
+const DEFAULT_READY_TIMEOUT_MS: f64 = 500.0;
+/// Longest that a key may set \[ms\]: an operator would take the machine for dead.
+const MAX_READY_TIMEOUT_MS: f64 = 10_000.0;
 /// Longest delay of drives \[us\]: with more, a platform a tenth lighter than modelled is unstable.
 const MAX_DELAY_US: f64 = 15_000.0;
 
@@ -17,6 +23,8 @@ pub struct SensorNoise {
     pub length_m: f64,
     /// Resolution of a length; 0 if it is not known.
     pub length_step_m: f64,
+    /// Largest difference of a length from that of a pose that another sensor measures; no standard deviation.
+    pub pose_tolerance_m: f64,
     /// Of a rate; `None` if the rates that the driver sends are only checked.
     pub rate_m_s: Option<f64>,
 }
@@ -28,6 +36,8 @@ pub struct Drive {
     pub delay_s: Option<f64>,
     /// Time constant of the force.
     pub lag_s: f64,
+    /// Longest wait for drives that report that they are not enabled, or their brakes not open.
+    pub ready_timeout_s: f64,
 }
 
 impl Drive {
@@ -43,6 +53,7 @@ pub(super) fn read_noise(mut section: SectionReader) -> SensorNoise {
     let noise = SensorNoise {
         length_step_m: step,
         length_m: section.number_or("length_noise_m", default, Bound::Positive),
+        pose_tolerance_m: section.number_or("pose_tolerance_m", DEFAULT_POSE_TOLERANCE_M, Bound::Positive),
         rate_m_s: finite(section.number_or("rate_noise_m_s", f64::INFINITY, Bound::Positive)),
     };
     section.finish();
@@ -53,8 +64,10 @@ pub(super) fn read_drive(mut section: SectionReader) -> Drive {
     let bound = Bound::Within(0.0, MAX_DELAY_US);
     let delay_us = finite(section.number_or("delay_us", f64::INFINITY, bound));
     let lag_us = section.number_or("lag_us", 0.0, bound);
+    let longest = Bound::UpTo(MAX_READY_TIMEOUT_MS);
+    let ready_timeout_s = section.number_or("ready_timeout_ms", DEFAULT_READY_TIMEOUT_MS, longest) / 1e3;
     section.finish();
-    Drive { delay_s: delay_us.map(|delay_us| delay_us / 1e6), lag_s: lag_us / 1e6 }
+    Drive { delay_s: delay_us.map(|delay_us| delay_us / 1e6), lag_s: lag_us / 1e6, ready_timeout_s }
 }
 
 fn finite(value: f64) -> Option<f64> {

@@ -31,6 +31,7 @@ use nalgebra::Vector6;
 use self::covariance::{Covariance, NoiseModel};
 pub(super) use self::frozen_sensors::FrozenSensors;
 pub(super) use self::leg_rates::LegRateEstimator;
+pub use self::sent_accelerations::CAPACITY as SENT_ACCELERATIONS;
 use self::sent_accelerations::SentAccelerations;
 use super::input_validation::seconds_between;
 use super::tracking_error::FeedbackError;

@@ -6,7 +6,7 @@ use super::ErrorState;
 use crate::control::input_validation::seconds_between;
 
 /// Accelerations kept, a power of two: at 10 kHz those of 25 ms, the longest delay of the drives with the age of a measurement.
-const CAPACITY: usize = 256;
+pub const CAPACITY: usize = 256;
 
 /// An acceleration and the instant from which on it acts.
 #[derive(Clone, Copy, Debug, Default)]

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::status::StatusReport;
 use crate::control::diagnostic::Diagnostic;
 use crate::control::state::{Request, State};
+use crate::daemon::process_names::sentence;
 
 /// Version of the protocol. It changes only if a client of an older one would misunderstand.
 pub const VERSION: u32 = 1;
@@ -106,7 +107,7 @@ impl From<Diagnostic> for DiagnosticReport {
             value: finite(value),
             bound: finite(bound),
             index,
-            text: diagnostic.to_string(),
+            text: sentence(&diagnostic),
         }
     }
 }

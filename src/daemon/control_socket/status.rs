@@ -9,7 +9,9 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::connection::user_name;
 use super::protocol::{AnswerLine, DiagnosticReport, RequestResult, VERSION};
 use crate::config::Config;
+use crate::control::controller::Publishers;
 use crate::control::limits::{Limit, LimitSet};
+use crate::daemon::process_names::{command, sentence};
 use crate::daemon::snapshot::Snapshot;
 use crate::messages::{Bus, MeasuredMessage, SetpointMessage, TopicObserver};
 use crate::model::machine::LEGS;
@@ -107,6 +109,9 @@ pub struct ProcessReport {
     pub command: String,
     /// Its user, empty if it has ended.
     pub user: String,
+    /// Its messages arrive, and those of another process count.
+    #[serde(default)]
+    pub is_ignored: bool,
 }
 
 /// What status reports are made of.
@@ -147,7 +152,7 @@ impl<'a> StatusSource<'a> {
             result: RequestResult::Done,
             request: "status".into(),
             state: state.name().into(),
-            text: diagnostic.to_string(),
+            text: sentence(&diagnostic),
             diagnostic: DiagnosticReport::from(diagnostic),
             status: Some(Box::new(report)),
         }
@@ -189,18 +194,25 @@ impl<'a> StatusSource<'a> {
         let is_simulated = config.deployment.realtime.is_simulated();
         let now_ns = measured_ns.filter(|_| is_simulated).unwrap_or(now_ns);
         let topics = self.topics.get_or_insert_with(|| Topics::open(config)).as_ref();
-        let source = |topic: &str, time_ns: Option<u64>, processes: Option<Vec<u32>>| SourceReport {
-            topic: topic.into(),
-            age_s: time_ns.map(|time_ns| seconds(time_ns, now_ns)),
-            processes: processes.into_iter().flatten().map(process_report).collect(),
-        };
+        let source =
+            |topic: &str, time_ns: Option<u64>, of: Publishers, processes: Option<Vec<u32>>| SourceReport {
+                topic: topic.into(),
+                age_s: time_ns.map(|time_ns| seconds(time_ns, now_ns)),
+                processes: processes.into_iter().flatten().map(|id| process_report(id, of)).collect(),
+            };
         vec![
             source(
                 "setpoint",
                 snapshot.setpoint.map(|setpoint| setpoint.time_ns),
+                snapshot.setpoint_publishers,
                 topics.map(|topics| topics.setpoint.publisher_process_ids()),
             ),
-            source("measured", measured_ns, topics.map(|topics| topics.measured.publisher_process_ids())),
+            source(
+                "measured",
+                measured_ns,
+                snapshot.measured_publishers,
+                topics.map(|topics| topics.measured.publisher_process_ids()),
+            ),
         ]
     }
 }
@@ -231,11 +243,14 @@ fn legs(snapshot: &Snapshot) -> Vec<LegReport> {
         .collect()
 }
 
-fn process_report(process_id: u32) -> ProcessReport {
-    let folder = format!("/proc/{process_id}");
-    let command = fs::read_to_string(format!("{folder}/comm")).unwrap_or_default().trim_end().into();
-    let user = fs::metadata(folder).map(|found| user_name(found.uid())).unwrap_or_default();
-    ProcessReport { process_id, command, user }
+fn process_report(process_id: u32, publishers: Publishers) -> ProcessReport {
+    let user = fs::metadata(format!("/proc/{process_id}")).map(|found| user_name(found.uid()));
+    ProcessReport {
+        process_id,
+        command: command(process_id),
+        user: user.unwrap_or_default(),
+        is_ignored: process_id == publishers.ignored,
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use crate::control::state::{OperatorRequest, Request};
 use crate::daemon::cycle::{CycleInput, MAX_REQUEST_AGE_NS};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{
-    Bus, CommandMessage, MeasuredMessage, PortError, RejectionCounts, SetpointMessage, Subscriber,
+    Bus, CommandMessage, LeasedSubscriber, MeasuredMessage, PortError, RejectionCounts, SetpointMessage,
+    Subscriber,
 };
 
 /// The daemon's own request before it ends; no message has this epoch.
@@ -16,17 +17,28 @@ const DEPTH: usize = 8;
 
 /// Subscribers of the daemon, and the input that their messages make.
 pub struct Inputs {
-    setpoints: Subscriber<SetpointMessage>,
-    measured: Subscriber<MeasuredMessage>,
+    setpoints: LeasedSubscriber<SetpointMessage>,
+    measured: LeasedSubscriber<MeasuredMessage>,
     commands: Subscriber<CommandMessage>,
     cycle: CycleInput,
     /// The request word of the last call.
     word: u64,
 }
 
-/// Which requests are accepted.
+/// Silence after which a publisher has left \[ns\].
 #[derive(Clone, Copy)]
-pub struct RequestFilter {
+pub struct Silence {
+    /// Of setpoints.
+    pub setpoint_ns: u64,
+    /// Of measurements.
+    pub measured_ns: u64,
+}
+
+/// Which publishers and which requests are accepted.
+#[derive(Clone, Copy)]
+pub struct InputFilter {
+    /// The platform is under control: no publisher takes over from one that lives, nor one that was ignored.
+    pub has_control: bool,
     /// The last request that the controller has carried out or refused.
     pub answered: (u64, u64),
     /// The daemon is to end: no request may start control, and the platform is to come to rest.
@@ -39,10 +51,10 @@ pub struct RequestFilter {
 
 impl Inputs {
     /// Opens the subscribers.
-    pub fn open(bus: &Bus) -> Result<Self, PortError> {
+    pub fn open(bus: &Bus, silence: Silence) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.subscriber(DEPTH)?,
-            measured: bus.subscriber(DEPTH)?,
+            setpoints: bus.leased_subscriber(DEPTH, silence.setpoint_ns)?,
+            measured: bus.leased_subscriber(DEPTH, silence.measured_ns)?,
             commands: bus.subscriber(usize::MAX)?,
             cycle: CycleInput::default(),
             word: 0,
@@ -61,10 +73,11 @@ impl Inputs {
     }
 
     /// Receives the newest message of each topic; true if a measurement is among them.
-    pub fn receive(&mut self, filter: RequestFilter) -> bool {
+    pub fn receive(&mut self, filter: InputFilter) -> bool {
         self.receive_requests(monotonic_ns(), filter);
-        self.receive_setpoint();
-        let measured = self.measured.receive_latest();
+        self.receive_setpoint(filter.has_control);
+        let measured = self.measured.receive_latest(filter.has_control);
+        self.cycle.input.measured_publishers = self.measured.publishers();
         if let Some(message) = &measured {
             self.cycle.input.measurement = Some(message.into());
             self.cycle.measurements = self.measured.received_count();
@@ -73,8 +86,10 @@ impl Inputs {
     }
 
     /// The next measurement, in order.
-    pub fn receive_next_measurement(&mut self) -> Option<Measurement> {
-        self.measured.receive().map(|message| (&message).into())
+    pub fn receive_next_measurement(&mut self, has_control: bool) -> Option<Measurement> {
+        let message = self.measured.receive(has_control)?;
+        self.cycle.input.measured_publishers = self.measured.publishers();
+        Some((&message).into())
     }
 
     /// Makes a measurement the one of the next cycle.
@@ -84,22 +99,23 @@ impl Inputs {
     }
 
     /// Whether the setpoint of an instant has arrived, or none will because the source has left.
-    pub fn has_setpoint_of(&mut self, time_ns: u64) -> bool {
+    pub fn has_setpoint_of(&mut self, time_ns: u64, has_control: bool) -> bool {
         // In this order: the source sends its last message before it leaves.
         let has_left = self.setpoints.received_count() > 0 && self.setpoints.publisher_count() == 0;
-        self.receive_setpoint();
+        self.receive_setpoint(has_control);
         has_left || self.cycle.input.setpoint.is_some_and(|setpoint| setpoint.time_ns == time_ns)
     }
 
-    fn receive_setpoint(&mut self) {
-        if let Some(message) = self.setpoints.receive_latest() {
+    fn receive_setpoint(&mut self, has_control: bool) {
+        if let Some(message) = self.setpoints.receive_latest(has_control) {
             self.cycle.input.setpoint = Some(Setpoint::from(&message));
         }
+        self.cycle.input.setpoint_publishers = self.setpoints.publishers();
     }
 
     /// Of the requests that are not yet answered the one of highest precedence counts.
-    pub fn receive_requests(&mut self, now_ns: u64, filter: RequestFilter) {
-        let RequestFilter { answered, is_ending, word, word_ns } = filter;
+    pub fn receive_requests(&mut self, now_ns: u64, filter: InputFilter) {
+        let InputFilter { answered, is_ending, word, word_ns, .. } = filter;
         if word != self.word {
             (self.word, self.cycle.input.request) = (word, None);
         }

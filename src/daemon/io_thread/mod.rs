@@ -9,7 +9,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
 
-use self::inputs::{Inputs, RequestFilter};
+pub use self::inputs::Silence;
+use self::inputs::{InputFilter, Inputs};
 use self::outputs::{OutputSettings, Outputs};
 use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
 use super::snapshot::Snapshot;
@@ -82,8 +83,8 @@ pub struct IoReport {
 
 impl Ports {
     /// Opens all. They belong to the thread that calls this.
-    pub fn open(bus: &Bus) -> Result<Self, PortError> {
-        Ok(Self { inputs: Inputs::open(bus)?, outputs: Outputs::open(bus)? })
+    pub fn open(bus: &Bus, silence: Silence) -> Result<Self, PortError> {
+        Ok(Self { inputs: Inputs::open(bus, silence)?, outputs: Outputs::open(bus)? })
     }
 }
 
@@ -93,8 +94,17 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
     let Ports { inputs, outputs } = ports;
     let allocations_at_start = at_start.allocations;
     let (published, answered, snapshot) = (0, (0, 0), Snapshot::default());
-    let mut io =
-        IoThread { settings, inputs, outputs, links, published, answered, snapshot, allocations_at_start };
+    let mut io = IoThread {
+        settings,
+        inputs,
+        outputs,
+        links,
+        published,
+        answered,
+        has_control: false,
+        snapshot,
+        allocations_at_start,
+    };
     let is_stopped = || stop.load(Ordering::Relaxed);
     match settings.timing.release {
         ReleaseMode::Lockstep => io.run_in_lockstep(is_stopped),
@@ -118,6 +128,8 @@ struct IoThread<'a> {
     published: u64,
     /// The last request that the controller has carried out or refused.
     answered: (u64, u64),
+    /// The platform is under control.
+    has_control: bool,
     /// What the control thread received last.
     snapshot: Snapshot,
     /// Of this thread, before the first cycle.
@@ -133,7 +145,7 @@ impl IoThread<'_> {
         while !is_stopped() {
             let release_ns = grid.next_after(monotonic_ns() + lead_ns);
             waiter.until(&mut Monotonic, release_ns - lead_ns);
-            self.inputs.receive(self.request_filter());
+            self.inputs.receive(self.input_filter());
             self.hand_over_inputs();
             if timing.spin_ns() == 0 {
                 sleep_until(release_ns);
@@ -154,7 +166,7 @@ impl IoThread<'_> {
         let mut polling = Polling::new(monotonic_ns(), period_ns);
         while !is_stopped() {
             let published = self.published;
-            let is_measured = self.inputs.receive(self.request_filter());
+            let is_measured = self.inputs.receive(self.input_filter());
             if is_measured {
                 self.hand_over_inputs();
                 self.links.exchange.event.signal();
@@ -174,7 +186,7 @@ impl IoThread<'_> {
         let next_measurement = |io: &mut Self| {
             // Whether the daemon may end is updated while all wait, too.
             io.publish_if_new();
-            io.inputs.receive_next_measurement()
+            io.inputs.receive_next_measurement(io.has_control)
         };
         while let Some(measurement) = poll_until(&is_stopped, || next_measurement(self)) {
             let time_ns = measurement.time_ns;
@@ -184,11 +196,13 @@ impl IoThread<'_> {
             }
             answered_ns = Some(time_ns);
             self.inputs.set_measurement(measurement);
-            let setpoint = poll_until(&is_stopped, || self.inputs.has_setpoint_of(time_ns).then_some(()));
+            let setpoint = poll_until(&is_stopped, || {
+                self.inputs.has_setpoint_of(time_ns, self.has_control).then_some(())
+            });
             if setpoint.is_none() {
                 return;
             }
-            self.inputs.receive_requests(time_ns, self.request_filter());
+            self.inputs.receive_requests(time_ns, self.input_filter());
             self.hand_over_inputs();
             self.links.exchange.event.signal();
             let before = self.published;
@@ -199,12 +213,12 @@ impl IoThread<'_> {
         }
     }
 
-    fn request_filter(&self) -> RequestFilter {
+    fn input_filter(&self) -> InputFilter {
         let is_ending = self.links.is_ending.load(Ordering::Relaxed);
         let word = self.links.word.load();
         let is_simulated = self.settings.timing.release == ReleaseMode::Lockstep;
         let word_ns = if is_simulated { 0 } else { request_word::time_ns(word) };
-        RequestFilter { answered: self.answered, is_ending, word, word_ns }
+        InputFilter { has_control: self.has_control, answered: self.answered, is_ending, word, word_ns }
     }
 
     fn hand_over_inputs(&mut self) {
@@ -214,7 +228,7 @@ impl IoThread<'_> {
     /// Publishes the newest output unless it was published before; returns when it was due \[ns\].
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
-        self.answered = output.answered;
+        (self.answered, self.has_control) = (output.answered, output.state.has_control());
         if let (WORD_EPOCH, word) = output.answered {
             (self.snapshot.answered, self.snapshot.refusal) = (word, output.request_diagnostic);
             self.links.word.set_seen(word);
@@ -246,6 +260,8 @@ impl IoThread<'_> {
             time_ns: monotonic_ns(),
             setpoint: input.setpoint,
             measurement: input.measurement,
+            setpoint_publishers: input.setpoint_publishers,
+            measured_publishers: input.measured_publishers,
             ..self.snapshot
         };
         snapshots.write(self.snapshot);

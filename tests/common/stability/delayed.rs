@@ -107,9 +107,9 @@ impl Delayed {
         let output = self.controller.step(&Input {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint::motion(time_ns, task)),
-            measurement: Some(Measurement { time_ns, length, rate: Some(rate) }),
+            measurement: Some(Measurement { time_ns, length, rate: Some(rate), ..Measurement::default() }),
             request: Some(OperatorRequest { request: Request::Engage, message: (START_NS, 1) }),
-            deadline_missed: false,
+            ..Input::default()
         });
         self.hardware.advance(self.age_ns, self.force);
         self.force = output.state.has_control().then_some(output.force);

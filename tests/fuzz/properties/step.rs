@@ -109,9 +109,10 @@ impl<'a> Play<'a> {
                 time_ns: self.now_ns,
                 length: legs.length,
                 rate: self.has_rates.then_some(legs.rate),
+                ..Measurement::default()
             }),
             request: self.asked,
-            deadline_missed: false,
+            ..Input::default()
         }
     }
 

@@ -55,10 +55,10 @@ impl Controlled {
         Self { peer, daemon, plant, machine }
     }
 
-    /// Another peer comes; when it is there, the present one is killed.
+    /// The present peer is killed; another one follows it within the timeout.
     pub fn replace_peer(&mut self) {
-        let next = start(&self.machine);
-        core::mem::replace(&mut self.peer, next).kill();
+        self.peer.kill();
+        self.peer = start(&self.machine);
     }
 }
 

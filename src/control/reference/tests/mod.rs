@@ -105,6 +105,9 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         following_orientation: 0.05,
         setpoint_timeout_ns: 20_000_000,
         measured_timeout_ns: 10_000_000,
+        max_measured_age_ns: 10_000_000,
+        ready_timeout_ns: 500_000_000,
+        pose_tolerance: 5e-4,
     }
 }
 

@@ -6,6 +6,7 @@ use super::protocol::{AnswerLine, RequestResult};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::{Request, State};
 use crate::daemon::cycle::MAX_REQUEST_AGE_NS;
+use crate::daemon::process_names::sentence;
 use crate::daemon::snapshot::Snapshot;
 use crate::realtime::request_word::RequestWord;
 
@@ -236,7 +237,7 @@ fn diagnostic(snapshot: &Snapshot) -> Diagnostic {
 }
 
 fn state_text(snapshot: &Snapshot) -> String {
-    format!("the daemon is in {}: {}", state(snapshot).name(), diagnostic(snapshot))
+    format!("the daemon is in {}: {}", state(snapshot).name(), sentence(&diagnostic(snapshot)))
 }
 
 /// Why the last request was refused, with what an operator needs to correct it.
@@ -253,7 +254,7 @@ fn refusal_text(snapshot: &Snapshot) -> String {
             norm(status.position_error_m) * 1e3,
             norm(status.orientation_error_rad) * 1e3
         ),
-        _ => refusal.to_string(),
+        _ => sentence(refusal),
     }
 }
 

@@ -1,0 +1,45 @@
+//! Longest delay of a sampled loop of which the estimator knows, as it knows the age of a measurement by its time stamp.
+
+use super::sampled_loop::SampledLoop;
+
+/// Longest known delay that is computed with the true period, in periods, and the resolution: the cost grows with the third power.
+const KNOWN_DELAY_PERIODS: f64 = 16.0;
+const KNOWN_DELAY_STEP: f64 = 0.01;
+/// Longest period in the search for the longest known delay, in true ones: more than a second at 20 kHz.
+const MAX_COARSE_PERIODS: f64 = 1024.0;
+
+impl SampledLoop {
+    /// The longest stable delay, in periods, of which the estimator knows all but what it does not know of the present one, as it
+    /// knows the age of a measurement by its stamp; with each of these masses over that of the model. More than
+    /// [`KNOWN_DELAY_PERIODS`] are those of a loop with longer periods, which stands less.
+    pub fn longest_known_delay(&self, masses: &[f64]) -> f64 {
+        let mut periods = 1.0;
+        loop {
+            let delay = self.coarse_known_delay(periods, masses);
+            if delay < KNOWN_DELAY_PERIODS || periods > MAX_COARSE_PERIODS {
+                return delay * periods;
+            }
+            periods *= 2.0;
+        }
+    }
+
+    /// The same of a loop with so many times the period, in periods of that loop.
+    fn coarse_known_delay(&self, periods: f64, masses: &[f64]) -> f64 {
+        let unknown = (self.delay - self.known_delay) / periods;
+        let rate_noise = self.rate_noise.map(|noise| noise * periods);
+        let coarse = Self { wn_t: self.wn_t * periods, rate_noise, ..*self };
+        let with = |known_delay: f64| {
+            let late = Self { known_delay, delay: known_delay + unknown, ..coarse };
+            masses.iter().all(|mass| late.is_stable_with_gain(1.0 / mass))
+        };
+        if with(KNOWN_DELAY_PERIODS) {
+            return KNOWN_DELAY_PERIODS;
+        }
+        let (mut inside, mut step) = (0.0, 0.5 * KNOWN_DELAY_PERIODS);
+        while step > KNOWN_DELAY_STEP {
+            inside += if with(inside + step) { step } else { 0.0 };
+            step *= 0.5;
+        }
+        inside
+    }
+}

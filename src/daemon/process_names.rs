@@ -1,0 +1,50 @@
+//! Names of processes, and sentences about them.
+
+use std::fs;
+
+use crate::control::diagnostic::{BoundDescription, Diagnostic};
+
+/// Command of a process; empty if it has ended.
+pub fn command(process_id: u32) -> String {
+    fs::read_to_string(format!("/proc/{process_id}/comm")).unwrap_or_default().trim_end().into()
+}
+
+/// The sentence of a diagnostic. Processes are named by command and number.
+pub fn sentence(diagnostic: &Diagnostic) -> String {
+    let Diagnostic { code, value, bound, .. } = diagnostic;
+    if code.comparison() != BoundDescription::Processes || *bound == 0.0 {
+        return diagnostic.to_string();
+    }
+    let [counts, ignored] = [value, bound].map(|number| named(*number as u32));
+    format!("{}: {counts} counts, {ignored} does not; {}", code.name(), code.remedy())
+}
+
+/// Number and command of a process.
+pub fn named(process_id: u32) -> String {
+    match command(process_id).as_str() {
+        "" => format!("process {process_id} (ended)"),
+        command => format!("process {process_id} ({command})"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::diagnostic::DiagnosticCode;
+
+    #[test]
+    fn a_sentence_about_two_processes_names_both() {
+        let this = std::process::id();
+        let name = command(this);
+        assert!(!name.is_empty());
+        let two = Diagnostic::new(DiagnosticCode::TwoMeasuredSources, this.into(), f64::from(u32::MAX));
+        let expected = format!(
+            "two sources of measurements: process {this} ({name}) counts, process {} (ended) does not; end one of them",
+            u32::MAX
+        );
+        assert_eq!(sentence(&two), expected);
+        assert!(two.to_string().contains(&format!(": process {this} counts, process {} does not", u32::MAX)));
+        let other = Diagnostic::new(DiagnosticCode::SetpointTooFar, 2.0, 1.0);
+        assert_eq!(sentence(&other), other.to_string());
+    }
+}

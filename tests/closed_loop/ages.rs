@@ -1,0 +1,95 @@
+//! Measurements of a constant age: the loop stands them without an oscillation, or they are refused.
+
+use std::collections::VecDeque;
+
+use hexad::config::Config;
+use hexad::config::control_loops::{longest_age_s, timeout_warning};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::model::task::TaskState;
+use hexad::plant::imperfections::Imperfections;
+
+use super::common::hardware_loop::{HardwareLoop, configured};
+
+/// After engaging, in which whatever grows has grown \[s\].
+const RUN_S: f64 = 8.0;
+
+/// Largest distance of the true platform from home in the last half of a run at rest \[m\]; or why it has no control.
+fn wobble(config: &Config, age_ms: f64, mass: f64) -> Result<f64, DiagnosticCode> {
+    let mut platform = config.machine.clone();
+    platform.platform.mass *= mass;
+    let mut control = HardwareLoop::new(config, &platform, &Imperfections::default());
+    let home = TaskState::at_rest(config.machine.home);
+    // The release is half a period after the measurement of now.
+    let periods = (age_ms * 1e6 / control.period_ns as f64 - 0.5).round() as usize;
+    let mut measured = VecDeque::new();
+    let mut largest = 0.0_f64;
+    let mut last = (State::Off, DiagnosticCode::None);
+    while control.time_s() < RUN_S {
+        let mut input = control.input(&home);
+        measured.push_back(input.measurement);
+        input.measurement = if measured.len() > periods { measured.pop_front().unwrap() } else { None };
+        // Again and again, until it is carried out.
+        let number = (control.time_s() / 0.1) as u64;
+        input.request = (last.0 == State::Standby)
+            .then_some(OperatorRequest { request: Request::Engage, message: (1, number) });
+        let output = control.cycle(&input);
+        last = (
+            output.state,
+            if output.state.has_control() {
+                DiagnosticCode::None
+            } else if output.diagnostic.code.is_fault() {
+                output.diagnostic.code
+            } else {
+                output.request_diagnostic.code
+            },
+        );
+        let away = control.hardware.simulator().state().pose.position - home.motion().pose.position;
+        if control.time_s() > 0.5 * RUN_S {
+            largest = largest.max(away.norm());
+        }
+    }
+    if last.0 == State::Active { Ok(largest) } else { Err(last.1) }
+}
+
+/// Payloads and errors of the model for which the age that the loop stands is computed.
+const MASSES: [f64; 3] = [0.9, 1.0, 1.1];
+
+#[test]
+fn ages_are_stood_without_an_oscillation_or_refused() {
+    for (machine, lines) in [
+        ("motion_base", ""),
+        ("motion_base", "[drive]\ndelay_us = 100.0\n"),
+        ("motion_base", "[timeouts]\nmeasured_ms = 200.0\n"),
+        ("fried2008", "[timeouts]\nmeasured_ms = 200.0\n[realtime]\nrate_hz = 500.0\n"),
+    ] {
+        let config = configured(machine, lines);
+        let bound_ms = 1e3 * longest_age_s(&config.deployment);
+        let timeout_ms = 1e3 * config.deployment.timeouts.measured_s;
+        println!("{machine} {lines:?}: {bound_ms:.2} ms");
+        assert!((20.0..100.0).contains(&bound_ms), "{bound_ms}");
+        let least_ms = bound_ms.min(timeout_ms);
+        for age_ms in [10.0, least_ms - 2.6, bound_ms + 2.6, 70.0, 150.0] {
+            for (mass, found) in MASSES.map(|mass| (mass, wobble(&config, age_ms, mass))) {
+                println!("{age_ms:.2} ms, mass {mass}: {found:?}");
+                match found {
+                    Ok(way) => assert!(age_ms < least_ms && way < 1e-4, "{age_ms} ms, mass {mass}: {way} m"),
+                    Err(_) if age_ms < least_ms => panic!("{age_ms} ms, mass {mass}: {found:?}"),
+                    Err(code) if age_ms < timeout_ms => assert_eq!(code, DiagnosticCode::MeasurementTooOld),
+                    Err(code) => assert_eq!(code, DiagnosticCode::MeasurementStampInvalid),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn control_without_measurements_for_longer_than_the_loop_stands_is_warned_of() {
+    let warning = |lines: &str| timeout_warning(&configured("motion_base", lines).deployment);
+    assert_eq!(warning(""), None);
+    let text = warning("[timeouts]\nmeasured_ms = 200.0\n").unwrap();
+    assert!(
+        text.starts_with("timeouts.measured_ms = 200 is more than ") && text.contains(" ms, the largest age"),
+        "{text}"
+    );
+}

@@ -1,0 +1,149 @@
+//! What a driver reports of its drives: control waits for them, and ends if they fault or if a force does not arrive.
+
+use hexad::control::controller::{Input, Output};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::drive_monitor::DriveStatus;
+use hexad::control::state::{Request, State};
+use hexad::model::machine::LEGS;
+use hexad::model::task::TaskState;
+use hexad::motion::built_in::{BuiltInMotion, fit};
+
+use super::common::deployed;
+use super::common::rig::{Rig, in_motion};
+
+const ALL: u32 = (1 << LEGS) - 1;
+
+fn reporting(input: &Input, drives: DriveStatus) -> Input {
+    let mut input = *input;
+    input.measurement.as_mut().unwrap().drives = drives;
+    input
+}
+
+/// Engages at rest with brakes that open so many cycles after the first force; the outputs until active or without control, and
+/// the largest way of the platform \[m\].
+fn engaged(opens_after: usize) -> (Vec<Output>, f64) {
+    let config = deployed("motion_base");
+    let mut rig = Rig::new(&config, &config.machine);
+    let home = TaskState::at_rest(config.machine.home);
+    for _ in 0..50 {
+        rig.cycle(&rig.input(&home));
+    }
+    rig.ask(Request::Engage);
+    let (mut outputs, mut farthest) = (Vec::<Output>::new(), 0.0_f64);
+    while outputs.len() < 2000 {
+        let is_open = outputs.len() > opens_after;
+        let drives = DriveStatus {
+            enabled: Some(ALL),
+            brake_open: Some(if is_open { ALL } else { ALL & !(1 << 4) }),
+            ..DriveStatus::default()
+        };
+        let output = rig.controller.step(&reporting(&rig.input(&home), drives));
+        rig.pass((is_open && output.state.has_control()).then_some(output.force));
+        let way = rig.simulator.state().pose.position - home.motion().pose.position;
+        farthest = farthest.max(way.norm());
+        outputs.push(output);
+        if output.state == State::Active || !output.state.has_control() {
+            break;
+        }
+    }
+    (outputs, farthest)
+}
+
+#[test]
+fn engaging_waits_for_the_brakes_and_no_longer_than_the_timeout() {
+    for opens_after in [0, 200, 490] {
+        let (outputs, farthest) = engaged(opens_after);
+        let waited = outputs.iter().filter(|output| output.state == State::Engaging).count();
+        println!("{opens_after}: active after {waited} cycles, {farthest:.1e} m");
+        assert_eq!(outputs.last().unwrap().state, State::Active);
+        assert!(waited >= opens_after && waited <= opens_after + 50 && farthest < 1e-5);
+    }
+    let (outputs, farthest) = engaged(600);
+    let last = outputs.last().unwrap();
+    assert_eq!((last.state, last.diagnostic.code), (State::Fault, DiagnosticCode::DriveNotReady));
+    assert_eq!((last.diagnostic.index, last.diagnostic.bound, outputs.len()), (5, 0.5, 502));
+    assert!(farthest < 1e-9);
+    let text = last.diagnostic.to_string();
+    assert!(text.starts_with("drive not ready: time without enabled drive and open brake 0.50"), "{text}");
+}
+
+#[test]
+fn a_brake_that_closes_or_a_drive_that_faults_ends_control() {
+    let config = deployed("motion_base");
+    let ready = DriveStatus { enabled: Some(ALL), brake_open: Some(ALL), fault: Some(0), force: None };
+    for (bad, code, longest) in [
+        (DriveStatus { brake_open: Some(ALL & !(1 << 2)), ..ready }, DiagnosticCode::DriveNotReady, 22),
+        (DriveStatus { enabled: Some(ALL & !(1 << 2)), ..ready }, DiagnosticCode::DriveNotReady, 22),
+        (DriveStatus { fault: Some(1 << 2), ..ready }, DiagnosticCode::DriveFault, 1),
+    ] {
+        let (mut rig, task) = in_motion(&config);
+        rig.cycle(&reporting(&rig.input(&task), ready));
+        let end = (1..100).find_map(|cycle| {
+            let input = reporting(&rig.input(&TaskState::at_rest(task.x.into())), bad);
+            let output = rig.cycle(&Input { setpoint: rig.input(&task).setpoint, ..input });
+            (!output.state.has_control()).then_some((cycle, output))
+        });
+        let (cycles, output) = end.expect("control ends");
+        assert_eq!((output.diagnostic.code, output.diagnostic.index), (code, 3));
+        assert!(cycles <= longest, "{cycles}");
+        // And it does not begin again.
+        rig.ask(Request::Clear);
+        rig.cycle(&reporting(&rig.input(&task), bad));
+        rig.ask(Request::Engage);
+        let refused = rig.cycle(&reporting(&rig.input(&task), bad)).request_diagnostic;
+        assert!(code != DiagnosticCode::DriveFault || refused.code == code, "{refused:?}");
+    }
+}
+
+/// In motion, with actual forces of `scale` of the commanded ones, so many cycles late, of which one leg has `share`; what acts
+/// is what is reported. The cycles until control ends, cause, leg, and the largest way from the setpoint \[m\].
+fn with_forces(
+    scale: f64,
+    late: usize,
+    share: f64,
+    cycles: usize,
+) -> Option<(usize, DiagnosticCode, u32, f64)> {
+    let config = deployed("motion_base");
+    let (mut rig, _) = in_motion(&config);
+    let scene = fit(&config.machine, BuiltInMotion::Sines, 8.0);
+    let period_s = rig.period_ns as f64 * 1e-9;
+    let mut sent = vec![];
+    let mut farthest = 0.0_f64;
+    for k in 0..cycles {
+        let task = scene.at(period_s * (1500 + k) as f64);
+        let mut input = rig.input(&task);
+        if sent.len() > late {
+            let mut force: [f64; LEGS] = sent[sent.len() - 1 - late];
+            force = force.map(|force| scale * force);
+            force[1] *= share;
+            let drives = DriveStatus { force: Some(force), ..DriveStatus::default() };
+            input = reporting(&input, drives);
+        }
+        let output = rig.controller.step(&input);
+        if !output.state.has_control() {
+            return Some((k, output.diagnostic.code, output.diagnostic.index, farthest));
+        }
+        sent.push(output.force);
+        let mut acts = output.force;
+        acts[1] *= share;
+        let way = rig.simulator.state().pose.position - task.motion().pose.position;
+        farthest = farthest.max(way.norm());
+        rig.pass(Some(acts));
+    }
+    None
+}
+
+#[test]
+fn a_force_that_does_not_arrive_is_noticed_by_the_drive_that_lacks_it() {
+    let (cycles, code, leg, farthest) = with_forces(1.0, 1, 0.5, 2000).expect("control ends");
+    println!("half of a force: {cycles} cycles, {farthest:.2e} m");
+    assert_eq!((code, leg), (DiagnosticCode::DriveForceMissing, 2));
+    assert!(cycles < 150 && farthest < 2e-3, "{cycles} cycles, {farthest} m");
+}
+
+#[test]
+fn forces_of_a_tenth_less_that_are_late_are_no_fault() {
+    for (scale, late) in [(1.0, 0), (0.9, 5), (1.1, 10)] {
+        assert_eq!(with_forces(scale, late, 1.0, 4000), None, "{scale}, {late} ms late");
+    }
+}
