@@ -1,0 +1,135 @@
+//! Computes the cycles of a recording again and compares every output.
+
+use crate::config::{Config, fidelity};
+use crate::control::controller::Controller;
+use crate::daemon::parameters;
+use crate::messages::CycleMessage;
+use crate::messages::layout::Declared as _;
+use crate::model::fidelity::Fidelity;
+use crate::realtime::setup::denormals;
+use crate::recording::reader::{Recording, Summary};
+use crate::recording::{Item, RecordingError, RunInfo, memory_from};
+
+/// One number of an output that a replay computes differently.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Number of the cycle.
+    pub cycle: u64,
+    /// When it was due, since the first cycle of the recording \[s\].
+    pub time_s: f64,
+    /// Field of the message of the cycle.
+    pub field: String,
+    /// Number in the recording.
+    pub recorded: f64,
+    /// Number of the replay.
+    pub replayed: f64,
+}
+
+impl Difference {
+    /// Size of the difference, of numbers above 1 as a ratio.
+    pub fn size(&self) -> f64 {
+        let difference = (self.recorded - self.replayed).abs() / self.recorded.abs().max(1.0);
+        if difference.is_nan() { f64::INFINITY } else { difference }
+    }
+}
+
+/// Result of a replay.
+#[derive(Clone, Debug, Default)]
+pub struct Replay {
+    /// Cycles computed again.
+    pub compared: u64,
+    /// Cycles for which the memory of the controller is unknown: before the first that is recorded, and behind gaps.
+    pub unknown: u64,
+    /// Cycles of which an output differs.
+    pub different: u64,
+    /// The first difference.
+    pub first: Option<Difference>,
+    /// The largest difference.
+    pub largest: Option<Difference>,
+}
+
+/// Controller as it was recorded.
+pub fn recorded_controller(info: &RunInfo, config: &Config) -> Controller {
+    let recorded = Fidelity::ALL.into_iter().find(|fidelity| fidelity.name() == info.fidelity);
+    let fidelity = recorded.unwrap_or_else(|| fidelity::fidelity(config));
+    Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
+}
+
+/// Controller of another configuration.
+pub fn other_controller(config: &Config) -> Controller {
+    let fidelity = fidelity::fidelity(config);
+    Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
+}
+
+/// Computes the cycles of a recording again with a controller before its first cycle.
+pub fn replay(recording: &Recording, controller: Controller) -> Result<(Summary, Replay), RecordingError> {
+    denormals::flush();
+    let mut replayer = Replayer {
+        controller,
+        next_cycle: Some(1),
+        begin_ns: None,
+        columns: CycleMessage::LAYOUT.columns(""),
+        replay: Replay::default(),
+    };
+    let summary = recording.each(|item| replayer.add(&item))?;
+    Ok((summary, replayer.replay))
+}
+
+struct Replayer {
+    controller: Controller,
+    /// The cycle that the controller can compute; `None` if its memory is unknown.
+    next_cycle: Option<u64>,
+    begin_ns: Option<u64>,
+    columns: Vec<String>,
+    replay: Replay,
+}
+
+impl Replayer {
+    fn add(&mut self, item: &Item) {
+        match item {
+            Item::Cycle(cycle) => self.step(cycle),
+            // A controller that is in step goes on: what it remembers is compared by what it computes.
+            Item::Memory { cycle, bytes } if self.next_cycle != Some(*cycle) => {
+                if let Some(memory) = memory_from(bytes) {
+                    self.controller.set_memory(memory);
+                    self.next_cycle = Some(*cycle);
+                }
+            }
+            Item::Memory { .. } => {}
+            Item::Gap(_) => self.next_cycle = None,
+        }
+    }
+
+    fn step(&mut self, cycle: &CycleMessage) {
+        let begin_ns = *self.begin_ns.get_or_insert(cycle.due_ns);
+        let input = cycle.input().filter(|_| self.next_cycle == Some(cycle.cycle));
+        let Some(input) = input else {
+            self.replay.unknown += 1;
+            return;
+        };
+        self.next_cycle = Some(cycle.cycle + 1);
+        self.replay.compared += 1;
+        let replayed = CycleMessage::new(&input, &self.controller.step(&input)).timed_as(cycle);
+        if replayed.bytes() == cycle.bytes() {
+            return;
+        }
+        self.replay.different += 1;
+        let time_s = cycle.due_ns.saturating_sub(begin_ns) as f64 * 1e-9;
+        for ((field, recorded), replayed) in self.columns.iter().zip(cycle.numbers()).zip(replayed.numbers())
+        {
+            if recorded.to_bits() != replayed.to_bits() {
+                let (cycle, field) = (cycle.cycle, field.clone());
+                self.replay.add(Difference { cycle, time_s, field, recorded, replayed });
+            }
+        }
+    }
+}
+
+impl Replay {
+    fn add(&mut self, difference: Difference) {
+        self.first.get_or_insert_with(|| difference.clone());
+        if self.largest.as_ref().is_none_or(|largest| difference.size() > largest.size()) {
+            self.largest = Some(difference);
+        }
+    }
+}
