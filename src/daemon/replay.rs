@@ -10,6 +10,9 @@ use crate::realtime::setup::denormals;
 use crate::recording::reader::{Recording, Summary};
 use crate::recording::{Item, RecordingError, RunInfo, memory_from};
 
+/// Field that is a quotient of a rate that may be zero.
+const TIME_TO_SINGULARITY: &str = "time_to_singularity_s";
+
 /// One number of an output that a replay computes differently.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
@@ -23,12 +26,18 @@ pub struct Difference {
     pub recorded: f64,
     /// Number of the replay.
     pub replayed: f64,
+    /// Largest number of the field in the recording: of all six legs, of a matrix.
+    pub scale: f64,
 }
 
 impl Difference {
-    /// Size of the difference, of numbers above 1 as a ratio.
+    /// Size of the difference, as a ratio of the largest number of the field if that is above 1. A time to a singularity counts by its inverse: of a platform that
+    /// moves along it is what rounding has left, divided into a determinant.
     pub fn size(&self) -> f64 {
-        let difference = (self.recorded - self.replayed).abs() / self.recorded.abs().max(1.0);
+        let is_time = self.field == TIME_TO_SINGULARITY;
+        let [recorded, replayed] =
+            [self.recorded, self.replayed].map(|number| if is_time { number.recip() } else { number });
+        let difference = (recorded - replayed).abs() / if is_time { 1.0 } else { self.scale.max(1.0) };
         if difference.is_nan() { f64::INFINITY } else { difference }
     }
 }
@@ -115,14 +124,22 @@ impl Replayer {
         }
         self.replay.different += 1;
         let time_s = cycle.due_ns.saturating_sub(begin_ns) as f64 * 1e-9;
-        for ((field, recorded), replayed) in self.columns.iter().zip(cycle.numbers()).zip(replayed.numbers())
-        {
+        let (numbers, cycle) = (cycle.numbers(), cycle.cycle);
+        for ((field, recorded), replayed) in self.columns.iter().zip(&numbers).zip(replayed.numbers()) {
             if recorded.to_bits() != replayed.to_bits() {
-                let (cycle, field) = (cycle.cycle, field.clone());
-                self.replay.add(Difference { cycle, time_s, field, recorded, replayed });
+                let is_of_field = |(other, _): &(&String, &f64)| array(other) == array(field);
+                let of_field = self.columns.iter().zip(&numbers).filter(is_of_field);
+                let scale = of_field.fold(0.0, |scale: f64, (_, number)| scale.max(number.abs()));
+                let (field, recorded) = (field.clone(), *recorded);
+                self.replay.add(Difference { cycle, time_s, field, recorded, replayed, scale });
             }
         }
     }
+}
+
+/// Name of the array to which a column belongs.
+fn array(column: &str) -> &str {
+    column.trim_end_matches(|letter: char| letter.is_ascii_digit())
 }
 
 impl Replay {

@@ -265,3 +265,65 @@ pub fn instruction_set(config: &Config) -> String {
     let level = format!("{:?}", config.machine.level);
     level.split('(').next().unwrap_or_default().into()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::controller::Input;
+    use crate::daemon::replay::{recorded_controller, replay};
+    use crate::messages::GapMessage;
+    use crate::recording::Item;
+    use crate::recording::reader::Recording;
+
+    /// The cycles of a run without messages.
+    fn cycles(mut controller: Controller, count: u64) -> Vec<CycleMessage> {
+        let cycle = |cycle: u64| {
+            let input = Input { release_ns: cycle * 1_000_000, ..Input::default() };
+            let message = CycleMessage::new(&input, &controller.step(&input));
+            CycleMessage { cycle, due_ns: input.release_ns, ..message }
+        };
+        (1..=count).map(cycle).collect()
+    }
+
+    /// Records cycles without those that `is_lost`: report, items, and numbers of the replay of the file.
+    fn recorded(count: u64, is_lost: impl Fn(u64) -> bool) -> (RecorderReport, Vec<Item>, [u64; 3]) {
+        let config = Config::load("config/fried2008.toml".as_ref()).unwrap();
+        let info = RunInfo { fidelity: Fidelity::Exact.name().into(), ..RunInfo::default() };
+        let controller = recorded_controller(&info, &config);
+        let folder = tempfile::tempdir().unwrap();
+        let folders = Folders { record: Some(folder.path().into()), ..Folders::default() };
+        let (recorder, queue) = Recorder::new(&config, Fidelity::Exact, &controller, &folders).unwrap();
+        let report = thread::scope(|threads| {
+            let recorder = threads.spawn(|| recorder.run());
+            let kept = cycles(controller.clone(), count).into_iter().filter(|cycle| !is_lost(cycle.cycle));
+            kept.for_each(|cycle| queue.send(cycle).unwrap());
+            drop(queue);
+            recorder.join().unwrap()
+        });
+        let path = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
+        let recording = Recording::read(&path).unwrap();
+        let mut items = vec![];
+        recording.each(|item| items.push(item)).unwrap();
+        let (_, replay) = replay(&recording, controller).unwrap();
+        (report, items, [replay.compared, replay.unknown, replay.different])
+    }
+
+    #[test]
+    fn lost_cycles_are_counted_and_marked_where_they_are_missing() {
+        let (report, items, replayed) = recorded(3000, |cycle| (1501..=1510).contains(&cycle));
+        assert_eq!((report.cycles, report.missing, report.is_repeatable), (2990, 10, false));
+        let mark = Item::Gap(GapMessage { first_cycle: 1501, cycles: 10 });
+        let gap = items.iter().position(|item| *item == mark).unwrap();
+        assert!(matches!(&items[gap + 1], Item::Cycle(after) if after.cycle == 1511));
+        let memories = items.iter().filter(|item| matches!(item, Item::Memory { .. })).count();
+        assert_eq!([memories, items.len()], [2, 2 + 1 + 2990], "behind the gap the memory is unknown");
+        assert_eq!(replayed, [1500, 1490, 0]);
+    }
+
+    #[test]
+    fn a_whole_recording_is_repeated() {
+        let (report, items, replayed) = recorded(3000, |_| false);
+        assert_eq!((report.cycles, report.missing, report.is_repeatable), (3000, 0, true));
+        assert_eq!((items.len(), replayed), (3003, [3000, 0, 0]));
+    }
+}
