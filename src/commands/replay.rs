@@ -15,8 +15,9 @@ use crate::recording::Item;
 use crate::recording::copy::copy;
 use crate::recording::reader::{Recording, Summary};
 
-/// Largest difference between two instruction sets: they add the same numbers in another order.
-const INSTRUCTION_SET_TOLERANCE: f64 = 1e-12;
+/// Largest difference between two instruction sets, which add the same numbers in another order: that of the reference's
+/// acceleration, a difference of velocities over a cycle; 2e-11 was seen. Forces agree to 1e-11 of the largest.
+const INSTRUCTION_SET_TOLERANCE: f64 = 1e-10;
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
@@ -86,7 +87,7 @@ impl ReplayArguments {
         if replay.compared == 0 {
             return Err(ReplayError::Unknown(info.version).into());
         }
-        let largest = replay.largest.as_ref().map_or(0.0, Difference::size);
+        let largest = replay.largest().map_or(0.0, Difference::size);
         let is_tolerated =
             info.instruction_set != instruction_set(&recorded) && largest <= INSTRUCTION_SET_TOLERANCE;
         if replay.different > 0 && other.is_none() && !is_tolerated {
@@ -150,7 +151,7 @@ fn description(recording: &Recording, summary: &Summary, replay: &Replay, config
         );
     }
     let Replay { compared, different, .. } = replay;
-    match (&replay.first, &replay.largest) {
+    match (&replay.first, replay.largest()) {
         (Some(first), Some(largest)) => {
             let _ = writeln!(text, "{different} of {compared} cycles differ");
             for (name, it) in [("first", first), ("largest", largest)] {

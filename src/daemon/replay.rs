@@ -1,5 +1,7 @@
 //! Computes the cycles of a recording again and compares every output.
 
+use std::collections::BTreeMap;
+
 use crate::config::{Config, fidelity};
 use crate::control::controller::Controller;
 use crate::daemon::parameters;
@@ -53,8 +55,8 @@ pub struct Replay {
     pub different: u64,
     /// The first difference.
     pub first: Option<Difference>,
-    /// The largest difference.
-    pub largest: Option<Difference>,
+    /// The largest difference of each field.
+    pub largest: BTreeMap<String, Difference>,
 }
 
 /// Controller as it was recorded.
@@ -139,14 +141,22 @@ impl Replayer {
 
 /// Name of the array to which a column belongs.
 fn array(column: &str) -> &str {
-    column.trim_end_matches(|letter: char| letter.is_ascii_digit())
+    let name = column.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    name.strip_suffix('_').unwrap_or(column)
 }
 
 impl Replay {
+    /// The largest difference of all fields.
+    pub fn largest(&self) -> Option<&Difference> {
+        self.largest.values().max_by(|a, b| a.size().total_cmp(&b.size()))
+    }
+
     fn add(&mut self, difference: Difference) {
         self.first.get_or_insert_with(|| difference.clone());
-        if self.largest.as_ref().is_none_or(|largest| difference.size() > largest.size()) {
-            self.largest = Some(difference);
+        let largest =
+            self.largest.entry(array(&difference.field).into()).or_insert_with(|| difference.clone());
+        if difference.size() > largest.size() {
+            *largest = difference;
         }
     }
 }

@@ -73,7 +73,7 @@ pub struct RecorderReport {
     pub cycles: u64,
     /// Cycles that are missing, because a queue was full.
     pub missing: u64,
-    /// Bytes written.
+    /// Bytes written, at most.
     pub bytes: u64,
     /// Whether the replica computed every cycle as the real-time thread did.
     pub is_repeatable: bool,
