@@ -15,7 +15,8 @@
 //! | `realtime` | threads, clock, cyclic loop, exchange between threads | `daemon` |
 //! | `output` | charts, tables, CSV and JSON files | `daemon` |
 //! | `config` | machine and deployment files | `daemon` |
-//! | `daemon` | the four threads, translation between messages and controller, reports | `daemon` |
+//! | `recording` | every cycle in a file: format, reader, repair | `daemon` |
+//! | `daemon` | the five threads, translation between messages and controller, reports | `daemon` |
 //! | `commands` | one file or folder for each command of the command line | `daemon` |
 //!
 //! A folder uses folders above it in this table and no other; `tests/wall.rs` checks that. `output` stands above
@@ -80,10 +81,13 @@
 //! | plausibility window | longest time over which lengths and rates of a measurement are compared |
 //! | policy | reaction to a setpoint that the limits do not allow: `stop` or `limit`, `[setpoint] on_violation` |
 //! | prefault | touch memory in advance, so that no cycle causes a page fault |
+//! | recording | file with every cycle of a run: timing, input, output, see [`recording`] |
 //! | reference | motion that the controller tracks; generated from the target, within all limits |
 //! | reference generator | moves the reference towards the target, only to where a verified stop exists |
 //! | regressor | matrix that takes inertial parameters to forces, see [`model::regressor`] |
 //! | release | instant at which a cycle begins, on a fixed grid |
+//! | replay | computing the cycles of a recording again, compared bit for bit |
+//! | replica | controller that repeats every cycle in the recorder, for its memory |
 //! | reservation | processor time that SCHED_DEADLINE guarantees in each period |
 //! | sample | pose of a motion at one instant, without derivatives, see [`control::reference::pose_samples`] |
 //! | saturation | a quantity held at its limit |
@@ -118,6 +122,8 @@ pub mod output;
 pub mod plant;
 #[cfg(feature = "daemon")]
 pub mod realtime;
+#[cfg(feature = "daemon")]
+pub mod recording;
 
 /// The driver in the README compiles.
 #[cfg(all(doctest, feature = "daemon"))]

@@ -13,8 +13,18 @@ use syn::visit::{self, Visit};
 use syn::{ExprUnsafe, ItemUse, Macro, UseTree};
 
 /// The folders, from the one that uses nothing. A folder uses folders above it and no other.
-const FOLDERS: [&str; 11] = [
-    "model", "control", "motion", "plant", "analysis", "messages", "realtime", "output", "config", "daemon",
+const FOLDERS: [&str; 12] = [
+    "model",
+    "control",
+    "motion",
+    "plant",
+    "analysis",
+    "messages",
+    "realtime",
+    "output",
+    "config",
+    "recording",
+    "daemon",
     "commands",
 ];
 

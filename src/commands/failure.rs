@@ -8,6 +8,7 @@ use crate::daemon::DaemonError;
 use crate::messages::PortError;
 use crate::output::files::FileError;
 use crate::output::svg::ChartError;
+use crate::recording::RecordingError;
 
 /// Error that ends a command, with the exit code of the process: 1 if the command ran and failed, 2 if it could not
 /// begin.
@@ -41,6 +42,7 @@ impl<E: CommandError> From<E> for Failure {
 impl CommandError for ConfigError {}
 impl CommandError for DaemonError {}
 impl CommandError for PortError {}
+impl CommandError for RecordingError {}
 impl CommandError for ctrlc::Error {}
 
 impl CommandError for ChartError {

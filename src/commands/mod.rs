@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 use self::advise::AdviseArguments;
 use self::arguments::{EngageArguments, MachineFile, RequestArguments};
 use self::check::CheckArguments;
+use self::convert::ConvertArguments;
 use self::demo::DemoArguments;
 use self::doctor::DoctorArguments;
 use self::export::ExportArguments;
@@ -18,6 +19,8 @@ use self::inverse_dynamics::InverseDynamicsArguments;
 use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
 use self::operate::Order;
+use self::recover::RecoverArguments;
+use self::replay::ReplayArguments;
 use self::run::RunArguments;
 use self::status::StatusArguments;
 use self::workspace::WorkspaceArguments;
@@ -28,6 +31,7 @@ use crate::realtime::stop_request::Stop;
 pub mod advise;
 mod arguments;
 pub mod check;
+mod convert;
 pub mod demo;
 pub mod doctor;
 pub mod export;
@@ -42,6 +46,8 @@ mod offline_tables;
 pub mod operate;
 pub mod plant;
 mod progress;
+mod recover;
+mod replay;
 mod run;
 pub mod status;
 pub mod workspace;
@@ -92,6 +98,12 @@ enum CommandArguments {
     Workspace(WorkspaceArguments),
     /// Write the machine as a model for other tools
     Export(ExportArguments),
+    /// Compute the cycles of a recording again and compare every output; or copy a part of it
+    Replay(ReplayArguments),
+    /// Write a recording in another format
+    Convert(ConvertArguments),
+    /// Complete a recording that a crash or a full disk has left unfinished
+    Recover(RecoverArguments),
     /// Forces, lengths and their derivatives for a file of motions
     InverseDynamics(InverseDynamicsArguments),
     /// Poses, and twists if there are rates, for a file of leg lengths
@@ -121,6 +133,9 @@ impl CommandLine {
             Is::Advise(arguments) => arguments.execute(),
             Is::Workspace(arguments) => arguments.execute(),
             Is::Export(arguments) => arguments.execute(),
+            Is::Replay(arguments) => arguments.execute(),
+            Is::Convert(arguments) => arguments.execute(),
+            Is::Recover(arguments) => arguments.execute(),
             Is::InverseDynamics(arguments) => arguments.execute(),
             Is::ForwardKinematics(arguments) => arguments.execute(),
         }

@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, value_parser};
 
 use super::arguments::MachineFile;
 use super::failure::Failure;
 use crate::daemon;
+use crate::daemon::recorder::Folders;
+use crate::daemon::recorder::folder::Bounds;
 use crate::realtime::stop_request::Stop;
 
 #[derive(Debug, Args)]
@@ -19,16 +21,27 @@ pub struct RunArguments {
     /// Write how often each time occurred, as CSV, at the end
     #[arg(long, value_name = "FILE")]
     histogram: Option<PathBuf>,
-    /// Write the cycles around each fault as CSV into this folder
+    /// Record every cycle into this folder, as MCAP
+    #[arg(long, value_name = "FOLDER")]
+    record: Option<PathBuf>,
+    /// Write the 30 s before each fault, and a second after it, into this folder, as MCAP
     #[arg(long, value_name = "FOLDER", env = "LOGS_DIRECTORY")]
     faults: Option<PathBuf>,
+    /// Begin a new file of a recording at this size
+    #[arg(long, value_name = "MIB", default_value_t = 256, value_parser = value_parser!(u64).range(1..=65_536))]
+    record_file_mib: u64,
+    /// Delete the oldest recordings of the machine in a folder above this size, over all runs
+    #[arg(long, value_name = "MIB", default_value_t = 4096, value_parser = value_parser!(u64).range(2..=16_777_216))]
+    record_total_mib: u64,
 }
 
 impl RunArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let Self { machine, report, histogram, faults } = self;
+        let Self { machine, report, histogram, record, faults, record_file_mib, record_total_mib } = self;
+        let bounds = Bounds { file: record_file_mib << 20, total: record_total_mib << 20 };
+        let folders = Folders { record, faults, bounds };
         let (config, stop) = (machine.load()?, Stop::on_signals()?);
-        daemon::run(&config, &daemon::Files { report, histogram, faults }, &stop)?;
+        daemon::run(&config, &daemon::Files { report, histogram, folders }, &stop)?;
         Ok(())
     }
 }

@@ -43,6 +43,8 @@ pub struct Config {
     pub machine: Machine,
     /// Settings with which the machine is run.
     pub deployment: Deployment,
+    /// The file as it was read, for recordings.
+    pub text: String,
 }
 
 /// Error of loading a configuration.
@@ -87,8 +89,8 @@ impl Config {
     }
 
     /// Validates a text; error texts name it `place`.
-    pub fn parse(text: &str, place: &str) -> Result<Self, ConfigError> {
-        let (text, syntax_errors) = syntax::without_broken_lines(text);
+    pub fn parse(original: &str, place: &str) -> Result<Self, ConfigError> {
+        let (text, syntax_errors) = syntax::without_broken_lines(original);
         let (table, _) = DeTable::parse_recoverable(&text);
         let log = ViolationLog::new(&text, syntax_errors);
         let mut root = SectionReader::root(&log, table.get_ref());
@@ -97,7 +99,9 @@ impl Config {
         let deployment = deployment::read(&mut root, &machine);
         root.finish();
         match log.into_violations() {
-            violations if violations.is_empty() => Ok(Self { name, machine, deployment }),
+            violations if violations.is_empty() => {
+                Ok(Self { name, machine, deployment, text: original.into() })
+            }
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }
     }

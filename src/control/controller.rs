@@ -27,6 +27,7 @@ use crate::model::task::TaskState;
 
 /// Meaning of the numbers of a setpoint, as the messages carry it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u32)]
 pub enum SetpointKind {
     /// X, X' and X'' of a motion at one instant.
@@ -47,6 +48,7 @@ impl SetpointKind {
 
 /// Task coordinates, with their derivatives, that the platform shall have at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Setpoint {
     /// Which of the numbers hold, and for how long.
     pub kind: SetpointKind,
@@ -65,6 +67,7 @@ impl Setpoint {
 
 /// Lengths \[m\] and rates \[m/s\] of the legs at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Measurement {
     /// Instant of the measurement, on the clock of the releases \[ns\].
     pub time_ns: u64,
@@ -146,10 +149,17 @@ pub(super) struct Cycle<'a> {
     pub state: State,
 }
 
-/// Controller of one machine: the constants and the memory of each stage.
+/// Controller of one machine: its constants, and the memory of each stage.
 #[derive(Clone, Debug)]
 pub struct Controller {
     constants: Constants,
+    memory: Memory,
+}
+
+/// All of a controller that changes from cycle to cycle: whoever has it and the inputs can repeat what follows.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct Memory {
     stamp_clock: StampClock,
     drives: DriveMonitor,
     external_pose: ExternalPose,
@@ -169,10 +179,9 @@ impl Controller {
     /// Waits at the home pose for a first measurement.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
         let constants = Constants::new(machine, parameters);
-        Self {
+        let memory = Memory {
             localization: Localization::new(&constants),
             reference: ReferenceGenerator::new(&constants),
-            constants,
             stamp_clock: StampClock::default(),
             drives: DriveMonitor::default(),
             external_pose: ExternalPose::default(),
@@ -184,23 +193,26 @@ impl Controller {
             leg_rates: LegRateEstimator::default(),
             feedback: FeedbackBound::default(),
             limiter: ForceLimiter::default(),
-        }
+        };
+        Self { constants, memory }
+    }
+
+    /// What it remembers after the last cycle.
+    pub fn memory(&self) -> &Memory {
+        &self.memory
+    }
+
+    /// Goes on from a memory, which a controller of the same machine and parameters had.
+    pub fn set_memory(&mut self, memory: Memory) {
+        self.memory = memory;
     }
 
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
-        let Self { constants, measurements, setpoints, localization, supervisor, reference, .. } = self;
-        let Self {
-            stamp_clock,
-            drives,
-            external_pose,
-            free_motion,
-            errors,
-            leg_rates,
-            feedback,
-            limiter,
-            ..
-        } = self;
+        let Self { constants, memory } = self;
+        let Memory { measurements, setpoints, localization, supervisor, reference, .. } = memory;
+        let Memory { stamp_clock, drives, external_pose, free_motion, errors, leg_rates, .. } = memory;
+        let Memory { feedback, limiter, .. } = memory;
         let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
         let parameters = &constants.parameters;
 

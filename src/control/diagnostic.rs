@@ -90,6 +90,7 @@ macro_rules! codes {
         $(#[doc = concat!("| ", $number, " | ", $name, " | ", reaction!($reaction), " | ", $remedy, " |")])*
         #[allow(rustdoc::broken_intra_doc_links, reason = "remedies name sections of the configuration: [limits]")]
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
         #[repr(u32)]
         pub enum DiagnosticCode { $($(#[$doc])* $variant = $number,)* }
 
@@ -238,6 +239,7 @@ impl DiagnosticCode {
 
 /// Result of a check: what happened, the number that was found and its bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Diagnostic {
     /// Event that the check found, with its reaction and remedy.
     pub code: DiagnosticCode,

@@ -25,6 +25,7 @@ const MAX_MISSING_S: f64 = 0.05;
 
 /// Drives as a driver reports them. The sets have a bit for each leg, the lowest for leg 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriveStatus {
     /// Drives that are enabled; `None` if it is not reported.
     pub enabled: Option<u32>,
@@ -50,6 +51,7 @@ impl DriveStatus {
 
 /// Supervision of the drives.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct DriveMonitor {
     /// Force of the cycle before \[N\].
     sent: [f64; LEGS],

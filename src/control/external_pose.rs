@@ -18,6 +18,7 @@ const TIME_CONSTANT_S: f64 = 0.03;
 
 /// Differences between measured lengths and those of the other pose.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ExternalPose {
     difference: [f64; LEGS],
     time_ns: u64,

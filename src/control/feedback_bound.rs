@@ -27,6 +27,7 @@ const FORGETTING_RATIO: f64 = 0.03;
 
 /// Bound of the feedback, and for how long it was reached lately.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct FeedbackBound {
     saturated_s: f64,
 }

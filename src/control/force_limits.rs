@@ -23,6 +23,7 @@ pub(super) struct LimitedForces {
 
 /// Last stage of the cycle: limits magnitude and rate of the forces.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ForceLimiter {
     /// Of the last cycle under control.
     last: [f64; LEGS],

@@ -23,6 +23,7 @@ const STANDING_RATIO: f64 = 1e-3;
 
 /// What a measurement without force has shown.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Sample {
     time_ns: u64,
     pose: Pose,
@@ -41,6 +42,7 @@ impl Sample {
 
 /// The last measurements without force.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct FreeMotion {
     /// The instant until which the last force was held \[ns\].
     held_until_ns: u64,

@@ -78,6 +78,7 @@ impl Limit {
 
 /// Set of limits that a cycle has reached, or nearly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct LimitSet(pub u32);
 
 /// Part of a bound from which on its limit is in the set: the operator is warned before the bound is exceeded.

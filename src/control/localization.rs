@@ -48,6 +48,7 @@ pub(super) struct Located<'a> {
 
 /// Rate at which the determinant approaches zero, from one measurement to the next.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct SingularityApproach {
     /// Of the last measurement.
     time_ns: u64,
@@ -57,6 +58,7 @@ struct SingularityApproach {
 
 /// Second stage of the cycle: follows the pose of the platform.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Localization {
     tracker: Tracker,
     /// Whether the pose was followed from home on without a gap.

@@ -93,6 +93,7 @@ pub enum ViolationPolicy {
 
 /// Range of the setpoint: lowest and highest X.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Envelope {
     /// Lowest value of each coordinate of X \[rad\], \[m\].
     pub lowest: [f64; 6],

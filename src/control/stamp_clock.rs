@@ -12,6 +12,7 @@ const MAX_DRIFT: f64 = 0.01;
 
 /// Offset between the clocks.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StampClock {
     /// Clock of the stamps less that of the daemon, as it was followed \[ns\].
     offset_ns: i64,

@@ -19,6 +19,7 @@
 
 /// State of the controller, which decides whether forces are valid and which reference the platform follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u32)]
 pub enum State {
     /// No force: the pose is unknown, or an operator requested it.

@@ -12,6 +12,7 @@ use super::state::{OperatorRequest, Request, State};
 
 /// Goal of a stop: the state that follows once the platform is at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub enum AfterStop {
     /// Forces are disabled; brakes close.
     #[default]
@@ -24,6 +25,7 @@ pub enum AfterStop {
 
 /// State of the controller, with its reason and the goal of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct SupervisorState {
     /// State of the controller; it decides whether forces are applied.
     pub state: State,
@@ -50,6 +52,7 @@ pub struct Findings {
 
 /// Third stage of the cycle: the state, and the answer to the last request.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Supervisor {
     pub mode: SupervisorState,
     /// Message of the last request carried out or refused.

@@ -21,6 +21,7 @@ use crate::model::rigid::{Motion, Pose, Twist};
 
 /// Tracking error of pose and twist, desired minus measured, base axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct TrackingError {
     /// `[e_R; e_p]` \[rad\], \[m\].
     pub pose: Twist,
@@ -59,6 +60,7 @@ impl TrackingError {
 
 /// Error that feedback acts on, desired minus measured: of the pose, or in modes on legs of their lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct FeedbackError {
     /// Desired minus measured: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,
@@ -102,6 +104,7 @@ pub(super) fn setpoint_error(
 
 /// Error of the platform against the reference, under control.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ErrorTracker {
     estimator: Estimator,
     sensors: FrozenSensors,

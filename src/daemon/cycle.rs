@@ -2,6 +2,7 @@
 
 use crate::control::controller::{Input, Output};
 use crate::control::state::{OperatorRequest, Request, State};
+use crate::messages::CycleMessage;
 use crate::realtime::cyclic::{self, CyclicInput};
 use crate::realtime::exchange;
 use crate::realtime::request_word;
@@ -80,6 +81,13 @@ pub fn of_word(word: u64, now_ns: u64) -> Option<OperatorRequest> {
     let is_too_old = now_ns.saturating_sub(request_word::time_ns(word)) > MAX_REQUEST_AGE_NS;
     let is_lost = request.can_begin_control() && is_too_old;
     (!is_lost).then_some(OperatorRequest { request, message: (WORD_EPOCH, word) })
+}
+
+/// A cycle as a recording holds it.
+pub fn message(record: &CycleRecord) -> CycleMessage {
+    let CycleRecord { cycle, due_ns, wakeup_ns, compute_ns, io_late, ref input, ref output } = *record;
+    let io_late = u32::from(io_late);
+    CycleMessage { cycle, due_ns, wakeup_ns, compute_ns, io_late, ..CycleMessage::new(input, output) }
 }
 
 /// Age of the measurement at the release \[ns\], if there is one.

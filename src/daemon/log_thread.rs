@@ -1,16 +1,17 @@
-//! The log thread: turns the records of the other two threads into statistics, log lines and fault dumps.
+//! The log thread: turns the records of the other two threads into statistics, log lines, and hands each cycle to
+//! the recorder.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::sync::OnceLock;
+use std::sync::mpsc::SyncSender;
 use std::thread;
 use std::time::Instant;
 
 use heapless::spsc::Consumer;
 use tracing::{info, warn};
 
-use super::cycle::{CycleRecord, tracking_error};
-use super::fault_dump::FaultDump;
+use super::cycle::{CycleRecord, message, tracking_error};
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::process_names::sentence;
@@ -19,7 +20,7 @@ use super::statistics::Collector;
 use crate::control::controller::{Input, Output, Publishers};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
-use crate::messages::Statistics;
+use crate::messages::{CycleMessage, Statistics};
 use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
@@ -41,7 +42,8 @@ pub struct LogLinks<'a> {
     pub statistics: Writer<Statistics>,
     /// Of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
-    pub dump: FaultDump,
+    /// To the recorder, if there is one. When it is full, cycles are lost.
+    pub recorder: Option<SyncSender<CycleMessage>>,
     pub first_pose: FirstPose,
 }
 
@@ -68,9 +70,7 @@ pub fn run(mut links: LogLinks<'_>, stop: &AtomicBool) -> LogReport {
             window_began = Instant::now();
             links.statistics.write(log.collector.end_window());
         }
-        links.dump.step();
         if stopping {
-            links.dump.finish();
             let usage = ThreadUsage::of_this_thread().since(&at_start);
             let (statistics, counts_csv) = (log.collector.statistics(), log.collector.counts_csv());
             return LogReport { statistics, counts_csv, usage, ..log.report };
@@ -95,7 +95,9 @@ impl Log {
     fn empty_queues(&mut self, links: &mut LogLinks<'_>) {
         while let Some(record) = links.records.dequeue() {
             self.collector.add(&record);
-            links.dump.add(&record);
+            if let Some(recorder) = &links.recorder {
+                let _ = recorder.try_send(message(&record));
+            }
             links.first_pose.add(&record);
             if let Some((position, orientation)) = tracking_error(&record) {
                 self.report.tracking.add(position, orientation);

@@ -2,7 +2,7 @@
 //!
 //! Start: configuration, ports, threads, real-time set-up; only then the first release. Stop, in this order: the platform
 //! comes to rest, the real-time thread ends its cycle and writes an output without valid forces, the I/O thread publishes
-//! it, the log thread empties its queues, the report is written.
+//! it, the log thread empties its queues, the recorder completes its files, the report is written.
 
 use std::io;
 use std::path::PathBuf;
@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use tracing::info;
 
 use self::control_socket::location::{self, SocketError};
+use self::recorder::Folders;
 use self::report::Report;
 use crate::config::Config;
 use crate::control::state::Request;
@@ -22,13 +23,14 @@ use crate::realtime::stop_request::Stop;
 
 pub mod control_socket;
 pub mod cycle;
-mod fault_dump;
 mod first_pose;
 mod hints;
 mod io_thread;
 mod log_thread;
 mod parameters;
 pub mod process_names;
+pub mod recorder;
+pub mod replay;
 pub mod report;
 mod snapshot;
 pub mod start;
@@ -74,8 +76,8 @@ pub struct Files {
     pub report: Option<PathBuf>,
     /// How often each time occurred, as CSV, at the end.
     pub histogram: Option<PathBuf>,
-    /// Folder for the cycles around each fault.
-    pub faults: Option<PathBuf>,
+    /// Recordings.
+    pub folders: Folders,
 }
 
 /// Request that a signal to the daemon posts.
@@ -97,7 +99,7 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
     let socket = location::open(&config.name, &config.deployment.operator)?;
     info!("control socket: {}", socket.path.display());
     claim.record(&socket.path)?;
-    let (report, counts_csv) = threads::run(config, files.faults.as_deref(), socket, word, stop)?;
+    let (report, counts_csv) = threads::run(config, &files.folders, socket, word, stop)?;
     if let Some(path) = &files.report {
         report.write(path)?;
     }

@@ -7,6 +7,7 @@ use tracing::warn;
 
 use super::io_thread::IoReport;
 use super::log_thread::LogReport;
+use super::recorder::RecorderReport;
 use crate::config::Config;
 use crate::messages::{Statistics, Times, WorstCycle};
 use crate::output::files::{FileError, write_whole};
@@ -41,6 +42,9 @@ pub struct Report {
     pub io_thread: ThreadUsage,
     /// It allocates only to log a change of state.
     pub log_thread: ThreadUsage,
+    /// The recording, if there was one.
+    #[serde(default)]
+    pub recording: Option<RecorderReport>,
     /// The first faults of the run, in the order of their cycles.
     pub faults: Vec<Fault>,
 }
@@ -106,6 +110,7 @@ impl Report {
             rt_thread: cyclic.usage,
             io_thread: io.usage,
             log_thread: log.usage,
+            recording: None,
             faults: log.faults,
         }
     }

@@ -1,9 +1,8 @@
-//! The four threads of the daemon: start, supervision, end.
+//! The five threads of the daemon: start, supervision, end.
 
 use core::mem;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::io;
-use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, OnceLock};
 use std::thread::{self, Builder, Scope, ScopedJoinHandle, scope};
@@ -16,12 +15,12 @@ use tracing::{info, warn};
 use super::control_socket::location::ControlSocket;
 use super::control_socket::{self, ControlLinks};
 use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
-use super::fault_dump::FaultDump;
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports, Silence};
 use super::log_thread::{self, LogLinks, LogReport};
 use super::parameters::{nanoseconds, parameters, timing};
+use super::recorder::{Folders, Recorder, RecorderReport};
 use super::report::Report;
 use super::snapshot::Snapshot;
 use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
@@ -31,6 +30,7 @@ use crate::config::{Config, fidelity};
 use crate::control::controller::{Controller, Input, Output};
 use crate::control::diagnostic::DiagnosticCode;
 use crate::messages::Statistics;
+use crate::model::fidelity::Fidelity;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, LoopReport, RECORDS};
 use crate::realtime::event::Event;
@@ -65,12 +65,14 @@ struct Flags {
 /// Runs the threads until `stop`; the report, and the histograms as CSV.
 pub(super) fn run(
     config: &Config,
-    faults: Option<&Path>,
+    folders: &Folders,
     socket: ControlSocket,
     word: &'static RequestWord,
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
-    let controller = controller(config);
+    let fidelity = fidelity::fidelity(config);
+    let controller = controller(config, fidelity);
+    let (recorder, recorder_queue) = Recorder::new(config, fidelity, &controller, folders).unzip();
     let (realtime_side, io_side) = exchange();
     let event = io_side.event.clone();
     let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
@@ -88,7 +90,7 @@ pub(super) fn run(
         delays,
         statistics: statistics_writer,
         files,
-        dump: FaultDump::new(faults, config.machine.home),
+        recorder: recorder_queue,
         first_pose: FirstPose::of(&config.machine),
     };
     let realtime_links = RealtimeLinks {
@@ -114,6 +116,8 @@ pub(super) fn run(
         let _stop_all = StopOnDrop(flags);
         let run_control = || control_socket::run(config, control_links, &flags.stop_control);
         let control = spawn(threads, "hexad-control", run_control)?;
+        let recorder =
+            recorder.map(|recorder| spawn(threads, "hexad-recorder", || recorder.run())).transpose()?;
         let log = spawn(threads, "hexad-log", || log_thread::run(log_links, &flags.stop_log))?;
         let cyclic = spawn(threads, REALTIME_THREAD, || {
             run_realtime(config, controller, realtime_links, &flags.stop_loop)
@@ -127,25 +131,31 @@ pub(super) fn run(
         drop(go);
         let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
+        let recorded = recorder.map(|recorder| recorder.join().map_err(|_| DaemonError::Died("recorder")));
         let (cyclic, io, log) = reports?;
-        Ok(report(config, &cyclic, &io, log))
+        Ok(report(config, &cyclic, &io, log, recorded.transpose()?))
     })
 }
 
 /// The report of a run, and the histograms as CSV.
-fn report(config: &Config, cyclic: &LoopReport, io: &IoReport, mut log: LogReport) -> (Report, String) {
+fn report(
+    config: &Config,
+    cyclic: &LoopReport,
+    io: &IoReport,
+    mut log: LogReport,
+    recording: Option<RecorderReport>,
+) -> (Report, String) {
     let counts_csv = mem::take(&mut log.counts_csv);
-    (Report::new(config, cyclic, io, log), counts_csv)
+    (Report { recording, ..Report::new(config, cyclic, io, log) }, counts_csv)
 }
 
 /// Controller of a configuration. Logs which of its loops are close to unstable.
-fn controller(config: &Config) -> Controller {
+fn controller(config: &Config, fidelity: Fidelity) -> Controller {
     let of_loops = loops(&config.deployment);
     let warnings = of_loops.iter().filter_map(ControlLoop::warning);
     for warning in warnings.chain(timeout_warning(&config.deployment)) {
         warn!("{warning}");
     }
-    let fidelity = fidelity::fidelity(config);
     Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
 }
 

@@ -1,7 +1,8 @@
 //! The one list of the fields of each message: `message!` declares a struct and describes it.
 //!
 //! From the description follow the declarations in other languages (`hexad messages`), the columns of CSV files, the
-//! checksum and the tests of the layout. A field is declared in no other place.
+//! checksum, the schemas of recordings and the tests of the layout. A field is declared in no other place.
+#![allow(unsafe_code, reason = "a struct as its bytes; each block carries its argument")]
 
 /// Memory layout of a struct in the shared memory.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +72,7 @@ pub trait FieldType {
 }
 
 /// A struct declared by `message!`.
-pub trait Declared: FieldType {
+pub trait Declared: FieldType + Copy {
     /// Description of the struct in memory; declarations in other languages follow from it.
     const LAYOUT: Layout;
 
@@ -80,6 +81,20 @@ pub trait Declared: FieldType {
         let mut numbers = Vec::new();
         self.visit(&mut |number, _| numbers.push(number));
         numbers
+    }
+
+    /// The struct as it is in memory, which for numbers without gaps is also its CDR encoding.
+    fn bytes(&self) -> &[u8] {
+        // SAFETY: `message!` accepts only structs of plain numbers without gaps, so every byte is initialized; the slice
+        // has the size of the struct and borrows it.
+        unsafe { core::slice::from_raw_parts(core::ptr::from_ref(self).cast(), size_of::<Self>()) }
+    }
+
+    /// Reads what [`Self::bytes`] returned; `None` if the size differs.
+    fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let is_whole = bytes.len() == size_of::<Self>();
+        // SAFETY: there are as many bytes as the struct has, at any alignment, and each pattern of bits is a number.
+        is_whole.then(|| unsafe { bytes.as_ptr().cast::<Self>().read_unaligned() })
     }
 
     /// CRC-32 (of zlib, PNG, Ethernet) of the bytes before an offset.

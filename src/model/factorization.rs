@@ -64,6 +64,7 @@ pub(super) struct Factorization<'a, S: Simd> {
 
 /// A [`Factorization`] in memory, the halves of both triples in one lane.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StoredFactorization {
     /// m of A, c.
     moment_adjugate: [LegLanes; 3],

@@ -24,6 +24,7 @@ use super::triples::LegLanes;
 /// assert!(home.sensitivity().condition < 100.0, "legs hold the platform in every direction");
 /// ```
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct KinematicState {
     pub(super) pose: Pose,
     pub(super) legs: StoredLegs,
@@ -33,6 +34,7 @@ pub struct KinematicState {
 
 /// Geometry of the legs in memory.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StoredLegs {
     arm: [LegLanes; 3],
     direction: [LegLanes; 3],

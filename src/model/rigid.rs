@@ -16,6 +16,7 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 /// assert!((back.vector() - step.vector()).amax() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Pose {
     /// R, platform axes expressed in base axes.
     pub rotation: Matrix3<f64>,
@@ -33,6 +34,7 @@ pub struct Pose {
 /// assert_eq!(wrench.vector().dot(&twist.vector()), 1.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Twist {
     /// omega, base axes \[rad/s\].
     pub angular: Vector3<f64>,
@@ -42,6 +44,7 @@ pub struct Twist {
 
 /// Acceleration of the platform: the time derivative of its twist, part by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Acceleration {
     /// omega', base axes \[rad/s^2\].
     pub angular: Vector3<f64>,
@@ -51,6 +54,7 @@ pub struct Acceleration {
 
 /// Wrench on the platform: torque about C, and force.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Wrench {
     /// Torque about C, base axes \[N m\].
     pub torque: Vector3<f64>,
@@ -60,6 +64,7 @@ pub struct Wrench {
 
 /// Motion of the platform at one instant: pose, twist and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Motion {
     /// R and C.
     pub pose: Pose,

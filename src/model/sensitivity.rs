@@ -21,6 +21,7 @@ use super::machine::{Joints, LEGS};
 
 /// Sensitivity of a pose to errors of leg lengths, torques and angles measured at the radius. All without units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sensitivity {
     /// Frobenius condition of N: never below the 2-norm condition and at most six times it, at a singular pose
     /// not finite.

@@ -22,6 +22,7 @@ use super::rigid::{Acceleration, Motion, Pose, Twist};
 /// assert!((omega - nalgebra::Vector3::new(2.0 * 0.5_f64.sin(), 0.0, 2.0 * 0.5_f64.cos())).norm() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct TaskState {
     /// X
     pub x: Vector6<f64>,

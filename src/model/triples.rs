@@ -15,6 +15,7 @@ use super::machine::LEGS;
 
 /// One number per leg in memory, in the order of the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 #[repr(align(64))]
 pub struct LegLanes(pub [f64; 8]);
 

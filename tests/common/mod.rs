@@ -18,6 +18,7 @@ pub mod limit_check;
 pub mod not_run;
 pub mod observed;
 pub mod paper;
+pub mod python;
 pub mod rig;
 pub mod stability;
 pub mod stalls;

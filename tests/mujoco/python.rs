@@ -2,12 +2,13 @@
 //!
 //! Where it cannot be had, the tests are not run and say why.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
 use super::common::not_run::lacking;
+use super::common::python::{self, output};
 
 /// The engine. Pinned: what it makes of a model may change.
 const MUJOCO: &str = "mujoco==4.0.0";
@@ -41,7 +42,7 @@ fn clients() -> PathBuf {
 }
 
 fn python() -> Command {
-    let mut command = Command::new(environment().as_ref().unwrap().join("bin/python"));
+    let mut command = Command::new(environment().unwrap().join("bin/python"));
     // No __pycache__ between the sources.
     command.arg("-B").env("PYTHONPATH", declarations());
     command
@@ -69,42 +70,10 @@ pub fn declared(language: &str) -> String {
 
 /// Whether there is no such Python here; the calling test is then not run.
 pub fn is_lacking() -> bool {
-    environment().as_ref().inspect_err(|why| lacking(why)).is_err()
+    environment().inspect_err(|why| lacking(why)).is_err()
 }
 
-/// The virtual environment, set up by whoever comes first, or why there is none.
-fn environment() -> &'static Result<PathBuf, String> {
-    static READY: OnceLock<Result<PathBuf, String>> = OnceLock::new();
-    READY.get_or_init(|| {
-        let packages = [MUJOCO.to_owned(), iceoryx2()];
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(packages.join("-").replace("==", "-"));
-        // Another process may be at it. (Versions have dots: no `with_extension` here.)
-        let beside = |end: &str| PathBuf::from(format!("{}.{end}", folder.display()));
-        let lock = File::create(beside("lock")).unwrap();
-        lock.lock().unwrap();
-        let complete = folder.join("complete");
-        if !complete.exists() {
-            set_up(&folder, &packages).map_err(|why| {
-                format!("a Python with {packages:?}; apt-get install python3-venv, and PyPI, once\n{why}")
-            })?;
-            fs::write(complete, "").unwrap();
-        }
-        Ok(folder)
-    })
-}
-
-fn set_up(folder: &Path, packages: &[String]) -> Result<(), String> {
-    output(Command::new("python3").args(["-m", "venv", "--clear"]).arg(folder))?;
-    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-    output(Command::new(folder.join("bin/python")).args(pip).args(packages)).map(drop)
-}
-
-fn output(command: &mut Command) -> Result<String, String> {
-    match command.output() {
-        Ok(ended) if ended.status.success() => Ok(String::from_utf8_lossy(&ended.stdout).into()),
-        Ok(ended) => {
-            Err(format!("{command:?}: {}\n{}", ended.status, String::from_utf8_lossy(&ended.stderr)))
-        }
-        Err(error) => Err(format!("{command:?}: {error}")),
-    }
+/// The virtual environment with both, or why there is none.
+fn environment() -> Result<PathBuf, String> {
+    python::environment(&[MUJOCO.to_owned(), iceoryx2()])
 }

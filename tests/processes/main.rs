@@ -40,6 +40,7 @@ mod overruns;
 mod paused;
 mod players;
 mod readme;
+mod recordings;
 mod refusals;
 mod released;
 mod requests;

@@ -132,7 +132,7 @@ pub struct WorkspaceMap {
 impl WorkspaceMap {
     /// Evaluates the slices, searches the regions, writes the files.
     pub fn new(config: &Config, query: &WorkspaceQuery) -> Result<Self, WorkspaceError> {
-        let Config { name, machine, deployment } = config;
+        let Config { name, machine, deployment, .. } = config;
         let largest_condition = deployment.limits.condition;
         let clearance = Clearance::new(machine, largest_condition);
         let through = query.through.unwrap_or(machine.home);

@@ -28,6 +28,7 @@ pub struct NoiseModel {
 
 /// Covariance matrix of one axis, its upper triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Covariance {
     ee: f64,
     ew: f64,

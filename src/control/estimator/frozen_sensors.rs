@@ -31,6 +31,7 @@ impl Readings {
 
 /// Readings that did not change, and where the reference was at the first of them.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrozenSensors {
     last: [f64; LEGS],
     equal_readings: [u32; LEGS],

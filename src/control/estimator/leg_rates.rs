@@ -13,6 +13,7 @@ const MAX_GAP_S: f64 = 0.1;
 
 /// Estimator of the rates of the legs. It takes the acceleration of a leg for constant.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct LegRateEstimator {
     filter: Option<Filter>,
 }

@@ -38,6 +38,7 @@ use super::tracking_error::FeedbackError;
 
 /// Estimate of one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct ErrorState {
     /// e, desired minus true: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,
@@ -76,6 +77,7 @@ impl ErrorState {
 
 /// Filter of six axes: the estimate at the instant of the last measurement, and how certain it is.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Filter {
     state: ErrorState,
     time_ns: u64,
@@ -113,6 +115,7 @@ impl Filter {
 
 /// Estimator of the error under control.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimator {
     filter: Filter,
     sent: SentAccelerations,

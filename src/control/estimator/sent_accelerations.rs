@@ -10,6 +10,7 @@ pub const CAPACITY: usize = 256;
 
 /// An acceleration and the instant from which on it acts.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct SentAcceleration {
     begin_ns: u64,
     acceleration: Vector6<f64>,
@@ -17,7 +18,9 @@ struct SentAcceleration {
 
 /// Ring of the last accelerations.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct SentAccelerations {
+    #[cfg_attr(feature = "daemon", serde(with = "serde_big_array::BigArray"))]
     ring: [SentAcceleration; CAPACITY],
     /// Number ever recorded; the last has the index of this less one.
     count: usize,

@@ -41,6 +41,7 @@ const MIN_LEAD_NS: u64 = 10_000;
 
 /// Difference between each leg's change of length and the integral of its rate, with the travel. Both decay.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct RateConsistency {
     residual: [f64; LEGS],
     travel: [f64; LEGS],
@@ -87,6 +88,7 @@ impl RateConsistency {
 
 /// First stage of the cycle: validates each new measurement and keeps the last valid one.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct MeasurementValidator {
     last: LastValid<Measurement, Measurement>,
     consistency: RateConsistency,

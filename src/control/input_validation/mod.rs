@@ -24,6 +24,7 @@ const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
 
 /// The last valid input, and why the one after it was rejected. `Valid` is what a valid input stands for.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct LastValid<Input, Valid> {
     pub valid: Option<Valid>,
     /// The last input, valid or not: each is validated once.

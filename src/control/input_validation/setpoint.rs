@@ -42,6 +42,7 @@ pub(in crate::control) struct ValidatedSetpoint<'a> {
 
 /// First stage of the cycle: validates each new setpoint and keeps the last valid one.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct SetpointValidator {
     last: LastValid<Setpoint, SetpointMotion>,
     samples: PoseSamples,

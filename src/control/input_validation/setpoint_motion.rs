@@ -16,6 +16,7 @@ const JERK_INTERVALS: f64 = 3.0;
 
 /// A setpoint with the motion of the platform it describes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct SetpointMotion {
     /// The setpoint as received: time stamp and X, X', X''.
     pub setpoint: Setpoint,

@@ -8,6 +8,7 @@ const STEPS: u32 = 20;
 
 /// Components that approach the target; after so many accepted steps.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum Components {
     #[default]
     Both,

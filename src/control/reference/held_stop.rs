@@ -7,6 +7,7 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 
 /// Where the stop begins.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum Phase {
     /// The platform does not move.
     #[default]
@@ -19,6 +20,7 @@ pub(super) enum Phase {
 
 /// The stop that may be followed from the present motion on.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct HeldStop {
     pub(super) phase: Phase,
     /// While it is followed.

@@ -9,6 +9,7 @@ const SEGMENT_COUNT: usize = 128;
 
 /// Motion of the reference from one instant to the next, with constant jerk.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Segment {
     begin_ns: u64,
     motion: Motion,
@@ -17,7 +18,9 @@ struct Segment {
 
 /// Ring of the last segments.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct History {
+    #[cfg_attr(feature = "daemon", serde(with = "serde_big_array::BigArray"))]
     segments: [Option<Segment>; SEGMENT_COUNT],
     /// Number of segments ever recorded; the last has the index of this less one.
     count: usize,

@@ -71,6 +71,7 @@ const MAX_STEPS: f64 = 32.0;
 
 /// Reference generator.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReferenceGenerator {
     /// At `time_ns`, the end of the last cycle's period.
     motion: Motion,

@@ -16,6 +16,7 @@ const ROUNDING: f64 = 1e-9;
 /// Bounds of the legs and of X. A platform that is beyond the nominal bounds when control begins may come back: its
 /// bounds are relaxed to where it is, and follow it until they are the nominal ones.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct PoseBounds {
     /// \[m\]
     pub shortest: [f64; LEGS],

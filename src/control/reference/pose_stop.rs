@@ -11,6 +11,7 @@ use crate::model::rigid::{Motion, Pose, Twist};
 
 /// Stop that was verified.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) enum StopKind {
     /// See [`super::stop`].
     #[default]
@@ -21,6 +22,7 @@ pub(super) enum StopKind {
 
 /// Stop of orientation and position.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct PoseStop {
     pub orientation: Stop,
     pub position: Stop,
@@ -28,6 +30,7 @@ pub(super) struct PoseStop {
 
 /// Motion parameters of a stop at one instant, relative to its start.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct PoseStopState {
     pub orientation: StopState,
     pub position: StopState,

@@ -70,6 +70,7 @@ impl Regularity {
 
 /// Centre of a ball.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Ball {
     center: Pose,
     /// F, B, and the length of the shortest leg \[m\].
@@ -118,6 +119,7 @@ impl Ball {
 
 /// The balls found last.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct RegularBalls {
     balls: [Option<Ball>; BALL_COUNT],
 }

@@ -82,6 +82,7 @@ fn straight_extent(v: f64, DerivativeLimits { acceleration, jerk, .. }: &Derivat
 
 /// Displacement, velocity and acceleration at one instant of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StopState {
     pub displacement: Vector3<f64>,
     pub velocity: Vector3<f64>,
@@ -102,6 +103,7 @@ impl StopState {
 
 /// Piece of a stop with constant jerk.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Piece {
     begin: f64,
     state: StopState,
@@ -110,6 +112,7 @@ struct Piece {
 
 /// A stop as pieces of constant jerk.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Stop {
     pieces: [Piece; MAX_PIECES],
     count: usize,

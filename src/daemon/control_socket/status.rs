@@ -159,7 +159,7 @@ impl<'a> StatusSource<'a> {
     }
 
     fn report(&mut self, snapshot: &Snapshot, now_ns: u64) -> StatusReport {
-        let Config { name, machine, deployment } = self.config;
+        let Config { name, machine, deployment, .. } = self.config;
         let status = &snapshot.status;
         let (is_known, has_error) = (status.pose_valid == 1, status.error_valid == 1);
         let limits = Limit::ALL.into_iter().filter(|it| LimitSet(status.active_limits).contains(*it));

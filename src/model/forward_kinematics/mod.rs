@@ -47,6 +47,7 @@ pub const MAX_CONDITION: f64 = 1e4;
 
 /// Outcome of forward kinematics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
     /// The pose belongs to the lengths, and no other pose in the trusted region does.
     Solved,

@@ -28,6 +28,7 @@ const MAX_TRACKING_STEPS: u32 = 2000;
 /// assert!((tracker.pose.position - pose.position).norm() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tracker {
     /// Pose of the last converged step.
     pub pose: Pose,

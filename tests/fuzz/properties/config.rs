@@ -58,7 +58,7 @@ fn check_violation(violation: &Violation, input: &[u8]) {
 
 /// Every number is finite; the model works at home, at rest and in motion.
 fn check_machine(config: &Config) {
-    let Config { name, machine, deployment } = config;
+    let Config { name, machine, deployment, .. } = config;
     assert!((1..=64).contains(&name.len()), "{name}");
     for (what, debug) in [("machine", format!("{machine:?}")), ("deployment", format!("{deployment:?}"))] {
         assert!(

@@ -34,6 +34,7 @@ const RETURN_INTERVALS: f64 = 4.0;
 
 /// A sample, or the average of samples close to each other.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Sample {
     time_ns: u64,
     /// Stamps of the first and the last of the averaged samples.
@@ -69,6 +70,7 @@ struct Sample {
 /// assert!((target.pose.position.x - 0.5 * (59.0 * 0.020 - 0.040)).abs() < 1e-9);
 /// ```
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseSamples {
     /// A ring; [`Self::newest`] is the place of the newest sample.
     samples: [Option<Sample>; CAPACITY],

@@ -18,6 +18,7 @@ const JITTER_PER_DEVIATION: f64 = 2.25;
 
 /// Estimates of the stream's timing \[s\].
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Timing {
     /// Number of intervals seen, up to the length of the average.
     pub count: f64,
@@ -54,6 +55,7 @@ impl Timing {
 
 /// Delay of the target \[s\]; between two samples it changes at a constant rate.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Delay {
     since_ns: u64,
     value: f64,

@@ -1,0 +1,31 @@
+//! `hexad convert`: a recording in another format.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::failure::Failure;
+use crate::config::Config;
+use crate::output::files::print;
+use crate::recording::reader::Recording;
+use crate::recording::table::write_csv;
+
+#[derive(Debug, Args)]
+pub struct ConvertArguments {
+    /// Recording of `hexad run --record` or `--faults`
+    #[arg(value_name = "FILE")]
+    recording: PathBuf,
+    /// Write a row for each cycle
+    #[arg(long, value_name = "FILE")]
+    csv: PathBuf,
+}
+
+impl ConvertArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let recording = Recording::read(&self.recording)?;
+        let info = recording.summary()?.info;
+        let config = Config::parse(&info.configuration, "configuration of the recording")?;
+        let summary = write_csv(&recording, &config.machine.home, &self.csv)?;
+        Ok(print(format_args!("{}: {} cycles\n", self.csv.display(), summary.cycles))?)
+    }
+}

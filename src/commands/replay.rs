@@ -1,0 +1,175 @@
+//! `hexad replay`: computes the cycles of a recording again, and compares.
+
+use core::fmt::Write as _;
+use core::ops::RangeInclusive;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::failure::{CommandError, Failure};
+use crate::config::Config;
+use crate::daemon::recorder::instruction_set;
+use crate::daemon::replay::{Difference, Replay, other_controller, recorded_controller, replay};
+use crate::output::files::print;
+use crate::recording::Item;
+use crate::recording::copy::copy;
+use crate::recording::reader::{Recording, Summary};
+
+/// Largest difference between two instruction sets, which add the same numbers in another order: that of the reference's
+/// acceleration, a difference of velocities over a cycle; 2e-11 was seen. Forces agree to 1e-11 of the largest.
+const INSTRUCTION_SET_TOLERANCE: f64 = 1e-10;
+
+#[derive(Debug, Args)]
+pub struct ReplayArguments {
+    /// Recording of `hexad run --record` or `--faults`
+    #[arg(value_name = "FILE")]
+    recording: PathBuf,
+    /// Show what would have been different with this configuration
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Copy this part, in seconds from the first cycle, to `--output`; it begins up to a second sooner, where a replay can begin
+    #[arg(long, value_name = "FROM..TO", value_parser = part, requires = "output")]
+    extract: Option<Part>,
+    /// File for the part
+    #[arg(long, short, value_name = "FILE", requires = "extract")]
+    output: Option<PathBuf>,
+}
+
+/// Part of a recording \[s\].
+#[derive(Clone, Debug)]
+struct Part(RangeInclusive<f64>);
+
+fn part(text: &str) -> Result<Part, String> {
+    let (from, to) = text.split_once("..").ok_or("must be two numbers of seconds, as in 12.5..14")?;
+    match (from.trim().parse(), to.trim().parse()) {
+        (Ok(from), Ok(to)) if from <= to => Ok(Part(from..=to)),
+        (Ok(_), Ok(_)) => Err("the end must not be before the beginning".into()),
+        _ => Err("must be two numbers of seconds, as in 12.5..14".into()),
+    }
+}
+
+/// The replay is not the recording.
+#[derive(Debug, thiserror::Error)]
+enum ReplayError {
+    #[error("{0} of the cycles differ: the outputs are not those of the recording")]
+    Different(u64),
+    #[error(
+        "no cycle could be compared: the memory of the controller in the recording is that of hexad {0}; use that version"
+    )]
+    Unknown(String),
+    #[error("no cycle is in {0:?} s; the recording is {1:.3} s long")]
+    NoPart(RangeInclusive<f64>, f64),
+}
+
+impl CommandError for ReplayError {
+    fn has_begun(&self) -> bool {
+        true
+    }
+}
+
+impl ReplayArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let recording = Recording::read(&self.recording)?;
+        if let (Some(Part(part)), Some(output)) = (self.extract, self.output) {
+            let times_ns = times_of(&recording, &part)?;
+            let messages = copy(&recording, &output, times_ns)?;
+            return Ok(print(format_args!("{}: {messages} messages\n", output.display()))?);
+        }
+        let info = recording.summary()?.info;
+        let recorded = Config::parse(&info.configuration, "configuration of the recording")?;
+        let other = self.config.as_deref().map(Config::load).transpose()?;
+        let controller = match &other {
+            Some(config) => other_controller(config),
+            None => recorded_controller(&info, &recorded),
+        };
+        let (summary, replay) = replay(&recording, controller)?;
+        print(description(&recording, &summary, &replay, other.as_ref().unwrap_or(&recorded)))?;
+        if replay.compared == 0 {
+            return Err(ReplayError::Unknown(info.version).into());
+        }
+        let largest = replay.largest().map_or(0.0, Difference::size);
+        let is_tolerated =
+            info.instruction_set != instruction_set(&recorded) && largest <= INSTRUCTION_SET_TOLERANCE;
+        if replay.different > 0 && other.is_none() && !is_tolerated {
+            return Err(ReplayError::Different(replay.different).into());
+        }
+        Ok(())
+    }
+}
+
+/// Range of `log_time` \[ns\] of a part, from where a replay can begin.
+fn times_of(recording: &Recording, part: &RangeInclusive<f64>) -> Result<RangeInclusive<u64>, Failure> {
+    let Summary { first, info, .. } = recording.summary()?;
+    let (mut begin, mut end, mut repeatable, mut length_s) = (None, None, None, 0.0);
+    recording.each(|item| match item {
+        Item::Memory { cycle, .. } => repeatable = Some(cycle),
+        Item::Cycle(cycle) => {
+            length_s = cycle.due_ns.saturating_sub(first.due_ns) as f64 * 1e-9;
+            if length_s <= *part.start() && (repeatable == Some(cycle.cycle) || begin.is_none()) {
+                begin = Some(cycle.due_ns);
+            }
+            if part.contains(&length_s) {
+                end = Some(cycle.due_ns);
+            }
+        }
+        Item::Gap(_) => {}
+    })?;
+    let at = |due_ns: u64| due_ns.wrapping_add(info.clock_offset_ns);
+    match (begin, end) {
+        (Some(begin), Some(end)) => Ok(at(begin)..=at(end)),
+        _ => Err(ReplayError::NoPart(part.clone(), length_s).into()),
+    }
+}
+
+fn description(recording: &Recording, summary: &Summary, replay: &Replay, config: &Config) -> String {
+    let Summary { info, first, cycles, unfinished, .. } = summary;
+    let mut text = format!(
+        "{}: {}, {cycles} cycles from number {}, hexad {} (commit {}), {}, {}\n",
+        recording.path().display(),
+        info.name,
+        first.cycle,
+        info.version,
+        info.commit,
+        info.instruction_set,
+        info.fidelity,
+    );
+    if let Some(why) = unfinished {
+        let _ = writeln!(text, "the file is not complete ({why}); `hexad recover` makes it so");
+    }
+    let instruction_set = instruction_set(config);
+    if info.instruction_set != instruction_set {
+        let _ = writeln!(text, "the instruction set is another one here: {instruction_set}");
+    }
+    if info.version != env!("CARGO_PKG_VERSION") {
+        let _ = writeln!(text, "the version is another one here: {}", env!("CARGO_PKG_VERSION"));
+    }
+    if replay.unknown > 0 {
+        let _ = writeln!(
+            text,
+            "{} cycles cannot be repeated: the memory of the controller is unknown",
+            replay.unknown
+        );
+    }
+    let Replay { compared, different, .. } = replay;
+    match (&replay.first, replay.largest()) {
+        (Some(first), Some(largest)) => {
+            let _ = writeln!(text, "{different} of {compared} cycles differ");
+            for (name, it) in [("first", first), ("largest", largest)] {
+                let _ = writeln!(
+                    text,
+                    "{name}: cycle {} (t = {:.6} s), {}: {:?}, recorded {:?}, difference {:.1e}",
+                    it.cycle,
+                    it.time_s,
+                    it.field,
+                    it.replayed,
+                    it.recorded,
+                    it.size()
+                );
+            }
+        }
+        _ => {
+            let _ = writeln!(text, "{compared} cycles repeated: every output is the same to the bit");
+        }
+    }
+    text
+}

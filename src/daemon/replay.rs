@@ -1,0 +1,162 @@
+//! Computes the cycles of a recording again and compares every output.
+
+use std::collections::BTreeMap;
+
+use crate::config::{Config, fidelity};
+use crate::control::controller::Controller;
+use crate::daemon::parameters;
+use crate::messages::CycleMessage;
+use crate::messages::layout::Declared as _;
+use crate::model::fidelity::Fidelity;
+use crate::realtime::setup::denormals;
+use crate::recording::reader::{Recording, Summary};
+use crate::recording::{Item, RecordingError, RunInfo, memory_from};
+
+/// Field that is a quotient of a rate that may be zero.
+const TIME_TO_SINGULARITY: &str = "time_to_singularity_s";
+
+/// One number of an output that a replay computes differently.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Number of the cycle.
+    pub cycle: u64,
+    /// When it was due, since the first cycle of the recording \[s\].
+    pub time_s: f64,
+    /// Field of the message of the cycle.
+    pub field: String,
+    /// Number in the recording.
+    pub recorded: f64,
+    /// Number of the replay.
+    pub replayed: f64,
+    /// Largest number of the field in the recording: of all six legs, of a matrix.
+    pub scale: f64,
+}
+
+impl Difference {
+    /// Size of the difference, as a ratio of the largest number of the field if that is above 1. A time to a singularity counts by its inverse: of a platform that
+    /// moves along it is what rounding has left, divided into a determinant.
+    pub fn size(&self) -> f64 {
+        let is_time = self.field == TIME_TO_SINGULARITY;
+        let [recorded, replayed] =
+            [self.recorded, self.replayed].map(|number| if is_time { number.recip() } else { number });
+        let difference = (recorded - replayed).abs() / if is_time { 1.0 } else { self.scale.max(1.0) };
+        if difference.is_nan() { f64::INFINITY } else { difference }
+    }
+}
+
+/// Result of a replay.
+#[derive(Clone, Debug, Default)]
+pub struct Replay {
+    /// Cycles computed again.
+    pub compared: u64,
+    /// Cycles for which the memory of the controller is unknown: before the first that is recorded, and behind gaps.
+    pub unknown: u64,
+    /// Cycles of which an output differs.
+    pub different: u64,
+    /// The first difference.
+    pub first: Option<Difference>,
+    /// The largest difference of each field.
+    pub largest: BTreeMap<String, Difference>,
+}
+
+/// Controller as it was recorded.
+pub fn recorded_controller(info: &RunInfo, config: &Config) -> Controller {
+    let recorded = Fidelity::ALL.into_iter().find(|fidelity| fidelity.name() == info.fidelity);
+    let fidelity = recorded.unwrap_or_else(|| fidelity::fidelity(config));
+    Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
+}
+
+/// Controller of another configuration.
+pub fn other_controller(config: &Config) -> Controller {
+    let fidelity = fidelity::fidelity(config);
+    Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
+}
+
+/// Computes the cycles of a recording again with a controller before its first cycle.
+pub fn replay(recording: &Recording, controller: Controller) -> Result<(Summary, Replay), RecordingError> {
+    denormals::flush();
+    let mut replayer = Replayer {
+        controller,
+        next_cycle: Some(1),
+        begin_ns: None,
+        columns: CycleMessage::LAYOUT.columns(""),
+        replay: Replay::default(),
+    };
+    let summary = recording.each(|item| replayer.add(&item))?;
+    Ok((summary, replayer.replay))
+}
+
+struct Replayer {
+    controller: Controller,
+    /// The cycle that the controller can compute; `None` if its memory is unknown.
+    next_cycle: Option<u64>,
+    begin_ns: Option<u64>,
+    columns: Vec<String>,
+    replay: Replay,
+}
+
+impl Replayer {
+    fn add(&mut self, item: &Item) {
+        match item {
+            Item::Cycle(cycle) => self.step(cycle),
+            // A controller that is in step goes on: what it remembers is compared by what it computes.
+            Item::Memory { cycle, bytes } if self.next_cycle != Some(*cycle) => {
+                if let Some(memory) = memory_from(bytes) {
+                    self.controller.set_memory(memory);
+                    self.next_cycle = Some(*cycle);
+                }
+            }
+            Item::Memory { .. } => {}
+            Item::Gap(_) => self.next_cycle = None,
+        }
+    }
+
+    fn step(&mut self, cycle: &CycleMessage) {
+        let begin_ns = *self.begin_ns.get_or_insert(cycle.due_ns);
+        let input = cycle.input().filter(|_| self.next_cycle == Some(cycle.cycle));
+        let Some(input) = input else {
+            self.replay.unknown += 1;
+            return;
+        };
+        self.next_cycle = Some(cycle.cycle + 1);
+        self.replay.compared += 1;
+        let replayed = CycleMessage::new(&input, &self.controller.step(&input)).timed_as(cycle);
+        if replayed.bytes() == cycle.bytes() {
+            return;
+        }
+        self.replay.different += 1;
+        let time_s = cycle.due_ns.saturating_sub(begin_ns) as f64 * 1e-9;
+        let (numbers, cycle) = (cycle.numbers(), cycle.cycle);
+        for ((field, recorded), replayed) in self.columns.iter().zip(&numbers).zip(replayed.numbers()) {
+            if recorded.to_bits() != replayed.to_bits() {
+                let is_of_field = |(other, _): &(&String, &f64)| array(other) == array(field);
+                let of_field = self.columns.iter().zip(&numbers).filter(is_of_field);
+                let scale = of_field.fold(0.0, |scale: f64, (_, number)| scale.max(number.abs()));
+                let (field, recorded) = (field.clone(), *recorded);
+                self.replay.add(Difference { cycle, time_s, field, recorded, replayed, scale });
+            }
+        }
+    }
+}
+
+/// Name of the array to which a column belongs.
+fn array(column: &str) -> &str {
+    let name = column.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    name.strip_suffix('_').unwrap_or(column)
+}
+
+impl Replay {
+    /// The largest difference of all fields.
+    pub fn largest(&self) -> Option<&Difference> {
+        self.largest.values().max_by(|a, b| a.size().total_cmp(&b.size()))
+    }
+
+    fn add(&mut self, difference: Difference) {
+        self.first.get_or_insert_with(|| difference.clone());
+        let largest =
+            self.largest.entry(array(&difference.field).into()).or_insert_with(|| difference.clone());
+        if difference.size() > largest.size() {
+            *largest = difference;
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Reads a recording, also one that a crash left unfinished.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mcap::read::{ChunkFlattener, Options};
+use mcap::records::Record;
+
+use super::cdr;
+use super::{CYCLE, GAP, Item, MEMORY, RecordingError, RunInfo};
+use crate::messages::layout::Declared as _;
+use crate::messages::{CycleMessage, GapMessage};
+use crate::output::files::FileError;
+
+/// The bytes of a recording.
+pub struct Recording {
+    path: PathBuf,
+    bytes: Vec<u8>,
+}
+
+/// What a file says about itself.
+#[derive(Clone, Debug, Default)]
+pub struct Summary {
+    /// What was recorded.
+    pub info: RunInfo,
+    /// The cycle of the fault whose window it is.
+    pub fault: Option<u64>,
+    /// Number of the first cycle.
+    pub first: CycleMessage,
+    /// Number of cycles.
+    pub cycles: u64,
+    /// Why reading ended before the end of the file: a crash or a full disk has left it so.
+    pub unfinished: Option<String>,
+}
+
+impl Recording {
+    /// Reads a file.
+    pub fn read(path: &Path) -> Result<Self, RecordingError> {
+        let bytes = fs::read(path).map_err(FileError::on(path))?;
+        let recording = Self { path: path.to_path_buf(), bytes };
+        if !recording.bytes.starts_with(mcap::MAGIC) {
+            return Err(recording.foreign("it is not an MCAP file"));
+        }
+        Ok(recording)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn foreign(&self, cause: impl ToString) -> RecordingError {
+        RecordingError::Foreign { path: self.path.clone(), cause: cause.to_string() }
+    }
+
+    /// All records as far as the file is complete; why it ended, if it is not finished.
+    pub(super) fn each_record(
+        &self,
+        mut visit: impl FnMut(Record<'_>) -> Result<(), RecordingError>,
+    ) -> Result<Option<String>, RecordingError> {
+        let records = ChunkFlattener::new_with_options(&self.bytes, Options::IgnoreEndMagic.into());
+        for record in records.map_err(|error| self.foreign(error))? {
+            match record {
+                Ok(Record::DataEnd(_)) => return Ok(None),
+                Ok(record) => visit(record)?,
+                Err(error) => return Ok(Some(error.to_string())),
+            }
+        }
+        Ok(Some("the end is missing".into()))
+    }
+
+    /// Calls `visit` with each item, and returns what the file says about itself.
+    pub fn each(&self, mut visit: impl FnMut(Item)) -> Result<Summary, RecordingError> {
+        let mut summary = Summary::default();
+        let mut topics = BTreeMap::new();
+        let mut names = BTreeSet::new();
+        let unfinished = self.each_record(|record| {
+            match record {
+                Record::Channel(channel) => drop(topics.insert(channel.id, channel.topic)),
+                Record::Metadata(found) => {
+                    match found.name.as_str() {
+                        "hexad" => summary.info = RunInfo::from_metadata(&found.metadata),
+                        "fault" => {
+                            summary.fault = found.metadata.get("cycle").and_then(|cycle| cycle.parse().ok());
+                        }
+                        _ => {}
+                    }
+                    names.insert(found.name);
+                }
+                Record::Message { header, data } => {
+                    let Some(topic) = topics.get(&header.channel_id) else { return Ok(()) };
+                    let item = item(topic, &data).map_err(|cause| self.foreign(cause))?;
+                    if let Some(Item::Cycle(cycle)) = &item {
+                        if summary.cycles == 0 {
+                            summary.first = **cycle;
+                        }
+                        summary.cycles += 1;
+                    }
+                    item.into_iter().for_each(&mut visit);
+                }
+                _ => {}
+            }
+            Ok(())
+        })?;
+        if !names.contains("hexad") {
+            return Err(self.foreign("it does not say what was recorded"));
+        }
+        if summary.cycles == 0 {
+            return Err(RecordingError::Empty(self.path.clone()));
+        }
+        Ok(Summary { unfinished, ..summary })
+    }
+
+    /// What the file says about itself.
+    pub fn summary(&self) -> Result<Summary, RecordingError> {
+        self.each(|_| ())
+    }
+}
+
+/// The item of a message; `None` for topics that are only drawn.
+fn item(topic: &str, message: &[u8]) -> Result<Option<Item>, String> {
+    let is_hexad = [CYCLE, MEMORY, GAP].contains(&topic);
+    if !is_hexad {
+        return Ok(None);
+    }
+    let bytes = cdr::content(message).ok_or("its numbers are those of another processor")?;
+    let other_layout = || format!("its messages on {topic} are of another version of hexad");
+    match topic {
+        CYCLE => CycleMessage::from_bytes(bytes).map(|cycle| Item::Cycle(Box::new(cycle))),
+        GAP => GapMessage::from_bytes(bytes).map(Item::Gap),
+        _ => memory(bytes),
+    }
+    .map(Some)
+    .ok_or_else(other_layout)
+}
+
+fn memory(bytes: &[u8]) -> Option<Item> {
+    let (cycle, rest) = bytes.split_first_chunk()?;
+    let (length, content) = rest.split_first_chunk()?;
+    let is_whole = u32::from_ne_bytes(*length) as usize == content.len();
+    is_whole.then(|| Item::Memory { cycle: u64::from_ne_bytes(*cycle), bytes: content.into() })
+}

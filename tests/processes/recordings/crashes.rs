@@ -1,0 +1,148 @@
+//! A daemon that is killed, and disks that are full: what is complete in a file is recovered.
+
+use std::path::Path;
+use std::process::Command;
+use std::thread::sleep;
+use std::time::Duration;
+use std::{env, fs};
+
+use hexad::daemon::report::Report;
+
+use super::{about, arguments, files, read, replays_exactly, start_recording};
+use crate::support::children::{Ended, HANG, Hexad, hexad};
+use crate::support::machine::{Machine, PATIENT};
+use crate::support::random::Random;
+use crate::support::trio::start_plant;
+use crate::support::turns;
+
+/// Kills in a run; `HEXAD_KILLS` for more.
+const KILLS: u32 = 20;
+
+/// Numbers in the records of MCAP.
+const CHUNK: u8 = 6;
+const CHANNEL: u8 = 4;
+const MESSAGE: u8 = 5;
+
+/// The records in bytes, as far as they are complete: number and content.
+fn records(mut bytes: &[u8]) -> Vec<(u8, &[u8])> {
+    let mut found = vec![];
+    while let Some(((kind, length), rest)) = head(bytes) {
+        let Some((content, rest)) = rest.split_at_checked(length) else { break };
+        found.push((kind, content));
+        bytes = rest;
+    }
+    found
+}
+
+fn head(bytes: &[u8]) -> Option<((u8, usize), &[u8])> {
+    let (kind, rest) = bytes.split_first()?;
+    let (length, rest) = rest.split_first_chunk()?;
+    Some(((*kind, u64::from_le_bytes(*length) as usize), rest))
+}
+
+/// Cycles in the complete chunks of a file, counted without the reader under test.
+fn complete_cycles(path: &Path) -> u64 {
+    let bytes = fs::read(path).unwrap();
+    let (mut channel, mut cycles) = (None, 0);
+    for (_, chunk) in records(&bytes[8..]).into_iter().filter(|(kind, _)| *kind == CHUNK) {
+        // Times, size and checksum; an empty name of a compression; a length.
+        for (kind, content) in records(&chunk[8 + 8 + 8 + 4 + 4 + 8..]) {
+            let number = u16::from_le_bytes([content[0], content[1]]);
+            if kind == CHANNEL && content[8..].starts_with(b"/hexad/cycle") {
+                channel = Some(number);
+            }
+            cycles += u64::from(kind == MESSAGE && Some(number) == channel);
+        }
+    }
+    cycles
+}
+
+/// Whether there was anything to recover.
+fn is_recovered(machine: &Machine, file: &Path) -> bool {
+    let complete = complete_cycles(file);
+    let Ended { status, stdout, stderr } = about(machine, "recover", file, &[]);
+    if complete == 0 && status.code() == Some(2) {
+        assert!(stderr.contains("nothing can be recovered"), "{stderr}");
+        return false;
+    }
+    assert_eq!(status.code(), Some(0), "{stderr}");
+    assert!(stdout.contains(" cycles, "), "{stdout}");
+    replays_exactly(machine, file);
+    let (summary, _) = read(file);
+    assert!(summary.cycles >= complete, "{} of {complete} cycles", summary.cycles);
+    assert_eq!(complete_cycles(file), summary.cycles);
+    let again = about(machine, "recover", file, &[]);
+    assert!(again.stdout.ends_with(": it is complete\n"), "{}", again.stdout);
+    true
+}
+
+#[test]
+fn what_a_killed_daemon_has_recorded_is_recovered() {
+    let _turn = turns::beside_others();
+    let kills = env::var("HEXAD_KILLS").ok().and_then(|kills| kills.parse().ok()).unwrap_or(KILLS);
+    let machine = Machine::patient("recorded-killed");
+    let _plant = start_plant(&machine);
+    let mut random = Random::new(16);
+    let mut recovered = 0;
+    for _ in 0..kills {
+        let mut daemon = start_recording(&machine);
+        daemon.says("running");
+        sleep(Duration::from_millis(random.below(1500)));
+        daemon.kill();
+        for file in files(&machine, "record") {
+            recovered += u32::from(is_recovered(&machine, &file));
+            fs::remove_file(file).unwrap();
+        }
+    }
+    println!("{recovered} of {kills} recovered; the others were killed before the first chunk");
+    assert!(recovered * 2 > kills, "{recovered} of {kills}");
+}
+
+/// A limit on the size of files stands for a full disk: to the daemon both are a write that fails.
+#[test]
+fn a_full_disk_ends_the_recording_and_not_the_daemon() {
+    let _turn = turns::beside_others();
+    let machine = Machine::with("recorded-full", PATIENT);
+    let plant = start_plant(&machine);
+    let mut command = Command::new("sh");
+    // 8 MiB, in blocks of 512 bytes (or 16 MiB where the shell counts in 1024).
+    command.args(["-c", "ulimit -f 16384; exec \"$@\"", "sh"]);
+    command.arg(hexad().get_program()).args(["run", "--config"]).arg(&machine.file).args(arguments(&machine));
+    let mut daemon = Hexad::spawn(&machine, "run", command);
+    daemon.says("the recording has ended: ");
+    sleep(Duration::from_millis(500));
+    daemon.must_run();
+    let said = daemon.stops_on("TERM", HANG).stderr;
+    plant.stops_on("TERM", HANG);
+    assert_eq!(said.matches("the recording has ended: ").count(), 1, "{said}");
+    assert!(said.contains("free space and restart the daemon"), "{said}");
+    let recorded = files(&machine, "record");
+    assert!(is_recovered(&machine, &recorded[0]));
+    let (summary, _) = read(&recorded[0]);
+    let report = Report::read(&machine.path("report.json")).unwrap();
+    assert!(report.cycles > summary.cycles && summary.cycles > 1000, "{}: {}", report.cycles, summary.cycles);
+}
+
+#[test]
+fn the_size_of_recordings_is_bounded_over_all_runs() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("recorded-bounded");
+    let plant = start_plant(&machine);
+    for _ in 0..2 {
+        let bounds = ["--record-file-mib", "1", "--record-total-mib", "3"].map(Into::into);
+        let daemon = Hexad::start(&machine, "run", &[arguments(&machine), bounds.into()].concat());
+        daemon.says("running");
+        sleep(Duration::from_secs(7));
+        let said = daemon.stops_on("TERM", HANG).stderr;
+        assert!(said.contains("the recordings exceed 3 MiB: "), "{said}");
+    }
+    plant.stops_on("TERM", HANG);
+    let left = files(&machine, "record");
+    let bytes: u64 = left.iter().map(|file| fs::metadata(file).unwrap().len()).sum();
+    // A file ends with its second, which is up to 1.4 MiB more.
+    assert!(bytes < 5 << 20, "{bytes} in {left:?}");
+    for file in &left {
+        assert!(read(file).1[0].cycle > 1, "the first files were deleted: {left:?}");
+        replays_exactly(&machine, file);
+    }
+}

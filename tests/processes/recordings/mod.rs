@@ -1,0 +1,61 @@
+//! `hexad run --record` and `--faults`, and what becomes of their files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use hexad::messages::CycleMessage;
+use hexad::recording::Item;
+use hexad::recording::reader::{Recording, Summary};
+
+use crate::support::children::{Ended, Hexad, run};
+use crate::support::machine::Machine;
+
+mod crashes;
+mod python;
+mod replays;
+
+/// Arguments of a daemon that records.
+fn arguments(machine: &Machine) -> Vec<PathBuf> {
+    let [record, faults, report] = ["record", "faults", "report.json"].map(|name| machine.path(name));
+    ["--record".into(), record, "--faults".into(), faults, "--report".into(), report].into()
+}
+
+/// A daemon that records every cycle and every fault.
+fn start_recording(machine: &Machine) -> Hexad {
+    Hexad::start(machine, "run", &arguments(machine))
+}
+
+/// The recordings in a folder of a machine, the oldest first.
+fn files(machine: &Machine, folder: &str) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(machine.path(folder)) else { return vec![] };
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+/// What a recording says about itself, and its cycles.
+fn read(path: &Path) -> (Summary, Vec<CycleMessage>) {
+    let mut cycles = vec![];
+    let recording = Recording::read(path).unwrap();
+    let summary = recording.each(|item| {
+        if let Item::Cycle(cycle) = item {
+            cycles.push(*cycle);
+        }
+    });
+    (summary.unwrap(), cycles)
+}
+
+/// `hexad` with a command about a file.
+fn about(machine: &Machine, command: &str, file: &Path, more: &[&str]) -> Ended {
+    let file = file.display().to_string();
+    run(machine, &[&[command, &file], more].concat())
+}
+
+/// All cycles of a recording must be repeated to the bit.
+fn replays_exactly(machine: &Machine, file: &Path) {
+    let Ended { status, stdout, stderr } = about(machine, "replay", file, &[]);
+    let (summary, cycles) = read(file);
+    assert_eq!((status.code(), summary.unfinished), (Some(0), None), "{stdout}{stderr}");
+    let words = format!("\n{} cycles repeated: every output is the same to the bit\n", cycles.len());
+    assert!(stdout.contains(&words), "{words} must be in {stdout}");
+}

@@ -1,0 +1,201 @@
+//! Recordings of real processes are repeated to the bit, in every mode, with every model, under both policies.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+use std::thread::sleep;
+use std::time::Duration;
+
+use fearless_simd::Level;
+use hexad::config::Config;
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::state::{Request, State};
+use hexad::daemon::replay::{recorded_controller, replay};
+use hexad::recording::reader::Recording;
+
+use super::{about, files, read, replays_exactly, start_recording};
+use crate::support::children::{Ended, HANG, Hexad};
+use crate::support::machine::{Machine, PATIENT};
+use crate::support::operator::ask;
+use crate::support::trio::start_plant;
+use crate::support::turns;
+
+/// Time in which something happens in each part of a run; the motion begins a second after control.
+const WHILE: Duration = Duration::from_millis(2500);
+
+/// Short: the search for its amplitude takes a share of its length.
+const MOTION: [&str; 4] = ["--motion", "sines", "--seconds", "6"];
+
+/// Difference of the forces between two instruction sets, as a ratio of the largest.
+const FORCE_TOLERANCE: f64 = 1e-11;
+
+/// The same of any number; the acceleration of the reference is a difference of velocities over a cycle.
+const INSTRUCTION_SET_TOLERANCE: f64 = 1e-10;
+
+/// Motion, stop, motion, a source that dies, clear, motion, estop, clear.
+fn eventful_run(keys: &str, policy: &str) -> Machine {
+    let sections = format!("{PATIENT}\n[control]\n{keys}\n\n[setpoint]\non_violation = \"{policy}\"\n");
+    let machine = Machine::with("recorded", &sections);
+    let plant = start_plant(&machine);
+    let daemon = start_recording(&machine);
+    daemon.says("running");
+    // Some modes lag so far behind that a request is refused or a fault comes by itself; all of it is recorded.
+    for end in ["stop", "", "estop"] {
+        let mut source = Hexad::start(&machine, "move", &MOTION);
+        let _ = ask(&machine, "engage", &["--wait", "--within", "10"]);
+        sleep(WHILE);
+        if end.is_empty() {
+            if source.runs() {
+                source.kill();
+            }
+            sleep(WHILE);
+        } else {
+            let _ = ask(&machine, end, &[]);
+        }
+        let _ = ask(&machine, "clear", &[]);
+    }
+    daemon.stops_on("TERM", HANG);
+    plant.stops_on("TERM", HANG);
+    machine
+}
+
+/// The run is in one file, as is each fault; all of them are repeated.
+fn holds(machine: &Machine) {
+    let recorded = files(machine, "record");
+    let [file] = recorded.as_slice() else { panic!("one recording: {recorded:?}") };
+    for file in files(machine, "faults").iter().chain([file]) {
+        replays_exactly(machine, file);
+    }
+    let (_, cycles) = read(file);
+    let seen: BTreeSet<u32> = cycles.iter().map(|cycle| cycle.state).collect();
+    for state in [State::Active, State::Fault] {
+        assert!(seen.contains(&(state as u32)), "{state:?} in {seen:?}");
+    }
+    let requests: BTreeSet<u32> =
+        cycles.iter().filter(|cycle| cycle.has_request == 1).map(|it| it.request).collect();
+    for request in [Request::Engage, Request::Clear, Request::Stop, Request::Estop] {
+        assert!(requests.contains(&(request as u32)), "{request:?} in {requests:?}");
+    }
+}
+
+#[test]
+fn each_fidelity_is_repeated() {
+    let _turn = turns::beside_others();
+    for (fidelity, policy) in [
+        ("rigid-legs", "stop"),
+        ("no-velocity", "limit"),
+        ("lumped-legs", "stop"),
+        ("massless-legs", "limit"),
+        ("auto", "stop"),
+    ] {
+        holds(&eventful_run(&format!("fidelity = \"{fidelity}\""), policy));
+    }
+}
+
+#[test]
+fn each_mode_is_repeated() {
+    let _turn = turns::beside_others();
+    for (mode, policy) in [
+        ("feedforward_joint_pd", "limit"),
+        ("gravity_joint_pd", "stop"),
+        ("joint_pd", "limit"),
+        ("computed_torque", "limit"),
+    ] {
+        holds(&eventful_run(&format!("mode = \"{mode}\""), policy));
+    }
+}
+
+#[test]
+fn a_recording_is_repeated_cut_converted_and_compared() {
+    let _turn = turns::beside_others();
+    let machine = eventful_run("", "stop");
+    holds(&machine);
+    let file = &files(&machine, "record")[0];
+    would_be_different_with_another_configuration(&machine, file);
+    a_part_is_repeated_alone(&machine, file);
+    another_instruction_set_agrees(file);
+    let faults = files(&machine, "faults");
+    let window = faults.iter().find(|file| file.display().to_string().contains("fault-100-")).unwrap();
+    a_window_becomes_a_table(&machine, window);
+}
+
+fn would_be_different_with_another_configuration(machine: &Machine, file: &Path) {
+    let text = fs::read_to_string(&machine.file).unwrap();
+    let other = machine.path("other.toml");
+    fs::write(&other, text.replace("[control]", "[control]\nposition_bandwidth_hz = 5.0")).unwrap();
+    let Ended { status, stdout, stderr } =
+        about(machine, "replay", file, &["--config", &other.display().to_string()]);
+    assert_eq!(status.code(), Some(0), "{stderr}");
+    let first = stdout.lines().find_map(|line| line.strip_prefix("first: cycle ")).expect("a difference");
+    let first: u64 = first.split(' ').next().unwrap().parse().unwrap();
+    // Feedback is the first that differs, and with it the forces: under control, and not before.
+    let (_, cycles) = read(file);
+    let cycle = cycles.iter().find(|cycle| cycle.cycle == first).unwrap();
+    assert!([State::Engaging, State::Active].iter().any(|state| *state as u32 == cycle.state), "{cycle:?}");
+    assert!(stdout.contains(" cycles differ\n") && stdout.contains(" s), force_n_"), "{stdout}");
+}
+
+fn a_part_is_repeated_alone(machine: &Machine, file: &Path) {
+    let part = machine.path("part.mcap");
+    let output = part.display().to_string();
+    let ended = about(machine, "replay", file, &["--extract", "2.5..3", "--output", &output]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    replays_exactly(machine, &part);
+    let (_, cycles) = read(&part);
+    // It begins with the memory of cycle 2001, and holds half a second after cycle 2501.
+    assert!((2001..=2501).contains(&cycles[0].cycle) && cycles.len() <= 1001, "{}", cycles[0].cycle);
+    let ended = about(machine, "replay", file, &["--extract", "1000..1001", "--output", &output]);
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.stdout);
+    assert!(ended.stderr.contains("no cycle is in 1000.0..=1001.0 s"), "{}", ended.stderr);
+}
+
+fn another_instruction_set_agrees(file: &Path) {
+    let recording = Recording::read(file).unwrap();
+    let info = recording.summary().unwrap().info;
+    let mut config = Config::parse(&info.configuration, "the recording").unwrap();
+    config.machine.level = Level::baseline();
+    let (_, replayed) = replay(&recording, recorded_controller(&info, &config)).unwrap();
+    let sizes: Vec<_> = replayed.largest.iter().map(|(field, it)| (field.as_str(), it.size())).collect();
+    println!(
+        "another instruction set: {} of {} cycles differ: {sizes:?}",
+        replayed.different, replayed.compared
+    );
+    assert!(replayed.different > 0, "the lanes add in another order");
+    for (field, size) in sizes {
+        let tolerance = if field == "force_n" { FORCE_TOLERANCE } else { INSTRUCTION_SET_TOLERANCE };
+        assert!(size <= tolerance, "{:?}", replayed.largest[field]);
+    }
+}
+
+fn a_window_becomes_a_table(machine: &Machine, window: &Path) {
+    let table = machine.path("window.csv");
+    let ended = about(machine, "convert", window, &["--csv", &table.display().to_string()]);
+    assert_eq!(ended.status.code(), Some(0), "{}", ended.stderr);
+    let text = fs::read_to_string(&table).unwrap();
+    let begin = "cycle,t,wakeup_ns,compute_ns,setpoint_age_s,measured_age_s,setpoint_kind,setpoint_x_1,";
+    assert!(text.starts_with(begin), "{}", text.lines().next().unwrap());
+    let columns: Vec<_> = text.lines().next().unwrap().split(',').collect();
+    let place = |name: &str| columns.iter().position(|column| *column == name).expect(name);
+    let [cycle, t, code, force, length] =
+        ["cycle", "t", "diagnostic_code", "force_n_6", "measured_length_m_6"].map(place);
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|number| number.parse().unwrap()).collect())
+        .collect();
+    let (summary, cycles) = read(window);
+    assert_eq!(rows.len(), cycles.len());
+    for (row, message) in rows.iter().zip(&cycles) {
+        assert_eq!((row.len(), row[cycle]), (columns.len(), message.cycle as f64));
+        assert_eq!((row[force], row[length]), (message.force_n[5], message.measured_length_m[5]));
+    }
+    let fault = rows.iter().find(|row| row[cycle] as u64 == summary.fault.unwrap()).unwrap();
+    assert_eq!((fault[t], fault[code]), (0.0, f64::from(DiagnosticCode::SetpointLost as u32)));
+    // A second after the fault belongs to it, and what was before.
+    assert!(
+        rows[rows.len() - 1][t] >= 0.999 && rows[0][t] < -0.5,
+        "{} to {}",
+        rows[0][t],
+        rows[rows.len() - 1][t]
+    );
+}
