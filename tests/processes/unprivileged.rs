@@ -36,7 +36,7 @@ fn nobody_is_served_beside_root() {
     recorder.until("root's plant owns the shared memory", |recording| recording.measured.last().map(drop));
     let Ended { status, stdout, stderr } = demo(&machine, &nobody);
     assert_eq!(status.code(), Some(0), "{stdout}\n{stderr}");
-    assert!(stderr.contains("using /tmp/iceoryx2-65534"), "must say where its shared memory is: {stderr}");
+    assert!(stderr.contains("control socket: /tmp/hexad-65534/"), "must say where it is: {stderr}");
     assert!(stdout.contains("faults           0"), "{stdout}");
     plant.stops_on("TERM", HANG);
 }

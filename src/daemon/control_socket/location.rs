@@ -5,14 +5,12 @@ use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt, chown};
 use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
-use std::{env, process};
+use std::process;
 
 use nix::unistd::{Group, geteuid};
 
 use crate::config::deployment::OperatorAccess;
-
-/// Folder that a service manager makes for the daemon.
-pub const SYSTEM_FOLDER: &str = "/run/hexad";
+use crate::messages::location::{SYSTEM_FOLDER, TEMPORARY_FOLDER, user_folder};
 
 /// Error of opening the control socket.
 #[derive(Debug, thiserror::Error)]
@@ -82,7 +80,7 @@ pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, Soc
             result => return result,
         }
     }
-    let folder = user_folder(access);
+    let folder = folder(access);
     make_private(&folder, access, group_id).map_err(|cause| failed(folder.clone(), cause))?;
     let owner = fs::symlink_metadata(&folder).map_err(|cause| failed(folder.clone(), cause))?;
     if !owner.is_dir() || owner.uid() != geteuid().as_raw() || owner.mode() & 0o022 != 0 {
@@ -91,14 +89,10 @@ pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, Soc
     bind(&folder).map_err(|cause| failed(socket_path(&folder, machine), cause))
 }
 
-/// The user's runtime folder, if nobody else has to enter it, else one in the folder for temporary files.
-fn user_folder(access: &OperatorAccess) -> PathBuf {
+/// The user's folder, if nobody else has to enter it, else one among the temporary files.
+fn folder(access: &OperatorAccess) -> PathBuf {
     let is_private = access.group.is_none() && !access.is_for_everybody();
-    let runtime = env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
-    match runtime.filter(|folder| is_private && folder.is_absolute() && folder.is_dir()) {
-        Some(folder) => folder.join("hexad"),
-        None => PathBuf::from(format!("/tmp/hexad-{}", geteuid())),
-    }
+    if is_private { user_folder() } else { format!("{TEMPORARY_FOLDER}{}", geteuid()).into() }
 }
 
 /// Makes the folder; others may enter it, but not list it, only where they may use the socket.
