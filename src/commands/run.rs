@@ -22,13 +22,16 @@ pub struct RunArguments {
     /// Write the cycles around each fault as CSV into this folder
     #[arg(long, value_name = "FOLDER", env = "LOGS_DIRECTORY")]
     faults: Option<PathBuf>,
+    /// Keep an emergency stop in this folder until it is cleared, also while no daemon runs
+    #[arg(long, value_name = "FOLDER", env = "STATE_DIRECTORY")]
+    state: Option<PathBuf>,
 }
 
 impl RunArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let Self { machine, report, histogram, faults } = self;
+        let Self { machine, report, histogram, faults, state } = self;
         let (config, stop) = (machine.load()?, Stop::on_signals()?);
-        daemon::run(&config, &daemon::Files { report, histogram, faults }, &stop)?;
+        daemon::run(&config, &daemon::Files { report, histogram, faults, state }, &stop)?;
         Ok(())
     }
 }

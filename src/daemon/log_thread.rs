@@ -10,6 +10,7 @@ use heapless::spsc::Consumer;
 use tracing::{info, warn};
 
 use super::cycle::{CycleRecord, tracking_error};
+use super::emergency_latch::EmergencyLatch;
 use super::fault_dump::FaultDump;
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
@@ -42,6 +43,7 @@ pub struct LogLinks<'a> {
     pub files: &'a OnceLock<ThreadFiles>,
     pub dump: FaultDump,
     pub first_pose: FirstPose,
+    pub latch: EmergencyLatch,
 }
 
 /// Statistics of a run.
@@ -99,6 +101,8 @@ impl Log {
             }
             let state = (record.output.state, record.output.diagnostic.code);
             if state != self.state {
+                let (name, code) = state;
+                links.latch.follow(name, code);
                 self.log_state(&record);
                 self.state = state;
             }
