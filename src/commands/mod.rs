@@ -37,6 +37,7 @@ pub mod faults;
 pub mod forward_kinematics;
 pub mod in_step;
 pub mod inverse_dynamics;
+pub mod log;
 pub mod messages;
 pub mod r#move;
 mod offline_tables;

@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Instant;
 
 use heapless::spsc::Consumer;
-use tracing::{info, warn};
+use tracing::{error, info, warn};
 
 use super::cycle::{CycleRecord, tracking_error};
 use super::emergency_latch::EmergencyLatch;
@@ -17,7 +17,7 @@ use super::hints::{Hints, ThreadFiles};
 use super::report::{Fault, TrackingSum};
 use super::statistics::Collector;
 use crate::control::controller::Output;
-use crate::control::diagnostic::DiagnosticCode;
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
 use crate::messages::Statistics;
 use crate::realtime::triple_buffer::Writer;
@@ -119,20 +119,30 @@ impl Log {
 
     fn log_state(&mut self, record: &CycleRecord) {
         let CycleRecord { cycle, output: Output { state, diagnostic, .. }, .. } = *record;
-        let code = diagnostic.code;
+        let Diagnostic { code, value, bound, .. } = diagnostic;
+        let (name, number) = (state.name(), code as u32);
         match state {
             State::Fault => {
-                warn!(cycle, number = code as u32, "fault: {diagnostic}; no force until cleared");
+                error!(
+                    cycle,
+                    state = name,
+                    code = number,
+                    value,
+                    bound,
+                    "fault: {diagnostic}; no force until cleared"
+                );
                 let faults = &mut self.report.faults;
                 if faults.len() < MAX_FAULTS {
                     faults.push(Fault { cycle, number: code as u32, name: code.name().into() });
                 }
             }
-            State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
-            State::Stopping if code.is_fault() => {
-                warn!(cycle, number = code as u32, "stopping: {diagnostic}")
+            State::Engaging | State::Active => {
+                info!(cycle, state = name, code = number, "{name}: forces are valid");
             }
-            _ => info!(cycle, "{}: {diagnostic}", state.name()),
+            State::Stopping if code.is_fault() => {
+                warn!(cycle, state = name, code = number, value, bound, "stopping: {diagnostic}");
+            }
+            _ => info!(cycle, state = name, code = number, value, bound, "{name}: {diagnostic}"),
         }
     }
 }

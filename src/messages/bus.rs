@@ -13,6 +13,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::clock::monotonic_ns;
 use super::location::Location;
+use super::reservation::refusal;
 use super::{Message, Publisher, Subscriber};
 
 /// Daemon, plant, recorder, monitors.
@@ -36,7 +37,7 @@ impl PortError {
 }
 
 pub(super) fn port_error<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
-    move |cause| PortError { what, cause: format!("{cause:?}") }
+    move |cause| PortError { what, cause: refusal().unwrap_or_else(|| format!("{cause:?}")) }
 }
 
 /// Participation of this process in the topics of one machine.
@@ -70,7 +71,8 @@ impl Bus {
             .config(&location.config)
             .create::<ipc::Service>();
         let node = created.map_err(|cause| {
-            let cause = location.obstacle().unwrap_or_else(|| format!("{cause:?}"));
+            let known = refusal().or_else(|| location.obstacle());
+            let cause = known.unwrap_or_else(|| format!("{cause:?}"));
             PortError::new("cannot create a node".into(), cause)
         })?;
         Ok(Self { node, machine: machine.into(), is_simulated, epoch: monotonic_ns() })

@@ -4,9 +4,9 @@
 //! users can neither make it nor write in it, and nothing falls back on a folder that they could have made.
 
 use std::env;
-use std::fs::{self, DirBuilder, File, OpenOptions, TryLockError, metadata, symlink_metadata};
+use std::fs::{self, DirBuilder, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
 use std::io::{self, ErrorKind, Read, Write};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -40,6 +40,8 @@ const CREATION_TIMEOUT: Duration = Duration::from_millis(5);
 
 /// Only the owner may open it: also who may only read could lock it for good.
 pub(super) const PRIVATE_FILE: u32 = 0o600;
+/// Others may enter it for the control socket and the record beside it, whose own permissions say who may use them.
+const USER_FOLDER: u32 = 0o711;
 const PRIVATE_FOLDER: u32 = 0o700;
 /// Permissions with which others could write in a folder.
 const OTHERS_WRITE: u32 = 0o022;
@@ -71,15 +73,21 @@ pub fn user_folder() -> PathBuf {
 /// Makes the folder of this user if it is missing; an error if it could be another user's.
 pub fn open_user_folder() -> Result<PathBuf, PortError> {
     let folder = user_folder();
-    make_private(&folder).map_err(port_error(format!("cannot make {}", folder.display())))?;
+    make_user_folder(&folder).map_err(port_error(format!("cannot make {}", folder.display())))?;
     Ok(folder)
 }
 
-/// Makes a folder for this user alone, if it is missing.
-fn make_private(folder: &Path) -> io::Result<()> {
-    match DirBuilder::new().mode(PRIVATE_FOLDER).create(folder) {
+/// Makes a folder in which only this user may write, if it is missing; an error if it could be another user's.
+pub fn make_user_folder(folder: &Path) -> io::Result<()> {
+    make_own(folder, USER_FOLDER)
+}
+
+fn make_own(folder: &Path, mode: u32) -> io::Result<()> {
+    match DirBuilder::new().mode(mode).create(folder) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(error),
-        _ => {}
+        // Whatever the mask of this process.
+        Ok(()) => fs::set_permissions(folder, Permissions::from_mode(mode))?,
+        Err(_) => {}
     }
     let found = symlink_metadata(folder)?;
     if found.is_dir() && found.uid() == user_id() && found.mode() & OTHERS_WRITE == 0 {
@@ -114,7 +122,7 @@ impl Location {
         let (prefix, text) =
             open_prefix(&path).map_err(port_error(format!("cannot use {}", path.display())))?;
         let books = folder.join(BOOKS);
-        make_private(&books).map_err(port_error(format!("cannot make {}", books.display())))?;
+        make_own(&books, PRIVATE_FOLDER).map_err(port_error(format!("cannot make {}", books.display())))?;
         Ok(Self { config: config(&books, &text)?, _prefix: prefix })
     }
 
@@ -234,17 +242,18 @@ mod tests {
 
     #[test]
     fn a_folder_that_others_may_write_and_a_link_are_refused() {
-        use std::os::unix::fs::{PermissionsExt, symlink};
+        use std::os::unix::fs::symlink;
         let parent = TempDir::new().unwrap();
         let [open, link, private] = ["open", "link", "private"].map(|name| parent.path().join(name));
-        make_private(&private).unwrap();
-        assert_eq!(metadata(&private).unwrap().mode() & 0o777, PRIVATE_FOLDER);
-        make_private(&private).unwrap();
+        for _ in 0..2 {
+            make_own(&private, PRIVATE_FOLDER).unwrap();
+            assert_eq!(metadata(&private).unwrap().mode() & 0o777, PRIVATE_FOLDER);
+        }
         fs::create_dir(&open).unwrap();
-        fs::set_permissions(&open, fs::Permissions::from_mode(0o777)).unwrap();
+        fs::set_permissions(&open, Permissions::from_mode(0o777)).unwrap();
         symlink(&private, &link).unwrap();
         for path in [open, link] {
-            assert!(make_private(&path).is_err(), "{}", path.display());
+            assert!(make_user_folder(&path).is_err(), "{}", path.display());
         }
     }
 }

@@ -91,10 +91,11 @@ def user_folder():
     return f"/tmp/hexad-{user}" if user else "/run/hexad-root"
 
 
-def make_private(folder):
-    """Makes a folder of this user alone, and refuses one that another could have made."""
+def make_own(folder, mode):
+    """Makes a folder in which only this user may write, and refuses one that another could have made."""
     if not os.path.isdir(folder):
-        os.mkdir(folder, 0o700)
+        os.mkdir(folder)
+        os.chmod(folder, mode)
     found = os.lstat(folder)
     if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o022:
         raise PermissionError(f"{folder} must be a folder of this user in which nobody else may write")
@@ -104,8 +105,8 @@ def make_private(folder):
 def location():
     """Where this user's shared memory is; while a node is created there, no daemon chooses another prefix."""
     folder = user_folder()
-    make_private(folder)
-    make_private(f"{folder}/iceoryx2")
+    make_own(folder, 0o711)
+    make_own(f"{folder}/iceoryx2", 0o700)
     flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
     with open(os.open(f"{folder}/prefix", flags, 0o600), "r+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
