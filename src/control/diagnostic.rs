@@ -200,6 +200,8 @@ codes! {
     SensorFrozen = 125, Brake, absolute("motion of the reference since the reading changed last", "m", "exceeds", "the bound for a sensor that is alive,"), "sensor frozen", "check the encoder of this leg and the driver";
     /// The length of a leg is not where the model, the forces and the measurements before have it.
     MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "what noise and disturbances explain,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
+    /// The daemon did not run for so long that its last measurement is too old: it was stopped, or the host took the processor.
+    DaemonHeld = 127, Brake, absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"), "daemon held", "find out what stopped the daemon or took its processor; hexad doctor";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.
