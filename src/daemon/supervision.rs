@@ -174,7 +174,8 @@ mod tests {
     fn the_watchdog_is_fed_only_if_every_thread_has_progressed_since() {
         let progress = Progress::default();
         let mut supervision = Supervision::begin(&progress, 1000.0, false);
-        let steps: [(&[fn(&Progress)], bool); 6] = [
+        type Count = fn(&Progress);
+        let steps: [(&[Count], bool); 6] = [
             (&[], false),
             (&[Progress::count_cycle], false),
             (&[Progress::count_cycle], false),
