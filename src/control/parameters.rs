@@ -61,6 +61,8 @@ pub struct Parameters {
     pub setpoint_timeout_ns: u64,
     /// Age from which on a measurement counts as lost.
     pub measured_timeout_ns: u64,
+    /// Longest time between two cycles of a daemon that runs, also without messages \[ns\].
+    pub longest_pause_ns: u64,
 }
 
 impl Parameters {

@@ -6,6 +6,7 @@ use nalgebra::ComplexField as _;
 use super::{LastValid, check_stroke_with_tolerance, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Measurement};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::parameters::Parameters;
 use crate::model::machine::{Actuator, LEGS};
 
 /// Plausible rate of a leg over its largest: an external force may move it faster.
@@ -123,19 +124,18 @@ impl MeasurementValidator {
     fn check_age(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Result<(), Diagnostic> {
         let timeout_ns = cycle.constants.parameters.measured_timeout_ns;
         check_time_stamp(DiagnosticCode::MeasurementLost, measurement.time_ns, cycle.release_ns, timeout_ns)
-            .map_err(|lost| {
-                self.pause(measurement, timeout_ns).unwrap_or_else(|| self.last.rejection_or(lost))
-            })
+            .map_err(|lost| self.pause(cycle, measurement).unwrap_or_else(|| self.last.rejection_or(lost)))
     }
 
     /// The pause of the loop that made a measurement too old, if that is why: not the driver is to blame.
-    fn pause(&self, measurement: &Measurement, timeout_ns: u64) -> Option<Diagnostic> {
+    fn pause(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Option<Diagnostic> {
+        let Parameters { measured_timeout_ns, longest_pause_ns, .. } = cycle.constants.parameters;
         let before_ns = self.released_before_ns;
         let pause_ns = self.released_ns.saturating_sub(before_ns);
-        let was_recent = before_ns > 0 && before_ns.abs_diff(measurement.time_ns) <= timeout_ns;
-        let [pause_s, timeout_s] = [pause_ns, timeout_ns].map(|time_ns| time_ns as f64 * 1e-9);
-        (was_recent && pause_ns > timeout_ns)
-            .then(|| Diagnostic::new(DiagnosticCode::DaemonHeld, pause_s, timeout_s))
+        let was_recent = before_ns > 0 && before_ns.abs_diff(measurement.time_ns) <= measured_timeout_ns;
+        let [pause_s, longest_s] = [pause_ns, longest_pause_ns].map(|time_ns| time_ns as f64 * 1e-9);
+        (was_recent && pause_ns > longest_pause_ns)
+            .then(|| Diagnostic::new(DiagnosticCode::DaemonHeld, pause_s, longest_s))
     }
 
     /// Validates a new measurement and records it. It must continue the last valid one if that is young or the

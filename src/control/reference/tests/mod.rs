@@ -105,6 +105,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         following_orientation: 0.05,
         setpoint_timeout_ns: 20_000_000,
         measured_timeout_ns: 10_000_000,
+        longest_pause_ns: 10_000_000,
     }
 }
 
