@@ -5,13 +5,14 @@ use core::error::Error;
 use super::operate::OperatorError;
 use crate::config::ConfigError;
 use crate::daemon::DaemonError;
+use crate::daemon::control_socket::location::SocketError;
 use crate::messages::PortError;
 use crate::output::files::FileError;
 use crate::output::svg::ChartError;
 use crate::recording::RecordingError;
 
 /// Error that ends a command, with the exit code of the process: 1 if the command ran and failed, 2 if it could not
-/// begin.
+/// begin, and cannot without a correction.
 #[derive(Debug)]
 pub struct Failure {
     pub exit_code: u8,
@@ -40,7 +41,20 @@ impl<E: CommandError> From<E> for Failure {
 }
 
 impl CommandError for ConfigError {}
-impl CommandError for DaemonError {}
+
+impl CommandError for DaemonError {
+    /// What the system refuses now, and another daemon, may be different at the next attempt: a service manager repeats it.
+    fn has_begun(&self) -> bool {
+        let is_configured =
+            |error: &SocketError| matches!(error, SocketError::NoGroup(_) | SocketError::NotMember(_));
+        match self {
+            Self::NotRealtime(_) => false,
+            Self::Socket(error) => !is_configured(error),
+            Self::Port(_) | Self::Signals(_) | Self::Thread(_) | Self::Died(_) | Self::Report(_) => true,
+        }
+    }
+}
+
 impl CommandError for PortError {}
 impl CommandError for RecordingError {}
 impl CommandError for ctrlc::Error {}

@@ -1,7 +1,8 @@
 //! The command line: one file or folder for each command.
 //!
-//! Exit codes: 0 done; 1 the command ran and failed (a fault, a row without solution); 2 it could not begin
-//! (bad command line, configuration, input or environment).
+//! Exit codes: 0 done; 1 the command ran and failed (a fault, a row without solution; for the daemon also what it lacks now and
+//! may have later: memory, a socket, a machine that another controls); 2 it could not begin (bad command line,
+//! configuration, input or environment).
 
 use clap::{Parser, Subcommand};
 
@@ -40,6 +41,7 @@ pub mod faults;
 pub mod forward_kinematics;
 pub mod in_step;
 pub mod inverse_dynamics;
+pub mod log;
 pub mod messages;
 pub mod r#move;
 mod offline_tables;

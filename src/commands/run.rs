@@ -33,15 +33,19 @@ pub struct RunArguments {
     /// Delete the oldest recordings of the machine in a folder above this size, over all runs
     #[arg(long, value_name = "MIB", default_value_t = 4096, value_parser = value_parser!(u64).range(2..=16_777_216))]
     record_total_mib: u64,
+    /// Keep an emergency stop in this folder until it is cleared, also while no daemon runs
+    #[arg(long, value_name = "FOLDER", env = "STATE_DIRECTORY")]
+    state: Option<PathBuf>,
 }
 
 impl RunArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let Self { machine, report, histogram, record, faults, record_file_mib, record_total_mib } = self;
+        let Self { machine, report, histogram, record, faults, record_file_mib, record_total_mib, state } =
+            self;
         let bounds = Bounds { file: record_file_mib << 20, total: record_total_mib << 20 };
         let folders = Folders { record, faults, bounds };
         let (config, stop) = (machine.load()?, Stop::on_signals()?);
-        daemon::run(&config, &daemon::Files { report, histogram, folders }, &stop)?;
+        daemon::run(&config, &daemon::Files { report, histogram, folders, state }, &stop)?;
         Ok(())
     }
 }

@@ -10,7 +10,7 @@ use std::{fmt, io, path::Path};
 
 use thiserror::Error;
 use toml::de::DeTable;
-use tracing::{info, warn};
+use tracing::warn;
 
 use crate::messages::{Bus, PortError};
 use crate::model::machine::Machine;
@@ -108,9 +108,6 @@ impl Config {
 
     /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.
     pub fn join(&self) -> Result<Bus, PortError> {
-        if let Some(location) = Bus::fallback_location() {
-            info!("{location}");
-        }
         if self.deployment.realtime.is_simulated() {
             warn!(
                 "TIME IS SIMULATED (realtime.release = \"lockstep\"): no hardware receives messages, topics are \

@@ -219,6 +219,8 @@ codes! {
     DriveFault = 131, Brake, NO_NUMBER, "drive reports a fault", "see the display of the drive";
     /// The actual force of a drive is not the commanded one.
     DriveForceMissing = 132, Brake, absolute("difference of the actual force from the commanded one", "N", "exceeds", "a fifth of the command and a fiftieth of actuator.max_force_n,"), "actual force not as commanded", "check the drive of this leg";
+    /// The daemon did not run for so long that its last measurement is too old: it was stopped, or the host took the processor.
+    DaemonHeld = 133, Brake, absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"), "daemon held", "find out what stopped the daemon or took its processor; hexad doctor";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.

@@ -67,6 +67,8 @@ pub struct Parameters {
     pub pose_tolerance: f64,
     /// Largest age of a measurement that arrives: the loop is stable if all are as old.
     pub max_measured_age_ns: u64,
+    /// Longest time between two cycles of a daemon that runs, also without messages \[ns\].
+    pub longest_pause_ns: u64,
 }
 
 impl Parameters {

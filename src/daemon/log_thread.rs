@@ -9,9 +9,10 @@ use std::thread;
 use std::time::Instant;
 
 use heapless::spsc::Consumer;
-use tracing::{info, warn};
+use tracing::{error, info, warn};
 
 use super::cycle::{CycleRecord, message, tracking_error};
+use super::emergency_latch::EmergencyLatch;
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::process_names::sentence;
@@ -45,6 +46,7 @@ pub struct LogLinks<'a> {
     /// To the recorder, if there is one. When it is full, cycles are lost.
     pub recorder: Option<SyncSender<CycleMessage>>,
     pub first_pose: FirstPose,
+    pub latch: EmergencyLatch,
 }
 
 /// Statistics of a run.
@@ -105,6 +107,8 @@ impl Log {
             self.log_publishers(&record);
             let state = (record.output.state, record.output.diagnostic.code);
             if state != self.state {
+                let (name, code) = state;
+                links.latch.follow(name, code);
                 self.log_state(&record);
                 self.state = state;
             }
@@ -136,20 +140,38 @@ impl Log {
 
     fn log_state(&mut self, record: &CycleRecord) {
         let CycleRecord { cycle, output: Output { state, diagnostic, .. }, .. } = *record;
-        let code = diagnostic.code;
+        let Diagnostic { code, value, bound, .. } = diagnostic;
+        let (name, number) = (state.name(), code as u32);
         match state {
             State::Fault => {
-                warn!(cycle, number = code as u32, "fault: {diagnostic}; no force until cleared");
+                error!(
+                    cycle,
+                    state = name,
+                    code = number,
+                    value,
+                    bound,
+                    "fault: {diagnostic}; no force until cleared"
+                );
                 let faults = &mut self.report.faults;
                 if faults.len() < MAX_FAULTS {
                     faults.push(Fault { cycle, number: code as u32, name: code.name().into() });
                 }
             }
-            State::Engaging | State::Active => info!(cycle, "{}: forces are valid", state.name()),
-            State::Stopping if code.is_fault() => {
-                warn!(cycle, number = code as u32, "stopping: {diagnostic}")
+            State::Engaging | State::Active => {
+                info!(cycle, state = name, code = number, "{name}: forces are valid");
             }
-            _ => info!(cycle, "{}: {}", state.name(), sentence(&diagnostic)),
+            State::Stopping if code.is_fault() => {
+                warn!(
+                    cycle,
+                    state = name,
+                    code = number,
+                    value,
+                    bound,
+                    "stopping: {}",
+                    sentence(&diagnostic)
+                );
+            }
+            _ => info!(cycle, state = name, code = number, value, bound, "{name}: {}", sentence(&diagnostic)),
         }
     }
 }

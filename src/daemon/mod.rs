@@ -7,13 +7,15 @@
 use std::io;
 use std::path::PathBuf;
 
-use tracing::info;
+use tracing::{info, warn};
 
 use self::control_socket::location::{self, SocketError};
+use self::emergency_latch::EmergencyLatch;
 use self::recorder::Folders;
 use self::report::Report;
 use crate::config::Config;
 use crate::control::state::Request;
+use crate::messages::clock::monotonic_ns;
 use crate::messages::{Claim, PortError};
 use crate::output::files::{FileError, write_whole};
 use crate::realtime::request_signal::{RequestSignal, post_on_signals};
@@ -23,6 +25,7 @@ use crate::realtime::stop_request::Stop;
 
 pub mod control_socket;
 pub mod cycle;
+mod emergency_latch;
 mod first_pose;
 mod hints;
 mod io_thread;
@@ -35,6 +38,7 @@ pub mod report;
 mod snapshot;
 pub mod start;
 mod statistics;
+mod supervision;
 mod threads;
 pub mod time_histogram;
 
@@ -78,6 +82,8 @@ pub struct Files {
     pub histogram: Option<PathBuf>,
     /// Recordings.
     pub folders: Folders,
+    /// Folder in which an emergency stop outlives the daemon.
+    pub state: Option<PathBuf>,
 }
 
 /// Request that a signal to the daemon posts.
@@ -99,7 +105,12 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
     let socket = location::open(&config.name, &config.deployment.operator)?;
     info!("control socket: {}", socket.path.display());
     claim.record(&socket.path)?;
-    let (report, counts_csv) = threads::run(config, &files.folders, socket, word, stop)?;
+    let latch = EmergencyLatch::open(files.state.as_deref())?;
+    if latch.is_set() {
+        warn!("an emergency stop was not cleared before the daemon ended: it is still in force; hexad clear");
+        let _ = word.post(Request::Estop as u32, monotonic_ns());
+    }
+    let (report, counts_csv) = threads::run(config, &files.folders, latch, socket, word, stop)?;
     if let Some(path) = &files.report {
         report.write(path)?;
     }

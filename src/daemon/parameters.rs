@@ -13,7 +13,7 @@ use crate::control::law::Law;
 use crate::control::parameters::{Envelope, Parameters};
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
-use crate::realtime::cyclic::Timing;
+use crate::realtime::cyclic::{ReleaseMode, Timing};
 
 /// Parameters of the controller; `fidelity` is the one that the deployment's choice resolves to.
 pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity) -> Parameters {
@@ -53,6 +53,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         ready_timeout_ns: nanoseconds(deployment.drive.ready_timeout_s),
         pose_tolerance: deployment.noise.pose_tolerance_m,
         max_measured_age_ns: nanoseconds(longest_age_s(deployment)),
+        longest_pause_ns: nanoseconds(longest_pause_s(deployment)),
         limits: limits.reference,
         force_rate: limits.force_rate_n_s,
         condition: limits.condition,
@@ -64,6 +65,13 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         following_velocity: control.following_velocity_m_s,
         following_angular_velocity: control.following_velocity_rad_s,
     }
+}
+
+/// Longest time between two cycles of a daemon that was not held \[s\]. Released by messages it runs a cycle each timeout without
+/// one; the second that is late is not the driver's.
+fn longest_pause_s(deployment: &Deployment) -> f64 {
+    let timeout_s = deployment.timeouts.measured_s;
+    if deployment.realtime.release == ReleaseMode::External { 2.0 * timeout_s } else { timeout_s }
 }
 
 /// Release of the cyclic loop. The grid is half a period away from the multiples of the period, at which plants measure.

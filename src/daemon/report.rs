@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use tracing::warn;
+use tracing::{info, warn};
 
 use super::io_thread::IoReport;
 use super::log_thread::LogReport;
@@ -92,7 +92,7 @@ impl Report {
         warn_of_losses(cyclic, io);
         let counters = &cyclic.counters;
         let Statistics { total, worst, .. } = log.statistics;
-        Self {
+        let report = Self {
             cycles: counters.cycles,
             rate_hz: config.deployment.realtime.rate_hz,
             deadline_misses: DeadlineMisses {
@@ -112,7 +112,28 @@ impl Report {
             log_thread: log.usage,
             recording: None,
             faults: log.faults,
-        }
+        };
+        report.log_timing();
+        report
+    }
+
+    /// Logs the timing of the run.
+    fn log_timing(&self) {
+        let DeadlineMisses { late_wakeup, overrun, skipped, .. } = self.deadline_misses;
+        let micros = |times: &Times| {
+            let [p50, p99, max] = [times.p50, times.p99, times.max].map(|time_ns| time_ns as f64 * 1e-3);
+            format!("{p50:.1} / {p99:.1} / {max:.1}")
+        };
+        info!(
+            cycles = self.cycles,
+            late_wakeup,
+            overrun,
+            skipped,
+            "timing: p50 / p99 / max [us]: wake-up {}, compute {}, release to force sent {}",
+            micros(&self.wakeup_ns),
+            micros(&self.compute_ns),
+            micros(&self.end_to_end_ns)
+        );
     }
 
     /// Writes JSON.

@@ -9,12 +9,12 @@ use std::thread::{self, Builder, Scope, ScopedJoinHandle, scope};
 use std::time::{Duration, Instant};
 
 use heapless::spsc::{Producer, Queue};
-use sd_notify::NotifyState;
 use tracing::{info, warn};
 
 use super::control_socket::location::ControlSocket;
 use super::control_socket::{self, ControlLinks};
 use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
+use super::emergency_latch::EmergencyLatch;
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports, Silence};
@@ -24,6 +24,7 @@ use super::recorder::{Folders, Recorder, RecorderReport};
 use super::report::Report;
 use super::snapshot::Snapshot;
 use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
+use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
 use crate::config::control_loops::{ControlLoop, loops, timeout_warning};
 use crate::config::{Config, fidelity};
@@ -66,6 +67,7 @@ struct Flags {
 pub(super) fn run(
     config: &Config,
     folders: &Folders,
+    latch: EmergencyLatch,
     socket: ControlSocket,
     word: &'static RequestWord,
     stop: &Stop,
@@ -81,7 +83,7 @@ pub(super) fn run(
     let (delay_producer, delays) = delay_queue.split();
     let (statistics_writer, statistics) = triple_buffer(Statistics::default());
     let (snapshot_writer, snapshots) = triple_buffer(Snapshot::default());
-    let (flags, files) = (&Flags::default(), &OnceLock::new());
+    let (flags, progress, files) = (&Flags::default(), &Progress::default(), &OnceLock::new());
     let ((io_ready, ready), (go, go_ahead)) = (channel(), channel());
     memory::keep_heap();
 
@@ -92,11 +94,13 @@ pub(super) fn run(
         files,
         recorder: recorder_queue,
         first_pose: FirstPose::of(&config.machine),
+        latch,
     };
     let realtime_links = RealtimeLinks {
         exchange: realtime_side,
         records: record_producer,
         word,
+        progress,
         files,
         ready: io_ready.clone(),
         go_ahead,
@@ -109,6 +113,7 @@ pub(super) fn run(
         word,
         is_ending: &flags.is_ending,
         may_end: &flags.may_end,
+        progress,
     };
     let control_links = ControlLinks { socket, snapshots, word, is_ending: &flags.is_ending };
     scope(|threads| {
@@ -126,7 +131,7 @@ pub(super) fn run(
 
         let started = start(&config.deployment.realtime, &ready, &go);
         if started.is_ok() {
-            supervise(config, flags, stop);
+            supervise(config, flags, progress, stop);
         }
         drop(go);
         let reports = join(flags, &event, cyclic, io, log, control);
@@ -165,6 +170,8 @@ struct RealtimeLinks<'a> {
     records: Producer<'a, CycleRecord>,
     /// Requests of operators.
     word: &'static RequestWord,
+    /// To the main thread.
+    progress: &'a Progress,
     /// Receives the kernel's files about this thread.
     files: &'a OnceLock<ThreadFiles>,
     ready: Sender<Ready>,
@@ -187,8 +194,9 @@ fn run_realtime(
     let _ = ThreadFiles::of_this_thread().map(|found| links.files.set(found));
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
-    let (word, mut intake) = (links.word, RequestIntake::default());
+    let (word, progress, mut intake) = (links.word, links.progress, RequestIntake::default());
     let step = |input: &mut Input, woke_ns: u64| {
+        progress.count_cycle();
         input.request = intake.next(input.request, word.load(), woke_ns);
         controller.step(input)
     };
@@ -219,11 +227,15 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
 }
 
 /// Waits for `stop`, and then until the platform is at rest.
-fn supervise(config: &Config, flags: &Flags, stop: &Stop) {
-    let _ = sd_notify::notify(&[NotifyState::Ready]);
-    info!(name = %config.name, rate_hz = config.deployment.realtime.rate_hz, "running");
-    stop.wait();
-    let _ = sd_notify::notify(&[NotifyState::Stopping]);
+fn supervise(config: &Config, flags: &Flags, progress: &Progress, stop: &Stop) {
+    let realtime = &config.deployment.realtime;
+    let mut supervision = Supervision::begin(progress, realtime.rate_hz, realtime.is_simulated());
+    info!(name = %config.name, rate_hz = realtime.rate_hz, "running");
+    while !stop.is_requested() {
+        supervision.step();
+        stop.wait(SUPERVISION_INTERVAL);
+    }
+    supervision.end();
     info!("stopping");
     flags.is_ending.store(true, Ordering::Relaxed);
     let began = Instant::now();
@@ -232,6 +244,7 @@ fn supervise(config: &Config, flags: &Flags, stop: &Stop) {
             warn!("the platform did not come to rest: ending all the same");
             return;
         }
+        supervision.step();
         thread::sleep(REST_POLL_INTERVAL);
     }
 }

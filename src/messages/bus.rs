@@ -6,17 +6,14 @@
 //! A peer that connects or disappears is handled inside the next send or receive of every participant: allocations,
 //! system calls, up to 0.1 ms. No real-time thread may own a port.
 
-use core::time::Duration;
-use std::fs::metadata;
-use std::os::unix::fs::MetadataExt;
-
-use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::*;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::clock::monotonic_ns;
+use super::location::Location;
+use super::reservation::refusal;
 use super::{LeasedSubscriber, Message, Publisher, Subscriber};
 
 /// Daemon, plant, recorder, monitors.
@@ -24,8 +21,6 @@ const MAX_SUBSCRIBERS: usize = 16;
 const MAX_NODES: usize = 32;
 /// Messages that a slow subscriber (a recorder) may fall behind: 256 are 12.8 ms at 20 kHz, 0.25 s at 1 kHz.
 pub(super) const BUFFER: usize = 256;
-/// A port that cannot be opened (another user's) must not block the I/O thread for the default second.
-const CREATION_TIMEOUT: Duration = Duration::from_millis(5);
 
 /// Failure of a call to iceoryx2: what was attempted, and its own words.
 #[derive(Debug, thiserror::Error)]
@@ -42,27 +37,7 @@ impl PortError {
 }
 
 pub(super) fn port_error<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
-    move |cause| PortError { what, cause: format!("{cause:?}") }
-}
-
-/// Location of the shared memory: iceoryx2's usual one, or, where that belongs to another user, one of this user's
-/// own with a sentence about it. Another user's could not be opened, and root and others may use one host.
-pub(super) fn location() -> Result<(Config, Option<String>), PortError> {
-    let bad_name = || port_error::<SemanticStringError>("cannot name the shared memory".into());
-    let mut config = Config::default();
-    config.global.creation_timeout = CREATION_TIMEOUT;
-    let usual = config.global.root_path().to_string();
-    let owner = |path: &str| metadata(path).map(|found| found.uid()).ok();
-    if let (Some(owner), Some(user)) = (owner(&usual), owner("/proc/self"))
-        && owner != user
-    {
-        let own = format!("{}-{user}", usual.trim_end_matches('/'));
-        config.global.set_root_path(&Path::new(own.as_bytes()).map_err(bad_name())?);
-        config.global.prefix = FileName::new(format!("iox2_{user}_").as_bytes()).map_err(bad_name())?;
-        let moved = format!("{usual} belongs to user {owner}: using {own} and the prefix iox2_{user}_");
-        return Ok((config, Some(moved)));
-    }
-    Ok((config, None))
+    move |cause| PortError { what, cause: refusal().unwrap_or_else(|| format!("{cause:?}")) }
 }
 
 /// Participation of this process in the topics of one machine.
@@ -89,28 +64,23 @@ impl Bus {
     fn join_topics(machine: &str, is_simulated: bool) -> Result<Self, PortError> {
         // Its warnings (dead nodes cleaned up) are routine here.
         set_log_level(LogLevel::Error);
-        let (config, _) = location()?;
-        let node = NodeBuilder::new()
+        let location = Location::open()?;
+        let created = NodeBuilder::new()
             // Signals belong to the command line, not to a library's wait loop.
             .signal_handling_mode(SignalHandlingMode::Disabled)
-            .config(&config)
-            .create::<ipc::Service>()
-            .map_err(port_error(format!(
-                "cannot create a node; {} and the files iox2_* in /dev/shm must belong to this user: all \
-                 participants of a machine run as one user",
-                config.global.root_path()
-            )))?;
+            .config(&location.config)
+            .create::<ipc::Service>();
+        let node = created.map_err(|cause| {
+            let known = refusal().or_else(|| location.obstacle());
+            let cause = known.unwrap_or_else(|| format!("{cause:?}"));
+            PortError::new("cannot create a node".into(), cause)
+        })?;
         Ok(Self { node, machine: machine.into(), is_simulated, epoch: monotonic_ns() })
     }
 
     /// Whether the times of the messages are simulated.
     pub fn is_simulated(&self) -> bool {
         self.is_simulated
-    }
-
-    /// Why and where this user's shared memory is not in the usual location, if so.
-    pub fn fallback_location() -> Option<String> {
-        location().ok()?.1
     }
 
     /// A publisher of `T`.

@@ -1,32 +1,35 @@
 //! Claim of a machine: the lock that makes one daemon the only one, and the record by which commands find it.
+//!
+//! The lock is in the owner's private folder, so that no other user can hold it. The record beside the control socket may be
+//! read by everybody who may use the socket; it counts while its process lives.
 
-use std::fs::{self, File, OpenOptions, Permissions, TryLockError, create_dir_all};
-use std::io::{self, Read, Seek, Write};
-use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::fs::{self, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt, fchown};
 use std::path::{Path, PathBuf};
-use std::thread::sleep;
-use std::time::Duration;
 
-use super::bus::{PortError, location, port_error};
-
-/// Attempts to lock: a command that looks whether the lock is held holds it for a moment itself.
-const LOCK_ATTEMPTS: u32 = 10;
-const LOCK_INTERVAL: Duration = Duration::from_millis(10);
+use super::bus::{PortError, port_error};
+use super::location::{
+    PRIVATE_FILE, ROOT_FOLDER, SYSTEM_FOLDER, TEMPORARY_FOLDER, USER_RUNTIME_FOLDERS, open_private,
+    open_user_folder, renew_prefix, user_folder, user_id,
+};
 
 /// Longest record that is read \[bytes\].
 const MAX_RECORD_BYTES: u64 = 512;
 
-/// Everybody may read who controls the machine; only the owner may write.
-const FOLDER_MODE: u32 = 0o755;
-const FILE_MODE: u32 = 0o644;
+/// Everybody may read the record; only the owner may write.
+const RECORD_MODE: u32 = 0o644;
+
+/// Place of the start time in `/proc/PID/stat`, counted from the state behind the name of the process.
+const START_TIME_PLACE: usize = 19;
 
 /// Claim of this process to control a machine, until it is dropped or the process dies, however it dies.
 ///
 /// Topics alone would let a second daemon take over, and leave the first one's forces ignored for good.
 #[derive(Debug)]
 pub struct Claim {
-    file: File,
-    path: PathBuf,
+    _locks: Vec<File>,
+    record: Option<PathBuf>,
 }
 
 /// A running daemon, by its record.
@@ -41,86 +44,150 @@ pub struct RunningDaemon {
 }
 
 impl Claim {
-    /// Claims a machine; an error if another daemon of this user controls it.
+    /// Claims a machine; an error if another daemon of this user, of the service or of root controls it. Those of other
+    /// users do not count: they reach no participant of this one, and could block it for good.
     pub fn take(machine: &str) -> Result<Self, PortError> {
-        let folder = PathBuf::from(location()?.0.global.root_path().to_string());
-        let path = folder.join(file_name(machine));
-        let file = open_folder(&folder).and_then(|()| {
-            // Not truncated: it may be the record of another.
-            let mut options = OpenOptions::new();
-            options.read(true).write(true).create(true).truncate(false).mode(FILE_MODE).open(&path)
-        });
-        let file = file.map_err(port_error(format!("cannot open {}", path.display())))?;
-        for _ in 0..LOCK_ATTEMPTS {
-            match file.try_lock() {
-                Ok(()) => {
-                    let mut claim = Self { file, path };
-                    claim.write("").map_err(port_error(format!("cannot write {}", claim.path.display())))?;
-                    return Ok(claim);
-                }
-                Err(TryLockError::WouldBlock) => sleep(LOCK_INTERVAL),
-                Err(error) => return Err(port_error(format!("cannot lock {}", path.display()))(error)),
-            }
+        let own = open_user_folder()?;
+        let mut locks = vec![lock(&own, machine)?];
+        let system = Path::new(SYSTEM_FOLDER);
+        let system_user = metadata(system).ok().filter(fs::Metadata::is_dir).map(|found| found.uid());
+        if user_id() == 0 && own != system && system_user.is_some() {
+            locks.push(lock(system, machine)?);
         }
-        let what = format!("cannot control {machine}");
-        Err(PortError::new(what, format!("another daemon does ({} is locked)", path.display())))
+        let counts = |daemon: &RunningDaemon| [Some(0), system_user].contains(&Some(daemon.user_id));
+        if let Some(other) = running_daemons(machine).into_iter().find(counts) {
+            let (process_id, user_id) = (other.process_id, other.user_id);
+            return Err(refusal(machine, &format!("process {process_id} of user {user_id} does")));
+        }
+        renew_prefix()?;
+        Ok(Self { _locks: locks, record: None })
     }
 
-    /// Records this process and its control socket.
+    /// Records this process beside its control socket.
     pub fn record(&mut self, socket: &Path) -> Result<(), PortError> {
-        let text = format!("{}\n{}\n", std::process::id(), socket.display());
-        self.write(&text).map_err(port_error(format!("cannot write {}", self.path.display())))
-    }
-
-    fn write(&mut self, text: &str) -> io::Result<()> {
-        self.file.set_len(0)?;
-        self.file.rewind()?;
-        self.file.set_permissions(Permissions::from_mode(FILE_MODE))?;
-        self.file.write_all(text.as_bytes())
+        let path = record_path(socket);
+        let process_id = std::process::id();
+        let written = start_time(process_id)
+            .and_then(|start_time| write_record(&path, &format!("{process_id}\n{start_time}\n")));
+        written.map_err(port_error(format!("cannot write {}", path.display())))?;
+        self.record = Some(path);
+        Ok(())
     }
 }
 
-/// Folder of the lock, which other users may enter whatever the mask of the process that makes it.
-fn open_folder(folder: &Path) -> io::Result<()> {
-    if folder.is_dir() {
-        return Ok(());
+impl Drop for Claim {
+    fn drop(&mut self) {
+        if let Some(path) = &self.record {
+            // Fails only if somebody has removed it.
+            let _ = fs::remove_file(path);
+        }
     }
-    create_dir_all(folder)?;
-    fs::set_permissions(folder, Permissions::from_mode(FOLDER_MODE))
 }
 
-fn file_name(machine: &str) -> String {
-    format!("hexad-{machine}.lock")
+fn refusal(machine: &str, reason: &str) -> PortError {
+    PortError::new(format!("cannot control {machine}"), format!("another daemon does ({reason})"))
+}
+
+/// Locks a machine in a folder.
+fn lock(folder: &Path, machine: &str) -> Result<File, PortError> {
+    let path = folder.join(format!("{machine}.lock"));
+    let file = open_lock(folder, &path).map_err(port_error(format!("cannot open {}", path.display())))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(refusal(machine, &format!("{} is locked", path.display()))),
+        Err(TryLockError::Error(error)) => Err(port_error(format!("cannot lock {}", path.display()))(error)),
+    }
+}
+
+/// A lock that root makes in another user's folder is that user's.
+fn open_lock(folder: &Path, path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    let made = options.read(true).write(true).create_new(true).mode(PRIVATE_FILE).open(path);
+    match made {
+        Ok(file) => {
+            let owner = metadata(folder)?;
+            if owner.uid() != user_id() {
+                fchown(&file, Some(owner.uid()), Some(owner.gid()))?;
+            }
+            Ok(file)
+        }
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => open_private(path),
+        Err(error) => Err(error),
+    }
+}
+
+fn record_path(socket: &Path) -> PathBuf {
+    socket.with_extension("daemon")
+}
+
+/// Writes under a temporary name: a record appears as a whole.
+fn write_record(path: &Path, text: &str) -> io::Result<()> {
+    let temporary = path.with_extension(format!("daemon-{}", std::process::id()));
+    let _ = fs::remove_file(&temporary);
+    let mut options = OpenOptions::new();
+    let mut file = options.write(true).create_new(true).open(&temporary)?;
+    let written = file
+        .set_permissions(Permissions::from_mode(RECORD_MODE))
+        .and_then(|()| file.write_all(text.as_bytes()))
+        .and_then(|()| fs::rename(&temporary, path));
+    if written.is_err() {
+        let _ = fs::remove_file(&temporary);
+    }
+    written
 }
 
 /// Daemons that run for a machine, of every user whose record can be read.
 pub fn running_daemons(machine: &str) -> Vec<RunningDaemon> {
-    let Ok((config, _)) = location() else { return vec![] };
-    let own = PathBuf::from(config.global.root_path().to_string());
-    let Some(parent) = own.parent() else { return vec![] };
-    let usual = iceoryx2::config::Config::default().global.root_path().to_string();
-    let usual = Path::new(&usual).file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let entries = fs::read_dir(parent).into_iter().flatten().flatten();
-    let folders = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(&usual));
-    folders.filter_map(|folder| running_daemon(&folder.path(), machine)).collect()
+    let mut folders = vec![PathBuf::from(SYSTEM_FOLDER), ROOT_FOLDER.into(), user_folder()];
+    folders.extend(entries(USER_RUNTIME_FOLDERS).map(|folder| folder.join("hexad")));
+    let temporary = Path::new(TEMPORARY_FOLDER);
+    let name = temporary.file_name().unwrap_or_default().to_string_lossy();
+    let is_temporary =
+        |folder: &PathBuf| folder.file_name().is_some_and(|it| it.to_string_lossy().starts_with(&*name));
+    let parent = temporary.parent().unwrap_or(temporary).to_string_lossy().into_owned();
+    folders.extend(entries(&parent).filter(is_temporary));
+    folders.sort();
+    folders.dedup();
+    folders.iter().filter_map(|folder| running_daemon(folder, machine)).collect()
 }
 
-/// The daemon of a record, if its lock is held and folder, file and process are of one user.
+fn entries(folder: &str) -> impl Iterator<Item = PathBuf> {
+    fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+/// The daemon of a record, if its process lives, and if folder, file and process are of one user, or file and process of
+/// root.
 fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
-    let owner = fs::symlink_metadata(folder).ok().filter(fs::Metadata::is_dir)?.uid();
-    let path = folder.join(file_name(machine));
-    let mut file =
-        OpenOptions::new().read(true).custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(path).ok()?;
-    if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
-        return None;
-    }
+    let folder_owner = symlink_metadata(folder).ok().filter(fs::Metadata::is_dir)?.uid();
+    let path = folder.join(format!("{machine}.daemon"));
+    let mut options = OpenOptions::new();
+    let file = options.read(true).custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(&path).ok()?;
+    let owner = file.metadata().ok().filter(fs::Metadata::is_file)?.uid();
     let mut text = String::new();
-    (&mut file).take(MAX_RECORD_BYTES).read_to_string(&mut text).ok()?;
-    let (process_id, socket) = text.trim_end().split_once('\n')?;
-    let process_id = process_id.parse().ok()?;
-    let process_owner = fs::metadata(format!("/proc/{process_id}")).ok()?.uid();
-    let is_of_one_user = [file.metadata().ok()?.uid(), process_owner].iter().all(|user| *user == owner);
-    is_of_one_user.then(|| RunningDaemon { process_id, user_id: owner, socket: socket.into() })
+    file.take(MAX_RECORD_BYTES).read_to_string(&mut text).ok()?;
+    let mut lines = text.lines();
+    let process_id = lines.next()?.parse().ok()?;
+    let recorded_start: u64 = lines.next()?.parse().ok()?;
+    let socket = path.with_extension("sock");
+    let is_alive = start_time(process_id).is_ok_and(|started| started == recorded_start);
+    let is_of_one_user = process_user(process_id)? == owner && [folder_owner, 0].contains(&owner);
+    (is_alive && is_of_one_user).then_some(RunningDaemon { process_id, user_id: owner, socket })
+}
+
+/// Start of a process in clock ticks since boot: with its number it names the process for good.
+fn start_time(process_id: u32) -> io::Result<u64> {
+    let text = fs::read_to_string(format!("/proc/{process_id}/stat"))?;
+    // The name may contain anything, also spaces and brackets.
+    let fields = text.rsplit_once(')').map_or("", |(_, fields)| fields);
+    let start = fields.split_whitespace().nth(START_TIME_PLACE).and_then(|field| field.parse().ok());
+    start.ok_or_else(|| io::Error::other("no start time"))
+}
+
+/// Effective user of a process. The owner of its folder in `/proc` is root where it may not be traced.
+fn process_user(process_id: u32) -> Option<u32> {
+    let text = fs::read_to_string(format!("/proc/{process_id}/status")).ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("Uid:"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
 }
 
 #[cfg(test)]
@@ -133,15 +200,32 @@ mod tests {
         assert_eq!(running_daemons(&machine), []);
         let mut claim = Claim::take(&machine).unwrap();
         assert_eq!(running_daemons(&machine), [], "nothing is recorded yet");
-        claim.record(Path::new("/run/x.sock")).unwrap();
-        let user_id = fs::metadata("/proc/self").unwrap().uid();
+        let socket = user_folder().join(format!("{machine}.sock"));
+        claim.record(&socket).unwrap();
         let expected =
-            RunningDaemon { process_id: std::process::id(), user_id, socket: "/run/x.sock".into() };
+            RunningDaemon { process_id: std::process::id(), user_id: user_id(), socket: socket.clone() };
         assert_eq!(running_daemons(&machine), [expected]);
-        let path = claim.path.clone();
-        assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, FILE_MODE);
+        let (lock, record) = (socket.with_extension("lock"), record_path(&socket));
+        assert_eq!(metadata(&lock).unwrap().mode() & 0o777, PRIVATE_FILE, "others must not lock it");
+        assert_eq!(metadata(&record).unwrap().mode() & 0o777, RECORD_MODE);
+        let refused = Claim::take(&machine).unwrap_err().to_string();
+        assert!(refused.contains("another daemon does"), "{refused}");
         drop(claim);
-        assert_eq!(running_daemons(&machine), [], "the lock is free");
+        assert_eq!(running_daemons(&machine), []);
+        fs::remove_file(lock).unwrap();
+    }
+
+    #[test]
+    fn a_record_of_a_process_that_has_ended_does_not_count() {
+        let machine = format!("dead-test-{}", std::process::id());
+        let folder = open_user_folder().unwrap();
+        let path = folder.join(format!("{machine}.daemon"));
+        let process_id = std::process::id();
+        let started = start_time(process_id).unwrap();
+        for (start, is_found) in [(started, true), (started + 1, false)] {
+            write_record(&path, &format!("{process_id}\n{start}\n")).unwrap();
+            assert_eq!(running_daemons(&machine).len(), usize::from(is_found), "{start}");
+        }
         fs::remove_file(path).unwrap();
     }
 }

@@ -15,7 +15,8 @@
 //! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status` |
 //! | type name | `hexad_<last part>` |
 //! | settings | open or create with `max_publishers` 4, of `command` 16, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: the first participant sets them for all |
-//! | location | iceoryx2's defaults. If its root path belongs to another user: that path and `-<user ID>`, and the prefix `iox2_<user ID>_` |
+//! | location | in the folder of the user: root path `iceoryx2` in it, prefix the content of the file `prefix` in it; create the node while holding `flock` on that file |
+//! | folder of the user | `/run/hexad` if it belongs to the user; else `hexad` in `$XDG_RUNTIME_DIR`, or in `/run/user/<user ID>`, if that belongs to the user; else `/run/hexad-root` for root and `/tmp/hexad-<user ID>` for others; mode 0711, `iceoryx2` in it 0700 |
 //! | user | all participants of a machine run as one user |
 //! | signals | the daemon's node installs no handlers (`SignalHandlingMode::Disabled`) |
 //!
@@ -46,9 +47,11 @@ mod force;
 mod header;
 pub mod layout;
 mod lease;
+pub mod location;
 pub mod lockstep;
 mod measured;
 mod publisher;
+mod reservation;
 mod setpoint;
 mod statistics;
 mod status;

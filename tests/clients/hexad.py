@@ -10,8 +10,12 @@
     if force is not None and force.may_be_applied(monotonic_ns()): ...
 """
 
+import contextlib
+import fcntl
 import math
 import os
+import secrets
+import stat
 import time
 
 import iceoryx2 as iox2
@@ -56,8 +60,9 @@ class Bus:
         self.simulated = simulated
         # Signals belong to this program, not to the library.
         mode = iox2.SignalHandlingMode.Disabled
-        builder = iox2.NodeBuilder.new().signal_handling_mode(mode).config(location())
-        self.node = builder.create(iox2.ServiceType.Ipc)
+        with location() as config:
+            builder = iox2.NodeBuilder.new().signal_handling_mode(mode).config(config)
+            self.node = builder.create(iox2.ServiceType.Ipc)
 
     def _service(self, message):
         """The first participant creates the topic, so all use these numbers."""
@@ -75,14 +80,46 @@ class Bus:
         return Subscriber(port, message, self.simulated)
 
 
+def user_folder():
+    """Folder of this user's shared memory, as in the daemon: the service's own, the user's runtime folder, or /tmp."""
+    user = os.geteuid()
+    own = lambda path: os.path.isdir(path) and os.stat(path).st_uid == user
+    if own("/run/hexad"):
+        return "/run/hexad"
+    for runtime in os.environ.get("XDG_RUNTIME_DIR", ""), f"/run/user/{user}":
+        if os.path.isabs(runtime) and own(runtime):
+            return f"{runtime}/hexad"
+    return f"/tmp/hexad-{user}" if user else "/run/hexad-root"
+
+
+def make_own(folder, mode):
+    """Makes a folder in which only this user may write, and refuses one that another could have made."""
+    if not os.path.isdir(folder):
+        os.mkdir(folder)
+        os.chmod(folder, mode)
+    found = os.lstat(folder)
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o022:
+        raise PermissionError(f"{folder} must be a folder of this user in which nobody else may write")
+
+
+@contextlib.contextmanager
 def location():
-    """iceoryx2's usual location, or one of this user's own if that belongs to another user, as in the daemon."""
-    config = iox2.config.default()
-    usual, user = config.global_cfg.root_path.to_string().rstrip("/"), os.geteuid()
-    if os.path.exists(usual) and os.stat(usual).st_uid != user:
-        config.global_cfg.root_path = iox2.Path.new(f"{usual}-{user}")
-        config.global_cfg.prefix = iox2.FileName.new(f"iox2_{user}_")
-    return config
+    """Where this user's shared memory is; while a node is created there, no daemon chooses another prefix."""
+    folder = user_folder()
+    make_own(folder, 0o711)
+    make_own(f"{folder}/iceoryx2", 0o700)
+    flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+    with open(os.open(f"{folder}/prefix", flags, 0o600), "r+") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        prefix = file.read()
+        if not prefix:
+            prefix = f"hexad_{secrets.token_hex(8)}_"
+            file.write(prefix)
+            file.flush()
+        config = iox2.config.default()
+        config.global_cfg.root_path = iox2.Path.new(f"{folder}/iceoryx2")
+        config.global_cfg.prefix = iox2.FileName.new(prefix)
+        yield config
 
 
 class Publisher:

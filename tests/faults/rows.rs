@@ -1,7 +1,7 @@
 //! The rows of the table: every fault, and what becomes of it in every state.
 
 use hexad::control::diagnostic::DiagnosticCode::{
-    self, DeadlineMissed, EmergencyStop, HoldingPose, LengthOutOfStroke, MeasurementImplausible,
+    self, DaemonHeld, DeadlineMissed, EmergencyStop, HoldingPose, LengthOutOfStroke, MeasurementImplausible,
     MeasurementJumped, MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest,
     RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointEnded,
     SetpointJumped, SetpointLost, SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach,
@@ -102,7 +102,7 @@ pub const ROWS: &[Row] = &[
     ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), On]),
     // The host.
     ("deadline missed", host::deadline_missed, GENTLE, [On, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
-    ("daemon held for 1 s", host::held_1_s, GENTLE, [On, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
+    ("daemon held for 1 s", host::held_1_s, GENTLE, [On, Brake(DaemonHeld), Brake(DaemonHeld), Brake(DaemonHeld), Brake(DaemonHeld), Brake(DaemonHeld), On]),
     ("daemon held for 5 ms", host::held_5_ms, MISSED, EVERYWHERE),
     ("daemon restarted", host::restarted, GENTLE, [On, Idle(State::Standby, ReadyToEngage), Idle(State::Standby, ReadyToEngage), TOO_FAR, TOO_FAR, TOO_FAR, TOO_FAR]),
     // Two at once.

@@ -73,7 +73,7 @@ fn a_second_daemon_of_the_same_machine_is_refused() {
     let _turn = turns::beside_others();
     let Trio { setpoints, mut daemon, plant, recorder, machine } = Trio::in_motion("second");
     let second = start_daemon(&machine).ends_within(HANG);
-    assert_eq!(second.status.code(), Some(2), "{}", second.stderr);
+    assert_eq!(second.status.code(), Some(1), "{}", second.stderr);
     assert!(second.stderr.contains("another daemon does"), "{}", second.stderr);
     daemon.kill();
     // The lock dies with its holder.

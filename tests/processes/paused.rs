@@ -38,7 +38,7 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
         "daemon stopped for {PAUSE:?} at 1 kHz: {} skipped",
         after.counters.skipped - before.counters.skipped
     );
-    brakes_held_until_control_was_taken_anew(from_ns, &recording);
+    brakes_held_until_control_was_taken_anew(from_ns, DiagnosticCode::DaemonHeld, &recording);
 }
 
 #[test]
@@ -59,20 +59,16 @@ fn a_paused_plant_recovers() {
         "plant stopped for {PAUSE:?}: {} cycles of the daemon skipped",
         after.counters.skipped - before.counters.skipped
     );
-    brakes_held_until_control_was_taken_anew(from_ns, &recording);
+    brakes_held_until_control_was_taken_anew(from_ns, DiagnosticCode::MeasurementLost, &recording);
 }
 
 /// Whoever was away, the plant's brakes closed: the loop may not go on as if nothing had happened, but is in a
 /// fault until it is cleared and engaged from where the platform stands.
-fn brakes_held_until_control_was_taken_anew(from_ns: u64, recording: &Recording) {
+fn brakes_held_until_control_was_taken_anew(from_ns: u64, code: DiagnosticCode, recording: &Recording) {
     let after: Vec<_> = recording.forces.iter().filter(|force| force.release_ns > from_ns).collect();
     let let_go = after.iter().position(|force| force.valid == 0).expect("the daemon let go of the platform");
     let first = after[let_go];
-    assert_eq!(
-        (first.state, first.diagnostic_code),
-        (State::Fault as u32, DiagnosticCode::MeasurementLost as u32),
-        "{first:#?}"
-    );
+    assert_eq!((first.state, first.diagnostic_code), (State::Fault as u32, code as u32), "{first:#?}");
     let again = after[let_go..].iter().any(|force| valid_after(force, from_ns));
     assert!(again, "the loop became active again");
 }

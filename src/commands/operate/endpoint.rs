@@ -14,10 +14,11 @@ use nix::sys::socket::{
 };
 use nix::unistd::{Gid, Group, geteuid};
 
-use crate::daemon::control_socket::location::{SYSTEM_FOLDER, socket_path};
+use crate::daemon::control_socket::location::socket_path;
 use crate::daemon::control_socket::protocol::{AnswerLine, RequestLine};
 use crate::daemon::control_socket::user_name;
 use crate::messages::claim::{RunningDaemon, running_daemons};
+use crate::messages::location::SYSTEM_FOLDER;
 
 /// Longest sleep in a read, so that signals are noticed.
 const READ_INTERVAL: Duration = Duration::from_millis(20);

@@ -13,6 +13,7 @@ use crate::daemon::control_socket::protocol::RequestLine;
 use crate::daemon::control_socket::user_name;
 use crate::daemon::request_of;
 use crate::messages::clock::monotonic_ns;
+use crate::messages::location::user_id;
 use crate::messages::{StatusMessage, Subscriber};
 use crate::realtime::request_signal::RequestSignal;
 
@@ -42,8 +43,10 @@ pub fn send(
 ) -> Signalled {
     let signal = if request == Request::Stop { RequestSignal::User2 } else { RequestSignal::User1 };
     let carried_out = request_of(signal);
-    // Before the signal; without it the socket may still answer.
-    let mut statuses = config.join().and_then(|bus| bus.subscriber::<StatusMessage>(8)).ok();
+    // Before the signal. Another user's messages are not seen, but the socket may still answer.
+    let is_own = endpoint.daemon.as_ref().is_some_and(|daemon| daemon.user_id == user_id());
+    let join = || config.join().and_then(|bus| bus.subscriber::<StatusMessage>(8)).ok();
+    let mut statuses = if is_own { join() } else { None };
     let sent_ns = monotonic_ns();
     if let Err(error) = signal.send(process_id) {
         let owner = endpoint.daemon.as_ref().map_or_else(|| "its user".into(), |it| user_name(it.user_id));

@@ -6,6 +6,7 @@ use nalgebra::ComplexField as _;
 use super::{LastValid, check_stroke_with_tolerance, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Measurement};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::parameters::Parameters;
 use crate::model::machine::{Actuator, LEGS};
 
 /// Plausible rate of a leg over its largest: an external force may move it faster.
@@ -94,6 +95,10 @@ pub(in crate::control) struct MeasurementValidator {
     consistency: RateConsistency,
     /// Cycles under control without a new valid measurement.
     pub missed: u64,
+    /// Release of the cycle before \[ns\]; 0 before the first.
+    released_before_ns: u64,
+    /// Release of this cycle \[ns\].
+    released_ns: u64,
 }
 
 impl MeasurementValidator {
@@ -104,6 +109,7 @@ impl MeasurementValidator {
         cycle: &Cycle<'_>,
         newest: Option<&Measurement>,
     ) -> Result<&Measurement, Diagnostic> {
+        (self.released_before_ns, self.released_ns) = (self.released_ns, cycle.release_ns);
         let continuity = self.check_input_continuity(cycle);
         let new = newest.filter(|newest| self.last.newest.as_ref() != Some(newest));
         let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
@@ -126,7 +132,18 @@ impl MeasurementValidator {
     fn check_age(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Result<(), Diagnostic> {
         let timeout_ns = cycle.constants.parameters.measured_timeout_ns;
         check_time_stamp(DiagnosticCode::MeasurementLost, measurement.time_ns, cycle.release_ns, timeout_ns)
-            .map_err(|lost| self.last.rejection_or(lost))
+            .map_err(|lost| self.pause(cycle, measurement).unwrap_or_else(|| self.last.rejection_or(lost)))
+    }
+
+    /// The pause of the loop that made a measurement too old, if that is why: not the driver is to blame.
+    fn pause(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Option<Diagnostic> {
+        let Parameters { measured_timeout_ns, longest_pause_ns, .. } = cycle.constants.parameters;
+        let before_ns = self.released_before_ns;
+        let pause_ns = self.released_ns.saturating_sub(before_ns);
+        let was_recent = before_ns > 0 && before_ns.abs_diff(measurement.time_ns) <= measured_timeout_ns;
+        let [pause_s, longest_s] = [pause_ns, longest_pause_ns].map(|time_ns| time_ns as f64 * 1e-9);
+        (was_recent && pause_ns > longest_pause_ns)
+            .then(|| Diagnostic::new(DiagnosticCode::DaemonHeld, pause_s, longest_s))
     }
 
     /// Validates a new measurement and records it. It must continue the last valid one if that is young or the

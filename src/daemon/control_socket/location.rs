@@ -1,18 +1,16 @@
 //! Place and permissions of the control socket.
 
-use std::fs::{self, DirBuilder, Permissions};
+use std::fs::{self, Permissions};
 use std::io;
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt, chown};
+use std::os::unix::fs::{PermissionsExt, chown};
 use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
-use std::{env, process};
+use std::process;
 
 use nix::unistd::{Group, geteuid};
 
 use crate::config::deployment::OperatorAccess;
-
-/// Folder that a service manager makes for the daemon.
-pub const SYSTEM_FOLDER: &str = "/run/hexad";
+use crate::messages::location::{SYSTEM_FOLDER, TEMPORARY_FOLDER, make_user_folder, user_folder};
 
 /// Error of opening the control socket.
 #[derive(Debug, thiserror::Error)]
@@ -31,11 +29,6 @@ pub enum SocketError {
         /// Error of the operating system.
         cause: io::Error,
     },
-    /// The folder could be of another user.
-    #[error(
-        "cannot open the control socket in {0}: it must be a folder of this user that nobody else may write"
-    )]
-    Folder(PathBuf),
 }
 
 /// Path of the socket of a machine in a folder.
@@ -82,43 +75,15 @@ pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, Soc
             result => return result,
         }
     }
-    let folder = user_folder(access);
-    make_private(&folder, access, group_id).map_err(|cause| failed(folder.clone(), cause))?;
-    let owner = fs::symlink_metadata(&folder).map_err(|cause| failed(folder.clone(), cause))?;
-    if !owner.is_dir() || owner.uid() != geteuid().as_raw() || owner.mode() & 0o022 != 0 {
-        return Err(SocketError::Folder(folder));
-    }
+    let folder = folder(access);
+    make_user_folder(&folder).map_err(|cause| failed(folder.clone(), cause))?;
     bind(&folder).map_err(|cause| failed(socket_path(&folder, machine), cause))
 }
 
-/// The user's runtime folder, if nobody else has to enter it, else one in the folder for temporary files.
-fn user_folder(access: &OperatorAccess) -> PathBuf {
+/// The user's folder, if nobody else has to enter it, else one among the temporary files.
+fn folder(access: &OperatorAccess) -> PathBuf {
     let is_private = access.group.is_none() && !access.is_for_everybody();
-    let runtime = env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
-    match runtime.filter(|folder| is_private && folder.is_absolute() && folder.is_dir()) {
-        Some(folder) => folder.join("hexad"),
-        None => PathBuf::from(format!("/tmp/hexad-{}", geteuid())),
-    }
-}
-
-/// Makes the folder; others may enter it, but not list it, only where they may use the socket.
-fn make_private(folder: &Path, access: &OperatorAccess, group_id: Option<u32>) -> io::Result<()> {
-    match DirBuilder::new().mode(0o700).create(folder) {
-        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
-        _ => {}
-    }
-    if !fs::symlink_metadata(folder)?.is_dir() {
-        return Ok(());
-    }
-    let entered = if access.is_for_everybody() { 0o711 } else { 0o710 };
-    if let Some(group_id) = group_id {
-        chown(folder, None, Some(group_id))?;
-    }
-    let is_shared = group_id.is_some() || access.is_for_everybody();
-    let mode = fs::metadata(folder)?.mode() & 0o777;
-    // Machines of one user share the folder: what one has opened another does not close.
-    let wanted = if is_shared { mode | entered } else { mode };
-    if wanted != mode { fs::set_permissions(folder, Permissions::from_mode(wanted)) } else { Ok(()) }
+    if is_private { user_folder() } else { format!("{TEMPORARY_FOLDER}{}", geteuid()).into() }
 }
 
 /// Binds under a temporary name: the socket appears with its permissions, and replaces that of a daemon that died.
@@ -143,6 +108,7 @@ fn bind(path: &Path, mode: u32, group_id: Option<u32>) -> io::Result<ControlSock
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::MetadataExt;
     use tempfile::TempDir;
 
     #[test]

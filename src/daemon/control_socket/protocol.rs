@@ -80,6 +80,24 @@ pub enum RequestResult {
     Invalid,
 }
 
+impl RequestResult {
+    /// What became of it, for people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Accepted => "accepted",
+            Self::Waiting => "waiting",
+            Self::Done => "done",
+            Self::Refused => "refused",
+            Self::Failed => "failed",
+            Self::TimedOut => "timed out",
+            Self::Superseded => "superseded",
+            Self::Unanswered => "unanswered",
+            Self::Stale => "stale",
+            Self::Invalid => "not understood",
+        }
+    }
+}
+
 /// Diagnostic with its number, value, bound and sentence.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DiagnosticReport {

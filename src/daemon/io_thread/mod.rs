@@ -14,6 +14,7 @@ use self::inputs::{InputFilter, Inputs};
 use self::outputs::{OutputSettings, Outputs};
 use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
 use super::snapshot::Snapshot;
+use super::supervision::Progress;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::lockstep::poll_until;
 use crate::messages::{Bus, IoCounters, PortError, RejectionCounts, Statistics};
@@ -56,6 +57,8 @@ pub struct IoLinks<'a> {
     pub word: &'static RequestWord,
     /// Set when the daemon is to end: the platform comes to rest.
     pub is_ending: &'a AtomicBool,
+    /// To the main thread.
+    pub progress: &'a Progress,
     /// Set here when the daemon is to end and the platform is not under control.
     pub may_end: &'a AtomicBool,
 }
@@ -94,6 +97,8 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
     let Ports { inputs, outputs } = ports;
     let allocations_at_start = at_start.allocations;
     let (published, answered, snapshot) = (0, (0, 0), Snapshot::default());
+    // Every wait looks at it.
+    let progress = links.progress;
     let mut io = IoThread {
         settings,
         inputs,
@@ -105,7 +110,10 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
         snapshot,
         allocations_at_start,
     };
-    let is_stopped = || stop.load(Ordering::Relaxed);
+    let is_stopped = || {
+        progress.count_io_round();
+        stop.load(Ordering::Relaxed)
+    };
     match settings.timing.release {
         ReleaseMode::Lockstep => io.run_in_lockstep(is_stopped),
         ReleaseMode::Sleep | ReleaseMode::Hybrid => io.run_in_phase(is_stopped),
@@ -249,9 +257,10 @@ impl IoThread<'_> {
             allocations: ThreadUsage::allocations_of_this_thread() - self.allocations_at_start,
             rejected: self.inputs.rejections(),
         };
-        let IoLinks { exchange, statistics, delays, snapshots, .. } = &mut self.links;
+        let IoLinks { exchange, statistics, delays, snapshots, progress, .. } = &mut self.links;
         let settings = OutputSettings { home, max_force_age_ns };
         let cycle = *exchange.outputs.value();
+        progress.set_output(&cycle.output);
         let status = self.outputs.publish(&settings, cycle, counters, statistics, delays);
         let input = self.inputs.input();
         self.snapshot = Snapshot {

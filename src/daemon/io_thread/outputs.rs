@@ -98,7 +98,7 @@ fn invalidate_if_held(cycle: &mut CycleOutput, now_ns: u64, max_force_age_ns: u6
     let (output, age_ns) = (&mut cycle.output, now_ns.saturating_sub(cycle.due_ns));
     if age_ns > max_force_age_ns && output.state.has_control() {
         let [age_s, bound_s] = [age_ns, max_force_age_ns].map(|time_ns| time_ns as f64 * 1e-9);
-        let diagnostic = Diagnostic::new(DiagnosticCode::MeasurementLost, age_s, bound_s);
+        let diagnostic = Diagnostic::new(DiagnosticCode::DaemonHeld, age_s, bound_s);
         (output.state, output.diagnostic, output.force) = (State::Fault, diagnostic, Output::default().force);
     }
 }
@@ -118,7 +118,7 @@ mod tests {
                 let mut cycle = CycleOutput { due_ns: DUE_NS, output, ..CycleOutput::default() };
                 invalidate_if_held(&mut cycle, DUE_NS + age_ns, MAX_AGE_NS);
                 let expected = if is_held && state.has_control() {
-                    let diagnostic = Diagnostic::new(DiagnosticCode::MeasurementLost, 0.021, 0.02);
+                    let diagnostic = Diagnostic::new(DiagnosticCode::DaemonHeld, 0.021, 0.02);
                     Output { state: State::Fault, diagnostic, ..Output::default() }
                 } else {
                     output

@@ -12,15 +12,15 @@ use crate::common::not_run::lacking;
 /// `nobody` on every Linux.
 const NOBODY: &str = "65534";
 
-/// Empty places for iceoryx2, which keeps files of one owner in `/tmp/iceoryx2` and `/dev/shm`. They are seen
-/// by this process and its children only.
+/// Empty places for shared memory, and for its book-keeping of a user without a runtime folder. They are seen by this
+/// process and its children only.
 pub const OWN_PLACES: &[&str] = &[
     "unshare",
     "--mount",
     "sh",
     "-c",
-    "mkdir -p /tmp/iceoryx2 && mount -t tmpfs -o mode=1777 tmpfs /tmp/iceoryx2 \
-     && mount -t tmpfs -o mode=1777 tmpfs /dev/shm && exec \"$@\"",
+    "mount -t tmpfs -o mode=1777 tmpfs /dev/shm && if [ -d /run/hexad-root ]; then \
+     mount -t tmpfs -o mode=0700 tmpfs /run/hexad-root; fi && exec \"$@\"",
     "sh",
 ];
 

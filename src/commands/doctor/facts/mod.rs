@@ -8,7 +8,7 @@ use self::permissions::RefusedRights;
 use self::processors::LoopCpus;
 use super::files::HostFiles;
 use crate::config::deployment::Realtime;
-use crate::messages::Bus;
+use crate::messages::location::user_folder;
 use crate::realtime::clock_cost::ClockCost;
 use crate::realtime::setup::permissions::Permissions;
 
@@ -98,7 +98,7 @@ pub fn all(
         ("clock", kernel::clock(host, cost)),
         ("swap", surroundings::swap(host)),
         ("huge pages", surroundings::huge_pages(host)),
-        ("shared memory", surroundings::shared_memory(host, Bus::fallback_location().as_deref())),
+        ("shared memory", surroundings::shared_memory(host, &user_folder())),
     ]);
     facts.into_iter().map(|(name, examined)| named(name, examined)).collect()
 }

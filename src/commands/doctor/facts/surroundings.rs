@@ -1,5 +1,7 @@
 //! Facts about the host beyond the kernel: virtualization, swap, huge pages, shared memory.
 
+use std::path::Path;
+
 use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 
@@ -51,23 +53,22 @@ pub fn huge_pages(host: &HostFiles) -> Examined {
     }
 }
 
-/// File system of the shared memory; `fallback` is the reason why this user has a location of its own, if so.
-pub fn shared_memory(host: &HostFiles, fallback: Option<&str>) -> Examined {
+/// File system of the shared memory, and the `folder` of this user's book-keeping.
+pub fn shared_memory(host: &HostFiles, folder: &Path) -> Examined {
     let mounts = host.text("proc/self/mountinfo")?;
     // The last mount hides those before it.
     let kind = mounts.lines().rev().find_map(|line| {
         let (mount, kind) = line.split_once(" - ")?;
         (mount.split(' ').nth(4)? == "/dev/shm").then(|| kind.split(' ').next())?
     });
-    match (kind, fallback) {
-        (Some("tmpfs"), None) => Ok(Fact::good("/dev/shm")),
-        (Some("tmpfs"), Some(reason)) => {
-            Ok(Fact::fair(reason, "run all participants of a machine as one user"))
+    match kind {
+        Some("tmpfs") => {
+            Ok(Fact::good(format!("/dev/shm, for all who run as this user: {}", folder.display())))
         }
-        (Some(kind), _) => {
+        Some(kind) => {
             Ok(Fact::bad(format!("/dev/shm is {kind} and not memory"), "mount -t tmpfs tmpfs /dev/shm"))
         }
-        (None, _) => Ok(Fact::bad("nothing is mounted on /dev/shm", "mount -t tmpfs tmpfs /dev/shm")),
+        None => Ok(Fact::bad("nothing is mounted on /dev/shm", "mount -t tmpfs tmpfs /dev/shm")),
     }
 }
 
@@ -124,21 +125,21 @@ mod tests {
     }
 
     #[test]
-    fn shared_memory_is_in_memory_and_of_this_user() {
+    fn shared_memory_is_in_memory() {
         let disk = "25 24 8:1 / /dev/shm rw - ext4 /dev/sda1 rw";
         let memory = "25 24 0:23 / /dev/shm rw shared:3 - tmpfs tmpfs rw,size=24684084k";
         let both = "25 24 8:1 / /dev/shm rw - ext4 /dev/sda1 rw\n26 25 0:23 / /dev/shm rw - tmpfs tmpfs rw";
         let elsewhere = "25 24 0:23 / /tmp rw - tmpfs tmpfs rw";
-        for (mounts, fallback, assessment) in [
-            (memory, None, Assessment::Good),
-            (both, None, Assessment::Good),
-            (memory, Some("/tmp/iceoryx2 belongs to user 0"), Assessment::Fair),
-            (disk, None, Assessment::Bad),
-            (elsewhere, None, Assessment::Bad),
+        let folder = Path::new("/run/hexad");
+        for (mounts, assessment) in [
+            (memory, Assessment::Good),
+            (both, Assessment::Good),
+            (disk, Assessment::Bad),
+            (elsewhere, Assessment::Bad),
         ] {
-            let fact = examined(shared_memory(&host(&[("proc/self/mountinfo", mounts)]).files, fallback));
+            let fact = examined(shared_memory(&host(&[("proc/self/mountinfo", mounts)]).files, folder));
             assert_eq!(fact.assessment, assessment, "{mounts}: {fact:?}");
         }
-        assert_eq!(examined(shared_memory(&host(&[]).files, None)).assessment, Assessment::Unknown);
+        assert_eq!(examined(shared_memory(&host(&[]).files, folder)).assessment, Assessment::Unknown);
     }
 }

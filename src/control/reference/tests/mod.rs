@@ -108,6 +108,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         max_measured_age_ns: 10_000_000,
         ready_timeout_ns: 500_000_000,
         pose_tolerance: 5e-4,
+        longest_pause_ns: 10_000_000,
     }
 }
 

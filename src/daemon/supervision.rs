@@ -1,0 +1,203 @@
+//! Supervision of the threads by the main thread, for a service manager: its watchdog is fed only while the loop runs.
+//!
+//! Without a service manager only the log remains: a thread that hangs is named.
+
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use sd_notify::NotifyState;
+use tracing::{error, info, warn};
+
+use super::REALTIME_THREAD;
+use crate::control::controller::Output;
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::state::State;
+use crate::realtime::stop_request::Hangups;
+
+/// Time between two looks at the progress of the threads: many within the time-out of any watchdog.
+pub const SUPERVISION_INTERVAL: Duration = Duration::from_millis(100);
+
+/// A thread without progress for this long is reported: longer than a host takes a processor away.
+const REPORTED_AFTER: Duration = Duration::from_secs(1);
+
+/// Progress of the threads, each written by that thread alone.
+#[derive(Debug, Default)]
+pub struct Progress {
+    cycles: AtomicU64,
+    io_rounds: AtomicU64,
+    state: AtomicU32,
+    code: AtomicU32,
+}
+
+impl Progress {
+    /// A cycle of the real-time thread.
+    pub fn count_cycle(&self) {
+        // One writer: no need for an operation that locks the bus.
+        self.cycles.store(self.cycles.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+
+    /// A round of the I/O thread.
+    pub fn count_io_round(&self) {
+        self.io_rounds.store(self.io_rounds.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
+    }
+
+    /// Output of the last cycle.
+    pub fn set_output(&self, output: &Output) {
+        self.state.store(output.state as u32, Ordering::Relaxed);
+        self.code.store(output.diagnostic.code as u32, Ordering::Relaxed);
+    }
+
+    fn status(&self) -> (State, DiagnosticCode) {
+        let state = State::from_number(self.state.load(Ordering::Relaxed));
+        let code = DiagnosticCode::from_number(self.code.load(Ordering::Relaxed));
+        (state.unwrap_or_default(), code.unwrap_or_default())
+    }
+}
+
+/// A thread under supervision.
+struct Supervised {
+    name: &'static str,
+    /// In simulated time a thread may wait for ever.
+    has_to_progress: bool,
+    counted: u64,
+    /// The last look that saw progress.
+    seen: Instant,
+    is_reported: bool,
+}
+
+impl Supervised {
+    fn new(name: &'static str, has_to_progress: bool) -> Self {
+        Self { name, has_to_progress, counted: 0, seen: Instant::now(), is_reported: false }
+    }
+
+    /// Whether there was progress since the last call.
+    fn has_progressed(&mut self, count: u64) -> bool {
+        if !self.has_to_progress {
+            return true;
+        }
+        let has_progressed = count != self.counted;
+        if has_progressed {
+            if self.is_reported {
+                warn!(thread = self.name, "the thread {} runs again", self.name);
+            }
+            (self.counted, self.seen, self.is_reported) = (count, Instant::now(), false);
+        } else if !self.is_reported && self.seen.elapsed() > REPORTED_AFTER {
+            self.is_reported = true;
+            error!(thread = self.name, "the thread {} has stopped: it makes no progress", self.name);
+        }
+        has_progressed
+    }
+}
+
+/// Supervision of the loop.
+pub struct Supervision<'a> {
+    progress: &'a Progress,
+    threads: [Supervised; 2],
+    /// Threads that have progressed since the watchdog was fed.
+    has_progressed: [bool; 2],
+    rate_hz: f64,
+    reported: Option<(State, DiagnosticCode)>,
+    looked: Instant,
+    hangups: Option<Hangups>,
+}
+
+impl<'a> Supervision<'a> {
+    /// Reports that the daemon is ready.
+    pub fn begin(progress: &'a Progress, rate_hz: f64, is_simulated: bool) -> Self {
+        let is_service = std::env::var_os("NOTIFY_SOCKET").is_some();
+        // A terminal that is closed ends the daemon; a service manager has other means.
+        let hangups = is_service.then(Hangups::count).and_then(Result::ok);
+        let _ = sd_notify::notify(&[NotifyState::Ready]);
+        let threads = [REALTIME_THREAD, "hexad-io"].map(|name| Supervised::new(name, !is_simulated));
+        Self {
+            progress,
+            threads,
+            has_progressed: [false; 2],
+            rate_hz,
+            reported: None,
+            looked: Instant::now(),
+            hangups,
+        }
+    }
+
+    /// Looks at the progress, feeds the watchdog and reports a new state.
+    pub fn step(&mut self) {
+        if self.looked.elapsed() < SUPERVISION_INTERVAL {
+            return;
+        }
+        self.looked = Instant::now();
+        if self.have_all_progressed() {
+            let _ = sd_notify::notify(&[NotifyState::Watchdog]);
+        }
+        let status = self.progress.status();
+        if self.reported != Some(status) {
+            self.reported = Some(status);
+            let _ = sd_notify::notify(&[NotifyState::Status(&text(status, self.rate_hz))]);
+        }
+        if self.hangups.as_mut().is_some_and(Hangups::has_new) {
+            info!("SIGHUP: nothing to do; the machine file is read at the start only");
+        }
+    }
+
+    /// Whether every thread has progressed since this was true last.
+    fn have_all_progressed(&mut self) -> bool {
+        let counts = [&self.progress.cycles, &self.progress.io_rounds];
+        for ((thread, count), seen) in self.threads.iter_mut().zip(counts).zip(&mut self.has_progressed) {
+            *seen |= thread.has_progressed(count.load(Ordering::Relaxed));
+        }
+        let have_all = self.has_progressed == [true; 2];
+        if have_all {
+            self.has_progressed = [false; 2];
+        }
+        have_all
+    }
+
+    /// Reports that the daemon is about to end.
+    pub fn end(&self) {
+        let _ = sd_notify::notify(&[NotifyState::Stopping]);
+    }
+}
+
+/// Status for people.
+fn text((state, code): (State, DiagnosticCode), rate_hz: f64) -> String {
+    if state.has_control() && code == DiagnosticCode::None {
+        return format!("{} at {rate_hz} Hz", state.name());
+    }
+    format!("{} at {rate_hz} Hz: {}", state.name(), Diagnostic::from(code))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_watchdog_is_fed_only_if_every_thread_has_progressed_since() {
+        let progress = Progress::default();
+        let mut supervision = Supervision::begin(&progress, 1000.0, false);
+        type Count = fn(&Progress);
+        let steps: [(&[Count], bool); 6] = [
+            (&[], false),
+            (&[Progress::count_cycle], false),
+            (&[Progress::count_cycle], false),
+            (&[Progress::count_io_round], true),
+            (&[Progress::count_io_round], false),
+            (&[Progress::count_io_round, Progress::count_cycle], true),
+        ];
+        for (k, (threads, expected)) in steps.into_iter().enumerate() {
+            threads.iter().for_each(|count| count(&progress));
+            assert_eq!(supervision.have_all_progressed(), expected, "step {k}");
+        }
+        let mut simulated = Supervision::begin(&progress, 1000.0, true);
+        assert!(simulated.have_all_progressed(), "in simulated time all may wait");
+    }
+
+    #[test]
+    fn the_status_says_state_and_reason() {
+        let of = |state, code| text((state, code), 500.0);
+        assert_eq!(of(State::Active, DiagnosticCode::None), "active at 500 Hz");
+        assert_eq!(
+            of(State::Fault, DiagnosticCode::EmergencyStop),
+            "fault at 500 Hz: emergency stop; clear when it is safe"
+        );
+    }
+}
