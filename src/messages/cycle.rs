@@ -220,9 +220,9 @@ impl CycleMessage {
     /// Input of the cycle; `None` if a number has no meaning.
     pub fn input(&self) -> Option<Input> {
         let setpoint = Setpoint {
-            kind: [SetpointKind::ALL.as_slice(), &[SetpointKind::Unknown]]
-                .concat()
+            kind: SetpointKind::ALL
                 .into_iter()
+                .chain([SetpointKind::Unknown])
                 .find(|kind| *kind as u32 == self.setpoint_kind)?,
             time_ns: self.setpoint_time_ns,
             task: TaskState {
