@@ -141,7 +141,7 @@ fn who_has_read_enough_is_no_failure_and_a_full_disk_is_one() {
 fn a_daemon_says_that_its_loop_is_bold() {
     let machine = Machine::with(
         "bold",
-        "[control]\nmode = \"feedforward_joint_pd\"\nposition_bandwidth_hz = 28.7\nposition_damping_ratio = 3.0\n",
+        "[control]\nmode = \"feedforward_joint_pd\"\nposition_bandwidth_hz = 28.724\nposition_damping_ratio = 3.0\ndisturbance_m_s2_per_sqrt_s = 500.0\n",
     );
     let daemon = start_daemon(&machine);
     daemon.says("WARN legs loop: with 2.10 periods of delay it is stable with");
