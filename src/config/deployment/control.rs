@@ -190,7 +190,7 @@ impl Plant<'_> {
     }
 
     /// Bandwidth of the estimator \[Hz\]: what noise and disturbances ask for, no more than the delay lets it be, and slower where a
-    /// loop would not be stable with [`STABLE_MASSES`]. `None` if a loop is stable with none.
+    /// loop would not be stable with [`STABLE_MASSES`], or as fast as a loop where only that is stable. `None` if a loop is stable with none.
     fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> Option<f64> {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();
@@ -198,11 +198,14 @@ impl Plant<'_> {
         let asked_hz = intensity.powf(1.0 / 6.0) / TAU;
         let ratio = if drive.delay_s.is_some() { ESTIMATOR_RATIO } else { ESTIMATOR_RATIO_DELAY_UNKNOWN };
         let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(asked_hz, f64::min);
-        if !largest_hz.is_finite() {
+        // Something else of the file is wrong.
+        if !(largest_hz.is_finite() && largest_hz > 0.0) {
             return Some(f64::NAN);
         }
+        let slower = (0..ESTIMATOR_STEPS).map(|step| largest_hz * 0.8_f64.powi(step));
+        let candidates: Vec<_> = slower.chain(loops.iter().map(|(hertz, ..)| *hertz)).collect();
         let first = |is_stable: fn(&SampledLoop) -> bool| {
-            (0..ESTIMATOR_STEPS).map(|step| largest_hz * 0.8_f64.powi(step)).find(|estimator_hz| {
+            candidates.iter().copied().find(|estimator_hz| {
                 loops.iter().all(|(hertz, sampled, gain)| {
                     let (wn_t, estimator_ratio) = (TAU * hertz * period_s, estimator_hz / hertz);
                     is_stable(&SampledLoop { wn_t, estimator_ratio, ..*sampled }.with_feedback_gain(*gain))
