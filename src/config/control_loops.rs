@@ -53,19 +53,21 @@ const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
 /// Largest constant age of the measurements with which all loops are stable, and the estimator knows what was sent since \[s\].
 /// No less than the age that the measurements have in any case.
 pub fn longest_age_s(deployment: &Deployment) -> f64 {
-    let period_s = deployment.realtime.period_s();
-    let drive = deployment.drive.total_delay_s() / period_s;
-    let recorded = SENT_ACCELERATIONS as f64 - 1.0 - drive;
-    let ages = loops(deployment).into_iter().map(|ControlLoop { sampled, .. }| {
-        let longest = sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay);
-        longest - drive
+    let recorded = SENT_ACCELERATIONS as f64 - 1.0;
+    let recorded_s = recorded * deployment.realtime.period_s() - deployment.drive.total_delay_s();
+    stable_age_s(deployment).min(recorded_s)
+}
+
+fn stable_age_s(deployment: &Deployment) -> f64 {
+    let delays = loops(deployment).into_iter().map(|ControlLoop { sampled, .. }| {
+        sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay)
     });
-    ages.fold(recorded, f64::min) * period_s
+    delays.fold(f64::INFINITY, f64::min) * deployment.realtime.period_s() - deployment.drive.total_delay_s()
 }
 
 /// Warning if control without measurements may last longer than the loop stands measurements of that age.
 pub fn timeout_warning(deployment: &Deployment) -> Option<String> {
-    let [timeout_ms, age_ms] = [deployment.timeouts.measured_s, longest_age_s(deployment)].map(|s| 1e3 * s);
+    let [timeout_ms, age_ms] = [deployment.timeouts.measured_s, stable_age_s(deployment)].map(|s| 1e3 * s);
     (timeout_ms > age_ms).then(|| {
         format!(
             "timeouts.measured_ms = {timeout_ms} is more than {age_ms:.1} ms, the largest age of measurements with which the \

@@ -190,7 +190,8 @@ fn status_shows_what_the_daemon_knows() {
     for (source, process) in [("setpoint", &trio.setpoints), ("measured", &trio.plant)] {
         let sources = report["sources"].as_array().expect("sources");
         let found = sources.iter().find(|found| found["topic"] == source).expect(source);
-        let process = json!([{"process_id": process.id(), "command": "hexad", "user": "root"}]);
+        let process =
+            json!([{"process_id": process.id(), "command": "hexad", "user": "root", "is_ignored": false}]);
         assert_eq!(found["processes"], process, "{source}");
         assert!(found["age_s"].as_f64().is_some_and(|age_s| age_s < 1.0), "{found}");
     }

@@ -146,7 +146,7 @@ fn has_exactly_the_fields_of_the_contract(report: &Value) {
         ("io_thread", &usage),
         ("log_thread", &usage),
     ];
-    let mut top = vec!["cycles", "rate_hz", "worst_cycles", "faults"];
+    let mut top = vec!["cycles", "rate_hz", "worst_cycles", "faults", "recording"];
     top.extend(fields.iter().map(|(name, _)| *name));
     top.sort_unstable();
     assert_eq!(keys(report), top);
