@@ -80,13 +80,18 @@ impl ControlLoop {
     /// Warning where a mass that is plausible would make the loop unstable.
     pub fn warning(&self) -> Option<String> {
         let Self { name, sampled, .. } = self;
+        let delay = sampled.delay;
+        if !sampled.is_stable() {
+            return Some(format!(
+                "{name} loop: with {delay:.2} periods of delay it is not stable: lower the bandwidths or the damping ratios"
+            ));
+        }
         let (lightest, heaviest) = (1.0 / sampled.gain_margin(), 1.0 / sampled.least_gain());
         let [light, heavy] = STABLE_MASSES;
         (lightest > light || heaviest < heavy).then(|| {
             format!(
-                "{name} loop: with {:.2} periods of delay it is stable with {lightest:.2} to {heaviest:.2} of the modelled \
-                 mass only; {light} to {heavy} is advisable: lower the bandwidths, or shorten the delay",
-                sampled.delay
+                "{name} loop: with {delay:.2} periods of delay it is stable with {lightest:.2} to {heaviest:.2} of the modelled \
+                 mass only; {light} to {heavy} is advisable: lower the bandwidths, or shorten the delay"
             )
         })
     }

@@ -122,13 +122,6 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     } else {
         [position(1.0), orientation]
     };
-    let estimator_bandwidth_hz =
-        plant.estimator_hz(disturbance_m_s2_per_sqrt_s, &loops).unwrap_or_else(|| {
-            let bound =
-                "must be lower, or the damping ratios: no bandwidth of the estimator makes the loops stable";
-            section.reject("position_bandwidth_hz", bound);
-            f64::NAN
-        });
     let control = Control {
         mode,
         position_bandwidth_hz,
@@ -161,7 +154,7 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
         fidelity_tolerance: section.number_or("fidelity_tolerance", 0.001, Bound::UpTo(1.0)),
         compensate_disturbances,
         disturbance_m_s2_per_sqrt_s,
-        estimator_bandwidth_hz,
+        estimator_bandwidth_hz: plant.estimator_hz(disturbance_m_s2_per_sqrt_s, &loops),
         on_setpoint_lost: section.choice_or(
             "on_setpoint_lost",
             AfterStop::Fault,
@@ -190,8 +183,8 @@ impl Plant<'_> {
     }
 
     /// Bandwidth of the estimator \[Hz\]: what noise and disturbances ask for, no more than the delay lets it be, and slower where a
-    /// loop would not be stable with [`STABLE_MASSES`], or as fast as a loop where only that is stable. `None` if a loop is stable with none.
-    fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> Option<f64> {
+    /// loop would not be stable with [`STABLE_MASSES`], or as fast as a loop where only that is stable.
+    fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> f64 {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();
         let intensity = disturbance * disturbance / (noise.length_m * noise.length_m * period_s);
@@ -200,7 +193,7 @@ impl Plant<'_> {
         let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(asked_hz, f64::min);
         // Something else of the file is wrong.
         if !(largest_hz.is_finite() && largest_hz > 0.0) {
-            return Some(f64::NAN);
+            return f64::NAN;
         }
         let slower = (0..ESTIMATOR_STEPS).map(|step| largest_hz * 0.8_f64.powi(step));
         let candidates: Vec<_> = slower.chain(loops.iter().map(|(hertz, ..)| *hertz)).collect();
@@ -212,7 +205,7 @@ impl Plant<'_> {
                 })
             })
         };
-        first(is_stable_with_masses).or_else(|| first(SampledLoop::is_stable))
+        first(is_stable_with_masses).or_else(|| first(SampledLoop::is_stable)).unwrap_or(largest_hz)
     }
 }
 

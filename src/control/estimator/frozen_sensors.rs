@@ -13,8 +13,8 @@ use crate::model::machine::LEGS;
 
 /// Equal readings in a row from which on a sensor may be frozen: fewer happen by chance with coarse steps.
 const MIN_EQUAL_READINGS: u32 = 3;
-/// Motion of the reference that six equal lengths allow, and one \[m\]. Stiction and coarse steps leave 6 and 33 um
-/// (`tests/closed_loop/false_alarms.rs`).
+/// Motion of the reference that six equal lengths allow, and one \[m\]. A drive with stiction of a thousandth of its
+/// largest force leaves 6 and 33 um.
 const ALL_LEGS_BOUND_M: f64 = 15e-6;
 const ONE_LEG_BOUND_M: f64 = 60e-6;
 /// Equal readings in a row of a sensor with noise of [`NOISY_STEPS`] steps: with a chance of 0.07 each, once in 1e14.
