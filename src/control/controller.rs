@@ -156,7 +156,7 @@ pub struct Controller {
     memory: Memory,
 }
 
-/// All of a controller that changes from cycle to cycle: whoever has it and the inputs can repeat what follows.
+/// All of a controller that changes from cycle to cycle: with it and the inputs what follows can be repeated.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory {

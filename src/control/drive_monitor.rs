@@ -3,9 +3,6 @@
 //! A driver reports what it has; what it does not report is not checked. After `engage` the platform is held where it stands until
 //! all drives are ready.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
-
 use super::controller::{Cycle, Measurement};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::input_validation::seconds_between;

@@ -3,9 +3,6 @@
 //! A wrong homing, a wrong scale or a slipped encoder moves the pose of forward kinematics, and with lengths alone nothing contradicts
 //! it. The lengths that the other pose has say which leg is wrong.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
-
 use super::controller::{Cycle, Measurement};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::input_validation::seconds_between;

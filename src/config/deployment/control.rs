@@ -21,7 +21,7 @@ const DEFAULT_BANDWIDTH_HZ: f64 = 10.0;
 /// Usual damping ratios; a ratio beyond them is a mistake.
 const DAMPING_RATIO_BOUND: Bound = Bound::Within(0.1, 10.0);
 /// Masses of the platform over that of the model with which the default bandwidths and the estimator are stable; less is
-/// warned of. A payload that is not told should stay well within them.
+/// warned of. A payload that is not configured should stay well within them.
 pub const STABLE_MASSES: [f64; 2] = [0.7, 1.5];
 /// Bandwidth of the estimator over the lesser bandwidth of the loops, at most: with the delay of the drives configured, and
 /// without. What is faster only amplifies noise, and a delay that is not known would make it unstable.
