@@ -11,7 +11,7 @@ const MAX_COARSE_PERIODS: f64 = 1024.0;
 impl SampledLoop {
     /// The longest stable delay, in periods, of which the estimator knows all but what it does not know of the present one, as it
     /// knows the age of a measurement by its stamp; with each of these masses over that of the model. More than
-    /// [`KNOWN_DELAY_PERIODS`] are those of a loop with longer periods, which stands less.
+    /// `KNOWN_DELAY_PERIODS` are those of a loop with longer periods, which stands less.
     pub fn longest_known_delay(&self, masses: &[f64]) -> f64 {
         let mut periods = 1.0;
         loop {

@@ -154,7 +154,7 @@ fn process_of<T: Message>(service: &PortFactory<ipc::Service, T, ()>, id: Unique
     found
 }
 
-/// Subscriber of one topic on which one publisher counts at a time, see [`super::lease`].
+/// Subscriber of one topic on which one publisher counts at a time, see `src/messages/lease.rs`.
 pub struct LeasedSubscriber<T: Message> {
     subscriber: Subscriber<T>,
     lease: Lease<UniquePublisherId>,
