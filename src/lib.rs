@@ -67,6 +67,7 @@
 //! | hold | constant force or pose between two instants |
 //! | home | pose of the machine's configuration from which it is started and to which it parks |
 //! | innovation | measured minus predicted motion |
+//! | jog | motion by keys, while they are held |
 //! | kinematic state | pose with its leg lengths and the factorization of N, see [`model::kinematic_state`] |
 //! | lane | element of a SIMD vector; one leg each |
 //! | leg masses | effective mass that each actuator moves at home |
@@ -79,6 +80,7 @@
 //! | park | operator request to move home and disable forces |
 //! | plant | simulated platform with drives and sensors, see [`plant`] |
 //! | plausibility window | longest time over which lengths and rates of a measurement are compared |
+//! | player | setpoint source that plays a motion, `hexad move` |
 //! | policy | reaction to a setpoint that the limits do not allow: `stop` or `limit`, `[setpoint] on_violation` |
 //! | prefault | touch memory in advance, so that no cycle causes a page fault |
 //! | recording | file with every cycle of a run: timing, input, output, see [`recording`] |

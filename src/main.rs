@@ -13,12 +13,13 @@ use hexad::realtime::process::stop_with_parent;
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
-    log::install();
     let parent = env::var(PARENT_VARIABLE).ok().and_then(|number| number.parse().ok());
     if parent.is_some_and(|parent| !stop_with_parent(parent)) {
         return ExitCode::SUCCESS;
     }
-    match CommandLine::parse().execute() {
+    let command = CommandLine::parse();
+    log::install(command.log_format);
+    match command.execute() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             log::report_failure(&failure.message);

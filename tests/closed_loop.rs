@@ -18,6 +18,7 @@ mod closed_loop {
     mod false_alarms;
     mod feedback;
     mod fidelities;
+    mod hardware_failures;
     mod inputs;
     mod limits;
     mod modes;

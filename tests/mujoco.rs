@@ -11,7 +11,6 @@ mod mujoco {
     mod in_the_loop;
     mod layouts;
     pub mod python;
-    mod verdicts;
 }
 
 use std::ffi::OsStr;

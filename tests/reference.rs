@@ -8,6 +8,7 @@ mod reference {
     use super::*;
 
     mod arrival;
+    mod goto;
     mod limits;
     mod observer;
     mod rates;

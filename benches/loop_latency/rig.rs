@@ -72,7 +72,7 @@ impl Rig {
         let deployment = format!(
             "[realtime]\nrate_hz = {rate_hz}\nrelease = \"{}\"\ncpu = {contestant}\nio_cpu = {helpers}\n\
              priority = {PRIORITY}\nrequire_realtime = true\n\
-             [timeouts]\nsetpoint_ms = {TIMEOUT_MS:?}\nmeasured_ms = {TIMEOUT_MS:?}\n",
+             [timeouts]\nsetpoint_ms = {TIMEOUT_MS:?}\nmeasured_ms = {TIMEOUT_MS:?}\nallow_unstable_age = true\n",
             release.name()
         );
         table.extend(toml::from_str::<toml::Table>(&deployment)?);

@@ -23,15 +23,28 @@ impl SampledLoop {
         }
     }
 
-    /// The same of a loop with so many times the period, in periods of that loop.
-    fn coarse_known_delay(&self, periods: f64, masses: &[f64]) -> f64 {
+    /// Whether a delay, in periods, of which the estimator knows as much is stable with each of these masses; of a loop with longer
+    /// periods where it is long. Much faster than [`SampledLoop::longest_known_delay`].
+    pub fn is_stable_with_known_delay(&self, delay: f64, masses: &[f64]) -> bool {
+        let mut periods = 1.0;
+        while delay / periods > KNOWN_DELAY_PERIODS {
+            periods *= 2.0;
+        }
+        self.is_stable_with_coarse(periods, delay / periods, masses)
+    }
+
+    /// Whether a loop with so many times the period is stable with a known delay in periods of that loop.
+    fn is_stable_with_coarse(&self, periods: f64, known_delay: f64, masses: &[f64]) -> bool {
         let unknown = (self.delay - self.known_delay) / periods;
         let rate_noise = self.rate_noise.map(|noise| noise * periods);
-        let coarse = Self { wn_t: self.wn_t * periods, rate_noise, ..*self };
-        let with = |known_delay: f64| {
-            let late = Self { known_delay, delay: known_delay + unknown, ..coarse };
-            masses.iter().all(|mass| late.is_stable_with_gain(1.0 / mass))
-        };
+        let wn_t = self.wn_t * periods;
+        let late = Self { wn_t, rate_noise, known_delay, delay: known_delay + unknown, ..*self };
+        masses.iter().all(|mass| late.is_stable_with_gain(1.0 / mass))
+    }
+
+    /// The same of a loop with so many times the period, in periods of that loop.
+    fn coarse_known_delay(&self, periods: f64, masses: &[f64]) -> f64 {
+        let with = |known_delay: f64| self.is_stable_with_coarse(periods, known_delay, masses);
         if with(KNOWN_DELAY_PERIODS) {
             return KNOWN_DELAY_PERIODS;
         }

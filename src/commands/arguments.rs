@@ -30,10 +30,13 @@ impl MachineFile {
 
 #[derive(Debug, Args)]
 pub struct TableFiles {
-    /// CSV to read
+    /// CSV to read; `-` is standard input
+    ///
+    /// Motions have the columns of `hexad move --trajectory`; lengths t, length_1 ... length_6 and length_rate_1 ... length_rate_6 or none
+    /// of these, in s and m, or with a unit at the end of the name: length_1_mm, length_rate_1_mm_s.
     #[arg(long, value_name = "FILE")]
     pub input: PathBuf,
-    /// CSV to write
+    /// CSV to write; `-` is standard output
     #[arg(long, value_name = "FILE")]
     pub output: PathBuf,
 }

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::failure::Failure;
 use crate::config::Config;
-use crate::output::files::print;
+use crate::output::files::{is_standard, print};
 use crate::recording::reader::Recording;
 use crate::recording::table::write_csv;
 
@@ -15,17 +15,20 @@ pub struct ConvertArguments {
     /// Recording of `hexad run --record` or `--faults`
     #[arg(value_name = "FILE")]
     recording: PathBuf,
-    /// Write a row for each cycle
+    /// Write a row for each cycle; `-` is standard output
     #[arg(long, value_name = "FILE")]
     csv: PathBuf,
 }
 
 impl ConvertArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let recording = Recording::read(&self.recording)?;
+        let recording = Recording::open(&self.recording)?;
         let info = recording.summary()?.info;
         let config = Config::parse(&info.configuration, "configuration of the recording")?;
         let summary = write_csv(&recording, &config.machine.home, &self.csv)?;
+        if is_standard(&self.csv) {
+            return Ok(());
+        }
         Ok(print(format_args!("{}: {} cycles\n", self.csv.display(), summary.cycles))?)
     }
 }

@@ -11,6 +11,9 @@ use crate::output::files::FileError;
 use crate::output::svg::ChartError;
 use crate::recording::RecordingError;
 
+/// Exit code of a command that a signal ended before it had finished, as shells have it for SIGINT.
+pub const INTERRUPTED: u8 = 130;
+
 /// Error that ends a command, with the exit code of the process: 1 if the command ran and failed, 2 if it could not
 /// begin, and cannot without a correction.
 #[derive(Debug)]
@@ -32,11 +35,21 @@ pub trait CommandError: Error {
     fn has_begun(&self) -> bool {
         false
     }
+
+    /// Exit code of the process.
+    fn exit_code(&self) -> u8 {
+        default_exit_code(self)
+    }
+}
+
+/// Exit code of a command that ran and failed, or could not begin.
+pub fn default_exit_code(error: &(impl CommandError + ?Sized)) -> u8 {
+    if error.has_begun() { 1 } else { 2 }
 }
 
 impl<E: CommandError> From<E> for Failure {
     fn from(error: E) -> Self {
-        Self { exit_code: if error.has_begun() { 1 } else { 2 }, message: error.to_string() }
+        Self { exit_code: error.exit_code(), message: error.to_string() }
     }
 }
 
@@ -48,7 +61,7 @@ impl CommandError for DaemonError {
         let is_configured =
             |error: &SocketError| matches!(error, SocketError::NoGroup(_) | SocketError::NotMember(_));
         match self {
-            Self::NotRealtime(_) => false,
+            Self::NotRealtime(_) | Self::Config(_) => false,
             Self::Socket(error) => !is_configured(error),
             Self::Port(_) | Self::Signals(_) | Self::Thread(_) | Self::Died(_) | Self::Report(_) => true,
         }

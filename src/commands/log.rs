@@ -1,17 +1,20 @@
-//! Log of the process: to the journal with fields where standard error is the journal, else as text.
+//! Log of the process: to the journal with fields where standard error is the journal, else as text; or as JSON.
 
 use std::fs::metadata;
 use std::io::IsTerminal;
 use std::os::unix::fs::MetadataExt;
+use std::sync::OnceLock;
 use std::{env, io};
 
-use tracing::Level;
+use clap::ValueEnum;
+use tracing::{Level, Subscriber};
 use tracing_journald::{Priority, PriorityMappings};
-use tracing_subscriber::filter::LevelFilter;
+use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::fmt::format::debug_fn;
 use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt;
-use tracing_subscriber::{fmt, registry};
+use tracing_subscriber::{Layer, fmt, registry};
 
 /// Identifier of the journal's entries, whatever started the process.
 const IDENTIFIER: &str = "hexad";
@@ -21,36 +24,78 @@ const FIELD_PREFIX: &str = "HEXAD";
 /// Fields that the text of a message contains in words.
 const FIELDS_IN_TEXT: [&str; 3] = ["state", "value", "bound"];
 
-/// Installs the log of this process, with the level of `HEXAD_LOG`.
-pub fn install() {
-    let level = env::var("HEXAD_LOG").ok().and_then(|level| level.parse().ok()).unwrap_or(LevelFilter::INFO);
-    let journal = is_journal().then(tracing_journald::layer).and_then(Result::ok).map(|journal| {
-        journal
-            .with_syslog_identifier(IDENTIFIER.into())
-            .with_field_prefix(Some(FIELD_PREFIX.into()))
-            .with_priority_mappings(priorities())
-    });
+/// Environment variable of [`LogFormat`], which child processes inherit.
+pub const FORMAT_VARIABLE: &str = "HEXAD_LOG_FORMAT";
+
+/// Environment variables with the filter, the first that is set counts.
+pub const FILTER_VARIABLES: [&str; 2] = ["HEXAD_LOG", "RUST_LOG"];
+
+/// Format of the log on standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// Text; to the journal with fields where standard error is the journal.
+    #[default]
+    Text,
+    /// A JSON object per line: `timestamp`, `level`, `message`, `target` and the fields.
+    Json,
+}
+
+/// Format of this process.
+static FORMAT: OnceLock<LogFormat> = OnceLock::new();
+
+/// Installs the log of this process, with the filter of `HEXAD_LOG` or `RUST_LOG`, as `debug` or `info,hexad::daemon=debug`.
+pub fn install(format: LogFormat) {
+    let _ = FORMAT.set(format);
+    let given = FILTER_VARIABLES.iter().find_map(|name| Some((name, env::var(name).ok()?)));
+    let parsed = given.as_ref().map(|(_, text)| text.parse::<Targets>());
+    let default = || Targets::new().with_default(LevelFilter::INFO);
+    let filter = parsed.as_ref().and_then(|parsed| parsed.as_ref().ok()).cloned().unwrap_or_else(default);
+    let is_json = format == LogFormat::Json;
+    let journal =
+        (is_journal() && !is_json).then(tracing_journald::layer).and_then(Result::ok).map(|journal| {
+            journal
+                .with_syslog_identifier(IDENTIFIER.into())
+                .with_field_prefix(Some(FIELD_PREFIX.into()))
+                .with_priority_mappings(priorities())
+        });
     // The journal stamps its entries itself.
     match journal {
-        Some(journal) => registry().with(level).with(journal).init(),
-        None => {
-            let text = fmt::layer()
-                .with_target(false)
-                .with_ansi(io::stderr().is_terminal())
-                .with_writer(io::stderr)
-                .fmt_fields(debug_fn(|writer, field, value| match field.name() {
-                    "message" => write!(writer, "{value:?}"),
-                    name if FIELDS_IN_TEXT.contains(&name) => Ok(()),
-                    name => write!(writer, " {name}={value:?}"),
-                }));
-            registry().with(level).with(text).init();
+        Some(journal) => registry().with(filter).with(journal).init(),
+        None if is_json => {
+            let json = fmt::layer().json().flatten_event(true).with_writer(io::stderr);
+            registry().with(filter).with(json).init();
         }
+        None => registry().with(filter).with(text_layer()).init(),
+    }
+    if let (Some((name, text)), Some(Err(error))) = (given, parsed) {
+        tracing::warn!(
+            "{name} = {text:?} is ignored: {error}; must be a level, or as info,hexad::daemon=debug"
+        );
+    }
+}
+
+fn text_layer<S: Subscriber + for<'a> LookupSpan<'a>>() -> impl Layer<S> {
+    fmt::layer().with_target(false).with_ansi(io::stderr().is_terminal()).with_writer(io::stderr).fmt_fields(
+        debug_fn(|writer, field, value| match field.name() {
+            "message" => write!(writer, "{value:?}"),
+            name if FIELDS_IN_TEXT.contains(&name) => Ok(()),
+            name => write!(writer, " {name}={value:?}"),
+        }),
+    )
+}
+
+/// Name of the format of this process, for its children.
+pub fn format_name() -> &'static str {
+    match FORMAT.get() {
+        Some(LogFormat::Json) => "json",
+        _ => "text",
     }
 }
 
 /// Reports why the process ends.
 pub fn report_failure(message: &str) {
-    if is_journal() && tracing::enabled!(Level::ERROR) {
+    let is_structured = is_journal() || FORMAT.get() == Some(&LogFormat::Json);
+    if is_structured && tracing::enabled!(Level::ERROR) {
         tracing::error!("{message}");
     } else {
         eprintln!("hexad: {message}");

@@ -235,17 +235,17 @@ mod tests {
         }
         assert!(!c.contains("SETPOINT_KIND_UNKNOWN"));
         assert!(
-            c.contains("#define HEXAD_SETPOINT_SCHEMA 6u\n")
+            c.contains("#define HEXAD_SETPOINT_SCHEMA 7u\n")
                 && c.contains("\n    uint64_t kind; /* 0: X, X'")
         );
         assert!(c.contains("static_assert(offsetof(struct hexad_setpoint, kind) == 32, \"kind\");"));
-        assert!(python.contains("    topic = \"setpoint\"\n    schema = 6\n"));
+        assert!(python.contains("    topic = \"setpoint\"\n    schema = 7\n"));
         assert!(python.contains("(\"header\", Header),\n") || python.contains("(\"header\", Header),  #"));
         assert!(python.contains("        (\"kind\", c_uint64),  # 0: X, X'"));
         let json: Value = serde_json::from_str(&json).unwrap();
         let structs = json["structs"].as_array().unwrap();
         let setpoint = structs.iter().find(|it| it["name"] == "hexad_setpoint").unwrap();
-        assert_eq!((&setpoint["schema"], &setpoint["size"]), (&json!(6), &json!(184)));
+        assert_eq!((&setpoint["schema"], &setpoint["size"]), (&json!(7), &json!(192)));
         let kind = &setpoint["fields"][1];
         assert_eq!(
             (&kind["name"], &kind["type"], &kind["offset"]),

@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 done; 1 the command ran and failed (a fault, a row without solution; for the daemon also what it lacks now and
 //! may have later: memory, a socket, a machine that another controls); 2 it could not begin (bad command line,
-//! configuration, input or environment).
+//! configuration, input or environment); 130 a signal ended it before it had finished.
 
 use clap::{Parser, Subcommand};
 
@@ -16,17 +16,24 @@ use self::export::ExportArguments;
 use self::failure::Failure;
 use self::faults::FaultTables;
 use self::forward_kinematics::ForwardKinematicsArguments;
+use self::goto::GotoArguments;
+use self::hold::HoldArguments;
 use self::inverse_dynamics::InverseDynamicsArguments;
+use self::jog::JogArguments;
+use self::log::{FORMAT_VARIABLE, LogFormat};
 use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
 use self::operate::Order;
 use self::recover::RecoverArguments;
 use self::replay::ReplayArguments;
+use self::report::ReportArguments;
 use self::run::RunArguments;
 use self::status::StatusArguments;
+use self::view::ViewArguments;
 use self::workspace::WorkspaceArguments;
 use crate::control::state::Request;
 use crate::output::files::print;
+use crate::output::version::VERSION;
 use crate::realtime::stop_request::Stop;
 
 pub mod advise;
@@ -39,8 +46,11 @@ pub mod export;
 mod failure;
 pub mod faults;
 pub mod forward_kinematics;
+mod goto;
+mod hold;
 pub mod in_step;
 pub mod inverse_dynamics;
+mod jog;
 pub mod log;
 pub mod messages;
 pub mod r#move;
@@ -50,14 +60,20 @@ pub mod plant;
 mod progress;
 mod recover;
 mod replay;
+mod report;
 mod run;
 pub mod status;
+mod target;
+mod view;
 pub mod workspace;
 
 /// Hard real-time computed-torque controller for Gough-Stewart platforms.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version = VERSION, arg_required_else_help = true)]
 pub struct CommandLine {
+    /// Format of the log on standard error
+    #[arg(long, global = true, value_enum, default_value_t, env = FORMAT_VARIABLE)]
+    pub log_format: LogFormat,
     #[command(subcommand)]
     command: CommandArguments,
 }
@@ -70,6 +86,12 @@ enum CommandArguments {
     Plant(MachineFile),
     /// Play a motion or a trajectory as a setpoint source
     Move(MoveArguments),
+    /// Move the platform to a pose, at which it stands under control
+    Goto(GotoArguments),
+    /// Keep the platform under control where it is, until Ctrl-C; then stop
+    Hold(HoldArguments),
+    /// Move the platform by keys on a terminal, while they are held
+    Jog(JogArguments),
     /// Run daemon, plant and setpoint source through a motion; print timing and tracking, draw pictures
     Demo(DemoArguments),
     /// Take control: the platform follows the setpoint from now on
@@ -86,6 +108,8 @@ enum CommandArguments {
     Estop(RequestArguments),
     /// Show state, diagnostic, pose, legs, timing and sources of a running daemon
     Status(StatusArguments),
+    /// Show the charts of a recording's page live, for a browser on this host
+    View(ViewArguments),
     /// Show what the numbers of states, faults and limits mean, and what to do
     Faults,
     /// Print the declarations of the messages for a driver in another language
@@ -102,6 +126,8 @@ enum CommandArguments {
     Export(ExportArguments),
     /// Compute the cycles of a recording again and compare every output; or copy a part of it
     Replay(ReplayArguments),
+    /// Write a recording as one page with charts, which any browser opens from disk
+    Report(ReportArguments),
     /// Write a recording in another format
     Convert(ConvertArguments),
     /// Complete a recording that a crash or a full disk has left unfinished
@@ -120,6 +146,9 @@ impl CommandLine {
             Is::Run(arguments) => arguments.execute(),
             Is::Plant(machine) => Ok(plant::run(&machine.load()?, &Stop::on_signals()?)?),
             Is::Move(arguments) => arguments.execute(),
+            Is::Goto(arguments) => arguments.execute(),
+            Is::Hold(arguments) => arguments.execute(),
+            Is::Jog(arguments) => arguments.execute(),
             Is::Demo(arguments) => arguments.execute(),
             Is::Engage(EngageArguments { request, wait }) => send(&request, Request::Engage, wait),
             Is::Stop(arguments) => send(&arguments, Request::Stop, false),
@@ -128,6 +157,7 @@ impl CommandLine {
             Is::Off(arguments) => send(&arguments, Request::Off, false),
             Is::Estop(arguments) => send(&arguments, Request::Estop, false),
             Is::Status(arguments) => arguments.execute(),
+            Is::View(arguments) => arguments.execute(),
             Is::Faults => Ok(print(FaultTables)?),
             Is::Messages(arguments) => arguments.execute(),
             Is::Check(arguments) => arguments.execute(),
@@ -136,6 +166,7 @@ impl CommandLine {
             Is::Workspace(arguments) => arguments.execute(),
             Is::Export(arguments) => arguments.execute(),
             Is::Replay(arguments) => arguments.execute(),
+            Is::Report(arguments) => arguments.execute(),
             Is::Convert(arguments) => arguments.execute(),
             Is::Recover(arguments) => arguments.execute(),
             Is::InverseDynamics(arguments) => arguments.execute(),

@@ -3,8 +3,13 @@
 use std::path::Path;
 
 use super::failure::CommandError;
+use crate::analysis::pose_spline;
 use crate::model::task::TaskState;
-use crate::output::csv_table::{NumberTable, TableError, six, trajectory_columns};
+use crate::motion::trajectory::Knot;
+use crate::output::csv_table::{
+    NumberTable, TableError, TableErrors, derivative_columns, pose_columns, six, trajectory_columns,
+};
+use crate::output::files::name_of;
 
 /// Error for rows without a solution. The output is complete and marks them; the error makes sure that nobody misses
 /// them.
@@ -46,9 +51,52 @@ impl UnsolvedRows {
     }
 }
 
-/// Reads a table of t, X, X', X''.
+/// Least time from one row of a trajectory to the next \[s\], far below the period of any loop. Between
+/// rows that are nearer, X'' has no digits.
+const MIN_STEP_S: f64 = 1e-6;
+
+/// Reads a table of t, X, X', X''. Without X' and X'' they are those of the spline through the poses.
 pub fn read_trajectory(path: &Path) -> Result<NumberTable, TableError> {
-    NumberTable::read(path, &trajectory_columns(), &[])
+    let table = NumberTable::read(path, &pose_columns(), &derivative_columns())?;
+    with_derivatives(table, name_of(path))
+}
+
+/// The table with X' and X'', also if it has only poses.
+pub fn with_derivatives(table: NumberTable, path: &Path) -> Result<NumberTable, TableError> {
+    let width = trajectory_columns().len();
+    if table.rows().iter().all(|row| row.len() == width) {
+        return Ok(table);
+    }
+    let mut errors = TableErrors::new(path);
+    check_times(&table, &mut errors);
+    errors.into_result()?;
+    let mut knots: Vec<_> = table
+        .rows()
+        .iter()
+        .map(|row| Knot { t: time(row), state: TaskState::at_rest(six(row, 1)) })
+        .collect();
+    if pose_spline::complete(&mut knots).is_none() {
+        let mut errors = TableErrors::new(path);
+        errors.add("X' and X'' cannot be computed: the steps of t must be less unequal".into());
+        errors.into_result()?;
+    }
+    let numbers = |Knot { t, state: TaskState { x, xd, xdd } }: &Knot| {
+        [*t].into_iter().chain([x, xd, xdd].into_iter().flatten().copied()).collect()
+    };
+    let rows = knots.iter().map(numbers).collect();
+    Ok(table.with_rows(rows))
+}
+
+/// Adds an error for each row whose time is not after that of the row before.
+pub fn check_times(table: &NumberTable, errors: &mut TableErrors) {
+    let rows = || table.rows().iter().map(|row| time(row)).zip(table.lines());
+    for ((before, _), (after, line)) in rows().zip(rows().skip(1)) {
+        if !(after - before >= MIN_STEP_S) {
+            errors.add(format!(
+                "line {line}: t = {after:?} after t = {before:?}: must increase, by at least {MIN_STEP_S:?}"
+            ));
+        }
+    }
 }
 
 /// Time of a row.

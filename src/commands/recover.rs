@@ -21,7 +21,7 @@ pub struct RecoverArguments {
 
 impl RecoverArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let recording = Recording::read(&self.recording)?;
+        let recording = Recording::open(&self.recording)?;
         let summary = recording.summary()?;
         let output = self.output.as_ref().unwrap_or(&self.recording);
         let Some(why) = summary.unfinished else {

@@ -69,7 +69,7 @@ impl CommandError for ReplayError {
 
 impl ReplayArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let recording = Recording::read(&self.recording)?;
+        let recording = Recording::open(&self.recording)?;
         if let (Some(Part(part)), Some(output)) = (self.extract, self.output) {
             let times_ns = times_of(&recording, &part)?;
             let messages = copy(&recording, &output, times_ns)?;

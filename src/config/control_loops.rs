@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 use core::fmt;
 
-use super::deployment::{Deployment, STABLE_MASSES};
+use super::deployment::{Control, Deployment, Drive, Realtime, STABLE_MASSES};
 use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
 use crate::control::estimator::SENT_ACCELERATIONS;
 
@@ -22,7 +22,10 @@ pub struct ControlLoop {
 
 /// The loops of position and orientation, or that of the stiffest mode of the legs.
 pub fn loops(deployment: &Deployment) -> Vec<ControlLoop> {
-    let control = &deployment.control;
+    loops_of(&deployment.realtime, &deployment.control, &deployment.drive)
+}
+
+fn loops_of(realtime: &Realtime, control: &Control, drive: &Drive) -> Vec<ControlLoop> {
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
@@ -35,11 +38,11 @@ pub fn loops(deployment: &Deployment) -> Vec<ControlLoop> {
     let with = |(name, (bandwidth_hz, damping_ratio), gain): (_, (f64, f64), f64)| ControlLoop {
         name,
         bandwidth_hz,
-        rate_hz: deployment.realtime.rate_hz,
+        rate_hz: realtime.rate_hz,
         sampled: SampledLoop {
             estimator_ratio: control.estimator_bandwidth_hz / bandwidth_hz,
             compensates_disturbance: control.compensate_disturbances,
-            ..deployment.realtime.sampled_loop(bandwidth_hz, damping_ratio, deployment.drive.total_delay_s())
+            ..realtime.sampled_loop(bandwidth_hz, damping_ratio, drive.total_delay_s())
         }
         .with_feedback_gain(gain),
     };
@@ -55,28 +58,46 @@ const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
 pub fn longest_age_s(deployment: &Deployment) -> f64 {
     let recorded = SENT_ACCELERATIONS as f64 - 1.0;
     let recorded_s = recorded * deployment.realtime.period_s() - deployment.drive.total_delay_s();
-    stable_age_s(deployment).min(recorded_s)
+    stable_age_s(&deployment.realtime, &deployment.control, &deployment.drive).min(recorded_s)
 }
 
-fn stable_age_s(deployment: &Deployment) -> f64 {
-    let delays = loops(deployment).into_iter().map(|ControlLoop { sampled, .. }| {
-        sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay)
-    });
-    delays.fold(f64::INFINITY, f64::min) * deployment.realtime.period_s() - deployment.drive.total_delay_s()
+/// Largest constant age of the measurements with which all loops are stable \[s\].
+fn stable_age_s(realtime: &Realtime, control: &Control, drive: &Drive) -> f64 {
+    let sampled = loops_of(realtime, control, drive).into_iter().map(|it| it.sampled).filter(is_finite);
+    let delays =
+        sampled.map(|sampled| sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay));
+    delays.fold(f64::INFINITY, f64::min) * realtime.period_s() - drive.total_delay_s()
 }
 
-/// Warning if control without measurements may last longer than the loop stands measurements of that age.
-pub fn timeout_warning(deployment: &Deployment) -> Option<String> {
-    let [timeout_ms, age_ms] = [deployment.timeouts.measured_s, stable_age_s(deployment)].map(|s| 1e3 * s);
-    (timeout_ms > age_ms).then(|| {
-        format!(
-            "timeouts.measured_ms = {timeout_ms} is more than {age_ms:.1} ms, the largest age of measurements with which the \
-             loop is stable: older ones are refused when they arrive, and without any the platform is not controlled for so long"
-        )
-    })
+/// The age \[s\], or the largest with which all loops are stable if that is less. A rejected value leaves it open.
+pub(super) fn bounded_age_s(age_s: f64, realtime: &Realtime, control: &Control, drive: &Drive) -> f64 {
+    let delay = (age_s + drive.total_delay_s()) * realtime.rate_hz;
+    let is_stable = |ControlLoop { sampled, .. }: ControlLoop| {
+        !is_finite(&sampled) || sampled.is_stable_with_known_delay(delay, &MASSES_AT_LONGEST_AGE)
+    };
+    let are_stable = !delay.is_finite() || loops_of(realtime, control, drive).into_iter().all(is_stable);
+    if are_stable { age_s } else { age_s.min(stable_age_s(realtime, control, drive)) }
+}
+
+/// Whether the values from which the loop follows were all accepted.
+fn is_finite(sampled: &SampledLoop) -> bool {
+    let values = [sampled.wn_t, sampled.damping_ratio, sampled.estimator_ratio, sampled.delay];
+    values.iter().all(|value| value.is_finite())
+}
+
+/// `timeouts.measured_ms` that is beyond the age with which the loops are stable, as its value and that age \[ms\].
+pub fn unstable_timeout_ms(deployment: &Deployment) -> Option<(f64, f64)> {
+    let Deployment { realtime, control, drive, timeouts, .. } = deployment;
+    let age_s = bounded_age_s(timeouts.measured_s, realtime, control, drive);
+    (timeouts.measured_s > age_s).then_some((1e3 * timeouts.measured_s, 1e3 * age_s))
 }
 
 impl ControlLoop {
+    /// Largest bandwidth with which the loop is stable \[Hz\].
+    pub fn largest_stable_hz(&self) -> f64 {
+        self.sampled.largest_wn_t() * self.rate_hz / TAU
+    }
+
     /// Warning where a mass that is plausible would make the loop unstable.
     pub fn warning(&self) -> Option<String> {
         let Self { name, sampled, .. } = self;

@@ -9,7 +9,7 @@ use super::machine::{LegSection, rounded};
 use super::reader::SectionReader;
 use crate::model::forward_kinematics::MAX_CONDITION;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
-use crate::model::inverse_jacobian::condition;
+use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
 
@@ -159,6 +159,11 @@ fn check_condition(machine: &Machine, legs: &[LegSection], pose: &Pose, home: &S
         );
         first.reader.reject_section(shown, bound);
     }
+}
+
+/// Frobenius condition of the legs' wrenches at a pose, as everywhere: 6 is best.
+fn condition(machine: &Machine, pose: &Pose) -> f64 {
+    KinematicState::new(machine, *pose).sensitivity().condition
 }
 
 /// Poses in all directions from `pose`.

@@ -8,6 +8,7 @@
 
 use std::{fmt, io, path::Path};
 
+use serde::Serialize;
 use thiserror::Error;
 use toml::de::DeTable;
 use tracing::warn;
@@ -21,6 +22,7 @@ use self::reader::{SectionReader, ViolationLog};
 mod bound;
 pub mod control_loops;
 pub mod deployment;
+pub mod examination;
 pub mod fidelity;
 mod geometry;
 mod machine;
@@ -45,6 +47,8 @@ pub struct Config {
     pub deployment: Deployment,
     /// The file as it was read, for recordings.
     pub text: String,
+    /// The file in error texts.
+    pub place: String,
 }
 
 /// Error of loading a configuration.
@@ -69,7 +73,7 @@ pub enum ConfigError {
 }
 
 /// Violation of a rule of the configuration. Displays as `platform.mass_kg = -3: must be greater than 0`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Violation {
     /// Line, from 1. For a missing key, the line of the section that lacks it.
     pub line: usize,
@@ -100,7 +104,7 @@ impl Config {
         root.finish();
         match log.into_violations() {
             violations if violations.is_empty() => {
-                Ok(Self { name, machine, deployment, text: original.into() })
+                Ok(Self { name, machine, deployment, text: original.into(), place: place.into() })
             }
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }

@@ -158,6 +158,11 @@ impl<'t> SectionReader<'t> {
         self.find(key, None).map(|value| self.components(key, value, bounds))
     }
 
+    /// Whether the section has a value for `key`.
+    pub fn has(&self, key: &str) -> bool {
+        self.value(key).is_some()
+    }
+
     /// Whether the value of `key` is a table, for keys that may also be a number.
     pub fn is_table(&self, key: &str) -> bool {
         self.value(key).is_some_and(|value| value.get_ref().is_table())

@@ -93,7 +93,7 @@ fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &Re
     match cycle.state {
         State::Engaging => setpoint.target.as_ref().is_some_and(|target| is_within(target, REACHED_RATIO)),
         State::Stopping => reference.is_at_rest(),
-        State::Parking => is_within(&Target::Pose(cycle.constants.home.pose()), AT_HOME_RATIO),
+        State::Parking => is_within(&Target::Pose(cycle.constants.home.pose(), 1.0), AT_HOME_RATIO),
         State::Off | State::Standby | State::Active | State::Fault => false,
     }
 }

@@ -56,12 +56,14 @@ pub struct Setpoint {
     pub time_ns: u64,
     /// X, X', X'' at that instant.
     pub task: TaskState,
+    /// Share of the limits of autonomous motions with which a target is approached, up to 1; 0 is all of them.
+    pub target_speed: f64,
 }
 
 impl Setpoint {
     /// X, X' and X'' of a motion at an instant.
     pub fn motion(time_ns: u64, task: TaskState) -> Self {
-        Self { kind: SetpointKind::Motion, time_ns, task }
+        Self { kind: SetpointKind::Motion, time_ns, task, target_speed: 0.0 }
     }
 }
 
@@ -329,7 +331,7 @@ fn target<'a>(
 ) -> Option<Target<'a>> {
     match state {
         State::Engaging | State::Active => setpoint.target.filter(|_| setpoint.status.is_ok()),
-        State::Parking => Some(Target::Pose(constants.home.pose())),
+        State::Parking => Some(Target::Pose(constants.home.pose(), 1.0)),
         State::Off | State::Standby | State::Stopping | State::Fault => None,
     }
 }

@@ -256,3 +256,52 @@ fn parking(
 fn current(code: DiagnosticCode, findings: &Findings) -> Diagnostic {
     findings.engagement.err().filter(|found| found.code == code).unwrap_or(code.into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FOUND: Diagnostic =
+        Diagnostic { code: DiagnosticCode::FollowingError, value: 0.03, bound: 0.02, index: 4 };
+    const OTHER: Diagnostic =
+        Diagnostic { code: DiagnosticCode::MeasurementLost, value: 9.0, bound: 0.4, index: 1 };
+    const IN_ORDER: Findings = Findings {
+        localization: Ok(()),
+        start: Ok(()),
+        engagement: Ok(()),
+        tracking: Ok(()),
+        has_ended: false,
+    };
+
+    /// The mode after one cycle.
+    fn after(mode: SupervisorState, findings: &Findings) -> SupervisorState {
+        next(mode, None, findings, AfterStop::Fault).0
+    }
+
+    #[test]
+    fn a_fault_keeps_value_and_bound_of_its_first_cycle() {
+        let active = SupervisorState { state: State::Active, ..SupervisorState::default() };
+        for findings in
+            [Findings { localization: Err(FOUND), ..IN_ORDER }, Findings { tracking: Err(FOUND), ..IN_ORDER }]
+        {
+            let mut mode = after(active, &findings);
+            assert_eq!((mode.state, mode.diagnostic), (State::Fault, FOUND), "{findings:?}");
+            for later in [IN_ORDER, Findings { localization: Err(OTHER), tracking: Err(OTHER), ..IN_ORDER }] {
+                mode = after(mode, &later);
+                assert_eq!((mode.state, mode.diagnostic), (State::Fault, FOUND), "{later:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_stop_that_ends_in_a_fault_keeps_value_and_bound_of_its_cause() {
+        let cause = Diagnostic { code: DiagnosticCode::SetpointTooFast, ..FOUND };
+        let active = SupervisorState { state: State::Active, ..SupervisorState::default() };
+        let mut mode = after(active, &Findings { tracking: Err(cause), ..IN_ORDER });
+        assert_eq!((mode.state, mode.diagnostic), (State::Stopping, cause));
+        mode = after(mode, &IN_ORDER);
+        assert_eq!((mode.state, mode.diagnostic), (State::Stopping, cause));
+        mode = after(mode, &Findings { has_ended: true, ..IN_ORDER });
+        assert_eq!((mode.state, mode.diagnostic), (State::Fault, cause));
+    }
+}

@@ -13,7 +13,7 @@ use self::control_socket::location::{self, SocketError};
 use self::emergency_latch::EmergencyLatch;
 use self::recorder::Folders;
 use self::report::Report;
-use crate::config::Config;
+use crate::config::{Config, ConfigError};
 use crate::control::state::Request;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Claim, PortError};
@@ -50,6 +50,9 @@ pub const REALTIME_THREAD: &str = "hexad-rt";
 /// Why the daemon did not run.
 #[derive(Debug, thiserror::Error)]
 pub enum DaemonError {
+    /// The machine cannot be run with this configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
     /// A call to the shared memory failed, such as opening a topic.
     #[error(transparent)]
     Port(#[from] PortError),
@@ -94,8 +97,14 @@ pub fn request_of(signal: RequestSignal) -> Request {
     }
 }
 
+/// Target of the log of warnings about the configuration.
+pub const CONFIGURATION_LOG: &str = "hexad::config";
+
 /// Runs the daemon until `stop`.
 pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, DaemonError> {
+    for warning in config.examine().into_result(config)? {
+        warn!(target: CONFIGURATION_LOG, "{warning}");
+    }
     let mut claim = Claim::take(&config.name)?;
     // It lives as long as the process: signals may come until its end.
     let word: &'static RequestWord = Box::leak(Box::default());
@@ -104,7 +113,7 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
     // Not before the signals: who finds it may send them.
     let socket = location::open(&config.name, &config.deployment.operator)?;
     info!("control socket: {}", socket.path.display());
-    claim.record(&socket.path)?;
+    claim.record(&socket.path, &config.deployment.realtime.processors())?;
     let latch = EmergencyLatch::open(files.state.as_deref())?;
     if latch.is_set() {
         warn!("an emergency stop was not cleared before the daemon ended: it is still in force; hexad clear");

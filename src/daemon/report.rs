@@ -11,6 +11,7 @@ use super::recorder::RecorderReport;
 use crate::config::Config;
 use crate::messages::{Statistics, Times, WorstCycle};
 use crate::output::files::{FileError, write_whole};
+use crate::output::version::VERSION;
 use crate::realtime::cyclic::LoopReport;
 use crate::realtime::setup::deadline;
 use crate::realtime::usage::ThreadUsage;
@@ -18,6 +19,9 @@ use crate::realtime::usage::ThreadUsage;
 /// Report of a run: timing, tracking, resources and faults.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
+    /// Version, commit and build profile of the daemon.
+    #[serde(default)]
+    pub version: String,
     /// Number of cycles run since start.
     pub cycles: u64,
     /// Configured rate of the cycles \[Hz\].
@@ -93,6 +97,7 @@ impl Report {
         let counters = &cyclic.counters;
         let Statistics { total, worst, .. } = log.statistics;
         let report = Self {
+            version: VERSION.into(),
             cycles: counters.cycles,
             rate_hz: config.deployment.realtime.rate_hz,
             deadline_misses: DeadlineMisses {

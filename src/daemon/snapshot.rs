@@ -2,7 +2,7 @@
 
 use crate::control::controller::{Measurement, Publishers, Setpoint};
 use crate::control::diagnostic::Diagnostic;
-use crate::messages::StatusMessage;
+use crate::messages::{Rejection, StatusMessage};
 use crate::model::machine::LEGS;
 
 /// Newest cycle as the I/O thread published it, with its inputs.
@@ -22,6 +22,9 @@ pub struct Snapshot {
     pub setpoint_publishers: Publishers,
     /// Processes that publish measurements.
     pub measured_publishers: Publishers,
+    /// Why messages were rejected whatever they contain, of setpoints and of measurements.
+    pub setpoint_rejection: Option<Rejection>,
+    pub measured_rejection: Option<Rejection>,
     /// The last request word that was carried out or refused; 0 if none ever was.
     pub answered: u64,
     /// Why that one was refused; code `None` if it was not.

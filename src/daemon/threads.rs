@@ -26,7 +26,6 @@ use super::snapshot::Snapshot;
 use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
-use crate::config::control_loops::{ControlLoop, loops, timeout_warning};
 use crate::config::{Config, fidelity};
 use crate::control::controller::{Controller, Input, Output};
 use crate::control::diagnostic::DiagnosticCode;
@@ -154,13 +153,8 @@ fn report(
     (Report { recording, ..Report::new(config, cyclic, io, log) }, counts_csv)
 }
 
-/// Controller of a configuration. Logs which of its loops are close to unstable.
+/// Controller of a configuration.
 fn controller(config: &Config, fidelity: Fidelity) -> Controller {
-    let of_loops = loops(&config.deployment);
-    let warnings = of_loops.iter().filter_map(ControlLoop::warning);
-    for warning in warnings.chain(timeout_warning(&config.deployment)) {
-        warn!("{warning}");
-    }
     Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
 }
 

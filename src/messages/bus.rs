@@ -37,7 +37,32 @@ impl PortError {
 }
 
 pub(super) fn port_error<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) -> PortError {
-    move |cause| PortError { what, cause: refusal().unwrap_or_else(|| format!("{cause:?}")) }
+    move |cause| PortError { what, cause: refusal().unwrap_or_else(|| with_cure(&format!("{cause:?}"))) }
+}
+
+/// Words of iceoryx2 that do not say what to do, and what to do.
+const CURES: [(&str, &str); 6] = [
+    ("ServiceInCorruptedState", OTHER_VERSION),
+    ("VersionMismatch", OTHER_VERSION),
+    ("ServiceInUnknownState", OTHER_VERSION),
+    (
+        "IncompatibleTypes",
+        "another participant has declared the topic with another type: build all with the declarations of hexad messages of this \
+         version, then restart all",
+    ),
+    (
+        "DoesNotSupportRequested",
+        "another participant has opened the topic first, with other settings (docs/driver.md): correct its settings, then restart all",
+    ),
+    ("ExceedsMax", "all places of the topic are taken: end another participant"),
+];
+const OTHER_VERSION: &str = "another participant has another version of iceoryx2: every participant needs iceoryx2 0.9.3 exactly \
+                             (pip install iceoryx2==0.9.3); end all participants, then start them again";
+
+/// The words of an error, after what to do about it.
+fn with_cure(words: &str) -> String {
+    let cure = CURES.iter().find(|(name, _)| words.contains(name));
+    cure.map_or_else(|| words.into(), |(_, cure)| format!("{cure} ({words})"))
 }
 
 /// Participation of this process in the topics of one machine.
@@ -144,5 +169,29 @@ impl<T: Message> TopicObserver<T> {
             CallbackProgression::Continue
         });
         found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_cure;
+
+    #[test]
+    fn words_of_iceoryx2_come_with_what_to_do() {
+        for (words, cure) in [
+            (
+                "PublishSubscribeOpenError(ServiceInCorruptedState)",
+                "every participant needs iceoryx2 0.9.3 exactly",
+            ),
+            (
+                "PublishSubscribeOpenError(IncompatibleTypes)",
+                "with another type: build all with the declarations",
+            ),
+            ("ExceedsMaxSupportedPublishers", "end another participant"),
+        ] {
+            let text = with_cure(words);
+            assert!(text.contains(cure) && text.ends_with(&format!("({words})")), "{text}");
+        }
+        assert_eq!(with_cure("Interrupt"), "Interrupt");
     }
 }

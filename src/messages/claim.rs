@@ -14,6 +14,9 @@ use super::location::{
     open_user_folder, renew_prefix, user_folder, user_id,
 };
 
+/// End of the name of a record.
+const RECORD_EXTENSION: &str = "daemon";
+
 /// Longest record that is read \[bytes\].
 const MAX_RECORD_BYTES: u64 = 512;
 
@@ -35,12 +38,16 @@ pub struct Claim {
 /// A running daemon, by its record.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunningDaemon {
+    /// Name of the machine.
+    pub machine: String,
     /// Number of the process.
     pub process_id: u32,
     /// User of the process.
     pub user_id: u32,
     /// Its control socket.
     pub socket: PathBuf,
+    /// Processors to which its threads are bound.
+    pub processors: Vec<usize>,
 }
 
 impl Claim {
@@ -50,7 +57,7 @@ impl Claim {
         let own = open_user_folder()?;
         let mut locks = vec![lock(&own, machine)?];
         let system = Path::new(SYSTEM_FOLDER);
-        let system_user = metadata(system).ok().filter(fs::Metadata::is_dir).map(|found| found.uid());
+        let system_user = system_user();
         if user_id() == 0 && own != system && system_user.is_some() {
             locks.push(lock(system, machine)?);
         }
@@ -63,16 +70,41 @@ impl Claim {
         Ok(Self { _locks: locks, record: None })
     }
 
-    /// Records this process beside its control socket.
-    pub fn record(&mut self, socket: &Path) -> Result<(), PortError> {
+    /// Records this process beside its control socket, with the processors to which its threads are bound. An error if
+    /// the daemon of another machine is bound to one of them; as with [`Self::take`], those of other users do not count.
+    pub fn record(&mut self, socket: &Path, processors: &[usize]) -> Result<(), PortError> {
         let path = record_path(socket);
         let process_id = std::process::id();
         let written = start_time(process_id)
-            .and_then(|start_time| write_record(&path, &format!("{process_id}\n{start_time}\n")));
+            .and_then(|start_time| write_record(&path, &record_text(process_id, start_time, processors)));
         written.map_err(port_error(format!("cannot write {}", path.display())))?;
         self.record = Some(path);
-        Ok(())
+        // After the own record is there: of two daemons that start together at least one finds the other.
+        let users = [Some(user_id()), Some(0), system_user()];
+        let others = all_running_daemons().into_iter().filter(|other| other.process_id != process_id);
+        let shared = others.filter(|other| users.contains(&Some(other.user_id))).find_map(|other| {
+            let processor = processors.iter().find(|it| other.processors.contains(it))?;
+            Some((*processor, other))
+        });
+        shared.map_or(Ok(()), |(processor, other)| {
+            let RunningDaemon { machine, process_id, .. } = other;
+            Err(PortError::new(
+                format!("cannot use processor {processor}"),
+                format!("{machine} does (process {process_id}); give each machine its own [realtime] cpu and io_cpu"),
+            ))
+        })
     }
+}
+
+/// Text of a record.
+fn record_text(process_id: u32, start_time: u64, processors: &[usize]) -> String {
+    let processors: Vec<_> = processors.iter().map(usize::to_string).collect();
+    format!("{process_id}\n{start_time}\n{}\n", processors.join(","))
+}
+
+/// User of the service, if there is one.
+fn system_user() -> Option<u32> {
+    metadata(SYSTEM_FOLDER).ok().filter(fs::Metadata::is_dir).map(|found| found.uid())
 }
 
 impl Drop for Claim {
@@ -117,7 +149,7 @@ fn open_lock(folder: &Path, path: &Path) -> io::Result<File> {
 }
 
 fn record_path(socket: &Path) -> PathBuf {
-    socket.with_extension("daemon")
+    socket.with_extension(RECORD_EXTENSION)
 }
 
 /// Writes under a temporary name: a record appears as a whole.
@@ -138,6 +170,25 @@ fn write_record(path: &Path, text: &str) -> io::Result<()> {
 
 /// Daemons that run for a machine, of every user whose record can be read.
 pub fn running_daemons(machine: &str) -> Vec<RunningDaemon> {
+    folders().iter().filter_map(|folder| running_daemon(folder, machine)).collect()
+}
+
+/// Daemons that run on this host, of every user whose record can be read, by name of their machine.
+pub fn all_running_daemons() -> Vec<RunningDaemon> {
+    let mut found = vec![];
+    for folder in folders() {
+        let records =
+            entries(&folder).filter(|path| path.extension().is_some_and(|it| it == RECORD_EXTENSION));
+        let machines =
+            records.filter_map(|path| path.file_stem().map(|it| it.to_string_lossy().into_owned()));
+        found.extend(machines.filter_map(|machine| running_daemon(&folder, &machine)));
+    }
+    found.sort_by(|a, b| a.machine.cmp(&b.machine).then(a.process_id.cmp(&b.process_id)));
+    found
+}
+
+/// Folders in which a daemon may have recorded itself.
+fn folders() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from(SYSTEM_FOLDER), ROOT_FOLDER.into(), user_folder()];
     folders.extend(entries(USER_RUNTIME_FOLDERS).map(|folder| folder.join("hexad")));
     let temporary = Path::new(TEMPORARY_FOLDER);
@@ -148,10 +199,10 @@ pub fn running_daemons(machine: &str) -> Vec<RunningDaemon> {
     folders.extend(entries(&parent).filter(is_temporary));
     folders.sort();
     folders.dedup();
-    folders.iter().filter_map(|folder| running_daemon(folder, machine)).collect()
+    folders
 }
 
-fn entries(folder: &str) -> impl Iterator<Item = PathBuf> {
+fn entries(folder: impl AsRef<Path>) -> impl Iterator<Item = PathBuf> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
@@ -159,7 +210,7 @@ fn entries(folder: &str) -> impl Iterator<Item = PathBuf> {
 /// root.
 fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let folder_owner = symlink_metadata(folder).ok().filter(fs::Metadata::is_dir)?.uid();
-    let path = folder.join(format!("{machine}.daemon"));
+    let path = folder.join(format!("{machine}.{RECORD_EXTENSION}"));
     let mut options = OpenOptions::new();
     let file = options.read(true).custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK).open(&path).ok()?;
     let owner = file.metadata().ok().filter(fs::Metadata::is_file)?.uid();
@@ -168,10 +219,15 @@ fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let mut lines = text.lines();
     let process_id = lines.next()?.parse().ok()?;
     let recorded_start: u64 = lines.next()?.parse().ok()?;
+    // Empty where no thread is bound.
+    let list = lines.next().unwrap_or_default();
+    let processors = list.split(',').filter_map(|number| number.parse().ok()).collect();
     let socket = path.with_extension("sock");
     let is_alive = start_time(process_id).is_ok_and(|started| started == recorded_start);
     let is_of_one_user = process_user(process_id)? == owner && [folder_owner, 0].contains(&owner);
-    (is_alive && is_of_one_user).then_some(RunningDaemon { process_id, user_id: owner, socket })
+    let machine = machine.to_owned();
+    let found = RunningDaemon { machine, process_id, user_id: owner, socket, processors };
+    (is_alive && is_of_one_user).then_some(found)
 }
 
 /// Start of a process in clock ticks since boot: with its number it names the process for good.
@@ -201,10 +257,18 @@ mod tests {
         let mut claim = Claim::take(&machine).unwrap();
         assert_eq!(running_daemons(&machine), [], "nothing is recorded yet");
         let socket = user_folder().join(format!("{machine}.sock"));
-        claim.record(&socket).unwrap();
-        let expected =
-            RunningDaemon { process_id: std::process::id(), user_id: user_id(), socket: socket.clone() };
-        assert_eq!(running_daemons(&machine), [expected]);
+        let processors = vec![1022, 1023];
+        claim.record(&socket, &processors).unwrap();
+        let (process_id, user_id) = (std::process::id(), user_id());
+        let expected = RunningDaemon {
+            machine: machine.clone(),
+            process_id,
+            user_id,
+            socket: socket.clone(),
+            processors,
+        };
+        assert_eq!(running_daemons(&machine), core::slice::from_ref(&expected));
+        assert!(all_running_daemons().contains(&expected));
         let (lock, record) = (socket.with_extension("lock"), record_path(&socket));
         assert_eq!(metadata(&lock).unwrap().mode() & 0o777, PRIVATE_FILE, "others must not lock it");
         assert_eq!(metadata(&record).unwrap().mode() & 0o777, RECORD_MODE);
@@ -223,7 +287,7 @@ mod tests {
         let process_id = std::process::id();
         let started = start_time(process_id).unwrap();
         for (start, is_found) in [(started, true), (started + 1, false)] {
-            write_record(&path, &format!("{process_id}\n{start}\n")).unwrap();
+            write_record(&path, &record_text(process_id, start, &[])).unwrap();
             assert_eq!(running_daemons(&machine).len(), usize::from(is_found), "{start}");
         }
         fs::remove_file(path).unwrap();

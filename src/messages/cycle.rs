@@ -51,6 +51,8 @@ message! {
         setpoint_x_rate: [f64; 6] ["rad/s, m/s"],
         /// X'' of the setpoint.
         setpoint_x_accel: [f64; 6] ["rad/s^2, m/s^2"],
+        /// Share of the limits with which a target is approached; 0 is all.
+        setpoint_target_speed: f64,
         /// 1 if a measurement has ever arrived; else the fields up to `actual_force_n` are zero.
         has_measurement: u32,
         /// 1 if the driver measures rates.
@@ -164,7 +166,8 @@ impl CycleMessage {
         (self.setpoint_process, self.setpoint_process_ignored) = (counting, ignored);
         let Publishers { counting, ignored } = input.measured_publishers;
         (self.measured_process, self.measured_process_ignored) = (counting, ignored);
-        if let Some(Setpoint { kind, time_ns, task }) = input.setpoint {
+        if let Some(Setpoint { kind, time_ns, task, target_speed }) = input.setpoint {
+            self.setpoint_target_speed = target_speed;
             (self.has_setpoint, self.setpoint_kind, self.setpoint_time_ns) = (1, kind as u32, time_ns);
             [self.setpoint_x, self.setpoint_x_rate, self.setpoint_x_accel] =
                 [task.x, task.xd, task.xdd].map(Into::into);
@@ -230,6 +233,7 @@ impl CycleMessage {
                 xd: self.setpoint_x_rate.into(),
                 xdd: self.setpoint_x_accel.into(),
             },
+            target_speed: self.setpoint_target_speed,
         };
         let measured = MeasuredMessage {
             length_m: self.measured_length_m,

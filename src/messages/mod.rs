@@ -51,6 +51,7 @@ pub mod location;
 pub mod lockstep;
 mod measured;
 mod publisher;
+mod rejection;
 mod reservation;
 mod setpoint;
 mod statistics;
@@ -65,6 +66,7 @@ pub use self::force::ForceMessage;
 pub use self::header::Header;
 pub use self::measured::MeasuredMessage;
 pub use self::publisher::Publisher;
+pub use self::rejection::Rejection;
 pub use self::setpoint::SetpointMessage;
 pub use self::statistics::{
     IoCounters, LoopCounters, LoopTimes, RejectionCounts, Statistics, Times, WORST_CYCLES, WorstCycle,

@@ -8,7 +8,7 @@ use crate::model::task::TaskState;
 
 message! {
     /// Desired motion of the platform: X = alpha, beta, gamma, x, y, z and its derivatives.
-    SetpointMessage = "hexad_setpoint" on "setpoint" schema 6 {
+    SetpointMessage = "hexad_setpoint" on "setpoint" schema 7 {
         /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
         /// 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and stand at.
@@ -19,6 +19,8 @@ message! {
         x_rate: [f64; 6] ["rad/s, m/s"],
         /// X''.
         x_accel: [f64; 6] ["rad/s^2, m/s^2"],
+        /// Share of the limits of autonomous motions with which a target is approached, up to 1; 0 is all of them.
+        target_speed: f64,
     }
 }
 
@@ -30,7 +32,8 @@ impl From<&TaskState> for SetpointMessage {
 
 impl From<&Setpoint> for SetpointMessage {
     fn from(setpoint: &Setpoint) -> Self {
-        Self { kind: setpoint.kind as u64, ..Self::from(&setpoint.task) }
+        let target_speed = setpoint.target_speed;
+        Self { kind: setpoint.kind as u64, target_speed, ..Self::from(&setpoint.task) }
     }
 }
 
@@ -39,7 +42,7 @@ impl From<&SetpointMessage> for Setpoint {
         let task = TaskState { x: message.x.into(), xd: message.x_rate.into(), xdd: message.x_accel.into() };
         let has_number = |kind: &SetpointKind| *kind as u64 == message.kind;
         let kind = SetpointKind::ALL.into_iter().find(has_number).unwrap_or(SetpointKind::Unknown);
-        Self { kind, time_ns: message.header.time_ns, task }
+        Self { kind, time_ns: message.header.time_ns, task, target_speed: message.target_speed }
     }
 }
 
@@ -55,7 +58,14 @@ mod tests {
     fn message(kind: u64) -> SetpointMessage {
         let number = |first: usize| core::array::from_fn(|i| (first + i) as f64);
         let header = Header { time_ns: 77, ..Header::default() };
-        SetpointMessage { header, kind, x: number(1), x_rate: number(7), x_accel: number(13) }
+        SetpointMessage {
+            header,
+            kind,
+            x: number(1),
+            x_rate: number(7),
+            x_accel: number(13),
+            target_speed: 0.5,
+        }
     }
 
     #[test]
@@ -69,7 +79,7 @@ mod tests {
             (u64::MAX, SetpointKind::Unknown),
         ] {
             let setpoint = Setpoint::from(&message(number));
-            assert_eq!((setpoint.kind, setpoint.time_ns), (kind, 77), "{number}");
+            assert_eq!((setpoint.kind, setpoint.time_ns, setpoint.target_speed), (kind, 77, 0.5), "{number}");
             let TaskState { x, xd, xdd } = setpoint.task;
             let numbers: Vec<f64> = x.iter().chain(&xd).chain(&xdd).copied().collect();
             assert_eq!(numbers, (1..=18).map(f64::from).collect::<Vec<_>>());
@@ -89,8 +99,8 @@ mod tests {
     }
 
     #[test]
-    fn the_kind_is_the_first_number_behind_the_header_since_schema_6() {
-        assert_eq!(SetpointMessage::SCHEMA, 6);
+    fn the_kind_is_the_first_number_behind_the_header_since_schema_6_and_the_speed_the_last_since_7() {
+        assert_eq!(SetpointMessage::SCHEMA, 7);
         let layout = SetpointMessage::LAYOUT;
         let fields: Vec<_> =
             layout.fields.iter().map(|field| (field.name, field.offset, field.count)).collect();
@@ -102,10 +112,11 @@ mod tests {
                 ("kind", 32, None),
                 ("x", 40, six),
                 ("x_rate", 88, six),
-                ("x_accel", 136, six)
+                ("x_accel", 136, six),
+                ("target_speed", 184, None)
             ]
         );
-        assert_eq!((layout.size, size_of::<SetpointMessage>()), (184, 184));
+        assert_eq!((layout.size, size_of::<SetpointMessage>()), (192, 192));
         assert_eq!((offset_of!(SetpointMessage, kind), offset_of!(SetpointMessage, x)), (32, 40));
         assert_eq!(SetpointMessage::LAYOUT.columns("").get(5).map(String::as_str), Some("kind"));
         assert_eq!(message(2).numbers().get(5), Some(&2.0));

@@ -9,7 +9,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use super::bus::BUFFER;
 use super::clock::monotonic_ns;
 use super::lease::{Arrival, Lease, PUBLISHERS};
-use super::{Message, RejectionCounts};
+use super::{Message, Rejection, RejectionCounts};
 use crate::control::controller::Publishers;
 
 /// Subscriber of one topic, which gives precedence to the latest life of the publisher.
@@ -21,6 +21,8 @@ pub struct Subscriber<T: Message> {
     last: (u64, u64),
     received: u64,
     rejected: RejectionCounts,
+    /// The last mistake of a sender.
+    last_rejection: Option<Rejection>,
 }
 
 impl<T: Message> Subscriber<T> {
@@ -33,7 +35,7 @@ impl<T: Message> Subscriber<T> {
         is_simulated: bool,
     ) -> Self {
         let rejected = RejectionCounts::default();
-        Self { service, port, is_simulated, last: (0, 0), received: 0, rejected }
+        Self { service, port, is_simulated, last: (0, 0), received: 0, rejected, last_rejection: None }
     }
 
     /// The next message in order, if any. Rejects other schemas, wrong checksums, older lives of the publisher and
@@ -89,6 +91,11 @@ impl<T: Message> Subscriber<T> {
         self.rejected
     }
 
+    /// The last message that was rejected for a mistake of its sender.
+    pub fn last_rejection(&self) -> Option<Rejection> {
+        self.last_rejection
+    }
+
     fn receive_unchecked(&mut self) -> Option<(T, UniquePublisherId)> {
         match self.port.receive() {
             Ok(sample) => sample.map(|sample| (*sample.payload(), sample.origin())),
@@ -104,10 +111,14 @@ impl<T: Message> Subscriber<T> {
         let header = message.header();
         // A life that begins in the future (another clock) would take precedence over all that begin later. In
         // simulated time it may begin at any instant.
-        let has_begun = self.is_simulated || header.epoch <= monotonic_ns();
+        let ahead_ns = if self.is_simulated { 0 } else { header.epoch.saturating_sub(monotonic_ns()) };
         let count = if header.schema != T::SCHEMA {
+            self.last_rejection = Some(Rejection::Schema { found: header.schema, expected: T::SCHEMA });
             &mut self.rejected.schema
-        } else if !(message.is_intact() && has_begun) {
+        } else if !message.is_intact() {
+            &mut self.rejected.damaged
+        } else if ahead_ns > 0 {
+            self.last_rejection = Some(Rejection::Clock { ahead_ns });
             &mut self.rejected.damaged
         } else {
             return true;
@@ -218,6 +229,11 @@ impl<T: Message> LeasedSubscriber<T> {
     /// See [`Subscriber::received_count`].
     pub fn received_count(&self) -> u64 {
         self.subscriber.received_count()
+    }
+
+    /// See [`Subscriber::last_rejection`].
+    pub fn last_rejection(&self) -> Option<Rejection> {
+        self.subscriber.last_rejection()
     }
 
     /// See [`Subscriber::rejections`].

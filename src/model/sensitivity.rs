@@ -17,7 +17,10 @@ use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
 use super::lanes::Triple;
 use super::lu;
-use super::machine::{Joints, LEGS};
+use super::machine::Joints;
+
+/// Meaning of the condition, for people.
+pub const CONDITION_MEANING: &str = "6 is best; errors and forces grow with it";
 
 /// Sensitivity of a pose to errors of leg lengths, torques and angles measured at the radius. All without units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -103,16 +106,11 @@ fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeo
     (torques * r).mul_add(r, forces).legs().into_iter().sum()
 }
 
-/// The same by LU with partial pivoting, a column of the inverse after the other.
+/// The same by LU with partial pivoting.
 #[cold]
 #[inline(never)]
 fn inverse_norm_squared_by_lu(n: &Matrix6<f64>, radius: f64) -> f64 {
-    let rows: [[f64; LEGS]; LEGS] = n.transpose().into();
-    let scales = [radius, radius, radius, 1.0, 1.0, 1.0];
-    let mut sum = 0.0;
-    for (unit, scale) in Matrix6::<f64>::identity().column_iter().zip(scales) {
-        let column = lu::solve(&rows, &(unit * scale).into_owned().into()).unwrap_or([f64::INFINITY; LEGS]);
-        sum += Vector6::from(column).norm_squared();
-    }
-    sum
+    let scale = Matrix6::from_diagonal(&Vector6::new(radius, radius, radius, 1.0, 1.0, 1.0));
+    lu::solve_columns(&n.transpose().into(), &scale.into())
+        .map_or(f64::INFINITY, |inverse| Matrix6::from(inverse).norm_squared())
 }

@@ -3,14 +3,17 @@
 //! All errors of a file are reported at once (up to a limit), each with line, column, value and bound.
 
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use super::csv_columns::{Column, find, hint};
+pub use super::csv_columns::{
+    coordinates, derivative_columns, legs, length_columns, pose_columns, trajectory_columns,
+};
 use super::csv_rows::CsvRows;
 use super::excerpt::excerpt;
-use super::files::FileError;
-use super::numbers::{AXES, MAX_MAGNITUDE};
+use super::files::{FileError, name_of, open};
+use super::numbers::MAX_MAGNITUDE;
 
 /// Errors shown of one file; a file with more has one mistake many times.
 const MAX_ERRORS_SHOWN: usize = 20;
@@ -38,14 +41,16 @@ pub struct NumberTable {
 }
 
 impl NumberTable {
-    /// Reads a CSV file, see [`NumberTable::from_reader`].
+    /// Reads a CSV file, or standard input for `-`, see [`NumberTable::from_reader`].
     pub fn read(path: &Path, required: &[String], optional: &[String]) -> Result<Self, TableError> {
-        let file = File::open(path).map_err(FileError::on(path))?;
-        Self::from_reader(file, path, required, optional)
+        Self::from_reader(open(path)?, name_of(path), required, optional)
     }
 
     /// Reads the named columns of CSV text, in this order, whatever the order in the text, and ignores other columns.
     /// Every number must be finite and at most 1e12 in magnitude. Error texts name the source `path`.
+    ///
+    /// A column may say another unit than SI in its name (`x_mm`, `t_ms`); the rows have SI units. Fields are separated by commas,
+    /// semicolons or tabs, as in the header; where not by commas, a number may have a decimal comma.
     ///
     /// `optional` columns come after the required ones if the text has all of them.
     pub fn from_reader(
@@ -56,7 +61,9 @@ impl NumberTable {
     ) -> Result<Self, TableError> {
         let mut errors = TableErrors::new(path);
         let mut table = Self::default();
-        if let Err(error) = table.fill(&mut CsvRows::new(source), required, optional, &mut errors) {
+        let result = CsvRows::new(source).map_err(|error| format!("line 1: {error}"));
+        if let Err(error) = result.and_then(|mut rows| table.fill(&mut rows, required, optional, &mut errors))
+        {
             errors.add(error);
         }
         if table.rows.is_empty() && errors.list.is_empty() {
@@ -80,18 +87,23 @@ impl NumberTable {
         if !errors.list.is_empty() {
             return Ok(());
         }
-        let mut read = 0;
+        let (mut read, is_comma_decimal) = (0, source.delimiter() != b',');
         while let Some((line, record)) = source.next_row()? {
             if read == MAX_ROWS {
                 return Err(format!("line {line}: a row after {MAX_ROWS}: must be at most those"));
             }
             read += 1;
-            if let Some(row) = errors.row(record, line, header.len(), &columns) {
+            if let Some(row) = errors.row(record, line, header.len(), &columns, is_comma_decimal) {
                 self.rows.push(row);
                 self.lines.push(line);
             }
         }
         Ok(())
+    }
+
+    /// The same with other columns, row by row.
+    pub fn with_rows(self, rows: Vec<Vec<f64>>) -> Self {
+        Self { rows, ..self }
     }
 
     /// The rows, each with the requested columns.
@@ -108,6 +120,14 @@ impl NumberTable {
 /// Text of a field. Bytes that are not UTF-8 become a character that is part of no name and no number.
 fn cell(field: &[u8]) -> Cow<'_, str> {
     String::from_utf8_lossy(field)
+}
+
+/// A number, with a decimal comma where those do not separate fields.
+fn number(text: &str, is_comma_decimal: bool) -> Option<f64> {
+    if is_comma_decimal && text.contains(',') && !text.contains('.') {
+        return text.replacen(',', ".", 1).parse().ok();
+    }
+    text.parse().ok()
 }
 
 /// Errors found in the content of one file.
@@ -140,34 +160,44 @@ impl TableErrors {
         if self.list.is_empty() { Ok(()) } else { Err(TableError::Content(self.list)) }
     }
 
-    /// Index and name of every column to be read.
+    /// Every column to be read.
     fn columns(
         &mut self,
         line: u64,
         header: &[String],
         required: &[String],
         optional: &[String],
-    ) -> Vec<(usize, String)> {
-        let place = |name: &String| header.iter().position(|found| found == name);
-        let found = |names: &[String]| -> Vec<_> {
-            names.iter().filter_map(|name| Some((place(name)?, name.clone()))).collect()
-        };
-        let missing: Vec<_> = required.iter().filter(|name| place(name).is_none()).cloned().collect();
-        if !missing.is_empty() {
-            self.add(format!("line {line}: missing columns {}", missing.join(", ")));
-        }
-        for name in required.iter().chain(optional) {
-            let times = header.iter().filter(|found| *found == name).count();
-            if times > 1 {
-                self.add(format!("line {line}: column {name} appears {times} times: must appear once"));
+    ) -> Vec<Column> {
+        let mut found = |names: &[String]| -> Vec<Column> {
+            let mut columns = vec![];
+            for name in names {
+                let mut places = find(header, name);
+                if places.len() > 1 {
+                    self.add(format!(
+                        "line {line}: column {name} appears {} times: must appear once",
+                        places.len()
+                    ));
+                }
+                columns.extend(places.drain(..).next());
             }
+            columns
+        };
+        let (mut columns, optional_found) = (found(required), found(optional));
+        let missing = |names: &[String]| -> Vec<String> {
+            let absent = names.iter().filter(|name| find(header, name).is_empty());
+            absent.map(|name| format!("{name}{}", hint(header, name))).collect()
+        };
+        let absent = missing(required);
+        if !absent.is_empty() {
+            self.add(format!("line {line}: missing columns {}", absent.join(", ")));
         }
-        let optional_found = found(optional);
         if !optional_found.is_empty() && optional_found.len() < optional.len() {
-            let names = optional.join(", ");
-            self.add(format!("line {line}: of the columns {names} either all or none must be there"));
+            let absent = missing(optional).join(", ");
+            self.add(format!(
+                "line {line}: missing columns {absent}: of {} either all or none must be there",
+                optional.join(", ")
+            ));
         }
-        let mut columns = found(required);
         columns.extend(optional_found);
         columns
     }
@@ -177,53 +207,33 @@ impl TableErrors {
         record: &csv::ByteRecord,
         line: u64,
         width: usize,
-        columns: &[(usize, String)],
+        columns: &[Column],
+        is_comma_decimal: bool,
     ) -> Option<Vec<f64>> {
         if record.len() != width {
-            self.add(format!("line {line}: {} fields: must be {width}, as in the header", record.len()));
+            let cure = "; with decimal commas the fields must be separated by semicolons";
+            let cure = if record.len() > width && !is_comma_decimal { cure } else { "" };
+            self.add(format!(
+                "line {line}: {} fields: must be {width}, as in the header{cure}",
+                record.len()
+            ));
             return None;
         }
         let mut row = Vec::with_capacity(columns.len());
-        for (index, name) in columns {
+        for Column { index, name, factor } in columns {
             let text = cell(record.get(*index).unwrap_or_default());
-            match text.trim().parse::<f64>() {
-                Ok(value) if value.abs() <= MAX_MAGNITUDE => row.push(value),
-                Ok(value) => {
+            match number(text.trim(), is_comma_decimal).map(|value| value * factor) {
+                Some(value) if value.abs() <= MAX_MAGNITUDE => row.push(value),
+                Some(value) => {
                     let finite = value.is_finite().then(|| format!("at most {MAX_MAGNITUDE:e} in magnitude"));
                     let bound = finite.unwrap_or("finite".into());
                     self.add(format!("line {line}: {name} = {}: must be {bound}", excerpt(&text)));
                 }
-                Err(_) => self.add(format!("line {line}: {name} = \"{}\": must be a number", excerpt(&text))),
+                None => self.add(format!("line {line}: {name} = \"{}\": must be a number", excerpt(&text))),
             }
         }
         (row.len() == columns.len()).then_some(row)
     }
-}
-
-/// Names of six columns, `stem_1 ... stem_6`.
-pub fn legs(stem: &str) -> Vec<String> {
-    (1..=6).map(|leg| format!("{stem}_{leg}")).collect()
-}
-
-/// Names of the columns of X or a derivative, `alpha<suffix> ... z<suffix>`.
-pub fn coordinates(suffix: &str) -> Vec<String> {
-    AXES.iter().map(|name| format!("{name}{suffix}")).collect()
-}
-
-/// Names of the columns of a trajectory: `t`, X, X', X''.
-pub fn trajectory_columns() -> Vec<String> {
-    let mut columns = vec!["t".into()];
-    for suffix in ["", "_rate", "_accel"] {
-        columns.extend(coordinates(suffix));
-    }
-    columns
-}
-
-/// Names of the columns that forward kinematics needs: `t` and lengths.
-pub fn length_columns() -> Vec<String> {
-    let mut columns = vec!["t".into()];
-    columns.extend(legs("length"));
-    columns
 }
 
 /// Six consecutive columns of a row.
@@ -232,89 +242,4 @@ pub fn six(row: &[f64], first: usize) -> [f64; 6] {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::io::repeat;
-
-    use super::*;
-    use crate::output::csv_rows::MAX_ROW_BYTES;
-
-    /// Error text for CSV with the columns t and x.
-    fn refusal(source: impl Read) -> String {
-        let columns = ["t".into(), "x".into()];
-        NumberTable::from_reader(source, Path::new("x.csv"), &columns, &[]).unwrap_err().to_string()
-    }
-
-    #[test]
-    fn endless_text_is_refused() {
-        for byte in *b"1\",\n\0" {
-            let bound = "x.csv: line 1: a row longer than 65536 bytes: must be at most that long";
-            assert_eq!(refusal(repeat(byte)), bound);
-            let bound = "x.csv: line 2: a row longer than 65536 bytes: must be at most that long";
-            assert_eq!(refusal(b"t,x\n".chain(repeat(byte))), bound);
-        }
-        // A quote that is not closed, below a sound row.
-        let bound = "x.csv: line 3: a row longer than 65536 bytes: must be at most that long";
-        assert_eq!(refusal(b"t,x\n1,2\n\"1,".chain(repeat(b'2'))), bound);
-    }
-
-    #[test]
-    fn a_long_row_is_read_to_its_bound() {
-        let columns = ["t".into(), "x".into()];
-        let rows = |notes: usize| format!("t,x,notes\n1,2,{}\n", "n".repeat(notes));
-        let read =
-            |text: String| NumberTable::from_reader(text.as_bytes(), Path::new("x.csv"), &columns, &[]);
-        assert_eq!(read(rows(MAX_ROW_BYTES - 5)).unwrap().rows(), [[1.0, 2.0]]);
-        assert!(read(rows(2 * MAX_ROW_BYTES)).is_err());
-    }
-
-    #[test]
-    fn rows_without_end_are_refused() {
-        struct EndlessRows;
-        impl Read for EndlessRows {
-            fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-                for (i, byte) in buffer.iter_mut().enumerate() {
-                    *byte = if i % 2 == 0 { b'1' } else { b'\n' };
-                }
-                Ok(buffer.len() & !1)
-            }
-        }
-        let message = refusal(b"t,x\n".chain(EndlessRows));
-        assert!(message.starts_with("x.csv: line 2: 1 fields: must be 2, as in the header\n"), "{message}");
-        assert!(
-            message.ends_with(&format!("\nx.csv: and {} more", MAX_ROWS + 1 - MAX_ERRORS_SHOWN)),
-            "{message}"
-        );
-    }
-
-    #[test]
-    fn values_are_shown_cut_and_on_one_line() {
-        let text = format!("t,x\n1,\"1\n\u{1b}[2J\"\n2,{}\n3,-1e13\n", "9".repeat(400));
-        let wanted = [
-            "x.csv: line 2: x = \"1 \\u{1b}[2J\": must be a number",
-            &format!("x.csv: line 4: x = {}...: must be finite", "9".repeat(60)),
-            "x.csv: line 5: x = -1e13: must be at most 1e12 in magnitude",
-        ];
-        assert_eq!(refusal(text.as_bytes()), wanted.join("\n"));
-    }
-
-    #[test]
-    fn errors_of_the_header_name_its_line() {
-        for text in ["\nt,y\n", "\r\nt,y\r\n", "\nt,y"] {
-            assert_eq!(refusal(text.as_bytes()), "x.csv: line 2: missing columns x");
-        }
-    }
-
-    #[test]
-    fn each_row_has_its_line() {
-        let columns = ["t".into(), "x".into()];
-        for end in ["\n", "\r\n"] {
-            let text = "t,x\n1,2\n\n3,\"4\n\"\n5,\"6\"\n\n\n7,8".replace('\n', end);
-            for text in [text.clone(), text + end] {
-                let table =
-                    NumberTable::from_reader(text.as_bytes(), Path::new("x.csv"), &columns, &[]).unwrap();
-                assert_eq!(table.lines(), [2, 4, 6, 9], "{text:?}");
-                assert_eq!(table.rows(), [[1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [7.0, 8.0]]);
-            }
-        }
-    }
-}
+mod tests;

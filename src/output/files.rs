@@ -2,7 +2,7 @@
 
 use core::fmt;
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -36,8 +36,40 @@ pub fn print(text: impl fmt::Display) -> Result<(), FileError> {
     }
 }
 
-/// Writes a file durably: a crash or a power failure at any instant leaves the old content or the new.
+/// Path that means standard input or output.
+const STANDARD: &str = "-";
+
+/// Whether a path means standard input or output.
+pub fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == STANDARD
+}
+
+/// Name of a file to read, for people.
+pub fn name_of(path: &Path) -> &Path {
+    if is_standard(path) { Path::new("standard input") } else { path }
+}
+
+/// Opens a file to read; `-` is standard input.
+pub fn open(path: &Path) -> Result<Box<dyn Read>, FileError> {
+    if is_standard(path) {
+        return Ok(Box::new(io::stdin()));
+    }
+    File::open(path).map_err(FileError::on(path)).map(|file| Box::new(file) as Box<dyn Read>)
+}
+
+/// Writes a value as JSON to standard output, with [`print()`].
+pub fn print_json(value: &impl Serialize) -> Result<(), FileError> {
+    let json = serde_json::to_string_pretty(value)
+        .map_err(|error| FileError::on(Path::new("standard output"))(error.into()))?;
+    print(format_args!("{json}\n"))
+}
+
+/// Writes a file durably: a crash or a power failure at any instant leaves the old content or the new. `-` is standard
+/// output.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    if is_standard(path) {
+        return print(String::from_utf8_lossy(content));
+    }
     replace(path, |file| file.write_all(content)).map_err(FileError::on(path))
 }
 

@@ -2,11 +2,14 @@
 
 pub mod axis;
 pub mod charts;
+mod csv_columns;
 pub mod csv_rows;
 pub mod csv_table;
 pub mod csv_writer;
 pub mod excerpt;
 pub mod files;
 pub mod numbers;
+pub mod page;
 pub mod svg;
 pub mod text_table;
+pub mod version;

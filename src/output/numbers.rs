@@ -31,6 +31,13 @@ pub fn significant(x: f64) -> String {
     }
 }
 
+/// A number with so many digits after the point, and no negative zero.
+pub fn fixed(number: f64, digits: usize) -> String {
+    let text = format!("{number:.digits$}");
+    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+    if is_zero { text.trim_start_matches('-').into() } else { text }
+}
+
 /// A share in per cent, with three significant digits.
 pub fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share))

@@ -16,6 +16,7 @@ pub mod event;
 pub mod exchange;
 pub mod futex;
 pub mod overrun;
+pub mod pause_signals;
 pub mod process;
 pub mod request_signal;
 pub mod request_word;

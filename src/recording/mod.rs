@@ -63,7 +63,7 @@ pub struct RunInfo {
     pub name: String,
     /// Version of hexad.
     pub version: String,
-    /// Commit of the source, if `HEXAD_COMMIT` was set when it was built.
+    /// Commit of the source, or `unknown`.
     pub commit: String,
     /// Instruction set of the model's lanes.
     pub instruction_set: String,

@@ -1,11 +1,12 @@
 //! Reads a recording, also one that a crash left unfinished.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use mcap::read::{ChunkFlattener, Options};
 use mcap::records::Record;
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::cdr;
 use super::{CYCLE, GAP, Item, MEMORY, RecordingError, RunInfo};
@@ -13,10 +14,12 @@ use crate::messages::layout::Declared as _;
 use crate::messages::{CycleMessage, GapMessage};
 use crate::output::files::FileError;
 
-/// The bytes of a recording.
+/// Most bytes that are read at once: a chunk. A damaged length cannot demand more.
+const READ_BYTES: usize = 128 * 1024;
+
+/// A recording, which is read anew from its file each time.
 pub struct Recording {
     path: PathBuf,
-    bytes: Vec<u8>,
 }
 
 /// What a file says about itself.
@@ -35,11 +38,13 @@ pub struct Summary {
 }
 
 impl Recording {
-    /// Reads a file.
-    pub fn read(path: &Path) -> Result<Self, RecordingError> {
-        let bytes = fs::read(path).map_err(FileError::on(path))?;
-        let recording = Self { path: path.to_path_buf(), bytes };
-        if !recording.bytes.starts_with(mcap::MAGIC) {
+    /// Opens a file, which must begin as an MCAP file.
+    pub fn open(path: &Path) -> Result<Self, RecordingError> {
+        let recording = Self { path: path.to_path_buf() };
+        let mut magic = vec![];
+        let file = File::open(path).map_err(FileError::on(path))?;
+        file.take(mcap::MAGIC.len() as u64).read_to_end(&mut magic).map_err(FileError::on(path))?;
+        if magic != mcap::MAGIC {
             return Err(recording.foreign("it is not an MCAP file"));
         }
         Ok(recording)
@@ -59,11 +64,21 @@ impl Recording {
         &self,
         mut visit: impl FnMut(Record<'_>) -> Result<(), RecordingError>,
     ) -> Result<Option<String>, RecordingError> {
-        let records = ChunkFlattener::new_with_options(&self.bytes, Options::IgnoreEndMagic.into());
-        for record in records.map_err(|error| self.foreign(error))? {
-            match record {
-                Ok(Record::DataEnd(_)) => return Ok(None),
-                Ok(record) => visit(record)?,
+        let mut file = File::open(&self.path).map_err(FileError::on(&self.path))?;
+        let mut reader =
+            LinearReader::new_with_options(LinearReaderOptions::default().with_skip_end_magic(true));
+        while let Some(event) = reader.next_event() {
+            match event {
+                Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                    let buffer = reader.insert(wanted.min(READ_BYTES));
+                    let count = file.read(buffer).map_err(FileError::on(&self.path))?;
+                    reader.notify_read(count);
+                }
+                Ok(LinearReadEvent::Record { data, opcode }) => match mcap::parse_record(opcode, data) {
+                    Ok(Record::DataEnd(_)) => return Ok(None),
+                    Ok(record) => visit(record)?,
+                    Err(error) => return Ok(Some(error.to_string())),
+                },
                 Err(error) => return Ok(Some(error.to_string())),
             }
         }

@@ -126,7 +126,7 @@ impl Channel {
         if messages.kind != SetpointKind::Motion {
             task = TaskState::at_rest(task.x.into());
         }
-        self.newest = Some(Setpoint { kind: messages.kind, time_ns, task });
+        self.newest = Some(Setpoint { kind: messages.kind, ..Setpoint::motion(time_ns, task) });
         self.newest
     }
 

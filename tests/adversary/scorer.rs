@@ -136,7 +136,7 @@ fn too_fast_a_leg_is_seen() {
 #[test]
 fn too_hard_an_acceleration_is_seen() {
     Driven::at_acceleration(Z, 0.05, 7.8).assert_seen(Quantity::Acceleration, unchanged);
-    Driven::at_acceleration(ALPHA, 0.1, 31.0).assert_seen(Quantity::AngularAcceleration, unchanged);
+    Driven::at_acceleration(ALPHA, 0.1, 14.7).assert_seen(Quantity::AngularAcceleration, unchanged);
 }
 
 #[test]

@@ -8,69 +8,62 @@ SIGTERM or SIGINT; --record writes what was measured, and the forces that follow
 """
 
 import argparse
-import os
-import signal
-import sys
 
-from hexad import Bus, Force, Measured, use_fifo_priority, monotonic_ns, sleep_until
+import hexad
 from mujoco_machine import COORDINATES, LEGS, Machine, write_rows
 
-# Without a response a measurement is repeated: a participant may not be connected yet [ns].
-REPEAT_NS = 100_000_000
+# A force older than this is not applied [s].
+FORCE_TIMEOUT_S = 0.05
+
+# Before all that is not real-time.
+PRIORITY = 1
 
 
-def measurement(machine):
-    velocities = machine.velocities()
-    return Measured(
-        length_m=tuple(machine.lengths),
-        length_rate_m_s=tuple(velocities[machine.prismatic_dof]),
-        rates_valid=1,
-        pose_valid=1,
-        x=tuple(machine.coordinates()),
-        twist=tuple(machine.twist(velocities)),
-    )
+class Plant(hexad.Driver):
+    """The platform moves between the ticks, under the forces of the last one."""
 
+    def __init__(self, given):
+        period_s = 1.0 / given.rate_hz
+        super().__init__(
+            given.name,
+            period_s=period_s,
+            longest_age_s=FORCE_TIMEOUT_S,
+            priority=PRIORITY,
+            simulated=given.lockstep,
+        )
+        self.machine_in_mujoco, self.rows = Machine(given.model), []
+        self.machine_in_mujoco.place(self.machine_in_mujoco.coordinates())
+        self.steps = round(period_s / self.machine_in_mujoco.model.opt.timestep)
+        self.last_tick_ns, self.measured = None, None
 
-def drive(machine, measured, force, steps, rows):
-    """One period under a force, or braked."""
-    push = list(force.force_n) if force is not None else None
-    pushes = [float("nan")] * 6 if push is None else push
-    rows.append([measured.header.time_ns, *measured.x, *measured.twist, *pushes])
-    machine.push(push)
-    machine.advance(steps)
+    def measure(self, tick_ns):
+        machine = self.machine_in_mujoco
+        if self.last_tick_ns is not None:
+            machine.advance((tick_ns - self.last_tick_ns) // self.period_ns * self.steps)
+        self.last_tick_ns = tick_ns
+        velocities = machine.velocities()
+        self.measured = hexad.Measured(
+            length_m=tuple(machine.lengths),
+            length_rate_m_s=tuple(velocities[machine.prismatic_dof]),
+            rates_valid=1,
+            pose_valid=1,
+            x=tuple(machine.coordinates()),
+            twist=tuple(machine.twist(velocities)),
+        )
+        # It moves by the grid of the ticks, so its measurements are those of the tick.
+        self.measured.header.time_ns = tick_ns
+        return self.measured
 
+    def apply(self, force_n):
+        self.push(force_n, force_n)
 
-def run_in_real_time(machine, bus, period_ns, rows):
-    forces, source = bus.subscriber(Force), bus.publisher(Measured)
-    steps = round(period_ns * 1e-9 / machine.model.opt.timestep)
-    use_fifo_priority()
-    tick_ns = (monotonic_ns() // period_ns + 1) * period_ns
-    force = None
-    while True:
-        sleep_until(tick_ns)
-        measured = measurement(machine)
-        source.publish(tick_ns, measured)
-        force = forces.receive_latest() or force
-        now_ns = monotonic_ns()
-        drive(machine, measured, force if force and force.may_be_applied(now_ns) else None, steps, rows)
-        tick_ns += period_ns
+    def brake(self):
+        self.push(None, [float("nan")] * len(LEGS))
 
-
-def run_in_lockstep(machine, bus, period_ns, rows):
-    forces, source = bus.subscriber(Force), bus.publisher(Measured)
-    steps = round(period_ns * 1e-9 / machine.model.opt.timestep)
-    time_ns = 0
-    while True:
-        measured = measurement(machine)
-        source.publish(time_ns, measured)
-        said_ns = monotonic_ns()
-        while (force := forces.receive_latest()) is None or force.release_ns != time_ns:
-            if monotonic_ns() - said_ns > REPEAT_NS:
-                source.publish(time_ns, measured)
-                said_ns = monotonic_ns()
-            os.sched_yield()
-        drive(machine, measured, force if force.may_be_applied(time_ns) else None, steps, rows)
-        time_ns += period_ns
+    def push(self, force_n, recorded):
+        """Forces, or brakes, until the next tick."""
+        self.rows.append([self.last_tick_ns, *self.measured.x, *self.measured.twist, *recorded])
+        self.machine_in_mujoco.push(force_n)
 
 
 def main():
@@ -81,18 +74,12 @@ def main():
     arguments.add_argument("--lockstep", action="store_true")
     arguments.add_argument("--record")
     given = arguments.parse_args()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    machine, rows = Machine(given.model), []
-    machine.place(machine.coordinates())
-    run = run_in_lockstep if given.lockstep else run_in_real_time
-    try:
-        run(machine, Bus(given.name, given.lockstep), round(1e9 / given.rate_hz), rows)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        if given.record:
-            twist = ["omega_x", "omega_y", "omega_z", "x_rate", "y_rate", "z_rate"]
-            write_rows(given.record, ["time_ns", *COORDINATES, *twist, *(f"force_{i}" for i in LEGS)], rows)
+    plant = Plant(given)
+    plant.run()
+    if given.record:
+        twist = ["omega_x", "omega_y", "omega_z", "x_rate", "y_rate", "z_rate"]
+        columns = ["time_ns", *COORDINATES, *twist, *(f"force_{i}" for i in LEGS)]
+        write_rows(given.record, columns, plant.rows)
 
 
 if __name__ == "__main__":

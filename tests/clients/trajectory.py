@@ -13,8 +13,8 @@ import os
 
 import numpy as np
 
-from hexad_messages import DIAGNOSTIC_READY_TO_ENGAGE, REQUEST_ENGAGE, SETPOINT_KIND_MOTION, STATE_ACTIVE
-from hexad import Bus, Command, Measured, Setpoint, Status, use_fifo_priority, monotonic_ns, sleep_until
+from hexad import Client, Role, Setpoint, monotonic_ns, sleep_until
+from hexad.messages import DIAGNOSTIC_READY_TO_ENGAGE, REQUEST_ENGAGE, SETPOINT_KIND_MOTION, STATE_ACTIVE
 from mujoco_machine import COORDINATES, rows_of, write_rows
 
 # How long to stand at the end [s]: the platform is a little behind.
@@ -50,18 +50,18 @@ class Trajectory:
 class Player:
     """The setpoint of each instant."""
 
-    def __init__(self, bus, trajectory, engage):
-        self.statuses, self.commands = bus.subscriber(Status), bus.publisher(Command)
+    def __init__(self, client, trajectory, engage):
+        self.client = client
         self.trajectory, self.engage, self.began_ns = trajectory, engage, None
 
     def setpoint(self, now_ns):
         """The setpoint of this instant; None at the end."""
-        status = self.statuses.receive_latest()
+        status = self.client.latest_status()
         if status is not None and self.began_ns is None:
             if status.state == STATE_ACTIVE:
                 self.began_ns = now_ns
             elif self.engage and status.diagnostic.code == DIAGNOSTIC_READY_TO_ENGAGE:
-                self.commands.publish(now_ns, Command(request=REQUEST_ENGAGE))
+                self.client.publish_request(now_ns, REQUEST_ENGAGE)
         t = 0.0 if self.began_ns is None else (now_ns - self.began_ns) * 1e-9
         if t > self.trajectory.duration + SETTLE_S:
             return None
@@ -69,32 +69,39 @@ class Player:
         return Setpoint(kind=SETPOINT_KIND_MOTION, x=tuple(x), x_rate=tuple(xd), x_accel=tuple(xdd))
 
 
-def run_in_real_time(bus, player, period_ns, rows):
-    setpoints = bus.publisher(Setpoint)
+def use_fifo_priority():
+    """Runs this process before all that is not real-time, if the system permits it."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError:
+        pass
+
+
+def run_in_real_time(client, player, period_ns, rows):
     use_fifo_priority()
     tick_ns = (monotonic_ns() // period_ns + 1) * period_ns
     while (setpoint := player.setpoint(tick_ns)) is not None:
-        setpoints.publish(tick_ns, setpoint)
+        client.publish_setpoint(tick_ns, setpoint)
         rows.append([tick_ns, *setpoint.x])
         tick_ns = (max(tick_ns, monotonic_ns()) // period_ns + 1) * period_ns
         sleep_until(tick_ns)
 
 
-def run_in_lockstep(bus, player, _period_ns, rows):
-    setpoints, measurements = bus.publisher(Setpoint), bus.subscriber(Measured)
-    setpoint = None
+def run_in_lockstep(client, player, _period_ns, rows):
+    setpoint, answered, setpoint_ns = None, 0, None
     while True:
-        if (measured := measurements.receive()) is None:
+        measured = client.latest_measured()
+        if measured is None or measured.header.sequence == answered:
             os.sched_yield()
             continue
-        time_ns = measured.header.time_ns
+        answered, time_ns = measured.header.sequence, measured.header.time_ns
         # A measurement that is repeated has the same response.
-        if setpoint is None or time_ns != setpoint.header.time_ns:
-            setpoint = player.setpoint(time_ns)
+        if time_ns != setpoint_ns:
+            setpoint, setpoint_ns = player.setpoint(time_ns), time_ns
             if setpoint is None:
                 return
             rows.append([time_ns, *setpoint.x])
-        setpoints.publish(time_ns, setpoint)
+        client.publish_setpoint(time_ns, setpoint)
 
 
 def main():
@@ -106,10 +113,11 @@ def main():
     arguments.add_argument("--lockstep", action="store_true")
     arguments.add_argument("--record")
     given = arguments.parse_args()
-    bus, rows = Bus(given.name, given.lockstep), []
-    player = Player(bus, Trajectory(given.trajectory), given.engage)
-    run = run_in_lockstep if given.lockstep else run_in_real_time
-    run(bus, player, round(1e9 / given.rate_hz), rows)
+    role, rows = Role.SOURCE | Role.SIMULATED if given.lockstep else Role.SOURCE, []
+    with Client(given.name, role) as client:
+        player = Player(client, Trajectory(given.trajectory), given.engage)
+        run = run_in_lockstep if given.lockstep else run_in_real_time
+        run(client, player, round(1e9 / given.rate_hz), rows)
     if given.record:
         write_rows(given.record, ["time_ns", *COORDINATES], rows)
 

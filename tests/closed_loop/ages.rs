@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use hexad::config::Config;
-use hexad::config::control_loops::{longest_age_s, timeout_warning};
+use hexad::config::control_loops::longest_age_s;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::model::task::TaskState;
@@ -84,12 +84,14 @@ fn ages_are_stood_without_an_oscillation_or_refused() {
 }
 
 #[test]
-fn control_without_measurements_for_longer_than_the_loop_stands_is_warned_of() {
-    let warning = |lines: &str| timeout_warning(&configured("motion_base", lines).deployment);
-    assert_eq!(warning(""), None);
-    let text = warning("[timeouts]\nmeasured_ms = 200.0\n").unwrap();
-    assert!(
-        text.starts_with("timeouts.measured_ms = 200 is more than ") && text.contains(" ms, the largest age"),
-        "{text}"
-    );
+fn a_timeout_longer_than_the_age_that_the_loop_stands_is_refused_unless_accepted() {
+    let examined = |lines: &str| configured("motion_base", lines).examine();
+    assert_eq!(examined("").errors, []);
+    let text = "[timeouts]\nmeasured_ms = 200.0\n";
+    let found = examined(text);
+    let [error] = found.errors.as_slice() else { panic!("{found:?}") };
+    assert!(error.to_string().starts_with("timeouts.measured_ms = 200: must be at most 4"), "{error}");
+    let accepted = examined(&format!("{text}allow_unstable_age = true\n"));
+    assert_eq!(accepted.errors, []);
+    assert!(accepted.warnings.iter().any(|warning| warning.key == error.key), "{accepted:?}");
 }

@@ -109,6 +109,8 @@ fn a_hopeless_platform_gets_no_more_than_the_limit() {
         let mut config = unbounded(name);
         config.deployment.control.following_position_m = f64::INFINITY;
         config.deployment.control.following_orientation_rad = f64::INFINITY;
+        config.deployment.control.following_velocity_m_s = f64::INFINITY;
+        config.deployment.control.following_velocity_rad_s = f64::INFINITY;
         let limit = config.machine.actuator.max_force;
         let mut platform = config.machine.clone();
         platform.platform.mass *= 5.0;

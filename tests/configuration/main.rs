@@ -4,6 +4,7 @@
 
 mod bodies;
 mod deployment;
+mod examination;
 mod files;
 mod limits;
 mod plant;

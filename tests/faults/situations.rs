@@ -4,6 +4,7 @@ use hexad::analysis::envelope;
 use hexad::config::Config;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
+use hexad::control::limits::DerivativeLimits;
 use hexad::control::parameters::{Parameters, ViolationPolicy};
 use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
@@ -116,6 +117,10 @@ pub fn machine(mode: ControlMode) -> (Config, Parameters) {
     config.deployment.control.mode = mode;
     config.deployment.control.compensate_disturbances = mode.includes_inertia();
     config.deployment.plant.step_s = 1e-3;
+    // The table is that of limits whose defaults its drives cannot give all at once.
+    config.deployment.limits.reference.orientation =
+        DerivativeLimits { velocity: 2.0, acceleration: 20.0, jerk: 2000.0 };
+    config.deployment.control.following_velocity_rad_s = 0.6;
     let wide = [0.5, 0.5, GAMMA_RANGE, 1.0, 1.0, 1.0];
     config.deployment.envelope = Some(envelope::EnvelopeBounds {
         pose_min: wide.map(|x| -x),

@@ -4,6 +4,7 @@
 use std::mem::{align_of, offset_of, size_of};
 use std::process::Command;
 
+use crate::common::libhexad::declared;
 use crate::{file, python};
 use hexad::messages::layout::{Declared, Kind, Layout};
 use hexad::messages::{ForceMessage, Header, MESSAGES, StatusMessage};
@@ -31,7 +32,7 @@ fn all_lines() -> String {
 }
 
 const PRINT: &str = "
-import ctypes, hexad_messages
+import ctypes, hexad.messages
 seen = []
 def show(struct):
     print(struct.type_name(), struct.schema if hasattr(struct, 'topic') else 0, ctypes.sizeof(struct), ctypes.alignment(struct))
@@ -45,7 +46,7 @@ def show(struct):
             seen.append(inner)
             show(inner)
 for name in ['Setpoint', 'Measured', 'Command', 'Force', 'Status']:
-    message = getattr(hexad_messages, name)
+    message = getattr(hexad.messages, name)
     assert message.type_name() == 'hexad_' + message.topic
     show(message)
 ";
@@ -58,7 +59,7 @@ fn python_sees_the_layouts_of_rust() {
 /// The header asserts every size and offset itself.
 #[test]
 fn a_c_compiler_sees_the_layouts_of_rust() {
-    let header = python::declared("c");
+    let header = declared("c");
     let accepts = |name: &str, text: &str| {
         let path = file(name);
         std::fs::write(&path, text).unwrap();
@@ -100,13 +101,14 @@ fn the_list_of_fields_is_that_of_the_structs() {
 /// A force of simulated time 1 s, good but for one thing at a time.
 const JUDGE: &str = "
 import hexad, zlib
+from hexad.messages import Header
 def judged(now_ns=1_000_000_000, **fields):
-    force = hexad.Force(hexad.Header(hexad.Force.schema, 0, 7, 1, 1_000_000_000), valid=1, force_n=(1, 2, 3, 4, 5, 6))
+    force = hexad.Force(Header(hexad.Force.schema, 0, 7, 1, 1_000_000_000), valid=1, force_n=(1, 2, 3, 4, 5, 6))
     damaged = fields.pop('damaged', 0)
     for name, value in fields.items():
         setattr(force, name, value)
     force.checksum = damaged ^ zlib.crc32(bytes(force)[:hexad.Force.checksum.offset])
-    return force.may_be_applied(now_ns)
+    return hexad.judge(force, now_ns, 50_000_000)
 print(judged(), judged(now_ns=1_050_000_000), judged(now_ns=1_050_000_001), judged(now_ns=999_999_999))
 print(judged(valid=0), judged(damaged=1), judged(force_n=(1, 2, 3, 4, 5, float('nan'))))
 ";

@@ -1,23 +1,16 @@
-//! A Python of our own with MuJoCo and iceoryx2 in it.
+//! A Python of our own with MuJoCo in it, and the package `hexad`.
 //!
 //! Where it cannot be had, the tests are not run and say why.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
 
+use super::common::libhexad::with_library;
 use super::common::not_run::lacking;
 use super::common::python::{self, output};
 
 /// The engine. Pinned: what it makes of a model may change.
 const MUJOCO: &str = "mujoco==4.0.0";
-
-/// What speaks with the daemon, of the daemon's own version.
-fn iceoryx2() -> String {
-    let (_, after) = include_str!("../../Cargo.toml").split_once("iceoryx2 = { version = \"=").unwrap();
-    format!("iceoryx2=={}", after.split_once('"').unwrap().0)
-}
 
 /// Runs a script of `tests/clients`; its standard error if it fails.
 pub fn run(script: &str, arguments: &[&Path]) -> Result<(), String> {
@@ -42,30 +35,7 @@ fn clients() -> PathBuf {
 }
 
 fn python() -> Command {
-    let mut command = Command::new(environment().unwrap().join("bin/python"));
-    // No __pycache__ between the sources.
-    command.arg("-B").env("PYTHONPATH", declarations());
-    command
-}
-
-/// A folder with `hexad_messages.py`, as a user of the clients generates it.
-fn declarations() -> &'static Path {
-    static READY: OnceLock<PathBuf> = OnceLock::new();
-    READY.get_or_init(|| {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("declarations");
-        fs::create_dir_all(&folder).unwrap();
-        // Whole at once: another process may import it at this moment.
-        let part = folder.join(format!("{}.part", std::process::id()));
-        fs::write(&part, declared("python")).unwrap();
-        fs::rename(&part, folder.join("hexad_messages.py")).unwrap();
-        folder
-    })
-}
-
-/// What `hexad messages` prints.
-pub fn declared(language: &str) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
-    output(command.args(["messages", "--language", language])).unwrap()
+    with_library(Command::new(environment().unwrap().join("bin/python")))
 }
 
 /// Whether there is no such Python here; the calling test is then not run.
@@ -73,7 +43,7 @@ pub fn is_lacking() -> bool {
     environment().inspect_err(|why| lacking(why)).is_err()
 }
 
-/// The virtual environment with both, or why there is none.
+/// The virtual environment with it, or why there is none.
 fn environment() -> Result<PathBuf, String> {
-    python::environment(&[MUJOCO.to_owned(), iceoryx2()])
+    python::environment(&[MUJOCO.to_owned()])
 }

@@ -91,6 +91,10 @@ fn has_left_what_it_should(machine: &str, shown: &Demonstration) {
     let Report { tracking, deadline_misses, .. } = &report;
     println!("{machine}: {tracking:?}, {deadline_misses:?}, the host was away for {:?}", shown.largest_gap);
     the_pictures_are_there(&shown.charts());
+    let page = shown.charts().join("report.html");
+    assert!(output.ends_with(&format!("report           {}\n", page.display())), "{output}");
+    let text = fs::read_to_string(page).expect("the page");
+    assert!(text.contains("\"name\":\"state\""), "the page must have states");
     let folder = shown.files.folder().join(format!("hexad-demo-{}", shown.id));
     assert!(!folder.exists(), "{} must be gone", folder.display());
 }
@@ -146,7 +150,7 @@ fn has_exactly_the_fields_of_the_contract(report: &Value) {
         ("io_thread", &usage),
         ("log_thread", &usage),
     ];
-    let mut top = vec!["cycles", "rate_hz", "worst_cycles", "faults", "recording"];
+    let mut top = vec!["version", "cycles", "rate_hz", "worst_cycles", "faults", "recording"];
     top.extend(fields.iter().map(|(name, _)| *name));
     top.sort_unstable();
     assert_eq!(keys(report), top);
@@ -201,6 +205,9 @@ fn the_pictures_are_there(folder: &Path) {
         .map(|entry| entry.expect("a file").file_name().into_string().expect("a plain name"))
         .collect();
     found.sort_unstable();
+    let others = ["recording.mcap", "report.html"];
+    assert!(others.iter().all(|name| found.contains(&name.to_string())), "{found:?}");
+    found.retain(|name| !others.contains(&name.as_str()));
     assert_eq!(found, PICTURES);
     for name in PICTURES {
         let text = fs::read_to_string(folder.join(name)).expect("a picture");

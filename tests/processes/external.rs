@@ -30,7 +30,8 @@ fn external(test: &str) -> Machine {
 
 #[test]
 fn a_cycle_per_message_and_silence_is_noticed() {
-    let _turn = turns::beside_others();
+    // Its daemon polls: on two processors it leaves others little.
+    let _turn = turns::alone();
     let machine = external("external");
     let recorder = Recorder::start(&machine.name);
     let Controlled { peer: _peer, daemon, plant, machine } = Controlled::start(machine);
@@ -127,7 +128,8 @@ const CYCLES_AFTER: usize = 3000;
 /// A driver and a source whose stamps stand still: all ages stay zero, and forces would be valid for ever.
 #[test]
 fn stamps_that_stand_still_end_control() {
-    let _turn = turns::beside_others();
+    // Its daemon polls: on two processors it leaves others little.
+    let _turn = turns::alone();
     let machine = external("frozen-stamps");
     let daemon = start_daemon(&machine);
     daemon.says("running");

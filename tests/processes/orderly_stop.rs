@@ -93,7 +93,7 @@ fn processes_that_wait_for_others_stop_as_well() {
     daemon.says("off: no measurement");
     let setpoints = start_setpoints(&machine);
     setpoints.says("waiting: the pose of the platform is not known: no measurement");
-    setpoints.stops_on("INT", SOON);
+    setpoints.interrupted_on("INT", SOON);
     daemon.stops_on("TERM", SOON);
     let report = fs::read_to_string(machine.path("report.json")).expect("the report");
     let report: Report = serde_json::from_str(&report).expect("JSON");

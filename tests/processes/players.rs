@@ -66,7 +66,7 @@ fn a_move_takes_control_after_whatever_was_before_or_says_why_not() {
 fn a_signal_brings_the_platform_to_rest_under_control() {
     let _turn = turns::beside_others();
     let Trio { setpoints, daemon, plant, recorder, machine } = Trio::in_motion("interrupted");
-    let Ended { stderr, .. } = setpoints.stops_on("INT", HANG);
+    let Ended { stderr, .. } = setpoints.interrupted_on("INT", HANG);
     for words in [
         "slowing down along the path, within ",
         "the platform stands under control; hexad stop or park ends it",
@@ -119,7 +119,7 @@ fn a_move_without_a_daemon_says_what_it_waits_for() {
     setpoints.says("waiting: the pose of the platform is not known: no measurement");
     let plant = start_plant(&machine);
     setpoints.says("waiting for control (hexad engage)");
-    setpoints.stops_on("INT", HANG);
+    setpoints.interrupted_on("INT", HANG);
     drop((daemon, plant, recorder));
 }
 

@@ -33,6 +33,7 @@ const STROKE_M: [f64; 2] = [0.85, 1.6];
 const TIMEOUTS: &str = "
 [timeouts]
 measured_ms = 400.0
+allow_unstable_age = true
 
 [plant]
 force_timeout_ms = 400.0

@@ -45,8 +45,8 @@ fn nobody_is_served_beside_root() {
 
 /// With timeouts that also a busy machine does not reach: nobody has priority here.
 fn machine(test: &str) -> Machine {
-    let timeouts =
-        "[timeouts]\nsetpoint_ms = 200.0\nmeasured_ms = 900.0\n[plant]\nforce_timeout_ms = 900.0\n";
+    let timeouts = "[timeouts]\nsetpoint_ms = 200.0\nmeasured_ms = 900.0\nallow_unstable_age = true\n\
+                    [plant]\nforce_timeout_ms = 900.0\n";
     Machine::with(test, timeouts)
 }
 

@@ -14,10 +14,10 @@ use super::common::data;
 use super::common::rig::parameters;
 
 /// Part of the way that is left on arrival.
-const ARRIVED: f64 = 0.01;
+pub const ARRIVED: f64 = 0.01;
 
 /// Time of the time-optimal profile from rest to rest until 1 % of the way is left.
-fn optimal_s(way: f64, limits: &DerivativeLimits) -> f64 {
+pub fn optimal_s(way: f64, limits: &DerivativeLimits) -> f64 {
     let mut generator = Ruckig::<1, ThrowErrorHandler>::new(None, 1e-5);
     let mut input = InputParameter::new(None);
     input.target_position[0] = way;

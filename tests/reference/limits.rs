@@ -17,6 +17,23 @@ use super::streams::Stream;
 const RATES_HZ: [u64; 6] = [100, 250, 1000, 1000, 4000, 20000];
 const SECONDS: f64 = 3.0;
 
+/// Bounds of what [`examine`] finds.
+pub const BOUNDS: [(&str, f64); 13] = [
+    ("velocity", 1.0 + 1e-9),
+    ("angular velocity", 1.0 + 1e-9),
+    ("acceleration", 1.0 + 1e-9),
+    ("angular acceleration", 1.0 + 1e-9),
+    ("jerk", 1.0 + 1e-6),
+    ("angular jerk", 1.0 + 1e-6),
+    ("leg rate", 1.0),
+    ("stroke", 2e-5),
+    ("envelope angle", 1e-4),
+    ("envelope position", 1e-8),
+    ("condition", 1.0),
+    ("determinant", 0.0),
+    ("derivative", 1.0),
+];
+
 /// Limits, envelope and rate of a run by its seed.
 fn setup(name: &str, seed: u64) -> (Constants, Vector6<f64>, f64) {
     let config = Config::load(&data(name, "toml")).unwrap();
@@ -78,28 +95,13 @@ fn run(name: &str, seed: u64) -> (Largest, u64) {
 fn every_limit_is_kept() {
     let runs: u64 = std::env::var("HEXAD_RUNS").map_or(20, |runs| runs.parse().unwrap());
     let first: u64 = std::env::var("HEXAD_SEED").map_or(0, |seed| seed.parse().unwrap());
-    let bounds = [
-        ("velocity", 1.0 + 1e-9),
-        ("angular velocity", 1.0 + 1e-9),
-        ("acceleration", 1.0 + 1e-9),
-        ("angular acceleration", 1.0 + 1e-9),
-        ("jerk", 1.0 + 1e-6),
-        ("angular jerk", 1.0 + 1e-6),
-        ("leg rate", 1.0),
-        ("stroke", 2e-5),
-        ("envelope angle", 1e-4),
-        ("envelope position", 1e-8),
-        ("condition", 1.0),
-        ("determinant", 0.0),
-        ("derivative", 1.0),
-    ];
     let (mut all, mut cycles, mut failures) = (Largest::default(), 0, Vec::new());
     for name in MACHINES {
         let results: Vec<_> =
             (first..first + runs).into_par_iter().map(|seed| (seed, run(name, seed * 7919))).collect();
         let mut of_machine = Largest::default();
         for (seed, (largest, count)) in results {
-            for (quantity, bound) in bounds {
+            for (quantity, bound) in BOUNDS {
                 let value = largest.0.get(quantity).copied().unwrap_or(f64::NEG_INFINITY);
                 if value > bound {
                     let (constants, _, period_s) = setup(name, seed * 7919);

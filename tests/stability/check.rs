@@ -8,6 +8,8 @@ use super::common::data;
 /// What `check` prints of the motion base with its home turned about the vertical.
 fn checked(turn: f64) -> String {
     let text = fs::read_to_string(data("motion_base", "toml")).unwrap();
+    // Near a singular pose only strong drives hold the platform.
+    let text = text.replace("max_force_n = 20000.0", "max_force_n = 200000.0");
     let turned = text.replace("pose = [0.0, 0.0, 0.0,", &format!("pose = [0.0, 0.0, {turn},"));
     printed(
         &turned.replace("min_length_m = 1.1\nmax_length_m = 2.3", "min_length_m = 0.9\nmax_length_m = 4.0"),

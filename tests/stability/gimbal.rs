@@ -6,6 +6,7 @@ use core::f64::consts::FRAC_PI_2;
 use hexad::config::Config;
 use hexad::control::controller::Output;
 use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::limits::DerivativeLimits;
 use hexad::control::state::State;
 use hexad::model::rigid::{Motion, Pose};
 use hexad::model::task::TaskState;
@@ -88,6 +89,8 @@ fn quarter() -> Matrix3<f64> {
 /// The motion base with other homes, and with the world turned or not.
 fn configured(home: &TaskState, world: &Matrix3<f64>) -> Config {
     let mut config = deployed("motion_base");
+    config.deployment.limits.reference.orientation =
+        DerivativeLimits { velocity: 2.0, acceleration: 20.0, jerk: 2000.0 };
     let machine = &mut config.machine;
     machine.home = home.x.into();
     let legs = Legs::of(machine);

@@ -64,7 +64,7 @@ fn columns_must_be_unambiguous() {
     let all = "length_rate_1, length_rate_2, length_rate_3, length_rate_4, length_rate_5, length_rate_6";
     refused(
         format!("{LENGTHS},{rates}\n{ROW},0,0,0,0,0\n"),
-        &[&format!("line 1: of the columns {all} either all or none must be there")],
+        &[&format!("line 1: missing columns length_rate_4: of {all} either all or none must be there")],
     );
 }
 
@@ -77,7 +77,10 @@ fn a_table_without_rows_is_no_input() {
 fn everything_wrong_with_the_rows_is_reported_at_once() {
     let bad = [
         ("0.1,1.1,1.1", "line 3: 3 fields: must be 7, as in the header"),
-        ("0.2,1.1,1.1,1.1,1.1,1.1,1.1,1.1", "line 4: 8 fields: must be 7, as in the header"),
+        (
+            "0.2,1.1,1.1,1.1,1.1,1.1,1.1,1.1",
+            "line 4: 8 fields: must be 7, as in the header; with decimal commas the fields must be separated by semicolons",
+        ),
         ("0.3,1.1,long,1.1,1.1,1.1,1.1", "line 5: length_2 = \"long\": must be a number"),
         ("0.4,1.1,1.1,,1.1,1.1,1.1", "line 6: length_3 = \"\": must be a number"),
         ("0.5,1.1,1.1,1.1,nan,1.1,1.1", "line 7: length_4 = nan: must be finite"),
@@ -120,7 +123,11 @@ fn inverse_dynamics_refuses_in_the_same_words() {
     let input = folder.path().join("in.csv");
     fs::write(&input, text.replacen(",z_accel,", ",z_acceleration,", 1)).unwrap();
     let ran = hexad("inverse-dynamics", &data("fried2008", "toml"), &input, &[]);
-    assert_refused(&ran, &input, &["line 1: missing columns z_accel"]);
+    let columns = ["rate", "accel"]
+        .map(|part| ["alpha", "beta", "gamma", "x", "y", "z"].map(|axis| format!("{axis}_{part}")).join(", "))
+        .join(", ");
+    let message = format!("line 1: missing columns z_accel: of {columns} either all or none must be there");
+    assert_refused(&ran, &input, &[&message]);
 }
 
 /// Runs forward kinematics of a sound machine to an output of choice; its exit code and message.

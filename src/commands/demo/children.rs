@@ -7,6 +7,8 @@ use std::thread::sleep;
 use std::time::Instant;
 use std::{env, io};
 
+use crate::commands::log::{FILTER_VARIABLES, FORMAT_VARIABLE, format_name};
+use crate::daemon::CONFIGURATION_LOG;
 use crate::realtime::process::terminate;
 
 /// Environment variable with the process number of the parent: a child stops when that process dies.
@@ -22,15 +24,20 @@ pub struct ChildProcess {
 }
 
 impl ChildProcess {
-    /// Starts `hexad <name> <arguments>`; only its warnings are shown.
+    /// Starts `hexad <name> <arguments>`; only its warnings are shown, unless a filter is set.
     pub fn start<S: AsRef<OsStr>>(
         name: &'static str,
         arguments: impl IntoIterator<Item = S>,
     ) -> io::Result<Self> {
-        let child = Command::new(env::current_exe()?)
+        let mut command = Command::new(env::current_exe()?);
+        if FILTER_VARIABLES.iter().all(|name| env::var_os(name).is_none()) {
+            // Those about the configuration are of the copy; the demonstration itself shows those of the file.
+            command.env("HEXAD_LOG", format!("warn,{CONFIGURATION_LOG}=error"));
+        }
+        let child = command
             .arg(name)
             .args(arguments)
-            .env("HEXAD_LOG", "warn")
+            .env(FORMAT_VARIABLE, format_name())
             .env(PARENT_VARIABLE, id().to_string())
             .stdin(Stdio::null())
             .spawn()?;

@@ -7,6 +7,7 @@ use std::time::Instant;
 use std::{env, fs, io, process, thread};
 
 use clap::Args;
+use tracing::warn;
 
 use self::children::ChildProcess;
 use self::recording::{Recording, TopicRecorder};
@@ -15,6 +16,7 @@ use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, duration};
 use super::failure::{CommandError, Failure};
 use super::in_step::Operator;
 use super::progress::time_bar;
+use super::report::{self, ReportError, recordings_in};
 use crate::config::text::read_file;
 use crate::config::{Config, ConfigError};
 use crate::control::diagnostic::DiagnosticCode;
@@ -25,6 +27,7 @@ use crate::motion::built_in::BuiltInMotion;
 use crate::output::files::{FileError, print, write_whole};
 use crate::output::svg::ChartError;
 use crate::realtime::stop_request::Stop;
+use crate::recording::RecordingError;
 
 pub mod children;
 mod pictures;
@@ -42,6 +45,13 @@ const MAX_OVERHEAD_S: f64 = 20.0;
 
 /// Typical time from start to end beyond the motion itself, for the progress bar \[s\].
 const TYPICAL_OVERHEAD_S: f64 = 2.5;
+
+/// Files of a demonstration beside its pictures.
+const RECORDING: &str = "recording.mcap";
+const PAGE: &str = "report.html";
+
+/// Size of the file of a recording \[MiB\]: one file, however long the demonstration is.
+const RECORDING_MIB: &str = "65536";
 
 /// Tracking errors above which the motion counts as not made \[m\], \[rad\].
 const MAX_POSITION_ERROR_M: f64 = 0.01;
@@ -67,7 +77,7 @@ pub struct DemoArguments {
     /// Write a JSON report
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Folder for the pictures
+    /// Folder for the recording, its page and the pictures
     #[arg(long, value_name = "FOLDER", default_value = "hexad-demo")]
     charts: PathBuf,
 }
@@ -89,6 +99,8 @@ pub enum DemoError {
     File(#[from] FileError),
     #[error(transparent)]
     Chart(#[from] ChartError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
     #[error("cannot run the processes: {0}")]
     Process(#[from] io::Error),
     #[error("hexad {0} ended early: {1}")]
@@ -111,7 +123,14 @@ impl CommandError for DemoError {
 fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
     let stage = Stage::new(demo)?;
     fs::create_dir_all(&demo.charts).map_err(FileError::on(&demo.charts))?;
-    let recording = stage.perform(demo, stop)?;
+    let performed = stage.perform(demo, stop);
+    // A demonstration that failed is worth a look, too.
+    let page = stage.write_page(&demo.charts);
+    let recording = performed.inspect_err(|_| {
+        if let Ok(page) = &page {
+            eprintln!("hexad: report: {}", page.display());
+        }
+    })?;
 
     let tracking = recording.tracking();
     let mut report = Report::read(&stage.report)?;
@@ -121,8 +140,9 @@ fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
     print(format_args!("pictures         {} in {}\n", pictures.len(), demo.charts.display()))?;
     if let Some(path) = &demo.report {
         report.write(path)?;
-        print(format_args!("report           {}\n", path.display()))?;
+        print(format_args!("figures          {}\n", path.display()))?;
     }
+    print(format_args!("report           {}\n", page?.display()))?;
     if !report.faults.is_empty() {
         return Err(DemoError::Failed(format!("{} faults", report.faults.len())));
     }
@@ -160,6 +180,9 @@ impl Stage {
         let (text, place) = read(demo.config.as_deref())?;
         // Error texts about the user's files show the names of those files.
         let original = Config::parse(&text, &place)?;
+        for warning in original.examine().into_result(&original)? {
+            warn!("{warning}");
+        }
         let (plant_text, plant_place) = match &demo.plant_config {
             Some(path) => read(Some(path))?,
             None => (text.clone(), place.clone()),
@@ -192,10 +215,12 @@ impl Stage {
         let seconds = format!("{}", demo.seconds);
         let controller = ["--config".as_ref(), self.controller.as_os_str()];
         let plant = ChildProcess::start("plant", ["--config".as_ref(), self.plant.as_os_str()])?;
-        let daemon = ChildProcess::start(
-            "run",
-            controller.into_iter().chain(["--report".as_ref(), self.report.as_os_str()]),
-        )?;
+        let records = ["--record".as_ref(), demo.charts.as_os_str()];
+        let size =
+            ["--record-file-mib", RECORDING_MIB, "--record-total-mib", RECORDING_MIB].map(AsRef::as_ref);
+        let report = ["--report".as_ref(), self.report.as_os_str()];
+        let daemon =
+            ChildProcess::start("run", controller.into_iter().chain(report).chain(records).chain(size))?;
         let setpoints = ChildProcess::start(
             "move",
             controller
@@ -204,18 +229,31 @@ impl Stage {
         )?;
         let mut processes = vec![plant, daemon, setpoints];
         let operator = Operator::new(&bus)?;
-        watch(&mut processes, &mut recorder, operator, demo.seconds, stop)?;
+        let watched = watch(&mut processes, &mut recorder, operator, demo.seconds, stop);
         // In reverse order of their start: the setpoint source has ended, the daemon publishes that no force is
         // valid, the plant brakes.
         for process in processes.drain(..).rev() {
             let name = process.name;
             let status = process.stop()?;
-            if !status.success() {
+            if !status.success() && watched.is_ok() {
                 return Err(DemoError::Ended(name, status));
             }
             recorder.poll();
         }
-        Ok(recorder.finish())
+        watched.map(|()| recorder.finish())
+    }
+
+    /// Gives the recording its name, in place of that of the demonstration before, and writes its page; returns the path of
+    /// the page.
+    fn write_page(&self, folder: &Path) -> Result<PathBuf, DemoError> {
+        let (recording, page) = (folder.join(RECORDING), folder.join(PAGE));
+        let name = format!("{}.", self.config.name);
+        let Some(file) = recordings_in(folder, &name).pop() else {
+            return Err(ReportError::from(RecordingError::Empty(folder.into())).into());
+        };
+        fs::rename(&file, &recording).map_err(FileError::on(&file))?;
+        report::write(&[recording], &page)?;
+        Ok(page)
     }
 }
 
@@ -275,24 +313,25 @@ fn read(path: Option<&Path>) -> Result<(String, String), ConfigError> {
 /// The configuration under another name and rate. The text has been parsed before.
 ///
 /// A desktop takes the processor away for tens of milliseconds now and then. That is no fault of the loop,
-/// so where the file sets no timeouts those of a demonstration are longer than those of a deployment.
+/// so where the file sets no timeouts those of a demonstration are longer than those of a deployment, and than its loop stands.
 fn adapted(text: &str, name: &str, rate_hz: Option<f64>) -> String {
     let mut table: toml::Table = toml::from_str(text).unwrap_or_default();
     table.insert("name".into(), name.into());
-    let mut set = |section: &str, key: &str, value: f64, replace: bool| {
+    let mut set = |section: &str, key: &str, value: toml::Value, replace: bool| {
         let section = table.entry(section).or_insert_with(|| toml::Table::new().into());
         if let Some(section) = section.as_table_mut().filter(|section| replace || !section.contains_key(key))
         {
-            section.insert(key.into(), value.into());
+            section.insert(key.into(), value);
         }
     };
     for (section, key) in
         [("timeouts", "setpoint_ms"), ("timeouts", "measured_ms"), ("plant", "force_timeout_ms")]
     {
-        set(section, key, DEFAULT_TIMEOUT_MS, false);
+        set(section, key, DEFAULT_TIMEOUT_MS.into(), false);
     }
+    set("timeouts", "allow_unstable_age", true.into(), false);
     if let Some(rate_hz) = rate_hz {
-        set("realtime", "rate_hz", rate_hz, true);
+        set("realtime", "rate_hz", rate_hz.into(), true);
     }
     table.to_string()
 }

@@ -21,7 +21,7 @@ use crate::config::deployment::{Deployment, Realtime, Scheduler};
 use crate::config::{Config, ConfigError};
 use crate::daemon::nanoseconds;
 use crate::daemon::start::prepare_loop;
-use crate::output::files::{FileError, print, write_json};
+use crate::output::files::{FileError, print, print_json, write_json};
 use crate::realtime::clock_cost::ClockCost;
 use crate::realtime::cyclic::ReleaseMode;
 use crate::realtime::setup::idle::PmQosRequest;
@@ -37,6 +37,9 @@ mod running;
 mod text;
 pub mod verdict;
 
+/// Schema of the JSON, raised when a field changes its meaning or goes.
+const SCHEMA: u32 = 1;
+
 #[derive(Debug, Args)]
 pub struct DoctorArguments {
     /// Machine file whose CPU, priority and rate are meant [default: the built-in fried2008]
@@ -51,6 +54,9 @@ pub struct DoctorArguments {
     /// Write a JSON report
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Print the report as JSON instead of the text
+    #[arg(long)]
+    json: bool,
     /// Measure although a controller runs on the same CPUs, and delay it
     #[arg(long)]
     disturb: bool,
@@ -93,9 +99,11 @@ impl CommandError for DoctorError {
     }
 }
 
-/// Diagnosis of a host: the JSON that `--report` writes.
+/// Diagnosis of a host: the JSON of `--report` and `--json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Diagnosis {
+    #[serde(default)]
+    pub schema: u32,
     pub name: String,
     /// Configured rate, and the release mode that was measured for it.
     pub rate_hz: f64,
@@ -123,7 +131,9 @@ fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
     let host = &HostFiles::under(Path::new("/"));
     let facts = facts::all(host, realtime, &permissions, &refused, &ClockCost::measure());
     let style = TextStyle::of_stdout();
-    print(style.facts(&config.name, realtime, &facts))?;
+    if !doctor.json {
+        print(style.facts(&config.name, realtime, &facts))?;
+    }
 
     let controller = running::controllers(host, realtime.cpu).first().copied();
     if let Some(process) = controller.filter(|_| !doctor.disturb) {
@@ -142,16 +152,25 @@ fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
     let configured = rates.iter().find(|rate| rate.latency.is_of(rate_hz, release));
     let verdict = configured.map_or(Feasibility::Impossible, |rate| rate.verdict);
     let (cpu, seconds) = (realtime.cpu, doctor.seconds);
-    let diagnosis = Diagnosis { name: config.name, rate_hz, release, cpu, seconds, facts, rates, verdict };
-    print(style.rates(&diagnosis))?;
-    if let Some(path) = &doctor.report {
-        write_json(path, &diagnosis)?;
-        print(format_args!("report  {}\n", path.display()))?;
-    }
+    let (schema, name) = (SCHEMA, config.name);
+    let diagnosis = Diagnosis { schema, name, rate_hz, release, cpu, seconds, facts, rates, verdict };
+    show(doctor, &style, &diagnosis)?;
     match verdict {
         Feasibility::Good | Feasibility::Marginal => Ok(()),
         Feasibility::Impossible => Err(DoctorError::Impossible { rate_hz, release }),
     }
+}
+
+/// Prints the rates, or all as JSON, and writes the report.
+fn show(doctor: &DoctorArguments, style: &TextStyle, diagnosis: &Diagnosis) -> Result<(), FileError> {
+    if doctor.json {
+        print_json(diagnosis)?;
+    } else {
+        print(style.rates(diagnosis))?;
+    }
+    let Some(path) = &doctor.report else { return Ok(()) };
+    write_json(path, diagnosis)?;
+    if doctor.json { Ok(()) } else { print(format_args!("report  {}\n", path.display())) }
 }
 
 /// The configured section, with the CPU of the command line if there is one.

@@ -215,6 +215,7 @@ mod tests {
         };
         let verdict = Feasibility::Impossible;
         Diagnosis {
+            schema: 1,
             name: "test".into(),
             rate_hz: 20_000.0,
             release: ReleaseMode::Hybrid,

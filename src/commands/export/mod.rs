@@ -28,7 +28,7 @@
 //! A transverse inertia that varies with the length belongs to no rigid body, so no engine of rigid bodies
 //! can carry it: a mass that moved along the leg would add `dI/dt omega`, which the paper leaves out. What
 //! the paper does, Newton-Euler with the instantaneous value, a reader of the MJCF does by setting
-//! `body_inertia` from the numbers before each step (`tests/clients/machine.py`).
+//! `body_inertia` from the numbers before each step (`tests/clients/mujoco_machine.py`).
 //!
 //! The models have no brakes, drives or controllers. Without forces the machine falls.
 

@@ -1,13 +1,10 @@
 //! Request for control by a setpoint source, beside its setpoints: once they are published, not before.
 
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
+use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
-use tracing::info;
-
 use super::MoveError;
-use crate::commands::operate::{OperatorError, Order, carry_out};
+use crate::commands::operate::{OperatorError, Order, carry_out_in_background};
 use crate::config::Config;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::Request;
@@ -55,7 +52,8 @@ impl Engagement {
             Self::Socket { config, began, within, stop, result } => {
                 let result = result.get_or_insert_with(|| {
                     let rest = within.saturating_sub(began.elapsed());
-                    start(config.clone(), rest, stop.clone())
+                    let order = Order { request: Request::Engage, is_patient: true, timeout: rest };
+                    carry_out_in_background(config, order, stop)
                 });
                 match result.try_recv() {
                     Ok(outcome) => Ok(outcome?),
@@ -78,16 +76,4 @@ impl Engagement {
             }
         }
     }
-}
-
-/// Sends the request in a thread: the setpoints must not wait.
-fn start(config: Box<Config>, timeout: Duration, stop: Stop) -> Outcome {
-    let (send, result) = channel();
-    thread::spawn(move || {
-        let order = Order { request: Request::Engage, is_patient: true, timeout };
-        let outcome = carry_out(&config, &order, &stop, |reason| info!("engage waits: {reason}"));
-        // Nobody receives it when the player has ended.
-        let _ = send.send(outcome.map(drop));
-    });
-    result
 }

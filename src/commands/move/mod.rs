@@ -3,8 +3,9 @@
 //! It starts where the platform stands (the daemon's status contains the pose), moves the platform gently to the start
 //! of the trajectory, plays it and ends at rest. When an operator ends control it ends, too; after a fault or a restart of
 //! the daemon it starts over from wherever the platform stands then. A signal slows the platform down along its path, to
-//! rest under control.
+//! rest under control, and ends the player with exit code 130. `--pause` and `--resume` are requests to the player that runs.
 
+use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -16,7 +17,7 @@ use self::playback::{Playback, PlaybackStep};
 use self::precheck::SetpointRefusal;
 use self::trajectory::{MIN_AMPLITUDE_SHARE, Trajectory};
 use super::arguments::{MachineFile, duration};
-use super::failure::{CommandError, Failure};
+use super::failure::{CommandError, Failure, INTERRUPTED, default_exit_code};
 use super::operate::OperatorError;
 use super::plant::prepare_thread;
 use crate::config::Config;
@@ -32,12 +33,16 @@ use crate::motion::built_in::BuiltInMotion;
 use crate::output::csv_table::TableError;
 use crate::output::numbers::percent;
 use crate::realtime::clock::{Grid, sleep_until};
+use crate::realtime::pause_signals::PauseRequest;
 use crate::realtime::stop_request::Stop;
 
+mod approach;
 mod engagement;
+mod path;
+mod pause;
 mod playback;
 mod precheck;
-mod slowdown;
+mod rate_change;
 pub mod trajectory;
 
 #[derive(Debug, Args)]
@@ -63,14 +68,27 @@ struct TrajectorySource {
     /// A built-in motion
     #[arg(long, value_enum)]
     motion: Option<BuiltInMotion>,
-    /// A CSV file with t, X, X', X''
+    /// A CSV file with t and X, or t, X, X', X''; `-` is standard input
+    ///
+    /// Columns t, alpha, beta, gamma, x, y, z, and alpha_rate ... z_rate, alpha_accel ... z_accel or none of these, in s, rad and m, or
+    /// with a unit at the end of the name: t_ms, x_mm, alpha_deg, x_rate_mm_s, alpha_accel_deg_s2. Commas, semicolons or tabs
+    /// separate fields; without commas a number may have a decimal comma.
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
+    /// Let the player that runs slow down along its path, to rest under control
+    #[arg(long)]
+    pause: bool,
+    /// Let a paused player go on along its path
+    #[arg(long)]
+    resume: bool,
 }
 
 impl MoveArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let config = self.machine.load()?;
+        if self.source.pause || self.source.resume {
+            return Ok(pause::request(&config, self.source.pause)?);
+        }
         let trajectory = match (&self.source.trajectory, self.source.motion) {
             (Some(path), _) => Trajectory::from_file(&config, path)?,
             (None, motion) => {
@@ -104,6 +122,12 @@ pub enum MoveError {
     Operator(#[from] OperatorError),
     #[error("not engaged within {0} s: {1}")]
     NotEngaged(f64, String),
+    #[error("no player to pause or resume: {0}")]
+    NoPlayer(String),
+    #[error("signals of pause and resume: {0}")]
+    Signals(#[from] io::Error),
+    #[error("interrupted")]
+    Interrupted,
     #[error("the motion has ended: the daemon is in {state}: {reason}", state = .0.name(), reason = .1)]
     Ended(State, Diagnostic),
 }
@@ -111,9 +135,16 @@ pub enum MoveError {
 impl CommandError for MoveError {
     fn has_begun(&self) -> bool {
         match self {
-            Self::Port(_) => false,
+            Self::Port(_) | Self::Signals(_) => false,
             Self::Operator(error) => error.has_begun(),
-            Self::NotEngaged(..) | Self::Ended(..) => true,
+            Self::NotEngaged(..) | Self::Ended(..) | Self::NoPlayer(_) | Self::Interrupted => true,
+        }
+    }
+
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Interrupted => INTERRUPTED,
+            _ => default_exit_code(self),
         }
     }
 }
@@ -137,10 +168,11 @@ fn run(
     // Every status counts: a state may last one cycle.
     let playback = Playback::new(config, trajectory, bus.subscriber(usize::MAX)?, engagement);
     if bus.is_simulated() {
-        run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)
+        run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?;
     } else {
-        run_in_real_time(config, playback, setpoints, stop)
+        run_in_real_time(config, playback, setpoints, stop)?;
     }
+    if stop.is_requested() { Err(MoveError::Interrupted) } else { Ok(()) }
 }
 
 fn run_in_real_time(
@@ -149,6 +181,7 @@ fn run_in_real_time(
     mut setpoints: Publisher<SetpointMessage>,
     stop: &Stop,
 ) -> Result<(), MoveError> {
+    let pause = PauseRequest::on_signals()?;
     prepare_thread(config);
     let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
     let mut tick_ns = grid.next_after(monotonic_ns());
@@ -157,6 +190,7 @@ fn run_in_real_time(
         if stop.is_requested() && playback.slow_down(tick_ns) {
             break;
         }
+        playback.set_paused(tick_ns, pause.is_requested());
         match playback.step(tick_ns)? {
             PlaybackStep::Silent => {}
             PlaybackStep::Setpoint(setpoint) => setpoints.publish(tick_ns, (&setpoint).into())?,

@@ -4,22 +4,20 @@ use nalgebra::Vector6;
 use tracing::{info, warn};
 
 use super::MoveError;
+use super::approach::approach_s;
 use super::engagement::Engagement;
-use super::slowdown::Slowdown;
+use super::path::Path;
+use super::rate_change::RateChange;
 use super::trajectory::Trajectory;
 use crate::config::Config;
 use crate::control::controller::{Setpoint, SetpointKind};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::limits::{DerivativeLimits, Limits};
+use crate::control::limits::Limits;
 use crate::control::state::State;
 use crate::messages::{StatusMessage, Subscriber};
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::motion::minimum_jerk::shortest_duration;
 use crate::motion::timeline::Timeline;
-
-/// Share of each limit that the approach uses; the rest is for angles that turn at once and add up.
-const APPROACH_SHARE: f64 = 0.5;
 
 /// Longest time without a status of a daemon in control, after which the approach starts over \[ns\].
 const CONTROL_TIMEOUT_NS: u64 = 200_000_000;
@@ -41,9 +39,11 @@ enum Phase {
     /// At the pose where the platform stands, until the daemon takes control.
     Standing(Timeline),
     /// Since this instant \[ns\].
-    Playing(Timeline, u64),
+    Playing(Path, u64),
     /// To rest along the path, since this instant \[ns\].
-    Slowing(Timeline, Slowdown, u64),
+    Slowing(Path, RateChange, u64),
+    /// At rest at this time of the path \[s\], to go on.
+    Paused(Path, f64),
     /// At this pose, since this instant \[ns\].
     Holding(TaskState, u64),
 }
@@ -62,8 +62,9 @@ pub(super) struct Playback<'a> {
     last_active_ns: u64,
     /// Why it waits, as last logged.
     reason: String,
-    /// Whether the platform is to come to rest for good.
+    /// Whether the platform is to come to rest for good, or until the motion is resumed.
     is_ending: bool,
+    is_to_pause: bool,
 }
 
 impl<'a> Playback<'a> {
@@ -86,6 +87,7 @@ impl<'a> Playback<'a> {
             last_active_ns: 0,
             reason: String::new(),
             is_ending: false,
+            is_to_pause: false,
         }
     }
 
@@ -101,7 +103,7 @@ impl<'a> Playback<'a> {
     /// Reads every new status and returns the setpoint of an instant.
     pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
         self.receive(now_ns)?;
-        let is_followed = matches!(self.phase, Phase::Playing(..) | Phase::Slowing(..));
+        let is_followed = matches!(self.phase, Phase::Playing(..) | Phase::Slowing(..) | Phase::Paused(..));
         if is_followed && now_ns.saturating_sub(self.last_active_ns) > CONTROL_TIMEOUT_NS {
             self.start_over()?;
         }
@@ -119,19 +121,42 @@ impl<'a> Playback<'a> {
                 self.phase = Phase::Holding(timeline.at(0.0, |t| self.trajectory.at(t)), now_ns);
                 !has_control
             }
-            Phase::Playing(timeline, engaged_ns) => {
-                let t = seconds(*engaged_ns, now_ns);
-                let slowdown =
-                    Slowdown::shortest(t, self.limits, |t| timeline.at(t, |t| self.trajectory.at(t)));
-                info!(
-                    "slowing down along the path, within {:.1} s; once more ends at once",
-                    slowdown.duration_s
-                );
-                self.phase = Phase::Slowing(*timeline, slowdown, now_ns);
+            Phase::Playing(path, since_ns) => {
+                self.phase = self.slowing(*path, *since_ns, now_ns);
+                false
+            }
+            Phase::Paused(path, t) => {
+                self.phase = Phase::Holding(path.at(*t, self.trajectory), now_ns);
                 false
             }
             Phase::Slowing(..) | Phase::Holding(..) => false,
         }
+    }
+
+    /// Pauses the motion, or lets it go on: along its path, from rest to rest.
+    pub fn set_paused(&mut self, now_ns: u64, is_to_pause: bool) {
+        let has_changed = core::mem::replace(&mut self.is_to_pause, is_to_pause) != is_to_pause;
+        match &self.phase {
+            Phase::Playing(path, since_ns) if is_to_pause => {
+                self.phase = self.slowing(*path, *since_ns, now_ns);
+            }
+            Phase::Paused(path, t) if !is_to_pause => {
+                info!("resumed");
+                self.phase = Phase::Playing(path.resumed(*t, self.limits, self.trajectory), now_ns);
+            }
+            Phase::Waiting | Phase::Standing(_) if has_changed => {
+                info!("{}", if is_to_pause { "paused: the motion will not begin" } else { "resumed" });
+            }
+            _ => {}
+        }
+    }
+
+    fn slowing(&self, path: Path, since_ns: u64, now_ns: u64) -> Phase {
+        let t = seconds(since_ns, now_ns);
+        let slowdown = RateChange::to_rest(t, self.limits, |t| path.at(t, self.trajectory));
+        let then = if self.is_ending { "once more ends at once" } else { "hexad move --resume goes on" };
+        info!("slowing down along the path, within {:.1} s; {then}", slowdown.duration_s);
+        Phase::Slowing(path, slowdown, now_ns)
     }
 
     fn update(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
@@ -143,7 +168,7 @@ impl<'a> Playback<'a> {
         }
         match &self.phase {
             Phase::Waiting | Phase::Standing(_) => self.prepare(now_ns, status, state),
-            Phase::Playing(..) | Phase::Slowing(..) | Phase::Holding(..) => {
+            Phase::Playing(..) | Phase::Slowing(..) | Phase::Paused(..) | Phase::Holding(..) => {
                 self.follow(now_ns, state, diagnostic)
             }
         }
@@ -153,7 +178,8 @@ impl<'a> Playback<'a> {
     fn prepare(&mut self, now_ns: u64, status: &StatusMessage, state: State) -> Result<(), MoveError> {
         if let (Phase::Standing(timeline), State::Active) = (&self.phase, state) {
             info!("the daemon is in control: moving");
-            (self.phase, self.last_active_ns) = (Phase::Playing(*timeline, now_ns), now_ns);
+            let path = Path::new(*timeline);
+            (self.phase, self.last_active_ns) = (Phase::Playing(path, now_ns), now_ns);
             return Ok(());
         }
         // While the daemon engages, the setpoint must not change.
@@ -218,21 +244,27 @@ impl<'a> Playback<'a> {
                 );
                 motion(task)
             }
-            Phase::Playing(timeline, engaged_ns) => {
-                let t = seconds(*engaged_ns, now_ns);
-                if t > timeline.end() {
+            Phase::Playing(path, since_ns) => {
+                let t = seconds(*since_ns, now_ns);
+                if path.has_ended(t) {
                     return Ok(PlaybackStep::Finished);
                 }
-                motion(timeline.at(t, |t| self.trajectory.at(t)))
+                motion(path.at(t, self.trajectory))
             }
-            Phase::Slowing(timeline, slowdown, since_ns) => {
+            Phase::Slowing(path, slowdown, since_ns) => {
                 let since_s = seconds(*since_ns, now_ns);
-                let task = slowdown.at(since_s, |t| timeline.at(t, |t| self.trajectory.at(t)));
+                let task = slowdown.at(since_s, |t| path.at(t, self.trajectory));
                 if slowdown.has_ended(since_s) {
-                    self.phase = Phase::Holding(task, now_ns);
+                    self.phase = if self.is_ending {
+                        Phase::Holding(task, now_ns)
+                    } else {
+                        info!("paused");
+                        Phase::Paused(*path, slowdown.own_time_s(since_s))
+                    };
                 }
                 motion(task)
             }
+            Phase::Paused(path, t) => motion(TaskState::at_rest(path.at(*t, self.trajectory).x.into())),
             Phase::Holding(task, since_ns) => {
                 if now_ns.saturating_sub(*since_ns) > HOLD_TIME_NS {
                     info!("the platform stands under control; hexad stop or park ends it");
@@ -240,7 +272,7 @@ impl<'a> Playback<'a> {
                 }
                 let kind = SetpointKind::Target;
                 let task = TaskState::at_rest(task.x.into());
-                Ok(PlaybackStep::Setpoint(Setpoint { kind, time_ns: now_ns, task }))
+                Ok(PlaybackStep::Setpoint(Setpoint { kind, ..Setpoint::motion(now_ns, task) }))
             }
         }
     }
@@ -273,46 +305,4 @@ impl<'a> Playback<'a> {
 
 fn seconds(from_ns: u64, to_ns: u64) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 * 1e-9
-}
-
-/// Duration \[s\] of an approach that keeps the limits, in any direction.
-fn approach_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
-    let way = to - from;
-    // No angle turns the platform further than by itself.
-    let angle = way.fixed_rows::<3>(0).abs().sum();
-    let shortest = |way: f64, limits: &DerivativeLimits| {
-        let DerivativeLimits { velocity, acceleration, jerk } = limits.scaled(APPROACH_SHARE);
-        shortest_duration(way, [velocity, acceleration, jerk])
-    };
-    shortest(angle, &limits.orientation).max(shortest(way.fixed_rows::<3>(3).norm(), &limits.position))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::commands::arguments::DEFAULT_CONFIG;
-    use crate::commands::r#move::precheck::Precheck;
-
-    /// From far and turned, under limits of which each binds once; a quarter of the time would not do.
-    #[test]
-    fn the_approach_keeps_the_limits() {
-        for tight in
-            ["velocity_m_s = 0.02", "acceleration_m_s2 = 0.02", "jerk_m_s3 = 0.05", "jerk_rad_s3 = 0.1"]
-        {
-            let config = Config::parse(&format!("{DEFAULT_CONFIG}\n[limits]\n{tight}\n"), "a test").unwrap();
-            let home = Vector6::from(config.machine.home);
-            let from = home + Vector6::new(0.08, -0.1, 0.09, 0.06, 0.05, -0.04);
-            let precheck = Precheck::new(&config);
-            let refused = |share: f64| {
-                let duration_s = share * approach_s(&config.deployment.limits.reference, &from, &home);
-                let timeline =
-                    Timeline::new(&config.machine, &from, &home, 1.0).with_shortest_approach(duration_s);
-                let at = |t| timeline.at(t, |_| TaskState::at_rest(config.machine.home));
-                // In one piece: where the reference begins anew it has fallen behind nothing.
-                precheck.refusal(at, [0.0, timeline.motion_start()])
-            };
-            assert!(refused(1.0).is_none(), "{tight}: {:?}", refused(1.0));
-            assert!(refused(0.25).is_some(), "{tight}");
-        }
-    }
 }

@@ -8,20 +8,21 @@ use tracing::info;
 use super::SetpointError;
 use super::precheck::Precheck;
 use crate::analysis::sampled_loop::edge;
-use crate::commands::offline_tables::{read_trajectory, task_state, time};
+use crate::commands::offline_tables::{check_times, read_trajectory, task_state, time};
 use crate::config::Config;
 use crate::model::task::TaskState;
 use crate::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use crate::motion::trajectory::{Knot, interpolate};
 use crate::output::csv_table::{NumberTable, TableError, TableErrors};
+use crate::output::files::name_of;
 use crate::output::numbers::percent;
 
 /// Largest X' and X'' at the ends of a trajectory that count as at rest, per second.
 const MAX_REST_RATE: f64 = 1e-3;
 
-/// Least time from one row of a trajectory to the next \[s\], far below the period of any loop. Between
-/// rows that are nearer, X'' has no digits.
-const MIN_STEP_S: f64 = 1e-6;
+/// Largest ratio of the way by the rates to the way by the poses. Rows that are far apart may leave out a part of the way;
+/// a time in milliseconds makes a thousand.
+const MAX_WAY_RATIO: f64 = 30.0;
 
 /// Least amplitude of a built-in motion, as a share of its usual one; a smaller motion is invisible.
 pub(super) const MIN_AMPLITUDE_SHARE: f64 = 1e-3;
@@ -57,6 +58,7 @@ impl Trajectory {
     /// daemon.
     pub fn from_file(config: &Config, path: &Path) -> Result<Self, SetpointError> {
         let table = read_trajectory(path)?;
+        let path = name_of(path);
         let trajectory = Self::from_rows(&table, path)?;
         trajectory.check(config, &table, path)?;
         Ok(trajectory)
@@ -94,13 +96,11 @@ impl Trajectory {
         let knots: Vec<_> =
             table.rows().iter().map(|row| Knot { t: time(row), state: task_state(row) }).collect();
         let rows = || knots.iter().zip(table.lines());
-        for ((before, _), (after, line)) in rows().zip(rows().skip(1)) {
-            if !(after.t - before.t >= MIN_STEP_S) {
-                errors.add(format!(
-                    "line {line}: t = {:?} after t = {:?}: must increase, by at least {MIN_STEP_S:?}",
-                    after.t, before.t
-                ));
-            }
+        check_times(table, &mut errors);
+        if let (Some(ratio), Some(line)) = (way_ratio(&knots), table.lines().get(1)) {
+            errors.add(format!(
+                "line {line}: by its rates the way is {ratio:.0} times that by its poses: t must be in s; name the column t_ms if it is in ms"
+            ));
         }
         for (end, row) in [("first", rows().next()), ("last", rows().next_back())] {
             let Some((Knot { state, .. }, line)) = row else { continue };
@@ -135,6 +135,17 @@ impl Trajectory {
     }
 }
 
+/// Way by the rates over way by the poses, if it is too large to belong to the same motion.
+fn way_ratio(knots: &[Knot]) -> Option<f64> {
+    let (mut by_rates, mut by_poses) = (0.0, 0.0);
+    for (a, b) in knots.iter().zip(knots.iter().skip(1)) {
+        by_rates += 0.5 * (a.state.xd.norm() + b.state.xd.norm()) * (b.t - a.t);
+        by_poses += (b.state.x - a.state.x).norm();
+    }
+    let ratio = by_rates / by_poses;
+    (ratio > MAX_WAY_RATIO && ratio.is_finite()).then_some(ratio)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,6 +171,36 @@ mod tests {
             "x.csv: line 3: t = 1e-300 after t = 0.0: must increase, by at least 1e-6\n\
              x.csv: line 5: t = 0.5 after t = 0.5: must increase, by at least 1e-6"
         );
+    }
+
+    #[test]
+    fn times_in_milliseconds_are_seen_by_the_rates() {
+        let text = |unit: &str, step: f64| {
+            let mut text = trajectory_columns().join(",").replacen("t,", &format!("t{unit},"), 1) + "\n";
+            for k in 0..=20 {
+                let profile = crate::motion::minimum_jerk::rise(0.1 * f64::from(k), 2.0);
+                text += &format!(
+                    "{},0,0,0,{},0,0,0,0,0,{},0,0,0,0,0,{},0,0\n",
+                    step * f64::from(k),
+                    profile.value,
+                    profile.rate,
+                    profile.accel
+                );
+            }
+            text
+        };
+        let read = |text: String| {
+            let path = Path::new("x.csv");
+            let table = NumberTable::from_reader(text.as_bytes(), path, &trajectory_columns(), &[]).unwrap();
+            Trajectory::from_rows(&table, path)
+        };
+        let message = read(text("", 100.0)).unwrap_err().to_string();
+        let words = "line 3: by its rates the way is 1000 times that by its poses: t must be in s; name the column t_ms";
+        assert!(message.contains(words), "{message}");
+        for (unit, step) in [("", 0.1), ("_ms", 100.0)] {
+            let trajectory = read(text(unit, step)).unwrap();
+            assert!((trajectory.duration() - 2.0).abs() < 1e-12);
+        }
     }
 
     #[test]

@@ -34,6 +34,12 @@ pub struct Endpoint {
     pub daemon: Option<RunningDaemon>,
 }
 
+impl From<RunningDaemon> for Endpoint {
+    fn from(daemon: RunningDaemon) -> Self {
+        Self { socket: daemon.socket.clone(), daemon: Some(daemon) }
+    }
+}
+
 /// Result of an attempt to connect.
 pub enum Attempt {
     Connected(Connection),
@@ -50,9 +56,8 @@ pub fn endpoints(machine: &str) -> Vec<Endpoint> {
     let user_id = geteuid().as_raw();
     daemons.sort_by_key(|daemon| (daemon.user_id != user_id, daemon.user_id));
     let system = socket_path(Path::new(SYSTEM_FOLDER), machine);
-    let recorded = |daemon: RunningDaemon| Endpoint { socket: daemon.socket.clone(), daemon: Some(daemon) };
     let (of_system, others): (Vec<_>, Vec<_>) =
-        daemons.into_iter().map(recorded).partition(|endpoint| endpoint.socket == system);
+        daemons.into_iter().map(Endpoint::from).partition(|endpoint| endpoint.socket == system);
     let mut found = of_system;
     if found.is_empty() && fs::symlink_metadata(&system).is_ok() {
         found.push(Endpoint { socket: system, daemon: None });

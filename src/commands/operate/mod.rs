@@ -5,8 +5,11 @@
 
 use core::fmt;
 use std::io;
-use std::thread::sleep;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant};
+
+use tracing::info;
 
 use self::endpoint::{Attempt, Connection, Endpoint, endpoints};
 use self::signal::Signalled;
@@ -113,6 +116,23 @@ pub fn carry_out(
     }
 }
 
+/// Carries it out in a thread: setpoints must not wait. What it waits for is logged.
+pub fn carry_out_in_background(
+    config: &Config,
+    order: Order,
+    stop: &Stop,
+) -> Receiver<Result<(), OperatorError>> {
+    let (send, result) = channel();
+    let (config, stop) = (config.clone(), stop.clone());
+    spawn(move || {
+        let name = order.request.name();
+        let outcome = carry_out(&config, &order, &stop, |reason| info!("{name} waits: {reason}"));
+        // Nobody receives it when the command has ended.
+        let _ = send.send(outcome.map(drop));
+    });
+    result
+}
+
 /// Sends the request to each daemon that may be there, until one answers.
 fn attempt(
     config: &Config,
@@ -152,28 +172,31 @@ fn attempt(
 }
 
 /// The status of the daemon of a machine.
-pub fn status(config: &Config) -> Result<AnswerLine, OperatorError> {
-    let places = endpoints(&config.name);
+pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
     let mut forbidden = None;
-    for endpoint in &places {
-        match endpoint.connect() {
-            Ok(Attempt::Connected(mut connection)) => {
-                let until = Instant::now() + PATIENT_FIRST_LINE_LIMIT;
-                let line = RequestLine::new("status");
-                let answer = connection.send(&line).and_then(|()| connection.receive(until, || false));
-                return match answer {
-                    Ok(Some(answer)) => Ok(answer),
-                    Ok(None) => {
-                        Err(OperatorError::NoStatus(format!("nothing within {PATIENT_FIRST_LINE_LIMIT:?}")))
-                    }
-                    Err(error) => Err(OperatorError::NoStatus(error.to_string())),
-                };
-            }
-            Ok(Attempt::Forbidden) => forbidden = forbidden.or(Some(endpoint)),
-            Ok(Attempt::Absent) | Err(_) => {}
+    for endpoint in endpoints(machine) {
+        match status_of(machine, &endpoint) {
+            Err(error @ OperatorError::Forbidden { .. }) => forbidden = forbidden.or(Some(error)),
+            Err(OperatorError::NoDaemon(_)) => {}
+            answer => return answer,
         }
     }
-    Err(unreachable_daemon(&config.name, forbidden))
+    Err(forbidden.unwrap_or_else(|| OperatorError::NoDaemon(machine.into())))
+}
+
+/// The status of the daemon that listens there.
+pub fn status_of(machine: &str, endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
+    match endpoint.connect() {
+        Ok(Attempt::Connected(mut connection)) => {
+            let until = Instant::now() + PATIENT_FIRST_LINE_LIMIT;
+            let line = RequestLine::new("status");
+            let answer = connection.send(&line).and_then(|()| connection.receive(until, || false));
+            let limit = || OperatorError::NoStatus(format!("nothing within {PATIENT_FIRST_LINE_LIMIT:?}"));
+            answer.map_err(|error| OperatorError::NoStatus(error.to_string()))?.ok_or_else(limit)
+        }
+        Ok(Attempt::Forbidden) => Err(unreachable_daemon(machine, Some(endpoint))),
+        Ok(Attempt::Absent) | Err(_) => Err(unreachable_daemon(machine, None)),
+    }
 }
 
 /// Why no daemon was reached: it may not be, or there is none.

@@ -1,19 +1,21 @@
-//! `hexad status`: the state of a running daemon, once or again and again.
+//! `hexad status`: the state of a running daemon, once or again and again, or of all that run on this host.
 
 use std::io::{self, IsTerminal};
+use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
 
 use clap::Args;
 
 use self::screen::Screen;
-use super::arguments::MachineFile;
 use super::failure::Failure;
 use super::operate;
+use crate::config::Config;
 use crate::output::files::print;
 use crate::realtime::stop_request::Stop;
 
-mod screen;
+mod hosted;
+pub(super) mod screen;
 
 /// Time between two screens: a person reads no faster.
 const INTERVAL: Duration = Duration::from_millis(200);
@@ -26,10 +28,11 @@ const CLEAR_BELOW: &str = "\x1b[J";
 
 #[derive(Debug, Args)]
 pub struct StatusArguments {
-    #[command(flatten)]
-    machine: MachineFile,
+    /// Machine file (TOML); without it, all machines that run on this host
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
     /// Show it again and again, until Ctrl-C
-    #[arg(long)]
+    #[arg(long, requires = "config")]
     watch: bool,
     /// Print the daemon's answer as JSON, one line for each
     #[arg(long)]
@@ -38,14 +41,21 @@ pub struct StatusArguments {
 
 impl StatusArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        let config = self.machine.load()?;
+        match &self.config {
+            Some(path) => self.show_machine(path),
+            None => hosted::show(self.json),
+        }
+    }
+
+    fn show_machine(&self, path: &Path) -> Result<(), Failure> {
+        let machine = Config::load(path)?.name;
         if !self.watch {
-            return self.show(&operate::status(&config)?, false);
+            return self.show(&operate::status(&machine)?, false);
         }
         let stop = Stop::on_signals()?;
         let is_terminal = io::stdout().is_terminal();
         while !stop.is_requested() {
-            match operate::status(&config) {
+            match operate::status(&machine) {
                 Ok(answer) => self.show(&answer, is_terminal)?,
                 // The daemon may be about to start again.
                 Err(error) if is_terminal && !self.json => {

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::daemon::control_socket::protocol::AnswerLine;
 use crate::daemon::control_socket::status::{LegReport, SourceReport, StatusReport};
-use crate::output::numbers::{AXES, axis_unit, significant};
+use crate::output::numbers::{AXES, axis_unit, fixed, significant};
 use crate::output::text_table::paragraph;
 
 /// Columns of the screen.
@@ -62,7 +62,7 @@ fn timing(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     )
 }
 
-fn poses(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
+pub(in crate::commands) fn poses(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     write!(f, "\n{:10}", "")?;
     for (k, axis) in AXES.iter().enumerate() {
         write!(f, "{:>11}", format!("{axis} {}", axis_unit(k).1))?;
@@ -87,7 +87,7 @@ fn poses(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     writeln!(f)
 }
 
-fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
+pub(in crate::commands) fn legs(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
     let [shortest, longest] = report.stroke_m.map(|length_m| length_m * 1e3);
     let strokes = format!(
         "{shortest:.1}{:>width$}",
@@ -130,7 +130,7 @@ fn singularity(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result
     };
     writeln!(
         f,
-        "\ncondition {condition}, limit {}; singular pose {ahead}",
+        "\ncondition {condition} (6 is best), limit {}; singular pose {ahead}",
         significant(report.condition_limit)
     )
 }
@@ -147,14 +147,9 @@ fn source_line(source: &SourceReport) -> String {
         })
         .collect();
     let from = if processes.is_empty() { "no process".into() } else { processes.join(", ") };
-    format!("{:.80}", format!("{:10}{age}, from {from}", source.topic))
-}
-
-/// A number with so many digits after the point, and no negative zero.
-fn fixed(number: f64, digits: usize) -> String {
-    let text = format!("{number:.digits$}");
-    let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
-    if is_zero { text.trim_start_matches('-').into() } else { text }
+    let rejected = source.rejected.as_ref().map(|why| format!("REJECTED: {why}"));
+    let text = rejected.unwrap_or_else(|| format!("{age}, from {from}"));
+    format!("{:.80}", format!("{:10}{text}", source.topic))
 }
 
 fn microseconds(time_ns: u64) -> String {
@@ -170,14 +165,14 @@ fn age_text(age_s: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(in crate::commands) mod tests {
     use super::*;
     use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
     use crate::daemon::control_socket::protocol::{RequestResult, VERSION};
     use crate::daemon::control_socket::status::{ProcessReport, TimingReport};
 
     /// Every field as long as it gets.
-    fn answer() -> AnswerLine {
+    pub fn answer() -> AnswerLine {
         let process = ProcessReport {
             process_id: 4_194_304,
             command: "a".repeat(15),
@@ -188,8 +183,10 @@ mod tests {
             topic: topic.into(),
             age_s: Some(0.0123),
             processes: vec![process.clone(), process.clone()],
+            rejected: None,
         };
         let report = StatusReport {
+            version: String::new(),
             machine: "m".repeat(20),
             process_id: 4_194_304,
             age_s: Some(0.0011),

@@ -8,28 +8,29 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use self::map::MapDrawing;
+use self::report::{BoxRange, SCHEMA, SliceReport, WorkspaceReport, region_reports};
 use self::slice::{Plane, Slice};
 use super::arguments::{MachineFile, number_within};
 use super::failure::{CommandError, Failure};
 use super::progress::item_bar;
 use crate::analysis::clearance::{Clearance, WorkspaceLimit};
 use crate::analysis::envelope::EnvelopeBounds;
-use crate::analysis::pose_quality::{AccelerationDemand, PoseEvaluator, PoseQuality};
+use crate::analysis::pose_quality::{AccelerationDemand, PoseEvaluator};
 use crate::analysis::reachable_envelope;
 use crate::analysis::region_search::{MAX_CELLS, RegionBounds, largest_region};
 use crate::analysis::region_shape::RegionShape;
 use crate::config::Config;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
-use crate::output::files::{FileError, print};
-use crate::output::numbers::{AXES, MAX_MAGNITUDE, axis_unit, significant};
+use crate::output::files::{FileError, print, print_json};
+use crate::output::numbers::{MAX_MAGNITUDE, significant};
 use crate::output::svg::ChartError;
-use crate::output::text_table::{Left, Right, text_table};
 
 mod bands;
 mod contour;
 mod map;
 mod map_content;
+mod report;
 pub mod slice;
 
 #[derive(Debug, Args)]
@@ -38,6 +39,9 @@ pub struct WorkspaceArguments {
     machine: MachineFile,
     #[command(flatten)]
     query: WorkspaceQuery,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -67,7 +71,13 @@ pub struct WorkspaceQuery {
 
 impl WorkspaceArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        Ok(print(WorkspaceMap::new(&self.machine.load()?, &self.query)?)?)
+        let report = WorkspaceReport::new(&self.machine.load()?, &self.query)?;
+        if self.json {
+            print_json(&report)?
+        } else {
+            print(report)?
+        }
+        Ok(())
     }
 }
 
@@ -111,25 +121,7 @@ pub enum WorkspaceError {
 
 impl CommandError for WorkspaceError {}
 
-/// PoseQuality of the poses of some slices, and regions without obstacle; displays as tables.
-pub struct WorkspaceMap {
-    name: String,
-    effort: AccelerationDemand,
-    largest_condition: f64,
-    max_force: f64,
-    slices: Vec<Slice>,
-    turn_deg: f64,
-    /// The ball at home's orientation, the ball with any turn, the box.
-    regions: [RegionBounds; 3],
-    /// RegionShape of the box.
-    shape: EnvelopeBounds,
-    /// Whether the shape of the box is that of `[envelope]`.
-    has_envelope: bool,
-    /// Files with the maps and their tables.
-    files: Vec<PathBuf>,
-}
-
-impl WorkspaceMap {
+impl WorkspaceReport {
     /// Evaluates the slices, searches the regions, writes the files.
     pub fn new(config: &Config, query: &WorkspaceQuery) -> Result<Self, WorkspaceError> {
         let Config { name, machine, deployment, .. } = config;
@@ -152,18 +144,21 @@ impl WorkspaceMap {
         let [ball, ..] = &regions;
         let drawing = MapDrawing { name, machine, largest_condition, ball: ball.guaranteed };
         let files = write(&drawing, &slices, &query.output)?;
-        Ok(Self {
-            name: name.clone(),
-            effort,
-            largest_condition,
-            max_force: machine.actuator.max_force,
+        let slices = slices.iter().map(|slice| SliceReport::new(slice, largest_condition)).collect();
+        let report = Self {
+            schema: SCHEMA,
+            machine: name.clone(),
+            acceleration_m_s2: effort.linear,
+            angular_acceleration_rad_s2: effort.angular,
+            condition_limit: largest_condition,
+            max_force_n: machine.actuator.max_force,
             slices,
-            turn_deg: query.turn_deg,
-            regions,
-            shape,
-            has_envelope: envelope.is_some(),
+            regions: region_reports(regions, query.turn_deg, envelope.is_some(), largest_condition),
+            largest_box: BoxRange::all(&shape, regions[2].guaranteed),
+            hint: None,
             files,
-        })
+        };
+        Ok(Self { hint: report.payload_hint(machine), ..report })
     }
 }
 
@@ -229,95 +224,5 @@ impl fmt::Display for ObstacleText {
                 write!(f, "the condition is beyond {}", significant(self.largest_condition))
             }
         }
-    }
-}
-
-impl fmt::Display for WorkspaceMap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, effort, largest_condition, .. } = self;
-        let [linear, angular] = [effort.linear, effort.angular].map(significant);
-        writeln!(
-            f,
-            "{name}: forces from rest under {linear} m/s2 and {angular} rad/s2, each in any direction\n"
-        )?;
-        let [name, numbers @ ..] = [
-            "slice",
-            "poses",
-            "in reach",
-            "usable",
-            "margin [mm]",
-            "condition",
-            "worst force [N]",
-            "payload [kg]",
-        ];
-        let columns: Vec<_> = [(name, Left)].into_iter().chain(numbers.map(|name| (name, Right))).collect();
-        write!(f, "{}", text_table(2, &columns, self.slices.iter().map(|slice| self.slice_cells(slice))))?;
-        writeln!(
-            f,
-            "\nin reach: within the stroke, on home's side of singular poses; usable: and the condition is up to {}.\n\
-             Numbers are of usable poses; the actuators' limit is {} N.\n",
-            significant(*largest_condition),
-            significant(self.max_force)
-        )?;
-        writeln!(
-            f,
-            "Guaranteed around home, by bounds on every pose in between: all usable, none singular:"
-        )?;
-        self.fmt_regions(f)?;
-        writeln!(f)?;
-        self.files.iter().try_for_each(|path| writeln!(f, "written: {}", path.display()))
-    }
-}
-
-impl WorkspaceMap {
-    fn slice_cells(&self, slice: &Slice) -> [String; 8] {
-        let in_reach = slice.qualities.iter().filter(|quality| quality.within_reach());
-        let usable = in_reach.clone().filter(|quality| quality.condition <= self.largest_condition);
-        let ends = |value: fn(&PoseQuality) -> f64| {
-            let values = usable.clone().map(value);
-            values.fold((f64::INFINITY, 0.0), |(low, high), v| (f64::min(low, v), f64::max(high, v)))
-        };
-        let range = |value: fn(&PoseQuality) -> f64| {
-            let (low, high) = ends(value);
-            format!("{} to {}", significant(low), significant(high))
-        };
-        [
-            slice.plane.to_string(),
-            slice.qualities.len().to_string(),
-            in_reach.clone().count().to_string(),
-            usable.clone().count().to_string(),
-            format!("up to {}", significant(1e3 * ends(|quality| quality.stroke_margin).1)),
-            range(|quality| quality.condition),
-            range(|quality| quality.worst_force),
-            range(|quality| quality.payload),
-        ]
-    }
-
-    fn fmt_regions(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let turned = format!("ball, turned up to {} deg about any axis", significant(self.turn_deg));
-        let origin = if self.has_envelope { "box, times [envelope]" } else { "box, times the one below" };
-        let names = ["ball at home's orientation", &turned, origin];
-        let rows = names.into_iter().zip(self.regions).enumerate().map(|(k, (name, found))| {
-            let size = |size: f64| {
-                if k < 2 { format!("{} mm", significant(1e3 * size)) } else { significant(size) }
-            };
-            let text =
-                |obstacle| ObstacleText { obstacle, largest_condition: self.largest_condition }.to_string();
-            let limit = match found.violation {
-                Some((at, obstacle)) if at <= 0.0 => format!("without going anywhere {}", text(obstacle)),
-                Some((at, obstacle)) => format!("at {} {}", size(at), text(obstacle)),
-                None => "nothing met further out".into(),
-            };
-            [name.into(), size(found.guaranteed), limit]
-        });
-        write!(f, "{}", text_table(2, &[("region", Left), ("size", Right), ("limited by", Left)], rows))?;
-        let [.., found] = self.regions;
-        let ranges = self.shape.pose_min.iter().zip(&self.shape.pose_max);
-        let rows = AXES.into_iter().zip(ranges).enumerate().map(|(axis, (name, (low, high)))| {
-            let (scale, unit) = axis_unit(axis);
-            let [low, high] = [low, high].map(|x| significant(found.guaranteed * scale * x));
-            [format!("  {name}"), format!("{low} to {high} {unit}")]
-        });
-        write!(f, "\n{}", text_table(2, &[("box", Left), ("offset from home", Right)], rows))
     }
 }

@@ -1,5 +1,6 @@
 //! `[limits]`: limits of motions and forces.
 
+use super::default_limits::DefaultLimits;
 use super::realtime::Realtime;
 use crate::config::bound::Bound;
 use crate::config::machine::rounded;
@@ -41,20 +42,17 @@ pub struct DeploymentLimits {
     pub condition: f64,
 }
 
-/// Reads the section. The defaults are motions that a standing person tolerates: half of gravity, a tenth of a second to
-/// build it up. Autonomous motions use a fifth of them.
+/// Reads the section. Autonomous motions use a fifth of the limits.
 pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Realtime) -> DeploymentLimits {
-    let mut positive = |key, default| section.number_or(key, default, Bound::Positive);
-    let position = DerivativeLimits {
-        velocity: positive("velocity_m_s", 1.0),
-        acceleration: positive("acceleration_m_s2", 5.0),
-        jerk: positive("jerk_m_s3", 500.0),
+    let default = DefaultLimits::new(machine);
+    let mut of = |keys: [&'static str; 3], default: DerivativeLimits| {
+        let defaults = [default.velocity, default.acceleration, default.jerk];
+        let mut read = keys.into_iter().zip(defaults);
+        let mut next = || read.next().map_or(f64::NAN, |(key, x)| section.number_or(key, x, Bound::Positive));
+        DerivativeLimits { velocity: next(), acceleration: next(), jerk: next() }
     };
-    let orientation = DerivativeLimits {
-        velocity: positive("velocity_rad_s", 2.0),
-        acceleration: positive("acceleration_rad_s2", 20.0),
-        jerk: positive("jerk_rad_s3", 2000.0),
-    };
+    let position = of(["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"], default.position);
+    let orientation = of(["velocity_rad_s", "acceleration_rad_s2", "jerk_rad_s3"], default.orientation);
     let autonomous_scale = section.number_or("autonomous_scale", 0.2, Bound::UpTo(1.0));
     let force_rate_n_s =
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);

@@ -11,6 +11,7 @@ pub use self::operator::OperatorAccess;
 pub use self::plant::Plant;
 pub use self::realtime::{Realtime, Scheduler};
 use super::bound::Bound;
+use super::control_loops::bounded_age_s;
 use super::machine::rounded;
 use super::reader::SectionReader;
 use crate::analysis::envelope;
@@ -18,6 +19,7 @@ use crate::control::parameters::ViolationPolicy;
 use crate::model::machine::Machine;
 
 mod control;
+pub mod default_limits;
 mod hardware;
 mod limits;
 mod operator;
@@ -26,6 +28,9 @@ mod realtime;
 
 /// Least default of a timeout in periods: one late message does not mean that its sender is lost.
 const MIN_DEFAULT_TIMEOUT_PERIODS: f64 = 4.0;
+/// Default of `measured_ms`, if the loop stands it; and its least default in periods: longer than one.
+const MAX_DEFAULT_MEASURED_MS: f64 = 20.0;
+const MIN_MEASURED_PERIODS: f64 = 1.5;
 /// Longest timeout \[ms\]. After a second without messages the pose of the platform is unknown.
 const MAX_TIMEOUT_MS: f64 = 1000.0;
 /// Largest deceleration of the brakes \[m/s^2\]: a hundred times gravity is an impact.
@@ -72,6 +77,8 @@ pub struct Timeouts {
     pub setpoint_s: f64,
     /// Age of the measured lengths and rates.
     pub measured_s: f64,
+    /// Whether `measured_s` may be longer than the age of measurements with which the loop is stable.
+    pub allow_unstable_age: bool,
 }
 
 /// Reads and checks the sections; some defaults follow from the machine. Rejected numbers are NaN.
@@ -86,12 +93,14 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
         &control::Plant { realtime: &realtime, machine, limits: &limits, noise: &noise, drive: &drive },
     );
     let setpoint = setpoint(root.section("setpoint"));
+    let stable_ms = |age_ms: f64| 1e3 * bounded_age_s(1e-3 * age_ms, &realtime, &control, &drive);
+    let timeouts = timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation, stable_ms);
     Deployment {
         control,
         limits,
         noise,
         drive,
-        timeouts: timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation),
+        timeouts,
         setpoint,
         operator: operator::read(root.section("operator")),
         plant: plant::read(root.section("plant"), rate_hz, machine),
@@ -107,15 +116,26 @@ fn setpoint(mut section: SectionReader) -> SetpointPolicy {
     SetpointPolicy { on_violation }
 }
 
-fn timeouts(mut section: SectionReader, rate_hz: f64, policy: ViolationPolicy) -> Timeouts {
+fn timeouts(
+    mut section: SectionReader,
+    rate_hz: f64,
+    policy: ViolationPolicy,
+    stable_ms: impl Fn(f64) -> f64,
+) -> Timeouts {
     let setpoint_ms = match policy {
         ViolationPolicy::Stop => 50.0,
         // Sources may send 30 poses a second, and some are lost.
         ViolationPolicy::Limit => 200.0,
     };
+    let mut measured_ms = default_timeout_ms(MAX_DEFAULT_MEASURED_MS, rate_hz);
+    if !section.has("measured_ms") {
+        // Without measurements the platform is controlled for no longer than the loop stands.
+        measured_ms = stable_ms(measured_ms).max(MIN_MEASURED_PERIODS * 1e3 / rate_hz);
+    }
     let timeouts = Timeouts {
-        setpoint_s: timeout_s(&mut section, "setpoint_ms", setpoint_ms, rate_hz),
-        measured_s: timeout_s(&mut section, "measured_ms", 20.0, rate_hz),
+        setpoint_s: timeout_s(&mut section, "setpoint_ms", default_timeout_ms(setpoint_ms, rate_hz), rate_hz),
+        measured_s: timeout_s(&mut section, "measured_ms", measured_ms, rate_hz),
+        allow_unstable_age: section.flag_or("allow_unstable_age", false),
     };
     section.finish();
     timeouts
@@ -141,10 +161,14 @@ fn envelope(mut section: SectionReader) -> Option<envelope::EnvelopeBounds> {
     Some(envelope::EnvelopeBounds { pose_min, pose_max, velocity, acceleration })
 }
 
+/// A default timeout \[ms\], longer where the periods are.
+fn default_timeout_ms(timeout_ms: f64, rate_hz: f64) -> f64 {
+    timeout_ms.max(MIN_DEFAULT_TIMEOUT_PERIODS * 1e3 / rate_hz)
+}
+
 /// Reads a timeout \[s\], which must be longer than a period, as messages are sent once a period.
 fn timeout_s(section: &mut SectionReader, key: &'static str, default_ms: f64, rate_hz: f64) -> f64 {
     let period_ms = 1e3 / rate_hz;
-    let default_ms = default_ms.max(MIN_DEFAULT_TIMEOUT_PERIODS * period_ms);
     let timeout_ms = section.number_or(key, default_ms, Bound::UpTo(MAX_TIMEOUT_MS));
     if timeout_ms <= period_ms {
         let bound = format!(

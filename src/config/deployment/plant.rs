@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{MAX_BRAKE_DECELERATION_M_S2, timeout_s};
+use super::{MAX_BRAKE_DECELERATION_M_S2, default_timeout_ms, timeout_s};
 use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
@@ -40,7 +40,12 @@ pub(super) fn read(mut section: SectionReader, rate_hz: f64, machine: &Machine) 
     let brake = Bound::UpTo(MAX_BRAKE_DECELERATION_M_S2);
     let step = Bound::Within(MIN_STEP_US, MAX_STEP_US);
     let plant = Plant {
-        force_timeout_s: timeout_s(&mut section, "force_timeout_ms", 50.0, rate_hz),
+        force_timeout_s: timeout_s(
+            &mut section,
+            "force_timeout_ms",
+            default_timeout_ms(50.0, rate_hz),
+            rate_hz,
+        ),
         brake_deceleration_m_s2: section.number_or("brake_deceleration_m_s2", 9.81, brake),
         step_s: section.number_or("step_us", 250.0, step) / 1e6,
         tolerance_m: section.number_or("tolerance_um", DEFAULT_TOLERANCE_UM, Bound::UpTo(1000.0)) / 1e6,

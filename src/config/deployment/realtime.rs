@@ -82,6 +82,12 @@ impl Realtime {
         self.release == ReleaseMode::Lockstep
     }
 
+    /// Processors to which threads are bound; none in simulated time.
+    pub fn processors(&self) -> Vec<usize> {
+        let bound = [self.cpu, self.io_cpu].into_iter().flatten();
+        bound.filter(|_| !self.is_simulated()).collect()
+    }
+
     /// Longest time from a measurement to its force, in periods, of a loop that misses nothing and whose driver
     /// measures once a period: the newest message may be a period old when it is read, a lead before the
     /// release, and the force may come at the next release. What the drives wait or sleep comes on top.

@@ -4,8 +4,9 @@
 //! the reference of the leg has moved no further than a bound since the first of them. A frozen sensor makes a false error that
 //! grows with the reference and acts on the platform as long as nobody notices: the slower the motion, the longer.
 //!
-//! At rest without noise a frozen leg cannot be distinguished by its length: its readings are those of standing. An independent
-//! pose or a second encoder closes that.
+//! A sensor whose noise is at least its resolution does not repeat itself at rest either. One with less noise, or of unknown
+//! resolution, may: a leg that freezes at rest cannot be distinguished then, and the platform drifts away. An independent pose
+//! or a second encoder closes that.
 
 use super::Readings;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
@@ -17,16 +18,19 @@ const MIN_EQUAL_READINGS: u32 = 3;
 /// largest force leaves 6 and 33 um.
 const ALL_LEGS_BOUND_M: f64 = 15e-6;
 const ONE_LEG_BOUND_M: f64 = 60e-6;
-/// Equal readings in a row of a sensor with noise of [`NOISY_STEPS`] steps: with a chance of 0.07 each, once in 1e14.
-const MAX_EQUAL_NOISY_READINGS: u32 = 12;
-const NOISY_STEPS: f64 = 4.0;
+/// Equal readings in a row of a sensor whose noise is one step, and of any with noise: by chance at most once in 1e12, with one
+/// step also if the noise is a third of the configured one.
+const MAX_EQUAL_AT_ONE_STEP: f64 = 100.0;
+const MAX_EQUAL_NOISY_READINGS: f64 = 12.0;
 /// The same in steps of a coarse sensor.
 const BOUND_STEPS: f64 = 10.0;
 
 impl Readings {
-    /// Whether every reading differs from the last by noise.
-    fn is_noisy(&self) -> bool {
-        self.step > 0.0 && self.noise >= NOISY_STEPS * self.step
+    /// Equal readings in a row that noise allows; `None` if its noise is less than a step, or the step is not known.
+    fn most_equal(&self) -> Option<f64> {
+        let steps = self.noise / self.step;
+        (self.step > 0.0 && steps >= 1.0)
+            .then(|| (MAX_EQUAL_AT_ONE_STEP / (steps * steps)).max(MAX_EQUAL_NOISY_READINGS))
     }
 }
 
@@ -77,10 +81,9 @@ impl FrozenSensors {
             if *equal + 1 >= MIN_EQUAL_READINGS && moved > bound && result.is_ok() {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, bound).at(leg));
             }
-            // Noise of many steps does not leave a reading as it is.
-            if readings.is_noisy() && *equal + 1 >= MAX_EQUAL_NOISY_READINGS && result.is_ok() {
-                let bound = f64::from(MAX_EQUAL_NOISY_READINGS - 1) * readings.step;
-                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, bound).at(leg));
+            let repeats = |most| f64::from(*equal + 1) > most;
+            if readings.most_equal().is_some_and(repeats) && result.is_ok() {
+                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, readings.step).at(leg));
             }
         }
         result
@@ -123,9 +126,22 @@ mod tests {
         for _ in 0..1000 {
             assert!(sensors.check(&[1.0; LEGS], &Readings::default(), || [1.0; LEGS]).is_ok());
         }
-        // But with noise of many steps.
-        let noisy = Readings { noise: 5e-6, step: 1e-6 };
-        assert!(sensors.check(&[1.0; LEGS], &noisy, || [1.0; LEGS]).is_err());
+    }
+
+    /// Equal readings at rest until a sensor counts as frozen.
+    fn repeated(noise: f64, step: f64) -> Option<u32> {
+        let mut sensors = FrozenSensors::default();
+        let readings = Readings { noise, step };
+        (1..1000).find(|_| sensors.check(&[1.0; LEGS], &readings, || [1.0; LEGS]).is_err())
+    }
+
+    #[test]
+    fn a_sensor_with_noise_repeats_itself_only_if_it_is_frozen() {
+        assert_eq!(repeated(5e-6, 1e-6), Some(13));
+        assert_eq!(repeated(2e-6, 1e-6), Some(26));
+        assert_eq!(repeated(1e-6, 1e-6), Some(101));
+        assert_eq!(repeated(0.9e-6, 1e-6), None);
+        assert_eq!(repeated(1e-6, 0.0), None);
     }
 
     /// Steps of 1 um at 20 um/s: 50 equal readings in a row.

@@ -36,10 +36,10 @@ const CHORD_DEPARTURE_M: f64 = 1e-4;
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
 /// Bounds on the number of intervals between knots: the last bounds the work of a cycle.
 const MIN_INTERVALS: f64 = 3.0;
-const MAX_INTERVALS: f64 = 24.0;
+const MAX_INTERVALS: f64 = 20.0;
 /// Most knots of a stop for which a pose is factorized: bounds the work of a cycle. The balls that were found remain for the
 /// next one.
-const MAX_FACTORIZATIONS: u32 = 8;
+const MAX_FACTORIZATIONS: u32 = 5;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;
@@ -168,10 +168,9 @@ impl<'a> Examination<'a> {
         // Half of an interval on either side.
         let (v, w) = (self.stop.position.peak_velocity, self.stop.orientation.peak_velocity);
         let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
-        // Between knots up to the limit of the platform: else a reference at its own limit could not leave it.
-        let is_conditioned = balls.cover_by_known(constants, pose, [0.0; 2], constants.reference_condition);
         let around = constants.parameters.condition;
-        if is_conditioned && balls.cover_by_known(constants, pose, reach, around) {
+        let cover = balls.knot_cover(constants, pose, reach);
+        if cover.is_complete() {
             return Ok(());
         }
         self.factorizations += 1;
@@ -180,7 +179,7 @@ impl<'a> Examination<'a> {
         }
         let regularity = balls.cover_by_new(constants, pose, reach, around).ok_or(Limit::Condition)?;
         let at_knot = Regularity::of_reference(constants);
-        if is_conditioned || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
+        if cover.knot || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
         }
         Err(Limit::Condition)

@@ -79,6 +79,8 @@ struct Ball {
     shortest: f64,
     /// Least sine of the angle between a leg and the first axis of its universal joint.
     universal_sine: f64,
+    /// Square of the largest D for the loosest limit of the condition, times `L^2 / 6`.
+    largest_change: f64,
 }
 
 impl Ball {
@@ -88,7 +90,12 @@ impl Ball {
         let Sensitivity { condition, norm, .. } = *kinematic_state.sensitivity();
         let shortest = kinematic_state.lengths(machine).into_iter().fold(f64::INFINITY, f64::min);
         let universal_sine = universal_sine(machine, center);
-        Self { center: *center, norm, inverse_norm: condition / norm, shortest, universal_sine }
+        let inverse_norm = condition / norm;
+        let limit = constants.parameters.condition.max(constants.reference_condition);
+        let change = ((limit - condition) / (inverse_norm * (1.0 + limit)))
+            .max(1.0 / inverse_norm - MAX_WRENCH_NORM_SQUARED.sqrt() / limit);
+        let largest_change = change.max(0.0).powi(2) * shortest * shortest / 6.0;
+        Self { center: *center, norm, inverse_norm, shortest, universal_sine, largest_change }
     }
 
     /// Of the centre.
@@ -96,12 +103,23 @@ impl Ball {
         Regularity { condition: self.norm * self.inverse_norm, universal_sine: self.universal_sine }
     }
 
-    /// Whether every pose within `shift` \[m\] and `turn` \[rad\] of a pose is regular and has at most a condition.
-    fn covers(&self, constants: &Constants, pose: &Pose, [shift, turn]: [f64; 2], limit: f64) -> bool {
-        let Self { center, norm, inverse_norm, shortest, universal_sine } = self;
-        let chord = ((pose.rotation - center.rotation).norm_squared() * 0.5).sqrt();
-        let turn = ANGLE_PER_CHORD * chord + turn;
-        let moved = (pose.position - center.position).norm() + shift + constants.arm * turn;
+    /// How a pose differs from the centre; `None` if the ball does not cover it.
+    fn displacement(&self, constants: &Constants, pose: &Pose) -> Option<Displacement> {
+        let chord = ((pose.rotation - self.center.rotation).norm_squared() * 0.5).sqrt();
+        let (shift, turn) = ((pose.position - self.center.position).norm(), ANGLE_PER_CHORD * chord);
+        // D at least, times L / sqrt 6, as q >= s / L: most balls are elsewhere.
+        let joint = shift + constants.arm * turn;
+        let arm = turn * self.shortest + joint;
+        let is_elsewhere = joint * joint + arm * arm > self.largest_change;
+        (!is_elsewhere && chord <= MAX_CHORD).then_some(Displacement { shift, turn })
+    }
+
+    /// Whether every pose within a reach of a displaced one is regular and has at most a condition.
+    fn covers(&self, constants: &Constants, displacement: &Displacement, reach: Reach, limit: f64) -> bool {
+        let Self { norm, inverse_norm, shortest, universal_sine, .. } = self;
+        let [shift, turn] = reach;
+        let turn = displacement.turn + turn;
+        let moved = displacement.shift + shift + constants.arm * turn;
         let left = shortest - moved;
         let turned_squared = moved * moved / (shortest * left);
         let turned_leg = turned_squared.sqrt();
@@ -109,11 +127,52 @@ impl Ball {
         let change = (6.0 * (turned_squared + turned_arm * turned_arm)).sqrt();
         let largest_norm = (norm + change).min(MAX_WRENCH_NORM_SQUARED.sqrt());
         let least_sine = least_universal_sine(constants, limit);
-        let limit = limit * (1.0 - inverse_norm * change);
-        chord <= MAX_CHORD
-            && left > 0.0
+        left > 0.0
             && universal_sine - turned_leg >= least_sine
-            && largest_norm * inverse_norm <= limit
+            && largest_norm * inverse_norm <= limit * (1.0 - inverse_norm * change)
+    }
+
+    fn covers_pose(&self, constants: &Constants, pose: &Pose, reach: Reach, limit: f64) -> bool {
+        self.displacement(constants, pose)
+            .is_some_and(|displacement| self.covers(constants, &displacement, reach, limit))
+    }
+
+    /// What of a knot it covers.
+    fn knot_cover(&self, constants: &Constants, pose: &Pose, reach: Reach) -> KnotCover {
+        self.displacement(constants, pose).map_or_else(KnotCover::default, |displacement| KnotCover {
+            knot: self.covers(constants, &displacement, [0.0; 2], constants.reference_condition),
+            surroundings: self.covers(constants, &displacement, reach, constants.parameters.condition),
+        })
+    }
+}
+
+/// Poses around one: a shift \[m\] and a turn \[rad\].
+pub(super) type Reach = [f64; 2];
+
+/// Bounds on how far a pose is from the centre of a ball: shift \[m\] and turn \[rad\].
+#[derive(Clone, Copy, Debug)]
+struct Displacement {
+    shift: f64,
+    turn: f64,
+}
+
+/// What of a knot is proved to be regular.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct KnotCover {
+    /// The pose itself, and within the condition of the reference.
+    pub knot: bool,
+    /// The poses around it, within the condition of the platform: else a reference at its own limit could not leave it.
+    pub surroundings: bool,
+}
+
+impl KnotCover {
+    /// Whether nothing is missing.
+    pub fn is_complete(&self) -> bool {
+        self.knot && self.surroundings
+    }
+
+    fn or(&self, other: &Self) -> Self {
+        Self { knot: self.knot || other.knot, surroundings: self.surroundings || other.surroundings }
     }
 }
 
@@ -122,27 +181,22 @@ impl Ball {
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct RegularBalls {
     balls: [Option<Ball>; BALL_COUNT],
+    /// Around the pose that was tried last, if it was too small for its reach.
+    too_small: Option<Ball>,
 }
 
 impl RegularBalls {
-    /// Whether every pose within `reach`, a shift \[m\] and a turn \[rad\], of a pose is regular and has at most a condition.
-    /// `false` is no proof of the contrary.
-    pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: [f64; 2], limit: f64) -> bool {
+    /// Whether every pose within a reach of a pose is regular and has at most a condition. `false` is no proof of the contrary.
+    pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: Reach, limit: f64) -> bool {
         self.cover_by_known(constants, pose, reach, limit)
             || self.cover_by_new(constants, pose, reach, limit).is_some()
     }
 
     /// The same by the balls that are kept.
-    pub fn cover_by_known(
-        &mut self,
-        constants: &Constants,
-        pose: &Pose,
-        reach: [f64; 2],
-        limit: f64,
-    ) -> bool {
+    fn cover_by_known(&mut self, constants: &Constants, pose: &Pose, reach: Reach, limit: f64) -> bool {
         let [last, others @ ..] = &mut self.balls;
         let covers = |ball: &Option<Ball>| {
-            ball.as_ref().is_some_and(|ball| ball.covers(constants, pose, reach, limit))
+            ball.as_ref().is_some_and(|ball| ball.covers_pose(constants, pose, reach, limit))
         };
         if covers(last) {
             return true;
@@ -155,18 +209,40 @@ impl RegularBalls {
         false
     }
 
-    /// The same by a new ball around the pose. Returns the regularity of the pose.
+    /// What of a knot the balls that are kept cover.
+    pub fn knot_cover(&mut self, constants: &Constants, pose: &Pose, reach: Reach) -> KnotCover {
+        let by = |ball: &Option<Ball>| {
+            ball.as_ref().map_or_else(KnotCover::default, |ball| ball.knot_cover(constants, pose, reach))
+        };
+        let [last, others @ ..] = &mut self.balls;
+        let mut cover = by(last).or(&by(&self.too_small));
+        for ball in others {
+            if cover.is_complete() {
+                break;
+            }
+            let next = by(ball);
+            // The next knot is near this one: its ball is tried first.
+            if next.surroundings && !cover.surroundings {
+                core::mem::swap(last, ball);
+            }
+            cover = cover.or(&next);
+        }
+        cover
+    }
+
+    /// Covers by a new ball around the pose. Returns the regularity of the pose.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
     pub fn cover_by_new(
         &mut self,
         constants: &Constants,
         pose: &Pose,
-        reach: [f64; 2],
+        reach: Reach,
         limit: f64,
     ) -> Option<Regularity> {
         let ball = Ball::new(constants, pose);
-        if !ball.covers(constants, pose, reach, limit) {
+        if !ball.covers_pose(constants, pose, reach, limit) {
+            self.too_small = Some(ball);
             return None;
         }
         self.balls.rotate_right(1);

@@ -16,9 +16,12 @@ pub enum Target<'a> {
     Motion(&'a SetpointMotion),
     /// Samples of a motion.
     Samples(&'a PoseSamples),
-    /// A pose to move to and stand at, with the limits of autonomous motions.
-    Pose(&'a Pose),
+    /// A pose to move to and stand at, with a share of the limits of autonomous motions.
+    Pose(&'a Pose, f64),
 }
+
+/// Least share of the limits of autonomous motions: with less the numbers of the approach lose their digits.
+const MIN_TARGET_SPEED: f64 = 0.01;
 
 impl<'a> Target<'a> {
     /// The target that a valid setpoint stands for.
@@ -27,7 +30,7 @@ impl<'a> Target<'a> {
         if setpoint.setpoint.kind == SetpointKind::Pose {
             Self::Samples(samples)
         } else if setpoint.setpoint.kind == SetpointKind::Target {
-            Self::Pose(&setpoint.motion.pose)
+            Self::Pose(&setpoint.motion.pose, share(setpoint.setpoint.target_speed))
         } else {
             Self::Motion(setpoint)
         }
@@ -38,7 +41,7 @@ impl<'a> Target<'a> {
         match self {
             Self::Motion(setpoint) => Some(setpoint.motion_at(parameters, instant_ns)),
             Self::Samples(samples) => samples.target(instant_ns),
-            Self::Pose(pose) => Some(at_rest(pose)),
+            Self::Pose(pose, _) => Some(at_rest(pose)),
         }
     }
 
@@ -59,7 +62,7 @@ impl<'a> Target<'a> {
                 };
                 Some((led, continued.displacement))
             }
-            Self::Samples(_) | Self::Pose(_) => {
+            Self::Samples(_) | Self::Pose(..) => {
                 Some((self.motion_at(parameters, instant_ns)?, Vector6::zeros()))
             }
         }
@@ -67,19 +70,51 @@ impl<'a> Target<'a> {
 
     /// Share of its limits with which the distance is closed: those of a pose are scaled already.
     pub(super) fn closing_scale(&self, scale: f64) -> f64 {
-        if let Self::Pose(_) = self { 1.0 } else { scale }
+        if let Self::Pose(..) = self { 1.0 } else { scale }
     }
 
     /// The limits of the way to it.
     pub(super) fn limits(&self, limits: &Limits) -> Limits {
         match self {
             Self::Motion(_) | Self::Samples(_) => *limits,
-            Self::Pose(_) => limits.scaled(limits.autonomous_scale),
+            Self::Pose(_, share) => limits.scaled(limits.autonomous_scale * share),
         }
     }
+}
+
+/// Share of the limits that a setpoint's speed means; what is no share is all.
+pub(crate) fn share(target_speed: f64) -> f64 {
+    if target_speed > 0.0 { target_speed.clamp(MIN_TARGET_SPEED, 1.0) } else { 1.0 }
 }
 
 /// A pose without motion.
 pub(super) fn at_rest(pose: &Pose) -> Motion {
     Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::controller::Setpoint;
+    use crate::control::limits::DerivativeLimits;
+
+    #[test]
+    fn the_speed_of_a_target_is_a_share_of_the_limits_of_autonomous_motions() {
+        let one = DerivativeLimits { velocity: 1.0, acceleration: 1.0, jerk: 1.0 };
+        let limits = Limits { position: one, orientation: one, autonomous_scale: 0.5 };
+        for (target_speed, share) in
+            [(0.0, 1.0), (0.25, 0.25), (1.0, 1.0), (2.0, 1.0), (1e-300, 0.01), (-1.0, 1.0), (f64::NAN, 1.0)]
+        {
+            for (kind, scale) in [(SetpointKind::Target, 0.5 * share), (SetpointKind::Motion, 1.0)] {
+                let setpoint = Setpoint { kind, target_speed, ..Setpoint::default() };
+                let (setpoint, samples) = (SetpointMotion::new(setpoint), PoseSamples::default());
+                let found = Target::of_setpoint(&setpoint, &samples).limits(&limits);
+                assert_eq!(
+                    (found.position.jerk, found.orientation.velocity),
+                    (scale, scale),
+                    "{target_speed}"
+                );
+            }
+        }
+    }
 }

@@ -21,6 +21,7 @@ use super::snapshot::Snapshot;
 use crate::config::Config;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::Request;
+use crate::messages::Rejection;
 use crate::messages::clock::monotonic_ns;
 use crate::realtime::request_word::RequestWord;
 use crate::realtime::triple_buffer::Reader;
@@ -74,12 +75,14 @@ pub(super) fn run(config: &Config, links: ControlLinks<'_>, stop: &AtomicBool) {
         stale_until_ns: 0,
         warned_ns: 0,
         closed: 0,
+        logged: [None; 2],
     };
     while !stop.load(Ordering::Relaxed) {
         server.wait();
         server.accept();
         server.read();
         server.advance();
+        server.log_rejections();
     }
     server.advance();
 }
@@ -98,6 +101,8 @@ struct Server<'a> {
     /// The last warning \[ns\], and the connections closed without one since then.
     warned_ns: u64,
     closed: u64,
+    /// Mistakes of the senders of setpoints and measurements that were logged last.
+    logged: [Option<Rejection>; 2],
 }
 
 impl Server<'_> {
@@ -235,6 +240,20 @@ impl Server<'_> {
         let pending = PendingOrder::post(order, snapshot, self.word, monotonic_ns());
         connection.pending = Some(pending);
         replaced.map(|replaced| replaced.superseded(snapshot))
+    }
+
+    /// Logs each mistake of a sender when it is first seen.
+    fn log_rejections(&mut self) {
+        let snapshot = self.snapshots.read();
+        let found = [snapshot.setpoint_rejection, snapshot.measured_rejection];
+        for ((topic, found), logged) in ["setpoint", "measured"].into_iter().zip(found).zip(&mut self.logged)
+        {
+            let Some(found) = found else { continue };
+            if logged.is_none_or(|logged| !logged.is_same_kind(&found)) {
+                warn!("{topic}: {found}");
+                *logged = Some(found);
+            }
+        }
     }
 
     /// Looks at every pending request and answers.

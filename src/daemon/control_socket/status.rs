@@ -13,12 +13,16 @@ use crate::control::controller::Publishers;
 use crate::control::limits::{Limit, LimitSet};
 use crate::daemon::process_names::{command, sentence};
 use crate::daemon::snapshot::Snapshot;
-use crate::messages::{Bus, MeasuredMessage, SetpointMessage, TopicObserver};
+use crate::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
 use crate::model::machine::LEGS;
+use crate::output::version::VERSION as BUILD;
 
 /// State of the daemon and of everything it knows, in SI units and radians.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatusReport {
+    /// Version, commit and build profile of the daemon.
+    #[serde(default)]
+    pub version: String,
     /// Name of the machine.
     pub machine: String,
     /// Process of the daemon.
@@ -98,6 +102,9 @@ pub struct SourceReport {
     pub age_s: Option<f64>,
     /// Processes that publish now.
     pub processes: Vec<ProcessReport>,
+    /// Why messages were rejected whatever they contain, with the remedy.
+    #[serde(default)]
+    pub rejected: Option<String>,
 }
 
 /// A process.
@@ -164,6 +171,7 @@ impl<'a> StatusSource<'a> {
         let (is_known, has_error) = (status.pose_valid == 1, status.error_valid == 1);
         let limits = Limit::ALL.into_iter().filter(|it| LimitSet(status.active_limits).contains(*it));
         StatusReport {
+            version: BUILD.into(),
             machine: name.clone(),
             process_id: process::id(),
             age_s: (snapshot.time_ns > 0).then(|| seconds(snapshot.time_ns, now_ns)),
@@ -194,24 +202,30 @@ impl<'a> StatusSource<'a> {
         let is_simulated = config.deployment.realtime.is_simulated();
         let now_ns = measured_ns.filter(|_| is_simulated).unwrap_or(now_ns);
         let topics = self.topics.get_or_insert_with(|| Topics::open(config)).as_ref();
-        let source =
-            |topic: &str, time_ns: Option<u64>, of: Publishers, processes: Option<Vec<u32>>| SourceReport {
-                topic: topic.into(),
-                age_s: time_ns.map(|time_ns| seconds(time_ns, now_ns)),
-                processes: processes.into_iter().flatten().map(|id| process_report(id, of)).collect(),
-            };
+        let source = |topic: &str,
+                      time_ns: Option<u64>,
+                      of: Publishers,
+                      processes: Option<Vec<u32>>,
+                      rejection: Option<Rejection>| SourceReport {
+            topic: topic.into(),
+            age_s: time_ns.map(|time_ns| seconds(time_ns, now_ns)),
+            processes: processes.into_iter().flatten().map(|id| process_report(id, of)).collect(),
+            rejected: rejection.map(|rejection| rejection.to_string()),
+        };
         vec![
             source(
                 "setpoint",
                 snapshot.setpoint.map(|setpoint| setpoint.time_ns),
                 snapshot.setpoint_publishers,
                 topics.map(|topics| topics.setpoint.publisher_process_ids()),
+                snapshot.setpoint_rejection,
             ),
             source(
                 "measured",
                 measured_ns,
                 snapshot.measured_publishers,
                 topics.map(|topics| topics.measured.publisher_process_ids()),
+                snapshot.measured_rejection,
             ),
         ]
     }

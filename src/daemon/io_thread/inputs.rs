@@ -5,8 +5,8 @@ use crate::control::state::{OperatorRequest, Request};
 use crate::daemon::cycle::{CycleInput, MAX_REQUEST_AGE_NS};
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{
-    Bus, CommandMessage, LeasedSubscriber, MeasuredMessage, PortError, RejectionCounts, SetpointMessage,
-    Subscriber,
+    Bus, CommandMessage, LeasedSubscriber, MeasuredMessage, PortError, Rejection, RejectionCounts,
+    SetpointMessage, Subscriber,
 };
 
 /// The daemon's own request before it ends; no message has this epoch.
@@ -137,8 +137,41 @@ impl Inputs {
         }
     }
 
+    /// Why the last rejected setpoint and measurement were rejected, where that is for their sender to correct.
+    pub fn last_rejections(&self) -> [Option<Rejection>; 2] {
+        [self.setpoints.last_rejection(), self.measured.last_rejection()]
+    }
+
     /// Messages rejected on all topics.
     pub fn rejections(&self) -> RejectionCounts {
         self.setpoints.rejections() + self.measured.rejections() + self.commands.rejections()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_old_request_of_the_topic_stops_and_does_not_begin_control() {
+        let bus = Bus::join(&format!("old-requests-{}", std::process::id())).unwrap();
+        let mut inputs = Inputs::open(&bus, Silence { setpoint_ns: 1, measured_ns: 1 }).unwrap();
+        let mut commands = bus.publisher::<CommandMessage>().unwrap();
+        let mut answered = (0, 0);
+        for request in Request::ALL {
+            for (age_ns, is_old) in [(MAX_REQUEST_AGE_NS, false), (MAX_REQUEST_AGE_NS + 1, true)] {
+                let sent_ns = monotonic_ns();
+                let message = commands.next_message();
+                commands.publish(sent_ns, request.into()).unwrap();
+                let filter =
+                    InputFilter { has_control: false, answered, is_ending: false, word: 0, word_ns: 0 };
+                inputs.receive_requests(sent_ns + age_ns, filter);
+                let found = inputs.input().request.filter(|found| found.message == message);
+                let is_accepted = !(is_old && request.can_begin_control());
+                let expected = is_accepted.then_some(OperatorRequest { request, message });
+                assert_eq!(found, expected, "{request:?} after {age_ns} ns");
+                answered = found.map_or(answered, |found| found.message);
+            }
+        }
     }
 }

@@ -263,6 +263,7 @@ impl IoThread<'_> {
         progress.set_output(&cycle.output);
         let status = self.outputs.publish(&settings, cycle, counters, statistics, delays);
         let input = self.inputs.input();
+        let [setpoint_rejection, measured_rejection] = self.inputs.last_rejections();
         self.snapshot = Snapshot {
             status,
             force: cycle.output.force,
@@ -271,6 +272,8 @@ impl IoThread<'_> {
             measurement: input.measurement,
             setpoint_publishers: input.setpoint_publishers,
             measured_publishers: input.measured_publishers,
+            setpoint_rejection,
+            measured_rejection,
             ..self.snapshot
         };
         snapshots.write(self.snapshot);

@@ -105,10 +105,34 @@ fn invalidate_if_held(cycle: &mut CycleOutput, now_ns: u64, max_force_age_ns: u6
 
 #[cfg(test)]
 mod tests {
+    use heapless::spsc::Queue;
+
     use super::*;
+    use crate::realtime::triple_buffer::triple_buffer;
 
     const DUE_NS: u64 = 7_000_000_000;
     const MAX_AGE_NS: u64 = 20_000_000;
+
+    /// Also the last one: nothing follows while the loop is held.
+    #[test]
+    fn what_is_published_of_a_held_loop_is_no_valid_force() {
+        let bus = Bus::join(&format!("held-loop-{}", std::process::id())).unwrap();
+        let mut outputs = Outputs::open(&bus).unwrap();
+        let mut forces = bus.subscriber::<ForceMessage>(8).unwrap();
+        let (_writer, mut statistics) = triple_buffer(Statistics::default());
+        let mut queue = Queue::<u64, 8>::new();
+        let (mut delays, _) = queue.split();
+        let output = Output { state: State::Active, force: [5.0; 6], ..Output::default() };
+        for (max_force_age_ns, is_valid) in [(u64::MAX, true), (0, false)] {
+            let settings = OutputSettings { home: [0.0; 6], max_force_age_ns };
+            let cycle = CycleOutput { due_ns: monotonic_ns() - 1000, output, ..CycleOutput::default() };
+            let io = IoCounters::default();
+            let status = outputs.publish(&settings, cycle, io, &mut statistics, &mut delays);
+            let force = forces.receive_latest().unwrap();
+            let (state, sent) = if is_valid { (State::Active, [5.0; 6]) } else { (State::Fault, [0.0; 6]) };
+            assert_eq!((force.valid, force.force_n, status.state), (u32::from(is_valid), sent, state as u32));
+        }
+    }
 
     #[test]
     fn a_force_that_was_held_too_long_is_a_fault_with_its_age() {

@@ -251,7 +251,7 @@ fn info(config: &Config, fidelity: Fidelity) -> RunInfo {
     RunInfo {
         name: config.name.clone(),
         version: env!("CARGO_PKG_VERSION").into(),
-        commit: option_env!("HEXAD_COMMIT").unwrap_or("unknown").into(),
+        commit: env!("HEXAD_COMMIT").into(),
         instruction_set: instruction_set(config),
         fidelity: fidelity.name().into(),
         configuration: config.text.clone(),
@@ -301,7 +301,7 @@ mod tests {
             recorder.join().unwrap()
         });
         let path = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
-        let recording = Recording::read(&path).unwrap();
+        let recording = Recording::open(&path).unwrap();
         let mut items = vec![];
         recording.each(|item| items.push(item)).unwrap();
         let (_, replay) = replay(&recording, controller).unwrap();

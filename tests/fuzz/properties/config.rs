@@ -1,6 +1,6 @@
 //! Any bytes as a configuration file: refused in so many words, or a machine that works at home.
 
-use hexad::commands::check::Check;
+use hexad::commands::check::CheckReport;
 use hexad::config::text::read_text;
 use hexad::config::{Config, ConfigError, Violation};
 use hexad::model::active_forces::InverseDynamics;
@@ -81,8 +81,13 @@ fn check_machine(config: &Config) {
     let (tracked, _) = Tracker::new(machine, home.motion().pose).find(machine, &lengths);
     assert_eq!(tracked, TrackingResult::Found, "forward kinematics does not find home");
     check_forces(config, &home);
-    let text = Check::new(config).to_string();
-    assert!(text.starts_with(&format!("{name}: valid.")), "{text}");
+    let examination = config.examine();
+    let text = CheckReport::new(config, &examination).to_string();
+    let verdict = if examination.errors.is_empty() { "valid." } else { "NOT VALID, " };
+    assert!(text.starts_with(&format!("{name}: {verdict}")), "{text}");
+    examination.errors.iter().chain(&examination.warnings).for_each(|found| {
+        assert!(found.line >= 1 && found.value.is_some() && !found.bound.contains("NaN"), "{found:?}");
+    });
     assert!(!text.contains("NaN") && !text.replacen(name, "", 1).contains("inf"), "{text}");
 }
 

@@ -36,7 +36,7 @@ fn files(machine: &Machine, folder: &str) -> Vec<PathBuf> {
 /// What a recording says about itself, and its cycles.
 fn read(path: &Path) -> (Summary, Vec<CycleMessage>) {
     let mut cycles = vec![];
-    let recording = Recording::read(path).unwrap();
+    let recording = Recording::open(path).unwrap();
     let summary = recording.each(|item| {
         if let Item::Cycle(cycle) = item {
             cycles.push(*cycle);

@@ -150,7 +150,7 @@ fn a_part_is_repeated_alone(machine: &Machine, file: &Path) {
 }
 
 fn another_instruction_set_agrees(file: &Path) {
-    let recording = Recording::read(file).unwrap();
+    let recording = Recording::open(file).unwrap();
     let info = recording.summary().unwrap().info;
     let mut config = Config::parse(&info.configuration, "the recording").unwrap();
     config.machine.level = Level::baseline();

@@ -91,6 +91,11 @@ impl Hexad {
         fs::read_to_string(&self.stderr).expect("standard error")
     }
 
+    /// What it has written to standard output.
+    pub fn printed(&self) -> String {
+        fs::read_to_string(&self.stdout).expect("standard output")
+    }
+
     /// Waits until it has said this.
     pub fn says(&self, words: &str) {
         let start = Instant::now();
@@ -132,6 +137,16 @@ impl Hexad {
         let command = self.command.clone();
         let ended = self.ends_within(limit);
         assert_eq!(ended.status.code(), Some(0), "{command} after SIG{signal}:\n{}", ended.stderr);
+        ended
+    }
+
+    /// Sends a signal to what is at work: it must end in order, and say that it was interrupted.
+    pub fn interrupted_on(self, signal: &str, limit: Duration) -> Ended {
+        self.signal(signal);
+        let command = self.command.clone();
+        let ended = self.ends_within(limit);
+        assert_eq!(ended.status.code(), Some(130), "{command} after SIG{signal}:\n{}", ended.stderr);
+        assert!(ended.stderr.contains("hexad: interrupted"), "{}", ended.stderr);
         ended
     }
 }

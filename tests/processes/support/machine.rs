@@ -19,6 +19,7 @@ pub const PATIENT: &str = "
 [timeouts]
 setpoint_ms = 400.0
 measured_ms = 400.0
+allow_unstable_age = true
 
 [plant]
 force_timeout_ms = 400.0

@@ -1,10 +1,11 @@
 //! What must hold of every recording, whatever the host did.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
+use hexad::control::controller::SetpointKind;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
-use hexad::messages::{ForceMessage, MeasuredMessage, Message};
+use hexad::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage};
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};
 use super::recorder::Recording;
@@ -138,10 +139,13 @@ fn nothing_moves_unasked(recording: &Recording) {
 }
 
 /// A force marked valid was computed from a measurement younger than the timeout, and from a setpoint as young
-/// where it follows one; and it was not itself older than that when it was sent.
+/// where it follows one that is no target, which holds without end; and it was not itself older than that when it was sent.
 fn valid_forces_are_fresh(recording: &Recording) {
     let measured = Instants::of(&recording.measured);
     let setpoints = Instants::of(&recording.setpoints);
+    let is_target = |setpoint: &&SetpointMessage| setpoint.kind == SetpointKind::Target as u64;
+    let targets: HashSet<_> =
+        recording.setpoints.iter().filter(is_target).map(|setpoint| setpoint.header.time_ns).collect();
     for force in recording.forces.iter().filter(|force| force.valid == 1) {
         let (release_ns, sent_ns) = (force.release_ns, force.header.time_ns);
         let follows =
@@ -150,6 +154,9 @@ fn valid_forces_are_fresh(recording: &Recording) {
             [(&measured, "measurement"), (&setpoints, "setpoint")].into_iter().take(1 + usize::from(follows))
         {
             let newest_ns = instants.newest_until(sent_ns);
+            if what == "setpoint" && newest_ns.is_some_and(|newest_ns| targets.contains(&newest_ns)) {
+                continue;
+            }
             let age_ns = newest_ns.map(|newest_ns| release_ns.saturating_sub(newest_ns));
             assert!(
                 age_ns.is_some_and(|age_ns| age_ns <= TIMEOUT_NS),

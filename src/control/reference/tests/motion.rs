@@ -125,7 +125,7 @@ fn steps_and_stops_move_the_pose_as_their_twist_says() {
         let mut reference = ReferenceGenerator::new(&constants);
         reference.start(&constants, 0, &motion);
         let home = at_rest(constants.home.pose()).pose;
-        let target = Target::Pose(&home);
+        let target = Target::Pose(&home, 1.0);
         let mut expected = motion;
         for step in 1..=200 {
             let target = (k % 2 == 0).then_some(&target);

@@ -1,10 +1,10 @@
 //! `hexad advise`: error and time of each model fidelity over an envelope or a trajectory, and which one suffices.
 
-use core::fmt;
 use core::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use self::report::{AdviceReport, FidelityRow, SCHEMA};
 use super::arguments::MachineFile;
 use super::failure::{CommandError, Failure};
 use super::offline_tables::{read_trajectory, task_state};
@@ -18,9 +18,11 @@ use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::rigid::Motion;
 use crate::output::csv_table::TableError;
-use crate::output::files::print;
-use crate::output::numbers::{AXES, axis_unit, percent, plain_percent, significant};
+use crate::output::files::{print, print_json};
+use crate::output::numbers::{AXES, axis_unit, significant};
 use crate::output::text_table::{Left, Right, text_table};
+
+mod report;
 
 /// Motions that are timed: enough to be different ones, few enough to stay in the cache.
 const TIMED_MOTIONS: usize = 256;
@@ -35,14 +37,23 @@ const MIN_TIME_SAVED: f64 = 0.1;
 pub struct AdviseArguments {
     #[command(flatten)]
     machine: MachineFile,
-    /// A CSV file with t, X, X', X'', instead of the envelope
+    /// A CSV file as for `hexad move`, instead of the envelope; `-` is standard input
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 impl AdviseArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        Ok(print(Advice::new(&self.machine.load()?, self.trajectory.as_deref())?)?)
+        let report = advise(&self.machine.load()?, self.trajectory.as_deref())?;
+        if self.json {
+            print_json(&report)?
+        } else {
+            print(report)?
+        }
+        Ok(())
     }
 }
 
@@ -57,49 +68,46 @@ pub enum AdviseError {
 
 impl CommandError for AdviseError {}
 
-/// Errors and times of all fidelities over a set of motions; displays as a table with a recommendation.
-pub struct Advice {
-    name: String,
-    /// The set of motions, in lines of text.
-    scene: String,
-    /// Largest force of an actuator \[N\].
-    max_force: f64,
-    comparison: FidelityComparison,
-    /// Median time of an evaluation, in the order of [`Fidelity::ALL`] \[ns\].
-    times: [f64; FIDELITY_COUNT],
-    tolerance: f64,
+/// Evaluates the configured envelope, or a trajectory.
+fn advise(config: &Config, trajectory: Option<&Path>) -> Result<AdviceReport, AdviseError> {
+    let model = InverseDynamics::new(&config.machine);
+    let (scene, comparison, motions) = match trajectory {
+        Some(path) => judge_trajectory(&model, path)?,
+        None => judge_envelope(config, &model),
+    };
+    let (times, tolerance) = (time(&model, &motions), config.deployment.control.fidelity_tolerance);
+    let (inside, all) = (&comparison.inside, &comparison.all);
+    let errors = comparison.errors.iter().zip(times);
+    let is_within = |of: Fidelity| comparison.within(tolerance).any(|error| error.fidelity == of);
+    let rows = errors
+        .map(|(error, time_ns)| FidelityRow::new(error, time_ns, inside.peak, is_within(error.fidelity)));
+    Ok(AdviceReport {
+        schema: SCHEMA,
+        machine: config.name.clone(),
+        scene,
+        evaluated: all.evaluated,
+        outside_stroke: all.outside,
+        singular: all.singular,
+        peak_force_n: all.peak,
+        peak_inside_n: inside.peak,
+        max_force_n: config.machine.actuator.max_force,
+        tolerance,
+        fidelities: rows.collect(),
+        recommended: choice(&comparison, &times, tolerance).name(),
+    })
 }
 
-impl Advice {
-    /// Evaluates the configured envelope, or a trajectory.
-    pub fn new(config: &Config, trajectory: Option<&Path>) -> Result<Self, AdviseError> {
-        let model = InverseDynamics::new(&config.machine);
-        let (scene, comparison, motions) = match trajectory {
-            Some(path) => judge_trajectory(&model, path)?,
-            None => judge_envelope(config, &model),
-        };
-        Ok(Self {
-            name: config.name.clone(),
-            scene,
-            max_force: config.machine.actuator.max_force,
-            comparison,
-            times: time(&model, &motions),
-            tolerance: config.deployment.control.fidelity_tolerance,
-        })
-    }
-
-    /// The fastest fidelity within the tolerance that a control loop can use.
-    fn choice(&self) -> Fidelity {
-        let time = |fidelity: Fidelity| {
-            let times = Fidelity::ALL.into_iter().zip(self.times);
-            times.filter(|(timed, _)| *timed == fidelity).map(|(_, time)| time).sum::<f64>()
-        };
-        let first = self.comparison.choice(self.tolerance);
-        let allowed = self.comparison.within(self.tolerance).map(|error| error.fidelity);
-        allowed.filter(|fidelity| fidelity.has_inertia()).fold(first, |best, fidelity| {
-            if time(fidelity) < (1.0 - MIN_TIME_SAVED) * time(best) { fidelity } else { best }
-        })
-    }
+/// The fastest fidelity within the tolerance that a control loop can use.
+fn choice(comparison: &FidelityComparison, times: &[f64; FIDELITY_COUNT], tolerance: f64) -> Fidelity {
+    let time = |fidelity: Fidelity| {
+        let times = Fidelity::ALL.into_iter().zip(times);
+        times.filter(|(timed, _)| *timed == fidelity).map(|(_, time)| time).sum::<f64>()
+    };
+    let first = comparison.choice(tolerance);
+    let allowed = comparison.within(tolerance).map(|error| error.fidelity);
+    allowed.filter(|fidelity| fidelity.has_inertia()).fold(first, |best, fidelity| {
+        if time(fidelity) < (1.0 - MIN_TIME_SAVED) * time(best) { fidelity } else { best }
+    })
 }
 
 fn judge_envelope(config: &Config, model: &InverseDynamics) -> (String, FidelityComparison, Vec<Motion>) {
@@ -189,71 +197,4 @@ fn time(model: &InverseDynamics, motions: &[Motion]) -> [f64; FIDELITY_COUNT] {
         times.sort_by(f64::total_cmp);
         times.get(times.len() / 2).copied().unwrap_or(f64::NAN)
     })
-}
-
-impl fmt::Display for Advice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, scene, max_force, comparison, times, tolerance } = self;
-        let (inside, all) = (&comparison.inside, &comparison.all);
-        writeln!(f, "{name} over {scene}")?;
-        for (count, what) in
-            [(all.outside, "outside the actuators' stroke"), (all.singular, "at singular poses")]
-        {
-            if count > 0 {
-                writeln!(f, "passed over: {count} motions {what}")?;
-            }
-        }
-        write!(f, "peak force {} N", significant(all.peak))?;
-        if all.peak > *max_force {
-            write!(f, ", {} times the actuators' limit", significant(all.peak / max_force))?;
-        }
-        if inside.peak < all.peak {
-            write!(f, "; {} N among the motions inside", significant(inside.peak))?;
-        }
-        let header = ["mean", "RMS", "max", "mean %", "RMS %", "max %", "ns"];
-        let [mean, rms, max, mean_share, rms_share, max_share, ns] = header.map(|name| (name, Right));
-        let columns =
-            [("fidelity", Left), mean, rms, max, mean_share, rms_share, max_share, ns, ("leaves out", Left)];
-        let rows = comparison.errors.iter().zip(times).map(|(error, time)| {
-            let share = |error: f64| if error == 0.0 { 0.0 } else { 100.0 * error / inside.peak };
-            let [mean, rms, max] = [error.mean, error.rms, error.max].map(significant);
-            let shares = [share(error.mean), share(error.rms), 100.0 * error.share].map(significant);
-            let [mean_share, rms_share, max_share] = shares;
-            let (name, left_out_terms) =
-                (error.fidelity.name().into(), error.fidelity.left_out_terms().into());
-            [name, mean, rms, max, mean_share, rms_share, max_share, format!("{time:.0}"), left_out_terms]
-        });
-        writeln!(f, "\n\nerror of a leg's force [N], and as a share of the peak force [%]:")?;
-        write!(f, "{}", text_table(1, &columns, rows))?;
-        self.fmt_recommendation(f, &plain_percent(*tolerance))
-    }
-}
-
-impl Advice {
-    fn fmt_recommendation(&self, f: &mut fmt::Formatter<'_>, tolerance: &str) -> fmt::Result {
-        let choice = self.choice();
-        writeln!(f, "\nrecommended: fidelity = \"{}\", at a tolerance of {tolerance}", choice.name())?;
-        let kept: Vec<_> = self.comparison.errors.iter().filter(|error| error.fidelity != choice).collect();
-        for error in &self.comparison.errors {
-            if error.fidelity == choice && choice != Fidelity::Exact {
-                let (what, max, share) =
-                    (choice.left_out_terms(), significant(error.max), percent(error.share));
-                writeln!(f, "  leaving out {what} costs at most {max} N, {share}")?;
-            }
-        }
-        let within = |fidelity: Fidelity| {
-            self.comparison.within(self.tolerance).any(|error| error.fidelity == fidelity)
-        };
-        for error in kept.into_iter().rev().filter(|error| !within(error.fidelity)) {
-            let (what, share) = (error.fidelity.left_out_terms(), percent(error.share));
-            writeln!(f, "  leaving out {what} would cost {share}")?;
-        }
-        if within(Fidelity::Gravity) {
-            writeln!(
-                f,
-                "  gravity alone is within the tolerance too, but a loop without inertia has no feedback"
-            )?;
-        }
-        Ok(())
-    }
 }

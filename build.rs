@@ -1,0 +1,25 @@
+//! Commit and build profile for `hexad --version`. Works without git: from a tarball the commit is unknown.
+
+use std::env::var;
+use std::process::Command;
+
+fn git(arguments: &[&str]) -> Option<String> {
+    let output =
+        Command::new("git").args(arguments).output().ok().filter(|output| output.status.success())?;
+    Some(String::from_utf8(output.stdout).ok()?.trim().to_owned()).filter(|text| !text.is_empty())
+}
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    // A tarball unpacked inside of another repository has no commit of its own.
+    let here = var("CARGO_MANIFEST_DIR").ok();
+    let is_own = git(&["rev-parse", "--show-toplevel"]).is_some_and(|top| Some(top) == here);
+    let commit =
+        is_own.then(|| git(&["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])).flatten();
+    // It changes with every commit.
+    if let Some(log) = commit.as_ref().and_then(|_| git(&["rev-parse", "--git-path", "logs/HEAD"])) {
+        println!("cargo::rerun-if-changed={log}");
+    }
+    println!("cargo::rustc-env=HEXAD_COMMIT={}", commit.as_deref().unwrap_or("unknown"));
+    println!("cargo::rustc-env=HEXAD_PROFILE={}", var("PROFILE").unwrap_or_default());
+}

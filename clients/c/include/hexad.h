@@ -1,0 +1,179 @@
+/* Drivers, setpoint sources and panels of hexad. Made by cbindgen from clients/c/src.
+ *
+ * Structs and numbers are in hexad_messages.h. Link with `pkg-config --cflags --libs hexad`.
+ *
+ * Threads: every function may be called in any thread. Two calls with one client at the same time do not wait for
+ * each other: the second returns HEXAD_BUSY. A client may be used in one thread and later in another.
+ * hexad_last_error is that of the calling thread.
+ *
+ * Real time: hexad_open allocates and may take milliseconds. Publishing and hexad_latest_* neither allocate nor wait,
+ * except while a participant connects or leaves (up to 0.1 ms). hexad_request waits: call it in another thread.
+ */
+
+#ifndef HEXAD_H
+#define HEXAD_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include "hexad_messages.h"
+
+// Version of this ABI, which is also the number of libhexad.so.0.
+#define HEXAD_ABI 0
+
+// Role of a client: publishes measurements and receives forces.
+#define HEXAD_DRIVER 1
+
+// Role of a client: publishes setpoints and in-band requests; receives status and measurements.
+#define HEXAD_SOURCE 2
+
+// Role of a client: receives status and measurements.
+#define HEXAD_MONITOR 4
+
+// Added to a role for a daemon with `release = "lockstep"`: all times are those of the measured messages.
+#define HEXAD_SIMULATED 8
+
+// Outcome of a function. hexad_last_error has the text of all from HEXAD_INVALID on.
+enum hexad_result {
+  // Done. Of hexad_latest_force: the forces may be applied.
+  HEXAD_OK = 0,
+  // No force may be applied: close the brakes.
+  HEXAD_BRAKE = 1,
+  // No message has arrived yet.
+  HEXAD_NOTHING = 2,
+  // An argument is wrong, or the client was not opened in the role of the function.
+  HEXAD_INVALID = 3,
+  // Another thread uses the client.
+  HEXAD_BUSY = 4,
+  // The shared memory could not be used.
+  HEXAD_SHARED_MEMORY = 5,
+  // No daemon of the machine was found.
+  HEXAD_NO_DAEMON = 6,
+  // This user may not send requests.
+  HEXAD_FORBIDDEN = 7,
+  // The daemon has refused the request.
+  HEXAD_REFUSED = 8,
+  // The request was accepted and did not reach its state.
+  HEXAD_NOT_COMPLETED = 9,
+  // Neither its state nor an answer came in time: it is not known whether the request was carried out.
+  HEXAD_TIMED_OUT = 10,
+  // An error in this library: report it.
+  HEXAD_INTERNAL = 11,
+};
+
+// A program that has joined the topics of a machine.
+struct hexad_client;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// Version of the ABI of the library that is loaded: HEXAD_ABI of its header.
+uint32_t hexad_abi(void);
+
+// CLOCK_MONOTONIC [ns], the clock of all stamps.
+uint64_t hexad_monotonic_ns(void);
+
+// Text of the last failure in this thread; empty before the first. It is valid until the next failure in this thread.
+const char *hexad_last_error(void);
+
+// Joins the topics of a machine (`name` of its file) in one or several roles (their sum), as the user of the daemon.
+// Returns NULL on failure. The client belongs to the caller until hexad_close.
+//
+// # Safety
+//
+// `machine` is NULL or a string.
+struct hexad_client *hexad_open(const char *machine,
+                                uint32_t roles);
+
+// Leaves the topics and frees the client; NULL is allowed. Returns HEXAD_BUSY, and frees nothing, while another thread uses
+// it.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open, and is not used afterwards.
+enum hexad_result hexad_close(struct hexad_client *client);
+
+// Publishes a measurement for the instant at which the sensors were sampled [ns]. The library fills in the header of the
+// message that it sends.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open; `measured` is NULL or a message.
+enum hexad_result hexad_publish_measured(struct hexad_client *client,
+                                         uint64_t time_ns,
+                                         const struct hexad_measured *measured);
+
+// Judges the newest force message with a longest age [ns]: HEXAD_OK if its forces may be applied now, else HEXAD_BRAKE.
+// Called in every period it is the driver's watchdog: without new messages the last one becomes too old. `force` receives
+// the message in either case; zeros before the first. Damaged, repeated and older messages never get here. In simulated time
+// now is the time of the last measurement that this client has published.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open; `force` is NULL or room for a message.
+enum hexad_result hexad_latest_force(struct hexad_client *client,
+                                     uint64_t longest_age_ns,
+                                     struct hexad_force *force);
+
+// The same judgement of a message from anywhere at any instant [ns], but for its order: age, schema, checksum, valid, finite forces.
+//
+// # Safety
+//
+// `force` is NULL or a message.
+enum hexad_result hexad_judge_force(const struct hexad_force *force,
+                                    uint64_t now_ns,
+                                    uint64_t longest_age_ns);
+
+// Publishes a setpoint for an instant [ns]. The library fills in the header of the message that it sends.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open; `setpoint` is NULL or a message.
+enum hexad_result hexad_publish_setpoint(struct hexad_client *client,
+                                         uint64_t time_ns,
+                                         const struct hexad_setpoint *setpoint);
+
+// Publishes a request (HEXAD_REQUEST_...) in step with the setpoints. The status shows what became of it.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open.
+enum hexad_result hexad_publish_request(struct hexad_client *client,
+                                        uint64_t time_ns,
+                                        uint32_t request);
+
+// The newest status: HEXAD_OK if one has arrived since the client was opened, else HEXAD_NOTHING. The same message is
+// returned again until another arrives; its header has the time.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open; `status` is NULL or room for a message.
+enum hexad_result hexad_latest_status(struct hexad_client *client,
+                                      struct hexad_status *status);
+
+// The newest measurement of the driver, in the same way.
+//
+// # Safety
+//
+// `client` is NULL or from hexad_open; `measured` is NULL or room for a message.
+enum hexad_result hexad_latest_measured(struct hexad_client *client,
+                                        struct hexad_measured *measured);
+
+// Sends a request (HEXAD_REQUEST_...) over the control socket and waits until its state is reached, at most `within_s`
+// seconds and two more. `until_ready` also waits for measurement and setpoint where they are missing. It needs no client,
+// and any user whom the machine file admits may call it. hexad_last_error has the daemon's reason. A daemon whose socket
+// does not answer is not signalled, as the command `hexad estop` does.
+//
+// # Safety
+//
+// `machine` is NULL or a string.
+enum hexad_result hexad_request(const char *machine,
+                                uint32_t request,
+                                bool until_ready,
+                                double within_s);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* HEXAD_H */

@@ -1,0 +1,133 @@
+//! Errors and times of all fidelities over a set of motions: one struct for the text and for `--json`.
+
+use core::fmt;
+
+use serde::Serialize;
+
+use crate::analysis::fidelity_choice::FidelityError;
+use crate::model::fidelity::Fidelity;
+use crate::output::numbers::{percent, plain_percent, significant};
+use crate::output::text_table::{Left, Right, text_table};
+
+/// Schema of the JSON, raised when a field changes its meaning or goes.
+pub const SCHEMA: u32 = 1;
+
+/// Result of `hexad advise`.
+#[derive(Clone, Debug, Serialize)]
+pub struct AdviceReport {
+    pub schema: u32,
+    pub machine: String,
+    /// The set of motions, in lines of text.
+    pub scene: String,
+    /// Motions that were evaluated, and those passed over.
+    pub evaluated: u64,
+    pub outside_stroke: u64,
+    pub singular: u64,
+    /// Largest force of a leg over all motions, and over those inside.
+    pub peak_force_n: f64,
+    pub peak_inside_n: f64,
+    /// `actuator.max_force_n`.
+    pub max_force_n: f64,
+    /// `control.fidelity_tolerance`.
+    pub tolerance: f64,
+    pub fidelities: Vec<FidelityRow>,
+    pub recommended: &'static str,
+}
+
+/// Errors of the force of a leg, absolute and as ratios of the peak force, and the median time of an evaluation.
+#[derive(Clone, Debug, Serialize)]
+pub struct FidelityRow {
+    #[serde(serialize_with = "by_name")]
+    pub fidelity: Fidelity,
+    pub leaves_out: &'static str,
+    pub mean_n: f64,
+    pub rms_n: f64,
+    pub max_n: f64,
+    pub mean_ratio: f64,
+    pub rms_ratio: f64,
+    pub max_ratio: f64,
+    pub time_ns: f64,
+    pub is_within_tolerance: bool,
+}
+
+fn by_name<S: serde::Serializer>(fidelity: &Fidelity, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(fidelity.name())
+}
+
+impl FidelityRow {
+    /// Row of a fidelity; `peak` is that of the motions inside.
+    pub fn new(error: &FidelityError, time_ns: f64, peak: f64, is_within_tolerance: bool) -> Self {
+        let ratio = |error: f64| if error == 0.0 { 0.0 } else { error / peak };
+        Self {
+            fidelity: error.fidelity,
+            leaves_out: error.fidelity.left_out_terms(),
+            mean_n: error.mean,
+            rms_n: error.rms,
+            max_n: error.max,
+            mean_ratio: ratio(error.mean),
+            rms_ratio: ratio(error.rms),
+            max_ratio: error.share,
+            time_ns,
+            is_within_tolerance,
+        }
+    }
+
+    fn cells(&self) -> [String; 9] {
+        let [mean, rms, max] = [self.mean_n, self.rms_n, self.max_n].map(significant);
+        let ratios = [self.mean_ratio, self.rms_ratio, self.max_ratio];
+        let [mean_share, rms_share, max_share] = ratios.map(|ratio| significant(100.0 * ratio));
+        let (name, time) = (self.fidelity.name().into(), format!("{:.0}", self.time_ns));
+        [name, mean, rms, max, mean_share, rms_share, max_share, time, self.leaves_out.into()]
+    }
+}
+
+impl fmt::Display for AdviceReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{} over {}", self.machine, self.scene)?;
+        let passed =
+            [(self.outside_stroke, "outside the actuators' stroke"), (self.singular, "at singular poses")];
+        for (count, what) in passed.into_iter().filter(|(count, _)| *count > 0) {
+            writeln!(f, "passed over: {count} motions {what}")?;
+        }
+        write!(f, "peak force {} N", significant(self.peak_force_n))?;
+        if self.peak_force_n > self.max_force_n {
+            write!(f, ", {} times the actuators' limit", significant(self.peak_force_n / self.max_force_n))?;
+        }
+        if self.peak_inside_n < self.peak_force_n {
+            write!(f, "; {} N among the motions inside", significant(self.peak_inside_n))?;
+        }
+        let header = ["mean", "RMS", "max", "mean %", "RMS %", "max %", "ns"];
+        let [mean, rms, max, mean_share, rms_share, max_share, ns] = header.map(|name| (name, Right));
+        let columns =
+            [("fidelity", Left), mean, rms, max, mean_share, rms_share, max_share, ns, ("leaves out", Left)];
+        writeln!(f, "\n\nerror of a leg's force [N], and as a share of the peak force [%]:")?;
+        write!(f, "{}", text_table(1, &columns, self.fidelities.iter().map(FidelityRow::cells)))?;
+        self.fmt_recommendation(f)
+    }
+}
+
+impl AdviceReport {
+    fn fmt_recommendation(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, tolerance) = (self.recommended, plain_percent(self.tolerance));
+        writeln!(f, "\nrecommended: fidelity = \"{name}\", at a tolerance of {tolerance}")?;
+        let is_chosen = |row: &&FidelityRow| row.fidelity.name() == name;
+        if let Some(row) =
+            self.fidelities.iter().find(is_chosen).filter(|row| row.fidelity != Fidelity::Exact)
+        {
+            let (what, max, share) = (row.leaves_out, significant(row.max_n), percent(row.max_ratio));
+            writeln!(f, "  leaving out {what} costs at most {max} N, {share}")?;
+        }
+        let kept = self.fidelities.iter().filter(|row| !is_chosen(row) && !row.is_within_tolerance);
+        for row in kept.rev() {
+            writeln!(f, "  leaving out {} would cost {}", row.leaves_out, percent(row.max_ratio))?;
+        }
+        let is_gravity = |row: &FidelityRow| row.fidelity == Fidelity::Gravity && row.is_within_tolerance;
+        if self.fidelities.iter().any(is_gravity) {
+            writeln!(
+                f,
+                "  gravity alone is within the tolerance too, but a loop without inertia has no feedback"
+            )?;
+        }
+        Ok(())
+    }
+}

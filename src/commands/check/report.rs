@@ -1,0 +1,157 @@
+//! What `hexad check` finds: one struct for the text and for `--json`.
+
+use serde::Serialize;
+
+use crate::analysis::assembly_modes::other_modes;
+use crate::config::control_loops::{ControlLoop, longest_age_s, loops};
+use crate::config::deployment::default_limits::{DerivedLimit, derived_limits};
+use crate::config::examination::Examination;
+use crate::config::{Config, Violation};
+use crate::model::active_forces::inverse_dynamics;
+use crate::model::fidelity::Exact;
+use crate::model::inverse_geometry::{leg_directions, leg_lengths};
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::LEGS;
+use crate::model::task::TaskState;
+
+/// Schema of the JSON, raised when a field changes its meaning or goes.
+const SCHEMA: u32 = 1;
+
+/// Findings, and the machine at home, at rest. Numbers that do not exist are null in JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct CheckReport {
+    pub schema: u32,
+    pub machine: String,
+    /// Whether the machine can be run: no errors.
+    pub is_valid: bool,
+    pub errors: Vec<Violation>,
+    pub warnings: Vec<Violation>,
+    pub legs: Vec<LegAtHome>,
+    /// Frobenius condition: 6 is best, infinite is singular.
+    pub condition: f64,
+    /// `limits.condition`.
+    pub condition_limit: f64,
+    pub rate_hz: f64,
+    /// Largest motion from one measurement to the next for which the pose is certain.
+    pub certain_step_m: f64,
+    pub certain_step_rad: f64,
+    /// Other poses with the same lengths, and the nearest.
+    pub other_poses: usize,
+    pub nearest_pose: Option<OtherPose>,
+    /// Limits of the file's defaults that are less than usual, as the drives cannot give more.
+    pub derived_limits: Vec<DerivedLimit>,
+    pub control_mode: &'static str,
+    pub estimator_hz: f64,
+    pub compensates_disturbances: bool,
+    /// Slowest and fastest mode of legs that are controlled each by itself.
+    pub leg_modes_hz: Option<[f64; 2]>,
+    pub loops: Vec<LoopMargins>,
+    /// Largest age of measurements with which the loops are stable.
+    pub stable_age_s: f64,
+}
+
+/// A leg at home.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct LegAtHome {
+    pub length_m: f64,
+    pub to_shortest_m: f64,
+    pub to_longest_m: f64,
+    /// Static force; none at a singular pose.
+    pub force_n: Option<f64>,
+    /// Its share of the limit.
+    pub force_ratio: Option<f64>,
+    /// Angle between the leg and the first axis of its universal joint.
+    pub joint_axis_deg: f64,
+}
+
+/// Another pose with the same lengths.
+#[derive(Clone, Debug, Serialize)]
+pub struct OtherPose {
+    pub text: String,
+    /// Whether it may be confused with home at start-up.
+    pub is_nearby: bool,
+}
+
+/// Margins of a control loop.
+#[derive(Clone, Debug, Serialize)]
+pub struct LoopMargins {
+    pub name: &'static str,
+    pub bandwidth_hz: f64,
+    pub delay_periods: f64,
+    pub largest_stable_hz: f64,
+    pub gain_margin: f64,
+    pub longest_delay_periods: f64,
+    #[serde(skip)]
+    pub text: String,
+}
+
+impl CheckReport {
+    /// Evaluates the model at home, at rest.
+    pub fn new(config: &Config, examination: &Examination) -> Self {
+        let Config { name, machine, deployment, .. } = config;
+        let control = &deployment.control;
+        let kinematic_state = KinematicState::new(machine, machine.home_pose());
+        let sensitivity = kinematic_state.sensitivity();
+        let others = other_modes(machine, &kinematic_state);
+        let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
+        let masses = &control.leg_masses;
+        let leg_modes_hz = [root(masses.softest), root(masses.stiffest)];
+        Self {
+            schema: SCHEMA,
+            machine: name.clone(),
+            is_valid: examination.errors.is_empty(),
+            errors: examination.errors.clone(),
+            warnings: examination.warnings.clone(),
+            legs: legs(config),
+            condition: sensitivity.condition,
+            condition_limit: deployment.limits.condition,
+            rate_hz: deployment.realtime.rate_hz,
+            certain_step_m: sensitivity.trusted_step * machine.joints.radius,
+            certain_step_rad: sensitivity.trusted_step,
+            other_poses: others.len(),
+            nearest_pose: others
+                .first()
+                .map(|mode| OtherPose { text: mode.to_string(), is_nearby: mode.is_nearby() }),
+            derived_limits: derived_limits(machine, &deployment.limits.reference),
+            control_mode: control.mode.name(),
+            estimator_hz: control.estimator_bandwidth_hz,
+            compensates_disturbances: control.compensate_disturbances,
+            leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
+            loops: margins(config),
+            stable_age_s: longest_age_s(deployment),
+        }
+    }
+}
+
+fn legs(config: &Config) -> Vec<LegAtHome> {
+    let machine = &config.machine;
+    let (motion, actuator) = (TaskState::at_rest(machine.home).motion(), &machine.actuator);
+    let axes = machine.joints.triples.unpack_vectors(&machine.joints.universal_axis);
+    let forces = inverse_dynamics::<Exact>(machine, &motion).map_or([None; LEGS], |forces| forces.map(Some));
+    let lengths = leg_lengths(machine, &motion.pose);
+    let directions = leg_directions(machine, &motion.pose);
+    let angles = axes.iter().zip(&directions).map(|(u, n)| u.cross(n).norm().atan2(u.dot(n)).to_degrees());
+    let values = lengths.into_iter().zip(forces).zip(angles);
+    let leg = |((length_m, force_n), joint_axis_deg): (_, f64)| LegAtHome {
+        length_m,
+        to_shortest_m: length_m - actuator.min_length,
+        to_longest_m: actuator.max_length - length_m,
+        force_n,
+        force_ratio: force_n.map(|force: f64| force.abs() / actuator.max_force),
+        joint_axis_deg,
+    };
+    values.map(leg).collect()
+}
+
+fn margins(config: &Config) -> Vec<LoopMargins> {
+    let of_loop = |control_loop: ControlLoop| LoopMargins {
+        name: control_loop.name,
+        bandwidth_hz: control_loop.bandwidth_hz,
+        delay_periods: control_loop.sampled.delay,
+        largest_stable_hz: control_loop.largest_stable_hz(),
+        gain_margin: control_loop.sampled.gain_margin(),
+        longest_delay_periods: control_loop.sampled.longest_delay(),
+        text: control_loop.to_string(),
+    };
+    loops(&config.deployment).into_iter().map(of_loop).collect()
+}

@@ -1,0 +1,89 @@
+//! The result of `hexad check` as text.
+
+use core::fmt;
+
+use super::report::{CheckReport, LegAtHome};
+use crate::model::sensitivity::CONDITION_MEANING;
+use crate::output::numbers::significant;
+use crate::output::text_table::{Right, text_table};
+
+impl fmt::Display for CheckReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = match self.errors.len() {
+            0 => "valid".to_string(),
+            count => format!("NOT VALID, errors: {count}"),
+        };
+        writeln!(f, "{}: {verdict}. At home, at rest:\n", self.machine)?;
+        let header = ["leg", "length", "to shortest", "to longest", "force", "of the limit", "to joint axis"];
+        let rows = self.legs.iter().enumerate().map(|(index, leg)| cells(index, leg));
+        write!(f, "{}", text_table(2, &header.map(|name| (name, Right)), rows))?;
+        writeln!(
+            f,
+            "\ncondition    {} ({CONDITION_MEANING}; limits.condition {})",
+            significant(self.condition),
+            significant(self.condition_limit)
+        )?;
+        self.fmt_modes(f)?;
+        self.fmt_loops(f)?;
+        for limit in &self.derived_limits {
+            writeln!(f, "{limit}")?;
+        }
+        self.warnings.iter().try_for_each(|warning| writeln!(f, "WARNING: {warning}"))
+    }
+}
+
+fn cells(index: usize, leg: &LegAtHome) -> [String; 7] {
+    [
+        format!("{}", index + 1),
+        format!("{:.4} m", leg.length_m),
+        format!("{:.4} m", leg.to_shortest_m),
+        format!("{:.4} m", leg.to_longest_m),
+        format!("{:.2} N", leg.force_n.unwrap_or(f64::NAN)),
+        format!("{:.1} %", 100.0 * leg.force_ratio.unwrap_or(f64::NAN)),
+        format!("{:.1} deg", leg.joint_axis_deg),
+    ]
+}
+
+impl CheckReport {
+    /// Writes the stability margins of the control loops.
+    fn fmt_loops(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let compensated = if self.compensates_disturbances { "" } else { ", disturbances not compensated" };
+        writeln!(
+            f,
+            "control mode {}, estimator {:.2} Hz{compensated}",
+            self.control_mode, self.estimator_hz
+        )?;
+        if let Some([softest, stiffest]) = self.leg_modes_hz {
+            writeln!(f, "legs         coupled, they move with {softest:.2} to {stiffest:.2} Hz")?;
+        }
+        self.loops.iter().try_for_each(|margins| writeln!(f, "{}", margins.text))?;
+        writeln!(f, "measurements stable to an age of {:.1} ms", 1e3 * self.stable_age_s)
+    }
+
+    /// Writes within which bounds start-up and the loop know the pose.
+    fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "pose certain from cycle to cycle  up to {:.1} mm or {:.2} deg, {:.1} m/s at {:.0} Hz",
+            1e3 * self.certain_step_m,
+            self.certain_step_rad.to_degrees(),
+            self.certain_step_m * self.rate_hz,
+            self.rate_hz,
+        )?;
+        let Some(nearest) = &self.nearest_pose else {
+            return writeln!(
+                f,
+                "other poses with these lengths    none found within 90 deg and 2 radii of home"
+            );
+        };
+        let count = self.other_poses;
+        writeln!(f, "other poses with these lengths    {count} found, the nearest {}", nearest.text)?;
+        if nearest.is_nearby {
+            writeln!(
+                f,
+                "WARNING: at start-up the lengths alone may not distinguish it from home; choose a home further away from it"
+            )?;
+        }
+        Ok(())
+    }
+}

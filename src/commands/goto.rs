@@ -1,0 +1,232 @@
+//! `hexad goto`: moves the platform to a pose, at which it stands under control afterwards.
+//!
+//! Before anything moves the reference generator takes the whole way offline: a target or a way outside of the workspace
+//! is refused with leg, value and bound, and `--dry-run` prints what it would do.
+
+use core::fmt;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+
+use super::arguments::{MachineFile, duration, number_within};
+use super::failure::Failure;
+use super::operate::status;
+use super::target::pose_options::PoseOptions;
+use super::target::{TargetError, TargetSource, constants, pose_of, reference_x};
+use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, TargetMotion, target_motion};
+use crate::config::Config;
+use crate::control::limits::Limit;
+use crate::control::parameters::Constants;
+use crate::model::machine::LEGS;
+use crate::output::files::print;
+use crate::output::numbers::{AXES, axis_unit, fixed, percent, significant};
+use crate::realtime::stop_request::Stop;
+
+/// Time for the way, as a multiple of what was computed, and beyond that \[s\].
+const LONGEST_SHARE: f64 = 1.5;
+const LONGEST_EXTRA_S: f64 = 5.0;
+
+#[derive(Debug, Args)]
+pub struct GotoArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    #[command(flatten)]
+    target: PoseOptions,
+    /// Add the coordinates to those of the present pose
+    #[arg(long)]
+    relative: bool,
+    /// What is not given is that of the home pose
+    #[arg(long, conflicts_with = "relative")]
+    home: bool,
+    /// Share of the limits of autonomous motions, for example 50%
+    #[arg(long, value_name = "SHARE", default_value = "100%", value_parser = speed)]
+    speed: f64,
+    /// Compute the way and its duration; move nothing. Without a daemon it begins at home
+    #[arg(long)]
+    dry_run: bool,
+    /// Take control, if the platform is not under control
+    #[arg(long, conflicts_with = "dry_run")]
+    engage: bool,
+    /// Longest to wait for control [s]
+    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
+    within: f64,
+}
+
+impl GotoArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        if self.target.is_empty() && !self.home {
+            return Err(Failure {
+                exit_code: 2,
+                message: "no target: give coordinates, for example --x-mm 100, or --home".into(),
+            });
+        }
+        let config = self.machine.load()?;
+        let constants = constants(&config);
+        let (from, origin) = self.start(&config)?;
+        let base = if self.home { config.machine.home } else { from };
+        let to = self.target.applied_to(base, self.relative);
+        let motion = target_motion(&constants, &pose_of(&from), &pose_of(&to), self.speed, |_, _| ())
+            .map_err(TargetError::Refused)?;
+        if self.dry_run {
+            return Ok(print(Plan {
+                constants: &constants,
+                from: &from,
+                origin,
+                to: &to,
+                speed: self.speed,
+                motion: &motion,
+            })?);
+        }
+        print(format_args!("{:.2} s to the target\n", motion.duration_s))?;
+        let stop = Stop::on_signals()?;
+        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
+        let mut source = TargetSource::open(&config, within, &stop)?;
+        source.set_speed(self.speed);
+        Ok(drive(source, &constants, [from, to], motion.duration_s, &stop)?)
+    }
+
+    /// X at which the way begins, and where that is from.
+    fn start(&self, config: &Config) -> Result<([f64; 6], &'static str), TargetError> {
+        match status(&config.name) {
+            Ok(answer) => reference_x(config, &answer)
+                .map(|x| (x, "where the platform is"))
+                .ok_or(TargetError::UnknownPose(answer.text)),
+            Err(_) if self.dry_run => Ok((config.machine.home, "home, as no daemon answers")),
+            Err(error) => Err(error.into()),
+        }
+    }
+}
+
+/// Publishes the target until the reference is there; after a signal until the platform stands where it can. Control begins
+/// where the platform is.
+fn drive(
+    mut source: TargetSource,
+    constants: &Constants,
+    [from, to]: [[f64; 6]; 2],
+    duration_s: f64,
+    stop: &Stop,
+) -> Result<(), TargetError> {
+    let longest_s = LONGEST_SHARE * duration_s + LONGEST_EXTRA_S;
+    let mut resting = None;
+    loop {
+        if stop.is_repeated() {
+            return Err(TargetError::Interrupted);
+        }
+        let Some(since) = source.active_since() else {
+            if stop.is_requested() {
+                return Err(TargetError::InterruptedEarly);
+            }
+            source.publish(from)?;
+            continue;
+        };
+        if stop.is_requested() && resting.is_none() {
+            resting = Some(source.resting_x(constants)?);
+            source.set_speed(1.0);
+        }
+        let x = resting.unwrap_or(to);
+        source.publish(x)?;
+        let elapsed_s = since.elapsed().as_secs_f64();
+        if elapsed_s > longest_s {
+            return Err(TargetError::TimedOut(longest_s));
+        }
+        // A status from before would have the platform elsewhere.
+        if source.status().newest.0 < since {
+            continue;
+        }
+        let left = pose_of(&source.present_x()?).displacement_to(&pose_of(&x));
+        if left.linear.norm() < REACHED_M && left.angular.norm() < REACHED_RAD {
+            return if resting.is_some() { Err(TargetError::Interrupted) } else { reached(&source, since) };
+        }
+    }
+}
+
+/// Reports the pose of the platform.
+fn reached(source: &TargetSource, since: Instant) -> Result<(), TargetError> {
+    let (elapsed_s, answer) = (since.elapsed().as_secs_f64(), source.status().newest.1);
+    let pose = answer.status.and_then(|report| report.pose).unwrap_or_default();
+    let text = format!(
+        "reached after {elapsed_s:.2} s; the platform stands under control\n{}{}",
+        heading(),
+        row("pose", &pose)
+    );
+    // The platform has moved: a closed standard output is no reason to fail.
+    let _ = print(text);
+    Ok(())
+}
+
+/// Share of a speed, as a number or in per cent.
+fn speed(text: &str) -> Result<f64, String> {
+    match text.strip_suffix('%') {
+        Some(percent) => number_within(percent.trim(), 1.0..=100.0, " %").map(|percent| percent / 100.0),
+        None => number_within(text, 0.01..=1.0, ""),
+    }
+}
+
+/// What the reference will do.
+struct Plan<'a> {
+    constants: &'a Constants,
+    from: &'a [f64; 6],
+    origin: &'static str,
+    to: &'a [f64; 6],
+    speed: f64,
+    motion: &'a TargetMotion,
+}
+
+impl fmt::Display for Plan<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { constants, from, origin, to, speed, motion } = self;
+        let actuator = &constants.machine().actuator;
+        writeln!(f, "{}{}{}from is {origin}", heading(), row("from", from), row("to", to))?;
+        writeln!(
+            f,
+            "duration  {:.3} s, to within {} mm and {} mrad",
+            motion.duration_s,
+            1e3 * REACHED_M,
+            1e3 * REACHED_RAD
+        )?;
+        writeln!(
+            f,
+            "velocity  at most {} mm/s and {} deg/s",
+            significant(1e3 * motion.velocity_m_s),
+            significant(motion.velocity_rad_s.to_degrees())
+        )?;
+        writeln!(
+            f,
+            "leg  length mm (stroke {:.1} to {:.1})  largest rate mm/s (of {:.1})",
+            1e3 * actuator.min_length,
+            1e3 * actuator.max_length,
+            1e3 * actuator.max_rate
+        )?;
+        for (leg, ([shortest, longest], rate)) in
+            (1..=LEGS).zip(motion.lengths_m.iter().zip(motion.leg_rates_m_s))
+        {
+            writeln!(f, "{leg:>3}  {:>9.3} to {:>9.3}  {:>19.3}", 1e3 * shortest, 1e3 * longest, 1e3 * rate)?;
+        }
+        let shares = Limit::ALL.into_iter().zip(motion.limited_shares).filter(|(_, share)| *share > 0.0);
+        let limits: Vec<_> =
+            shares.map(|(limit, share)| format!("{} {}", limit.name(), percent(share))).collect();
+        let limits = if limits.is_empty() { "nothing".into() } else { limits.join(", ") };
+        writeln!(
+            f,
+            "limited by {limits} of the time, with {} of [limits] (limits.autonomous_scale and --speed)",
+            percent(speed * constants.parameters.limits.autonomous_scale)
+        )
+    }
+}
+
+/// A line with X in the units of people.
+fn row(name: &str, x: &[f64; 6]) -> String {
+    let numbers: String =
+        x.iter().enumerate().map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, 3))).collect();
+    format!("{name:10}{numbers}\n")
+}
+
+/// The names of X above [`row`].
+fn heading() -> String {
+    let names: String = AXES
+        .iter()
+        .enumerate()
+        .map(|(k, axis)| format!("{:>11}", format!("{axis} {}", axis_unit(k).1)))
+        .collect();
+    format!("{:10}{names}\n", "")
+}

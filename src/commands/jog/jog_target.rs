@@ -1,0 +1,180 @@
+//! Target that keys move: no farther ahead of the reference than it brakes, and never out of the workspace.
+
+use crate::analysis::target_motion::{TargetRefusal, WorkspaceBound, check_target};
+use crate::commands::jog::keys::Key;
+use crate::commands::target::pose_of;
+use crate::control::limits::DerivativeLimits;
+use crate::control::parameters::Constants;
+use crate::model::rigid::Pose;
+
+/// Velocities, as shares of those of autonomous motions.
+const SHARES: [f64; 7] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
+const FIRST_SHARE: usize = 3;
+
+/// Steps of positions \[m\] and of angles \[rad\].
+const STEPS: [[f64; 2]; 4] = [[1e-5, 1.745e-5], [1e-4, 1.745e-4], [1e-3, 1.745e-3], [1e-2, 1.745e-2]];
+const FIRST_STEP: usize = 2;
+
+/// Age of the reference that is compared with the target \[s\]: of a status report, twice its interval.
+const REFERENCE_AGE_S: f64 = 0.15;
+
+/// How a key moves the target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// While keys arrive, with this velocity of position and of angles \[m/s\], \[rad/s\].
+    Continuous([f64; 2]),
+    /// By this much for each key \[m\], \[rad\].
+    Step([f64; 2]),
+}
+
+/// Target of a jog.
+pub struct JogTarget<'a> {
+    constants: &'a Constants,
+    x: [f64; 6],
+    is_continuous: bool,
+    share: usize,
+    step: usize,
+    /// What has held the target back last.
+    blocked: Option<WorkspaceBound>,
+}
+
+impl<'a> JogTarget<'a> {
+    /// At X, to be moved continuously.
+    pub fn new(constants: &'a Constants, x: [f64; 6]) -> Self {
+        Self { constants, x, is_continuous: true, share: FIRST_SHARE, step: FIRST_STEP, blocked: None }
+    }
+
+    pub fn x(&self) -> [f64; 6] {
+        self.x
+    }
+
+    pub fn blocked(&self) -> Option<&WorkspaceBound> {
+        self.blocked.as_ref()
+    }
+
+    pub fn pace(&self) -> Pace {
+        if self.is_continuous {
+            Pace::Continuous(self.velocities())
+        } else {
+            Pace::Step(STEPS.get(self.step).copied().unwrap_or_default())
+        }
+    }
+
+    fn velocities(&self) -> [f64; 2] {
+        let limits = &self.constants.parameters.limits;
+        let share = limits.autonomous_scale * SHARES.get(self.share).copied().unwrap_or_default();
+        [share * limits.position.velocity, share * limits.orientation.velocity]
+    }
+
+    /// The effect of a key; the key itself if it goes on while it is held.
+    pub fn press(&mut self, key: Key, reference: &Pose) -> Option<Key> {
+        match (key, self.is_continuous) {
+            (Key::Move { .. }, true) => return Some(key),
+            (Key::Move { axis, sign }, false) => {
+                let [position, angle] = STEPS.get(self.step).copied().unwrap_or_default();
+                self.shift(axis, sign * if axis < 3 { angle } else { position }, reference);
+            }
+            (Key::Faster, true) => self.share = (self.share + 1).min(SHARES.len() - 1),
+            (Key::Slower, true) => self.share = self.share.saturating_sub(1),
+            (Key::Faster, false) => self.step = (self.step + 1).min(STEPS.len() - 1),
+            (Key::Slower, false) => self.step = self.step.saturating_sub(1),
+            (Key::Mode, _) => self.is_continuous = !self.is_continuous,
+            (Key::Stop, _) => {}
+        }
+        None
+    }
+
+    /// Moves a coordinate for a signed time \[s\].
+    pub fn advance(&mut self, axis: usize, time_s: f64, reference: &Pose) {
+        let [position, angle] = self.velocities();
+        self.shift(axis, time_s * if axis < 3 { angle } else { position }, reference);
+    }
+
+    fn shift(&mut self, axis: usize, by: f64, reference: &Pose) {
+        let mut x = self.x;
+        if let Some(x) = x.get_mut(axis) {
+            *x += by;
+        }
+        let pose = pose_of(&x);
+        let step = if self.is_continuous { 0.0 } else { by.abs() };
+        if self.distance_ratio(reference, &pose, step) > 1.0 {
+            return;
+        }
+        match check_target(self.constants, &pose) {
+            Ok(()) => (self.x, self.blocked) = (x, None),
+            Err(
+                TargetRefusal::Target(bound) | TargetRefusal::Way { bound, .. } | TargetRefusal::Start(bound),
+            ) => {
+                self.blocked = Some(bound);
+            }
+        }
+    }
+
+    /// Distance of a target from the reference, over the largest allowed: the way in which it brakes, and what it has moved
+    /// since its report; at least one step.
+    fn distance_ratio(&self, reference: &Pose, target: &Pose, step: f64) -> f64 {
+        let limits = &self.constants.parameters.limits;
+        let left = reference.displacement_to(target);
+        let [position, angle] = self.velocities();
+        let allowed = |velocity: f64, limits: &DerivativeLimits| {
+            let DerivativeLimits { acceleration, jerk, .. } =
+                limits.scaled(self.constants.parameters.limits.autonomous_scale);
+            let braking =
+                velocity * (REFERENCE_AGE_S + velocity / (2.0 * acceleration) + acceleration / jerk);
+            braking.max(step) * (1.0 + 1e-9)
+        };
+        let linear = left.linear.norm() / allowed(position, &limits.position);
+        linear.max(left.angular.norm() / allowed(angle, &limits.orientation))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::arguments::DEFAULT_CONFIG;
+    use crate::commands::target::constants;
+    use crate::config::Config;
+
+    const UP: Key = Key::Move { axis: 5, sign: 1.0 };
+
+    #[test]
+    fn a_target_stays_near_its_reference_and_in_the_workspace() {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let constants = constants(&config);
+        let home = config.machine.home;
+        let mut target = JogTarget::new(&constants, home);
+        let reference = pose_of(&home);
+        for _ in 0..10_000 {
+            assert_eq!(target.press(UP, &reference), Some(UP));
+            target.advance(5, 0.01, &reference);
+        }
+        // 10 % of 0.2 m/s; 0.15 s, v / 2a, a / j.
+        let ahead = target.x()[5] - home[5];
+        assert!(ahead > 0.002 && ahead < 0.01, "{ahead} m ahead of a platform that does not move");
+        assert!(target.blocked().is_none());
+        // A platform that follows, to the end of the workspace.
+        for _ in 0..10_000 {
+            let reference = pose_of(&target.x());
+            target.advance(5, 0.01, &reference);
+        }
+        let end = pose_of(&target.x());
+        assert!(check_target(&constants, &end).is_ok() && target.blocked().is_some());
+        assert!(target.x()[5] - home[5] > 0.2, "{:?}", target.x());
+    }
+
+    #[test]
+    fn a_step_is_one_step() {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let constants = constants(&config);
+        let home = config.machine.home;
+        let mut target = JogTarget::new(&constants, home);
+        assert_eq!(target.press(Key::Mode, &pose_of(&home)), None);
+        assert_eq!(target.press(Key::Faster, &pose_of(&home)), None);
+        assert_eq!(target.pace(), Pace::Step([1e-2, 1.745e-2]));
+        assert_eq!(target.press(UP, &pose_of(&home)), None);
+        assert!((target.x()[5] - home[5] - 1e-2).abs() < 1e-12);
+        // The next one when the platform is there.
+        assert_eq!(target.press(UP, &pose_of(&home)), None);
+        assert!((target.x()[5] - home[5] - 1e-2).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,66 @@
+//! Keys of `hexad jog`.
+
+/// Meaning of a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Key {
+    /// Moves a coordinate of X, counted from 0, up or down.
+    Move {
+        axis: usize,
+        sign: f64,
+    },
+    Faster,
+    Slower,
+    /// Between continuous motion and steps.
+    Mode,
+    /// Ends motion, as any other key that has no meaning does.
+    Stop,
+}
+
+/// Keys of each coordinate of X, up and down. `z` is where a German keyboard has `y`.
+const KEYS: [(&[u8], &[u8]); 6] =
+    [(b"r", b"f"), (b"t", b"g"), (b"yz", b"h"), (b"q", b"a"), (b"w", b"s"), (b"e", b"d")];
+
+/// Key of what a terminal has sent. Of many at once only the last counts: they may have waited in a
+/// slow connection.
+pub fn last_key(bytes: &[u8]) -> Option<Key> {
+    // A sequence of an arrow or function key moves nothing.
+    if bytes.contains(&0x1b) {
+        return Some(Key::Stop);
+    }
+    bytes.last().map(|byte| key(*byte))
+}
+
+fn key(byte: u8) -> Key {
+    let moves = KEYS.iter().enumerate().find_map(|(axis, (up, down))| {
+        let sign = if up.contains(&byte) { 1.0 } else { -1.0 };
+        (up.contains(&byte) || down.contains(&byte)).then_some(Key::Move { axis, sign })
+    });
+    moves.unwrap_or(match byte {
+        b'+' => Key::Faster,
+        b'-' => Key::Slower,
+        b'm' => Key::Mode,
+        _ => Key::Stop,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_axis_has_two_keys_and_everything_else_moves_nothing() {
+        let mut moves = vec![];
+        for byte in 0..=255 {
+            if let Some(Key::Move { axis, sign }) = last_key(&[byte]) {
+                moves.push((axis, sign as i32));
+            }
+        }
+        moves.sort_unstable();
+        moves.dedup();
+        assert_eq!(moves.len(), 12);
+        assert_eq!(last_key(b""), None);
+        assert_eq!(last_key(b"qqqa"), Some(Key::Move { axis: 3, sign: -1.0 }));
+        // An arrow key whose last byte is a letter of its own.
+        assert_eq!(last_key(b"\x1b[a"), Some(Key::Stop));
+    }
+}

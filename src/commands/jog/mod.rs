@@ -1,0 +1,89 @@
+//! `hexad jog`: moves the platform by keys on a terminal, one for each direction of each axis.
+//!
+//! Dead-man: motion goes on only while keys arrive. A key moves a target, which the reference generator of the daemon
+//! follows within every limit; the target is never farther ahead than the way in which the platform brakes.
+
+use std::io::{self, IsTerminal};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+
+use self::jog_target::JogTarget;
+use self::keys::{Key, last_key};
+use self::screen::JogScreen;
+use self::terminal::Terminal;
+use super::arguments::{MachineFile, duration};
+use super::failure::Failure;
+use super::target::{TargetError, TargetSource, constants, pose_of};
+use crate::output::files::print;
+use crate::realtime::stop_request::Stop;
+
+mod jog_target;
+mod keys;
+mod screen;
+mod terminal;
+
+/// Time after a key after which motion ends, unless another arrives: twice the repetition of a slow keyboard.
+const KEY_TIMEOUT: Duration = Duration::from_millis(200);
+
+/// Time between two screens: a person reads no faster.
+const SCREEN_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Longest time for which a target moves in one cycle \[s\], so that it does not jump after a pause of this process.
+const MAX_STEP_S: f64 = 0.02;
+
+#[derive(Debug, Args)]
+pub struct JogArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    /// Take control, if the platform is not under control
+    #[arg(long)]
+    engage: bool,
+    /// Longest to wait for control [s]
+    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true, requires = "engage")]
+    within: f64,
+}
+
+impl JogArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
+            let message = "jog reads keys: standard input and output must be a terminal".into();
+            return Err(Failure { exit_code: 2, message });
+        }
+        let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
+        let constants = constants(&config);
+        let within = self.engage.then(|| Duration::from_secs_f64(self.within));
+        let mut source = TargetSource::open(&config, within, &stop)?;
+        let target = JogTarget::new(&constants, source.resting_x(&constants)?);
+        jog(&mut source, target, &stop)?;
+        Ok(print("the platform stands under control; hexad stop or park ends it\n")?)
+    }
+}
+
+/// Publishes a target that keys move, until a signal.
+fn jog(source: &mut TargetSource, mut target: JogTarget, stop: &Stop) -> Result<(), Failure> {
+    let terminal = Terminal::open().map_err(|error| Failure { exit_code: 2, message: error.to_string() })?;
+    let mut held: Option<(Key, Instant)> = None;
+    let (mut moved, mut drawn) = (Instant::now(), None::<Instant>);
+    while !stop.is_requested() {
+        source.publish(target.x())?;
+        let (reference, now) = (source.present_x()?, Instant::now());
+        if let Some(key) = last_key(&terminal.bytes()) {
+            held = target.press(key, &pose_of(&reference)).map(|key| (key, now));
+        }
+        held = held.filter(|(_, at)| at.elapsed() < KEY_TIMEOUT && source.active_since().is_some());
+        let step_s = now.duration_since(core::mem::replace(&mut moved, now)).as_secs_f64().min(MAX_STEP_S);
+        if let Some((Key::Move { axis, sign }, _)) = held {
+            target.advance(axis, sign * step_s, &pose_of(&reference));
+        }
+        if drawn.is_none_or(|drawn| drawn.elapsed() > SCREEN_INTERVAL) {
+            let answer = &source.status().newest.1;
+            terminal.draw(&JogScreen { answer, target: &target, held: held.map(|(key, _)| key) }.to_string());
+            drawn = Some(now);
+        }
+    }
+    if source.active_since().is_none() {
+        return Err(TargetError::InterruptedEarly.into());
+    }
+    Ok(())
+}

@@ -1,0 +1,82 @@
+//! Screen of `hexad jog`, for 80 columns and 24 lines.
+
+use core::fmt;
+
+use super::jog_target::{JogTarget, Pace};
+use super::keys::Key;
+use crate::commands::operate::Answer;
+use crate::commands::status::screen::{legs, poses};
+use crate::output::numbers::{AXES, significant};
+
+/// What it shows.
+pub struct JogScreen<'a> {
+    pub answer: &'a Answer,
+    pub target: &'a JogTarget<'a>,
+    pub held: Option<Key>,
+}
+
+impl fmt::Display for JogScreen<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { answer, target, held } = self;
+        let Some(report) = &answer.status else { return writeln!(f, "{}", answer.text) };
+        let state = answer.state.to_uppercase();
+        writeln!(
+            f,
+            "{:.80}",
+            format!("jog {}   {state}   Ctrl-C ends; the platform then stands under control", report.machine)
+        )?;
+        let code = answer.diagnostic.code;
+        writeln!(f, "{:.80}", if code == 0 { "" } else { &answer.diagnostic.text })?;
+        let limits =
+            if report.active_limits.is_empty() { "none".into() } else { report.active_limits.join(", ") };
+        writeln!(f, "{:.80}", format!("limits    {limits}"))?;
+        let bound = target.blocked().map_or_else(|| "none".into(), ToString::to_string);
+        writeln!(f, "{:.80}", format!("bound     {bound}"))?;
+        poses(f, report)?;
+        legs(f, report)?;
+        writeln!(f, "\nup/down   x q/a   y w/s   z e/d   alpha r/f   beta t/g   gamma y/h")?;
+        let pace = match target.pace() {
+            Pace::Continuous([position, angle]) => format!(
+                "{} mm/s, {} deg/s while a key is held",
+                significant(position * 1e3),
+                significant(angle.to_degrees())
+            ),
+            Pace::Step([position, angle]) => format!(
+                "{} mm, {} deg for each key",
+                significant(position * 1e3),
+                significant(angle.to_degrees())
+            ),
+        };
+        writeln!(f, "pace +/-  {pace}; m: steps or continuous")?;
+        let moving = match held {
+            Some(Key::Move { axis, sign }) => {
+                format!("{} {}", AXES.get(*axis).unwrap_or(&""), if *sign > 0.0 { "up" } else { "down" })
+            }
+            _ => "nothing".into(),
+        };
+        writeln!(f, "moving    {moving}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::arguments::DEFAULT_CONFIG;
+    use crate::commands::status::screen::tests::answer;
+    use crate::commands::target::constants;
+    use crate::config::Config;
+
+    #[test]
+    fn it_fits_the_smallest_terminal() {
+        let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();
+        let constants = constants(&config);
+        let target = JogTarget::new(&constants, config.machine.home);
+        let held = Some(Key::Move { axis: 5, sign: -1.0 });
+        let text = JogScreen { answer: &answer(), target: &target, held }.to_string();
+        let widest = text.lines().map(|line| line.chars().count()).max();
+        assert!(text.lines().count() <= 24 && widest <= Some(80), "{text}");
+        for words in ["STOPPING", "force, force rate, stroke", "moving    z down", "setpoint", "1225.000"] {
+            assert!(text.contains(words), "{words}: {text}");
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! `hexad move --pause | --resume`: a request to the player that runs.
+//!
+//! The player is the process that publishes setpoints, by the daemon's status; the request is a signal, which only its user
+//! and root may send.
+
+use std::fs::read;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use tracing::info;
+
+use super::MoveError;
+use crate::commands::operate::{Answer, status};
+use crate::config::Config;
+use crate::daemon::process_names::named;
+use crate::realtime::pause_signals::{handles_pause, pause_signal};
+
+/// Time for which the setpoint must not change to count as at rest.
+const REST_TIME: Duration = Duration::from_millis(300);
+/// Longest slowdown, with a reserve.
+const REST_LIMIT: Duration = Duration::from_secs(60);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
+
+/// Requests it, and waits until the setpoints of a paused player rest.
+pub fn request(config: &Config, pauses: bool) -> Result<(), MoveError> {
+    let player = player(&status(&config.name)?)?;
+    pause_signal(pauses)
+        .send(player)
+        .map_err(|error| MoveError::NoPlayer(format!("{} cannot be signalled: {error}", named(player))))?;
+    if !pauses {
+        info!("{} goes on", named(player));
+        return Ok(());
+    }
+    let (began, mut last, mut since) = (Instant::now(), None, Instant::now());
+    while since.elapsed() < REST_TIME {
+        if began.elapsed() > REST_LIMIT {
+            return Err(MoveError::NoPlayer(format!("{} does not come to rest", named(player))));
+        }
+        sleep(POLL_INTERVAL);
+        let setpoint = status(&config.name)?.status.and_then(|report| report.setpoint);
+        if setpoint != last {
+            (last, since) = (setpoint, Instant::now());
+        }
+    }
+    info!("{} is paused; hexad move --resume goes on", named(player));
+    Ok(())
+}
+
+/// The process that plays a motion.
+fn player(answer: &Answer) -> Result<u32, MoveError> {
+    let report = answer.status.as_deref();
+    let sources = report.into_iter().flat_map(|report| &report.sources);
+    let processes = sources.filter(|source| source.topic == "setpoint").flat_map(|source| &source.processes);
+    let mut alive = processes.filter(|process| !process.command.is_empty());
+    let Some(process) = alive.find(|process| !process.is_ignored) else {
+        return Err(MoveError::NoPlayer("no process publishes setpoints".into()));
+    };
+    // Without a handler the signal would end it.
+    if is_player(process.process_id) && handles_pause(process.process_id) {
+        return Ok(process.process_id);
+    }
+    let reason = format!("{} publishes setpoints and is no hexad move", named(process.process_id));
+    Err(MoveError::NoPlayer(reason))
+}
+
+/// Whether the first argument of a process is `move`.
+fn is_player(process_id: u32) -> bool {
+    let line = read(format!("/proc/{process_id}/cmdline")).unwrap_or_default();
+    line.split(|byte| *byte == 0).nth(1) == Some(b"move")
+}

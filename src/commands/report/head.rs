@@ -1,0 +1,133 @@
+//! The head of a page: everything but the samples, as JSON.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::history::{Bars, History};
+use super::levels::Extent;
+use super::signals::{COLUMNS, SIGNALS};
+use super::summary::{Fact, facts};
+use super::track::Track;
+use crate::config::Config;
+use crate::control::state::State;
+use crate::model::machine::{LEGS, Machine};
+use crate::recording::RunInfo;
+
+/// Head of a page.
+#[derive(Serialize)]
+struct Head<'a> {
+    name: &'a str,
+    is_live: bool,
+    /// Unix time of the first cycle \[s\]; 0 if the page is live.
+    begin_s: f64,
+    period_s: f64,
+    length_s: f64,
+    /// First column of each signal.
+    columns: BTreeMap<&'static str, usize>,
+    column_count: usize,
+    levels: Vec<LevelHead>,
+    /// Description of the samples.
+    kept: &'a str,
+    states: [&'static str; 7],
+    machine: MachineHead,
+    configuration: &'a str,
+    #[serde(flatten)]
+    run: Events<'a>,
+}
+
+/// Facts, intervals and distributions of a run.
+#[derive(Serialize, Default)]
+pub struct Events<'a> {
+    facts: Vec<Fact>,
+    tracks: Vec<&'a Track>,
+    distributions: Vec<Bars>,
+}
+
+impl<'a> Events<'a> {
+    /// Of a run.
+    pub fn new(config: &Config, info: &RunInfo, history: &'a History) -> Self {
+        Self {
+            facts: facts(config, info, history),
+            tracks: history.tracks(),
+            distributions: history.distributions(),
+        }
+    }
+}
+
+/// A level: instants \[s\], and where its samples begin.
+#[derive(Serialize)]
+struct LevelHead {
+    from: f64,
+    step: f64,
+    samples: u64,
+}
+
+/// The machine as the page draws it.
+#[derive(Serialize)]
+struct MachineHead {
+    base: [[f64; 3]; LEGS],
+    platform: [[f64; 3]; LEGS],
+    home: [f64; 6],
+    gravity: [f64; 3],
+}
+
+/// Head of a page about a recording.
+pub fn of_recording(
+    config: &Config,
+    info: &RunInfo,
+    history: &History,
+    extents: &[Extent],
+    kept: &str,
+) -> String {
+    let period_s = config.deployment.realtime.period_s();
+    let level = |extent: &Extent| LevelHead {
+        from: extent.first as f64 * period_s,
+        step: extent.step as f64 * period_s,
+        samples: extent.samples,
+    };
+    let run = Events::new(config, info, history);
+    let levels = extents.iter().map(level).collect();
+    let begin_s = history.begin_ns().wrapping_add(info.clock_offset_ns) as f64 * 1e-9;
+    json(&Head { begin_s, length_s: history.length_s(), levels, kept, ..head(config, run) })
+}
+
+/// Head of a page that a server feeds.
+pub fn of_live(config: &Config) -> String {
+    json(&Head { is_live: true, ..head(config, Events::default()) })
+}
+
+fn head<'a>(config: &'a Config, run: Events<'a>) -> Head<'a> {
+    let begins = SIGNALS.iter().scan(0, |next, (name, components)| {
+        let first = *next;
+        *next += components;
+        Some((*name, first))
+    });
+    Head {
+        name: &config.name,
+        is_live: false,
+        begin_s: 0.0,
+        period_s: config.deployment.realtime.period_s(),
+        length_s: 0.0,
+        columns: begins.collect(),
+        column_count: COLUMNS,
+        levels: vec![],
+        kept: "",
+        states: State::ALL.map(State::name),
+        machine: machine(&config.machine),
+        configuration: &config.text,
+        run,
+    }
+}
+
+fn machine(machine: &Machine) -> MachineHead {
+    let joints = &machine.joints;
+    let [base, platform] =
+        [&joints.base, &joints.platform].map(|lanes| joints.triples.unpack_vectors(lanes).map(Into::into));
+    MachineHead { base, platform, home: machine.home, gravity: machine.gravity.into() }
+}
+
+/// As JSON; numbers without a value are null.
+pub fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default()
+}

@@ -1,0 +1,167 @@
+//! `hexad report`: a recording as one page with charts, which any browser opens from disk.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use self::history::History;
+use self::levels::{Extent, Level};
+use self::signals::Signals;
+use super::failure::{CommandError, Failure};
+use crate::config::{Config, ConfigError};
+use crate::output::files::{FileError, print, write_whole};
+use crate::output::page::page;
+use crate::recording::reader::{Recording, Summary};
+use crate::recording::{Item, RecordingError, RunInfo};
+
+pub mod head;
+pub mod history;
+pub mod levels;
+pub mod signals;
+pub mod summary;
+pub mod track;
+
+/// Most samples of a page \[bytes\]; a third more as text. Such a page still fits into an e-mail, and a browser decodes it in
+/// a tenth of a second.
+const MAX_SAMPLE_BYTES: usize = 12_000_000;
+
+#[derive(Debug, Args)]
+pub struct ReportArguments {
+    /// Recordings of one run of `hexad run --record` or `--faults`, one or more
+    #[arg(value_name = "FILE", required = true)]
+    recordings: Vec<PathBuf>,
+    /// Page to write
+    #[arg(long, short, value_name = "FILE", default_value = "report.html")]
+    output: PathBuf,
+}
+
+/// Error of a report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    #[error(transparent)]
+    File(#[from] FileError),
+    #[error("{}: of another configuration or version than {}; report each run alone", .0.display(), .1.display())]
+    OtherRun(PathBuf, PathBuf),
+}
+
+impl CommandError for ReportError {}
+
+impl ReportArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let words = write(&self.recordings, &self.output)?;
+        Ok(print(format_args!("{}: {words}\n", self.output.display()))?)
+    }
+}
+
+/// Writes the page of a run that is recorded in some files; returns what it contains, in words.
+pub fn write(recordings: &[PathBuf], output: &Path) -> Result<String, ReportError> {
+    let run = Run::read(recordings)?;
+    let levels = run.levels()?;
+    let extents: Vec<Extent> = levels.iter().map(|level| level.extent).collect();
+    let kept = kept(&extents, run.history.span(), &run.config);
+    let samples: Vec<u8> = levels.iter().flat_map(Level::bytes).collect();
+    let head = head::of_recording(&run.config, &run.info, &run.history, &extents, &kept);
+    let title = format!("{}: recording", run.info.name);
+    let text = page(&title, &head, &samples, false);
+    write_whole(output, text.as_bytes())?;
+    let megabytes = text.len() as f64 * 1e-6;
+    Ok(format!("{} cycles, {megabytes:.1} MB; {kept}", run.history.cycles))
+}
+
+/// A run in its files.
+struct Run {
+    /// In the order of time.
+    files: Vec<PathBuf>,
+    info: RunInfo,
+    config: Config,
+    history: History,
+}
+
+impl Run {
+    /// Reads what happened, and where all files are of one run.
+    fn read(recordings: &[PathBuf]) -> Result<Self, ReportError> {
+        let mut files = vec![];
+        for path in recordings {
+            let Summary { info, first, .. } = Recording::open(path)?.summary()?;
+            files.push((first.release_ns, path.clone(), info));
+        }
+        files.sort_by_key(|(begin_ns, ..)| *begin_ns);
+        let Some((_, first, info)) = files.first().cloned() else {
+            return Err(RecordingError::Empty(PathBuf::new()).into());
+        };
+        for (_, path, other) in &files {
+            if *other != info {
+                return Err(ReportError::OtherRun(path.clone(), first));
+            }
+        }
+        let config = Config::parse(&info.configuration, "configuration of the recording")?;
+        let history = History::new(&config);
+        let files = files.into_iter().map(|(_, path, _)| path).collect();
+        let mut run = Self { files, info, config, history };
+        for file in &run.files {
+            Recording::open(file)?.each(|item| {
+                if let Item::Cycle(cycle) = item {
+                    run.history.add(&cycle);
+                }
+            })?;
+        }
+        Ok(run)
+    }
+
+    /// The samples that are kept.
+    fn levels(&self) -> Result<Vec<Level>, ReportError> {
+        let Self { history, config, .. } = self;
+        let rate_hz = config.deployment.realtime.rate_hz;
+        let extents = levels::plan(history.span(), &history.events(), rate_hz, MAX_SAMPLE_BYTES);
+        let mut levels: Vec<_> = extents.into_iter().map(Level::new).collect();
+        let mut signals = Signals::new(&config.machine);
+        let mut last = 0;
+        for file in &self.files {
+            Recording::open(file)?.each(|item| {
+                if let Item::Cycle(cycle) = item
+                    && cycle.cycle > last
+                {
+                    last = cycle.cycle;
+                    let (index, row) = (history.index(&cycle), signals.row(&cycle));
+                    levels.iter_mut().for_each(|level| level.add(index, &row));
+                }
+            })?;
+        }
+        Ok(levels)
+    }
+}
+
+/// Description of the samples that a page keeps.
+fn kept(extents: &[Extent], span: u64, config: &Config) -> String {
+    let milliseconds =
+        |cycles: u64| (1e6 * config.deployment.realtime.period_s() * cycles as f64).round() * 1e-3;
+    let whole = extents.iter().filter(|it| it.first == 0 && it.end() >= span);
+    let finest = whole.map(|it| it.step).min().unwrap_or(1);
+    let windows = extents.iter().filter(|it| it.step == 1).count();
+    match (finest, windows) {
+        (1, _) => "every cycle is kept".into(),
+        (_, windows) => format!(
+            "the smallest and largest value in every {} ms are kept, and every cycle in {windows} windows around \
+             faults, the largest tracking error, the latest output and changes of state",
+            milliseconds(2 * finest)
+        ),
+    }
+}
+
+/// Recordings in a folder whose names begin so, the oldest first.
+pub fn recordings_in(folder: &Path, beginning: &str) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder) else { return vec![] };
+    let names = entries.flatten().map(|entry| entry.path());
+    let is_one = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with(beginning) && name.ends_with(".mcap")
+    };
+    let mut found: Vec<_> = names.filter(is_one).collect();
+    found.sort();
+    found
+}

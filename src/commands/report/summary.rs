@@ -1,0 +1,165 @@
+//! A run in words.
+
+use serde::Serialize;
+
+use super::history::History;
+use crate::config::Config;
+use crate::messages::Times;
+use crate::recording::RunInfo;
+
+/// Most faults that are described; the axis of time shows all.
+const MAX_FAULTS: usize = 20;
+
+/// A fact about the run.
+#[derive(Debug, PartialEq, Eq, Serialize)]
+pub struct Fact {
+    /// Its subject.
+    pub name: &'static str,
+    /// In words.
+    pub text: String,
+    /// Whether it needs attention.
+    pub is_bad: bool,
+}
+
+/// The run in words.
+pub fn facts(config: &Config, info: &RunInfo, history: &History) -> Vec<Fact> {
+    let commit = if info.commit.is_empty() { "unknown" } else { &info.commit };
+    let software = format!(
+        "hexad {} (commit {commit}), fidelity {}, instruction set {}",
+        info.version, info.fidelity, info.instruction_set
+    );
+    let mut facts = live_facts(config, history, &history.times());
+    facts.extend([lost(history), Fact { name: "Software", text: software, is_bad: false }]);
+    facts
+}
+
+/// The run so far in words; `times` are those of wake-up and computation.
+pub fn live_facts(config: &Config, history: &History, times: &[Times; 2]) -> Vec<Fact> {
+    let good = |name, text| Fact { name, text, is_bad: false };
+    let rate_hz = config.deployment.realtime.rate_hz;
+    let (length, cycles) = (duration(history.length_s()), thousands(history.cycles));
+    let states = history.time_in_states();
+    let states = states.iter().map(|(state, length)| format!("{} {}", state.name(), duration(*length)));
+    vec![
+        good("Run", format!("{length} at {rate_hz} Hz, {cycles} cycles")),
+        good("States", states.collect::<Vec<_>>().join(", ")),
+        faults(history),
+        tracking(history),
+        missed(config, history),
+        good("Times", times_in_words(times)),
+    ]
+}
+
+fn faults(history: &History) -> Fact {
+    let faults = &history.faults;
+    let count = match faults.len() {
+        0 => return Fact { name: "Faults", text: "none".into(), is_bad: false },
+        1 => "one".to_string(),
+        many => many.to_string(),
+    };
+    let described = faults.iter().take(MAX_FAULTS).map(|fault| format!("at {:.3} s {}", fault.t, fault.text));
+    let text = format!("{count}: {}", described.collect::<Vec<_>>().join(". Then "));
+    Fact { name: "Faults", text, is_bad: true }
+}
+
+fn tracking(history: &History) -> Fact {
+    let tracking = history.tracking.tracking();
+    let text = if history.tracking.count() == 0 {
+        "never active".into()
+    } else {
+        format!(
+            "position {} RMS, {} largest; orientation {} RMS, {} largest (state active)",
+            scaled(tracking.position_rms_m, "m"),
+            scaled(tracking.position_max_m, "m"),
+            scaled(tracking.orientation_rms_rad, "rad"),
+            scaled(tracking.orientation_max_rad, "rad")
+        )
+    };
+    Fact { name: "Tracking error", text, is_bad: false }
+}
+
+fn missed(config: &Config, history: &History) -> Fact {
+    let [late, overruns, skipped, inputs] = history.missed().map(thousands);
+    let late_us = config.deployment.realtime.late_wakeup_s * 1e6;
+    let mut text = format!(
+        "late wake-ups (above {late_us:.0} µs): {late}; overruns: {overruns}; skipped releases: {skipped}"
+    );
+    if inputs != "0" {
+        text += &format!("; cycles without new inputs: {inputs}");
+    }
+    let [_, overruns, skipped, _] = history.missed();
+    Fact { name: "Missed deadlines", text, is_bad: overruns + skipped > 0 }
+}
+
+/// Times of wake-up and computation in words.
+fn times_in_words([wakeup, compute]: &[Times; 2]) -> String {
+    let words = |times: &Times| {
+        let [p50, p99, max] = [times.p50, times.p99, times.max].map(|ns| ns as f64 * 1e-3);
+        format!("{p50:.1} / {p99:.1} / {max:.1} µs")
+    };
+    format!("p50 / p99 / largest: wake-up {}, computation {}", words(wakeup), words(compute))
+}
+
+fn lost(history: &History) -> Fact {
+    let text = match history.lost {
+        0 => "none: every cycle is in the recording".into(),
+        lost => format!("{}: these cycles are not in the recording", thousands(lost)),
+    };
+    Fact { name: "Records lost", text, is_bad: history.lost > 0 }
+}
+
+/// Seconds as people say them.
+pub fn duration(seconds: f64) -> String {
+    // Beyond a minute to a tenth, so that no 60.0 s are left.
+    let seconds = if seconds < 59.95 { seconds } else { (10.0 * seconds).round() / 10.0 };
+    let whole = seconds as u64;
+    let (hours, minutes) = (whole / 3600, whole / 60 % 60);
+    let rest = seconds - (whole - whole % 60) as f64;
+    match (hours, minutes) {
+        (0, 0) => format!("{seconds:.3} s"),
+        (0, _) => format!("{minutes} min {rest:.1} s"),
+        _ => format!("{hours} h {minutes} min {rest:.0} s"),
+    }
+}
+
+/// With a narrow space between groups of three digits.
+fn thousands(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A number with a prefix of its unit.
+fn scaled(value: f64, unit: &str) -> String {
+    let (factor, prefix) = [(1.0, ""), (1e3, "m"), (1e6, "µ")]
+        .into_iter()
+        .find(|(factor, _)| value * factor >= 1.0)
+        .unwrap_or((1e9, "n"));
+    let number = value * factor;
+    let digits = if number >= 100.0 {
+        0
+    } else if number >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{number:.digits$} {prefix}{unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_people_read_them() {
+        assert_eq!([1.5, 61.24, 3599.97].map(duration), ["1.500 s", "1 min 1.2 s", "1 h 0 min 0 s"]);
+        assert_eq!([7, 1234, 3_600_000].map(thousands), ["7", "1\u{202f}234", "3\u{202f}600\u{202f}000"]);
+        assert_eq!([1.4e-7, 2.5e-3, 0.0].map(|value| scaled(value, "m")), ["140 nm", "2.50 mm", "0.00 nm"]);
+    }
+}

@@ -1,0 +1,285 @@
+//! Source of targets: poses to move to and stand at, for `goto`, `hold` and `jog`.
+//!
+//! The reference generator of the daemon takes the way, so no target can exceed a limit. A target holds without end: the
+//! platform stands at it under control after its source has ended, until another source, `stop` or `park`. So a command
+//! that has reached its target ends, and nobody has to go on publishing.
+
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+
+use self::watch::{StatusWatch, Watched};
+use super::failure::{CommandError, INTERRUPTED, default_exit_code};
+use super::operate::{Answer, OperatorError, Order, carry_out_in_background, status};
+use super::plant::prepare_thread;
+use crate::analysis::target_motion::{TargetRefusal, check_target};
+use crate::config::Config;
+use crate::control::controller::{Setpoint, SetpointKind};
+use crate::control::limits::DerivativeLimits;
+use crate::control::parameters::Constants;
+use crate::control::state::{Request, State};
+use crate::daemon::control_socket::status::StatusReport;
+use crate::daemon::process_names::named;
+use crate::daemon::{self, nanoseconds};
+use crate::messages::clock::monotonic_ns;
+use crate::messages::{Bus, PortError, Publisher, SetpointMessage};
+use crate::model::fidelity::Fidelity;
+use crate::model::rigid::{Pose, Twist};
+use crate::model::task::{TaskState, task_coordinates};
+use crate::realtime::clock::{Grid, sleep_until};
+use crate::realtime::stop_request::Stop;
+
+pub mod pose_options;
+pub mod watch;
+
+/// Time after which the daemon must follow a target that is published.
+const FOLLOWING_LIMIT: Duration = Duration::from_secs(3);
+
+/// Difference of a coordinate between what is published and what the daemon has received \[rad\], \[m\].
+const SAME: f64 = 1e-12;
+
+/// Longest time between two status reports from which a velocity is computed \[s\].
+const MAX_REPORT_INTERVAL_S: f64 = 0.5;
+
+/// Why a target is not published, or not followed.
+#[derive(Debug, thiserror::Error)]
+pub enum TargetError {
+    #[error(transparent)]
+    Port(#[from] PortError),
+    #[error(transparent)]
+    Operator(#[from] OperatorError),
+    #[error(transparent)]
+    Refused(#[from] TargetRefusal),
+    #[error("the machine runs in simulated time, in which no person moves it; use hexad move")]
+    Simulated,
+    #[error("{0} publishes setpoints; end it first (hexad stop, or Ctrl-C there)")]
+    OtherSource(String),
+    #[error("the platform is not under control (state {0}: {1}); --engage takes control")]
+    NotInControl(String, String),
+    #[error("the pose of the platform is not known: {0}")]
+    UnknownPose(String),
+    #[error("the daemon does not follow this target, but another setpoint: does another source run?")]
+    NotFollowed,
+    #[error("control has ended: the daemon is in {0}: {1}")]
+    Ended(String, String),
+    #[error("the target was not reached within {0:.1} s")]
+    TimedOut(f64),
+    #[error("interrupted; the platform stands under control; hexad stop or park ends it")]
+    Interrupted,
+    #[error("interrupted before control was taken; hexad status shows the state")]
+    InterruptedEarly,
+}
+
+impl CommandError for TargetError {
+    fn has_begun(&self) -> bool {
+        match self {
+            Self::Port(_) | Self::Refused(_) | Self::Simulated => false,
+            Self::Operator(error) => error.has_begun(),
+            _ => true,
+        }
+    }
+
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Interrupted | Self::InterruptedEarly => INTERRUPTED,
+            _ => default_exit_code(self),
+        }
+    }
+}
+
+/// Constants of the daemon's controller.
+pub fn constants(config: &Config) -> Constants {
+    // The fidelity has no part in the reference.
+    let parameters = daemon::parameters(&config.machine, &config.deployment, Fidelity::Exact);
+    Constants::new(&config.machine, parameters)
+}
+
+/// The pose of X.
+pub fn pose_of(x: &[f64; 6]) -> Pose {
+    TaskState::at_rest(*x).motion().pose
+}
+
+/// X of the reference under control, else of the platform; `None` if it is unknown.
+pub fn reference_x(config: &Config, answer: &Answer) -> Option<[f64; 6]> {
+    let report = answer.status.as_ref()?;
+    let pose = report.pose?;
+    let error = report.orientation_error_rad.zip(report.position_error_m);
+    let Some((angular, linear)) = error.filter(|_| has_control(answer)) else { return Some(pose) };
+    let error = Twist { angular: Vector3::from(angular), linear: Vector3::from(linear) };
+    Some(task_coordinates(&pose_of(&pose).displaced(&error), &config.machine.home))
+}
+
+fn has_control(answer: &Answer) -> bool {
+    State::ALL.into_iter().any(|state| state.has_control() && state.name() == answer.state)
+}
+
+/// Source of targets.
+pub struct TargetSource<'a> {
+    config: &'a Config,
+    setpoints: Publisher<SetpointMessage>,
+    _bus: Bus,
+    watch: StatusWatch,
+    engagement: Option<Receiver<Result<(), OperatorError>>>,
+    within: Option<Duration>,
+    stop: Stop,
+    grid: Grid,
+    tick_ns: u64,
+    /// Since when the platform is in the state active.
+    active_since: Option<Instant>,
+    published: Option<([f64; 6], Instant)>,
+    /// Share of the limits of autonomous motions.
+    speed: f64,
+}
+
+impl<'a> TargetSource<'a> {
+    /// Joins the machine, if the platform is under control at rest or may be taken under control within a time, and no
+    /// other source publishes.
+    pub fn open(config: &'a Config, within: Option<Duration>, stop: &Stop) -> Result<Self, TargetError> {
+        let answer = status(&config.name)?;
+        let bus = config.join()?;
+        if bus.is_simulated() {
+            return Err(TargetError::Simulated);
+        }
+        if let Some(other) = answer.status.as_deref().and_then(other_source) {
+            return Err(TargetError::OtherSource(named(other)));
+        }
+        let is_active = answer.state == State::Active.name();
+        if !is_active && within.is_none() {
+            return Err(TargetError::NotInControl(answer.state, answer.text));
+        }
+        prepare_thread(config);
+        let grid = Grid::new(nanoseconds(config.deployment.realtime.period_s()), 0);
+        Ok(Self {
+            config,
+            setpoints: bus.publisher()?,
+            _bus: bus,
+            watch: StatusWatch::start(config, answer),
+            engagement: None,
+            within: within.filter(|_| !is_active),
+            stop: stop.clone(),
+            grid,
+            tick_ns: grid.next_after(monotonic_ns()),
+            active_since: is_active.then(Instant::now),
+            published: None,
+            speed: 1.0,
+        })
+    }
+
+    /// Sets the share of the limits of autonomous motions with which the next targets are approached.
+    pub fn set_speed(&mut self, speed: f64) {
+        self.speed = speed;
+    }
+
+    /// The newest status.
+    pub fn status(&self) -> Watched {
+        self.watch.newest()
+    }
+
+    /// Since when the platform follows.
+    pub fn active_since(&self) -> Option<Instant> {
+        self.active_since
+    }
+
+    /// X of the reference or of the platform now.
+    pub fn present_x(&self) -> Result<[f64; 6], TargetError> {
+        let Watched { newest: (_, answer), .. } = self.watch.newest();
+        reference_x(self.config, &answer).ok_or(TargetError::UnknownPose(answer.text))
+    }
+
+    /// X at which the platform comes to rest if it brakes now, with the limits of autonomous motions; where it is, if that is
+    /// outside of the workspace.
+    pub fn resting_x(&self, constants: &Constants) -> Result<[f64; 6], TargetError> {
+        let Watched { newest: (requested, answer), before, .. } = self.watch.newest();
+        let of = |answer: &Answer| Some(pose_of(&reference_x(self.config, answer)?));
+        let now = of(&answer).ok_or(TargetError::UnknownPose(answer.text.clone()))?;
+        let earlier = before.and_then(|(then, answer)| {
+            let interval_s = requested.duration_since(then).as_secs_f64();
+            Some((of(&answer)?, interval_s)).filter(|_| interval_s < MAX_REPORT_INTERVAL_S)
+        });
+        let Some((then, interval_s)) = earlier else { return self.present_x() };
+        let moved = then.displacement_to(&now);
+        let limits = &constants.parameters.limits;
+        let age_s = requested.elapsed().as_secs_f64();
+        let ahead = |moved: Vector3<f64>, limits: &DerivativeLimits| {
+            let DerivativeLimits { acceleration, jerk, .. } =
+                limits.scaled(constants.parameters.limits.autonomous_scale);
+            let velocity = moved / interval_s;
+            velocity * (age_s + velocity.norm() / (2.0 * acceleration) + acceleration / (2.0 * jerk))
+        };
+        let ahead = Twist {
+            angular: ahead(moved.angular, &limits.orientation),
+            linear: ahead(moved.linear, &limits.position),
+        };
+        let rest = now.displaced(&ahead);
+        let pose = if check_target(constants, &rest).is_ok() { rest } else { now };
+        Ok(task_coordinates(&pose, &self.config.machine.home))
+    }
+
+    /// Waits for the next instant of the loop and publishes a target; an error if control has ended.
+    pub fn publish(&mut self, x: [f64; 6]) -> Result<(), TargetError> {
+        sleep_until(self.tick_ns);
+        let task = TaskState::at_rest(x);
+        let setpoint =
+            Setpoint { kind: SetpointKind::Target, time_ns: self.tick_ns, task, target_speed: self.speed };
+        self.setpoints.publish(self.tick_ns, (&setpoint).into())?;
+        self.tick_ns = self.grid.next_after(self.tick_ns.max(monotonic_ns()));
+        if self.published.is_none_or(|(published, _)| published != x) {
+            self.published = Some((x, Instant::now()));
+        }
+        self.engage()?;
+        self.check()
+    }
+
+    /// Requests control once, if it was not there.
+    fn engage(&mut self) -> Result<(), TargetError> {
+        let Some(timeout) = self.within else { return Ok(()) };
+        let engagement = self.engagement.get_or_insert_with(|| {
+            let order = Order { request: Request::Engage, is_patient: true, timeout };
+            carry_out_in_background(self.config, order, &self.stop)
+        });
+        match engagement.try_recv() {
+            // The command itself has noticed the signal, too.
+            Ok(Err(OperatorError::Interrupted)) => {
+                self.within = None;
+                Ok(())
+            }
+            Ok(outcome) => {
+                outcome?;
+                (self.within, self.active_since) = (None, Some(Instant::now()));
+                Ok(())
+            }
+            Err(TryRecvError::Empty | TryRecvError::Disconnected) => Ok(()),
+        }
+    }
+
+    /// Whether the platform is still under control by this source.
+    fn check(&self) -> Result<(), TargetError> {
+        let (Some(since), Some((x, published))) = (self.active_since, self.published) else { return Ok(()) };
+        let Watched { newest: (requested, answer), error, .. } = self.watch.newest();
+        if let Some(error) = error {
+            return Err(TargetError::Ended("an unknown state".into(), error));
+        }
+        if requested < since.max(published) {
+            return Ok(());
+        }
+        if !has_control(&answer) || [State::Stopping, State::Parking].iter().any(|s| s.name() == answer.state)
+        {
+            return Err(TargetError::Ended(answer.state, answer.text));
+        }
+        let received = answer.status.and_then(|report| report.setpoint);
+        let is_followed =
+            received.is_some_and(|received| received.iter().zip(x).all(|(a, b)| (a - b).abs() < SAME));
+        if !is_followed && published.max(since).elapsed() > FOLLOWING_LIMIT {
+            return Err(TargetError::NotFollowed);
+        }
+        Ok(())
+    }
+}
+
+/// A process that publishes setpoints and has not ended.
+fn other_source(report: &StatusReport) -> Option<u32> {
+    let sources = report.sources.iter().filter(|source| source.topic == "setpoint");
+    let mut processes = sources.flat_map(|source| &source.processes);
+    processes.find(|process| !process.command.is_empty()).map(|process| process.process_id)
+}

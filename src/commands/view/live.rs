@@ -1,0 +1,153 @@
+//! Content of a live page: the samples of the last minute, and the history since the command was started.
+
+use std::collections::VecDeque;
+
+use serde::Serialize;
+
+use crate::commands::report::head::json;
+use crate::commands::report::history::{Bars, History};
+use crate::commands::report::levels::{Extent, Level};
+use crate::commands::report::signals::Signals;
+use crate::commands::report::summary::{Fact, live_facts};
+use crate::commands::report::track::Track;
+use crate::config::Config;
+use crate::messages::{CycleMessage, LoopCounters, LoopTimes, StatusMessage};
+use crate::output::page::append_base64;
+
+/// Time between two samples, at least \[s\]: an eye sees no shorter one.
+const SAMPLE_S: f64 = 0.01;
+
+/// Samples that a page receives which is opened late \[s\].
+const KEPT_S: f64 = 60.0;
+
+/// Intervals that are kept \[s\]: as much as a page shows.
+const INTERVALS_S: f64 = 120.0;
+
+/// State of the live page.
+pub struct Live<'a> {
+    config: &'a Config,
+    history: History,
+    signals: Signals<'a>,
+    /// Cycles for each sample.
+    step: u64,
+    /// Two samples in the making, by number.
+    pair: Option<(u64, Level)>,
+    /// Finished pairs of samples with the number of the first.
+    pairs: VecDeque<(u64, Level)>,
+    counters: LoopCounters,
+    times: LoopTimes,
+    /// Number of the run, which changes with the daemon.
+    run: u64,
+}
+
+/// Reply to a page, as JSON.
+#[derive(Serialize)]
+struct Fresh<'a> {
+    run: u64,
+    length_s: f64,
+    step_s: f64,
+    /// Number of the first sample.
+    first: u64,
+    /// Sample by sample, in base64.
+    samples: String,
+    facts: Vec<Fact>,
+    tracks: Vec<&'a Track>,
+    distributions: Vec<Bars>,
+}
+
+impl<'a> Live<'a> {
+    /// Before the first cycle.
+    pub fn new(config: &'a Config) -> Self {
+        let rate_hz = config.deployment.realtime.rate_hz;
+        Self {
+            config,
+            history: History::new(config),
+            signals: Signals::new(&config.machine),
+            step: (SAMPLE_S * rate_hz).round().max(1.0) as u64,
+            pair: None,
+            pairs: VecDeque::new(),
+            counters: LoopCounters::default(),
+            times: LoopTimes::default(),
+            run: 0,
+        }
+    }
+
+    /// Adds a cycle.
+    pub fn add(&mut self, cycle: &CycleMessage, status: &StatusMessage) {
+        if status.counters.cycles < self.counters.cycles {
+            // Another daemon.
+            *self = Self { run: self.run + 1, ..Self::new(self.config) };
+        }
+        // The times are not those of the cycle: they are shown, and not counted.
+        let untimed = CycleMessage { wakeup_ns: 0, compute_ns: 0, ..*cycle };
+        let is_first = self.history.cycles == 0;
+        if !self.history.add(&untimed) {
+            return;
+        }
+        let before = core::mem::replace(&mut self.counters, status.counters);
+        if !is_first {
+            let late = self.counters.late_wakeups.saturating_sub(before.late_wakeups);
+            let overruns = self.counters.overruns.saturating_sub(before.overruns);
+            self.history.add_counted(self.history.length_s(), late, overruns);
+        }
+        self.times = status.statistics.total;
+        self.add_samples(cycle);
+        self.history.forget_before(self.history.length_s() - INTERVALS_S);
+    }
+
+    fn add_samples(&mut self, cycle: &CycleMessage) {
+        let (index, row) = (self.history.index(cycle), self.signals.row(cycle));
+        let number = index / (2 * self.step) * 2;
+        if self.pair.as_ref().is_some_and(|(first, _)| *first != number) {
+            self.pairs.extend(self.pair.take());
+        }
+        let extent = Extent { first: number * self.step, step: self.step, samples: 2 };
+        let (_, level) = self.pair.get_or_insert_with(|| (number, Level::new(extent)));
+        level.add(index, &row);
+        let oldest = number.saturating_sub((KEPT_S / self.step_s()) as u64);
+        while self.pairs.front().is_some_and(|(first, _)| *first < oldest) {
+            self.pairs.pop_front();
+        }
+    }
+
+    fn step_s(&self) -> f64 {
+        self.step as f64 * self.config.deployment.realtime.period_s()
+    }
+
+    /// Samples from a number on, with the history, as JSON.
+    pub fn since(&self, after: u64) -> String {
+        let fresh = || self.pairs.iter().skip_while(move |(number, _)| *number < after);
+        // Samples follow each other; where cycles are missing they are NaN.
+        let first = fresh().next().map_or(after, |(number, _)| *number);
+        let mut bytes: Vec<u8> = vec![];
+        let mut next = first;
+        for (number, level) in fresh() {
+            let empty = Level::new(level.extent);
+            let missing = (next..*number).map(|_| empty.sample(0).collect::<Vec<_>>());
+            let samples = [0, 1].map(|sample| level.sample(sample).collect());
+            for numbers in missing.chain(samples) {
+                bytes.extend(numbers.iter().flat_map(|number: &f32| number.to_le_bytes()));
+            }
+            next = number + 2;
+        }
+        let mut samples = String::new();
+        append_base64(&mut samples, &bytes);
+        let LoopTimes { wakeup_ns, compute_ns, measured_age_ns, end_to_end_ns } = self.times;
+        let distributions = [
+            ("wake-up", wakeup_ns),
+            ("compute", compute_ns),
+            ("release to force sent", end_to_end_ns),
+            ("age of the measurement", measured_age_ns),
+        ];
+        json(&Fresh {
+            run: self.run,
+            length_s: self.history.length_s(),
+            step_s: self.step_s(),
+            first,
+            samples,
+            facts: live_facts(self.config, &self.history, &[wakeup_ns, compute_ns]),
+            tracks: self.history.tracks(),
+            distributions: distributions.map(|(name, times)| Bars { name, times, bars: vec![] }).into(),
+        })
+    }
+}

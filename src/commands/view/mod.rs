@@ -1,0 +1,92 @@
+//! `hexad view`: the page of a recording, live, for browsers on this host.
+//!
+//! It subscribes to the topics as any client does and sends nothing: the daemon does not know of it.
+
+use std::io;
+use std::sync::{Mutex, PoisonError};
+use std::thread::sleep;
+use std::time::Duration;
+
+use clap::Args;
+
+use self::live::Live;
+use self::server::{Reply, Server};
+use self::topics::Topics;
+use super::arguments::MachineFile;
+use super::failure::{CommandError, Failure};
+use super::report::head;
+use crate::config::Config;
+use crate::output::files::print;
+use crate::output::page::page;
+use crate::realtime::stop_request::Stop;
+
+mod live;
+mod server;
+mod topics;
+
+/// Interval between two polls of the topics, in which they fill by a fraction at 20 kHz.
+const POLL_INTERVAL: Duration = Duration::from_millis(3);
+
+#[derive(Debug, Args)]
+pub struct ViewArguments {
+    #[command(flatten)]
+    machine: MachineFile,
+    /// Port on 127.0.0.1 [default: any that is free]
+    #[arg(long, default_value_t = 0, hide_default_value = true)]
+    port: u16,
+}
+
+/// The page cannot be served.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot listen on 127.0.0.1:{port}: {cause}; choose another --port")]
+struct ViewError {
+    port: u16,
+    cause: io::Error,
+}
+
+impl CommandError for ViewError {}
+
+impl ViewArguments {
+    pub fn execute(self) -> Result<(), Failure> {
+        let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
+        let mut topics = Topics::join(&config)?;
+        let live = Mutex::new(Live::new(&config));
+        let server = Server::start(self.port).map_err(|cause| ViewError { port: self.port, cause })?;
+        print(format_args!("{}\n", server.address()))?;
+        eprintln!("hexad: open this address in a browser on this host; Ctrl-C ends it");
+        std::thread::scope(|scope| {
+            for _ in 0..server::THREADS {
+                scope.spawn(|| server.serve(&stop, |path, query| reply(&config, &live, path, query)));
+            }
+            while !stop.is_requested() {
+                let cycles = topics.cycles();
+                if !cycles.is_empty() {
+                    let mut live = live.lock().unwrap_or_else(PoisonError::into_inner);
+                    cycles.iter().for_each(|(cycle, status)| live.add(cycle, status));
+                }
+                sleep(POLL_INTERVAL);
+            }
+        });
+        Ok(())
+    }
+}
+
+/// Reply to a path and its query.
+fn reply(config: &Config, live: &Mutex<Live>, path: &str, query: &[(&str, &str)]) -> Option<Reply> {
+    match path {
+        "/" => {
+            let title = format!("{}: live", config.name);
+            Some(Reply {
+                kind: "text/html; charset=utf-8",
+                content: page(&title, &head::of_live(config), &[], true),
+            })
+        }
+        "/data" => {
+            let after = query.iter().find(|(key, _)| *key == "after");
+            let after = after.and_then(|(_, number)| number.parse().ok()).unwrap_or(0);
+            let content = live.lock().unwrap_or_else(PoisonError::into_inner).since(after);
+            Some(Reply { kind: "application/json", content })
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,176 @@
+//! An HTTP server for a page and its data: on the loopback alone, for those who know its token, without any request that
+//! changes something.
+
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::thread::sleep;
+use std::time::Duration;
+
+use crate::realtime::stop_request::Stop;
+
+/// Threads that accept connections: a page has one or two open at a time.
+pub const THREADS: usize = 4;
+
+/// Longest head of a request \[bytes\].
+const MAX_HEAD: usize = 8192;
+
+/// Longest silence of a browser within a request.
+const TIMEOUT: Duration = Duration::from_secs(2);
+
+/// How often a thread without a connection looks for one.
+const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
+
+/// Bytes of the token: 128 bits cannot be guessed.
+const TOKEN_BYTES: usize = 16;
+
+/// Content of a reply, with its media type.
+pub struct Reply {
+    pub kind: &'static str,
+    pub content: String,
+}
+
+/// The server.
+pub struct Server {
+    listener: TcpListener,
+    port: u16,
+    token: String,
+}
+
+impl Server {
+    /// Listens on the loopback; port 0 is any that is free.
+    pub fn start(port: u16) -> io::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        listener.set_nonblocking(true)?;
+        let port = listener.local_addr()?.port();
+        let mut bytes = [0; TOKEN_BYTES];
+        File::open("/dev/urandom")?.read_exact(&mut bytes)?;
+        let token = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        Ok(Self { listener, port, token })
+    }
+
+    /// Address for a browser, with the token.
+    pub fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
+    }
+
+    /// Replies to requests until the stop; `reply` is called with the path and the query of those with the token.
+    pub fn serve(&self, stop: &Stop, reply: impl Fn(&str, &[(&str, &str)]) -> Option<Reply>) {
+        while !stop.is_requested() {
+            match self.listener.accept() {
+                // A browser that has gone needs no reply.
+                Ok((stream, _)) => drop(self.converse(stream, &reply)),
+                Err(_) => sleep(ACCEPT_INTERVAL),
+            }
+        }
+    }
+
+    fn converse(
+        &self,
+        mut stream: TcpStream,
+        reply: &impl Fn(&str, &[(&str, &str)]) -> Option<Reply>,
+    ) -> io::Result<()> {
+        stream.set_nonblocking(false)?;
+        stream.set_read_timeout(Some(TIMEOUT))?;
+        stream.set_write_timeout(Some(TIMEOUT))?;
+        let head = read_head(&mut stream)?;
+        let (status, reply) = self.response(&head, reply);
+        let Reply { kind, content } = reply;
+        let length = content.len();
+        write!(
+            stream,
+            "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nConnection: close\r\n\
+             Cache-Control: no-store\r\nReferrer-Policy: no-referrer\r\nX-Content-Type-Options: nosniff\r\n\
+             Content-Security-Policy: frame-ancestors 'none'\r\nCross-Origin-Resource-Policy: same-origin\r\n\r\n"
+        )?;
+        stream.write_all(content.as_bytes())
+    }
+
+    /// Status line and reply to a request.
+    fn response(
+        &self,
+        head: &str,
+        reply: impl Fn(&str, &[(&str, &str)]) -> Option<Reply>,
+    ) -> (&'static str, Reply) {
+        let refused =
+            |status: &'static str| (status, Reply { kind: "text/plain", content: format!("{status}\n") });
+        let mut words = head.lines().next().unwrap_or_default().split(' ');
+        let (method, target) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
+        let (path, query) = target.split_once('?').unwrap_or((target, ""));
+        let query: Vec<_> = query.split('&').filter_map(|pair| pair.split_once('=')).collect();
+        let has_token = query.iter().any(|(key, value)| *key == "token" && is_same(value, &self.token));
+        if !has_token || !self.is_own_name(head) {
+            return refused("403 Forbidden");
+        }
+        if method != "GET" {
+            return refused("405 Method Not Allowed");
+        }
+        reply(path, &query).map_or_else(|| refused("404 Not Found"), |reply| ("200 OK", reply))
+    }
+
+    /// Whether the browser names this host as it does: the name of another site that resolves to the loopback is refused.
+    fn is_own_name(&self, head: &str) -> bool {
+        let host = head.lines().skip(1).find_map(|line| {
+            let (name, value) = line.split_once(':')?;
+            name.eq_ignore_ascii_case("host").then(|| value.trim())
+        });
+        let names = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", self.port));
+        host.is_some_and(|host| names.iter().any(|name| name == host))
+    }
+}
+
+/// Reads until the empty line behind the head of a request.
+fn read_head(stream: &mut TcpStream) -> io::Result<String> {
+    let mut head = vec![];
+    let mut buffer = [0; 1024];
+    while !head.windows(4).any(|end| end == b"\r\n\r\n") {
+        let count = stream.read(&mut buffer)?;
+        if count == 0 || head.len() + count > MAX_HEAD {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        head.extend_from_slice(buffer.get(..count).unwrap_or_default());
+    }
+    Ok(String::from_utf8_lossy(&head).into())
+}
+
+/// Compares in a time that does not depend on where two texts differ.
+fn is_same(left: &str, right: &str) -> bool {
+    let differences = left.bytes().zip(right.bytes()).fold(0, |sum, (left, right)| sum | (left ^ right));
+    left.len() == right.len() && differences == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn status(server: &Server, head: &str) -> &'static str {
+        let known = |path: &str, _: &[(&str, &str)]| {
+            (path == "/data").then(|| Reply { kind: "text/plain", content: String::new() })
+        };
+        server.response(head, known).0
+    }
+
+    #[test]
+    fn only_requests_with_token_and_own_name_are_answered() {
+        let server = Server::start(0).unwrap();
+        let (token, port) = (&server.token, server.port);
+        assert_eq!((token.len(), server.address()), (32, format!("http://127.0.0.1:{port}/?token={token}")));
+        let host = format!("HOST: localhost:{port}");
+        let request =
+            |line: &str| status(&server, &format!("{line} HTTP/1.1\r\nAccept: */*\r\n{host}\r\n\r\n"));
+        assert_eq!(request(&format!("GET /data?after=3&token={token}")), "200 OK");
+        assert_eq!(request(&format!("GET /other?token={token}")), "404 Not Found");
+        assert_eq!(request(&format!("POST /data?token={token}")), "405 Method Not Allowed");
+        let wrong = token.replace(['1', '2', '3', '4', '5', '6', '7', '8'], "0");
+        for line in ["GET /", "GET /data", "GET /data?token=", "GET", ""] {
+            assert_eq!(request(line), "403 Forbidden", "{line}");
+        }
+        for token in [&token[1..], &format!("{token}0"), &wrong] {
+            assert_eq!(request(&format!("GET /data?token={token}")), "403 Forbidden");
+        }
+        let line = format!("GET /data?token={token} HTTP/1.1\r\n");
+        assert_eq!(status(&server, &format!("{line}\r\n")), "403 Forbidden");
+        assert_eq!(status(&server, &format!("{line}Host: evil.example:{port}\r\n\r\n")), "403 Forbidden");
+        assert_ne!(Server::start(0).unwrap().token, *token);
+    }
+}

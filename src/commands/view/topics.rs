@@ -1,0 +1,141 @@
+//! The cycles of a running daemon, put together from its topics.
+
+use std::collections::VecDeque;
+
+use crate::config::Config;
+use crate::control::controller::{Input, Measurement, Output, Setpoint};
+use crate::control::input_validation::seconds_between;
+use crate::control::limits::LimitSet;
+use crate::control::localization::PlatformState;
+use crate::control::state::State;
+use crate::control::tracking_error::TrackingError;
+use crate::messages::{
+    CycleMessage, ForceMessage, MeasuredMessage, PortError, SetpointMessage, StatusMessage, Subscriber,
+};
+use crate::model::rigid::{Motion, Twist};
+use crate::model::task::TaskState;
+
+/// Messages kept between two polls: all that the topic can hold.
+const TOPIC_DEPTH: usize = usize::MAX;
+
+/// Longest time for which a setpoint counts as the reference \[s\].
+const MAX_SETPOINT_AGE_S: f64 = 0.1;
+
+/// Subscribers to the four topics of a machine.
+pub struct Topics {
+    setpoints: Subscriber<SetpointMessage>,
+    measured: Subscriber<MeasuredMessage>,
+    forces: Subscriber<ForceMessage>,
+    statuses: Subscriber<StatusMessage>,
+    /// Newest of each that is not newer than the last cycle, and those that are.
+    setpoint: Newest<SetpointMessage>,
+    measurement: Newest<MeasuredMessage>,
+    /// Forces whose status has not arrived.
+    pending: VecDeque<ForceMessage>,
+}
+
+/// Messages with an instant.
+struct Newest<T> {
+    message: Option<T>,
+    later: VecDeque<T>,
+}
+
+impl<T: Copy> Newest<T> {
+    /// The newest message that is not after an instant \[ns\].
+    fn at(&mut self, now_ns: u64, instant_ns: fn(&T) -> u64) -> Option<T> {
+        while let Some(next) = self.later.front().filter(|next| instant_ns(next) <= now_ns) {
+            self.message = Some(*next);
+            self.later.pop_front();
+        }
+        self.message
+    }
+}
+
+impl Topics {
+    /// Joins the topics of a machine.
+    pub fn join(config: &Config) -> Result<Self, PortError> {
+        let bus = config.join()?;
+        Ok(Self {
+            setpoints: bus.subscriber(TOPIC_DEPTH)?,
+            measured: bus.subscriber(TOPIC_DEPTH)?,
+            forces: bus.subscriber(TOPIC_DEPTH)?,
+            statuses: bus.subscriber(TOPIC_DEPTH)?,
+            setpoint: Newest { message: None, later: VecDeque::new() },
+            measurement: Newest { message: None, later: VecDeque::new() },
+            pending: VecDeque::new(),
+        })
+    }
+
+    /// Cycles since the last call, each with its status.
+    pub fn cycles(&mut self) -> Vec<(CycleMessage, StatusMessage)> {
+        let statuses: Vec<_> = core::iter::from_fn(|| self.statuses.receive()).collect();
+        // A status follows its force, so the forces of these statuses have arrived.
+        self.pending.extend(core::iter::from_fn(|| self.forces.receive()));
+        self.setpoint.later.extend(core::iter::from_fn(|| self.setpoints.receive()));
+        self.measurement.later.extend(core::iter::from_fn(|| self.measured.receive()));
+        let mut cycles = vec![];
+        for status in statuses {
+            // Both have the stamp of the same instant.
+            let time_ns = status.header.time_ns;
+            while self.pending.front().is_some_and(|force| force.header.time_ns < time_ns) {
+                self.pending.pop_front();
+            }
+            let Some(force) = self.pending.front().filter(|force| force.header.time_ns == time_ns) else {
+                continue;
+            };
+            let release_ns = force.release_ns;
+            let setpoint = self.setpoint.at(release_ns, |message| message.header.time_ns);
+            let measurement = self.measurement.at(release_ns, |message| message.header.time_ns);
+            cycles.push((cycle(&status, force, setpoint.as_ref(), measurement.as_ref()), status));
+        }
+        cycles
+    }
+}
+
+/// A cycle as far as its messages have it. The reference is not published: while active it is the setpoint. Wake-up and
+/// computation are the largest of the last complete second.
+fn cycle(
+    status: &StatusMessage,
+    force: &ForceMessage,
+    setpoint: Option<&SetpointMessage>,
+    measurement: Option<&MeasuredMessage>,
+) -> CycleMessage {
+    let release_ns = force.release_ns;
+    let setpoint = setpoint.map(Setpoint::from);
+    let state = status.state().unwrap_or_default();
+    let reference = setpoint.filter(|_| state == State::Active).and_then(|it| motion_at(&it, release_ns));
+    let platform = (status.pose_valid == 1).then(|| PlatformState {
+        pose: TaskState::at_rest(status.x).motion().pose,
+        twist: Twist::from_vector(&status.twist.into()),
+        condition: status.condition,
+        time_to_singularity: status.time_to_singularity_s,
+    });
+    let error = (status.error_valid == 1).then(|| TrackingError {
+        pose: Twist { angular: status.orientation_error_rad.into(), linear: status.position_error_m.into() },
+        twist: Twist::default(),
+    });
+    let output = Output {
+        state,
+        diagnostic: status.diagnostic.diagnostic().unwrap_or_default(),
+        force: force.force_n,
+        active_limits: LimitSet(status.active_limits),
+        platform,
+        error,
+        reference,
+        ..Output::default()
+    };
+    let measurement = measurement.map(Measurement::from);
+    let input = Input { release_ns, setpoint, measurement, ..Input::default() };
+    CycleMessage {
+        cycle: status.counters.cycles,
+        due_ns: release_ns,
+        wakeup_ns: status.statistics.window.wakeup_ns.max,
+        compute_ns: status.statistics.window.compute_ns.max,
+        ..CycleMessage::new(&input, &output)
+    }
+}
+
+fn motion_at(setpoint: &Setpoint, instant_ns: u64) -> Option<Motion> {
+    let age_s = seconds_between(setpoint.time_ns, instant_ns);
+    (0.0..MAX_SETPOINT_AGE_S).contains(&age_s).then(|| setpoint.task.after(age_s).motion())
+}

@@ -1,0 +1,234 @@
+//! Qualities of the poses of some slices and regions without obstacle: one struct for the text and for `--json`.
+
+use core::fmt;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::ObstacleText;
+use super::slice::Slice;
+use crate::analysis::drive_capability::DriveCapability;
+use crate::analysis::envelope::EnvelopeBounds;
+use crate::analysis::pose_quality::PoseQuality;
+use crate::analysis::region_search::RegionBounds;
+use crate::model::machine::Machine;
+use crate::model::sensitivity::CONDITION_MEANING;
+use crate::output::numbers::{AXES, axis_unit, significant};
+use crate::output::text_table::{Left, Right, paragraph, text_table};
+
+/// Schema of the JSON, raised when a field changes its meaning or goes.
+pub const SCHEMA: u32 = 1;
+/// Columns of the hint, as of the tables.
+const HINT_WIDTH: usize = 100;
+
+/// Result of `hexad workspace`. Numbers that are infinite are null in JSON.
+#[derive(Clone, Debug, Serialize)]
+pub struct WorkspaceReport {
+    pub schema: u32,
+    pub machine: String,
+    /// Accelerations for the forces, in any direction.
+    pub acceleration_m_s2: f64,
+    pub angular_acceleration_rad_s2: f64,
+    /// `limits.condition`; 6 is best, infinite is singular.
+    pub condition_limit: f64,
+    /// `actuator.max_force_n`.
+    pub max_force_n: f64,
+    pub slices: Vec<SliceReport>,
+    /// The ball at home's orientation, the ball with any turn, the box.
+    pub regions: Vec<RegionReport>,
+    /// Ranges of the largest guaranteed box.
+    pub largest_box: Vec<BoxRange>,
+    /// Why there is no payload.
+    pub hint: Option<String>,
+    /// Maps and their tables.
+    pub files: Vec<PathBuf>,
+}
+
+/// Poses of a slice; numbers are of usable poses, lowest and highest.
+#[derive(Clone, Debug, Serialize)]
+pub struct SliceReport {
+    pub plane: String,
+    pub poses: usize,
+    pub in_reach: usize,
+    pub usable: usize,
+    pub largest_margin_m: f64,
+    pub condition: [f64; 2],
+    pub worst_force_n: [f64; 2],
+    pub payload_kg: [f64; 2],
+}
+
+/// Region around home that is proved to be usable.
+#[derive(Clone, Debug, Serialize)]
+pub struct RegionReport {
+    pub region: String,
+    /// Radius \[m\], or a multiple of the box.
+    pub guaranteed: f64,
+    /// `m`, or empty for a multiple.
+    pub unit: &'static str,
+    /// Size of the nearest violation found, and what it violates.
+    pub limited_at: Option<f64>,
+    pub limited_by: Option<String>,
+}
+
+/// Range of a coordinate, as offsets from home \[rad\], \[m\].
+#[derive(Clone, Debug, Serialize)]
+pub struct BoxRange {
+    pub axis: &'static str,
+    pub low: f64,
+    pub high: f64,
+}
+
+impl SliceReport {
+    pub fn new(slice: &Slice, condition_limit: f64) -> Self {
+        let in_reach = slice.qualities.iter().filter(|quality| quality.within_reach());
+        let usable = in_reach.clone().filter(|quality| quality.condition <= condition_limit);
+        let ends = |value: fn(&PoseQuality) -> f64| {
+            let values = usable.clone().map(value);
+            values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(high, v)])
+        };
+        let [_, largest_margin_m] = ends(|quality| quality.stroke_margin);
+        Self {
+            plane: slice.plane.to_string(),
+            poses: slice.qualities.len(),
+            in_reach: in_reach.clone().count(),
+            usable: usable.clone().count(),
+            largest_margin_m,
+            condition: ends(|quality| quality.condition),
+            worst_force_n: ends(|quality| quality.worst_force),
+            payload_kg: ends(|quality| quality.payload),
+        }
+    }
+
+    fn cells(&self) -> [String; 8] {
+        let range = |[low, high]: [f64; 2]| format!("{} to {}", significant(low), significant(high));
+        [
+            self.plane.clone(),
+            self.poses.to_string(),
+            self.in_reach.to_string(),
+            self.usable.to_string(),
+            format!("up to {}", significant(1e3 * self.largest_margin_m)),
+            range(self.condition),
+            range(self.worst_force_n),
+            range(self.payload_kg),
+        ]
+    }
+}
+
+/// Reports of the two balls and the box.
+pub fn region_reports(
+    regions: [RegionBounds; 3],
+    turn_deg: f64,
+    has_envelope: bool,
+    largest_condition: f64,
+) -> Vec<RegionReport> {
+    let turned = format!("ball, turned up to {} deg about any axis", significant(turn_deg));
+    let origin = if has_envelope { "box, times [envelope]" } else { "box, times the one below" };
+    let names = ["ball at home's orientation".into(), turned, origin.into()];
+    let report = |((region, unit), found): ((String, _), RegionBounds)| RegionReport {
+        region,
+        guaranteed: found.guaranteed,
+        unit,
+        limited_at: found.violation.map(|(size, _)| size),
+        limited_by: found
+            .violation
+            .map(|(_, obstacle)| ObstacleText { obstacle, largest_condition }.to_string()),
+    };
+    names.into_iter().zip(["m", "m", ""]).zip(regions).map(report).collect()
+}
+
+impl RegionReport {
+    fn cells(&self) -> [String; 3] {
+        let size = |size: f64| {
+            if self.unit == "m" { format!("{} mm", significant(1e3 * size)) } else { significant(size) }
+        };
+        let limit = match (self.limited_at, &self.limited_by) {
+            (Some(at), Some(text)) if at <= 0.0 => format!("without going anywhere {text}"),
+            (Some(at), Some(text)) => format!("at {} {text}", size(at)),
+            _ => "nothing met further out".into(),
+        };
+        [self.region.clone(), size(self.guaranteed), limit]
+    }
+}
+
+impl BoxRange {
+    /// Ranges of a shape at a size.
+    pub fn all(shape: &EnvelopeBounds, size: f64) -> Vec<Self> {
+        let ranges = shape.pose_min.iter().zip(&shape.pose_max);
+        let range =
+            |(axis, (low, high)): (_, (&f64, &f64))| Self { axis, low: size * low, high: size * high };
+        AXES.into_iter().zip(ranges).map(range).collect()
+    }
+}
+
+impl WorkspaceReport {
+    /// Why no usable pose carries a payload, with the limit that takes most of the force.
+    pub fn payload_hint(&self, machine: &Machine) -> Option<String> {
+        let has_none = |slice: &SliceReport| slice.usable > 0 && slice.payload_kg == [0.0; 2];
+        if !self.slices.iter().any(has_none) {
+            return None;
+        }
+        let drives = DriveCapability::new(machine, &machine.home_pose())?;
+        let (linear, angular) = (self.acceleration_m_s2, self.angular_acceleration_rad_s2);
+        let forces = drives.largest_forces(linear, angular);
+        let [holding, of_linear, of_angular] = forces.map(|force| 100.0 * force / self.max_force_n);
+        let (key, option) = if of_angular > of_linear {
+            ("limits.acceleration_rad_s2", "--angular-acceleration-rad-s2")
+        } else {
+            ("limits.acceleration_m_s2", "--acceleration-m-s2")
+        };
+        Some(format!(
+            "payload 0: at home a leg needs {holding:.0} % of actuator.max_force_n = {} to hold the platform, {of_linear:.0} % for \
+             {} m/s2 and {of_angular:.0} % for {} rad/s2; lower {key}, or see what less takes with {option}",
+            significant(self.max_force_n),
+            significant(linear),
+            significant(angular)
+        ))
+    }
+}
+
+impl fmt::Display for WorkspaceReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [linear, angular] = [self.acceleration_m_s2, self.angular_acceleration_rad_s2].map(significant);
+        writeln!(
+            f,
+            "{}: forces from rest under {linear} m/s2 and {angular} rad/s2, each in any direction\n",
+            self.machine
+        )?;
+        let [name, numbers @ ..] = [
+            "slice",
+            "poses",
+            "in reach",
+            "usable",
+            "margin [mm]",
+            "condition",
+            "worst force [N]",
+            "payload [kg]",
+        ];
+        let columns: Vec<_> = [(name, Left)].into_iter().chain(numbers.map(|name| (name, Right))).collect();
+        write!(f, "{}", text_table(2, &columns, self.slices.iter().map(SliceReport::cells)))?;
+        writeln!(
+            f,
+            "\nin reach: within the stroke, on home's side of singular poses; usable: and the condition is up to {}\n\
+             ({CONDITION_MEANING}). Numbers are of usable poses; the actuators' limit is {} N.\n",
+            significant(self.condition_limit),
+            significant(self.max_force_n)
+        )?;
+        if let Some(hint) = &self.hint {
+            writeln!(f, "{}", paragraph("", hint, HINT_WIDTH))?;
+        }
+        writeln!(
+            f,
+            "Guaranteed around home, by bounds on every pose in between: all usable, none singular:"
+        )?;
+        let columns = [("region", Left), ("size", Right), ("limited by", Left)];
+        write!(f, "{}", text_table(2, &columns, self.regions.iter().map(RegionReport::cells)))?;
+        let rows = self.largest_box.iter().enumerate().map(|(axis, range)| {
+            let (scale, unit) = axis_unit(axis);
+            let [low, high] = [range.low, range.high].map(|x| significant(scale * x));
+            [format!("  {}", range.axis), format!("{low} to {high} {unit}")]
+        });
+        write!(f, "\n{}", text_table(2, &[("box", Left), ("offset from home", Right)], rows))?;
+        writeln!(f)?;
+        self.files.iter().try_for_each(|path| writeln!(f, "written: {}", path.display()))
+    }
+}

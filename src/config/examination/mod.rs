@@ -1,0 +1,137 @@
+//! Examination of a configuration: whether its machine can be run with it.
+//!
+//! A file that loads is consistent in itself. Here its parts are compared with each other: drives with the platform's weight at home
+//! and in the envelope, limits with drives, timeouts with the margins of the loops, legs with each other. `hexad check` shows the
+//! result; the daemon and the demonstration refuse a configuration with an error, with the same sentence.
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::control_loops::{ControlLoop, loops, unstable_timeout_ms};
+use super::{Config, ConfigError, Violation};
+
+mod envelope;
+mod machine;
+
+/// Result of an examination.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Examination {
+    /// Why the machine must not be run.
+    pub errors: Vec<Violation>,
+    /// What is probably not meant.
+    pub warnings: Vec<Violation>,
+}
+
+impl Config {
+    /// Examines the configuration: some milliseconds, with an envelope up to some seconds.
+    pub fn examine(&self) -> Examination {
+        let mut examiner = Examiner { config: self, found: Examination::default() };
+        machine::examine(&mut examiner);
+        envelope::examine(&mut examiner);
+        examine_loops(&mut examiner);
+        examiner.found
+    }
+}
+
+impl Examination {
+    /// The errors as the error of a configuration.
+    pub fn into_result(self, config: &Config) -> Result<Vec<Violation>, ConfigError> {
+        if self.errors.is_empty() {
+            return Ok(self.warnings);
+        }
+        Err(ConfigError::Invalid { place: config.place.clone(), violations: self.errors })
+    }
+}
+
+/// Collects what an examination finds.
+struct Examiner<'a> {
+    config: &'a Config,
+    found: Examination,
+}
+
+impl Examiner<'_> {
+    fn error(&mut self, key: &str, value: impl Into<String>, bound: impl Into<String>) {
+        let violation = self.violation(key, value.into(), bound.into());
+        self.found.errors.push(violation);
+    }
+
+    fn warn(&mut self, key: &str, value: impl Into<String>, bound: impl Into<String>) {
+        let violation = self.violation(key, value.into(), bound.into());
+        self.found.warnings.push(violation);
+    }
+
+    fn violation(&self, key: &str, value: String, bound: String) -> Violation {
+        Violation { line: line_of(&self.config.text, key), key: key.into(), value: Some(value), bound }
+    }
+}
+
+/// Stability of the control loops, and the timeout of measurements against it.
+fn examine_loops(examiner: &mut Examiner) {
+    let deployment = &examiner.config.deployment;
+    for control_loop in loops(deployment) {
+        let ControlLoop { name, bandwidth_hz, .. } = control_loop;
+        // Both bandwidths of the legs are those of the position.
+        let axis = if name == "orientation" { name } else { "position" };
+        if let Some(warning) = control_loop.warning() {
+            examiner.warn(&format!("control.{axis}_bandwidth_hz"), format!("{bandwidth_hz}"), warning);
+        }
+    }
+    let Some((timeout_ms, age_ms)) = unstable_timeout_ms(deployment) else { return };
+    let bound = format!(
+        "must be at most {:.1}, the largest age of measurements with which the loop is stable: older ones are refused when they \
+         arrive, and without any the platform is not controlled for so long",
+        (10.0 * age_ms).floor() / 10.0
+    );
+    let (key, value) = ("timeouts.measured_ms", format!("{timeout_ms}"));
+    if deployment.timeouts.allow_unstable_age {
+        examiner.warn(key, value, bound + "; accepted, as timeouts.allow_unstable_age is true");
+    } else {
+        let remedy = "; lower it or the bandwidths; for simulated hardware timeouts.allow_unstable_age = true accepts it";
+        examiner.error(key, value, bound + remedy);
+    }
+}
+
+/// Line of a key, else of its section, else 1. Legs count from 1, as in `leg[3].platform_m`.
+fn line_of(text: &str, key: &str) -> usize {
+    let (table, _) = DeTable::parse_recoverable(text);
+    let mut parts = key.split('.');
+    let Some(first) = parts.next() else { return 1 };
+    let (name, index) = first.split_once('[').unwrap_or((first, ""));
+    let Some(mut found) = table.get_ref().get(name) else { return 1 };
+    let index: Option<usize> = index.trim_end_matches(']').parse().ok();
+    let row = |value: &'_ Spanned<DeValue<'_>>, index: usize| {
+        value.get_ref().as_array().and_then(|rows| rows.get(index.wrapping_sub(1)).map(Spanned::span))
+    };
+    if let Some(span) = index.and_then(|index| row(found, index)) {
+        return line_at(text, span.start);
+    }
+    for part in parts {
+        let Some(next) = found.get_ref().as_table().and_then(|table| table.get(part)) else { break };
+        found = next;
+    }
+    line_at(text, found.span().start)
+}
+
+fn line_at(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|byte| *byte == b'\n').count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::line_of;
+
+    #[test]
+    fn lines_are_those_of_keys_else_of_their_sections() {
+        let text = "name = \"x\"\n[control]\nmode = 1\n[[leg]]\na = 1\n[[leg]]\nb = 2\n";
+        for (key, line) in [
+            ("name", 1),
+            ("control.mode", 3),
+            ("control", 2),
+            ("control.none", 2),
+            ("leg[2].b", 6),
+            ("none", 1),
+        ] {
+            assert_eq!(line_of(text, key), line, "{key}");
+        }
+    }
+}

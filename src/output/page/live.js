@@ -1,0 +1,92 @@
+// Live: the server sends new samples and what has happened since the page was opened.
+
+// How often the page requests what is new [ms], and what it keeps [s].
+const POLL_MS = 200;
+const KEPT_S = 120;
+// Range of time that is shown as long as the user has not chosen one [s].
+const FOLLOWED_S = 20;
+
+let isFollowed = HEAD.is_live;
+// Number of the run, which changes with the daemon.
+let run = 0;
+
+function liveLevel(step) {
+  const capacity = Math.ceil((2 * KEPT_S) / step);
+  const columns = Array.from({ length: COLUMN_COUNT }, () => new Float32Array(capacity));
+  return { from: 0, shift: 0.5 * step, step, samples: 0, capacity, columns, next: 0 };
+}
+
+// Appends samples, row by row, that begin at a number; drops the oldest half when there is no room.
+function append(level, first, text) {
+  const rows = decoded(text);
+  const count = rows.length / COLUMN_COUNT;
+  if (level.samples === 0) level.from = first * level.step;
+  let skipped = first - level.next;
+  if (level.samples + count + Math.max(0, skipped) > level.capacity) {
+    const dropped = Math.min(level.samples, Math.floor(level.capacity / 2));
+    level.columns.forEach((column) => column.copyWithin(0, dropped, level.samples));
+    level.from += dropped * level.step;
+    level.samples -= dropped;
+  }
+  if (level.samples === 0) {
+    level.from = first * level.step;
+    skipped = 0;
+  }
+  for (; skipped > 0 && level.samples < level.capacity; skipped--, level.samples++) {
+    level.columns.forEach((column) => { column[level.samples] = NaN; });
+  }
+  for (let row = 0; row < count && level.samples < level.capacity; row++, level.samples++) {
+    level.columns.forEach((column, k) => { column[level.samples] = rows[row * COLUMN_COUNT + k]; });
+  }
+  level.next = first + count;
+}
+
+async function poll() {
+  const token = new URLSearchParams(location.search).get("token");
+  const after = levels.length > 0 ? levels[0].next : 0;
+  const reply = await fetch(`data?token=${token}&after=${after}`, { cache: "no-store" });
+  if (!reply.ok) throw new Error(`the server replied ${reply.status}`);
+  const fresh = await reply.json();
+  if (levels.length === 0 || fresh.run !== run) {
+    // Another daemon: its samples count from zero again.
+    const isEmpty = levels.length === 0;
+    levels = [liveLevel(fresh.step_s)];
+    run = fresh.run;
+    if (!isEmpty) return fresh;
+  }
+  if (fresh.samples !== "") append(levels[0], fresh.first, fresh.samples);
+  // To the last whole sample.
+  HEAD.length_s = Math.max(HEAD.period_s, levels[0].next * levels[0].step);
+  tracks = fresh.tracks;
+  showFacts(fresh.facts);
+  return fresh;
+}
+
+// Draws what is new; a chart whose window is hidden waits.
+async function follow() {
+  const error = document.getElementById("error");
+  let redrawn = 0;
+  for (;;) {
+    try {
+      const fresh = await poll();
+      error.hidden = true;
+      findLargestForce();
+      if (isFollowed && !document.hidden) {
+        showRange(Math.max(0, HEAD.length_s - FOLLOWED_S), HEAD.length_s);
+        setTime(HEAD.length_s);
+      }
+      if (redrawn++ % 10 === 0) {
+        drawDistributions(fresh.distributions);
+        fillList();
+      }
+      document.body.dataset.result = JSON.stringify({
+        samples: levels[0].samples, charts: charts.length, state: intervalText(HEAD.length_s).split(" · ")[0],
+        error: document.body.dataset.error || null,
+      });
+    } catch (failure) {
+      error.hidden = false;
+      error.textContent = `no data: ${failure.message}; is hexad view still running?`;
+    }
+    await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+  }
+}

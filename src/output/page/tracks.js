@@ -1,0 +1,135 @@
+// Tracks: intervals along the time axis, below each other, aligned with the charts.
+
+const ROW_PX = 20;
+const HEAD_PX = 4;
+const SCALE_PX = 20;
+const LEGEND_PX = 224;
+// An interval is at least so wide, so that a single cycle is seen.
+const LEAST_PX = 2;
+// Most rows of the list; more cannot be read.
+const LIST_ROWS = 300;
+
+let tracks = HEAD.tracks;
+
+function intervalColor(track, interval) {
+  if (track.group === "state") return color(HEAD.states[interval.key]);
+  if (track.group === "diagnostic") return interval.key % 1000 >= 100 ? color("fault") : color("engaging");
+  if (["late wake-up", "inputs late"].includes(track.name)) return color("engaging");
+  if (track.group === "missed deadlines" || track.group === "recording") return color("fault");
+  return track.group === "requests" ? color("accent") : color("stopping");
+}
+
+function plotWidth(canvas) {
+  return Math.max(100, canvas.clientWidth - Y_AXIS_PX - LEGEND_PX - RIGHT_PX);
+}
+
+const trackX = (t, width) => Y_AXIS_PX + ((t - range.from) / (range.to - range.from)) * width;
+
+function drawTracks() {
+  const canvas = document.getElementById("tracks");
+  const height = HEAD_PX + tracks.length * ROW_PX + SCALE_PX;
+  canvas.style.height = `${height}px`;
+  const ratio = window.devicePixelRatio || 1;
+  canvas.width = Math.round(canvas.clientWidth * ratio);
+  canvas.height = Math.round(height * ratio);
+  const pen = canvas.getContext("2d");
+  pen.scale(ratio, ratio);
+  pen.font = "12px system-ui, sans-serif";
+  pen.textBaseline = "middle";
+  const width = plotWidth(canvas);
+  tracks.forEach((track, row) => drawTrack(pen, track, HEAD_PX + row * ROW_PX, width));
+  drawScale(pen, HEAD_PX + tracks.length * ROW_PX, width);
+  drawNow(pen, height - SCALE_PX, width);
+}
+
+function drawTrack(pen, track, top, width) {
+  pen.fillStyle = color("panel");
+  pen.fillRect(Y_AXIS_PX, top + 1, width, ROW_PX - 3);
+  pen.save();
+  pen.beginPath();
+  pen.rect(Y_AXIS_PX, top, width, ROW_PX);
+  pen.clip();
+  for (const interval of track.intervals) {
+    if (interval.to < range.from || interval.from > range.to) continue;
+    const [left, right] = [trackX(interval.from, width), trackX(interval.to + HEAD.period_s, width)];
+    const long = Math.max(LEAST_PX, right - left);
+    pen.fillStyle = intervalColor(track, interval);
+    pen.fillRect(left, top + 1, long, ROW_PX - 3);
+    const shownLeft = Math.max(left, Y_AXIS_PX);
+    const room = Math.min(left + long, Y_AXIS_PX + width) - shownLeft - 10;
+    if (["state", "diagnostic"].includes(track.group) && pen.measureText(interval.text).width < room) {
+      pen.fillStyle = "#ffffff";
+      pen.fillText(interval.text, shownLeft + 5, top + ROW_PX / 2);
+    }
+  }
+  pen.restore();
+  pen.fillStyle = color("ink");
+  pen.textAlign = "left";
+  const name = track.group === "limits reached" ? `limit: ${track.name}` : track.name;
+  const count = track.group === "missed deadlines" ? `  ${track.count}` : "";
+  pen.fillText(name + count, Y_AXIS_PX + width + RIGHT_PX + 8, top + ROW_PX / 2);
+}
+
+function drawScale(pen, top, width) {
+  const span = range.to - range.from;
+  const raw = span / Math.max(2, width / 110);
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((k) => k * power).find((it) => it >= raw);
+  pen.textAlign = "center";
+  for (let k = Math.ceil(range.from / step); k * step <= range.to; k++) {
+    const x = trackX(k * step, width);
+    pen.fillStyle = color("edge");
+    pen.fillRect(x, top, 1, 4);
+    pen.fillStyle = color("ink");
+    pen.fillText(tickText(k * step), x, top + 12);
+  }
+  pen.textAlign = "left";
+  pen.fillText("time [s]", Y_AXIS_PX + width + RIGHT_PX + 8, top + 12);
+}
+
+function drawNow(pen, height, width) {
+  const x = trackX(now, width);
+  if (x < Y_AXIS_PX || x > Y_AXIS_PX + width) return;
+  pen.fillStyle = color("ink");
+  pen.fillRect(x, 0, 1, height);
+}
+
+// The intervals of all tracks at an instant, in words.
+function intervalText(t) {
+  const slack = ((range.to - range.from) / 800) * LEAST_PX;
+  const at = tracks.flatMap((track) => track.intervals
+    .filter((it) => it.from - slack <= t && t <= it.to + HEAD.period_s + slack)
+    .slice(-1)
+    .map((it) => (track.group === "limits reached" ? `limit: ${it.text}` : it.text)));
+  return at.join(" · ");
+}
+
+function fillList() {
+  const table = document.getElementById("intervals");
+  table.replaceChildren(element("tr", {}, ...["from [s]", "to [s]", "", ""].map((text) => element("th", { textContent: text }))));
+  const all = tracks.flatMap((track) => track.intervals.map((interval) => ({ track, interval })));
+  all.sort((a, b) => a.interval.from - b.interval.from);
+  for (const { track, interval } of all.slice(0, LIST_ROWS)) {
+    const button = element("button", { type: "button", textContent: interval.from.toFixed(3), title: "Show it" });
+    button.addEventListener("click", () => {
+      const border = Math.max(interval.to - interval.from, 100 * HEAD.period_s);
+      setRange(interval.from - border, interval.to + border);
+      setTime(interval.from);
+    });
+    const cells = [element("td", {}, button), interval.to.toFixed(3), track.name, interval.text];
+    table.append(element("tr", {}, cells[0], ...cells.slice(1).map((text) => element("td", { textContent: text }))));
+  }
+  if (all.length > LIST_ROWS) {
+    table.append(element("tr", {}, element("td", { colSpan: 4, textContent: `and ${all.length - LIST_ROWS} more` })));
+  }
+}
+
+function watchTracks() {
+  const canvas = document.getElementById("tracks");
+  const timeAt = (event) => range.from + ((event.offsetX - Y_AXIS_PX) / plotWidth(canvas)) * (range.to - range.from);
+  canvas.addEventListener("pointermove", (event) => {
+    const t = timeAt(event);
+    if (t >= range.from && t <= range.to) setTime(t);
+  });
+  canvas.addEventListener("dblclick", () => showAll());
+}

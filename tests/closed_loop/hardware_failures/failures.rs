@@ -1,0 +1,134 @@
+//! Failures of sensors, drives and messages: what each does to what the controller reads, or to the forces that act.
+
+use hexad::control::controller::Measurement;
+use hexad::control::drive_monitor::DriveStatus;
+use hexad::model::machine::{LEGS, Machine};
+use hexad::plant::random::Random;
+
+/// What a failure can know.
+pub struct Context<'a> {
+    pub machine: &'a Machine,
+    /// Since the failure began \[s\].
+    pub since_s: f64,
+    /// Measured when it began, and what was measured before it began and since, the newest last.
+    pub first: Measurement,
+    pub measured: &'a [Measurement],
+    /// True pose X.
+    pub x: [f64; 6],
+    /// Forces of the cycles so far, the newest last \[N\].
+    pub sent: &'a [[f64; LEGS]],
+    pub random: &'a mut Random,
+}
+
+impl Context<'_> {
+    /// So many cycles ago.
+    fn measured_before(&self, cycles: usize) -> Measurement {
+        self.measured[self.measured.len().saturating_sub(1 + cycles)]
+    }
+
+    fn sent_before(&self, cycles: usize) -> [f64; LEGS] {
+        self.sent[self.sent.len().saturating_sub(1 + cycles)]
+    }
+
+    fn most(&self) -> f64 {
+        self.machine.actuator.max_force
+    }
+}
+
+/// Where a failure acts.
+pub enum Part {
+    Sensor(fn(&mut Measurement, &mut Context<'_>)),
+    Drive(fn(&mut [f64; LEGS], &mut Context<'_>)),
+    /// On the force, and on what the driver reports.
+    Reported(fn(&mut [f64; LEGS], &mut Context<'_>), fn(&mut DriveStatus, &Context<'_>)),
+}
+
+/// The leg that fails.
+const LEG: usize = 1;
+const ALL: u32 = (1 << LEGS) - 1;
+/// Cycles in a millisecond.
+const PER_MS: usize = 1;
+
+const fn sensor(name: &'static str, fail: fn(&mut Measurement, &mut Context<'_>)) -> (&'static str, Part) {
+    (name, Part::Sensor(fail))
+}
+
+const fn drive(name: &'static str, fail: fn(&mut [f64; LEGS], &mut Context<'_>)) -> (&'static str, Part) {
+    (name, Part::Drive(fail))
+}
+
+/// Every failure with its name.
+pub const FAILURES: &[(&str, Part)] = &[
+    sensor("all lengths frozen, stamps fresh", |m, c| m.length = c.first.length),
+    sensor("one length frozen", |m, c| m.length[LEG] = c.first.length[LEG]),
+    sensor("two lengths frozen", |m, c| {
+        m.length[LEG] = c.first.length[LEG];
+        m.length[4] = c.first.length[4];
+    }),
+    sensor("one length jumps by 1 mm", |m, _| m.length[LEG] += 1e-3),
+    sensor("one length jumps by 0.1 mm", |m, _| m.length[LEG] += 1e-4),
+    sensor("one length drifts by 1 mm/s", |m, c| m.length[LEG] += 1e-3 * c.since_s),
+    sensor("one length drifts by 10 mm/s", |m, c| m.length[LEG] += 1e-2 * c.since_s),
+    sensor("one scale 1 % too large", |m, c| m.length[LEG] += 0.01 * (m.length[LEG] - c.first.length[LEG])),
+    sensor("one scale 10 % too large", |m, c| m.length[LEG] += 0.1 * (m.length[LEG] - c.first.length[LEG])),
+    sensor("one length counts backwards", |m, c| m.length[LEG] = 2.0 * c.first.length[LEG] - m.length[LEG]),
+    sensor("two lengths exchanged", |m, _| m.length.swap(LEG, LEG + 1)),
+    sensor("one length reads zero", |m, _| m.length[LEG] = 0.0),
+    sensor("one length is not a number", |m, _| m.length[LEG] = f64::NAN),
+    sensor("noise of 0.1 mm on one length", |m, c| m.length[LEG] += 1e-4 * c.random.gaussian()),
+    sensor("noise of 1 mm on one length", |m, c| m.length[LEG] += 1e-3 * c.random.gaussian()),
+    sensor("one length in steps of 0.5 mm", |m, _| m.length[LEG] = (m.length[LEG] / 5e-4).round() * 5e-4),
+    sensor("no measurements", |m, c| *m = c.first),
+    sensor("every second measurement missing", |m, c| {
+        if c.measured.len() % 2 == 0 {
+            *m = c.measured_before(1);
+        }
+    }),
+    sensor("stamps frozen, lengths fresh", |m, c| m.time_ns = c.first.time_ns),
+    sensor("measurements 5 ms late", |m, c| *m = c.measured_before(5 * PER_MS)),
+    sensor("measurements 30 ms late", |m, c| *m = c.measured_before(30 * PER_MS)),
+    sensor("lengths 5 ms late, stamps fresh", |m, c| m.length = c.measured_before(5 * PER_MS).length),
+    sensor("lengths 20 ms late, stamps fresh", |m, c| m.length = c.measured_before(20 * PER_MS).length),
+    sensor("stamps 5 ms ahead", |m, _| m.time_ns += 5_000_000),
+    sensor("one length frozen, external pose", |m, c| {
+        m.length[LEG] = c.first.length[LEG];
+        m.pose = Some(c.x);
+    }),
+    sensor("one length drifts by 10 mm/s, external pose", |m, c| {
+        m.length[LEG] += 1e-2 * c.since_s;
+        m.pose = Some(c.x);
+    }),
+    sensor("one scale 10 % too large, external pose", |m, c| {
+        m.length[LEG] += 0.1 * (m.length[LEG] - c.first.length[LEG]);
+        m.pose = Some(c.x);
+    }),
+    drive("one drive without force", |f, _| f[LEG] = 0.0),
+    drive("one drive with half of its force", |f, _| f[LEG] *= 0.5),
+    drive("one drive with 10 % less", |f, _| f[LEG] *= 0.9),
+    drive("one drive with its largest force", |f, c| f[LEG] = c.most()),
+    drive("one drive pushes the wrong way", |f, _| f[LEG] = -f[LEG]),
+    drive("one drive holds its last force", |f, c| f[LEG] = c.sent_before((1e3 * c.since_s) as usize)[LEG]),
+    drive("one drive oscillates by 10 % at 30 Hz", |f, c| {
+        f[LEG] += 0.1 * c.most() * (30.0 * core::f64::consts::TAU * c.since_s).sin();
+    }),
+    drive("all drives without force", |f, _| *f = [0.0; LEGS]),
+    drive("all drives with 20 % less", |f, _| *f = f.map(|force| 0.8 * force)),
+    drive("all drives hold their last forces", |f, c| *f = c.sent_before((1e3 * c.since_s) as usize)),
+    drive("forces 5 ms late", |f, c| *f = c.sent_before(5 * PER_MS)),
+    drive("forces 20 ms late", |f, c| *f = c.sent_before(20 * PER_MS)),
+    ("one drive reports a fault", Part::Reported(|_, _| {}, |d, _| d.fault = Some(1 << LEG))),
+    (
+        "one drive disabled, reported",
+        Part::Reported(|f, _| f[LEG] = 0.0, |d, _| d.enabled = Some(ALL & !(1 << LEG))),
+    ),
+    (
+        "one drive with half of its force, reported",
+        Part::Reported(
+            |f, _| f[LEG] *= 0.5,
+            |d, c| {
+                d.force = Some(c.sent_before(0));
+                d.force.as_mut().unwrap()[LEG] *= 0.5;
+            },
+        ),
+    ),
+];

@@ -1,0 +1,159 @@
+//! Table of hardware failures: each at rest, in slow and in fast motion, and while engaging.
+//!
+//! `docs/hardware_failures.md` holds the table: the test repeats every cell of it. `HEXAD_WRITE_TABLE=1` writes it anew.
+
+mod failures;
+mod table;
+
+use hexad::config::Config;
+use hexad::control::controller::{Measurement, Output};
+use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::drive_monitor::DriveStatus;
+use hexad::control::state::State;
+use hexad::model::machine::LEGS;
+use hexad::model::task::{TaskState, task_coordinates};
+use hexad::plant::imperfections::{Imperfections, SensorErrors};
+use hexad::plant::random::Random;
+
+use self::failures::{Context, FAILURES, Part};
+use super::common::hardware_loop::{HardwareLoop, SENDING, configured};
+use super::trust::scene;
+
+/// The machine of the table, with sensors and drives as they are: noise, resolution, dead time.
+const MACHINE: &str = "motion_base";
+const NOISE_M: f64 = 2e-6;
+const STEP_M: f64 = 1e-6;
+/// When failures begin under control, and how long they are watched \[s\].
+const FAILS_S: f64 = 4.3;
+const WATCHED_S: f64 = 3.0;
+const SLOW: f64 = 0.05;
+
+/// What the platform does when the failure begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Situation {
+    AtRest,
+    Slow,
+    Fast,
+    /// It begins with the first cycle in which control begins.
+    Engaging,
+}
+
+impl Situation {
+    pub const ALL: [Self; 4] = [Self::AtRest, Self::Slow, Self::Fast, Self::Engaging];
+
+    fn speed(self) -> f64 {
+        match self {
+            Self::AtRest | Self::Engaging => 0.0,
+            Self::Slow => SLOW,
+            Self::Fast => 1.0,
+        }
+    }
+}
+
+/// What became of a failure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// What ended the forces, and after which time \[s\]; `None` if nothing did.
+    pub noticed: Option<(DiagnosticCode, f64)>,
+    /// Largest distance of the true position from the setpoint while there were forces \[m\].
+    pub farthest: f64,
+}
+
+fn config() -> Config {
+    configured(
+        MACHINE,
+        &format!("[drive]\ndelay_us = 100\n[measured]\nlength_noise_m = {NOISE_M}\nlength_step_m = {STEP_M}"),
+    )
+}
+
+fn cell(config: &Config, part: &Part, situation: Situation) -> Cell {
+    let sensor = SensorErrors { length_noise: NOISE_M, length_step: STEP_M, ..SensorErrors::default() };
+    let imperfections = Imperfections { seed: 3, sensor, ..Imperfections::default() };
+    let mut control = HardwareLoop::new(config, &config.machine, &imperfections);
+    let moving = scene(config, situation.speed());
+    let mut random = Random::new(5);
+    let (mut measured, mut sent) = (Vec::<Measurement>::new(), Vec::<[f64; LEGS]>::new());
+    let (mut began, mut farthest, mut acting) = (None::<(f64, Measurement)>, 0.0_f64, None);
+    let mut output = Output::default();
+    loop {
+        let time_s = control.time_s();
+        let task =
+            if situation.speed() > 0.0 { moving(time_s) } else { TaskState::at_rest(config.machine.home) };
+        let mut input = control.input(&task);
+        let measurement = input.measurement.as_mut().unwrap();
+        measured.push(*measurement);
+        let fails =
+            if situation == Situation::Engaging { output.state.has_control() } else { time_s >= FAILS_S };
+        if began.is_none() && fails {
+            began = Some((time_s, *measurement));
+        }
+        let x = task_coordinates(&control.hardware.simulator().state().pose, &config.machine.home);
+        let status = DriveStatus { enabled: Some(u32::MAX), fault: Some(0), ..DriveStatus::default() };
+        if let Part::Reported(..) = part {
+            measurement.drives = status;
+        }
+        let mut context = began.map(|(begin_s, first)| Context {
+            machine: &config.machine,
+            since_s: time_s - begin_s,
+            first,
+            measured: &measured,
+            x,
+            sent: &sent,
+            random: &mut random,
+        });
+        if let Some(context) = &mut context {
+            match part {
+                Part::Sensor(fail) => fail(measurement, context),
+                Part::Reported(_, report) => report(&mut measurement.drives, context),
+                Part::Drive(_) => {}
+            }
+        }
+        let before = output.state;
+        output = control.controller.step(&input);
+        let has_control = output.state.has_control();
+        if let Some((begin_s, _)) = began {
+            let apart = control.hardware.simulator().state().pose.position - task.motion().pose.position;
+            farthest = farthest.max(if before.has_control() { apart.norm() } else { 0.0 });
+            if !has_control && output.state != State::Standby {
+                return Cell { noticed: Some((output.diagnostic.code, time_s - begin_s)), farthest };
+            }
+            if time_s > begin_s + WATCHED_S {
+                return Cell { noticed: None, farthest };
+            }
+        }
+        assert!(time_s < FAILS_S + 1.0 + WATCHED_S, "{situation:?}: control never began, {output:?}");
+        sent.push(output.force);
+        let mut force = has_control.then_some(output.force);
+        if let (Some(force), Some((begin_s, first))) = (&mut force, began) {
+            let mut context = Context {
+                machine: &config.machine,
+                since_s: time_s - begin_s,
+                first,
+                measured: &measured,
+                x,
+                sent: &sent,
+                random: &mut random,
+            };
+            match part {
+                Part::Drive(fail) | Part::Reported(fail, _) => fail(force, &mut context),
+                Part::Sensor(_) => {}
+            }
+        }
+        let delay_ns = control.period_ns / 2 + (SENDING * control.period_ns as f64) as u64;
+        control.hardware.advance(delay_ns, acting);
+        acting = force;
+        control.hardware.advance(control.period_ns - delay_ns, acting);
+        control.now_ns += control.period_ns;
+    }
+}
+
+#[test]
+fn every_failure_is_noticed_as_the_table_says() {
+    use rayon::prelude::*;
+    let config = config();
+    let rows: Vec<[Cell; 4]> = FAILURES
+        .par_iter()
+        .map(|(_, part)| Situation::ALL.map(|situation| cell(&config, part, situation)))
+        .collect();
+    table::check(&rows);
+}

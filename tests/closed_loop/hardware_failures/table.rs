@@ -1,0 +1,72 @@
+//! The table in the documents: written, read back and compared.
+
+use std::fmt::Write as _;
+use std::{env, fs};
+
+use super::failures::FAILURES;
+use super::{Cell, Situation};
+
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hardware_failures.md");
+/// The table begins after the line that contains this.
+const HEAD: &str = "| failure |";
+/// Other processors round otherwise: allowed differences of times and distances, relative and absolute.
+const RELATIVE: f64 = 0.25;
+const TIME_S: f64 = 0.01;
+const DISTANCE_M: f64 = 2e-5;
+
+impl Cell {
+    fn text(&self) -> String {
+        let farthest = format!("{:.3} mm", 1e3 * self.farthest);
+        match self.noticed {
+            Some((code, time_s)) => format!("{} {:.0} ms, {farthest}", code.name(), 1e3 * time_s),
+            None => format!("not noticed, {farthest}"),
+        }
+    }
+
+    /// Whether it is that of a text.
+    fn is_as(&self, text: &str) -> bool {
+        let Some((noticed, farthest)) = text.rsplit_once(", ") else { return false };
+        let number =
+            |text: &str, unit: &str| text.strip_suffix(unit)?.trim().rsplit(' ').next()?.parse::<f64>().ok();
+        let is_near =
+            |a: f64, b: f64, absolute: f64| (a - b).abs() <= absolute + RELATIVE * a.abs().max(b.abs());
+        let is_as_far =
+            number(farthest, "mm").is_some_and(|mm| is_near(1e-3 * mm, self.farthest, DISTANCE_M));
+        let is_noticed = match self.noticed {
+            None => noticed == "not noticed",
+            Some((code, time_s)) => noticed
+                .strip_prefix(code.name())
+                .is_some_and(|rest| number(rest, "ms").is_some_and(|ms| is_near(1e-3 * ms, time_s, TIME_S))),
+        };
+        is_as_far && is_noticed
+    }
+}
+
+/// Compares the rows with the table of the documents, or writes it.
+pub fn check(rows: &[[Cell; Situation::ALL.len()]]) {
+    let document = fs::read_to_string(FILE).unwrap();
+    let (head, table) = document.split_at(document.find(HEAD).unwrap());
+    if env::var_os("HEXAD_WRITE_TABLE").is_some() {
+        let mut text =
+            format!("{head}{HEAD} at rest | slow | fast | engaging |\n| --- | --- | --- | --- | --- |\n");
+        for ((name, _), cells) in FAILURES.iter().zip(rows) {
+            let cells: Vec<String> = cells.iter().map(Cell::text).collect();
+            writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
+        }
+        fs::write(FILE, text).unwrap();
+        return;
+    }
+    let lines: Vec<&str> = table.lines().skip(2).collect();
+    assert_eq!(lines.len(), rows.len(), "{FILE}: rows");
+    let mut wrong = String::new();
+    for (line, ((name, _), cells)) in lines.iter().zip(FAILURES.iter().zip(rows)) {
+        let texts: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        assert_eq!(texts[0], *name, "{FILE}");
+        for (text, (cell, situation)) in texts[1..].iter().zip(cells.iter().zip(Situation::ALL)) {
+            if !cell.is_as(text) {
+                writeln!(wrong, "{name}, {situation:?}: {}; in the table: {text}", cell.text()).unwrap();
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{FILE}:\n{wrong}");
+}

@@ -1,0 +1,46 @@
+//! libhexad, installed into a folder of the tests as a package would install it.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use super::python::output;
+
+/// The prefix: `include`, `lib`, `lib/pkgconfig`.
+pub fn prefix() -> &'static Path {
+    static READY: OnceLock<PathBuf> = OnceLock::new();
+    READY.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("libhexad");
+        fs::create_dir_all(&folder).unwrap();
+        // Another process may be at it.
+        let lock = File::create(folder.join("lock")).unwrap();
+        lock.lock().unwrap();
+        let mut install = Command::new(repository().join("clients/c/install"));
+        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
+        output(install.arg(folder.join("usr")).env("CARGO_TARGET_DIR", target)).unwrap();
+        folder.join("usr")
+    })
+}
+
+/// Where the sources are.
+pub fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Lets a command find the installed library and header, and the package of Python.
+pub fn with_library(mut command: Command) -> Command {
+    let library = prefix().join("lib");
+    command.env("PKG_CONFIG_PATH", library.join("pkgconfig")).env("LD_LIBRARY_PATH", &library);
+    let package: OsString = repository().join("clients/python/src").into();
+    // No __pycache__ between the sources.
+    command.env("PYTHONPATH", package).env("PYTHONDONTWRITEBYTECODE", "1");
+    command
+}
+
+/// What `hexad messages` prints.
+pub fn declared(language: &str) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hexad"));
+    output(command.args(["messages", "--language", language])).unwrap()
+}

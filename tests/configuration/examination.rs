@@ -1,0 +1,214 @@
+//! Configurations that load but must not be run: drives, limits, legs, gravity, envelope, timeouts.
+
+use hexad::config::deployment::default_limits::derived_limits;
+use hexad::config::examination::Examination;
+use hexad::config::{Config, Violation};
+
+use super::{FRIED, REFERENCE};
+
+const MOTION_BASE: &str = include_str!("../../config/motion_base.toml");
+const TSAI: &str = include_str!("../../config/tsai2000.toml");
+/// Machines of the test vectors.
+const OTHERS: [&str; 7] = [
+    include_str!("../data/ceiling.toml"),
+    include_str!("../data/gimbal.toml"),
+    include_str!("../data/scattered.toml"),
+    include_str!("../data/sideways_x_up.toml"),
+    include_str!("../data/tabletop.toml"),
+    include_str!("../data/telescope.toml"),
+    include_str!("../data/tilted.toml"),
+];
+
+fn load(text: &str) -> Config {
+    Config::parse(text, "test.toml").unwrap()
+}
+
+fn examine(text: &str) -> Examination {
+    load(text).examine()
+}
+
+/// The motion base with one piece of text replaced.
+fn base_with(from: &str, to: &str) -> String {
+    assert_eq!(MOTION_BASE.matches(from).count(), 1, "{from:?} must be in the file once");
+    MOTION_BASE.replace(from, to)
+}
+
+fn text(found: &[Violation]) -> Vec<String> {
+    found.iter().map(ToString::to_string).collect()
+}
+
+/// Asserts that there is one error, with these words, in the line of this text.
+fn refused(file: &str, line: &str, words: &[&str]) {
+    let found = examine(file);
+    let [error] = found.errors.as_slice() else { panic!("{:#?}", text(&found.errors)) };
+    for word in words {
+        assert!(error.to_string().contains(word), "{word:?} must be in {error}");
+    }
+    let number = 1 + file.lines().position(|written| written.starts_with(line)).unwrap();
+    assert_eq!(error.line, number, "{error}");
+}
+
+#[test]
+fn machines_in_order_are_valid_and_only_the_hanging_one_is_warned_of() {
+    for file in [FRIED, REFERENCE, MOTION_BASE, TSAI].into_iter().chain(OTHERS) {
+        let (config, found) = (load(file), examine(file));
+        assert_eq!(text(&found.errors), [""; 0], "{}", config.name);
+        let keys: Vec<_> = found.warnings.iter().map(|warning| warning.key.as_str()).collect();
+        let expected: &[&str] = if config.name == "ceiling" { &["gravity_m_s2"] } else { &[] };
+        assert_eq!(keys, expected, "{}: {:#?}", config.name, text(&found.warnings));
+    }
+}
+
+#[test]
+fn drives_that_cannot_hold_the_platform_with_a_margin_are_refused() {
+    // Leg 6 holds 3807 N at home; at most 90 % may be needed.
+    let needed = "must be at least 4230 to hold the platform: leg 6 needs 3806.91 N at home";
+    for force in [4229.0, 3000.0, 40.0] {
+        let file = base_with("max_force_n = 20000.0", &format!("max_force_n = {force:.1}"));
+        refused(&file, "max_force_n", &[&format!("actuator.max_force_n = {force}: "), needed]);
+    }
+    let enough = examine(&base_with("max_force_n = 20000.0", "max_force_n = 4230.0"));
+    assert_eq!(text(&enough.errors), [""; 0]);
+}
+
+/// Ranges of an envelope.
+fn envelope(angle: f64, position: f64, acceleration: f64) -> String {
+    let six = |a: f64, p: f64| format!("[{a}, {a}, {a}, {p}, {p}, {p}]");
+    format!(
+        "\n[envelope]\npose_min = {}\npose_max = {}\nvelocity = {}\nacceleration = {}\n",
+        six(-angle, -position),
+        six(angle, position),
+        six(0.1, 0.1),
+        six(acceleration, acceleration)
+    )
+}
+
+#[test]
+fn an_envelope_must_be_within_stroke_regular_and_held() {
+    let with = |angle, position| format!("{MOTION_BASE}{}", envelope(angle, position, 0.5));
+    assert_eq!(text(&examine(&with(0.05, 0.05)).errors), [""; 0]);
+    assert_eq!(text(&examine(&with(0.05, 0.05)).warnings), [""; 0]);
+    refused(&with(0.1, 0.4), "[envelope]", &["from home", "longer there than actuator.max_length_m"]);
+    // Where the platform leans, one leg carries more than at home.
+    let weak = base_with("max_force_n = 20000.0", "max_force_n = 4240.0") + &envelope(0.15, 0.01, 0.1);
+    refused(
+        &weak,
+        "max_force_n",
+        &["actuator.max_force_n = 4240: must be at least", "within [envelope] at "],
+    );
+    // Accelerations are a matter of the task, not of holding: a warning.
+    let fast = examine(&format!("{MOTION_BASE}{}", envelope(0.05, 0.05, 20.0)));
+    assert_eq!(text(&fast.errors), [""; 0]);
+    assert!(fast.warnings.iter().any(|warning| warning.key == "envelope.acceleration"), "{fast:?}");
+    // Beyond the singular poses of a machine with much stroke.
+    let wide = format!("{TSAI}{}", envelope(1.2, 0.01, 0.1));
+    refused(&wide, "[envelope]", &["shrink the ranges"]);
+}
+
+#[test]
+fn limits_that_the_drives_cannot_give_are_refused_with_those_that_they_can() {
+    let with = |line: &str| format!("{MOTION_BASE}\n[limits]\n{line}\n");
+    refused(
+        &with("acceleration_m_s2 = 16.0"),
+        "acceleration_m_s2",
+        &["= 16: must be at most 14.9", "the drives can give"],
+    );
+    refused(&with("acceleration_rad_s2 = 25.0"), "acceleration_rad_s2", &["= 25: must be at most 21.8"]);
+    // Each alone, but not both at once; and velocities, which the reference keeps.
+    for (line, key, words) in [
+        (
+            "acceleration_rad_s2 = 20.0",
+            "limits.acceleration_rad_s2",
+            "= 20: with limits.acceleration_m_s2 = 5 the drives can give 14.5",
+        ),
+        ("velocity_m_s = 1.3", "limits.velocity_m_s", "= 1.3: the legs allow 1.19999"),
+        ("velocity_rad_s = 1.3", "limits.velocity_rad_s", "= 1.3: the legs allow 1.21"),
+    ] {
+        let found = examine(&with(line));
+        assert_eq!(text(&found.errors), [""; 0], "{line}");
+        let [warning] = found.warnings.as_slice() else { panic!("{:#?}", text(&found.warnings)) };
+        assert!(warning.key == key && warning.to_string().contains(words), "{warning}");
+    }
+}
+
+#[test]
+fn defaults_of_limits_are_what_the_drives_can_give() {
+    let derived = |file: &str| {
+        let config = load(file);
+        let found = derived_limits(&config.machine, &config.deployment.limits.reference);
+        found.into_iter().map(|limit| (limit.key, limit.value)).collect::<Vec<_>>()
+    };
+    assert_eq!(derived(FRIED), []);
+    assert_eq!(derived(REFERENCE), []);
+    assert_eq!(
+        derived(MOTION_BASE),
+        [("limits.velocity_rad_s", 1.2), ("limits.acceleration_rad_s2", 9.4), ("limits.jerk_rad_s3", 940.0)]
+    );
+    // Given by hand they are not derived, and the others are as before.
+    let by_hand = format!(
+        "{MOTION_BASE}\n[limits]\nvelocity_rad_s = 1.0\nacceleration_rad_s2 = 7.0\njerk_rad_s3 = 700\n"
+    );
+    assert_eq!(derived(&by_hand), []);
+    let telescope = load(OTHERS[5]).deployment.limits.reference;
+    assert_eq!((telescope.position.velocity, telescope.orientation.velocity), (0.02, 0.029));
+    assert_eq!((telescope.position.jerk, telescope.orientation.jerk), (280.0, 490.0));
+}
+
+/// A machine whose legs have exchanged their joints on the platform.
+fn exchanged(file: &str, legs: [usize; 2]) -> String {
+    let mut table: toml::Table = file.parse().unwrap();
+    let rows = table["leg"].as_array_mut().unwrap();
+    let [first, second] = legs.map(|leg| rows[leg]["platform_m"].clone());
+    rows[legs[0]]["platform_m"] = second;
+    rows[legs[1]]["platform_m"] = first;
+    // The stroke must not refuse them.
+    let actuator = table["actuator"].as_table_mut().unwrap();
+    actuator.insert("min_length_m".into(), 0.01.into());
+    actuator.insert("max_length_m".into(), 10.0.into());
+    table.to_string()
+}
+
+#[test]
+fn two_joints_of_neighbours_that_are_swapped_are_named() {
+    let (mut missed, mut named) = (vec![], 0);
+    for file in [FRIED, REFERENCE, MOTION_BASE, TSAI].into_iter().chain(OTHERS) {
+        for first in 0..6 {
+            for second in first + 1..6 {
+                let text = exchanged(file, [first, second]);
+                let Ok(config) = Config::parse(&text, "test.toml") else { continue };
+                let found = config.examine();
+                let key = format!("leg[{}].platform_m", second + 1);
+                let pair = format!("leg {} ", second + 1);
+                let names = |found: &Violation| {
+                    found.key == key
+                        && found.to_string().contains(&pair)
+                        && found.to_string().contains(&format!("leg {}", first + 1))
+                };
+                if found.errors.iter().chain(&found.warnings).any(names) {
+                    named += 1;
+                } else {
+                    missed.push((config.name, first + 1, second + 1));
+                }
+            }
+        }
+    }
+    println!("{named} swaps named");
+    assert_eq!(missed, [], "beside {named} pairs");
+    assert!(named >= 90, "{named}: the others do not load");
+}
+
+#[test]
+fn gravity_that_does_not_press_the_platform_onto_its_legs_is_warned_of() {
+    for (gravity, words) in [
+        ("[0.0, 0.0, 9.81]", Some("the platform hangs")),
+        ("[9.81, 0.0, 0.0]", Some("is across")),
+        ("[3.0, 0.0, -9.0]", None),
+        ("[0.0, 0.0, 0.0]", None),
+    ] {
+        let found =
+            examine(&base_with("gravity_m_s2 = [0.0, 0.0, -9.81]", &format!("gravity_m_s2 = {gravity}")));
+        let warnings: Vec<_> = found.warnings.iter().filter(|found| found.key == "gravity_m_s2").collect();
+        assert_eq!(warnings.len(), usize::from(words.is_some()), "{gravity}: {warnings:?}");
+        assert!(warnings.iter().all(|found| found.to_string().contains(words.unwrap())), "{warnings:?}");
+    }
+}

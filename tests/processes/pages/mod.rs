@@ -1,0 +1,5 @@
+//! Pages with charts in a browser: of a recording, and live.
+
+mod browser;
+mod report;
+mod view;

@@ -1,0 +1,212 @@
+//! `hexad goto` before it moves: random pairs of poses, every limit, the time against the time-optimal profile, and that
+//! only targets or ways outside of the workspace are refused.
+
+use hexad::analysis::target_motion::{
+    REACHED_M, REACHED_RAD, TargetRefusal, check_target, target_motion, workspace_bounds,
+};
+use hexad::config::Config;
+use hexad::control::limits::Limit;
+use hexad::control::parameters::Constants;
+use hexad::model::rigid::{Pose, Twist};
+use hexad::model::task::TaskState;
+use hexad::plant::random::Random;
+use nalgebra::{Vector3, Vector6};
+use rayon::prelude::*;
+
+use super::arrival::{ARRIVED, optimal_s};
+use super::common::rig::parameters;
+use super::common::{MACHINES, data};
+use super::observer::{Largest, examine};
+
+/// Ways from which on the time is compared with the time-optimal profile \[m\], \[rad\], and the largest ratio.
+const COMPARED_FROM: [f64; 2] = [0.02, 0.02];
+const LONGEST_RATIO: f64 = 1.2;
+
+/// Shares of the limits of autonomous motions, in turn.
+const SPEEDS: [f64; 3] = [1.0, 0.5, 0.1];
+
+/// Instants of the way, of position and of orientation, at which a refused way is examined.
+const WAY_SAMPLES: u32 = 40;
+
+/// Share of the quantity by which a way may be nearer than allowed to a bound without being refused for nothing: what a
+/// proved stop needs beyond the bound.
+const PROOF_ROOM: f64 = 0.1;
+
+/// Outcome of the pairs of one machine.
+#[derive(Debug, Default)]
+struct Outcome {
+    reached: u32,
+    outside: u32,
+    ways: u32,
+    /// Refused although the way keeps every bound by [`PROOF_ROOM`].
+    for_nothing: u32,
+    slowest: f64,
+    compared: u32,
+    leg_rate: u32,
+    largest: Largest,
+}
+
+impl Outcome {
+    fn merge(mut self, other: Self) -> Self {
+        self.reached += other.reached;
+        self.outside += other.outside;
+        self.ways += other.ways;
+        self.for_nothing += other.for_nothing;
+        self.slowest = self.slowest.max(other.slowest);
+        self.compared += other.compared;
+        self.leg_rate += other.leg_rate;
+        self.largest.merge(&other.largest);
+        self
+    }
+}
+
+/// A pose around home, in the workspace or not.
+fn random_pose(random: &mut Random, constants: &Constants, scale: f64) -> Pose {
+    let machine = constants.machine();
+    let stroke = machine.actuator.stroke();
+    let size = Vector6::new(0.4, 0.4, 0.6, 0.5 * stroke, 0.5 * stroke, 0.5 * stroke);
+    let offset = size.map(|size| scale * size * (2.0 * random.uniform() - 1.0));
+    TaskState::at_rest((Vector6::from(machine.home) + offset).into()).motion().pose
+}
+
+fn pose_inside(random: &mut Random, constants: &Constants) -> Pose {
+    (0..10_000)
+        .map(|k| random_pose(random, constants, 1.0 / (1.0 + 0.01 * f64::from(k))))
+        .find(|pose| check_target(constants, pose).is_ok())
+        .unwrap()
+}
+
+/// One pair: from a pose in the workspace to another, of which a fifth may be anywhere. The way uses the limits of autonomous
+/// motions, or a share of them; a stop before a bound may use all.
+fn pair(constants: &Constants, seed: u64) -> Outcome {
+    let mut random = Random::new(seed);
+    let from = pose_inside(&mut random, constants);
+    let to = if seed.is_multiple_of(5) {
+        random_pose(&mut random, constants, 1.0)
+    } else {
+        pose_inside(&mut random, constants)
+    };
+    let mut outcome = Outcome::default();
+    let speed = SPEEDS[seed as usize % SPEEDS.len()];
+    let limits = &constants.parameters.limits;
+    let limits = limits.scaled(speed * limits.autonomous_scale);
+    let whole = from.displacement_to(&to);
+    let period_ns = constants.parameters.period_ns;
+    let mut arrived_s = [0.0; 2];
+    let result = target_motion(constants, &from, &to, speed, |reference, before| {
+        let end_ns = reference.time_ns();
+        examine(constants, reference, before, [end_ns - period_ns, end_ns], &mut outcome.largest);
+        let left = reference.motion().pose.displacement_to(&to);
+        for (arrived_s, (left, whole)) in
+            arrived_s.iter_mut().zip([(left.linear, whole.linear), (left.angular, whole.angular)])
+        {
+            if left.norm() > ARRIVED * whole.norm() {
+                *arrived_s = end_ns as f64 * 1e-9;
+            }
+        }
+    });
+    match result {
+        Ok(motion) => {
+            outcome.reached = 1;
+            let ways = [(whole.linear.norm(), &limits.position), (whole.angular.norm(), &limits.orientation)];
+            let is_leg_rate = motion.limited_shares[Limit::LegRate as usize] > 0.0;
+            let is_free = least_room(constants, &from, &to) > 0.0;
+            outcome.leg_rate += u32::from(is_leg_rate);
+            for ((way, limits), (from, arrived_s)) in
+                ways.into_iter().zip(COMPARED_FROM.into_iter().zip(arrived_s))
+            {
+                if way >= from && is_free && !is_leg_rate {
+                    outcome.compared += 1;
+                    let ratio = arrived_s / optimal_s(way, limits);
+                    outcome.slowest = outcome.slowest.max(ratio);
+                }
+            }
+        }
+        Err(TargetRefusal::Target(bound)) => {
+            outcome.outside = 1;
+            assert!(bound.margin < 0.0 && is_outside(constants, &to), "{bound}");
+        }
+        Err(TargetRefusal::Way { bound, share }) => {
+            outcome.ways = 1;
+            assert!(!is_outside(constants, &to) && (0.0..1.0).contains(&share), "{bound}");
+            if least_room(constants, &from, &to) > PROOF_ROOM {
+                outcome.for_nothing = 1;
+                println!("seed {seed}: refused after {share}: {bound}");
+            }
+        }
+        Err(TargetRefusal::Start(bound)) => {
+            outcome.ways = 1;
+            outcome.for_nothing = u32::from(least_room(constants, &from, &to) > PROOF_ROOM);
+            println!("seed {seed}: refused at its beginning: {bound}");
+        }
+    }
+    outcome
+}
+
+fn is_outside(constants: &Constants, pose: &Pose) -> bool {
+    workspace_bounds(constants, pose).iter().any(|bound| bound.margin < 0.0)
+}
+
+/// Least margin anywhere between the poses, whatever the order of position and orientation, as a share of the stroke, the
+/// envelope or the bound.
+fn least_room(constants: &Constants, from: &Pose, to: &Pose) -> f64 {
+    let whole = from.displacement_to(to);
+    let instants = || (0..=WAY_SAMPLES).map(|k| f64::from(k) / f64::from(WAY_SAMPLES));
+    let stroke = constants.machine().actuator.stroke();
+    let room_at = |turn: f64, shift: f64| {
+        let displacement = Twist { angular: whole.angular * turn, linear: whole.linear * shift };
+        let bounds = workspace_bounds(constants, &from.displaced(&displacement));
+        let share = |bound: &hexad::analysis::target_motion::WorkspaceBound| {
+            use hexad::analysis::target_motion::BoundedQuantity as Is;
+            bound.margin
+                / match bound.quantity {
+                    Is::Length(_) | Is::Coordinate(_) => stroke,
+                    Is::Condition | Is::UniversalSine => bound.bound,
+                    Is::Determinant => f64::MIN_POSITIVE,
+                }
+        };
+        bounds.iter().map(share).fold(f64::INFINITY, f64::min)
+    };
+    instants()
+        .flat_map(|turn| instants().map(move |shift| (turn, shift)))
+        .map(|(a, b)| room_at(a, b))
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// `HEXAD_RUNS` pairs of each machine.
+#[test]
+fn a_goto_keeps_every_limit_and_is_almost_as_fast_as_possible() {
+    let runs: u64 = std::env::var("HEXAD_RUNS").map_or(100, |runs| runs.parse().unwrap());
+    for name in MACHINES {
+        let config = Config::load(&data(name, "toml")).unwrap();
+        let constants = Constants::new(&config.machine, parameters(&config));
+        let pairs = (0..runs).into_par_iter().map(|seed| pair(&constants, seed));
+        let outcome = pairs.reduce(Outcome::default, Outcome::merge);
+        let Outcome { reached, outside, ways, for_nothing, slowest, compared, leg_rate, largest } = outcome;
+        println!(
+            "{name}: {reached} reached, {outside} targets and {ways} ways outside, {for_nothing} for nothing; {compared} compared, slowest {slowest:.3}, {leg_rate} by leg rate"
+        );
+        println!("  {:.4?}", largest.0);
+        for (quantity, bound) in super::limits::BOUNDS {
+            let value = largest.0.get(quantity).copied().unwrap_or(f64::NEG_INFINITY);
+            assert!(value <= bound, "{name}: {quantity} {value:e} > {bound}");
+        }
+        assert!(slowest <= LONGEST_RATIO, "{name}: {slowest}");
+        assert_eq!(for_nothing, 0, "{name}");
+        assert!(u64::from(reached) > runs / 2, "{name}: {reached} of {runs}");
+    }
+}
+
+/// Small turns and shifts, too: a target that is reached already takes no time.
+#[test]
+fn a_target_that_is_reached_already_takes_no_time() {
+    let config = Config::load(&data("motion_base", "toml")).unwrap();
+    let constants = Constants::new(&config.machine, parameters(&config));
+    let home = *constants.home.pose();
+    let near = home.displaced(&Twist {
+        angular: Vector3::x() * (0.4 * REACHED_RAD),
+        linear: Vector3::y() * (0.4 * REACHED_M),
+    });
+    let motion = target_motion(&constants, &home, &near, 1.0, |_, _| ()).unwrap();
+    assert_eq!(motion.duration_s, 0.0);
+}
