@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::config::{Config, ConfigError};
+use crate::config::{Config, ConfigError, load_name};
 
 /// Configuration of demonstrations and diagnoses without `--config`.
 pub const DEFAULT_CONFIG: &str = include_str!("../../config/fried2008.toml");
@@ -25,6 +25,11 @@ pub struct MachineFile {
 impl MachineFile {
     pub fn load(&self) -> Result<Config, ConfigError> {
         Config::load(&self.path)
+    }
+
+    /// Name of the machine, also if the rest of the file is not valid.
+    pub fn name(&self) -> Result<String, ConfigError> {
+        load_name(&self.path)
     }
 }
 

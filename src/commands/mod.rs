@@ -106,6 +106,8 @@ enum CommandArguments {
     Off(RequestArguments),
     /// Disable the forces at once, until cleared; the brakes close
     Estop(RequestArguments),
+    /// Take over gains, limits and timeouts of the daemon's machine file, while no force is valid
+    Reload(RequestArguments),
     /// Show state, diagnostic, pose, legs, timing and sources of a running daemon
     Status(StatusArguments),
     /// Show the charts of a recording's page live, for a browser on this host
@@ -156,6 +158,7 @@ impl CommandLine {
             Is::Clear(arguments) => send(&arguments, Request::Clear, false),
             Is::Off(arguments) => send(&arguments, Request::Off, false),
             Is::Estop(arguments) => send(&arguments, Request::Estop, false),
+            Is::Reload(arguments) => reload(&arguments),
             Is::Status(arguments) => arguments.execute(),
             Is::View(arguments) => arguments.execute(),
             Is::Faults => Ok(print(FaultTables)?),
@@ -173,6 +176,12 @@ impl CommandLine {
             Is::ForwardKinematics(arguments) => arguments.execute(),
         }
     }
+}
+
+/// Requests that the daemon reads its machine file again, and prints what has changed.
+fn reload(arguments: &RequestArguments) -> Result<(), Failure> {
+    let changed = operate::reload::reload(&arguments.machine.name()?, arguments.timeout())?;
+    Ok(print(format_args!("{changed}\n"))?)
 }
 
 /// Sends an operator's request and prints the state that it led to, and on standard error what it waits for.

@@ -6,7 +6,8 @@
 //!
 //! `config/reference.toml` has every key with its meaning, unit, default and bound.
 
-use std::{fmt, io, path::Path};
+use std::path::{Path, PathBuf, absolute};
+use std::{fmt, io};
 
 use serde::Serialize;
 use thiserror::Error;
@@ -20,6 +21,7 @@ use self::deployment::Deployment;
 use self::reader::{SectionReader, ViolationLog};
 
 mod bound;
+pub mod changes;
 pub mod control_loops;
 pub mod deployment;
 pub mod examination;
@@ -49,6 +51,8 @@ pub struct Config {
     pub text: String,
     /// The file in error texts.
     pub place: String,
+    /// The file, wherever the process works; `None` if the text came from elsewhere.
+    pub path: Option<PathBuf>,
 }
 
 /// Error of loading a configuration.
@@ -89,7 +93,7 @@ impl Config {
     /// Reads and validates a file.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let (text, place) = text::read_file(path)?;
-        Self::parse(&text, &place)
+        Ok(Self { path: absolute(path).ok(), ..Self::parse(&text, &place)? })
     }
 
     /// Validates a text; error texts name it `place`.
@@ -104,7 +108,8 @@ impl Config {
         root.finish();
         match log.into_violations() {
             violations if violations.is_empty() => {
-                Ok(Self { name, machine, deployment, text: original.into(), place: place.into() })
+                let (text, place) = (original.into(), place.into());
+                Ok(Self { name, machine, deployment, text, place, path: None })
             }
             violations => Err(ConfigError::Invalid { place: place.into(), violations }),
         }
@@ -121,6 +126,18 @@ impl Config {
             return Bus::join_simulated(&self.name);
         }
         Bus::join(&self.name)
+    }
+}
+
+/// Name of the machine of a file, also if the rest of it is not valid.
+pub fn load_name(path: &Path) -> Result<String, ConfigError> {
+    let (text, place) = text::read_file(path)?;
+    let (table, _) = DeTable::parse_recoverable(&text);
+    let log = ViolationLog::new(&text, vec![]);
+    let name = SectionReader::root(&log, table.get_ref()).name("name", MAX_NAME_LENGTH);
+    match log.into_violations() {
+        violations if violations.is_empty() => Ok(name),
+        violations => Err(ConfigError::Invalid { place, violations }),
     }
 }
 

@@ -12,7 +12,7 @@ use super::feedback_bound::FeedbackBound;
 use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
 use super::free_motion::FreeMotion;
-use super::input_validation::{MeasurementValidator, SetpointValidator, ValidatedSetpoint};
+use super::input_validation::{MeasurementValidator, SetpointValidator};
 use super::limits::LimitSet;
 use super::localization::{Localization, PlatformState};
 use super::parameters::{Constants, Parameters};
@@ -209,6 +209,22 @@ impl Controller {
         self.memory = memory;
     }
 
+    /// State since the last cycle.
+    pub fn state(&self) -> State {
+        self.memory.supervisor.mode.state
+    }
+
+    /// Exchanges the constants for those of a controller of the same machine before its first cycle. Not under control.
+    ///
+    /// What was proved or accepted by the old constants is forgotten; pose, state and statistics remain.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn exchange_constants(&mut self, new: &mut Self) {
+        core::mem::swap(&mut self.constants, &mut new.constants);
+        core::mem::swap(&mut self.memory.reference, &mut new.memory.reference);
+        self.memory.setpoints.forget();
+    }
+
     /// One cycle. Depends on nothing but the state of the controller and `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, memory } = self;
@@ -269,7 +285,7 @@ impl Controller {
         if next.has_control() {
             // Until the drives are ready it stays where it is, or comes to rest.
             let is_waiting = next == State::Engaging && !drives.is_ready;
-            let target = target(constants, next, &setpoint).filter(|_| !is_waiting);
+            let target = Target::of_state(constants, next, &setpoint).filter(|_| !is_waiting);
             reference.set_closing_scale(closing_scale(parameters, next));
             reference.advance(constants, begin_ns.saturating_add(parameters.period_ns), target.as_ref());
         }
@@ -319,20 +335,6 @@ impl Controller {
             error,
             reference: supervisor.mode.state.has_control().then(|| *reference.motion()),
         }
-    }
-}
-
-/// What the reference shall approach in a state; nothing where it follows its stop.
-#[inline(never)]
-fn target<'a>(
-    constants: &'a Constants,
-    state: State,
-    setpoint: &ValidatedSetpoint<'a>,
-) -> Option<Target<'a>> {
-    match state {
-        State::Engaging | State::Active => setpoint.target.filter(|_| setpoint.status.is_ok()),
-        State::Parking => Some(Target::Pose(constants.home.pose(), 1.0)),
-        State::Off | State::Standby | State::Stopping | State::Fault => None,
     }
 }
 

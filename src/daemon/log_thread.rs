@@ -3,8 +3,8 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use std::sync::OnceLock;
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{Sender, SyncSender};
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::Instant;
 
@@ -16,12 +16,15 @@ use super::emergency_latch::EmergencyLatch;
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::process_names::sentence;
+use super::recorder::Recorded;
+use super::reload::Loaded;
+use super::reload::handover::{Answer, Offer};
 use super::report::{Fault, TrackingSum};
 use super::statistics::Collector;
 use crate::control::controller::{Input, Output, Publishers};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
-use crate::messages::{CycleMessage, Statistics};
+use crate::messages::Statistics;
 use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
@@ -35,7 +38,7 @@ const WINDOW: Duration = Duration::from_secs(1);
 const MAX_FAULTS: usize = 1000;
 
 /// Links of the log thread to the other threads.
-pub struct LogLinks<'a> {
+pub struct LogLinks<'a, 'o> {
     pub records: Consumer<'a, CycleRecord>,
     /// Release to force sent \[ns\], from the I/O thread.
     pub delays: Consumer<'a, u64>,
@@ -44,7 +47,10 @@ pub struct LogLinks<'a> {
     /// Of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
     /// To the recorder, if there is one. When it is full, cycles are lost.
-    pub recorder: Option<SyncSender<CycleMessage>>,
+    pub recorder: Option<SyncSender<Recorded>>,
+    /// Offers that the real-time thread has answered; back to the reload thread.
+    pub answers: Consumer<'a, &'o mut Offer>,
+    pub returned: Sender<&'o mut Offer>,
     pub first_pose: FirstPose,
     pub latch: EmergencyLatch,
 }
@@ -60,7 +66,7 @@ pub struct LogReport {
 }
 
 /// Runs until `stop` and until the queues are empty.
-pub fn run(mut links: LogLinks<'_>, stop: &AtomicBool) -> LogReport {
+pub fn run(mut links: LogLinks<'_, '_>, stop: &AtomicBool) -> LogReport {
     let at_start = ThreadUsage::of_this_thread();
     let mut log = Log::default();
     log.report.faults.reserve(MAX_FAULTS);
@@ -83,7 +89,7 @@ pub fn run(mut links: LogLinks<'_>, stop: &AtomicBool) -> LogReport {
 
 /// What the log thread has collected so far.
 #[derive(Default)]
-struct Log {
+struct Log<'o> {
     collector: Collector,
     report: LogReport,
     /// Of the last cycle.
@@ -91,14 +97,19 @@ struct Log {
     /// The last two at once, of the measurements and of the setpoints.
     publishers: [Publishers; 2],
     hints: Hints,
+    /// An answered offer whose first cycle has not arrived yet.
+    offer: Option<&'o mut Offer>,
+    /// Configuration of the cycles that follow, while the recorder has no room for it.
+    unrecorded: Option<Arc<Loaded>>,
 }
 
-impl Log {
-    fn empty_queues(&mut self, links: &mut LogLinks<'_>) {
+impl<'o> Log<'o> {
+    fn empty_queues(&mut self, links: &mut LogLinks<'_, 'o>) {
         while let Some(record) = links.records.dequeue() {
             self.collector.add(&record);
+            self.return_offer(links, record.cycle);
             if let Some(recorder) = &links.recorder {
-                let _ = recorder.try_send(message(&record));
+                self.record(recorder, &record);
             }
             links.first_pose.add(&record);
             if let Some((position, orientation)) = tracking_error(&record) {
@@ -121,6 +132,29 @@ impl Log {
             self.collector.add_hints(&hints.since(&self.hints));
             self.hints = hints;
         }
+    }
+
+    /// Returns an offer before the first cycle with its constants: the recorder needs them before that cycle.
+    fn return_offer(&mut self, links: &mut LogLinks<'_, 'o>, cycle: u64) {
+        // Answered before the record of its cycle was written.
+        self.offer = self.offer.take().or_else(|| links.answers.dequeue());
+        let Some(offer) = self.offer.take_if(|offer| offer.is_due(cycle)) else { return };
+        if let Answer::Taken(_) = offer.answer {
+            self.unrecorded = Some(offer.loaded.clone());
+        }
+        // Nobody receives it when the daemon ends.
+        let _ = links.returned.send(offer);
+    }
+
+    /// Hands a cycle to the recorder, and before it its configuration if that is new. Where there is no room both are missing.
+    fn record(&mut self, recorder: &SyncSender<Recorded>, record: &CycleRecord) {
+        if let Some(loaded) = &self.unrecorded {
+            if recorder.try_send(Recorded::Configuration(loaded.clone())).is_err() {
+                return;
+            }
+            self.unrecorded = None;
+        }
+        let _ = recorder.try_send(Recorded::Cycle(message(record)));
     }
 
     /// Also under control, where a second publisher changes nothing.

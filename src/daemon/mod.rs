@@ -12,6 +12,7 @@ use tracing::{info, warn};
 use self::control_socket::location::{self, SocketError};
 use self::emergency_latch::EmergencyLatch;
 use self::recorder::Folders;
+use self::reload::Loaded;
 use self::report::Report;
 use crate::config::{Config, ConfigError};
 use crate::control::state::Request;
@@ -33,6 +34,7 @@ mod log_thread;
 mod parameters;
 pub mod process_names;
 pub mod recorder;
+pub mod reload;
 pub mod replay;
 pub mod report;
 mod snapshot;
@@ -119,7 +121,8 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
         warn!("an emergency stop was not cleared before the daemon ended: it is still in force; hexad clear");
         let _ = word.post(Request::Estop as u32, monotonic_ns());
     }
-    let (report, counts_csv) = threads::run(config, &files.folders, latch, socket, word, stop)?;
+    let (report, counts_csv) =
+        threads::run(Loaded::new(config.clone()), &files.folders, latch, socket, word, stop)?;
     if let Some(path) = &files.report {
         report.write(path)?;
     }

@@ -3,12 +3,14 @@
 //! Without a service manager only the log remains: a thread that hangs is named.
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
 use sd_notify::NotifyState;
-use tracing::{error, info, warn};
+use tracing::{error, warn};
 
 use super::REALTIME_THREAD;
+use super::reload::Requester;
 use crate::control::controller::Output;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
@@ -98,12 +100,19 @@ pub struct Supervision<'a> {
     rate_hz: f64,
     reported: Option<(State, DiagnosticCode)>,
     looked: Instant,
+    /// SIGHUP reloads the machine file.
     hangups: Option<Hangups>,
+    request_reload: &'a Sender<Requester>,
 }
 
 impl<'a> Supervision<'a> {
     /// Reports that the daemon is ready.
-    pub fn begin(progress: &'a Progress, rate_hz: f64, is_simulated: bool) -> Self {
+    pub fn begin(
+        progress: &'a Progress,
+        rate_hz: f64,
+        is_simulated: bool,
+        request_reload: &'a Sender<Requester>,
+    ) -> Self {
         let is_service = std::env::var_os("NOTIFY_SOCKET").is_some();
         // A terminal that is closed ends the daemon; a service manager has other means.
         let hangups = is_service.then(Hangups::count).and_then(Result::ok);
@@ -117,6 +126,7 @@ impl<'a> Supervision<'a> {
             reported: None,
             looked: Instant::now(),
             hangups,
+            request_reload,
         }
     }
 
@@ -135,7 +145,8 @@ impl<'a> Supervision<'a> {
             let _ = sd_notify::notify(&[NotifyState::Status(&text(status, self.rate_hz))]);
         }
         if self.hangups.as_mut().is_some_and(Hangups::has_new) {
-            info!("SIGHUP: nothing to do; the machine file is read at the start only");
+            // Nobody serves it when the daemon ends.
+            let _ = self.request_reload.send(None);
         }
     }
 
@@ -168,12 +179,15 @@ fn text((state, code): (State, DiagnosticCode), rate_hz: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::mpsc::channel;
+
     use super::*;
 
     #[test]
     fn the_watchdog_is_fed_only_if_every_thread_has_progressed_since() {
         let progress = Progress::default();
-        let mut supervision = Supervision::begin(&progress, 1000.0, false);
+        let (request_reload, _requests) = channel();
+        let mut supervision = Supervision::begin(&progress, 1000.0, false, &request_reload);
         type Count = fn(&Progress);
         let steps: [(&[Count], bool); 6] = [
             (&[], false),
@@ -187,7 +201,7 @@ mod tests {
             threads.iter().for_each(|count| count(&progress));
             assert_eq!(supervision.have_all_progressed(), expected, "step {k}");
         }
-        let mut simulated = Supervision::begin(&progress, 1000.0, true);
+        let mut simulated = Supervision::begin(&progress, 1000.0, true, &request_reload);
         assert!(simulated.have_all_progressed(), "in simulated time all may wait");
     }
 

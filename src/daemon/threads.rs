@@ -1,4 +1,4 @@
-//! The five threads of the daemon: start, supervision, end.
+//! The threads of the daemon: start, supervision, end.
 
 use core::mem;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -17,20 +17,22 @@ use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
 use super::emergency_latch::EmergencyLatch;
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
-use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports, Silence};
+use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
 use super::log_thread::{self, LogLinks, LogReport};
-use super::parameters::{nanoseconds, parameters, timing};
+use super::parameters::{nanoseconds, timing};
 use super::recorder::{Folders, Recorder, RecorderReport};
+use super::reload::handover::{Handover, Offer, OfferQueue};
+use super::reload::timeouts::MessageTimeouts;
+use super::reload::{self, Loaded, ReloadLinks, Requester};
 use super::report::Report;
 use super::snapshot::Snapshot;
 use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
-use crate::config::{Config, fidelity};
+use crate::config::Config;
 use crate::control::controller::{Controller, Input, Output};
 use crate::control::diagnostic::DiagnosticCode;
 use crate::messages::Statistics;
-use crate::model::fidelity::Fidelity;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, LoopReport, RECORDS};
 use crate::realtime::event::Event;
@@ -64,16 +66,21 @@ struct Flags {
 
 /// Runs the threads until `stop`; the report, and the histograms as CSV.
 pub(super) fn run(
-    config: &Config,
+    loaded: Loaded,
     folders: &Folders,
     latch: EmergencyLatch,
     socket: ControlSocket,
     word: &'static RequestWord,
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
-    let fidelity = fidelity::fidelity(config);
-    let controller = controller(config, fidelity);
-    let (recorder, recorder_queue) = Recorder::new(config, fidelity, &controller, folders).unzip();
+    let (timeouts, loaded) = (MessageTimeouts::new(loaded.timeouts()), Arc::new(loaded));
+    let (config, controller, timeouts) = (&loaded.config, loaded.controller.clone(), &timeouts);
+    let (recorder, recorder_queue) = Recorder::new(&loaded, folders).unzip();
+    let mut offer = Box::new(Offer::new(loaded.clone()));
+    let (mut offer_queue, mut answer_queue) = (OfferQueue::new(), OfferQueue::new());
+    let ((offer_producer, offers), (answer_producer, answers)) = (offer_queue.split(), answer_queue.split());
+    let ((request_reload, reload_requests), (reload_results, reloaded)) = (channel(), channel());
+    let (return_offer, returned) = channel();
     let (realtime_side, io_side) = exchange();
     let event = io_side.event.clone();
     let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
@@ -92,6 +99,8 @@ pub(super) fn run(
         statistics: statistics_writer,
         files,
         recorder: recorder_queue,
+        answers,
+        returned: return_offer,
         first_pose: FirstPose::of(&config.machine),
         latch,
     };
@@ -99,6 +108,7 @@ pub(super) fn run(
         exchange: realtime_side,
         records: record_producer,
         word,
+        handover: Handover::new(offers, answer_producer, timeouts),
         progress,
         files,
         ready: io_ready.clone(),
@@ -110,15 +120,26 @@ pub(super) fn run(
         statistics,
         snapshots: snapshot_writer,
         word,
+        timeouts,
         is_ending: &flags.is_ending,
         may_end: &flags.may_end,
         progress,
     };
-    let control_links = ControlLinks { socket, snapshots, word, is_ending: &flags.is_ending };
+    let control_links = ControlLinks {
+        socket,
+        snapshots,
+        word,
+        request_reload: request_reload.clone(),
+        reloaded,
+        is_ending: &flags.is_ending,
+    };
+    let reload_links =
+        ReloadLinks { requests: reload_requests, results: reload_results, offers: offer_producer, returned };
     scope(|threads| {
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop(flags);
-        let run_control = || control_socket::run(config, control_links, &flags.stop_control);
+        let run_control = || control_socket::run(loaded.clone(), control_links, &flags.stop_control);
+        spawn(threads, "hexad-reload", || reload::run(loaded.clone(), &mut offer, reload_links))?;
         let control = spawn(threads, "hexad-control", run_control)?;
         let recorder =
             recorder.map(|recorder| spawn(threads, "hexad-recorder", || recorder.run())).transpose()?;
@@ -130,9 +151,9 @@ pub(super) fn run(
 
         let started = start(&config.deployment.realtime, &ready, &go);
         if started.is_ok() {
-            supervise(config, flags, progress, stop);
+            supervise(config, flags, progress, &request_reload, stop);
         }
-        drop(go);
+        drop((go, request_reload));
         let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
         let recorded = recorder.map(|recorder| recorder.join().map_err(|_| DaemonError::Died("recorder")));
@@ -153,17 +174,14 @@ fn report(
     (Report { recording, ..Report::new(config, cyclic, io, log) }, counts_csv)
 }
 
-/// Controller of a configuration.
-fn controller(config: &Config, fidelity: Fidelity) -> Controller {
-    Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
-}
-
 /// Links of the real-time thread to the other threads.
-struct RealtimeLinks<'a> {
+struct RealtimeLinks<'a, 'o> {
     exchange: RealtimeSide,
     records: Producer<'a, CycleRecord>,
     /// Requests of operators.
     word: &'static RequestWord,
+    /// New constants.
+    handover: Handover<'a, 'o>,
     /// To the main thread.
     progress: &'a Progress,
     /// Receives the kernel's files about this thread.
@@ -176,7 +194,7 @@ struct RealtimeLinks<'a> {
 fn run_realtime(
     config: &Config,
     mut controller: Controller,
-    links: RealtimeLinks<'_>,
+    links: RealtimeLinks<'_, '_>,
     stop: &AtomicBool,
 ) -> Option<LoopReport> {
     let realtime = &config.deployment.realtime;
@@ -189,8 +207,10 @@ fn run_realtime(
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
     let (word, progress, mut intake) = (links.word, links.progress, RequestIntake::default());
+    let mut handover = links.handover;
     let step = |input: &mut Input, woke_ns: u64| {
         progress.count_cycle();
+        handover.begin_cycle(&mut controller, woke_ns);
         input.request = intake.next(input.request, word.load(), woke_ns);
         controller.step(input)
     };
@@ -204,9 +224,7 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     let Config { machine, deployment, .. } = config;
     let realtime = &deployment.realtime;
     // Ports belong to the thread that opens them.
-    let timeouts = &deployment.timeouts;
-    let [setpoint_ns, measured_ns] = [timeouts.setpoint_s, timeouts.measured_s].map(nanoseconds);
-    let ports = config.join().and_then(|bus| Ports::open(&bus, Silence { setpoint_ns, measured_ns }));
+    let ports = config.join().and_then(|bus| Ports::open(&bus, links.timeouts.get()));
     let (ports, opened) = ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
     let shortfalls = opened.map(|()| if realtime.is_simulated() { vec![] } else { prepare_io(realtime) });
     // There is no receiver only if the other thread failed first.
@@ -214,16 +232,22 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     let settings = IoSettings {
         timing: timing(deployment),
         lead_ns: nanoseconds(realtime.io_lead_s),
-        max_force_age_ns: measured_ns,
         home: machine.home,
     };
     Some(io_thread::run(&settings, ports?, links, stop))
 }
 
 /// Waits for `stop`, and then until the platform is at rest.
-fn supervise(config: &Config, flags: &Flags, progress: &Progress, stop: &Stop) {
+fn supervise(
+    config: &Config,
+    flags: &Flags,
+    progress: &Progress,
+    request_reload: &Sender<Requester>,
+    stop: &Stop,
+) {
     let realtime = &config.deployment.realtime;
-    let mut supervision = Supervision::begin(progress, realtime.rate_hz, realtime.is_simulated());
+    let mut supervision =
+        Supervision::begin(progress, realtime.rate_hz, realtime.is_simulated(), request_reload);
     info!(name = %config.name, rate_hz = realtime.rate_hz, "running");
     while !stop.is_requested() {
         supervision.step();

@@ -46,6 +46,11 @@ impl<Id: Copy> Lease<Id> {
         Self { known: [None; PUBLISHERS], holder: None, timeout_ns }
     }
 
+    /// Changes the silence after which a publisher has left \[ns\].
+    pub fn set_timeout_ns(&mut self, timeout_ns: u64) {
+        self.timeout_ns = timeout_ns;
+    }
+
     /// Records a message that was received now. `process_id` finds the process of a publisher that is new.
     pub fn record(
         &mut self,

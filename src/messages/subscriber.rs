@@ -177,6 +177,11 @@ impl<T: Message> LeasedSubscriber<T> {
         Self { subscriber, lease: Lease::new(timeout_ns) }
     }
 
+    /// Changes the silence after which a publisher has left \[ns\].
+    pub fn set_timeout_ns(&mut self, timeout_ns: u64) {
+        self.lease.set_timeout_ns(timeout_ns);
+    }
+
     /// The newest message of the publisher that counts, if one arrived since the last call.
     pub fn receive_latest(&mut self, has_control: bool) -> Option<T> {
         // All of them before the decision: after a pause of this process all publishers were silent alike.

@@ -46,6 +46,7 @@ mod readme;
 mod recordings;
 mod refusals;
 mod released;
+mod reload;
 mod requests;
 mod rounds;
 mod stale;

@@ -1,4 +1,4 @@
-//! `hexad engage | stop | park | clear | off | estop`: an operator's request and its outcome.
+//! `hexad engage | stop | park | clear | off | estop | reload`: an operator's request and its outcome.
 //!
 //! The request goes over the control socket, and the daemon's answer comes back. A command that ends with 0 has reached
 //! its state. What stops the platform falls back on a signal where the socket does not answer ([`signal`]).
@@ -22,6 +22,7 @@ use crate::messages::PortError;
 use crate::realtime::stop_request::Stop;
 
 pub mod endpoint;
+pub mod reload;
 pub mod signal;
 
 /// Longest wait for the first line of the daemon. A stop then goes by signal.
@@ -61,6 +62,10 @@ pub enum OperatorError {
     Stale(Request, String),
     #[error("the daemon does not answer: {0}")]
     NoStatus(String),
+    #[error("reload was refused, nothing has changed:\n{0}")]
+    ReloadRefused(String),
+    #[error("reload is not confirmed: {0}")]
+    ReloadNotConfirmed(String),
     #[error("interrupted")]
     Interrupted,
 }

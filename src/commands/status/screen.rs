@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::daemon::control_socket::protocol::AnswerLine;
-use crate::daemon::control_socket::status::{LegReport, SourceReport, StatusReport};
+use crate::daemon::control_socket::status::{ConfigurationReport, LegReport, SourceReport, StatusReport};
 use crate::output::numbers::{AXES, axis_unit, fixed, significant};
 use crate::output::text_table::paragraph;
 
@@ -11,6 +11,8 @@ use crate::output::text_table::paragraph;
 const WIDTH: usize = 80;
 /// Lines that a diagnostic may take.
 const DIAGNOSTIC_LINES: usize = 2;
+/// Digits of a hash that are shown: enough to tell two files apart.
+const SHA1_DIGITS: usize = 10;
 /// Characters of a bar.
 const BAR: usize = 26;
 /// Longest time to a singular pose that is shown \[s\]: beyond, the motion will be another.
@@ -40,8 +42,19 @@ impl fmt::Display for Screen<'_> {
         poses(f, report)?;
         legs(f, report)?;
         singularity(f, report)?;
-        report.sources.iter().try_for_each(|source| writeln!(f, "{}", source_line(source)))
+        report.sources.iter().try_for_each(|source| writeln!(f, "{}", source_line(source)))?;
+        writeln!(f, "{}", file_line(&report.configuration))
     }
+}
+
+/// The machine file in force; of a long path the end is shown.
+fn file_line(configuration: &ConfigurationReport) -> String {
+    let ConfigurationReport { file, sha1, reloads, .. } = configuration;
+    let tail = format!(", sha1 {}, reloads {reloads}", sha1.get(..SHA1_DIGITS).unwrap_or(sha1));
+    let room = WIDTH.saturating_sub("file      ".len() + tail.chars().count());
+    let hidden = file.chars().count().saturating_sub(room);
+    let shown: String = file.chars().skip(hidden).collect();
+    format!("file      {shown}{tail}")
 }
 
 fn timing(f: &mut fmt::Formatter<'_>, report: &StatusReport) -> fmt::Result {
@@ -189,6 +202,12 @@ pub(in crate::commands) mod tests {
             version: String::new(),
             machine: "m".repeat(20),
             process_id: 4_194_304,
+            configuration: ConfigurationReport {
+                file: "/f".repeat(60),
+                sha1: "0123456789abcdef".into(),
+                reloads: 1_000_000,
+                loaded_unix_s: 0,
+            },
             age_s: Some(0.0011),
             active_limits: [
                 "force",

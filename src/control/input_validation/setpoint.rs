@@ -76,6 +76,11 @@ impl SetpointValidator {
         }
     }
 
+    /// Forgets every setpoint; the newest is then validated anew.
+    pub fn forget(&mut self) {
+        *self = Self { missed: self.missed, ..Self::default() };
+    }
+
     /// Whether the valid setpoint is young enough to be followed. One that holds without end stays valid while it is
     /// followed.
     fn check_age(&self, cycle: &Cycle<'_>) -> Result<(), Diagnostic> {

@@ -3,10 +3,11 @@
 use nalgebra::Vector6;
 
 use crate::control::controller::SetpointKind;
-use crate::control::input_validation::SetpointMotion;
+use crate::control::input_validation::{SetpointMotion, ValidatedSetpoint};
 use crate::control::limits::Limits;
-use crate::control::parameters::Parameters;
+use crate::control::parameters::{Constants, Parameters};
 use crate::control::reference::pose_samples::PoseSamples;
+use crate::control::state::State;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 /// Target of one cycle.
@@ -24,6 +25,20 @@ pub enum Target<'a> {
 const MIN_TARGET_SPEED: f64 = 0.01;
 
 impl<'a> Target<'a> {
+    /// What the reference shall approach in a state; nothing where it follows its stop.
+    #[inline(never)]
+    pub(in crate::control) fn of_state(
+        constants: &'a Constants,
+        state: State,
+        setpoint: &ValidatedSetpoint<'a>,
+    ) -> Option<Self> {
+        match state {
+            State::Engaging | State::Active => setpoint.target.filter(|_| setpoint.status.is_ok()),
+            State::Parking => Some(Target::Pose(constants.home.pose(), 1.0)),
+            State::Off | State::Standby | State::Stopping | State::Fault => None,
+        }
+    }
+
     /// The target that a valid setpoint stands for.
     pub fn of_setpoint(setpoint: &'a SetpointMotion, samples: &'a PoseSamples) -> Self {
         // No `match`: a jump table inside the cycle is beyond the proof on its machine code.

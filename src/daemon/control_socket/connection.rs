@@ -45,6 +45,8 @@ pub struct Connection {
     pub peer: Peer,
     /// The request that is not answered yet.
     pub pending: Option<PendingOrder>,
+    /// Number of the reload that is not answered yet.
+    pub reload: Option<u64>,
     /// Whether its client wants lines before the answer.
     pub wants_progress: bool,
     buffer: Vec<u8>,
@@ -75,6 +77,7 @@ impl Connection {
             stream,
             peer,
             pending: None,
+            reload: None,
             wants_progress: false,
             buffer: Vec::new(),
             line_since_ns: Some(now_ns),
@@ -82,6 +85,11 @@ impl Connection {
             has_requested: false,
             has_ended: false,
         })
+    }
+
+    /// Whether an answer is to come.
+    pub fn is_waiting(&self) -> bool {
+        self.pending.is_some() || self.reload.is_some()
     }
 
     /// Reads what there is, up to one line's length, and returns the next complete line.
@@ -127,7 +135,7 @@ impl Connection {
     /// Whether the client has taken too long for a line, or has left and waits for nothing.
     pub fn is_done(&self, now_ns: u64) -> bool {
         let is_slow = self.line_since_ns.is_some_and(|since| now_ns.saturating_sub(since) > LINE_LIMIT_NS);
-        self.pending.is_none() && (self.has_ended || is_slow) && !self.has_line()
+        !self.is_waiting() && (self.has_ended || is_slow) && !self.has_line()
     }
 
     /// Sends a line; false if the client does not read its answers or has left.
@@ -140,7 +148,7 @@ impl Connection {
     /// the longest unused, then those that wait, those that stop last.
     pub fn rank(&self) -> (bool, bool, bool, u64) {
         let stops = self.pending.as_ref().is_some_and(|pending| is_stop(pending.request()));
-        (stops, self.pending.is_some(), self.has_requested, self.used_ns)
+        (stops, self.is_waiting(), self.has_requested, self.used_ns)
     }
 }
 

@@ -6,6 +6,8 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::os::fd::AsFd;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender};
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use tracing::{debug, info, warn};
@@ -15,10 +17,11 @@ use self::connection::{Connection, Peer, Received};
 use self::location::ControlSocket;
 use self::order::{Order, PendingOrder, Step};
 use self::protocol::{AnswerLine, RequestLine, RequestResult, VERSION};
+use self::reload::RELOAD;
 use self::status::StatusSource;
 use super::cycle::MAX_REQUEST_AGE_NS;
+use super::reload::{Loaded, Reloaded, Requester};
 use super::snapshot::Snapshot;
-use crate::config::Config;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::Request;
 use crate::messages::Rejection;
@@ -30,6 +33,7 @@ mod connection;
 pub mod location;
 mod order;
 pub mod protocol;
+mod reload;
 pub mod status;
 
 /// Most connections. One more closes the first in the order of [`Connection::rank`].
@@ -57,20 +61,26 @@ pub(super) struct ControlLinks<'a> {
     pub snapshots: Reader<Snapshot>,
     /// To the real-time thread.
     pub word: &'static RequestWord,
+    /// To the reload thread, and back.
+    pub request_reload: Sender<Requester>,
+    pub reloaded: Receiver<Reloaded>,
     /// Set when the daemon is to end.
     pub is_ending: &'a AtomicBool,
 }
 
 /// Serves clients until `stop`.
-pub(super) fn run(config: &Config, links: ControlLinks<'_>, stop: &AtomicBool) {
-    let ControlLinks { socket, snapshots, word, is_ending } = links;
+pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBool) {
+    let ControlLinks { socket, snapshots, word, request_reload, reloaded, is_ending } = links;
     let mut server = Server {
         socket,
         snapshots,
         word,
+        request_reload,
+        reloaded,
+        reloads: 0,
         is_ending,
         connections: Vec::with_capacity(MAX_CONNECTIONS),
-        status: StatusSource::new(config),
+        status: StatusSource::new(loaded),
         woke_ns: monotonic_ns(),
         stale_until_ns: 0,
         warned_ns: 0,
@@ -82,6 +92,7 @@ pub(super) fn run(config: &Config, links: ControlLinks<'_>, stop: &AtomicBool) {
         server.accept();
         server.read();
         server.advance();
+        server.answer_reloads();
         server.log_rejections();
     }
     server.advance();
@@ -91,9 +102,13 @@ struct Server<'a> {
     socket: ControlSocket,
     snapshots: Reader<Snapshot>,
     word: &'static RequestWord,
+    request_reload: Sender<Requester>,
+    reloaded: Receiver<Reloaded>,
+    /// Requests to reload so far.
+    reloads: u64,
     is_ending: &'a AtomicBool,
     connections: Vec<Connection>,
-    status: StatusSource<'a>,
+    status: StatusSource,
     /// End of the last wait \[ns\].
     woke_ns: u64,
     /// Until then a request may have been sent before the process was held \[ns\].
@@ -108,7 +123,7 @@ struct Server<'a> {
 impl Server<'_> {
     /// Waits for something to read, or a short time. Closes connections whose client has left.
     fn wait(&mut self) {
-        let is_busy = |connection: &Connection| connection.pending.is_some() || connection.has_line();
+        let is_busy = |connection: &Connection| connection.is_waiting() || connection.has_line();
         let is_pending = self.connections.iter().any(is_busy);
         let timeout = PollTimeout::from(if is_pending { PENDING_WAIT_MS } else { IDLE_WAIT_MS });
         let mut events = vec![PollFd::new(self.socket.listener.as_fd(), PollFlags::POLLIN)];
@@ -191,10 +206,15 @@ impl Server<'_> {
             debug!(user = %connection.peer.user, process = connection.peer.process_id, "status");
             return connection.send(&answer);
         }
+        if line.request == RELOAD {
+            info!(user = %connection.peer.user, process = connection.peer.process_id, "request: {RELOAD}");
+            return self.begin_reload(connection, &line, snapshot);
+        }
         let requested = Request::ALL.into_iter().find(|request| request.name() == line.request);
         let Some(request) = requested else {
             let names = Request::ALL.map(Request::name).join(", ");
-            let text = format!("unknown request {:?}; must be one of status, {names}", line.request);
+            let text =
+                format!("unknown request {:?}; must be one of status, {RELOAD}, {names}", line.request);
             return connection.send(&AnswerLine::invalid(text));
         };
         // Before anything else, also before the log, which may block.

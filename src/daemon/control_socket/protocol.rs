@@ -19,7 +19,7 @@ const DEFAULT_WITHIN_S: f64 = 30.0;
 pub struct RequestLine {
     /// Version of the protocol.
     pub version: u32,
-    /// `engage`, `stop`, `park`, `clear`, `off`, `estop` or `status`.
+    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload` or `status`.
     pub request: String,
     /// Whether the answer comes only when the request is completed: its state reached, or another.
     #[serde(default)]
@@ -159,7 +159,18 @@ impl AnswerLine {
         diagnostic: Diagnostic,
         text: String,
     ) -> Self {
-        let (request, state) = (request.name().into(), state.name().into());
+        Self::named(result, request.name(), state, diagnostic, text)
+    }
+
+    /// Answer to a request that is not the controller's.
+    pub fn named(
+        result: RequestResult,
+        request: &str,
+        state: State,
+        diagnostic: Diagnostic,
+        text: String,
+    ) -> Self {
+        let (request, state) = (request.into(), state.name().into());
         Self { version: VERSION, result, request, state, diagnostic: diagnostic.into(), text, status: None }
     }
 

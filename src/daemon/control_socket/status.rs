@@ -3,6 +3,7 @@
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::process;
+use std::sync::Arc;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -12,6 +13,7 @@ use crate::config::Config;
 use crate::control::controller::Publishers;
 use crate::control::limits::{Limit, LimitSet};
 use crate::daemon::process_names::{command, sentence};
+use crate::daemon::reload::Loaded;
 use crate::daemon::snapshot::Snapshot;
 use crate::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
 use crate::model::machine::LEGS;
@@ -27,6 +29,9 @@ pub struct StatusReport {
     pub machine: String,
     /// Process of the daemon.
     pub process_id: u32,
+    /// The configuration in force.
+    #[serde(default)]
+    pub configuration: ConfigurationReport,
     /// Time since the cycle that this describes \[s\]; `None` before the first.
     pub age_s: Option<f64>,
     /// Names of the limits that the cycle has reached, or nearly.
@@ -55,6 +60,19 @@ pub struct StatusReport {
     pub max_force_n: f64,
     /// Senders of the inputs.
     pub sources: Vec<SourceReport>,
+}
+
+/// Machine file in force.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ConfigurationReport {
+    /// The file as the daemon was started with it.
+    pub file: String,
+    /// SHA-1 of the file as it was read, as `sha1sum` prints it.
+    pub sha1: String,
+    /// Unix time at which it was read \[s\].
+    pub loaded_unix_s: u64,
+    /// Number of reloads that were carried out since start.
+    pub reloads: u64,
 }
 
 /// Cycles and missed deadlines since start, and times of the last second.
@@ -122,8 +140,9 @@ pub struct ProcessReport {
 }
 
 /// What status reports are made of.
-pub struct StatusSource<'a> {
-    config: &'a Config,
+pub struct StatusSource {
+    loaded: Arc<Loaded>,
+    reloads: u64,
     /// Opened at the first report; `None` if they cannot be opened, which leaves the processes unknown.
     topics: Option<Option<Topics>>,
 }
@@ -143,10 +162,15 @@ impl Topics {
     }
 }
 
-impl<'a> StatusSource<'a> {
+impl StatusSource {
     /// Reports of a machine.
-    pub fn new(config: &'a Config) -> Self {
-        Self { config, topics: None }
+    pub fn new(loaded: Arc<Loaded>) -> Self {
+        Self { loaded, reloads: 0, topics: None }
+    }
+
+    /// Goes on with a configuration that was reloaded.
+    pub fn set_loaded(&mut self, loaded: Arc<Loaded>) {
+        (self.loaded, self.reloads) = (loaded, self.reloads + 1);
     }
 
     /// Answer to a request for the status.
@@ -166,7 +190,8 @@ impl<'a> StatusSource<'a> {
     }
 
     fn report(&mut self, snapshot: &Snapshot, now_ns: u64) -> StatusReport {
-        let Config { name, machine, deployment, .. } = self.config;
+        let loaded = self.loaded.clone();
+        let Config { name, machine, deployment, place, .. } = &loaded.config;
         let status = &snapshot.status;
         let (is_known, has_error) = (status.pose_valid == 1, status.error_valid == 1);
         let limits = Limit::ALL.into_iter().filter(|it| LimitSet(status.active_limits).contains(*it));
@@ -174,6 +199,12 @@ impl<'a> StatusSource<'a> {
             version: BUILD.into(),
             machine: name.clone(),
             process_id: process::id(),
+            configuration: ConfigurationReport {
+                file: place.clone(),
+                sha1: loaded.sha1.clone(),
+                loaded_unix_s: loaded.loaded_unix_s,
+                reloads: self.reloads,
+            },
             age_s: (snapshot.time_ns > 0).then(|| seconds(snapshot.time_ns, now_ns)),
             active_limits: limits.map(|limit| limit.name().into()).collect(),
             timing: timing(snapshot, deployment.realtime.rate_hz),
@@ -196,7 +227,7 @@ impl<'a> StatusSource<'a> {
     }
 
     fn sources(&mut self, snapshot: &Snapshot, now_ns: u64) -> Vec<SourceReport> {
-        let config = self.config;
+        let config = &self.loaded.config;
         // In simulated time the newest measurement is now.
         let measured_ns = snapshot.measurement.map(|measurement| measurement.time_ns);
         let is_simulated = config.deployment.realtime.is_simulated();
@@ -285,7 +316,8 @@ mod tests {
         snapshot.status.pose_valid = 1;
         (snapshot.status.condition, snapshot.status.time_to_singularity_s) = (f64::INFINITY, f64::INFINITY);
         // Topics of nobody: the processes stay unknown.
-        let mut source = StatusSource { config: &config, topics: Some(None) };
+        let mut source =
+            StatusSource { topics: Some(None), ..StatusSource::new(Arc::new(Loaded::new(config))) };
         let line = source.answer(&snapshot, 2).to_line();
         let answer: AnswerLine = serde_json::from_str(&line).unwrap();
         let report = answer.status.unwrap();

@@ -3,6 +3,7 @@
 use crate::control::controller::{Input, Measurement, Setpoint};
 use crate::control::state::{OperatorRequest, Request};
 use crate::daemon::cycle::{CycleInput, MAX_REQUEST_AGE_NS};
+use crate::daemon::reload::timeouts::TimeoutsNs;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{
     Bus, CommandMessage, LeasedSubscriber, MeasuredMessage, PortError, Rejection, RejectionCounts,
@@ -25,15 +26,6 @@ pub struct Inputs {
     word: u64,
 }
 
-/// Silence after which a publisher has left \[ns\].
-#[derive(Clone, Copy)]
-pub struct Silence {
-    /// Of setpoints.
-    pub setpoint_ns: u64,
-    /// Of measurements.
-    pub measured_ns: u64,
-}
-
 /// Which publishers and which requests are accepted.
 #[derive(Clone, Copy)]
 pub struct InputFilter {
@@ -50,15 +42,21 @@ pub struct InputFilter {
 }
 
 impl Inputs {
-    /// Opens the subscribers.
-    pub fn open(bus: &Bus, silence: Silence) -> Result<Self, PortError> {
+    /// Opens the subscribers. A publisher that is silent for longer than its timeout has left.
+    pub fn open(bus: &Bus, timeouts: TimeoutsNs) -> Result<Self, PortError> {
         Ok(Self {
-            setpoints: bus.leased_subscriber(DEPTH, silence.setpoint_ns)?,
-            measured: bus.leased_subscriber(DEPTH, silence.measured_ns)?,
+            setpoints: bus.leased_subscriber(DEPTH, timeouts.setpoint_ns)?,
+            measured: bus.leased_subscriber(DEPTH, timeouts.measured_ns)?,
             commands: bus.subscriber(usize::MAX)?,
             cycle: CycleInput::default(),
             word: 0,
         })
+    }
+
+    /// Changes the timeouts.
+    pub fn set_timeouts(&mut self, timeouts: TimeoutsNs) {
+        self.setpoints.set_timeout_ns(timeouts.setpoint_ns);
+        self.measured.set_timeout_ns(timeouts.measured_ns);
     }
 
     /// The input for the next cycle, handed over now.
@@ -155,7 +153,7 @@ mod tests {
     #[test]
     fn an_old_request_of_the_topic_stops_and_does_not_begin_control() {
         let bus = Bus::join(&format!("old-requests-{}", std::process::id())).unwrap();
-        let mut inputs = Inputs::open(&bus, Silence { setpoint_ns: 1, measured_ns: 1 }).unwrap();
+        let mut inputs = Inputs::open(&bus, TimeoutsNs { setpoint_ns: 1, measured_ns: 1 }).unwrap();
         let mut commands = bus.publisher::<CommandMessage>().unwrap();
         let mut answered = (0, 0);
         for request in Request::ALL {

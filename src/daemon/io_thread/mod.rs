@@ -9,10 +9,10 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
 
-pub use self::inputs::Silence;
 use self::inputs::{InputFilter, Inputs};
 use self::outputs::{OutputSettings, Outputs};
 use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
+use super::reload::timeouts::{MessageTimeouts, TimeoutsNs};
 use super::snapshot::Snapshot;
 use super::supervision::Progress;
 use crate::messages::clock::monotonic_ns;
@@ -55,6 +55,8 @@ pub struct IoLinks<'a> {
     pub snapshots: Writer<Snapshot>,
     /// Requests of the control thread and of signals.
     pub word: &'static RequestWord,
+    /// A reload changes them.
+    pub timeouts: &'a MessageTimeouts,
     /// Set when the daemon is to end: the platform comes to rest.
     pub is_ending: &'a AtomicBool,
     /// To the main thread.
@@ -69,8 +71,6 @@ pub struct IoSettings {
     pub timing: Timing,
     /// Inputs are read this long before the release \[ns\].
     pub lead_ns: u64,
-    /// Forces computed longer ago than this are not valid any more \[ns\].
-    pub max_force_age_ns: u64,
     pub home: [f64; 6],
 }
 
@@ -86,8 +86,8 @@ pub struct IoReport {
 
 impl Ports {
     /// Opens all. They belong to the thread that calls this.
-    pub fn open(bus: &Bus, silence: Silence) -> Result<Self, PortError> {
-        Ok(Self { inputs: Inputs::open(bus, silence)?, outputs: Outputs::open(bus)? })
+    pub fn open(bus: &Bus, timeouts: TimeoutsNs) -> Result<Self, PortError> {
+        Ok(Self { inputs: Inputs::open(bus, timeouts)?, outputs: Outputs::open(bus)? })
     }
 }
 
@@ -237,6 +237,7 @@ impl IoThread<'_> {
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
         (self.answered, self.has_control) = (output.answered, output.state.has_control());
+        self.inputs.set_timeouts(self.links.timeouts.get());
         if let (WORD_EPOCH, word) = output.answered {
             (self.snapshot.answered, self.snapshot.refusal) = (word, output.request_diagnostic);
             self.links.word.set_seen(word);
@@ -252,7 +253,7 @@ impl IoThread<'_> {
     }
 
     fn publish(&mut self) {
-        let IoSettings { home, max_force_age_ns, .. } = *self.settings;
+        let (home, max_force_age_ns) = (self.settings.home, self.links.timeouts.get().measured_ns);
         let counters = IoCounters {
             allocations: ThreadUsage::allocations_of_this_thread() - self.allocations_at_start,
             rejected: self.inputs.rejections(),

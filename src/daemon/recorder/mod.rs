@@ -6,6 +6,7 @@
 
 use core::time::Duration;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread;
 use std::time::SystemTime;
@@ -18,11 +19,10 @@ use self::folder::Folder;
 use self::replica::Replica;
 use self::stream::Stream;
 use self::tape::Tape;
+use super::reload::Loaded;
 use crate::config::Config;
-use crate::control::controller::Controller;
 use crate::messages::CycleMessage;
 use crate::messages::clock::monotonic_ns;
-use crate::model::fidelity::Fidelity;
 use crate::realtime::setup::denormals;
 use crate::realtime::usage::ThreadUsage;
 use crate::recording::RunInfo;
@@ -81,9 +81,17 @@ pub struct RecorderReport {
     pub usage: ThreadUsage,
 }
 
+/// What the log thread hands over, in order.
+pub enum Recorded {
+    /// One cycle.
+    Cycle(CycleMessage),
+    /// Holds from the next cycle on.
+    Configuration(Arc<Loaded>),
+}
+
 /// The recorder of a daemon.
 pub struct Recorder {
-    queue: Receiver<CycleMessage>,
+    queue: Receiver<Recorded>,
     context: Context,
     tape: Tape,
     replica: Replica,
@@ -106,25 +114,21 @@ pub(super) struct Context {
 impl Recorder {
     /// Allocates all memory but that of the files; `None` if there is nothing to record for. The log thread has the other end
     /// of the queue.
-    pub fn new(
-        config: &Config,
-        fidelity: Fidelity,
-        controller: &Controller,
-        folders: &Folders,
-    ) -> Option<(Self, SyncSender<CycleMessage>)> {
+    pub fn new(loaded: &Loaded, folders: &Folders) -> Option<(Self, SyncSender<Recorded>)> {
         if folders.is_empty() {
             return None;
         }
+        let config = &loaded.config;
         let rate_hz = config.deployment.realtime.rate_hz;
         let (sender, queue) = sync_channel(((QUEUE_S * rate_hz) as usize).clamp(1024, MAX_QUEUE));
-        let info = info(config, fidelity);
+        let info = info(loaded);
         let context = Context { info, scene: Scene::new(&config.machine), rate: (rate_hz as u64).max(1) };
         let started_s = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |it| it.as_secs());
         let folder = |path: &PathBuf| Folder::new(path, &config.name, started_s, folders.bounds);
         let recorder = Self {
             queue,
             tape: Tape::new(rate_hz),
-            replica: Replica::new(controller.clone()),
+            replica: Replica::new(loaded.controller.clone()),
             recording: folders.record.as_ref().map(|path| Stream::recording(folder(path))),
             faults: folders.faults.as_ref().map(folder),
             watch: FaultWatch::new(context.rate),
@@ -159,7 +163,8 @@ impl Recorder {
     fn receive(&mut self) -> (usize, bool) {
         for received in 0..CYCLES_PER_STEP {
             match self.queue.try_recv() {
-                Ok(cycle) => self.add(&cycle),
+                Ok(Recorded::Cycle(cycle)) => self.add(&cycle),
+                Ok(Recorded::Configuration(loaded)) => self.reconfigure(&loaded),
                 Err(error) => return (received, error == TryRecvError::Empty),
             }
         }
@@ -169,7 +174,7 @@ impl Recorder {
     fn add(&mut self, cycle: &CycleMessage) {
         self.report.missing += cycle.cycle.saturating_sub(self.replica.next_cycle());
         self.report.cycles += 1;
-        let is_due = (cycle.cycle - 1).is_multiple_of(self.context.rate);
+        let is_due = self.tape.is_empty() || (cycle.cycle - 1).is_multiple_of(self.context.rate);
         let memory = if is_due { self.replica.memory_before(cycle) } else { None };
         self.tape.push(cycle, memory);
         self.replica.step(cycle);
@@ -178,6 +183,21 @@ impl Recorder {
             && let Some((code, fault)) = self.watch.due(false)
         {
             self.begin_window(code, fault);
+        }
+    }
+
+    /// Goes on with another configuration, in new files: each has one, so that its replay needs no other.
+    fn reconfigure(&mut self, loaded: &Loaded) {
+        self.write();
+        self.finish_windows();
+        let RunInfo { clock_offset_ns, .. } = self.context.info;
+        self.context.info = RunInfo { clock_offset_ns, ..info(loaded) };
+        self.replica.reconfigure(loaded.controller.clone());
+        self.tape.clear();
+        if let Some(recording) = &mut self.recording
+            && let Err(error) = recording.end_file()
+        {
+            warn!("the recording is not complete: {error}; `hexad recover` completes it");
         }
     }
 
@@ -224,7 +244,8 @@ impl Recorder {
         }
     }
 
-    fn finish(&mut self) {
+    /// Writes the windows of all faults so far.
+    fn finish_windows(&mut self) {
         while self.window.is_some() {
             self.write();
         }
@@ -234,6 +255,10 @@ impl Recorder {
         while self.window.is_some() {
             self.write();
         }
+    }
+
+    fn finish(&mut self) {
+        self.finish_windows();
         if let Some(recording) = self.recording.take() {
             self.report.bytes += recording.bytes();
             match recording.finish() {
@@ -245,7 +270,7 @@ impl Recorder {
     }
 }
 
-fn info(config: &Config, fidelity: Fidelity) -> RunInfo {
+fn info(Loaded { config, fidelity, .. }: &Loaded) -> RunInfo {
     let unix_ns =
         SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |it| it.as_nanos() as u64);
     RunInfo {
@@ -267,63 +292,4 @@ pub fn instruction_set(config: &Config) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::control::controller::Input;
-    use crate::daemon::replay::{recorded_controller, replay};
-    use crate::messages::GapMessage;
-    use crate::recording::Item;
-    use crate::recording::reader::Recording;
-
-    /// The cycles of a run without messages.
-    fn cycles(mut controller: Controller, count: u64) -> Vec<CycleMessage> {
-        let cycle = |cycle: u64| {
-            let input = Input { release_ns: cycle * 1_000_000, ..Input::default() };
-            let message = CycleMessage::new(&input, &controller.step(&input));
-            CycleMessage { cycle, due_ns: input.release_ns, ..message }
-        };
-        (1..=count).map(cycle).collect()
-    }
-
-    /// Records cycles without those that `is_lost`: report, items, and numbers of the replay of the file.
-    fn recorded(count: u64, is_lost: impl Fn(u64) -> bool) -> (RecorderReport, Vec<Item>, [u64; 3]) {
-        let config = Config::load("config/fried2008.toml".as_ref()).unwrap();
-        let info = RunInfo { fidelity: Fidelity::Exact.name().into(), ..RunInfo::default() };
-        let controller = recorded_controller(&info, &config);
-        let folder = tempfile::tempdir().unwrap();
-        let folders = Folders { record: Some(folder.path().into()), ..Folders::default() };
-        let (recorder, queue) = Recorder::new(&config, Fidelity::Exact, &controller, &folders).unwrap();
-        let report = thread::scope(|threads| {
-            let recorder = threads.spawn(|| recorder.run());
-            let kept = cycles(controller.clone(), count).into_iter().filter(|cycle| !is_lost(cycle.cycle));
-            kept.for_each(|cycle| queue.send(cycle).unwrap());
-            drop(queue);
-            recorder.join().unwrap()
-        });
-        let path = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
-        let recording = Recording::open(&path).unwrap();
-        let mut items = vec![];
-        recording.each(|item| items.push(item)).unwrap();
-        let (_, replay) = replay(&recording, controller).unwrap();
-        (report, items, [replay.compared, replay.unknown, replay.different])
-    }
-
-    #[test]
-    fn lost_cycles_are_counted_and_marked_where_they_are_missing() {
-        let (report, items, replayed) = recorded(3000, |cycle| (1501..=1510).contains(&cycle));
-        assert_eq!((report.cycles, report.missing, report.is_repeatable), (2990, 10, false));
-        let mark = Item::Gap(GapMessage { first_cycle: 1501, cycles: 10 });
-        let gap = items.iter().position(|item| *item == mark).unwrap();
-        assert!(matches!(&items[gap + 1], Item::Cycle(after) if after.cycle == 1511));
-        let memories = items.iter().filter(|item| matches!(item, Item::Memory { .. })).count();
-        assert_eq!([memories, items.len()], [2, 2 + 1 + 2990], "behind the gap the memory is unknown");
-        assert_eq!(replayed, [1500, 1490, 0]);
-    }
-
-    #[test]
-    fn a_whole_recording_is_repeated() {
-        let (report, items, replayed) = recorded(3000, |_| false);
-        assert_eq!((report.cycles, report.missing, report.is_repeatable), (3000, 0, true));
-        assert_eq!((items.len(), replayed), (3003, [3000, 0, 0]));
-    }
-}
+mod tests;

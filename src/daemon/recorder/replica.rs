@@ -19,6 +19,11 @@ impl Replica {
         Self { controller, next_cycle: 1, is_in_step: true }
     }
 
+    /// Exchanges the constants, as the real-time thread does.
+    pub fn reconfigure(&mut self, mut new: Controller) {
+        self.controller.exchange_constants(&mut new);
+    }
+
     /// Number of the cycle that follows.
     pub fn next_cycle(&self) -> u64 {
         self.next_cycle

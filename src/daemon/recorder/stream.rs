@@ -59,6 +59,13 @@ impl Stream {
         Ok(self.next_cycle > self.end)
     }
 
+    /// Completes the file; the next cycle begins another.
+    pub fn end_file(&mut self) -> Result<(), RecordingError> {
+        let Some(file) = self.file.take() else { return Ok(()) };
+        self.complete_bytes += file.bytes();
+        file.finish().map(drop)
+    }
+
     /// Completes the file.
     pub fn finish(self) -> Result<Option<PathBuf>, RecordingError> {
         self.file.map(RecordingFile::finish).transpose()
@@ -66,24 +73,22 @@ impl Stream {
 
     fn write(&mut self, context: &Context, tape: &Tape, cycle: &CycleMessage) -> Result<(), RecordingError> {
         let begins_second = (cycle.cycle - 1).is_multiple_of(context.rate);
-        if let Some(folder) = &self.folder {
-            let is_full = |file: &RecordingFile| begins_second && file.bytes() >= folder.file_bytes();
-            if let Some(full) = self.file.take_if(|file| is_full(file)) {
-                self.complete_bytes += full.bytes();
-                full.finish()?;
-            }
-            if self.file.is_none() {
-                self.files += 1;
-                let path = folder.next_path(&format!("{:03}", self.files));
-                self.file = Some(RecordingFile::create(&path, &context.info, None)?);
-            }
+        let is_full =
+            |folder: &Folder| self.file.as_ref().is_some_and(|it| it.bytes() >= folder.file_bytes());
+        if begins_second && self.folder.as_ref().is_some_and(is_full) {
+            self.end_file()?;
+        }
+        if let Some(folder) = self.folder.as_ref().filter(|_| self.file.is_none()) {
+            self.files += 1;
+            let path = folder.next_path(&format!("{:03}", self.files));
+            self.file = Some(RecordingFile::create(&path, &context.info, None)?);
         }
         let Some(file) = &mut self.file else { return Ok(()) };
         let missing = cycle.cycle.saturating_sub(self.next_cycle);
         if missing > 0 {
             file.write_gap(cycle.due_ns, &GapMessage { first_cycle: self.next_cycle, cycles: missing })?;
         }
-        if let Some(memory) = tape.memory_before(cycle.cycle).filter(|_| begins_second) {
+        if let Some(memory) = tape.memory_before(cycle.cycle) {
             file.write_memory(cycle.cycle, cycle.due_ns, &memory_bytes(memory))?;
         }
         file.write_cycle(cycle)?;

@@ -44,6 +44,17 @@ impl Tape {
         self.memories.push_back((cycle.cycle, kept));
     }
 
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.cycles.clear();
+        self.memories.clear();
+    }
+
+    /// Whether there is no cycle.
+    pub fn is_empty(&self) -> bool {
+        self.cycles.is_empty()
+    }
+
     /// Cycles from a number on.
     pub fn from(&self, cycle: u64) -> impl Iterator<Item = &CycleMessage> {
         let begin = self.cycles.partition_point(|kept| kept.cycle < cycle);

@@ -12,6 +12,7 @@ use crate::support::machine::Machine;
 
 mod crashes;
 mod python;
+mod reloads;
 mod replays;
 
 /// Arguments of a daemon that records.

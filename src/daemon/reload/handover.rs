@@ -1,0 +1,109 @@
+//! Handover of new constants to the real-time thread, which neither allocates nor waits for it.
+//!
+//! One [`Offer`] is allocated at the start and circulates as a reference: the reload thread fills it, the real-time thread
+//! exchanges its constants for those in it, in a cycle without control, and the log thread returns it. So the old constants are
+//! dropped by the reload thread, and the log thread knows the first cycle with the new ones before it receives that cycle.
+//!
+//! ```text
+//! reload thread --offers--> real-time thread --answers--> log thread --returned--> reload thread
+//! ```
+
+use std::sync::Arc;
+
+use heapless::spsc::{Consumer, Producer, Queue};
+
+use super::Loaded;
+use super::timeouts::{MessageTimeouts, TimeoutsNs};
+use crate::control::controller::Controller;
+use crate::control::state::State;
+use crate::daemon::cycle::MAX_REQUEST_AGE_NS;
+
+/// Room for the one offer: a queue holds one less than its length.
+pub const LENGTH: usize = 2;
+
+/// Queue of offers.
+pub type OfferQueue<'o> = Queue<&'o mut Offer, LENGTH>;
+
+/// New constants on their way to the real-time thread, or its old ones on their way back.
+pub struct Offer {
+    /// Its constants are exchanged.
+    pub controller: Controller,
+    /// The ages that go with them.
+    pub timeouts: TimeoutsNs,
+    /// What they were computed from, for the recorder; the real-time thread leaves it alone.
+    pub loaded: Arc<Loaded>,
+    /// Instant of the offer \[ns\].
+    pub offered_ns: u64,
+    /// Written by the real-time thread.
+    pub answer: Answer,
+}
+
+/// Answer of the real-time thread to an offer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// It has not seen the offer.
+    None,
+    /// The new constants are in force from this cycle on.
+    Taken(u64),
+    /// The platform is under control.
+    Refused(State),
+    /// The loop ran no cycle for so long that the offer counts as withdrawn.
+    TooOld,
+}
+
+impl Offer {
+    /// An offer of what is in force already.
+    pub fn new(loaded: Arc<Loaded>) -> Self {
+        let (controller, timeouts) = (loaded.controller.clone(), loaded.timeouts());
+        Self { controller, timeouts, loaded, offered_ns: 0, answer: Answer::None }
+    }
+
+    /// Whether all cycles before it have been received when `cycle` is received.
+    pub fn is_due(&self, cycle: u64) -> bool {
+        !matches!(self.answer, Answer::Taken(first) if first > cycle)
+    }
+}
+
+/// The real-time thread's ends.
+pub struct Handover<'q, 'o> {
+    offers: Consumer<'q, &'o mut Offer>,
+    answers: Producer<'q, &'o mut Offer>,
+    timeouts: &'q MessageTimeouts,
+    /// Number of the cycle.
+    cycle: u64,
+}
+
+impl<'q, 'o> Handover<'q, 'o> {
+    /// Before the first cycle. Both queues have the length [`LENGTH`].
+    pub fn new(
+        offers: Consumer<'q, &'o mut Offer>,
+        answers: Producer<'q, &'o mut Offer>,
+        timeouts: &'q MessageTimeouts,
+    ) -> Self {
+        Self { offers, answers, timeouts, cycle: 0 }
+    }
+
+    /// Called at the beginning of each cycle, before the controller's step: takes an offer, or refuses it.
+    #[inline(never)]
+    pub fn begin_cycle(&mut self, controller: &mut Controller, woke_ns: u64) {
+        self.cycle += 1;
+        // A queue divides by its length; there is none of another, and so the compiler sees that it is not zero.
+        let are_sound = self.offers.capacity() == LENGTH - 1 && self.answers.capacity() == LENGTH - 1;
+        if !are_sound {
+            return;
+        }
+        let Some(offer) = self.offers.dequeue() else { return };
+        let state = controller.state();
+        offer.answer = if state.has_control() {
+            Answer::Refused(state)
+        } else if woke_ns.saturating_sub(offer.offered_ns) > MAX_REQUEST_AGE_NS {
+            Answer::TooOld
+        } else {
+            controller.exchange_constants(&mut offer.controller);
+            self.timeouts.set(offer.timeouts);
+            Answer::Taken(self.cycle)
+        };
+        // There is one offer, so there is room.
+        let _ = self.answers.enqueue(offer);
+    }
+}
