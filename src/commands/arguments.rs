@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::config::{Config, ConfigError, load_name};
+use crate::config::identity::Identity;
+use crate::config::{Config, ConfigError};
 
 /// Configuration of demonstrations and diagnoses without `--config`.
 pub const DEFAULT_CONFIG: &str = include_str!("../../config/fried2008.toml");
@@ -27,9 +28,9 @@ impl MachineFile {
         Config::load(&self.path)
     }
 
-    /// Name of the machine, also if the rest of the file is not valid.
-    pub fn name(&self) -> Result<String, ConfigError> {
-        load_name(&self.path)
+    /// Identity of the machine, also if the rest of the file is not valid.
+    pub fn identity(&self) -> Result<Identity, ConfigError> {
+        Identity::load(&self.path)
     }
 }
 

@@ -47,7 +47,7 @@ impl HoldArguments {
         }
         // Its own wait must not end with the signal that has brought it here.
         let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT };
-        let outcome = carry_out(&config, &order, &Stop::default(), |_| ());
+        let outcome = carry_out(&config.identity(), &order, &Stop::default(), |_| ());
         if !has_control {
             // Without control there is nothing to stop, unless it was taken just now.
             return Err(TargetError::InterruptedEarly.into());

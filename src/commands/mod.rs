@@ -180,15 +180,16 @@ impl CommandLine {
 
 /// Requests that the daemon reads its machine file again, and prints what has changed.
 fn reload(arguments: &RequestArguments) -> Result<(), Failure> {
-    let changed = operate::reload::reload(&arguments.machine.name()?, arguments.timeout())?;
+    let changed = operate::reload::reload(&arguments.machine.identity()?.name, arguments.timeout())?;
     Ok(print(format_args!("{changed}\n"))?)
 }
 
 /// Sends an operator's request and prints the state that it led to, and on standard error what it waits for.
 fn send(arguments: &RequestArguments, request: Request, waits: bool) -> Result<(), Failure> {
-    let (config, stop) = (arguments.machine.load()?, Stop::on_signals()?);
+    let (machine, stop) = (arguments.machine.identity()?, Stop::on_signals()?);
     let order = Order { request, is_patient: waits, timeout: arguments.timeout() };
-    let outcome = operate::carry_out(&config, &order, &stop, |reason| eprintln!("hexad: waiting: {reason}"))?;
+    let outcome =
+        operate::carry_out(&machine, &order, &stop, |reason| eprintln!("hexad: waiting: {reason}"))?;
     if let Some(way) = outcome.confirmed {
         eprintln!("hexad: {way}");
     }

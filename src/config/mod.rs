@@ -12,12 +12,12 @@ use std::{fmt, io};
 use serde::Serialize;
 use thiserror::Error;
 use toml::de::DeTable;
-use tracing::warn;
 
 use crate::messages::{Bus, PortError};
 use crate::model::machine::Machine;
 
 use self::deployment::Deployment;
+use self::identity::Identity;
 use self::reader::{SectionReader, ViolationLog};
 
 mod bound;
@@ -27,6 +27,7 @@ pub mod deployment;
 pub mod examination;
 pub mod fidelity;
 mod geometry;
+pub mod identity;
 mod machine;
 mod reader;
 mod syntax;
@@ -115,29 +116,14 @@ impl Config {
         }
     }
 
+    /// What a request needs of it.
+    pub fn identity(&self) -> Identity {
+        Identity { name: self.name.clone(), is_simulated: self.deployment.realtime.is_simulated() }
+    }
+
     /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.
     pub fn join(&self) -> Result<Bus, PortError> {
-        if self.deployment.realtime.is_simulated() {
-            warn!(
-                "TIME IS SIMULATED (realtime.release = \"lockstep\"): no hardware receives messages, topics are \
-                 hexad-simulated/{}/...",
-                self.name
-            );
-            return Bus::join_simulated(&self.name);
-        }
-        Bus::join(&self.name)
-    }
-}
-
-/// Name of the machine of a file, also if the rest of it is not valid.
-pub fn load_name(path: &Path) -> Result<String, ConfigError> {
-    let (text, place) = text::read_file(path)?;
-    let (table, _) = DeTable::parse_recoverable(&text);
-    let log = ViolationLog::new(&text, vec![]);
-    let name = SectionReader::root(&log, table.get_ref()).name("name", MAX_NAME_LENGTH);
-    match log.into_violations() {
-        violations if violations.is_empty() => Ok(name),
-        violations => Err(ConfigError::Invalid { place, violations }),
+        self.identity().join()
     }
 }
 

@@ -62,6 +62,14 @@ pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
     prepare(realtime.io_cpu, scheduled)
 }
 
+/// FIFO priority of the control thread: above ordinary processes, below everything else in real time.
+const CONTROL_PRIORITY: i32 = 1;
+
+/// Prepares the calling thread for requests. Without the right to it the other two threads lack the same, and say so.
+pub(super) fn prepare_control() {
+    let _ = scheduling::fifo_priority(CONTROL_PRIORITY);
+}
+
 /// Prepares the calling thread for the loop. The warm-up comes before SCHED_DEADLINE, whose budget it would
 /// use up.
 pub(crate) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {

@@ -26,7 +26,7 @@ use super::reload::timeouts::MessageTimeouts;
 use super::reload::{self, Loaded, ReloadLinks, Requester};
 use super::report::Report;
 use super::snapshot::Snapshot;
-use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
+use super::start::{Ready, prepare_control, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
 use crate::config::Config;
@@ -138,7 +138,12 @@ pub(super) fn run(
     scope(|threads| {
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop(flags);
-        let run_control = || control_socket::run(loaded.clone(), control_links, &flags.stop_control);
+        let run_control = || {
+            if !config.deployment.realtime.is_simulated() {
+                prepare_control();
+            }
+            control_socket::run(loaded.clone(), control_links, &flags.stop_control);
+        };
         spawn(threads, "hexad-reload", || reload::run(loaded.clone(), &mut offer, reload_links))?;
         let control = spawn(threads, "hexad-control", run_control)?;
         let recorder =

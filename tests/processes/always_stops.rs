@@ -28,14 +28,14 @@ const HOSTILE: usize = 128;
 const TRIALS: usize = 10;
 
 /// What fills every slot of the shared memory.
-struct Slots {
+pub struct Slots {
     _commands: Vec<Publisher<CommandMessage>>,
     _statuses: Vec<Subscriber<StatusMessage>>,
     _nodes: Vec<Bus>,
 }
 
 impl Slots {
-    fn fill(machine: &str) -> Self {
+    pub fn fill(machine: &str) -> Self {
         let bus = Bus::join(machine).expect("to join");
         let _commands: Vec<_> = std::iter::from_fn(|| bus.publisher::<CommandMessage>().ok()).collect();
         let _statuses: Vec<_> = std::iter::from_fn(|| bus.subscriber::<StatusMessage>(8).ok()).collect();
@@ -190,14 +190,14 @@ fn with_a_log_that_nobody_reads() {
 }
 
 /// Clients that stay silent, send half a line, send without end, or never read; each connects again when it is closed.
-struct Hostile {
+pub struct Hostile {
     stop: Arc<AtomicBool>,
     sent: Arc<AtomicU64>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Hostile {
-    fn start(path: &std::path::Path) -> Self {
+    pub fn start(path: &std::path::Path) -> Self {
         let (stop, sent) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
         let start = |number: usize| {
             let (stop, sent, path) = (stop.clone(), sent.clone(), path.to_owned());
@@ -238,7 +238,7 @@ impl Hostile {
         }
     }
 
-    fn finish(self) -> u64 {
+    pub fn finish(self) -> u64 {
         self.stop.store(true, Ordering::Relaxed);
         self.threads.into_iter().for_each(|thread| thread.join().expect("a client"));
         self.sent.load(Ordering::Relaxed)

@@ -33,7 +33,7 @@ fn priorities_and_the_processor_of_the_loop_alone() {
     for (name, class, cpus) in [
         ("hexad", OTHER, &everywhere),
         ("hexad-log", OTHER, &everywhere),
-        ("hexad-control", OTHER, &everywhere),
+        ("hexad-control", (FIFO, 1), &everywhere),
         ("hexad-io", (FIFO, 79), &everywhere),
         ("hexad-rt", (FIFO, 80), &"0".to_owned()),
     ] {

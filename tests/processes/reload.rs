@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::process::Command;
+use std::time::Instant;
 
 use serde_json::Value;
 
@@ -176,6 +177,24 @@ fn a_hangup_reloads() {
     edit(&machine, &[("condition = 90.0", "condition = 80.0")]);
     daemon.signal("HUP");
     daemon.says("limits.condition: 90.0 -> 80.0");
-    assert_eq!(in_force(&machine), (sha1(&machine), 1.into(), 80.0.into()));
+    // The status follows when the control thread next looks.
+    let began = Instant::now();
+    while in_force(&machine) != (sha1(&machine), 1.into(), 80.0.into()) {
+        assert!(began.elapsed() < HANG, "{:?}", in_force(&machine));
+    }
+    daemon.stops_on("TERM", HANG);
+}
+
+/// A mistake in the file keeps nobody from stopping.
+#[test]
+fn with_a_file_that_is_not_valid_the_daemon_still_stops() {
+    let _turn = turns::beside_others();
+    let machine = machine("mistaken");
+    let daemon = start_daemon(&machine);
+    daemon.says("running");
+    edit(&machine, &[("= 10.0\n", "= -10.0\n")]);
+    does(&machine, "off", &[], &["off"]);
+    does(&machine, "estop", &[], &["fault"]);
+    assert_eq!(status(&machine)["state"], "fault");
     daemon.stops_on("TERM", HANG);
 }

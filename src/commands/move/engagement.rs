@@ -53,7 +53,7 @@ impl Engagement {
                 let result = result.get_or_insert_with(|| {
                     let rest = within.saturating_sub(began.elapsed());
                     let order = Order { request: Request::Engage, is_patient: true, timeout: rest };
-                    carry_out_in_background(config, order, stop)
+                    carry_out_in_background(&config.identity(), order, stop)
                 });
                 match result.try_recv() {
                     Ok(outcome) => Ok(outcome?),

@@ -13,7 +13,7 @@ use tracing::info;
 
 use self::endpoint::{Attempt, Connection, Endpoint, endpoints};
 use self::signal::Signalled;
-use crate::config::Config;
+use crate::config::identity::Identity;
 use crate::control::state::Request;
 pub use crate::daemon::control_socket::protocol::AnswerLine as Answer;
 use crate::daemon::control_socket::protocol::{AnswerLine, RequestLine, RequestResult};
@@ -100,14 +100,14 @@ enum Exchange {
 /// Sends the request and waits for its outcome. `waits` receives why it waits, each reason once. A patient request also
 /// waits for a daemon that is about to start.
 pub fn carry_out(
-    config: &Config,
+    machine: &Identity,
     order: &Order,
     stop: &Stop,
     mut waits: impl FnMut(&str),
 ) -> Result<Outcome, OperatorError> {
     let began = Instant::now();
     loop {
-        let outcome = attempt(config, order, stop, &mut waits);
+        let outcome = attempt(machine, order, stop, &mut waits);
         let limit = match &outcome {
             Err(OperatorError::NoDaemon(_)) if order.is_patient => DAEMON_START_LIMIT.min(order.timeout),
             // Only what this command has just sent itself is not old.
@@ -123,15 +123,15 @@ pub fn carry_out(
 
 /// Carries it out in a thread: setpoints must not wait. What it waits for is logged.
 pub fn carry_out_in_background(
-    config: &Config,
+    machine: &Identity,
     order: Order,
     stop: &Stop,
 ) -> Receiver<Result<(), OperatorError>> {
     let (send, result) = channel();
-    let (config, stop) = (config.clone(), stop.clone());
+    let (machine, stop) = (machine.clone(), stop.clone());
     spawn(move || {
         let name = order.request.name();
-        let outcome = carry_out(&config, &order, &stop, |reason| info!("{name} waits: {reason}"));
+        let outcome = carry_out(&machine, &order, &stop, |reason| info!("{name} waits: {reason}"));
         // Nobody receives it when the command has ended.
         let _ = send.send(outcome.map(drop));
     });
@@ -140,13 +140,12 @@ pub fn carry_out_in_background(
 
 /// Sends the request to each daemon that may be there, until one answers.
 fn attempt(
-    config: &Config,
+    machine: &Identity,
     order: &Order,
     stop: &Stop,
     waits: &mut impl FnMut(&str),
 ) -> Result<Outcome, OperatorError> {
-    let machine = &config.name;
-    let places = endpoints(machine);
+    let places = endpoints(&machine.name);
     let mut forbidden = None;
     for endpoint in &places {
         let mut process_id = endpoint.daemon.as_ref().map(|daemon| daemon.process_id);
@@ -169,11 +168,11 @@ fn attempt(
         }
         match (exchange, process_id) {
             (Exchange::Answer(answer), _) => return conclude(order, &answer),
-            (_, Some(process_id)) => return without_socket(config, order, endpoint, process_id),
+            (_, Some(process_id)) => return without_socket(machine, order, endpoint, process_id),
             (_, None) => {}
         }
     }
-    Err(unreachable_daemon(machine, forbidden))
+    Err(unreachable_daemon(&machine.name, forbidden))
 }
 
 /// The status of the daemon of a machine.
@@ -267,7 +266,7 @@ fn conclude(order: &Order, answer: &AnswerLine) -> Result<Outcome, OperatorError
 
 /// What stops the platform goes by signal; everything else has failed.
 fn without_socket(
-    config: &Config,
+    machine: &Identity,
     order: &Order,
     endpoint: &Endpoint,
     process_id: u32,
@@ -280,7 +279,7 @@ fn without_socket(
         );
         return Err(OperatorError::NotConfirmed(request, reason));
     }
-    match signal::send(config, request, endpoint, process_id, order.timeout) {
+    match signal::send(machine, request, endpoint, process_id, order.timeout) {
         Signalled::Confirmed { state, way } => Ok(Outcome { state, confirmed: Some(way) }),
         Signalled::Unconfirmed(reason) => Err(OperatorError::NotConfirmed(request, reason)),
     }

@@ -7,7 +7,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use super::endpoint::{Attempt, Endpoint};
-use crate::config::Config;
+use crate::config::identity::Identity;
 use crate::control::state::{Request, State};
 use crate::daemon::control_socket::protocol::RequestLine;
 use crate::daemon::control_socket::user_name;
@@ -35,7 +35,7 @@ pub enum Signalled {
 
 /// Sends a signal to the daemon and waits until the daemon reports that it is carried out.
 pub fn send(
-    config: &Config,
+    machine: &Identity,
     request: Request,
     endpoint: &Endpoint,
     process_id: u32,
@@ -45,7 +45,7 @@ pub fn send(
     let carried_out = request_of(signal);
     // Before the signal. Another user's messages are not seen, but the socket may still answer.
     let is_own = endpoint.daemon.as_ref().is_some_and(|daemon| daemon.user_id == user_id());
-    let join = || config.join().and_then(|bus| bus.subscriber::<StatusMessage>(8)).ok();
+    let join = || machine.join().and_then(|bus| bus.subscriber::<StatusMessage>(8)).ok();
     let mut statuses = if is_own { join() } else { None };
     let sent_ns = monotonic_ns();
     if let Err(error) = signal.send(process_id) {

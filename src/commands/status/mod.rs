@@ -10,7 +10,7 @@ use clap::Args;
 use self::screen::Screen;
 use super::failure::Failure;
 use super::operate;
-use crate::config::Config;
+use crate::config::identity::Identity;
 use crate::output::files::print;
 use crate::realtime::stop_request::Stop;
 
@@ -48,7 +48,7 @@ impl StatusArguments {
     }
 
     fn show_machine(&self, path: &Path) -> Result<(), Failure> {
-        let machine = Config::load(path)?.name;
+        let machine = Identity::load(path)?.name;
         if !self.watch {
             return self.show(&operate::status(&machine)?, false);
         }

@@ -236,7 +236,7 @@ impl<'a> TargetSource<'a> {
         let Some(timeout) = self.within else { return Ok(()) };
         let engagement = self.engagement.get_or_insert_with(|| {
             let order = Order { request: Request::Engage, is_patient: true, timeout };
-            carry_out_in_background(self.config, order, &self.stop)
+            carry_out_in_background(&self.config.identity(), order, &self.stop)
         });
         match engagement.try_recv() {
             // The command itself has noticed the signal, too.

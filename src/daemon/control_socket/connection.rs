@@ -8,7 +8,7 @@ use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use nix::unistd::{Uid, User};
 
 use super::order::{PendingOrder, is_stop};
-use super::protocol::AnswerLine;
+use super::protocol::{AnswerLine, RequestLine};
 
 /// Longest line \[bytes\]: many times the longest request.
 pub const MAX_LINE_BYTES: usize = 4096;
@@ -19,7 +19,7 @@ pub const LINE_LIMIT_NS: u64 = 2_000_000_000;
 /// User and process at the other end, from the kernel.
 #[derive(Clone, Debug)]
 pub struct Peer {
-    pub user: String,
+    user_id: Option<u32>,
     pub process_id: i32,
 }
 
@@ -27,8 +27,12 @@ impl Peer {
     fn of(stream: &UnixStream) -> Self {
         let found = getsockopt(&stream.as_fd(), PeerCredentials);
         let (user_id, process_id) = found.map_or((None, 0), |found| (Some(found.uid()), found.pid()));
-        let user = user_id.map_or_else(|| "unknown".into(), user_name);
-        Self { user, process_id }
+        Self { user_id, process_id }
+    }
+
+    /// Name of the user. The system may take long to find it: only for the log, when everything else is done.
+    pub fn user(&self) -> String {
+        self.user_id.map_or_else(|| "unknown".into(), user_name)
     }
 }
 
@@ -45,6 +49,8 @@ pub struct Connection {
     pub peer: Peer,
     /// The request that is not answered yet.
     pub pending: Option<PendingOrder>,
+    /// The line that waits for its turn.
+    pub line: Option<RequestLine>,
     /// Number of the reload that is not answered yet.
     pub reload: Option<u64>,
     /// Whether its client wants lines before the answer.
@@ -77,6 +83,7 @@ impl Connection {
             stream,
             peer,
             pending: None,
+            line: None,
             reload: None,
             wants_progress: false,
             buffer: Vec::new(),
@@ -89,7 +96,7 @@ impl Connection {
 
     /// Whether an answer is to come.
     pub fn is_waiting(&self) -> bool {
-        self.pending.is_some() || self.reload.is_some()
+        self.pending.is_some() || self.line.is_some() || self.reload.is_some()
     }
 
     /// Reads what there is, up to one line's length, and returns the next complete line.

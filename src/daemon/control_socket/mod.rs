@@ -1,6 +1,8 @@
 //! The control thread: requests of operators over a Unix socket, one JSON object per line.
 //!
-//! It is neither the real-time thread nor the I/O thread and has ordinary priority. Requests reach the real-time thread
+//! It is neither the real-time thread nor the I/O thread. Its priority is the lowest of those in real time, so that no ordinary
+//! process delays a stop, and it rests for as long as it has worked: clients that mean no good get half of a processor at most.
+//! Stops are served before everything else. Requests reach the real-time thread
 //! through the request word, answers come from the snapshot that the I/O thread writes in every cycle. Number of
 //! connections, length of a line and time for it are bounded, and nothing here waits for a client.
 
@@ -8,6 +10,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use std::os::fd::AsFd;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender};
+use std::thread::sleep;
+use std::time::Duration;
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use tracing::{debug, info, warn};
@@ -16,7 +20,7 @@ pub use self::connection::user_name;
 use self::connection::{Connection, Peer, Received};
 use self::location::ControlSocket;
 use self::order::{Order, PendingOrder, Step};
-use self::protocol::{AnswerLine, RequestLine, RequestResult, VERSION};
+use self::protocol::{AnswerLine, RequestLine, RequestResult};
 use self::reload::RELOAD;
 use self::status::StatusSource;
 use super::cycle::MAX_REQUEST_AGE_NS;
@@ -43,6 +47,11 @@ const MAX_CONNECTIONS: usize = 64;
 const IDLE_WAIT_MS: u8 = 50;
 /// The same while a request is pending \[ms\]: a period of the usual loop.
 const PENDING_WAIT_MS: u8 = 1;
+
+/// Lines that are answered in a round, besides stops: each is logged, which takes most of the time.
+const LINES_PER_ROUND: usize = 4;
+/// Longest rest after a round \[ns\]: a log that blocks is no work.
+const MAX_REST_NS: u64 = 500_000;
 
 /// Time after the process was held in which no request may begin control \[ns\]: it may have been sent before. Enough
 /// rounds to read what every connection has buffered.
@@ -79,7 +88,7 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         reloaded,
         reloads: 0,
         is_ending,
-        connections: Vec::with_capacity(MAX_CONNECTIONS),
+        connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
         status: StatusSource::new(loaded),
         woke_ns: monotonic_ns(),
         stale_until_ns: 0,
@@ -88,9 +97,11 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         logged: [None; 2],
     };
     while !stop.load(Ordering::Relaxed) {
+        server.rest();
         server.wait();
         server.accept();
         server.read();
+        server.make_room();
         server.advance();
         server.answer_reloads();
         server.log_rejections();
@@ -121,6 +132,12 @@ struct Server<'a> {
 }
 
 impl Server<'_> {
+    /// Rests for as long as the round has worked: others need the processor, too.
+    fn rest(&self) {
+        let worked_ns = monotonic_ns().saturating_sub(self.woke_ns);
+        sleep(Duration::from_nanos(worked_ns.min(MAX_REST_NS)));
+    }
+
     /// Waits for something to read, or a short time. Closes connections whose client has left.
     fn wait(&mut self) {
         let is_busy = |connection: &Connection| connection.is_waiting() || connection.has_line();
@@ -142,7 +159,8 @@ impl Server<'_> {
         let word = self.word;
         let mut gone = gone.drain(..);
         self.connections.retain(|connection| {
-            let is_gone = gone.next().unwrap_or_default() && !connection.has_line();
+            let is_gone =
+                gone.next().unwrap_or_default() && !connection.has_line() && connection.line.is_none();
             if let Some(pending) = connection.pending.as_ref().filter(|_| is_gone) {
                 pending.cancel(word);
             }
@@ -155,71 +173,95 @@ impl Server<'_> {
         self.woke_ns = now_ns;
     }
 
-    /// Accepts what waits, and makes room for it.
+    /// Accepts what waits.
     fn accept(&mut self) {
         for _ in 0..MAX_CONNECTIONS {
             let Ok((stream, _)) = self.socket.listener.accept() else { return };
-            if self.connections.len() >= MAX_CONNECTIONS {
-                let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
-                if let Some((_, least)) = ranks.min() {
-                    let closed = self.connections.swap_remove(least);
-                    closed.pending.iter().for_each(|pending| pending.cancel(self.word));
-                }
-            }
             self.connections.extend(Connection::new(stream, self.woke_ns));
         }
     }
 
-    /// Reads at most one line of each connection.
+    /// Closes connections beyond the most, after each was read once: however many connect, none is closed before its first line.
+    fn make_room(&mut self) {
+        while self.connections.len() > MAX_CONNECTIONS {
+            let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
+            let Some((_, least)) = ranks.min() else { return };
+            let closed = self.connections.swap_remove(least);
+            closed.pending.iter().for_each(|pending| pending.cancel(self.word));
+        }
+    }
+
+    /// Reads at most one line of each connection. Stops are carried out at once, of all else some in each round.
     fn read(&mut self) {
         let snapshot = *self.snapshots.read();
         let mut connections = core::mem::take(&mut self.connections);
-        connections.retain_mut(|connection| match connection.receive(self.woke_ns) {
+        connections.retain_mut(|connection| self.receive(connection, &snapshot));
+        let (mut answered, mut last) = (0, 0);
+        let mut place = 0;
+        connections.retain_mut(|connection| {
+            place += 1;
+            let Some(line) = connection.line.take_if(|_| answered < LINES_PER_ROUND) else { return true };
+            (answered, last) = (answered + 1, place);
+            self.respond(connection, &line, &snapshot)
+        });
+        // Those behind the last are the first of the next round.
+        let last = last.min(connections.len());
+        connections.rotate_left(last);
+        self.connections = connections;
+    }
+
+    /// Receives a line; false if the connection is of no more use.
+    fn receive(&mut self, connection: &mut Connection, snapshot: &Snapshot) -> bool {
+        if connection.line.is_some() {
+            return true;
+        }
+        match connection.receive(self.woke_ns) {
             Received::Nothing => !connection.is_done(self.woke_ns),
-            Received::Line(line) => self.respond(connection, &line, &snapshot),
+            Received::Line(line) => match RequestLine::parse(&line) {
+                Ok(line) if line.is_stop() => self.respond(connection, &line, snapshot),
+                Ok(line) => {
+                    connection.line = Some(line);
+                    true
+                }
+                Err(reason) => connection.send(&AnswerLine::invalid(reason)),
+            },
             Received::Garbage(reason) => {
                 connection.send(&AnswerLine::invalid(reason.into()));
                 self.warn_of(connection, reason);
                 false
             }
-        });
-        self.connections = connections;
+        }
     }
 
     fn warn_of(&mut self, connection: &Connection, reason: &str) {
         self.closed += 1;
         if self.woke_ns.saturating_sub(self.warned_ns) > WARNING_INTERVAL_NS {
             let (peer, count) = (&connection.peer, self.closed);
-            warn!(user = %peer.user, process = peer.process_id, count, "control socket: closed: {reason}");
+            warn!(user = %peer.user(), process = peer.process_id, count, "control socket: closed: {reason}");
             (self.warned_ns, self.closed) = (self.woke_ns, 0);
         }
     }
 
     /// Responds to a line; false if the connection is of no more use.
-    fn respond(&mut self, connection: &mut Connection, line: &str, snapshot: &Snapshot) -> bool {
-        let line = match parse(line) {
-            Ok(line) => line,
-            Err(reason) => return connection.send(&AnswerLine::invalid(reason)),
-        };
+    fn respond(&mut self, connection: &mut Connection, line: &RequestLine, snapshot: &Snapshot) -> bool {
         if line.request == "status" {
             let answer = self.status.answer(snapshot, self.woke_ns);
-            debug!(user = %connection.peer.user, process = connection.peer.process_id, "status");
+            debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
             return connection.send(&answer);
         }
         if line.request == RELOAD {
-            info!(user = %connection.peer.user, process = connection.peer.process_id, "request: {RELOAD}");
-            return self.begin_reload(connection, &line, snapshot);
+            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RELOAD}");
+            return self.begin_reload(connection, line, snapshot);
         }
-        let requested = Request::ALL.into_iter().find(|request| request.name() == line.request);
-        let Some(request) = requested else {
+        let Some(request) = line.controller_request() else {
             let names = Request::ALL.map(Request::name).join(", ");
             let text =
                 format!("unknown request {:?}; must be one of status, {RELOAD}, {names}", line.request);
             return connection.send(&AnswerLine::invalid(text));
         };
         // Before anything else, also before the log, which may block.
-        let answer = self.begin(connection, request, &line, snapshot);
-        info!(user = %connection.peer.user, process = connection.peer.process_id, "request: {}", request.name());
+        let answer = self.begin(connection, request, line, snapshot);
+        info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {}", request.name());
         answer.is_none_or(|answer| {
             log_failure(&connection.peer, &answer);
             connection.send(&answer)
@@ -303,7 +345,7 @@ fn log_failure(peer: &Peer, answer: &AnswerLine) {
     }
     let (value, bound) = (diagnostic.value.unwrap_or_default(), diagnostic.bound.unwrap_or_default());
     warn!(
-        user = %peer.user,
+        user = %peer.user(),
         process = peer.process_id,
         state = %state,
         code = diagnostic.code,
@@ -312,13 +354,4 @@ fn log_failure(peer: &Peer, answer: &AnswerLine) {
         "{request} {}: {text}",
         result.words()
     );
-}
-
-/// Reads a line.
-fn parse(line: &str) -> Result<RequestLine, String> {
-    let line: RequestLine = serde_json::from_str(line).map_err(|error| format!("no request: {error}"))?;
-    if line.version != VERSION {
-        return Err(format!("version {} of the protocol; this daemon has version {VERSION}", line.version));
-    }
-    Ok(line)
 }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::order::is_stop;
 use super::status::StatusReport;
 use crate::control::diagnostic::Diagnostic;
 use crate::control::state::{Request, State};
@@ -51,6 +52,28 @@ impl RequestLine {
             progress,
             within_s: DEFAULT_WITHIN_S,
         }
+    }
+
+    /// Reads a line.
+    pub fn parse(line: &str) -> Result<Self, String> {
+        let line: Self = serde_json::from_str(line).map_err(|error| format!("no request: {error}"))?;
+        if line.version != VERSION {
+            return Err(format!(
+                "version {} of the protocol; this daemon has version {VERSION}",
+                line.version
+            ));
+        }
+        Ok(line)
+    }
+
+    /// The request to the controller; `None` if it is another one, or unknown.
+    pub fn controller_request(&self) -> Option<Request> {
+        Request::ALL.into_iter().find(|request| request.name() == self.request)
+    }
+
+    /// Whether it ends control or force.
+    pub fn is_stop(&self) -> bool {
+        self.controller_request().is_some_and(is_stop)
     }
 }
 

@@ -14,4 +14,5 @@ pub mod steps;
 pub mod threads;
 pub mod trio;
 pub mod turns;
+pub mod witness;
 pub mod xml;
