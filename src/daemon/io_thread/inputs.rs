@@ -16,6 +16,9 @@ const STOP_BEFORE_END: OperatorRequest = OperatorRequest { request: Request::Sto
 /// Messages kept per topic between two reads. Only the newest counts.
 const DEPTH: usize = 8;
 
+/// Requests of the topic received in one round: a publisher that never pauses must not hold the thread. A tenth of a period at 1 kHz.
+const REQUESTS_PER_ROUND: usize = 256;
+
 /// Subscribers of the daemon, and the input that their messages make.
 pub struct Inputs {
     setpoints: LeasedSubscriber<SetpointMessage>,
@@ -118,7 +121,8 @@ impl Inputs {
             (self.word, self.cycle.input.request) = (word, None);
         }
         let is_pending = |request: &OperatorRequest| request.message != answered;
-        while let Some(message) = self.commands.receive_from_any() {
+        for _ in 0..REQUESTS_PER_ROUND {
+            let Some(message) = self.commands.receive_from_any() else { break };
             let Some(request) = message.request() else { continue };
             let is_too_old = now_ns.abs_diff(message.header.time_ns) > MAX_REQUEST_AGE_NS;
             let is_overtaken = message.header.time_ns < word_ns;
