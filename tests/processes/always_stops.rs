@@ -88,7 +88,7 @@ fn under_hostile_connections_and_four_that_wait() {
     drop(waiting);
     let plant = start_plant(&machine);
     let _peer = peer::start(&machine);
-    let hostile = Hostile::start(&path);
+    let hostile = Hostile::start(&path, HOSTILE);
     hostile.must_have_sent(10_000_000);
     let (mut by_socket, mut longest) = (0, Duration::ZERO);
     for trial in 0..TRIALS {
@@ -197,7 +197,7 @@ pub struct Hostile {
 }
 
 impl Hostile {
-    pub fn start(path: &std::path::Path) -> Self {
+    pub fn start(path: &std::path::Path, count: usize) -> Self {
         let (stop, sent) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
         let start = |number: usize| {
             let (stop, sent, path) = (stop.clone(), sent.clone(), path.to_owned());
@@ -226,7 +226,7 @@ impl Hostile {
                 }
             })
         };
-        let threads = (0..HOSTILE).map(start).collect();
+        let threads = (0..count).map(start).collect();
         Self { stop, sent, threads }
     }
 

@@ -1,7 +1,7 @@
 //! The control thread: requests of operators over a Unix socket, one JSON object per line.
 //!
 //! It is neither the real-time thread nor the I/O thread. Its priority is the lowest of those in real time, so that no ordinary
-//! process delays a stop, and it rests for as long as it has worked: clients that mean no good get half of a processor at most.
+//! process delays a stop, and it rests between its rounds: clients that mean no good leave some of the processor to others.
 //! Stops are served before everything else. Requests reach the real-time thread
 //! through the request word, answers come from the snapshot that the I/O thread writes in every cycle. Number of
 //! connections, length of a line and time for it are bounded, and nothing here waits for a client.
@@ -50,8 +50,8 @@ const PENDING_WAIT_MS: u8 = 1;
 
 /// Lines that are answered in a round, besides stops: each is logged, which takes most of the time.
 const LINES_PER_ROUND: usize = 4;
-/// Longest rest after a round \[ns\]: a log that blocks is no work.
-const MAX_REST_NS: u64 = 500_000;
+/// Longest rest after a round \[ns\]: a stop may come meanwhile, and a log that blocks is no work.
+const MAX_REST_NS: u64 = 200_000;
 
 /// Time after the process was held in which no request may begin control \[ns\]: it may have been sent before. Enough
 /// rounds to read what every connection has buffered.
@@ -132,7 +132,7 @@ struct Server<'a> {
 }
 
 impl Server<'_> {
-    /// Rests for as long as the round has worked: others need the processor, too.
+    /// Rests for as long as the round has worked, up to [`MAX_REST_NS`]: others need the processor, too.
     fn rest(&self) {
         let worked_ns = monotonic_ns().saturating_sub(self.woke_ns);
         sleep(Duration::from_nanos(worked_ns.min(MAX_REST_NS)));
@@ -196,13 +196,13 @@ impl Server<'_> {
         let snapshot = *self.snapshots.read();
         let mut connections = core::mem::take(&mut self.connections);
         connections.retain_mut(|connection| self.receive(connection, &snapshot));
-        let (mut answered, mut last) = (0, 0);
+        let (mut answered, mut last, mut status) = (0, 0, None);
         let mut place = 0;
         connections.retain_mut(|connection| {
             place += 1;
             let Some(line) = connection.line.take_if(|_| answered < LINES_PER_ROUND) else { return true };
             (answered, last) = (answered + 1, place);
-            self.respond(connection, &line, &snapshot)
+            self.respond(connection, &line, &snapshot, &mut status)
         });
         // Those behind the last are the first of the next round.
         let last = last.min(connections.len());
@@ -218,7 +218,7 @@ impl Server<'_> {
         match connection.receive(self.woke_ns) {
             Received::Nothing => !connection.is_done(self.woke_ns),
             Received::Line(line) => match RequestLine::parse(&line) {
-                Ok(line) if line.is_stop() => self.respond(connection, &line, snapshot),
+                Ok(line) if line.is_stop() => self.respond(connection, &line, snapshot, &mut None),
                 Ok(line) => {
                     connection.line = Some(line);
                     true
@@ -242,12 +242,18 @@ impl Server<'_> {
         }
     }
 
-    /// Responds to a line; false if the connection is of no more use.
-    fn respond(&mut self, connection: &mut Connection, line: &RequestLine, snapshot: &Snapshot) -> bool {
+    /// Responds to a line; false if the connection is of no more use. `status` is the answer to `status` in this round.
+    fn respond(
+        &mut self,
+        connection: &mut Connection,
+        line: &RequestLine,
+        snapshot: &Snapshot,
+        status: &mut Option<AnswerLine>,
+    ) -> bool {
         if line.request == "status" {
-            let answer = self.status.answer(snapshot, self.woke_ns);
+            let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
             debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
-            return connection.send(&answer);
+            return connection.send(answer);
         }
         if line.request == RELOAD {
             info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RELOAD}");
