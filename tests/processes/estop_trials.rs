@@ -5,28 +5,26 @@
 //! threads of real-time priority witness, as many more are allowed as fit into that time.
 
 use std::collections::BTreeMap;
+use std::env;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle, sleep, spawn};
+use std::path::Path;
+use std::process::{Child, Command};
+use std::thread::{self, sleep};
 use std::time::{Duration, Instant};
-use std::{env, fs};
 
 use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{Request, State};
+use hexad::control::state::State;
 use hexad::daemon::cycle::WORD_EPOCH;
+use hexad::messages::ForceMessage;
 use hexad::messages::clock::monotonic_ns;
-use hexad::messages::{Bus, CommandMessage, ForceMessage};
 use hexad::realtime::request_word;
 use hexad::realtime::setup::scheduling;
 use serde_json::{Value, json};
 
-use crate::always_stops::{Hostile, Slots};
 use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad};
+use crate::support::disturbance::{Disturbance, Situation, line_of, python};
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS};
 use crate::support::nobody::cannot;
 use crate::support::peer::Controlled;
@@ -55,10 +53,9 @@ const WITHIN_US: u64 = 60_000;
 /// The situation of a process in a namespace of its own, and the number of its trials.
 const PART: &str = "HEXAD_TEST_FULL";
 
-/// As the group of the daemon, or as a user outside of it; before everything ordinary, as an emergency-stop button would run.
+/// As the group of the daemon; before everything ordinary, as an emergency-stop button would run.
 const MEMBER: &[&str] =
     &["chrt", "-f", "2", "setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"];
-const OUTSIDER: &[&str] = &["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"];
 
 /// A client in another process: path of the socket; a line with the time and one with the answer for each line that it reads.
 const PYTHON_CLIENT: &str = r#"
@@ -70,43 +67,6 @@ for _ in sys.stdin:
     link.sendall(b'{"version": 1, "request": "estop", "wait": true}\n')
     print(sent, link.makefile().readline().strip(), flush=True)
 "#;
-
-/// 64 that connect again and again; the number of those that succeeded.
-const PYTHON_OUTSIDERS: &str = r#"
-import socket, sys, threading, time
-entered = 0
-def knock():
-    global entered
-    while True:
-        try:
-            socket.socket(socket.AF_UNIX).connect(sys.argv[1])
-            entered += 1
-            print("entered", flush=True)
-        except OSError:
-            time.sleep(0.0001)
-for _ in range(64):
-    threading.Thread(target=knock, daemon=True).start()
-print("here", flush=True)
-time.sleep(3600)
-"#;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Situation {
-    /// Nothing else goes on; the user of the daemon, who is root.
-    Quiet,
-    /// Every slot of the shared memory is taken.
-    Slots,
-    /// Requests without pause on the topic.
-    Messages,
-    /// 64 connections of the group that stay silent, send halves, send without end.
-    Connections,
-    /// 64 users outside of the group.
-    Outsiders,
-    /// Sent by a member of the group.
-    Member,
-    /// `/dev/shm` and `/tmp` are full.
-    Full,
-}
 
 const STATES: [State; 7] = State::ALL;
 
@@ -133,19 +93,17 @@ fn is_long() -> bool {
 
 /// In a process whose `/dev/shm` and `/tmp` are its own.
 fn in_full_file_systems(trials: usize) {
-    const PLACES: &[&str] = &[
-        "unshare",
-        "--mount",
-        "sh",
-        "-c",
-        "mount -t tmpfs -o size=128m,mode=1777 tmpfs /dev/shm && mount -t tmpfs -o size=8m,mode=1777 tmpfs /tmp && exec \"$@\"",
-        "sh",
-    ];
-    if cannot(&[PLACES]) {
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().expect("its folder").display().to_string();
+    // The programs may be in /tmp themselves.
+    const MOUNTS: &str = "mount --bind \"$0\" /mnt && mount -t tmpfs -o size=128m,mode=1777 tmpfs /dev/shm && \
+                          mount -t tmpfs -o size=8m,mode=1777 tmpfs /tmp && mkdir -p \"$0\" && mount --bind /mnt \"$0\" && \
+                          exec \"$@\"";
+    let places = ["unshare", "--mount", "sh", "-c", MOUNTS, &target];
+    if cannot(&[&places]) {
         return;
     }
-    let mut command = Command::new(PLACES[0]);
-    command.args(&PLACES[1..]).arg(env::current_exe().expect("this program"));
+    let mut command = Command::new(places[0]);
+    command.args(&places[1..]).arg(env::current_exe().expect("this program"));
     command.args(["estop_trials::with_full_file_systems", "--exact", "--ignored", "--nocapture"]);
     command.env(PART, trials.to_string()).env("TMPDIR", env!("CARGO_TARGET_TMPDIR"));
     let output = command.output().expect("a process");
@@ -160,109 +118,6 @@ fn in_full_file_systems(trials: usize) {
 fn with_full_file_systems() {
     let Some(trials) = env::var(PART).ok().and_then(|trials| trials.parse().ok()) else { return };
     run(Situation::Full, trials);
-}
-
-/// What disturbs, until it is dropped.
-enum Disturbance {
-    None,
-    Slots { _slots: Box<Slots> },
-    Messages(Vec<Flood>),
-    Connections(Hostile),
-    Outsiders(Child, BufReader<std::process::ChildStdout>),
-    Full(Vec<PathBuf>),
-}
-
-impl Disturbance {
-    fn begin(situation: Situation, machine: &str, socket: &Path) -> Self {
-        match situation {
-            Situation::Quiet | Situation::Member => Self::None,
-            Situation::Slots => Self::Slots { _slots: Box::new(Slots::fill(machine)) },
-            Situation::Messages => Self::Messages((0..4).map(|_| Flood::start(machine)).collect()),
-            Situation::Connections => Self::Connections(Hostile::start(socket, 64)),
-            Situation::Outsiders => {
-                let mut child = python(OUTSIDER, PYTHON_OUTSIDERS, socket);
-                let mut words = BufReader::new(child.stdout.take().expect("a pipe"));
-                assert_eq!(line_of(&mut words), "here");
-                Self::Outsiders(child, words)
-            }
-            Situation::Full => {
-                Self::Full(["/dev/shm", "/tmp"].map(|folder| filled(Path::new(folder))).into())
-            }
-        }
-    }
-
-    fn end(self) {
-        match self {
-            Self::None | Self::Slots { .. } => {}
-            Self::Messages(floods) => floods.into_iter().for_each(Flood::finish),
-            Self::Connections(hostile) => println!("the connections sent {} bytes", hostile.finish()),
-            Self::Outsiders(mut child, mut words) => {
-                child.kill().expect("a signal");
-                child.wait().expect("its end");
-                assert_eq!(line_of(&mut words), "", "nobody outside of the group may enter");
-            }
-            Self::Full(files) => files.iter().for_each(|file| fs::remove_file(file).expect("a file")),
-        }
-    }
-}
-
-fn python(user: &[&str], program: &str, socket: &Path) -> Child {
-    let mut command = Command::new(user[0]);
-    command.args(&user[1..]).args(["/usr/bin/env", "python3", "-c", program]).arg(socket);
-    command
-        .env("PATH", "/usr/bin:/bin")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("a process")
-}
-
-fn line_of(words: &mut impl BufRead) -> String {
-    let mut line = String::new();
-    words.read_line(&mut line).expect("a line");
-    line.trim().into()
-}
-
-/// Fills the file system of a folder to its last byte.
-fn filled(folder: &Path) -> PathBuf {
-    let path = folder.join("full");
-    let mut file = fs::File::create(&path).expect("a file");
-    for size in [1 << 20, 1 << 12, 1] {
-        while file.write_all(&vec![1; size]).is_ok() {}
-    }
-    path
-}
-
-/// Requests without pause on the topic.
-struct Flood {
-    stop: Arc<AtomicBool>,
-    thread: JoinHandle<u64>,
-}
-
-impl Flood {
-    fn start(machine: &str) -> Self {
-        let stop = Arc::new(AtomicBool::new(false));
-        let thread = {
-            let (stop, machine) = (stop.clone(), machine.to_owned());
-            spawn(move || {
-                let bus = Bus::join(&machine).expect("to join");
-                let mut commands = bus.publisher::<CommandMessage>().expect("to publish");
-                let mut sent = 0;
-                while !stop.load(Ordering::Relaxed) {
-                    // So it is under control again as soon as the fault is cleared, and not before.
-                    sent += u64::from(commands.publish(monotonic_ns(), Request::Engage.into()).is_ok());
-                }
-                sent
-            })
-        };
-        Self { stop, thread }
-    }
-
-    fn finish(self) {
-        self.stop.store(true, Ordering::Relaxed);
-        let sent = self.thread.join().expect("a publisher");
-        assert!(sent > 1000, "{sent} requests");
-    }
 }
 
 /// Sends `estop`; the instant before it connected \[ns\].

@@ -6,9 +6,10 @@ use std::os::unix::net::UnixStream;
 
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use nix::unistd::{Uid, User};
+use tracing::warn;
 
 use super::order::{PendingOrder, is_stop};
-use super::protocol::{AnswerLine, RequestLine};
+use super::protocol::{AnswerLine, RequestLine, RequestResult};
 
 /// Longest line \[bytes\]: many times the longest request.
 pub const MAX_LINE_BYTES: usize = 4096;
@@ -33,6 +34,27 @@ impl Peer {
     /// Name of the user. The system may take long to find it: only for the log, when everything else is done.
     pub fn user(&self) -> String {
         self.user_id.map_or_else(|| "unknown".into(), user_name)
+    }
+
+    /// Logs a request of it that was not carried out, and why.
+    pub fn log_failure(&self, answer: &AnswerLine) {
+        let AnswerLine { result, request, state, diagnostic, text, .. } = answer;
+        let is_success =
+            matches!(result, RequestResult::Done | RequestResult::Accepted | RequestResult::Waiting);
+        if is_success {
+            return;
+        }
+        let (value, bound) = (diagnostic.value.unwrap_or_default(), diagnostic.bound.unwrap_or_default());
+        warn!(
+            user = %self.user(),
+            process = self.process_id,
+            state = %state,
+            code = diagnostic.code,
+            value,
+            bound,
+            "{request} {}: {text}",
+            result.words()
+        );
     }
 }
 

@@ -17,7 +17,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use tracing::{debug, info, warn};
 
 pub use self::connection::user_name;
-use self::connection::{Connection, Peer, Received};
+use self::connection::{Connection, Received};
 use self::location::ControlSocket;
 use self::order::{Order, PendingOrder, Step};
 use self::protocol::{AnswerLine, RequestLine, RequestResult};
@@ -269,7 +269,7 @@ impl Server<'_> {
         let answer = self.begin(connection, request, line, snapshot);
         info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {}", request.name());
         answer.is_none_or(|answer| {
-            log_failure(&connection.peer, &answer);
+            connection.peer.log_failure(&answer);
             connection.send(&answer)
         })
     }
@@ -334,30 +334,10 @@ impl Server<'_> {
                 Step::Progress(line) => !connection.wants_progress || connection.send(&line),
                 Step::Answer(line) => {
                     connection.pending = None;
-                    log_failure(&connection.peer, &line);
+                    connection.peer.log_failure(&line);
                     connection.send(&line)
                 }
             }
         });
     }
-}
-
-/// Logs a request that was not carried out, and why.
-fn log_failure(peer: &Peer, answer: &AnswerLine) {
-    let AnswerLine { result, request, state, diagnostic, text, .. } = answer;
-    let is_success = matches!(result, RequestResult::Done | RequestResult::Accepted | RequestResult::Waiting);
-    if is_success {
-        return;
-    }
-    let (value, bound) = (diagnostic.value.unwrap_or_default(), diagnostic.bound.unwrap_or_default());
-    warn!(
-        user = %peer.user(),
-        process = peer.process_id,
-        state = %state,
-        code = diagnostic.code,
-        value,
-        bound,
-        "{request} {}: {text}",
-        result.words()
-    );
 }

@@ -1,6 +1,7 @@
 //! What the tests share.
 
 pub mod children;
+pub mod disturbance;
 pub mod forged;
 pub mod machine;
 pub mod nobody;
