@@ -29,7 +29,7 @@ use crate::support::machine::{Machine, PATIENT, PERIOD_NS};
 use crate::support::nobody::cannot;
 use crate::support::peer::Controlled;
 use crate::support::random::Random;
-use crate::support::recorder::Recorder;
+use crate::support::recorder::{Recorder, Recording};
 use crate::support::socket::path_of;
 use crate::support::trio::start_daemon;
 use crate::support::turns;
@@ -279,7 +279,7 @@ impl Trial {
                 .find(is_fault)
                 .map(drop)
         });
-        let recording = recorder.cut();
+        let mut recording = recorder.so_far();
         let before = recording.forces.iter().rfind(|force| force.header.time_ns <= sent_ns);
         let first = recording.forces.iter().find(is_fault).expect("a fault");
         assert_eq!(first.diagnostic_code, DiagnosticCode::EmergencyStop as u32, "{first:?}");
@@ -289,11 +289,14 @@ impl Trial {
         let posted = recording.statuses.iter().rev().filter(|status| status.request_epoch == WORD_EPOCH);
         let posted = posted.map(|status| status.request_sequence);
         let posted = posted.map(request_word::time_ns).find(|time_ns| time_ns + 1000 >= sent_ns);
-        Self {
+        let found = Self {
             state: before.and_then(|force| State::from_number(force.state)).expect("a state"),
             valid: valid as u64,
             invalid_ns: first.header.time_ns,
             posted_after_ns: posted.map_or(0, |posted_ns| posted_ns.saturating_sub(sent_ns)),
-        }
+        };
+        // Of a flood there are millions.
+        *recording = Recording::default();
+        found
     }
 }

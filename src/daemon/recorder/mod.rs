@@ -82,6 +82,10 @@ pub struct RecorderReport {
 }
 
 /// What the log thread hands over, in order.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly all are cycles, and a box for each would be an allocation"
+)]
 pub enum Recorded {
     /// One cycle.
     Cycle(CycleMessage),
