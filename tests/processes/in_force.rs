@@ -24,6 +24,8 @@ struct Thread {
 
 #[test]
 fn priorities_and_the_processor_of_the_loop_alone() {
+    // Daemons that are bound to the same processor are refused.
+    let _turn = turns::alone();
     let Some((daemon, _machine)) = granted("priorities_and_the_processor_of_the_loop_alone", "cpu = 0")
     else {
         return;
@@ -48,6 +50,7 @@ fn priorities_and_the_processor_of_the_loop_alone() {
 
 #[test]
 fn sched_deadline_for_the_loop_alone() {
+    let _turn = turns::beside_others();
     let test = "sched_deadline_for_the_loop_alone";
     let Some((daemon, _machine)) = granted(test, "scheduler = \"deadline\"") else { return };
     let threads = threads(&daemon);
@@ -59,7 +62,6 @@ fn sched_deadline_for_the_loop_alone() {
 
 /// A daemon with these keys of `[realtime]`; none, and said so, where the system lacks the rights.
 fn granted(test: &str, settings: &str) -> Option<(Hexad, Machine)> {
-    let _turn = turns::beside_others();
     let machine = Machine::with(test, &format!("[realtime]\n{settings}\n"));
     let daemon = start_daemon(&machine);
     daemon.says("running");
