@@ -181,7 +181,10 @@ impl<'a> Period<'a> {
         platform.advance(1.0, delay, |ago| (u(ago) + push(ago)) / mass_ratio + pole_squared * pose(ago));
         let head = [platform.e, platform.v, estimate.e, estimate.v, estimate.d];
         let (commands, poses) = ((0..self.pending).map(u), (0..self.pending).map(pose));
-        DVector::from_iterator(self.states(), head.into_iter().chain(commands).chain(poses).take(self.states()))
+        DVector::from_iterator(
+            self.states(),
+            head.into_iter().chain(commands).chain(poses).take(self.states()),
+        )
     }
 
     fn matrix(&self) -> DMatrix<f64> {
