@@ -19,6 +19,9 @@ use crate::recording::reader::{Recording, Summary};
 /// acceleration, a difference of velocities over a cycle; 2e-11 was seen. Forces agree to 1e-11 of the largest.
 const INSTRUCTION_SET_TOLERANCE: f64 = 1e-10;
 
+/// Most ranges of cycles that are listed.
+const MAX_RANGES: usize = 10;
+
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
     /// Recording of `hexad run --record` or `--faults`
@@ -143,11 +146,15 @@ fn description(recording: &Recording, summary: &Summary, replay: &Replay, config
     if info.version != env!("CARGO_PKG_VERSION") {
         let _ = writeln!(text, "the version is another one here: {}", env!("CARGO_PKG_VERSION"));
     }
-    if replay.unknown > 0 {
+    if !replay.unknown.is_empty() {
+        let ranges: Vec<_> = replay.unknown.iter().take(MAX_RANGES).map(|it| format!("{it:?}")).collect();
+        let more = replay.unknown.len().saturating_sub(MAX_RANGES);
+        let more = if more > 0 { format!(", and in {more} more places") } else { String::new() };
         let _ = writeln!(
             text,
-            "{} cycles cannot be repeated: the memory of the controller is unknown",
-            replay.unknown
+            "{} cycles cannot be repeated, as the memory of the controller is unknown: {}{more}",
+            replay.unknown_count(),
+            ranges.join(", ")
         );
     }
     let Replay { compared, different, .. } = replay;

@@ -1,5 +1,6 @@
 //! Computes the cycles of a recording again and compares every output.
 
+use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
 
 use crate::config::{Config, fidelity};
@@ -49,8 +50,8 @@ impl Difference {
 pub struct Replay {
     /// Cycles computed again.
     pub compared: u64,
-    /// Cycles for which the memory of the controller is unknown: before the first that is recorded, and behind gaps.
-    pub unknown: u64,
+    /// Cycles for which the memory of the controller is unknown: before the first that is recorded, and behind gaps until the next.
+    pub unknown: Vec<RangeInclusive<u64>>,
     /// Cycles of which an output differs.
     pub different: u64,
     /// The first difference.
@@ -115,7 +116,7 @@ impl Replayer {
         let begin_ns = *self.begin_ns.get_or_insert(cycle.due_ns);
         let input = cycle.input().filter(|_| self.next_cycle == Some(cycle.cycle));
         let Some(input) = input else {
-            self.replay.unknown += 1;
+            self.replay.add_unknown(cycle.cycle);
             return;
         };
         self.next_cycle = Some(cycle.cycle + 1);
@@ -149,6 +150,18 @@ impl Replay {
     /// The largest difference of all fields.
     pub fn largest(&self) -> Option<&Difference> {
         self.largest.values().max_by(|a, b| a.size().total_cmp(&b.size()))
+    }
+
+    /// Number of cycles that could not be computed again.
+    pub fn unknown_count(&self) -> u64 {
+        self.unknown.iter().map(|range| range.end() - range.start() + 1).sum()
+    }
+
+    fn add_unknown(&mut self, cycle: u64) {
+        match self.unknown.last_mut().filter(|range| range.end() + 1 == cycle) {
+            Some(range) => *range = *range.start()..=cycle,
+            None => self.unknown.push(cycle..=cycle),
+        }
     }
 
     fn add(&mut self, difference: Difference) {
