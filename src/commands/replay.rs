@@ -9,15 +9,11 @@ use clap::Args;
 use super::failure::{CommandError, Failure};
 use crate::config::Config;
 use crate::daemon::recorder::instruction_set;
-use crate::daemon::replay::{Difference, Replay, other_controller, recorded_controller, replay};
+use crate::daemon::replay::{Replay, other_controller, recorded_controller, replay};
 use crate::output::files::print;
 use crate::recording::Item;
 use crate::recording::copy::copy;
 use crate::recording::reader::{Recording, Summary};
-
-/// Largest difference between two instruction sets, which add the same numbers in another order: that of the reference's
-/// acceleration, a difference of velocities over a cycle; 2e-11 was seen. Forces agree to 1e-11 of the largest.
-const INSTRUCTION_SET_TOLERANCE: f64 = 1e-10;
 
 /// Most ranges of cycles that are listed.
 const MAX_RANGES: usize = 10;
@@ -90,9 +86,8 @@ impl ReplayArguments {
         if replay.compared == 0 {
             return Err(ReplayError::Unknown(info.version).into());
         }
-        let largest = replay.largest().map_or(0.0, Difference::size);
-        let is_tolerated =
-            info.instruction_set != instruction_set(&recorded) && largest <= INSTRUCTION_SET_TOLERANCE;
+        let is_tolerated = info.instruction_set != instruction_set(&recorded)
+            && replay.is_rounding(recorded.deployment.realtime.period_s());
         if replay.different > 0 && other.is_none() && !is_tolerated {
             return Err(ReplayError::Different(replay.different).into());
         }
