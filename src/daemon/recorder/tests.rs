@@ -2,10 +2,13 @@ use std::fs::{self, File};
 use std::sync::mpsc::channel;
 
 use super::*;
-use crate::control::controller::Input;
+use crate::control::controller::{Input, Measurement};
 use crate::daemon::memory_queue::{CycleMemory, MemoryProducer, MemoryQueue};
 use crate::daemon::replay::{Replay, recorded_controller, replay};
 use crate::messages::GapMessage;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
 use crate::recording::Item;
 use crate::recording::reader::Recording;
 
@@ -25,7 +28,17 @@ fn controller(config: &Config) -> Controller {
     recorded_controller(&info, config)
 }
 
-/// The real-time thread and the log thread: runs cycles without messages, and hands over those that are not lost, each changed
+/// Input of a cycle: the platform is moved by hand, so that the memory of each cycle is another.
+fn input(machine: &Machine, cycle: u64) -> Input {
+    let mut x = machine.home;
+    x[3] += 1e-3 * (cycle as f64 * 0.01).sin();
+    let length = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
+    let release_ns = cycle * 1_000_000;
+    let measurement = Some(Measurement { time_ns: release_ns, length, ..Measurement::default() });
+    Input { release_ns, measurement, ..Input::default() }
+}
+
+/// The real-time thread and the log thread: runs cycles, and hands over those that are not lost, each changed
 /// by `change`.
 fn run_cycles(
     controller: &mut Controller,
@@ -35,8 +48,9 @@ fn run_cycles(
     is_lost: impl Fn(u64) -> bool,
     change: impl Fn(&mut CycleMessage),
 ) {
+    let machine = config().machine;
     for cycle in 1..=count {
-        let input = Input { release_ns: cycle * 1_000_000, ..Input::default() };
+        let input = input(&machine, cycle);
         memories.begin_cycle(controller.memory());
         let message = CycleMessage::new(&input, &controller.step(&input));
         let mut message = CycleMessage { cycle, due_ns: input.release_ns, ..message };
