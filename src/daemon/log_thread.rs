@@ -43,8 +43,8 @@ pub struct LogLinks<'a> {
     pub statistics: Writer<Statistics>,
     /// Of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
-    /// To the recorder, if there is one. When it is full, cycles are lost.
-    pub recorder: Option<SyncSender<CycleMessage>>,
+    /// To the recorder. When it is full, cycles are lost.
+    pub recorder: SyncSender<CycleMessage>,
     pub first_pose: FirstPose,
     pub latch: EmergencyLatch,
 }
@@ -97,9 +97,7 @@ impl Log {
     fn empty_queues(&mut self, links: &mut LogLinks<'_>) {
         while let Some(record) = links.records.dequeue() {
             self.collector.add(&record);
-            if let Some(recorder) = &links.recorder {
-                let _ = recorder.try_send(message(&record));
-            }
+            let _ = links.recorder.try_send(message(&record));
             links.first_pose.add(&record);
             if let Some((position, orientation)) = tracking_error(&record) {
                 self.report.tracking.add(position, orientation);

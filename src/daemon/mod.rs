@@ -30,6 +30,7 @@ mod first_pose;
 mod hints;
 mod io_thread;
 mod log_thread;
+mod memory_queue;
 mod parameters;
 pub mod process_names;
 pub mod recorder;

@@ -62,6 +62,17 @@ pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
     prepare(realtime.io_cpu, scheduled)
 }
 
+/// FIFO priority of the threads that must keep up with the loop, log and recorder: the lowest.
+const RECORD_PRIORITY: i32 = 1;
+
+/// Prepares the calling thread to keep up with the loop on a busy host, where it may: without it cycles are missing in the
+/// recording, and nothing else. It never has the priority of the loop.
+pub(super) fn prepare_record(realtime: &Realtime) {
+    if !realtime.is_simulated() && realtime.priority.min(realtime.io_priority) > RECORD_PRIORITY {
+        let _ = scheduling::fifo_priority(RECORD_PRIORITY);
+    }
+}
+
 /// Prepares the calling thread for the loop. The warm-up comes before SCHED_DEADLINE, whose budget it would
 /// use up.
 pub(crate) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {

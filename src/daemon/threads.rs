@@ -19,11 +19,12 @@ use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports, Silence};
 use super::log_thread::{self, LogLinks, LogReport};
+use super::memory_queue::{MemoryProducer, MemoryQueue};
 use super::parameters::{nanoseconds, parameters, timing};
 use super::recorder::{Folders, Recorder, RecorderReport};
 use super::report::Report;
 use super::snapshot::Snapshot;
-use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
+use super::start::{Ready, prepare_io, prepare_loop, prepare_record, prepare_simulated, start, warm_up};
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
 use crate::config::{Config, fidelity};
@@ -73,7 +74,9 @@ pub(super) fn run(
 ) -> Result<(Report, String), DaemonError> {
     let fidelity = fidelity::fidelity(config);
     let controller = controller(config, fidelity);
-    let (recorder, recorder_queue) = Recorder::new(config, fidelity, &controller, folders).unzip();
+    let mut memory_queue = Box::new(MemoryQueue::new());
+    let (memory_producer, memories) = memory_queue.split();
+    let (recorder, recorder_links) = Recorder::new(config, fidelity, &controller, memories, folders);
     let (realtime_side, io_side) = exchange();
     let event = io_side.event.clone();
     let mut record_queue = Box::new(Queue::<CycleRecord, RECORDS>::new());
@@ -91,13 +94,14 @@ pub(super) fn run(
         delays,
         statistics: statistics_writer,
         files,
-        recorder: recorder_queue,
+        recorder: recorder_links.cycles,
         first_pose: FirstPose::of(&config.machine),
         latch,
     };
     let realtime_links = RealtimeLinks {
         exchange: realtime_side,
         records: record_producer,
+        memories: MemoryProducer::new(memory_producer),
         word,
         progress,
         files,
@@ -114,30 +118,37 @@ pub(super) fn run(
         may_end: &flags.may_end,
         progress,
     };
-    let control_links = ControlLinks { socket, snapshots, word, is_ending: &flags.is_ending };
+    let control_links =
+        ControlLinks { socket, snapshots, word, windows: recorder_links.orders, is_ending: &flags.is_ending };
     scope(|threads| {
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop(flags);
         let run_control = || control_socket::run(config, control_links, &flags.stop_control);
         let control = spawn(threads, "hexad-control", run_control)?;
-        let recorder =
-            recorder.map(|recorder| spawn(threads, "hexad-recorder", || recorder.run())).transpose()?;
-        let log = spawn(threads, "hexad-log", || log_thread::run(log_links, &flags.stop_log))?;
+        let realtime = &config.deployment.realtime;
+        let recorder = spawn(threads, "hexad-recorder", || {
+            prepare_record(realtime);
+            recorder.run()
+        })?;
+        let log = spawn(threads, "hexad-log", || {
+            prepare_record(realtime);
+            log_thread::run(log_links, &flags.stop_log)
+        })?;
         let cyclic = spawn(threads, REALTIME_THREAD, || {
             run_realtime(config, controller, realtime_links, &flags.stop_loop)
         })?;
         let io = spawn(threads, "hexad-io", move || run_io(config, io_links, &io_ready, &flags.stop_io))?;
 
-        let started = start(&config.deployment.realtime, &ready, &go);
+        let started = start(realtime, &ready, &go);
         if started.is_ok() {
             supervise(config, flags, progress, stop);
         }
         drop(go);
         let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
-        let recorded = recorder.map(|recorder| recorder.join().map_err(|_| DaemonError::Died("recorder")));
+        let recorded = recorder.join().map_err(|_| DaemonError::Died("recorder"));
         let (cyclic, io, log) = reports?;
-        Ok(report(config, &cyclic, &io, log, recorded.transpose()?))
+        Ok(report(config, &cyclic, &io, log, recorded?))
     })
 }
 
@@ -147,7 +158,7 @@ fn report(
     cyclic: &LoopReport,
     io: &IoReport,
     mut log: LogReport,
-    recording: Option<RecorderReport>,
+    recording: RecorderReport,
 ) -> (Report, String) {
     let counts_csv = mem::take(&mut log.counts_csv);
     (Report { recording, ..Report::new(config, cyclic, io, log) }, counts_csv)
@@ -162,6 +173,8 @@ fn controller(config: &Config, fidelity: Fidelity) -> Controller {
 struct RealtimeLinks<'a> {
     exchange: RealtimeSide,
     records: Producer<'a, CycleRecord>,
+    /// To the recorder.
+    memories: MemoryProducer<'a>,
     /// Requests of operators.
     word: &'static RequestWord,
     /// To the main thread.
@@ -189,8 +202,10 @@ fn run_realtime(
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
     let (word, progress, mut intake) = (links.word, links.progress, RequestIntake::default());
+    let mut memories = links.memories;
     let step = |input: &mut Input, woke_ns: u64| {
         progress.count_cycle();
+        memories.begin_cycle(controller.memory());
         input.request = intake.next(input.request, word.load(), woke_ns);
         controller.step(input)
     };

@@ -34,7 +34,8 @@ fn priorities_and_the_processor_of_the_loop_alone() {
     let everywhere = threads["hexad"].cpus.clone();
     for (name, class, cpus) in [
         ("hexad", OTHER, &everywhere),
-        ("hexad-log", OTHER, &everywhere),
+        ("hexad-log", (FIFO, 1), &everywhere),
+        ("hexad-recorder", (FIFO, 1), &everywhere),
         ("hexad-control", OTHER, &everywhere),
         ("hexad-io", (FIFO, 79), &everywhere),
         ("hexad-rt", (FIFO, 80), &"0".to_owned()),
@@ -55,7 +56,7 @@ fn sched_deadline_for_the_loop_alone() {
     let Some((daemon, _machine)) = granted(test, "scheduler = \"deadline\"") else { return };
     let threads = threads(&daemon);
     let classes: Vec<_> =
-        ["hexad", "hexad-log", "hexad-io", "hexad-rt"].iter().map(|name| threads[*name].class).collect();
+        ["hexad", "hexad-control", "hexad-io", "hexad-rt"].iter().map(|name| threads[*name].class).collect();
     assert_eq!(classes, [OTHER, OTHER, (FIFO, 79), (DEADLINE, 0)]);
     daemon.stops_on("TERM", HANG);
 }

@@ -1,14 +1,17 @@
 //! One connection of the control socket: lines in, answers out, without ever blocking.
 
-use std::io::{self, ErrorKind, Read, Write};
+use std::fs::File;
+use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use nix::unistd::{Uid, User};
 
+use super::last_seconds::LastSeconds;
 use super::order::{PendingOrder, is_stop};
 use super::protocol::AnswerLine;
+use crate::realtime::file_passing;
 
 /// Longest line \[bytes\]: many times the longest request.
 pub const MAX_LINE_BYTES: usize = 4096;
@@ -45,6 +48,10 @@ pub struct Connection {
     pub peer: Peer,
     /// The request that is not answered yet.
     pub pending: Option<PendingOrder>,
+    /// The recording that is not written yet.
+    pub last_seconds: Option<LastSeconds>,
+    /// The last file that came with a line.
+    pub file: Option<File>,
     /// Whether its client wants lines before the answer.
     pub wants_progress: bool,
     buffer: Vec<u8>,
@@ -75,6 +82,8 @@ impl Connection {
             stream,
             peer,
             pending: None,
+            last_seconds: None,
+            file: None,
             wants_progress: false,
             buffer: Vec::new(),
             line_since_ns: Some(now_ns),
@@ -88,14 +97,22 @@ impl Connection {
     pub fn receive(&mut self, now_ns: u64) -> Received {
         let mut bytes = [0; MAX_LINE_BYTES];
         if !self.has_ended && !self.buffer.contains(&b'\n') {
-            match self.stream.read(&mut bytes) {
-                Ok(0) => self.has_ended = true,
-                Ok(count) => self.buffer.extend(bytes.iter().take(count)),
+            match file_passing::receive(&self.stream, &mut bytes) {
+                Ok((0, _)) => self.has_ended = true,
+                Ok((count, file)) => {
+                    self.buffer.extend(bytes.iter().take(count));
+                    self.file = file.or(self.file.take());
+                }
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
                 Err(_) => self.has_ended = true,
             }
         }
         self.next_line(now_ns)
+    }
+
+    /// Whether its client waits for an answer.
+    pub fn is_waiting(&self) -> bool {
+        self.pending.is_some() || self.last_seconds.is_some()
     }
 
     /// Whether a line that was read waits to be returned.
@@ -127,7 +144,7 @@ impl Connection {
     /// Whether the client has taken too long for a line, or has left and waits for nothing.
     pub fn is_done(&self, now_ns: u64) -> bool {
         let is_slow = self.line_since_ns.is_some_and(|since| now_ns.saturating_sub(since) > LINE_LIMIT_NS);
-        self.pending.is_none() && (self.has_ended || is_slow) && !self.has_line()
+        !self.is_waiting() && (self.has_ended || is_slow) && !self.has_line()
     }
 
     /// Sends a line; false if the client does not read its answers or has left.
@@ -140,7 +157,7 @@ impl Connection {
     /// the longest unused, then those that wait, those that stop last.
     pub fn rank(&self) -> (bool, bool, bool, u64) {
         let stops = self.pending.as_ref().is_some_and(|pending| is_stop(pending.request()));
-        (stops, self.pending.is_some(), self.has_requested, self.used_ns)
+        (stops, self.is_waiting(), self.has_requested, self.used_ns)
     }
 }
 

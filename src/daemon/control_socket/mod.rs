@@ -6,17 +6,20 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::os::fd::AsFd;
+use std::sync::mpsc::SyncSender;
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use tracing::{debug, info, warn};
 
 pub use self::connection::user_name;
 use self::connection::{Connection, Peer, Received};
+use self::last_seconds::{LastSeconds, RECORD};
 use self::location::ControlSocket;
 use self::order::{Order, PendingOrder, Step};
 use self::protocol::{AnswerLine, RequestLine, RequestResult, VERSION};
 use self::status::StatusSource;
 use super::cycle::MAX_REQUEST_AGE_NS;
+use super::recorder::WindowOrder;
 use super::snapshot::Snapshot;
 use crate::config::Config;
 use crate::control::diagnostic::DiagnosticCode;
@@ -27,6 +30,7 @@ use crate::realtime::request_word::RequestWord;
 use crate::realtime::triple_buffer::Reader;
 
 mod connection;
+mod last_seconds;
 pub mod location;
 mod order;
 pub mod protocol;
@@ -57,17 +61,20 @@ pub(super) struct ControlLinks<'a> {
     pub snapshots: Reader<Snapshot>,
     /// To the real-time thread.
     pub word: &'static RequestWord,
+    /// To the recorder.
+    pub windows: SyncSender<WindowOrder>,
     /// Set when the daemon is to end.
     pub is_ending: &'a AtomicBool,
 }
 
 /// Serves clients until `stop`.
 pub(super) fn run(config: &Config, links: ControlLinks<'_>, stop: &AtomicBool) {
-    let ControlLinks { socket, snapshots, word, is_ending } = links;
+    let ControlLinks { socket, snapshots, word, windows, is_ending } = links;
     let mut server = Server {
         socket,
         snapshots,
         word,
+        windows,
         is_ending,
         connections: Vec::with_capacity(MAX_CONNECTIONS),
         status: StatusSource::new(config),
@@ -91,6 +98,7 @@ struct Server<'a> {
     socket: ControlSocket,
     snapshots: Reader<Snapshot>,
     word: &'static RequestWord,
+    windows: SyncSender<WindowOrder>,
     is_ending: &'a AtomicBool,
     connections: Vec<Connection>,
     status: StatusSource<'a>,
@@ -108,7 +116,7 @@ struct Server<'a> {
 impl Server<'_> {
     /// Waits for something to read, or a short time. Closes connections whose client has left.
     fn wait(&mut self) {
-        let is_busy = |connection: &Connection| connection.pending.is_some() || connection.has_line();
+        let is_busy = |connection: &Connection| connection.is_waiting() || connection.has_line();
         let is_pending = self.connections.iter().any(is_busy);
         let timeout = PollTimeout::from(if is_pending { PENDING_WAIT_MS } else { IDLE_WAIT_MS });
         let mut events = vec![PollFd::new(self.socket.listener.as_fd(), PollFlags::POLLIN)];
@@ -191,10 +199,18 @@ impl Server<'_> {
             debug!(user = %connection.peer.user, process = connection.peer.process_id, "status");
             return connection.send(&answer);
         }
+        if line.request == RECORD {
+            info!(user = %connection.peer.user, process = connection.peer.process_id, "request: {RECORD}");
+            return match LastSeconds::order(&self.windows, connection.file.take(), line.last_s) {
+                Ok(ordered) => connection.last_seconds.replace(ordered).is_none(),
+                Err(reason) => connection.send(&AnswerLine::invalid(reason)),
+            };
+        }
         let requested = Request::ALL.into_iter().find(|request| request.name() == line.request);
         let Some(request) = requested else {
             let names = Request::ALL.map(Request::name).join(", ");
-            let text = format!("unknown request {:?}; must be one of status, {names}", line.request);
+            let text =
+                format!("unknown request {:?}; must be one of status, {RECORD}, {names}", line.request);
             return connection.send(&AnswerLine::invalid(text));
         };
         // Before anything else, also before the log, which may block.
@@ -259,7 +275,14 @@ impl Server<'_> {
     /// Looks at every pending request and answers.
     fn advance(&mut self) {
         let (snapshot, now_ns, word) = (*self.snapshots.read(), monotonic_ns(), self.word);
+        let state = snapshot.status.state().unwrap_or_default();
         self.connections.retain_mut(|connection| {
+            if let Some(answer) = connection.last_seconds.as_ref().and_then(|it| it.answer(state)) {
+                connection.last_seconds = None;
+                if !connection.send(&answer) {
+                    return false;
+                }
+            }
             let Some(pending) = &mut connection.pending else { return true };
             match pending.step(&snapshot, word, now_ns) {
                 Step::Wait => true,

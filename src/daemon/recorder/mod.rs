@@ -2,7 +2,7 @@
 //!
 //! The log thread hands over each cycle through a bounded queue. A disk that stalls holds this thread alone; when the queue
 //! is full cycles are lost, which the recording says. The thread computes each cycle again in a replica of the controller:
-//! so it has the controller's memory at any cycle, and the real-time thread copies none of it.
+//! so it has the controller's memory at any cycle, and the real-time thread copies its own only after cycles were lost.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -11,13 +11,14 @@ use std::thread;
 use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
-use tracing::{info, warn};
 
-use self::fault_watch::FaultWatch;
+use self::continuous::Continuous;
 use self::folder::Folder;
 use self::replica::Replica;
-use self::stream::Stream;
 use self::tape::Tape;
+pub use self::windows::WindowOrder;
+use self::windows::Windows;
+use super::memory_queue::MemoryConsumer;
 use crate::config::Config;
 use crate::control::controller::Controller;
 use crate::messages::CycleMessage;
@@ -28,27 +29,31 @@ use crate::realtime::usage::ThreadUsage;
 use crate::recording::RunInfo;
 use crate::recording::scene::Scene;
 
+mod continuous;
 mod fault_watch;
 pub mod folder;
 mod replica;
 mod stream;
 mod tape;
+mod windows;
 
 /// How often the queue is emptied, as by the log thread.
 const PERIOD: Duration = Duration::from_millis(20);
+/// The same while a window is written: other threads must not wait for its end.
+const WINDOW_PERIOD: Duration = Duration::from_millis(1);
 
 /// Cycles that the queue holds \[s\]: disks were seen to stall for 25 ms, and busy ones stall for longer.
 const QUEUE_S: f64 = 2.0;
 /// Bound on the queue: 35 MB, all of it locked.
 const MAX_QUEUE: usize = 32_768;
 
-/// Cycles taken from the queue, or written of a window, in one step: some milliseconds.
+/// Cycles taken from the queue in one step: some milliseconds.
 const CYCLES_PER_STEP: usize = 2048;
 
-/// Most windows of one run.
-const MAX_WINDOWS: u32 = 100;
+/// Most orders of operators that wait.
+const MAX_ORDERS: usize = 4;
 
-/// Where the recorder writes.
+/// Where the recorder writes; what has no folder stays in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Folders {
     /// For every cycle.
@@ -57,13 +62,6 @@ pub struct Folders {
     pub faults: Option<PathBuf>,
     /// Bounds on the sizes of the files in each.
     pub bounds: folder::Bounds,
-}
-
-impl Folders {
-    /// Whether there is anything to record for.
-    pub fn is_empty(&self) -> bool {
-        self.record.is_none() && self.faults.is_none()
-    }
 }
 
 /// Numbers of a recording over a run.
@@ -81,17 +79,25 @@ pub struct RecorderReport {
     pub usage: ThreadUsage,
 }
 
+/// Ends of the queues to the recorder.
+pub struct RecorderLinks {
+    /// For the log thread. When it is full, cycles are lost.
+    pub cycles: SyncSender<CycleMessage>,
+    /// For the control thread.
+    pub orders: SyncSender<WindowOrder>,
+}
+
 /// The recorder of a daemon.
-pub struct Recorder {
+pub struct Recorder<'a> {
     queue: Receiver<CycleMessage>,
+    memories: MemoryConsumer<'a>,
     context: Context,
     tape: Tape,
     replica: Replica,
-    recording: Option<Stream>,
-    faults: Option<Folder>,
-    watch: FaultWatch,
-    window: Option<Stream>,
-    windows: u32,
+    /// Before this cycle the replica does not go on from another memory of the real-time thread.
+    resume_cycle: u64,
+    recording: Option<Continuous>,
+    windows: Windows,
     report: RecorderReport,
 }
 
@@ -103,37 +109,41 @@ pub(super) struct Context {
     rate: u64,
 }
 
-impl Recorder {
-    /// Allocates all memory but that of the files; `None` if there is nothing to record for. The log thread has the other end
-    /// of the queue.
+impl Context {
+    /// Whether a second of the run begins with a cycle.
+    fn begins_second(&self, cycle: u64) -> bool {
+        cycle % self.rate == 1 % self.rate
+    }
+}
+
+impl<'a> Recorder<'a> {
+    /// Allocates all memory but that of the files.
     pub fn new(
         config: &Config,
         fidelity: Fidelity,
         controller: &Controller,
+        memories: MemoryConsumer<'a>,
         folders: &Folders,
-    ) -> Option<(Self, SyncSender<CycleMessage>)> {
-        if folders.is_empty() {
-            return None;
-        }
+    ) -> (Self, RecorderLinks) {
         let rate_hz = config.deployment.realtime.rate_hz;
-        let (sender, queue) = sync_channel(((QUEUE_S * rate_hz) as usize).clamp(1024, MAX_QUEUE));
+        let (cycles, queue) = sync_channel(((QUEUE_S * rate_hz) as usize).clamp(1024, MAX_QUEUE));
+        let (order_sender, orders) = sync_channel(MAX_ORDERS);
         let info = info(config, fidelity);
         let context = Context { info, scene: Scene::new(&config.machine), rate: (rate_hz as u64).max(1) };
         let started_s = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |it| it.as_secs());
         let folder = |path: &PathBuf| Folder::new(path, &config.name, started_s, folders.bounds);
         let recorder = Self {
             queue,
-            tape: Tape::new(rate_hz),
+            memories,
+            tape: Tape::new(rate_hz, controller.memory()),
             replica: Replica::new(controller.clone()),
-            recording: folders.record.as_ref().map(|path| Stream::recording(folder(path))),
-            faults: folders.faults.as_ref().map(folder),
-            watch: FaultWatch::new(context.rate),
-            window: None,
-            windows: 0,
+            resume_cycle: 0,
+            recording: folders.record.as_ref().map(|path| Continuous::new(folder(path))),
+            windows: Windows::new(folders.faults.as_ref().map(folder), context.rate, orders),
             report: RecorderReport::default(),
             context,
         };
-        Some((recorder, sender))
+        (recorder, RecorderLinks { cycles, orders: order_sender })
     }
 
     /// Runs until the log thread has ended and everything is written.
@@ -142,17 +152,25 @@ impl Recorder {
         let at_start = ThreadUsage::of_this_thread();
         loop {
             let (received, is_open) = self.receive();
-            self.write();
+            if let Some(recording) = &mut self.recording {
+                recording.advance(&self.context, &self.tape);
+            }
+            self.windows.advance(&self.context, &self.tape);
             if !is_open {
                 break;
             }
-            if received < CYCLES_PER_STEP && self.window.is_none() {
-                thread::sleep(PERIOD);
+            if received < CYCLES_PER_STEP {
+                thread::sleep(if self.windows.is_writing() { WINDOW_PERIOD } else { PERIOD });
             }
         }
-        self.finish();
+        self.windows.finish(&self.context, &self.tape);
+        let mut bytes = self.windows.bytes();
+        if let Some(recording) = &mut self.recording {
+            recording.finish(&self.context, &self.tape);
+            bytes += recording.bytes();
+        }
         let usage = ThreadUsage::of_this_thread().since(&at_start);
-        RecorderReport { is_repeatable: self.replica.is_in_step(), usage, ..self.report }
+        RecorderReport { bytes, is_repeatable: self.replica.has_repeated_all(), usage, ..self.report }
     }
 
     /// Takes cycles from the queue: how many, and whether more may come.
@@ -167,81 +185,29 @@ impl Recorder {
     }
 
     fn add(&mut self, cycle: &CycleMessage) {
-        self.report.missing += cycle.cycle.saturating_sub(self.replica.next_cycle());
+        self.report.missing += self.replica.skip_to(cycle.cycle);
         self.report.cycles += 1;
-        let is_due = (cycle.cycle - 1).is_multiple_of(self.context.rate);
-        let memory = if is_due { self.replica.memory_before(cycle) } else { None };
-        self.tape.push(cycle, memory);
+        let is_resumed = !self.replica.is_in_step() && self.resume(cycle.cycle);
+        let is_kept = is_resumed || self.context.begins_second(cycle.cycle);
+        self.tape.push(cycle, self.replica.memory().filter(|_| is_kept));
         self.replica.step(cycle);
-        self.watch.add(cycle);
-        if self.window.is_none()
-            && let Some((code, fault)) = self.watch.due(false)
-        {
-            self.begin_window(code, fault);
-        }
+        self.windows.add(&self.context, &self.tape, cycle);
     }
 
-    fn begin_window(&mut self, code: u32, fault: u64) {
-        let Some(folder) = self.faults.as_ref().filter(|_| self.windows < MAX_WINDOWS) else { return };
-        self.windows += 1;
-        if self.windows == MAX_WINDOWS {
-            warn!("this was fault number {MAX_WINDOWS}: the cycles of later ones are not written");
+    /// Lets the replica go on where the real-time thread has copied its memory, at most once a second; whether it does.
+    fn resume(&mut self, cycle: u64) -> bool {
+        if cycle < self.resume_cycle {
+            return false;
         }
-        let window = Stream::window(folder, &self.context, &self.tape, code, fault);
-        self.window = window.map_err(|error| warn!("the cycles around the fault are lost: {error}")).ok();
-    }
-
-    /// Writes what has been received, and some of a window.
-    fn write(&mut self) {
-        if let Some(recording) = &mut self.recording
-            && let Err(error) = recording.advance(&self.context, &self.tape, usize::MAX)
-        {
-            let bytes = recording.bytes();
-            self.report.bytes += bytes;
-            self.recording = None;
-            warn!(
-                "the recording has ended: {error}; free space and restart the daemon; `hexad recover` completes the file"
-            );
+        // An older copy makes room for a new one.
+        while self.memories.peek().is_some_and(|copy| copy.cycle < cycle) {
+            let _ = self.memories.dequeue();
         }
-        let Some(window) = &mut self.window else { return };
-        match window.advance(&self.context, &self.tape, CYCLES_PER_STEP) {
-            Ok(false) => {}
-            Ok(true) => self.finish_window(),
-            Err(error) => {
-                warn!("the cycles around the fault are lost: {error}");
-                self.window = None;
-            }
-        }
-    }
-
-    fn finish_window(&mut self) {
-        let Some(window) = self.window.take() else { return };
-        self.report.bytes += window.bytes();
-        match window.finish() {
-            Ok(Some(path)) => info!("the cycles around the fault are in {}", path.display()),
-            Ok(None) => {}
-            Err(error) => warn!("the cycles around the fault are lost: {error}"),
-        }
-    }
-
-    fn finish(&mut self) {
-        while self.window.is_some() {
-            self.write();
-        }
-        if let Some((code, fault)) = self.watch.due(true) {
-            self.begin_window(code, fault);
-        }
-        while self.window.is_some() {
-            self.write();
-        }
-        if let Some(recording) = self.recording.take() {
-            self.report.bytes += recording.bytes();
-            match recording.finish() {
-                Ok(Some(path)) => info!("the recording is in {}", path.display()),
-                Ok(None) => {}
-                Err(error) => warn!("the recording is not complete: {error}; `hexad recover` completes it"),
-            }
-        }
+        let Some(copy) = self.memories.peek().filter(|copy| copy.cycle == cycle) else { return false };
+        self.replica.resume(&copy.memory);
+        self.resume_cycle = cycle + self.context.rate;
+        let _ = self.memories.dequeue();
+        true
     }
 }
 
@@ -267,63 +233,4 @@ pub fn instruction_set(config: &Config) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::control::controller::Input;
-    use crate::daemon::replay::{recorded_controller, replay};
-    use crate::messages::GapMessage;
-    use crate::recording::Item;
-    use crate::recording::reader::Recording;
-
-    /// The cycles of a run without messages.
-    fn cycles(mut controller: Controller, count: u64) -> Vec<CycleMessage> {
-        let cycle = |cycle: u64| {
-            let input = Input { release_ns: cycle * 1_000_000, ..Input::default() };
-            let message = CycleMessage::new(&input, &controller.step(&input));
-            CycleMessage { cycle, due_ns: input.release_ns, ..message }
-        };
-        (1..=count).map(cycle).collect()
-    }
-
-    /// Records cycles without those that `is_lost`: report, items, and numbers of the replay of the file.
-    fn recorded(count: u64, is_lost: impl Fn(u64) -> bool) -> (RecorderReport, Vec<Item>, [u64; 3]) {
-        let config = Config::load("config/fried2008.toml".as_ref()).unwrap();
-        let info = RunInfo { fidelity: Fidelity::Exact.name().into(), ..RunInfo::default() };
-        let controller = recorded_controller(&info, &config);
-        let folder = tempfile::tempdir().unwrap();
-        let folders = Folders { record: Some(folder.path().into()), ..Folders::default() };
-        let (recorder, queue) = Recorder::new(&config, Fidelity::Exact, &controller, &folders).unwrap();
-        let report = thread::scope(|threads| {
-            let recorder = threads.spawn(|| recorder.run());
-            let kept = cycles(controller.clone(), count).into_iter().filter(|cycle| !is_lost(cycle.cycle));
-            kept.for_each(|cycle| queue.send(cycle).unwrap());
-            drop(queue);
-            recorder.join().unwrap()
-        });
-        let path = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
-        let recording = Recording::open(&path).unwrap();
-        let mut items = vec![];
-        recording.each(|item| items.push(item)).unwrap();
-        let (_, replay) = replay(&recording, controller).unwrap();
-        (report, items, [replay.compared, replay.unknown, replay.different])
-    }
-
-    #[test]
-    fn lost_cycles_are_counted_and_marked_where_they_are_missing() {
-        let (report, items, replayed) = recorded(3000, |cycle| (1501..=1510).contains(&cycle));
-        assert_eq!((report.cycles, report.missing, report.is_repeatable), (2990, 10, false));
-        let mark = Item::Gap(GapMessage { first_cycle: 1501, cycles: 10 });
-        let gap = items.iter().position(|item| *item == mark).unwrap();
-        assert!(matches!(&items[gap + 1], Item::Cycle(after) if after.cycle == 1511));
-        let memories = items.iter().filter(|item| matches!(item, Item::Memory { .. })).count();
-        assert_eq!([memories, items.len()], [2, 2 + 1 + 2990], "behind the gap the memory is unknown");
-        assert_eq!(replayed, [1500, 1490, 0]);
-    }
-
-    #[test]
-    fn a_whole_recording_is_repeated() {
-        let (report, items, replayed) = recorded(3000, |_| false);
-        assert_eq!((report.cycles, report.missing, report.is_repeatable), (3000, 0, true));
-        assert_eq!((items.len(), replayed), (3003, [3000, 0, 0]));
-    }
-}
+mod tests;

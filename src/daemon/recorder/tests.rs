@@ -1,0 +1,195 @@
+use std::fs::{self, File};
+use std::sync::mpsc::channel;
+
+use super::*;
+use crate::control::controller::{Input, Measurement};
+use crate::daemon::memory_queue::{CycleMemory, MemoryProducer, MemoryQueue};
+use crate::daemon::replay::{Replay, recorded_controller, replay};
+use crate::messages::GapMessage;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
+use crate::recording::Item;
+use crate::recording::reader::Recording;
+
+/// What a test looks at.
+struct Recorded {
+    report: RecorderReport,
+    items: Vec<Item>,
+    replay: Replay,
+}
+
+fn config() -> Config {
+    Config::load("config/fried2008.toml".as_ref()).unwrap()
+}
+
+fn controller(config: &Config) -> Controller {
+    let info = RunInfo { fidelity: Fidelity::Exact.name().into(), ..RunInfo::default() };
+    recorded_controller(&info, config)
+}
+
+/// Input of a cycle: the platform is moved by hand, so that the memory of each cycle is another.
+fn input(machine: &Machine, cycle: u64) -> Input {
+    let mut x = machine.home;
+    x[3] += 1e-3 * (cycle as f64 * 0.01).sin();
+    let length = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
+    let release_ns = cycle * 1_000_000;
+    let measurement = Some(Measurement { time_ns: release_ns, length, ..Measurement::default() });
+    Input { release_ns, measurement, ..Input::default() }
+}
+
+/// The real-time thread and the log thread: runs cycles, and hands over those that are not lost, each changed
+/// by `change`.
+fn run_cycles(
+    controller: &mut Controller,
+    memories: &mut MemoryProducer<'_>,
+    queue: &SyncSender<CycleMessage>,
+    count: u64,
+    is_lost: impl Fn(u64) -> bool,
+    change: impl Fn(&mut CycleMessage),
+) {
+    let machine = config().machine;
+    for cycle in 1..=count {
+        let input = input(&machine, cycle);
+        memories.begin_cycle(controller.memory());
+        let message = CycleMessage::new(&input, &controller.step(&input));
+        let mut message = CycleMessage { cycle, due_ns: input.release_ns, ..message };
+        change(&mut message);
+        if !is_lost(cycle) {
+            queue.send(message).unwrap();
+        }
+    }
+}
+
+/// Records cycles without those that `is_lost`.
+fn recorded(count: u64, is_lost: impl Fn(u64) -> bool, change: impl Fn(&mut CycleMessage)) -> Recorded {
+    let config = config();
+    let mut controller = controller(&config);
+    let at_start = controller.clone();
+    let folder = tempfile::tempdir().unwrap();
+    let folders = Folders { record: Some(folder.path().into()), ..Folders::default() };
+    let mut memory_queue = MemoryQueue::new();
+    let (memories, consumer) = memory_queue.split();
+    let (recorder, links) = Recorder::new(&config, Fidelity::Exact, &controller, consumer, &folders);
+    let report = thread::scope(|threads| {
+        let recorder = threads.spawn(|| recorder.run());
+        let mut memories = MemoryProducer::new(memories);
+        run_cycles(&mut controller, &mut memories, &links.cycles, count, is_lost, change);
+        drop(links);
+        recorder.join().unwrap()
+    });
+    let path = fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
+    let recording = Recording::open(&path).unwrap();
+    let mut items = vec![];
+    recording.each(|item| items.push(item)).unwrap();
+    let (_, replay) = replay(&recording, at_start).unwrap();
+    Recorded { report, items, replay }
+}
+
+fn numbers(replay: &Replay) -> [u64; 3] {
+    [replay.compared, replay.unknown_count(), replay.different]
+}
+
+#[test]
+fn a_whole_recording_is_repeated() {
+    let Recorded { report, items, replay } = recorded(3000, |_| false, |_| ());
+    assert_eq!((report.cycles, report.missing, report.is_repeatable), (3000, 0, true));
+    assert_eq!((items.len(), numbers(&replay)), (3003, [3000, 0, 0]));
+}
+
+#[test]
+fn lost_cycles_are_counted_and_marked_and_the_replay_goes_on_behind_them() {
+    // The queue holds 2000 cycles: so far the copy of the memory may be ahead of the recorder.
+    let Recorded { report, items, replay } = recorded(9000, |cycle| (1501..=1510).contains(&cycle), |_| ());
+    assert_eq!((report.cycles, report.missing, report.is_repeatable), (8990, 10, false));
+    let mark = Item::Gap(GapMessage { first_cycle: 1501, cycles: 10 });
+    let gap = items.iter().position(|item| *item == mark).unwrap();
+    assert!(matches!(&items[gap + 1], Item::Cycle(after) if after.cycle == 1511));
+    let [compared, unknown, different] = numbers(&replay);
+    assert_eq!((compared + unknown, different), (8990, 0));
+    assert!((1500 + 4000..8990).contains(&compared), "{compared} compared");
+    let resumed = items.iter().find_map(|item| match item {
+        Item::Memory { cycle, .. } if *cycle > 1501 => Some(*cycle),
+        _ => None,
+    });
+    assert_eq!(resumed, Some(1511 + unknown), "from this memory on everything is compared");
+    assert_eq!(replay.unknown, [1511..=1510 + unknown]);
+}
+
+#[test]
+fn an_output_that_differs_behind_a_gap_is_noticed() {
+    let change = |cycle: &mut CycleMessage| {
+        if cycle.cycle == 8500 {
+            cycle.force_n[2] = f64::from_bits(cycle.force_n[2].to_bits() ^ 1);
+        }
+    };
+    let Recorded { report, replay, .. } = recorded(9000, |cycle| cycle == 1501, change);
+    assert!(!report.is_repeatable);
+    assert_eq!(replay.different, 1);
+    let first = replay.first.unwrap();
+    assert_eq!((first.cycle, first.field.as_str()), (8500, "force_n_3"));
+}
+
+/// A recorder without folders, by hand.
+fn in_memory(config: &Config, count: u64) -> (Recorder<'static>, SyncSender<WindowOrder>) {
+    let mut controller = controller(config);
+    let queue: &'static mut MemoryQueue = Box::leak(Box::new(MemoryQueue::new()));
+    let (memories, consumer) = queue.split();
+    let folders = Folders::default();
+    let (mut recorder, links) = Recorder::new(config, Fidelity::Exact, &controller, consumer, &folders);
+    let mut memories = MemoryProducer::new(memories);
+    let (sender, cycles) = sync_channel(count as usize);
+    run_cycles(&mut controller, &mut memories, &sender, count, |_| false, |_| ());
+    cycles.try_iter().for_each(|cycle| recorder.add(&cycle));
+    (recorder, links.orders)
+}
+
+/// The cycles of a window of the last seconds, which a replay repeats.
+fn window(recorder: &mut Recorder<'_>, orders: &SyncSender<WindowOrder>, last_s: f64) -> Vec<u64> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("last.mcap");
+    let (answer, answered) = channel();
+    orders.send(WindowOrder { file: File::create(&path).unwrap(), last_s, answer }).unwrap();
+    recorder.windows.advance(&recorder.context, &recorder.tape);
+    recorder.windows.finish(&recorder.context, &recorder.tape);
+    let written = answered.recv().unwrap().unwrap();
+    let recording = Recording::open(&path).unwrap();
+    let mut cycles = vec![];
+    let summary = recording.each(|item| {
+        if let Item::Cycle(cycle) = item {
+            cycles.push(cycle.cycle);
+        }
+    });
+    assert_eq!((summary.unwrap().unfinished, cycles.len() as u64), (None, written));
+    let (_, replay) = replay(&recording, controller(&config())).unwrap();
+    assert_eq!(numbers(&replay), [written, 0, 0], "last {last_s} s");
+    cycles
+}
+
+#[test]
+fn the_last_seconds_are_in_memory_without_a_folder() {
+    let config = config();
+    let (mut recorder, orders) = in_memory(&config, 40_500);
+    for (last_s, first) in [(1.0, 39_001), (2.6, 37_001), (30.0, 11_001), (1e9, 11_001)] {
+        let cycles = window(&mut recorder, &orders, last_s);
+        assert!(cycles.iter().copied().eq(first..=40_500), "{last_s} s: from {:?}", cycles.first());
+    }
+}
+
+#[test]
+fn the_copy_of_a_memory_is_that_before_its_cycle_and_is_made_only_where_there_is_room() {
+    let config = config();
+    let mut controller = controller(&config);
+    let mut queue = MemoryQueue::new();
+    let (producer, mut consumer) = queue.split();
+    let mut memories = MemoryProducer::new(producer);
+    let (sender, _cycles) = sync_channel(100);
+    run_cycles(&mut controller, &mut memories, &sender, 50, |_| false, |_| ());
+    let CycleMemory { cycle, .. } = consumer.dequeue().unwrap();
+    assert_eq!(cycle, 1);
+    let before = crate::recording::memory_bytes(controller.memory());
+    memories.begin_cycle(controller.memory());
+    controller.step(&Input { release_ns: 51_000_000, ..Input::default() });
+    let copy = consumer.dequeue().unwrap();
+    assert_eq!((copy.cycle, crate::recording::memory_bytes(&copy.memory)), (51, before));
+}
