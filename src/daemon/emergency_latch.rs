@@ -126,7 +126,10 @@ impl EmergencyLatch {
                 self.is_set = is_stopped;
                 let after_ms = monotonic_ns().saturating_sub(due_ns) as f64 * 1e-6;
                 if is_stopped {
-                    info!(after_ms, "the emergency stop will outlast a restart: stored {after_ms:.1} ms after its cycle");
+                    info!(
+                        after_ms,
+                        "the emergency stop will outlast a restart: stored {after_ms:.1} ms after its cycle"
+                    );
                 }
             }
             Err(cause) if is_stopped => {
@@ -202,7 +205,8 @@ mod tests {
     fn the_file_is_overwritten_in_place() {
         let folder = TempDir::new().unwrap();
         let mut latch = EmergencyLatch::open(folder.path()).unwrap();
-        let file = || fs::metadata(folder.path().join(FILE)).map(|found| (found.ino(), found.blocks(), found.len()));
+        let file =
+            || fs::metadata(folder.path().join(FILE)).map(|found| (found.ino(), found.blocks(), found.len()));
         let before = file().unwrap();
         for state in [EMERGENCY, OFF, EMERGENCY] {
             latch.follow(change(state));

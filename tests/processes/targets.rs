@@ -223,7 +223,8 @@ fn a_jog_moves_while_keys_arrive_and_no_longer() {
     assert_eq!(code.code(), Some(2), "{stderr}");
     assert!(stderr.contains("must be a terminal"), "{stderr}");
     // In place of the shell, which would else receive Ctrl-C too, and some shells then end with a code of their own.
-    let line = format!("exec {} jog --engage --config {}", env!("CARGO_BIN_EXE_hexad"), machine.file.display());
+    let line =
+        format!("exec {} jog --engage --config {}", env!("CARGO_BIN_EXE_hexad"), machine.file.display());
     let mut script = Command::new("script");
     script.args(["-qec", &line, "/dev/null"]).env("SHELL", "/bin/sh").env_remove(PARENT_VARIABLE);
     let child = script.stdin(Stdio::piped()).stdout(Stdio::null()).spawn();
