@@ -74,7 +74,8 @@ impl LatchLink {
     /// Wakes the thread of the latch if the state or its reason has changed.
     pub fn send(&mut self, output: &Output, due_ns: u64) {
         let (state, code) = (output.state, output.diagnostic.code);
-        if (state, code) != self.last {
+        // The output behind the last cycle is no state of the controller: an emergency stop outlives it.
+        if (state, code) != self.last && code != DiagnosticCode::DaemonEnding {
             self.last = (state, code);
             self.changes.write(Change { state, code, due_ns });
             self.event.signal();
@@ -239,23 +240,25 @@ mod tests {
     }
 
     #[test]
-    fn its_thread_follows_every_change_and_ends_with_the_last() {
-        let folder = TempDir::new().unwrap();
-        let latch = EmergencyLatch::open(folder.path()).unwrap();
-        let path = latch.path.clone();
-        let (mut link, changes) = latch_link();
-        let stop = AtomicBool::new(false);
-        scope(|threads| {
-            threads.spawn(|| latch.run(changes, &stop));
-            for (state, content) in [(EMERGENCY, IN_FORCE), (OFF, CLEARED), (EMERGENCY, IN_FORCE)] {
-                link.send(&output(state), 0);
-                while read(&path).unwrap() != content {
-                    yield_now();
+    fn its_thread_follows_every_change_but_the_end_of_the_daemon() {
+        for (last, is_left) in [(OFF, false), ((State::Off, DiagnosticCode::DaemonEnding), true)] {
+            let folder = TempDir::new().unwrap();
+            let latch = EmergencyLatch::open(folder.path()).unwrap();
+            let path = latch.path.clone();
+            let (mut link, changes) = latch_link();
+            let stop = AtomicBool::new(false);
+            scope(|threads| {
+                threads.spawn(|| latch.run(changes, &stop));
+                for (state, content) in [(EMERGENCY, IN_FORCE), (OFF, CLEARED), (EMERGENCY, IN_FORCE)] {
+                    link.send(&output(state), 0);
+                    while read(&path).unwrap() != content {
+                        yield_now();
+                    }
                 }
-            }
-            link.send(&output(OFF), 0);
-            stop.store(true, Ordering::Relaxed);
-        });
-        assert!(!is_kept(&folder), "the last change was not followed");
+                link.send(&output(last), 0);
+                stop.store(true, Ordering::Relaxed);
+            });
+            assert_eq!(is_kept(&folder), is_left, "{last:?}");
+        }
     }
 }
