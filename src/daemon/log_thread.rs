@@ -12,7 +12,6 @@ use heapless::spsc::Consumer;
 use tracing::{error, info, warn};
 
 use super::cycle::{CycleRecord, message, tracking_error};
-use super::emergency_latch::EmergencyLatch;
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::process_names::sentence;
@@ -46,7 +45,6 @@ pub struct LogLinks<'a> {
     /// To the recorder. When it is full, cycles are lost.
     pub recorder: SyncSender<CycleMessage>,
     pub first_pose: FirstPose,
-    pub latch: EmergencyLatch,
 }
 
 /// Statistics of a run.
@@ -105,8 +103,6 @@ impl Log {
             self.log_publishers(&record);
             let state = (record.output.state, record.output.diagnostic.code);
             if state != self.state {
-                let (name, code) = state;
-                links.latch.follow(name, code);
                 self.log_state(&record);
                 self.state = state;
             }

@@ -1,4 +1,4 @@
-//! The five threads of the daemon: start, supervision, end.
+//! The threads of the daemon: start, supervision, end.
 
 use core::mem;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -14,7 +14,7 @@ use tracing::{info, warn};
 use super::control_socket::location::ControlSocket;
 use super::control_socket::{self, ControlLinks};
 use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
-use super::emergency_latch::EmergencyLatch;
+use super::emergency_latch::{EmergencyLatch, latch_link};
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports, Silence};
@@ -57,6 +57,7 @@ struct Flags {
     stop_io: AtomicBool,
     stop_control: AtomicBool,
     stop_log: AtomicBool,
+    stop_latch: AtomicBool,
     /// The daemon is to end: the platform comes to rest.
     is_ending: AtomicBool,
     /// The daemon is to end and the platform is not under control.
@@ -67,7 +68,7 @@ struct Flags {
 pub(super) fn run(
     config: &Config,
     folders: &Folders,
-    latch: EmergencyLatch,
+    latch: Option<EmergencyLatch>,
     socket: ControlSocket,
     word: &'static RequestWord,
     stop: &Stop,
@@ -85,6 +86,12 @@ pub(super) fn run(
     let (delay_producer, delays) = delay_queue.split();
     let (statistics_writer, statistics) = triple_buffer(Statistics::default());
     let (snapshot_writer, snapshots) = triple_buffer(Snapshot::default());
+    let (latch, latch_link) = latch
+        .map(|latch| {
+            let (link, changes) = latch_link();
+            ((latch, changes), link)
+        })
+        .unzip();
     let (flags, progress, files) = (&Flags::default(), &Progress::default(), &OnceLock::new());
     let ((io_ready, ready), (go, go_ahead)) = (channel(), channel());
     memory::keep_heap();
@@ -96,7 +103,6 @@ pub(super) fn run(
         files,
         recorder: recorder_links.cycles,
         first_pose: FirstPose::of(&config.machine),
-        latch,
     };
     let realtime_links = RealtimeLinks {
         exchange: realtime_side,
@@ -113,6 +119,7 @@ pub(super) fn run(
         delays: delay_producer,
         statistics,
         snapshots: snapshot_writer,
+        latch: latch_link,
         word,
         is_ending: &flags.is_ending,
         may_end: &flags.may_end,
@@ -130,6 +137,11 @@ pub(super) fn run(
             prepare_record(realtime);
             recorder.run()
         })?;
+        let latch = latch
+            .map(|(latch, changes)| {
+                spawn(threads, "hexad-latch", move || latch.run(changes, &flags.stop_latch))
+            })
+            .transpose()?;
         let log = spawn(threads, "hexad-log", || {
             prepare_record(realtime);
             log_thread::run(log_links, &flags.stop_log)
@@ -146,6 +158,8 @@ pub(super) fn run(
         drop(go);
         let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
+        flags.stop_latch.store(true, Ordering::Relaxed);
+        latch.map_or(Ok(()), |latch| latch.join().map_err(|_| DaemonError::Died("latch")))?;
         let recorded = recorder.join().map_err(|_| DaemonError::Died("recorder"));
         let (cyclic, io, log) = reports?;
         Ok(report(config, &cyclic, &io, log, recorded?))
@@ -285,8 +299,8 @@ struct StopOnDrop<'a>(&'a Flags);
 
 impl Drop for StopOnDrop<'_> {
     fn drop(&mut self) {
-        let Flags { stop_loop, stop_io, stop_control, stop_log, .. } = self.0;
-        [stop_loop, stop_io, stop_control, stop_log]
+        let Flags { stop_loop, stop_io, stop_control, stop_log, stop_latch, .. } = self.0;
+        [stop_loop, stop_io, stop_control, stop_log, stop_latch]
             .into_iter()
             .for_each(|flag| flag.store(true, Ordering::Relaxed));
     }
