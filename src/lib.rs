@@ -16,7 +16,7 @@
 //! | `output` | charts, tables, CSV and JSON files | `daemon` |
 //! | `config` | machine and deployment files | `daemon` |
 //! | `recording` | every cycle in a file: format, reader, repair | `daemon` |
-//! | `daemon` | the five threads, translation between messages and controller, reports | `daemon` |
+//! | `daemon` | the threads, translation between messages and controller, reports | `daemon` |
 //! | `commands` | one file or folder for each command of the command line | `daemon` |
 //!
 //! A folder uses folders above it in this table and no other; `tests/wall.rs` checks that. `output` stands above

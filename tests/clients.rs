@@ -8,13 +8,20 @@ mod clients {
     mod declarations;
     mod drivers;
     mod library;
+    mod requests;
     mod verdicts;
     mod wheel;
 }
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{self, Command};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use hexad::commands::demo::children::PARENT_VARIABLE;
+
+use crate::common::libhexad::repository;
+use crate::common::process::Process;
 
 /// A file of this test.
 fn file(name: &str) -> PathBuf {
@@ -27,4 +34,18 @@ fn file(name: &str) -> PathBuf {
 fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A daemon of the machine of the paper under another name, with more sections in its file. It runs.
+fn start_daemon(name: &str, sections: &str) -> Process {
+    let machine = file(&format!("{name}.toml"));
+    let text = fs::read_to_string(repository().join("config/fried2008.toml")).unwrap();
+    let named = text.replace("name = \"fried2008\"", &format!("name = \"{name}\""));
+    fs::write(&machine, format!("{named}\n{sections}")).unwrap();
+    let mut daemon = Command::new(env!("CARGO_BIN_EXE_hexad"));
+    daemon.args(["run".as_ref(), "--config".as_ref(), machine.as_os_str()]).env_remove("HEXAD_LOG");
+    daemon.env(PARENT_VARIABLE, process::id().to_string());
+    let daemon = Process::start(daemon, file(&format!("{name}-daemon.txt")));
+    daemon.says("running");
+    daemon
 }

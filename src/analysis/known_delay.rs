@@ -38,7 +38,8 @@ impl SampledLoop {
         let unknown = (self.delay - self.known_delay) / periods;
         let rate_noise = self.rate_noise.map(|noise| noise * periods);
         let wn_t = self.wn_t * periods;
-        let late = Self { wn_t, rate_noise, known_delay, delay: known_delay + unknown, ..*self };
+        let held_pole = self.held_pole * periods;
+        let late = Self { wn_t, rate_noise, held_pole, known_delay, delay: known_delay + unknown, ..*self };
         masses.iter().all(|mass| late.is_stable_with_gain(1.0 / mass))
     }
 

@@ -62,6 +62,8 @@ pub struct SampledLoop {
     pub delay: f64,
     /// Mass of the platform over that of the model.
     pub mass_ratio: f64,
+    /// Open-loop pole of the platform under held forces, times the period: see [`held_forces`](super::held_forces).
+    pub held_pole: f64,
 }
 
 impl Default for SampledLoop {
@@ -76,19 +78,33 @@ impl Default for SampledLoop {
             known_delay: 0.0,
             delay: 0.0,
             mass_ratio: 1.0,
+            held_pole: 0.0,
         }
     }
 }
 
-/// Error and rate of an axis, and the acceleration that disturbs it.
+/// Error and rate of an axis, the acceleration that disturbs it, and its pole under held forces.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     e: f64,
     v: f64,
     d: f64,
+    pole: f64,
 }
 
 impl Axis {
+    /// Over `dt` with `e'' = pole^2 e + a`.
+    fn step(&mut self, dt: f64, a: f64) {
+        let Self { e, v, pole, .. } = *self;
+        let half = 0.5 * pole * dt;
+        // sinh x / x
+        let by_half = if half < 1e-4 { 1.0 } else { half.sinh() / half };
+        let (cosh, sinh_over_pole) = (1.0 + 2.0 * (half * by_half).powi(2), dt * by_half * half.cosh());
+        let growth = pole * pole * sinh_over_pole;
+        self.e = e * cosh + v * sinh_over_pole + 0.5 * a * (dt * by_half).powi(2);
+        self.v = e * growth + v * cosh + a * sinh_over_pole;
+    }
+
     /// Through commands that each act until the next: `u(j)` was commanded j periods ago and begins a delay later.
     fn advance(&mut self, duration: f64, delay: f64, u: impl Fn(usize) -> f64) {
         let (whole, mut now) = (delay.floor(), 0.0);
@@ -97,9 +113,7 @@ impl Axis {
         while now < duration {
             let dt = end.min(duration) - now;
             if dt > 0.0 {
-                let a = self.d - u(ago);
-                self.e += (self.v + 0.5 * a * dt) * dt;
-                self.v += a * dt;
+                self.step(dt, self.d - u(ago));
                 now += dt;
             }
             (ago, end) = (ago.saturating_sub(1), if ago == 1 { f64::INFINITY } else { end + 1.0 });
@@ -121,18 +135,27 @@ impl<'a> Period<'a> {
         Self { of, gains, pending: of.delay.max(of.known_delay).ceil() as usize + 1 }
     }
 
+    /// With the poses for which forces were commanded, if they matter.
     fn states(&self) -> usize {
-        5 + self.pending
+        let poses = if self.of.held_pole > 0.0 { self.pending } else { 0 };
+        5 + self.pending + poses
     }
 
     /// The state a period later; `noise` of the readings of e and of T e', and what acts beside the commands of so many periods ago.
     fn advance(&self, z: &DVector<f64>, noise: [f64; 2], push: impl Fn(usize) -> f64) -> DVector<f64> {
         let SampledLoop {
-            wn_t, damping_ratio, compensates_disturbance, known_delay, delay, mass_ratio, ..
+            wn_t,
+            damping_ratio,
+            compensates_disturbance,
+            known_delay,
+            delay,
+            mass_ratio,
+            held_pole,
+            ..
         } = *self.of;
         let at = |k: usize| z.get(k).copied().unwrap_or_default();
-        let mut platform = Axis { e: at(0), v: at(1), d: 0.0 };
-        let mut estimate = Axis { e: at(2), v: at(3), d: at(4) };
+        let mut platform = Axis { e: at(0), v: at(1), d: 0.0, pole: held_pole };
+        let mut estimate = Axis { e: at(2), v: at(3), d: at(4), pole: 0.0 };
         let correct = |[by_e, by_v, by_d]: Gains, innovation: f64, estimate: &mut Axis| {
             estimate.e += by_e * innovation;
             estimate.v += by_v * innovation;
@@ -141,6 +164,7 @@ impl<'a> Period<'a> {
         let [of_length, of_rate] = self.gains;
         correct(of_length, platform.e + noise[0] - estimate.e, &mut estimate);
         correct(of_rate, platform.v + noise[1] - estimate.v, &mut estimate);
+        let residual = platform.e + noise[0] - estimate.e;
         let mut begin = estimate;
         begin.advance(known_delay, known_delay, |ago| at(4 + ago));
         let mut newest = wn_t * wn_t * begin.e + 2.0 * damping_ratio * wn_t * begin.v;
@@ -148,11 +172,19 @@ impl<'a> Period<'a> {
             newest += begin.d;
         }
         let u = |ago: usize| if ago == 0 { newest } else { at(4 + ago) };
+        // The error of the pose for which the dynamics are evaluated.
+        let mut middle = begin;
+        middle.step(0.5, middle.d - newest);
+        let pose = |ago: usize| if ago == 0 { middle.e + residual } else { at(4 + self.pending + ago) };
         estimate.advance(1.0, known_delay, u);
-        platform.advance(1.0, delay, |ago| (u(ago) + push(ago)) / mass_ratio);
+        let pole_squared = held_pole * held_pole;
+        platform.advance(1.0, delay, |ago| (u(ago) + push(ago)) / mass_ratio + pole_squared * pose(ago));
         let head = [platform.e, platform.v, estimate.e, estimate.v, estimate.d];
-        let commands = (0..self.pending).map(u);
-        DVector::from_iterator(self.states(), head.into_iter().chain(commands))
+        let (commands, poses) = ((0..self.pending).map(u), (0..self.pending).map(pose));
+        DVector::from_iterator(
+            self.states(),
+            head.into_iter().chain(commands).chain(poses).take(self.states()),
+        )
     }
 
     fn matrix(&self) -> DMatrix<f64> {

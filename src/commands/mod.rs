@@ -24,6 +24,7 @@ use self::log::{FORMAT_VARIABLE, LogFormat};
 use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
 use self::operate::Order;
+use self::record::RecordArguments;
 use self::recover::RecoverArguments;
 use self::replay::ReplayArguments;
 use self::report::ReportArguments;
@@ -58,6 +59,7 @@ mod offline_tables;
 pub mod operate;
 pub mod plant;
 mod progress;
+mod record;
 mod recover;
 mod replay;
 mod report;
@@ -132,6 +134,8 @@ enum CommandArguments {
     Report(ReportArguments),
     /// Write a recording in another format
     Convert(ConvertArguments),
+    /// Write the last seconds of a running daemon, which it keeps in memory, as a recording
+    Record(RecordArguments),
     /// Complete a recording that a crash or a full disk has left unfinished
     Recover(RecoverArguments),
     /// Forces, lengths and their derivatives for a file of motions
@@ -171,6 +175,7 @@ impl CommandLine {
             Is::Replay(arguments) => arguments.execute(),
             Is::Report(arguments) => arguments.execute(),
             Is::Convert(arguments) => arguments.execute(),
+            Is::Record(arguments) => arguments.execute(),
             Is::Recover(arguments) => arguments.execute(),
             Is::InverseDynamics(arguments) => arguments.execute(),
             Is::ForwardKinematics(arguments) => arguments.execute(),

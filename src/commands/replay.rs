@@ -9,15 +9,14 @@ use clap::Args;
 use super::failure::{CommandError, Failure};
 use crate::config::Config;
 use crate::daemon::recorder::instruction_set;
-use crate::daemon::replay::{Difference, Replay, other_controller, recorded_controller, replay};
+use crate::daemon::replay::{Replay, other_controller, recorded_controller, replay};
 use crate::output::files::print;
 use crate::recording::Item;
 use crate::recording::copy::copy;
 use crate::recording::reader::{Recording, Summary};
 
-/// Largest difference between two instruction sets, which add the same numbers in another order: that of the reference's
-/// acceleration, a difference of velocities over a cycle; 2e-11 was seen. Forces agree to 1e-11 of the largest.
-const INSTRUCTION_SET_TOLERANCE: f64 = 1e-10;
+/// Most ranges of cycles that are listed.
+const MAX_RANGES: usize = 10;
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
@@ -87,9 +86,8 @@ impl ReplayArguments {
         if replay.compared == 0 {
             return Err(ReplayError::Unknown(info.version).into());
         }
-        let largest = replay.largest().map_or(0.0, Difference::size);
-        let is_tolerated =
-            info.instruction_set != instruction_set(&recorded) && largest <= INSTRUCTION_SET_TOLERANCE;
+        let is_tolerated = info.instruction_set != instruction_set(&recorded)
+            && replay.is_rounding(recorded.deployment.realtime.period_s());
         if replay.different > 0 && other.is_none() && !is_tolerated {
             return Err(ReplayError::Different(replay.different).into());
         }
@@ -143,11 +141,15 @@ fn description(recording: &Recording, summary: &Summary, replay: &Replay, config
     if info.version != env!("CARGO_PKG_VERSION") {
         let _ = writeln!(text, "the version is another one here: {}", env!("CARGO_PKG_VERSION"));
     }
-    if replay.unknown > 0 {
+    if !replay.unknown.is_empty() {
+        let ranges: Vec<_> = replay.unknown.iter().take(MAX_RANGES).map(|it| format!("{it:?}")).collect();
+        let more = replay.unknown.len().saturating_sub(MAX_RANGES);
+        let more = if more > 0 { format!(", and in {more} more places") } else { String::new() };
         let _ = writeln!(
             text,
-            "{} cycles cannot be repeated: the memory of the controller is unknown",
-            replay.unknown
+            "{} cycles cannot be repeated, as the memory of the controller is unknown: {}{more}",
+            replay.unknown_count(),
+            ranges.join(", ")
         );
     }
     let Replay { compared, different, .. } = replay;

@@ -3,8 +3,8 @@
 use core::f64::consts::TAU;
 use core::fmt;
 
-use super::deployment::{Control, Deployment, Drive, Realtime, STABLE_MASSES};
-use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop};
+use super::deployment::{Control, Deployment, DeploymentLimits, Drive, Realtime, STABLE_MASSES};
+use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop, edge};
 use crate::control::estimator::SENT_ACCELERATIONS;
 
 /// Control loop with the longest delay that the daemon may have.
@@ -22,10 +22,17 @@ pub struct ControlLoop {
 
 /// The loops of position and orientation, or that of the stiffest mode of the legs.
 pub fn loops(deployment: &Deployment) -> Vec<ControlLoop> {
-    loops_of(&deployment.realtime, &deployment.control, &deployment.drive)
+    loops_of(&deployment.realtime, &deployment.control, &deployment.drive, &deployment.limits)
 }
 
-fn loops_of(realtime: &Realtime, control: &Control, drive: &Drive) -> Vec<ControlLoop> {
+fn loops_of(
+    realtime: &Realtime,
+    control: &Control,
+    drive: &Drive,
+    limits: &DeploymentLimits,
+) -> Vec<ControlLoop> {
+    // Modes on legs take the forces at the desired pose.
+    let held_pole = if control.mode.acts_on_legs() { 0.0 } else { limits.held_pole };
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
@@ -42,6 +49,7 @@ fn loops_of(realtime: &Realtime, control: &Control, drive: &Drive) -> Vec<Contro
         sampled: SampledLoop {
             estimator_ratio: control.estimator_bandwidth_hz / bandwidth_hz,
             compensates_disturbance: control.compensate_disturbances,
+            held_pole: held_pole * realtime.period_s(),
             ..realtime.sampled_loop(bandwidth_hz, damping_ratio, drive.total_delay_s())
         }
         .with_feedback_gain(gain),
@@ -58,37 +66,47 @@ const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
 pub fn longest_age_s(deployment: &Deployment) -> f64 {
     let recorded = SENT_ACCELERATIONS as f64 - 1.0;
     let recorded_s = recorded * deployment.realtime.period_s() - deployment.drive.total_delay_s();
-    stable_age_s(&deployment.realtime, &deployment.control, &deployment.drive).min(recorded_s)
+    let Deployment { realtime, control, drive, limits, .. } = deployment;
+    stable_age_s(realtime, control, drive, limits).min(recorded_s)
 }
 
 /// Largest constant age of the measurements with which all loops are stable \[s\].
-fn stable_age_s(realtime: &Realtime, control: &Control, drive: &Drive) -> f64 {
-    let sampled = loops_of(realtime, control, drive).into_iter().map(|it| it.sampled).filter(is_finite);
+fn stable_age_s(realtime: &Realtime, control: &Control, drive: &Drive, limits: &DeploymentLimits) -> f64 {
+    let sampled =
+        loops_of(realtime, control, drive, limits).into_iter().map(|it| it.sampled).filter(is_finite);
     let delays =
         sampled.map(|sampled| sampled.longest_known_delay(&MASSES_AT_LONGEST_AGE).max(sampled.delay));
     delays.fold(f64::INFINITY, f64::min) * realtime.period_s() - drive.total_delay_s()
 }
 
 /// The age \[s\], or the largest with which all loops are stable if that is less. A rejected value leaves it open.
-pub(super) fn bounded_age_s(age_s: f64, realtime: &Realtime, control: &Control, drive: &Drive) -> f64 {
+pub(super) fn bounded_age_s(
+    age_s: f64,
+    realtime: &Realtime,
+    control: &Control,
+    drive: &Drive,
+    limits: &DeploymentLimits,
+) -> f64 {
     let delay = (age_s + drive.total_delay_s()) * realtime.rate_hz;
     let is_stable = |ControlLoop { sampled, .. }: ControlLoop| {
         !is_finite(&sampled) || sampled.is_stable_with_known_delay(delay, &MASSES_AT_LONGEST_AGE)
     };
-    let are_stable = !delay.is_finite() || loops_of(realtime, control, drive).into_iter().all(is_stable);
-    if are_stable { age_s } else { age_s.min(stable_age_s(realtime, control, drive)) }
+    let are_stable =
+        !delay.is_finite() || loops_of(realtime, control, drive, limits).into_iter().all(is_stable);
+    if are_stable { age_s } else { age_s.min(stable_age_s(realtime, control, drive, limits)) }
 }
 
 /// Whether the values from which the loop follows were all accepted.
 fn is_finite(sampled: &SampledLoop) -> bool {
-    let values = [sampled.wn_t, sampled.damping_ratio, sampled.estimator_ratio, sampled.delay];
+    let SampledLoop { wn_t, damping_ratio, estimator_ratio, delay, held_pole, .. } = *sampled;
+    let values = [wn_t, damping_ratio, estimator_ratio, delay, held_pole];
     values.iter().all(|value| value.is_finite())
 }
 
 /// `timeouts.measured_ms` that is beyond the age with which the loops are stable, as its value and that age \[ms\].
 pub fn unstable_timeout_ms(deployment: &Deployment) -> Option<(f64, f64)> {
-    let Deployment { realtime, control, drive, timeouts, .. } = deployment;
-    let age_s = bounded_age_s(timeouts.measured_s, realtime, control, drive);
+    let Deployment { realtime, control, drive, limits, timeouts, .. } = deployment;
+    let age_s = bounded_age_s(timeouts.measured_s, realtime, control, drive, limits);
     (timeouts.measured_s > age_s).then_some((1e3 * timeouts.measured_s, 1e3 * age_s))
 }
 
@@ -96,6 +114,22 @@ impl ControlLoop {
     /// Largest bandwidth with which the loop is stable \[Hz\].
     pub fn largest_stable_hz(&self) -> f64 {
         self.sampled.largest_wn_t() * self.rate_hz / TAU
+    }
+
+    /// Error where the loop is not stable because of the pole of the platform under held forces.
+    pub fn beyond_held_pole(&self) -> Option<String> {
+        let Self { name, rate_hz, sampled, .. } = self;
+        let with = |held_pole| SampledLoop { held_pole, ..*sampled }.is_stable();
+        if with(sampled.held_pole) || !with(0.0) {
+            return None;
+        }
+        let stable = edge(0.0, sampled.held_pole, with) * rate_hz;
+        Some(format!(
+            "too large for the {name} loop: within it the platform leaves a pose whose forces are held with up to {:.1}/s, and \
+             with {:.2} periods of delay the loop is stable to {stable:.1}/s; lower it, or raise realtime.rate_hz",
+            sampled.held_pole * rate_hz,
+            sampled.delay,
+        ))
     }
 
     /// Warning where a mass that is plausible would make the loop unstable.

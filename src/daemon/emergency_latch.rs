@@ -1,33 +1,99 @@
-//! Emergency stop that outlives the daemon: a file in the state directory, from the stop until `clear`.
+//! Emergency stop that outlives the daemon: a file in the state directory, in force from the stop until `clear`.
+//!
+//! The file is there from the start, and only its content changes, in place: no new file, no new name, no room that a full
+//! disk could lack. A thread of its own writes it as soon as the I/O thread has published the stop; neither the log nor the
+//! recorder can hold it up.
 
-use std::fs;
-use std::io::{self, ErrorKind};
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::fs::{File, read};
+use std::io::ErrorKind;
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use tracing::error;
+use tracing::{error, info};
 
+use crate::control::controller::Output;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::State;
+use crate::messages::clock::monotonic_ns;
 use crate::output::files::{FileError, write_whole};
+use crate::realtime::clock::Monotonic;
+use crate::realtime::event::Event;
+use crate::realtime::triple_buffer::{Reader, Writer, triple_buffer};
 
 /// Name of the file in the state directory.
 const FILE: &str = "emergency-stop";
-const CONTENT: &[u8] = b"Emergency stop. The daemon starts in it until an operator sends `clear`.\n";
+/// Its contents, of one length. Any other content, which an interrupted write may leave, is an emergency stop, too.
+const IN_FORCE: &[u8] = b"emergency stop: in force until an operator sends `clear`\n";
+const CLEARED: &[u8] = b"emergency stop: cleared                                 \n";
 
-/// Latch of the emergency stop; without a folder it lasts as long as the daemon.
-#[derive(Debug, Default)]
+/// How often its thread looks whether the daemon ends; a change wakes it at once \[ns\].
+const STOP_POLL_INTERVAL_NS: u64 = 20_000_000;
+
+/// Latch of the emergency stop.
+#[derive(Debug)]
 pub struct EmergencyLatch {
-    path: Option<PathBuf>,
+    path: PathBuf,
+    file: File,
     is_set: bool,
+}
+
+/// State of the controller after a cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Change {
+    state: State,
+    code: DiagnosticCode,
+    /// Release of the cycle \[ns\].
+    due_ns: u64,
+}
+
+/// From the I/O thread to the thread of the latch.
+pub struct LatchLink {
+    changes: Writer<Change>,
+    event: Arc<Event>,
+    /// The last that was sent.
+    last: (State, DiagnosticCode),
+}
+
+/// The other end of a [`LatchLink`].
+pub struct LatchChanges {
+    changes: Reader<Change>,
+    event: Arc<Event>,
+}
+
+/// Both ends of the link.
+pub fn latch_link() -> (LatchLink, LatchChanges) {
+    let (writer, reader) = triple_buffer(Change::default());
+    let event = Arc::new(Event::default());
+    let link = LatchLink { changes: writer, event: event.clone(), last: Default::default() };
+    (link, LatchChanges { changes: reader, event })
+}
+
+impl LatchLink {
+    /// Wakes the thread of the latch if the state or its reason has changed.
+    pub fn send(&mut self, output: &Output, due_ns: u64) {
+        let (state, code) = (output.state, output.diagnostic.code);
+        // The output behind the last cycle is no state of the controller: an emergency stop outlives it.
+        if (state, code) != self.last && code != DiagnosticCode::DaemonEnding {
+            self.last = (state, code);
+            self.changes.write(Change { state, code, due_ns });
+            self.event.signal();
+        }
+    }
 }
 
 impl EmergencyLatch {
     /// Latch in a folder, as the daemon before has left it. An error if that cannot be known or changed.
-    pub fn open(folder: Option<&Path>) -> Result<Self, FileError> {
-        let Some(folder) = folder else { return Ok(Self::default()) };
+    pub fn open(folder: &Path) -> Result<Self, FileError> {
         let path = folder.join(FILE);
-        let is_set = path.try_exists().map_err(FileError::on(&path))?;
-        Ok(Self { path: Some(path), is_set })
+        let is_set = match read(&path) {
+            Ok(content) => content != CLEARED,
+            Err(error) if error.kind() == ErrorKind::NotFound => false,
+            Err(error) => return Err(FileError::on(&path)(error)),
+        };
+        let file = create(&path, if is_set { IN_FORCE } else { CLEARED })?;
+        Ok(Self { path, file, is_set })
     }
 
     /// Whether an emergency stop has not been cleared.
@@ -35,62 +101,164 @@ impl EmergencyLatch {
         self.is_set
     }
 
-    /// Follows the state of the controller: an emergency stop sets the latch, the end of the fault releases it.
-    pub fn follow(&mut self, state: State, code: DiagnosticCode) {
+    /// Follows the controller until `stop`, and until the last change.
+    pub fn run(mut self, mut link: LatchChanges, stop: &AtomicBool) {
+        loop {
+            // Before the wait: what was sent before the stop is followed.
+            let is_ending = stop.load(Ordering::Relaxed);
+            let until_ns = monotonic_ns() + STOP_POLL_INTERVAL_NS;
+            if link.event.wait(&mut link.changes, &mut Monotonic, until_ns, stop) {
+                self.follow(*link.changes.value());
+            } else if is_ending {
+                return;
+            }
+        }
+    }
+
+    /// An emergency stop sets the latch, the end of the fault releases it.
+    fn follow(&mut self, change: Change) {
+        let Change { state, code, due_ns } = change;
         let is_stopped = state == State::Fault && (self.is_set || code == DiagnosticCode::EmergencyStop);
-        let Some(path) = self.path.as_ref().filter(|_| is_stopped != self.is_set) else { return };
-        let changed = if is_stopped { write_whole(path, CONTENT) } else { remove(path) };
-        match changed {
-            Ok(()) => self.is_set = is_stopped,
+        if is_stopped == self.is_set {
+            return;
+        }
+        match self.store(if is_stopped { IN_FORCE } else { CLEARED }) {
+            Ok(()) => {
+                self.is_set = is_stopped;
+                let after_ms = monotonic_ns().saturating_sub(due_ns) as f64 * 1e-6;
+                if is_stopped {
+                    info!(
+                        after_ms,
+                        "the emergency stop will outlast a restart: stored {after_ms:.1} ms after its cycle"
+                    );
+                }
+            }
             Err(cause) if is_stopped => {
                 error!("the emergency stop is in force, but a restart would end it: {cause}");
             }
             Err(cause) => error!("after a restart the daemon will be in emergency stop again: {cause}"),
         }
     }
-}
 
-fn remove(path: &Path) -> Result<(), FileError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
-        _ => path.parent().map_or(Ok(()), sync),
+    /// Replaces the content durably; the file too if somebody has removed it.
+    fn store(&mut self, content: &[u8]) -> Result<(), FileError> {
+        let written = self.file.write_all_at(content, 0).and_then(|()| self.file.sync_data());
+        let links = written.and_then(|()| self.file.metadata()).map(|found| found.nlink());
+        if links.map_err(FileError::on(&self.path))? == 0 {
+            self.file = create(&self.path, content)?;
+        }
+        Ok(())
     }
-    .map_err(FileError::on(path))
 }
 
-/// Makes the names in a folder durable.
-fn sync(folder: &Path) -> io::Result<()> {
-    fs::File::open(folder)?.sync_all()
+/// The file with a content, durably.
+fn create(path: &Path, content: &[u8]) -> Result<File, FileError> {
+    write_whole(path, content)?;
+    File::options().write(true).open(path).map_err(FileError::on(path))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::thread::{scope, yield_now};
+
+    use tempfile::TempDir;
+
     use super::*;
+
+    const EMERGENCY: (State, DiagnosticCode) = (State::Fault, DiagnosticCode::EmergencyStop);
+    const OFF: (State, DiagnosticCode) = (State::Off, DiagnosticCode::NoMeasurement);
+
+    fn change((state, code): (State, DiagnosticCode)) -> Change {
+        Change { state, code, due_ns: 0 }
+    }
+
+    fn output((state, code): (State, DiagnosticCode)) -> Output {
+        Output { state, diagnostic: code.into(), ..Output::default() }
+    }
+
+    /// What the next daemon finds.
+    fn is_kept(folder: &TempDir) -> bool {
+        EmergencyLatch::open(folder.path()).unwrap().is_set()
+    }
 
     #[test]
     fn an_emergency_stop_lasts_until_the_fault_is_left() {
-        let folder = tempfile::tempdir().unwrap();
-        let open = || EmergencyLatch::open(Some(folder.path())).unwrap();
-        let mut latch = open();
-        let emergency = DiagnosticCode::EmergencyStop;
-        for (state, code, is_set) in [
-            (State::Active, DiagnosticCode::None, false),
-            (State::Fault, DiagnosticCode::MeasurementLost, false),
-            (State::Fault, emergency, true),
+        let folder = TempDir::new().unwrap();
+        let mut latch = EmergencyLatch::open(folder.path()).unwrap();
+        for (state, is_set) in [
+            ((State::Active, DiagnosticCode::None), false),
+            ((State::Fault, DiagnosticCode::MeasurementLost), false),
+            (EMERGENCY, true),
             // A later fault does not replace it.
-            (State::Fault, DiagnosticCode::MeasurementLost, true),
-            (State::Off, DiagnosticCode::NoMeasurement, false),
-            (State::Off, emergency, false),
+            ((State::Fault, DiagnosticCode::MeasurementLost), true),
+            (OFF, false),
+            ((State::Off, DiagnosticCode::EmergencyStop), false),
         ] {
-            latch.follow(state, code);
-            assert_eq!((latch.is_set(), open().is_set()), (is_set, is_set), "{state:?}, {code:?}");
+            latch.follow(change(state));
+            assert_eq!((latch.is_set(), is_kept(&folder)), (is_set, is_set), "{state:?}");
+            // The other latch has replaced the file.
+            latch.file = File::options().write(true).open(&latch.path).unwrap();
         }
     }
 
     #[test]
-    fn without_a_folder_nothing_is_kept() {
-        let mut latch = EmergencyLatch::open(None).unwrap();
-        latch.follow(State::Fault, DiagnosticCode::EmergencyStop);
-        assert!(!latch.is_set());
+    fn the_file_is_overwritten_in_place() {
+        let folder = TempDir::new().unwrap();
+        let mut latch = EmergencyLatch::open(folder.path()).unwrap();
+        let file =
+            || fs::metadata(folder.path().join(FILE)).map(|found| (found.ino(), found.blocks(), found.len()));
+        let before = file().unwrap();
+        for state in [EMERGENCY, OFF, EMERGENCY] {
+            latch.follow(change(state));
+            assert_eq!(file().unwrap(), before, "{state:?}");
+        }
+        assert!(is_kept(&folder));
+    }
+
+    #[test]
+    fn a_file_that_was_removed_is_written_again() {
+        let folder = TempDir::new().unwrap();
+        let mut latch = EmergencyLatch::open(folder.path()).unwrap();
+        fs::remove_file(&latch.path).unwrap();
+        latch.follow(change(EMERGENCY));
+        assert!(is_kept(&folder));
+    }
+
+    #[test]
+    fn what_is_not_known_to_be_cleared_is_in_force() {
+        let folder = TempDir::new().unwrap();
+        assert!(!is_kept(&folder), "nothing is there");
+        // Interrupted writes.
+        for content in [b"".as_slice(), b"\0\0\0\0", &IN_FORCE[..10], b"emergency stop: cle"] {
+            fs::write(folder.path().join(FILE), content).unwrap();
+            assert!(is_kept(&folder), "{content:?}");
+        }
+        fs::write(folder.path().join(FILE), CLEARED).unwrap();
+        assert!(!is_kept(&folder));
+        assert_eq!(IN_FORCE.len(), CLEARED.len());
+    }
+
+    #[test]
+    fn its_thread_follows_every_change_but_the_end_of_the_daemon() {
+        for (last, is_left) in [(OFF, false), ((State::Off, DiagnosticCode::DaemonEnding), true)] {
+            let folder = TempDir::new().unwrap();
+            let latch = EmergencyLatch::open(folder.path()).unwrap();
+            let path = latch.path.clone();
+            let (mut link, changes) = latch_link();
+            let stop = AtomicBool::new(false);
+            scope(|threads| {
+                threads.spawn(|| latch.run(changes, &stop));
+                for (state, content) in [(EMERGENCY, IN_FORCE), (OFF, CLEARED), (EMERGENCY, IN_FORCE)] {
+                    link.send(&output(state), 0);
+                    while read(&path).unwrap() != content {
+                        yield_now();
+                    }
+                }
+                link.send(&output(last), 0);
+                stop.store(true, Ordering::Relaxed);
+            });
+            assert_eq!(is_kept(&folder), is_left, "{last:?}");
+        }
     }
 }

@@ -12,7 +12,6 @@ use heapless::spsc::Consumer;
 use tracing::{error, info, warn};
 
 use super::cycle::{CycleRecord, message, tracking_error};
-use super::emergency_latch::EmergencyLatch;
 use super::first_pose::FirstPose;
 use super::hints::{Hints, ThreadFiles};
 use super::process_names::sentence;
@@ -46,13 +45,12 @@ pub struct LogLinks<'a, 'o> {
     pub statistics: Writer<Statistics>,
     /// Of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
-    /// To the recorder, if there is one. When it is full, cycles are lost.
-    pub recorder: Option<SyncSender<Recorded>>,
+    /// To the recorder. When it is full, cycles are lost.
+    pub recorder: SyncSender<Recorded>,
     /// Offers that the real-time thread has answered; back to the reload thread.
     pub answers: Consumer<'a, &'o mut Offer>,
     pub returned: Sender<&'o mut Offer>,
     pub first_pose: FirstPose,
-    pub latch: EmergencyLatch,
 }
 
 /// Statistics of a run.
@@ -108,9 +106,7 @@ impl<'o> Log<'o> {
         while let Some(record) = links.records.dequeue() {
             self.collector.add(&record);
             self.return_offer(links, record.cycle);
-            if let Some(recorder) = &links.recorder {
-                self.record(recorder, &record);
-            }
+            self.record(&links.recorder, &record);
             links.first_pose.add(&record);
             if let Some((position, orientation)) = tracking_error(&record) {
                 self.report.tracking.add(position, orientation);
@@ -118,8 +114,6 @@ impl<'o> Log<'o> {
             self.log_publishers(&record);
             let state = (record.output.state, record.output.diagnostic.code);
             if state != self.state {
-                let (name, code) = state;
-                links.latch.follow(name, code);
                 self.log_state(&record);
                 self.state = state;
             }

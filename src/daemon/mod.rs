@@ -31,6 +31,7 @@ mod first_pose;
 mod hints;
 mod io_thread;
 mod log_thread;
+mod memory_queue;
 mod parameters;
 pub mod process_names;
 pub mod recorder;
@@ -116,8 +117,8 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
     let socket = location::open(&config.name, &config.deployment.operator)?;
     info!("control socket: {}", socket.path.display());
     claim.record(&socket.path, &config.deployment.realtime.processors())?;
-    let latch = EmergencyLatch::open(files.state.as_deref())?;
-    if latch.is_set() {
+    let latch = files.state.as_deref().map(EmergencyLatch::open).transpose()?;
+    if latch.as_ref().is_some_and(EmergencyLatch::is_set) {
         warn!("an emergency stop was not cleared before the daemon ended: it is still in force; hexad clear");
         let _ = word.post(Request::Estop as u32, monotonic_ns());
     }

@@ -1,5 +1,6 @@
 //! Computes the cycles of a recording again and compares every output.
 
+use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
 
 use crate::config::{Config, fidelity};
@@ -12,8 +13,15 @@ use crate::realtime::setup::denormals;
 use crate::recording::reader::{Recording, Summary};
 use crate::recording::{Item, RecordingError, RunInfo, memory_from};
 
+/// Relative rounding of a determinant of six rows: a few roundings of each of its factors.
+const DETERMINANT_ROUNDING: f64 = 32.0 * f64::EPSILON;
+
 /// Field that is a quotient of a rate that may be zero.
 const TIME_TO_SINGULARITY: &str = "time_to_singularity_s";
+
+/// Largest difference between two instruction sets, which add the same numbers in another order, for what is no difference over
+/// a cycle.
+const TOLERANCE: f64 = 1e-12;
 
 /// One number of an output that a replay computes differently.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,10 +45,24 @@ impl Difference {
     /// moves along it is what rounding has left, divided into a determinant.
     pub fn size(&self) -> f64 {
         let is_time = self.field == TIME_TO_SINGULARITY;
-        let [recorded, replayed] =
-            [self.recorded, self.replayed].map(|number| if is_time { number.recip() } else { number });
-        let difference = (recorded - replayed).abs() / if is_time { 1.0 } else { self.scale.max(1.0) };
+        let [recorded, replayed, scale] = [self.recorded, self.replayed, self.scale]
+            .map(|number| if is_time { number.recip() } else { number });
+        let difference = (recorded - replayed).abs() / scale.abs().max(1.0);
         if difference.is_nan() { f64::INFINITY } else { difference }
+    }
+
+    /// Largest size that another instruction set explains, at a period \[s\].
+    ///
+    /// The reference moves from pose to pose: of a pose with the relative rounding e, its velocity has e / h, and its
+    /// acceleration e / h^2, which the forces contain. The time to a singularity is that of a determinant, by its change over h.
+    pub fn tolerance(&self, period_s: f64) -> f64 {
+        let rounding = match array(&self.field) {
+            "reference_twist" | "error_rate" => f64::EPSILON / period_s,
+            TIME_TO_SINGULARITY => DETERMINANT_ROUNDING / period_s,
+            "reference_acceleration" | "force_n" | "wrench_error" => f64::EPSILON / (period_s * period_s),
+            _ => 0.0,
+        };
+        TOLERANCE + rounding
     }
 }
 
@@ -49,8 +71,8 @@ impl Difference {
 pub struct Replay {
     /// Cycles computed again.
     pub compared: u64,
-    /// Cycles for which the memory of the controller is unknown: before the first that is recorded, and behind gaps.
-    pub unknown: u64,
+    /// Cycles for which the memory of the controller is unknown: before the first that is recorded, and behind gaps until the next.
+    pub unknown: Vec<RangeInclusive<u64>>,
     /// Cycles of which an output differs.
     pub different: u64,
     /// The first difference.
@@ -115,7 +137,7 @@ impl Replayer {
         let begin_ns = *self.begin_ns.get_or_insert(cycle.due_ns);
         let input = cycle.input().filter(|_| self.next_cycle == Some(cycle.cycle));
         let Some(input) = input else {
-            self.replay.unknown += 1;
+            self.replay.add_unknown(cycle.cycle);
             return;
         };
         self.next_cycle = Some(cycle.cycle + 1);
@@ -146,9 +168,26 @@ fn array(column: &str) -> &str {
 }
 
 impl Replay {
+    /// Whether another instruction set explains all differences, at a period \[s\].
+    pub fn is_rounding(&self, period_s: f64) -> bool {
+        self.largest.values().all(|it| it.size() <= it.tolerance(period_s))
+    }
+
     /// The largest difference of all fields.
     pub fn largest(&self) -> Option<&Difference> {
         self.largest.values().max_by(|a, b| a.size().total_cmp(&b.size()))
+    }
+
+    /// Number of cycles that could not be computed again.
+    pub fn unknown_count(&self) -> u64 {
+        self.unknown.iter().map(|range| range.end() - range.start() + 1).sum()
+    }
+
+    fn add_unknown(&mut self, cycle: u64) {
+        match self.unknown.last_mut().filter(|range| range.end() + 1 == cycle) {
+            Some(range) => *range = *range.start()..=cycle,
+            None => self.unknown.push(cycle..=cycle),
+        }
     }
 
     fn add(&mut self, difference: Difference) {

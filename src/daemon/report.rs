@@ -46,9 +46,9 @@ pub struct Report {
     pub io_thread: ThreadUsage,
     /// It allocates only to log a change of state.
     pub log_thread: ThreadUsage,
-    /// The recording, if there was one.
+    /// Of the recorder, which keeps the last seconds also without a folder.
     #[serde(default)]
-    pub recording: Option<RecorderReport>,
+    pub recording: RecorderReport,
     /// The first faults of the run, in the order of their cycles.
     pub faults: Vec<Fault>,
 }
@@ -115,7 +115,7 @@ impl Report {
             rt_thread: cyclic.usage,
             io_thread: io.usage,
             log_thread: log.usage,
-            recording: None,
+            recording: RecorderReport::default(),
             faults: log.faults,
         };
         report.log_timing();

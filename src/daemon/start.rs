@@ -62,12 +62,15 @@ pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
     prepare(realtime.io_cpu, scheduled)
 }
 
-/// FIFO priority of the control thread: above ordinary processes, below everything else in real time.
-const CONTROL_PRIORITY: i32 = 1;
+/// FIFO priority of the threads of requests, log and recorder: above ordinary processes, below everything else in real time.
+const SUPPORT_PRIORITY: i32 = 1;
 
-/// Prepares the calling thread for requests. Without the right to it the other two threads lack the same, and say so.
-pub(super) fn prepare_control() {
-    let _ = scheduling::fifo_priority(CONTROL_PRIORITY);
+/// Prepares the calling thread to answer requests and to keep up with the loop on a busy host, where it may: without it
+/// requests wait and cycles are missing in the recording, and nothing else. It never has the priority of the loop.
+pub(super) fn prepare_support(realtime: &Realtime) {
+    if !realtime.is_simulated() && realtime.priority.min(realtime.io_priority) > SUPPORT_PRIORITY {
+        let _ = scheduling::fifo_priority(SUPPORT_PRIORITY);
+    }
 }
 
 /// Prepares the calling thread for the loop. The warm-up comes before SCHED_DEADLINE, whose budget it would

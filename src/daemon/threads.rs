@@ -14,11 +14,12 @@ use tracing::{info, warn};
 use super::control_socket::location::ControlSocket;
 use super::control_socket::{self, ControlLinks};
 use super::cycle::{CycleRecord, RealtimeSide, RequestIntake};
-use super::emergency_latch::EmergencyLatch;
+use super::emergency_latch::{EmergencyLatch, latch_link};
 use super::first_pose::FirstPose;
 use super::hints::ThreadFiles;
 use super::io_thread::{self, DELAYS, IoLinks, IoReport, IoSettings, Ports};
 use super::log_thread::{self, LogLinks, LogReport};
+use super::memory_queue::{MemoryProducer, MemoryQueue};
 use super::parameters::{nanoseconds, timing};
 use super::recorder::{Folders, Recorder, RecorderReport};
 use super::reload::handover::{Handover, Offer, OfferQueue};
@@ -26,7 +27,7 @@ use super::reload::timeouts::MessageTimeouts;
 use super::reload::{self, Loaded, ReloadLinks, Requester};
 use super::report::Report;
 use super::snapshot::Snapshot;
-use super::start::{Ready, prepare_control, prepare_io, prepare_loop, prepare_simulated, start, warm_up};
+use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, prepare_support, start, warm_up};
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
 use crate::config::Config;
@@ -58,6 +59,7 @@ struct Flags {
     stop_io: AtomicBool,
     stop_control: AtomicBool,
     stop_log: AtomicBool,
+    stop_latch: AtomicBool,
     /// The daemon is to end: the platform comes to rest.
     is_ending: AtomicBool,
     /// The daemon is to end and the platform is not under control.
@@ -68,14 +70,16 @@ struct Flags {
 pub(super) fn run(
     loaded: Loaded,
     folders: &Folders,
-    latch: EmergencyLatch,
+    latch: Option<EmergencyLatch>,
     socket: ControlSocket,
     word: &'static RequestWord,
     stop: &Stop,
 ) -> Result<(Report, String), DaemonError> {
     let (timeouts, loaded) = (MessageTimeouts::new(loaded.timeouts()), Arc::new(loaded));
     let (config, controller, timeouts) = (&loaded.config, loaded.controller.clone(), &timeouts);
-    let (recorder, recorder_queue) = Recorder::new(&loaded, folders).unzip();
+    let mut memory_queue = Box::new(MemoryQueue::new());
+    let (memory_producer, memories) = memory_queue.split();
+    let (recorder, recorder_links) = Recorder::new(&loaded, memories, folders);
     let mut offer = Box::new(Offer::new(loaded.clone()));
     let (mut offer_queue, mut answer_queue) = (OfferQueue::new(), OfferQueue::new());
     let ((offer_producer, offers), (answer_producer, answers)) = (offer_queue.split(), answer_queue.split());
@@ -89,6 +93,12 @@ pub(super) fn run(
     let (delay_producer, delays) = delay_queue.split();
     let (statistics_writer, statistics) = triple_buffer(Statistics::default());
     let (snapshot_writer, snapshots) = triple_buffer(Snapshot::default());
+    let (latch, latch_link) = latch
+        .map(|latch| {
+            let (link, changes) = latch_link();
+            ((latch, changes), link)
+        })
+        .unzip();
     let (flags, progress, files) = (&Flags::default(), &Progress::default(), &OnceLock::new());
     let ((io_ready, ready), (go, go_ahead)) = (channel(), channel());
     memory::keep_heap();
@@ -98,15 +108,15 @@ pub(super) fn run(
         delays,
         statistics: statistics_writer,
         files,
-        recorder: recorder_queue,
+        recorder: recorder_links.cycles,
         answers,
         returned: return_offer,
         first_pose: FirstPose::of(&config.machine),
-        latch,
     };
     let realtime_links = RealtimeLinks {
         exchange: realtime_side,
         records: record_producer,
+        memories: MemoryProducer::new(memory_producer),
         word,
         handover: Handover::new(offers, answer_producer, timeouts),
         progress,
@@ -119,6 +129,7 @@ pub(super) fn run(
         delays: delay_producer,
         statistics,
         snapshots: snapshot_writer,
+        latch: latch_link,
         word,
         timeouts,
         is_ending: &flags.is_ending,
@@ -131,6 +142,7 @@ pub(super) fn run(
         word,
         request_reload: request_reload.clone(),
         reloaded,
+        windows: recorder_links.orders,
         is_ending: &flags.is_ending,
     };
     let reload_links =
@@ -138,32 +150,43 @@ pub(super) fn run(
     scope(|threads| {
         // Also when a thread cannot be started the others must end.
         let _stop_all = StopOnDrop(flags);
+        let realtime = &config.deployment.realtime;
         let run_control = || {
-            if !config.deployment.realtime.is_simulated() {
-                prepare_control();
-            }
+            prepare_support(realtime);
             control_socket::run(loaded.clone(), control_links, &flags.stop_control);
         };
         spawn(threads, "hexad-reload", || reload::run(loaded.clone(), &mut offer, reload_links))?;
         let control = spawn(threads, "hexad-control", run_control)?;
-        let recorder =
-            recorder.map(|recorder| spawn(threads, "hexad-recorder", || recorder.run())).transpose()?;
-        let log = spawn(threads, "hexad-log", || log_thread::run(log_links, &flags.stop_log))?;
+        let recorder = spawn(threads, "hexad-recorder", || {
+            prepare_support(realtime);
+            recorder.run()
+        })?;
+        let latch = latch
+            .map(|(latch, changes)| {
+                spawn(threads, "hexad-latch", move || latch.run(changes, &flags.stop_latch))
+            })
+            .transpose()?;
+        let log = spawn(threads, "hexad-log", || {
+            prepare_support(realtime);
+            log_thread::run(log_links, &flags.stop_log)
+        })?;
         let cyclic = spawn(threads, REALTIME_THREAD, || {
             run_realtime(config, controller, realtime_links, &flags.stop_loop)
         })?;
         let io = spawn(threads, "hexad-io", move || run_io(config, io_links, &io_ready, &flags.stop_io))?;
 
-        let started = start(&config.deployment.realtime, &ready, &go);
+        let started = start(realtime, &ready, &go);
         if started.is_ok() {
             supervise(config, flags, progress, &request_reload, stop);
         }
         drop((go, request_reload));
         let reports = join(flags, &event, cyclic, io, log, control);
         let _pm_qos = started?;
-        let recorded = recorder.map(|recorder| recorder.join().map_err(|_| DaemonError::Died("recorder")));
+        flags.stop_latch.store(true, Ordering::Relaxed);
+        latch.map_or(Ok(()), |latch| latch.join().map_err(|_| DaemonError::Died("latch")))?;
+        let recorded = recorder.join().map_err(|_| DaemonError::Died("recorder"));
         let (cyclic, io, log) = reports?;
-        Ok(report(config, &cyclic, &io, log, recorded.transpose()?))
+        Ok(report(config, &cyclic, &io, log, recorded?))
     })
 }
 
@@ -173,7 +196,7 @@ fn report(
     cyclic: &LoopReport,
     io: &IoReport,
     mut log: LogReport,
-    recording: Option<RecorderReport>,
+    recording: RecorderReport,
 ) -> (Report, String) {
     let counts_csv = mem::take(&mut log.counts_csv);
     (Report { recording, ..Report::new(config, cyclic, io, log) }, counts_csv)
@@ -183,6 +206,8 @@ fn report(
 struct RealtimeLinks<'a, 'o> {
     exchange: RealtimeSide,
     records: Producer<'a, CycleRecord>,
+    /// To the recorder.
+    memories: MemoryProducer<'a>,
     /// Requests of operators.
     word: &'static RequestWord,
     /// New constants.
@@ -212,10 +237,11 @@ fn run_realtime(
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
     let (word, progress, mut intake) = (links.word, links.progress, RequestIntake::default());
-    let mut handover = links.handover;
+    let (mut handover, mut memories) = (links.handover, links.memories);
     let step = |input: &mut Input, woke_ns: u64| {
         progress.count_cycle();
         handover.begin_cycle(&mut controller, woke_ns);
+        memories.begin_cycle(controller.memory());
         input.request = intake.next(input.request, word.load(), woke_ns);
         controller.step(input)
     };
@@ -299,8 +325,8 @@ struct StopOnDrop<'a>(&'a Flags);
 
 impl Drop for StopOnDrop<'_> {
     fn drop(&mut self) {
-        let Flags { stop_loop, stop_io, stop_control, stop_log, .. } = self.0;
-        [stop_loop, stop_io, stop_control, stop_log]
+        let Flags { stop_loop, stop_io, stop_control, stop_log, stop_latch, .. } = self.0;
+        [stop_loop, stop_io, stop_control, stop_log, stop_latch]
             .into_iter()
             .for_each(|flag| flag.store(true, Ordering::Relaxed));
     }

@@ -70,7 +70,21 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<(), FileError> {
     if is_standard(path) {
         return print(String::from_utf8_lossy(content));
     }
-    replace(path, |file| file.write_all(content)).map_err(FileError::on(path))
+    write_whole_with(path, |file| file.write_all(content).map_err(FileError::on(path)))
+}
+
+/// Writes a file durably, as [`write_whole`] does, with what `write` writes.
+pub fn write_whole_with<E: From<FileError>>(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut temporary = path.as_os_str().to_os_string();
+    temporary.push(".part");
+    let temporary = PathBuf::from(temporary);
+    let mut file = File::create(&temporary).map_err(FileError::on(path))?;
+    write(&mut file)
+        .and_then(|()| Ok(replace(&file, &temporary, path).map_err(FileError::on(path))?))
+        .inspect_err(|_| drop(fs::remove_file(&temporary)))
 }
 
 /// Writes a value as JSON with [`write_whole`].
@@ -79,16 +93,10 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), FileError> 
     write_whole(path, &json)
 }
 
-/// Writes a temporary file in the same folder, renames it, and makes both the content and the new name durable.
-fn replace(path: &Path, write: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
-    let mut temporary = path.as_os_str().to_os_string();
-    temporary.push(".part");
-    let temporary = PathBuf::from(temporary);
-    let mut file = File::create(&temporary)?;
-    write(&mut file)
-        .and_then(|()| file.sync_all())
-        .and_then(|()| fs::rename(&temporary, path))
-        .inspect_err(|_| drop(fs::remove_file(&temporary)))?;
+/// Renames a temporary file in the same folder, and makes both the content and the new name durable.
+fn replace(file: &File, temporary: &Path, path: &Path) -> io::Result<()> {
+    file.sync_all()?;
+    fs::rename(temporary, path)?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     File::open(folder)?.sync_all()
 }
@@ -118,12 +126,13 @@ mod tests {
         let folder = TempDir::new().unwrap();
         let path = folder.path().join("report.json");
         write_whole(&path, b"old").unwrap();
-        let error = replace(&path, |file| {
-            file.write_all(b"half of the n")?;
+        let error = write_whole_with(&path, |file| {
+            let half = file.write_all(b"half of the n");
             // A full disk.
-            File::options().write(true).open("/dev/full")?.write_all(b"ew")
+            let full = || File::options().write(true).open("/dev/full")?.write_all(b"ew");
+            half.and_then(|()| full()).map_err(FileError::on(&path))
         });
-        assert_eq!(error.unwrap_err().kind(), io::ErrorKind::StorageFull);
+        assert_eq!(error.unwrap_err().cause.kind(), io::ErrorKind::StorageFull);
         assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(&folder)), ("old", vec![path]));
         // Neither does a target that cannot be replaced.
         let occupied = folder.path().join("folder");

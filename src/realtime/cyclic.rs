@@ -22,8 +22,9 @@ use super::usage::ThreadUsage;
 use super::waiter::Waiter;
 use crate::messages::LoopCounters;
 
-/// Length of the queue of records to the log thread: 50 ms at 20 kHz, twice the log's own period.
-pub const RECORDS: usize = 1024;
+/// Length of the queue of records to the log thread: 200 ms at 20 kHz, ten periods of the log. A busy processor may keep the log
+/// from its work for 50 ms and more.
+pub const RECORDS: usize = 4096;
 
 /// When cycles are released and which are late.
 #[derive(Clone, Copy, Debug)]

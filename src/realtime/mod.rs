@@ -14,6 +14,7 @@ pub mod clock_cost;
 pub mod cyclic;
 pub mod event;
 pub mod exchange;
+pub mod file_passing;
 pub mod futex;
 pub mod overrun;
 pub mod pause_signals;

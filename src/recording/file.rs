@@ -69,7 +69,16 @@ impl RecordingFile {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(FileError::on(folder))?;
         }
-        let file = File::create(path).map_err(FileError::on(path))?;
+        Self::write_to(File::create(path).map_err(FileError::on(path))?, path, info, fault)
+    }
+
+    /// Begins a recording in an open file, which messages call `path`.
+    pub fn write_to(
+        file: File,
+        path: &Path,
+        info: &RunInfo,
+        fault: Option<u64>,
+    ) -> Result<Self, RecordingError> {
         let mut writer = options().create(file).map_err(on(path))?;
         let channels = channels(&mut writer).map_err(on(path))?;
         let fault = fault.map(|cycle| BTreeMap::from([("cycle".into(), cycle.to_string())]));
@@ -124,6 +133,11 @@ impl RecordingFile {
             self.write(self.channels.joints, cycle.due_ns, message)?;
         }
         Ok(())
+    }
+
+    /// Writes the chunk that has begun.
+    pub fn flush(&mut self) -> Result<(), RecordingError> {
+        self.writer.flush().map_err(on(&self.path))
     }
 
     /// Completes the file.

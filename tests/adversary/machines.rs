@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};
 
 use hexad::config::Config;
+use hexad::config::control_loops::loops;
 
 use super::common::edited::{config, deployed_table, set, table};
 use super::common::{MACHINES as WITH_VECTORS, data};
@@ -45,12 +46,6 @@ const STRONGER: f64 = 10.0;
 const FASTER: f64 = 10.0;
 const FORCE_RISE_S: f64 = 0.01;
 
-/// Least rate of a machine's loop \[Hz\]. With legs of 0.1 m and measurements as old as a period, loops of 100 and 250 Hz
-/// do not hold the platform near `limits.condition`: its angular velocity doubles in 12 ms.
-fn slowest_hz(name: &str) -> f64 {
-    if name == "tabletop" { 1000.0 } else { 0.0 }
-}
-
 /// Which of the values above.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
@@ -72,7 +67,14 @@ pub fn variant(variant: Variant) -> Arc<Config> {
     config
 }
 
-fn edited(Variant { machine, rate, limits, autonomous }: Variant) -> Config {
+/// With the rate, or the next one with which the control loops are stable: `check` refuses slower ones.
+fn edited(variant: Variant) -> Config {
+    let mut configs = RATES_HZ.iter().skip(variant.rate).map(|rate_hz| at_rate(variant, *rate_hz));
+    let is_stable = |config: &Config| loops(&config.deployment).iter().all(|each| each.sampled.is_stable());
+    configs.find(is_stable).expect("a rate that is fast enough")
+}
+
+fn at_rate(Variant { machine, limits, autonomous, .. }: Variant, rate_hz: f64) -> Config {
     let name = MACHINES[machine];
     let mut table = if name == "reference" { deployed_table(name) } else { table(&data(name, "toml")) };
     // The deployment's defaults for every machine: they depend on the rate and on the limits.
@@ -86,7 +88,6 @@ fn edited(Variant { machine, rate, limits, autonomous }: Variant) -> Config {
     set(&mut table, "actuator", "max_force_n", STRONGER * max_force_n);
     // Nor is their rate: with the jerk limits of some variants the forces change faster than drives.
     set(&mut table, "limits", "force_rate_n_s", FASTER * STRONGER * max_force_n / FORCE_RISE_S);
-    let rate_hz = RATES_HZ[rate].max(slowest_hz(name));
     set(&mut table, "realtime", "rate_hz", rate_hz);
     let keys = [
         ["velocity_m_s", "acceleration_m_s2", "jerk_m_s3"],

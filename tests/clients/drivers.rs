@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::process::{self, Command};
 use std::time::Duration;
 
-use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::messages::{Bus, MeasuredMessage};
 
 use crate::common::libhexad::{prefix, repository, with_library};
@@ -15,7 +14,7 @@ use crate::common::not_run::lacking;
 use crate::common::process::Process;
 use crate::common::python::output;
 use crate::common::stalls::Watchdog;
-use crate::{file, turn};
+use crate::{file, start_daemon, turn};
 
 /// What a run does not survive, half of the drivers' watchdog, and how often it is tried.
 const HELD: Duration = Duration::from_millis(10);
@@ -117,16 +116,8 @@ fn a_driver_links_with_the_static_library() {
 /// A run of the daemon with a driver and a setpoint source: largest length of a leg beyond home \[m\].
 fn run(label: &str, driver: Command, source: &Path) -> f64 {
     let name = format!("driver-{label}-{}", process::id());
-    let machine = file(&format!("{name}.toml"));
-    let text = fs::read_to_string(repository().join("config/fried2008.toml")).unwrap();
-    let named = text.replace("name = \"fried2008\"", &format!("name = \"{name}\""));
-    fs::write(&machine, format!("{named}\n{PATIENT}")).unwrap();
     let log = |part: &str| file(&format!("{name}-{part}.txt"));
-    let mut daemon = Command::new(env!("CARGO_BIN_EXE_hexad"));
-    daemon.args(["run".as_ref(), "--config".as_ref(), machine.as_os_str()]).env_remove("HEXAD_LOG");
-    daemon.env(PARENT_VARIABLE, process::id().to_string());
-    let daemon = Process::start(daemon, log("daemon"));
-    daemon.says("running");
+    let daemon = start_daemon(&name, PATIENT);
     let bus = Bus::join(&name).unwrap();
     let mut measured = bus.subscriber::<MeasuredMessage>(256).unwrap();
     let start = |mut command: Command, part: &str| {

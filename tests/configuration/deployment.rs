@@ -261,8 +261,9 @@ fn the_largest_bandwidth_in_the_message_is_accepted() {
 #[test]
 fn defaults_fit_the_rate() {
     for (rate_hz, late_wakeup_s, measured_s) in [
-        (10, 200e-6, 0.4),
-        (100, 200e-6, 0.04),
+        // So slow a loop is not stable at home: the platform leaves it by itself. `check` refuses it.
+        (10, 200e-6, 0.2),
+        (100, 200e-6, 0.035),
         (2500, 200e-6, 0.02),
         (5000, 100e-6, 0.02),
         (20_000, 25e-6, 0.02),

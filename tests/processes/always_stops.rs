@@ -12,9 +12,9 @@ use std::time::{Duration, Instant};
 use hexad::messages::claim::running_daemons;
 use hexad::messages::{Bus, CommandMessage, Publisher, StatusMessage, Subscriber};
 
-use crate::support::children::{Ended, HANG, hexad};
+use crate::support::children::{Ended, HANG, Hexad, hexad};
 use crate::support::machine::Machine;
-use crate::support::operator::{ask, clear, does, engage};
+use crate::support::operator::{ask, clear, does, engage, is_refused};
 use crate::support::peer::{self, Controlled};
 use crate::support::recorder::Recorder;
 use crate::support::socket::{path_of, status, stops};
@@ -79,9 +79,8 @@ fn under_hostile_connections_and_four_that_wait() {
     let daemon = start_daemon(&machine);
     let path = path_of(&daemon);
     // Four operators wait to engage: there are no setpoints.
-    let waiting: Vec<_> = (0..4)
-        .map(|_| crate::support::children::Hexad::start(&machine, "engage", &["--wait", "--within", "60"]))
-        .collect();
+    let waiting: Vec<_> =
+        (0..4).map(|_| Hexad::start(&machine, "engage", &["--wait", "--within", "60"])).collect();
     waiting.iter().for_each(|one| one.says("waiting: no measurement"));
     stops(&machine, "estop", &["fault"]);
     clear(&machine);
@@ -157,16 +156,27 @@ fn a_held_daemon_is_not_called_stopped_and_stops_when_it_goes_on() {
     plant.stops_on("TERM", HANG);
 }
 
-/// The control thread hangs in its log: nobody reads standard error.
+/// The control thread hangs in its log, and with it the log thread: nobody reads standard error. An emergency stop is kept
+/// all the same.
 #[test]
 fn with_a_log_that_nobody_reads() {
     let _turn = turns::beside_others();
     let machine = Machine::patient("unread");
-    let mut command = hexad();
-    command.arg("run").arg("--config").arg(&machine.file).stderr(Stdio::piped()).stdout(Stdio::null());
-    let mut daemon = command.spawn().expect("a daemon");
+    let folder = machine.path("state");
+    fs::create_dir(&folder).expect("a folder");
+    let run = || {
+        let mut command = hexad();
+        command.arg("run").arg("--config").arg(&machine.file).arg("--state").arg(&folder);
+        command
+    };
+    let mut daemon = run().stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("a daemon");
     let plant = start_plant(&machine);
     let _peer = peer::start(&machine);
+    let began = Instant::now();
+    while running_daemons(&machine.name).is_empty() {
+        assert!(began.elapsed() < HANG, "no record");
+        sleep(Duration::from_millis(1));
+    }
     engage(&machine);
     let path = running_daemons(&machine.name).pop().expect("a record").socket;
     let mut stream = UnixStream::connect(path).expect("a connection");
@@ -181,11 +191,25 @@ fn with_a_log_that_nobody_reads() {
         })
         .count();
     assert!(answered < 5000, "its log never fills");
+    let kept = || fs::read(folder.join("emergency-stop")).ok();
+    let before = kept();
+    // A line for the log thread.
+    stops(&machine, "stop", &["standby"]);
     let Ended { status, stdout, stderr } = ask(&machine, "estop", &[]);
-    daemon.kill().expect("a signal");
-    daemon.wait().expect("its end");
     assert_eq!((status.code(), stdout.trim_end()), (Some(0), "fault"), "{stderr}");
     assert!(stderr.contains("confirmed by the status messages"), "after {answered} answers: {stderr}");
+    let began = Instant::now();
+    while kept() == before {
+        assert!(began.elapsed() < HANG, "the emergency stop is not kept");
+        sleep(Duration::from_millis(1));
+    }
+    daemon.kill().expect("a signal");
+    daemon.wait().expect("its end");
+    let daemon = Hexad::spawn(&machine, "run", run());
+    daemon.says("an emergency stop was not cleared before the daemon ended");
+    daemon.says("fault: emergency stop");
+    is_refused(&machine, "engage", &[], "engage was refused: not possible in state fault (emergency stop)");
+    daemon.stops_on("TERM", HANG);
     plant.stops_on("TERM", HANG);
 }
 

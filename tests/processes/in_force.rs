@@ -24,6 +24,8 @@ struct Thread {
 
 #[test]
 fn priorities_and_the_processor_of_the_loop_alone() {
+    // Daemons that are bound to the same processor are refused.
+    let _turn = turns::alone();
     let Some((daemon, _machine)) = granted("priorities_and_the_processor_of_the_loop_alone", "cpu = 0")
     else {
         return;
@@ -32,7 +34,8 @@ fn priorities_and_the_processor_of_the_loop_alone() {
     let everywhere = threads["hexad"].cpus.clone();
     for (name, class, cpus) in [
         ("hexad", OTHER, &everywhere),
-        ("hexad-log", OTHER, &everywhere),
+        ("hexad-log", (FIFO, 1), &everywhere),
+        ("hexad-recorder", (FIFO, 1), &everywhere),
         ("hexad-control", (FIFO, 1), &everywhere),
         ("hexad-io", (FIFO, 79), &everywhere),
         ("hexad-rt", (FIFO, 80), &"0".to_owned()),
@@ -48,18 +51,18 @@ fn priorities_and_the_processor_of_the_loop_alone() {
 
 #[test]
 fn sched_deadline_for_the_loop_alone() {
+    let _turn = turns::beside_others();
     let test = "sched_deadline_for_the_loop_alone";
     let Some((daemon, _machine)) = granted(test, "scheduler = \"deadline\"") else { return };
     let threads = threads(&daemon);
     let classes: Vec<_> =
-        ["hexad", "hexad-log", "hexad-io", "hexad-rt"].iter().map(|name| threads[*name].class).collect();
+        ["hexad", "hexad-control", "hexad-io", "hexad-rt"].iter().map(|name| threads[*name].class).collect();
     assert_eq!(classes, [OTHER, OTHER, (FIFO, 79), (DEADLINE, 0)]);
     daemon.stops_on("TERM", HANG);
 }
 
 /// A daemon with these keys of `[realtime]`; none, and said so, where the system lacks the rights.
 fn granted(test: &str, settings: &str) -> Option<(Hexad, Machine)> {
-    let _turn = turns::beside_others();
     let machine = Machine::with(test, &format!("[realtime]\n{settings}\n"));
     let daemon = start_daemon(&machine);
     daemon.says("running");

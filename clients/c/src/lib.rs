@@ -9,6 +9,7 @@
 pub mod client;
 pub mod outcome;
 pub mod request;
+mod signal;
 
 use core::ffi::{CStr, c_char};
 use std::ptr;
@@ -230,8 +231,9 @@ pub unsafe extern "C" fn hexad_latest_measured(
 
 /// Sends a request (HEXAD_REQUEST_...) over the control socket and waits until its state is reached, at most `within_s`
 /// seconds and two more. `until_ready` also waits for measurement and setpoint where they are missing. It needs no client,
-/// and any user whom the machine file admits may call it. hexad_last_error has the daemon's reason. A daemon whose socket
-/// does not answer is not signalled, as the command `hexad estop` does.
+/// and any user whom the machine file admits may call it. hexad_last_error has the daemon's reason. Where the socket does not
+/// answer an emergency stop within half a second, it goes by SIGUSR1, as that of the command `hexad estop` does; so does off,
+/// which then lasts until a clear. HEXAD_TIMED_OUT then means that the daemon has not reported the stop within two seconds.
 ///
 /// # Safety
 ///

@@ -1,11 +1,11 @@
-//! Requests over the control socket, by the lines of `docs/operator.md`.
+//! Requests over the control socket, by the lines of `docs/operator.md`; an emergency stop else by signal.
 
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use hexad::control::state::Request;
-use hexad::messages::claim::running_daemons;
+use hexad::control::state::{Request, State};
+use hexad::messages::claim::{RunningDaemon, running_daemons};
 use hexad::messages::location::{SYSTEM_FOLDER, user_id};
 use serde_json::{Value, json};
 use socket2::{Domain, SockAddr, Socket, Type};
@@ -15,12 +15,19 @@ use crate::outcome::hexad_result::{
     HEXAD_REFUSED, HEXAD_TIMED_OUT,
 };
 use crate::outcome::{Failure, Outcome};
+use crate::signal::emergency_stop;
 
 /// Version of the lines.
 const PROTOCOL_VERSION: u32 = 1;
 
 /// Time beyond that of the request in which the daemon must have answered.
 const ANSWER_GRACE: Duration = Duration::from_secs(2);
+
+/// Longest wait for the answer to an emergency stop, which needs one cycle; then it goes by signal.
+const EMERGENCY_LIMIT: Duration = Duration::from_millis(500);
+
+/// Longest wait for one status.
+const STATUS_LIMIT: Duration = Duration::from_millis(100);
 
 /// Longest time that the daemon accepts \[s\].
 const MAX_WITHIN_S: f64 = 86_400.0;
@@ -36,7 +43,9 @@ pub fn send(machine: &str, request: u32, until_ready: bool, within_s: f64) -> Ou
         let text = format!("within_s = {within_s} s is not between 0 and {MAX_WITHIN_S} s");
         return Err(Failure::new(HEXAD_INVALID, text));
     }
-    let socket = connect(machine, Duration::from_secs_f64(within_s) + ANSWER_GRACE)?;
+    // Both disable the forces, and there is one signal for it.
+    let is_emergency = matches!(request, Request::Estop | Request::Off);
+    let limit = if is_emergency { EMERGENCY_LIMIT } else { Duration::from_secs_f64(within_s) + ANSWER_GRACE };
     let line = json!({
         "version": PROTOCOL_VERSION,
         "request": request.name(),
@@ -44,11 +53,25 @@ pub fn send(machine: &str, request: u32, until_ready: bool, within_s: f64) -> Ou
         "until_ready": until_ready,
         "within_s": within_s,
     });
-    let answer = exchange(&socket, &line).map_err(|error| {
-        let text = format!("{} is not confirmed: the daemon does not answer: {error}", request.name());
-        Failure::new(HEXAD_TIMED_OUT, text)
-    })?;
-    conclude(&answer)
+    let answer = connect(machine, limit).and_then(|socket| {
+        exchange(&socket, &line).map_err(|error| {
+            let text = format!("{} is not confirmed: the daemon does not answer: {error}", request.name());
+            Failure::new(HEXAD_TIMED_OUT, text)
+        })
+    });
+    match answer {
+        Ok(answer) => conclude(&answer),
+        Err(failure) if is_emergency => emergency_stop(&daemons(machine), failure),
+        Err(failure) => Err(failure),
+    }
+}
+
+/// State that a daemon reports over its socket.
+pub fn state_of(socket: &Path) -> Option<State> {
+    let line = json!({ "version": PROTOCOL_VERSION, "request": "status" });
+    let answer = open(socket, STATUS_LIMIT).and_then(|socket| exchange(&socket, &line)).ok()?;
+    let name = answer.get("state")?.as_str()?;
+    State::ALL.into_iter().find(|state| state.name() == name)
 }
 
 /// Connects to the first daemon of the machine that admits this user: that of the service, of this user, of others.
@@ -71,11 +94,21 @@ fn connect(machine: &str, limit: Duration) -> Result<Socket, Failure> {
 }
 
 fn sockets(machine: &str) -> Vec<PathBuf> {
-    let system = Path::new(SYSTEM_FOLDER).join(format!("{machine}.sock"));
-    let mut daemons = running_daemons(machine);
-    daemons.sort_by_key(|daemon| (daemon.user_id != user_id(), daemon.user_id));
-    let others = daemons.into_iter().map(|daemon| daemon.socket).filter(|path| *path != system);
+    let system = system_socket(machine);
+    let others = daemons(machine).into_iter().map(|daemon| daemon.socket).filter(|path| *path != system);
     [system.clone()].into_iter().chain(others).collect()
+}
+
+fn system_socket(machine: &str) -> PathBuf {
+    Path::new(SYSTEM_FOLDER).join(format!("{machine}.sock"))
+}
+
+/// Daemons of a machine: that of the service, of this user, of others.
+fn daemons(machine: &str) -> Vec<RunningDaemon> {
+    let system = system_socket(machine);
+    let mut found = running_daemons(machine);
+    found.sort_by_key(|daemon| (daemon.socket != system, daemon.user_id != user_id(), daemon.user_id));
+    found
 }
 
 fn open(path: &Path, limit: Duration) -> io::Result<Socket> {

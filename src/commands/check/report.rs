@@ -48,6 +48,8 @@ pub struct CheckReport {
     pub loops: Vec<LoopMargins>,
     /// Largest age of measurements with which the loops are stable.
     pub stable_age_s: f64,
+    /// Largest pole of the platform under held forces within `condition_limit`.
+    pub held_pole_per_s: f64,
 }
 
 /// A leg at home.
@@ -119,6 +121,7 @@ impl CheckReport {
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
             stable_age_s: longest_age_s(deployment),
+            held_pole_per_s: deployment.limits.held_pole,
         }
     }
 }

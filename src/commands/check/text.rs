@@ -1,5 +1,6 @@
 //! The result of `hexad check` as text.
 
+use core::f64::consts::LN_2;
 use core::fmt;
 
 use super::report::{CheckReport, LegAtHome};
@@ -57,7 +58,12 @@ impl CheckReport {
             writeln!(f, "legs         coupled, they move with {softest:.2} to {stiffest:.2} Hz")?;
         }
         self.loops.iter().try_for_each(|margins| writeln!(f, "{}", margins.text))?;
-        writeln!(f, "measurements stable to an age of {:.1} ms", 1e3 * self.stable_age_s)
+        writeln!(
+            f,
+            "held forces  at a pose within limits.condition a displacement doubles in {:.1} ms; measurements stable to an age of {:.1} ms",
+            1e3 * LN_2 / self.held_pole_per_s,
+            1e3 * self.stable_age_s
+        )
     }
 
     /// Writes within which bounds start-up and the loop know the pose.

@@ -1,6 +1,6 @@
 //! Where the daemon of a machine listens, and a connection to it.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::AsRawFd;
 use std::os::unix::fs::MetadataExt;
@@ -19,6 +19,7 @@ use crate::daemon::control_socket::protocol::{AnswerLine, RequestLine};
 use crate::daemon::control_socket::user_name;
 use crate::messages::claim::{RunningDaemon, running_daemons};
 use crate::messages::location::SYSTEM_FOLDER;
+use crate::realtime::file_passing;
 
 /// Longest sleep in a read, so that signals are noticed.
 const READ_INTERVAL: Duration = Duration::from_millis(20);
@@ -123,6 +124,13 @@ impl Connection {
     pub fn send(&mut self, line: &RequestLine) -> io::Result<()> {
         let text = serde_json::to_string(line)? + "\n";
         self.stream.write_all(text.as_bytes())
+    }
+
+    /// Sends a request with a file to write.
+    pub fn send_with(&mut self, line: &RequestLine, file: &File) -> io::Result<()> {
+        let text = serde_json::to_string(line)? + "\n";
+        let count = file_passing::send(&self.stream, text.as_bytes(), file)?;
+        self.stream.write_all(text.as_bytes().get(count..).unwrap_or_default())
     }
 
     /// The next line of the daemon; `None` if none came until an instant or until `stop`.

@@ -4,6 +4,7 @@
 //! its state. What stops the platform falls back on a signal where the socket does not answer ([`signal`]).
 
 use core::fmt;
+use std::fs::File;
 use std::io;
 use std::sync::mpsc::{Receiver, channel};
 use std::thread::{sleep, spawn};
@@ -29,6 +30,9 @@ pub mod signal;
 const FIRST_LINE_LIMIT: Duration = Duration::from_millis(500);
 /// The same for requests that have no other way: longer than the daemon waits for its loop.
 const PATIENT_FIRST_LINE_LIMIT: Duration = Duration::from_secs(3);
+
+/// Longest wait for a recording of the last seconds: 160 MB on a slow disk.
+const RECORD_LIMIT: Duration = Duration::from_secs(60);
 
 /// Time beyond that of the request in which the daemon must have answered.
 const ANSWER_GRACE: Duration = Duration::from_secs(2);
@@ -61,11 +65,13 @@ pub enum OperatorError {
     #[error("{request} was not carried out: {reason}", request = .0.name(), reason = .1)]
     Stale(Request, String),
     #[error("the daemon does not answer: {0}")]
-    NoStatus(String),
+    NoAnswer(String),
     #[error("reload was refused, nothing has changed:\n{0}")]
     ReloadRefused(String),
     #[error("reload is not confirmed: {0}")]
     ReloadNotConfirmed(String),
+    #[error("the daemon has not written its last seconds: {0}")]
+    NotRecorded(String),
     #[error("interrupted")]
     Interrupted,
 }
@@ -177,9 +183,35 @@ fn attempt(
 
 /// The status of the daemon of a machine.
 pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
+    first_answer(machine, |endpoint| status_of(machine, endpoint))
+}
+
+/// The status of the daemon that listens there.
+pub fn status_of(machine: &str, endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
+    let line = RequestLine::new("status");
+    answer_of(machine, endpoint, PATIENT_FIRST_LINE_LIMIT, |connection| connection.send(&line))
+}
+
+/// Lets the daemon of a machine write its last seconds to a file; returns what it has written, in words.
+pub fn record(machine: &str, last_s: f64, file: &File) -> Result<String, OperatorError> {
+    let line = RequestLine { last_s: Some(last_s), ..RequestLine::new("record") };
+    let answer = first_answer(machine, |endpoint| {
+        answer_of(machine, endpoint, RECORD_LIMIT, |connection| connection.send_with(&line, file))
+    })?;
+    match answer.result {
+        RequestResult::Done => Ok(answer.text),
+        _ => Err(OperatorError::NotRecorded(answer.text)),
+    }
+}
+
+/// The answer of the first daemon of a machine that gives one.
+fn first_answer(
+    machine: &str,
+    answer: impl Fn(&Endpoint) -> Result<AnswerLine, OperatorError>,
+) -> Result<AnswerLine, OperatorError> {
     let mut forbidden = None;
     for endpoint in endpoints(machine) {
-        match status_of(machine, &endpoint) {
+        match answer(&endpoint) {
             Err(error @ OperatorError::Forbidden { .. }) => forbidden = forbidden.or(Some(error)),
             Err(OperatorError::NoDaemon(_)) => {}
             answer => return answer,
@@ -188,15 +220,19 @@ pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
     Err(forbidden.unwrap_or_else(|| OperatorError::NoDaemon(machine.into())))
 }
 
-/// The status of the daemon that listens there.
-pub fn status_of(machine: &str, endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
+/// The answer of the daemon that listens there to one line.
+fn answer_of(
+    machine: &str,
+    endpoint: &Endpoint,
+    limit: Duration,
+    send: impl FnOnce(&mut Connection) -> io::Result<()>,
+) -> Result<AnswerLine, OperatorError> {
     match endpoint.connect() {
         Ok(Attempt::Connected(mut connection)) => {
-            let until = Instant::now() + PATIENT_FIRST_LINE_LIMIT;
-            let line = RequestLine::new("status");
-            let answer = connection.send(&line).and_then(|()| connection.receive(until, || false));
-            let limit = || OperatorError::NoStatus(format!("nothing within {PATIENT_FIRST_LINE_LIMIT:?}"));
-            answer.map_err(|error| OperatorError::NoStatus(error.to_string()))?.ok_or_else(limit)
+            let until = Instant::now() + limit;
+            let answer = send(&mut connection).and_then(|()| connection.receive(until, || false));
+            let silent = || OperatorError::NoAnswer(format!("nothing within {limit:?}"));
+            answer.map_err(|error| OperatorError::NoAnswer(error.to_string()))?.ok_or_else(silent)
         }
         Ok(Attempt::Forbidden) => Err(unreachable_daemon(machine, Some(endpoint))),
         Ok(Attempt::Absent) | Err(_) => Err(unreachable_daemon(machine, None)),

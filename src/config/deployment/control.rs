@@ -115,12 +115,15 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
         gains(&mut section, ["orientation_bandwidth_hz", "orientation_damping_ratio"], plant, of, 1.0);
     let disturbance_m_s2_per_sqrt_s =
         section.number_or("disturbance_m_s2_per_sqrt_s", DEFAULT_DISTURBANCE, Bound::Positive);
-    let position = |gain| (position_bandwidth_hz, of(position_damping_ratio), gain);
-    let orientation = (orientation_bandwidth_hz, of(orientation_damping_ratio), 1.0);
     let loops = if mode.acts_on_legs() {
-        [position(softest), position(stiffest)]
+        [softest, stiffest].map(|gain| (position_bandwidth_hz, of(position_damping_ratio), gain))
     } else {
-        [position(1.0), orientation]
+        let held_pole = limits.held_pole * plant.realtime.period_s();
+        let with = |damping_ratio| SampledLoop { held_pole, ..of(damping_ratio) };
+        [
+            (position_bandwidth_hz, with(position_damping_ratio), 1.0),
+            (orientation_bandwidth_hz, with(orientation_damping_ratio), 1.0),
+        ]
     };
     let control = Control {
         mode,

@@ -2,6 +2,7 @@
 
 use super::default_limits::DefaultLimits;
 use super::realtime::Realtime;
+use crate::analysis::held_forces::{HeldForces, SurveyedPose};
 use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
@@ -16,9 +17,9 @@ const FORCE_RISE_S: f64 = 0.01;
 /// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
 /// a load needs leg forces of up to a hundred times its size.
 const DEFAULT_CONDITION: f64 = 100.0;
-/// Largest exponent of the growth of a tracking error under held forces, until a force computed from it acts. With it the growth
-/// takes about half of the damping from a loop with the default gains of a slow rate.
-const MAX_GROWTH_EXPONENT: f64 = 0.7;
+/// Largest exponent of the growth of a displacement under held forces, until a force computed from it acts. With it a loop with the
+/// default gains of a slow rate stands 0.7 of the modelled mass, as without growth.
+const MAX_GROWTH_EXPONENT: f64 = 0.2;
 /// From the beginning of a hold to its middle, in periods.
 const MIDDLE_OF_HOLD: f64 = 0.5;
 /// Least default of the condition over that of home: else the platform could not leave it.
@@ -40,6 +41,8 @@ pub struct DeploymentLimits {
     pub force_rate_n_s: f64,
     /// Largest Frobenius condition of the legs' wrenches under control.
     pub condition: f64,
+    /// Largest pole of the platform under held forces within that condition \[1/s\].
+    pub held_pole: f64,
 }
 
 /// Reads the section. Autonomous motions use a fifth of the limits.
@@ -58,8 +61,8 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
     let feedback_scale = section.number_or("feedback_scale", 0.5, Bound::Positive);
     let stroke_margin_m = stroke_margin_m(&mut section, machine);
-    let held = held_condition(machine, realtime, &position, feedback_scale);
-    let condition = condition(&mut section, machine, held);
+    let turning = turning_condition(machine, realtime, &position, feedback_scale);
+    let (condition, held_pole) = condition(&mut section, machine, realtime, turning);
     section.finish();
     DeploymentLimits {
         reference: ReferenceLimits { position, orientation, autonomous_scale },
@@ -67,6 +70,7 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
         stroke_margin_m,
         force_rate_n_s,
         condition,
+        held_pole,
     }
 }
 
@@ -89,35 +93,45 @@ fn stroke_margin_m(section: &mut SectionReader, machine: &Machine) -> f64 {
 /// Condition up to which forces that are held turn little enough with the legs.
 ///
 /// Forces F that carry a load `m a` are at most `condition m a / |N|`. Held, they turn with the legs: a displacement s of the
-/// joints changes their wrench by at most `|N| F s / L`, the acceleration by `condition a / L s`. So a tracking error s grows
-/// with `s'' <= condition a / L s` until a force computed from it acts, and within half of a period the acceleration departs
-/// from its mean, on a way of half a period at the largest velocity: by no more than feedback may add.
-fn held_condition(
+/// joints changes their wrench by at most `|N| F s / L`, the acceleration by `condition a / L s`. Within half of a period the
+/// acceleration departs from its mean, on a way of half a period at the largest velocity, by no more than feedback may add.
+fn turning_condition(
     machine: &Machine,
     realtime: &Realtime,
     position: &DerivativeLimits,
     feedback_scale: f64,
 ) -> f64 {
     let middle_s = MIDDLE_OF_HOLD * realtime.period_s();
-    let delay_s = realtime.longest_delay() * realtime.period_s() + middle_s;
-    let of_error = (MAX_GROWTH_EXPONENT / delay_s).powi(2);
-    let of_hold = feedback_scale * position.acceleration / (position.velocity * middle_s);
     let lengths = leg_lengths(machine, &machine.home_pose());
     let shortest = lengths.into_iter().fold(f64::INFINITY, f64::min);
     let load = machine.gravity.norm() + (1.0 + feedback_scale) * position.acceleration;
-    of_error.min(of_hold) * shortest / load
+    feedback_scale * position.acceleration / (position.velocity * middle_s) * shortest / load
 }
 
-/// Largest condition. The default is less where the rate is slow, and leaves room around a home that is badly conditioned;
-/// home must keep the limit.
-fn condition(section: &mut SectionReader, machine: &Machine, held: f64) -> f64 {
-    let home = machine.home_pose();
-    let at_home = KinematicState::new(machine, home).sensitivity().condition;
-    let default = DEFAULT_CONDITION.max(2.0 * at_home).min(held.max(MIN_CONDITION_PER_HOME * at_home));
-    let limit = section.number_or("condition", default, Bound::Positive);
+/// Largest condition, and the largest pole under held forces within it. The default is less where the rate is slow, so that no
+/// displacement grows far before a force answers it, and leaves room around a home that is badly conditioned; home must
+/// keep the limit.
+fn condition(
+    section: &mut SectionReader,
+    machine: &Machine,
+    realtime: &Realtime,
+    turning: f64,
+) -> (f64, f64) {
+    let at_home = KinematicState::new(machine, machine.home_pose()).sensitivity().condition;
+    let usual = DEFAULT_CONDITION.max(2.0 * at_home);
+    let given = section.has("condition").then(|| section.number_or("condition", usual, Bound::Positive));
+    let survey = HeldForces::new(machine).survey(given.unwrap_or(usual));
+    let delay_s = (realtime.longest_delay() + MIDDLE_OF_HOLD) * realtime.period_s();
+    let is_fast = |pose: &&SurveyedPose| pose.pole * delay_s > MAX_GROWTH_EXPONENT;
+    let first_fast = survey.iter().filter(is_fast).map(|pose| pose.condition).fold(f64::INFINITY, f64::min);
+    let slow = survey.iter().map(|pose| pose.condition).filter(|condition| *condition < first_fast);
+    let held = if first_fast < usual { slow.fold(0.0, f64::max) } else { usual };
+    let default = usual.min(held.min(turning).max(MIN_CONDITION_PER_HOME * at_home));
+    let limit = given.unwrap_or(default);
     if limit < at_home {
         let bound = format!("must be at least {} (that of home)", rounded(at_home));
         section.reject("condition", bound);
     }
-    limit
+    let within = survey.iter().filter(|pose| pose.condition <= limit.max(at_home));
+    (limit, within.map(|pose| pose.pole).fold(0.0, f64::max))
 }

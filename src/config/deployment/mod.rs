@@ -5,6 +5,7 @@
 //! timeouts. What is given is checked against the limits that follow from the rate.
 
 pub use self::control::{Control, FidelityChoice, STABLE_MASSES};
+use self::default_limits::rounded_down;
 pub use self::hardware::{Drive, SensorNoise};
 pub use self::limits::DeploymentLimits;
 pub use self::operator::OperatorAccess;
@@ -93,7 +94,7 @@ pub(super) fn read(root: &mut SectionReader, machine: &Machine) -> Deployment {
         &control::Plant { realtime: &realtime, machine, limits: &limits, noise: &noise, drive: &drive },
     );
     let setpoint = setpoint(root.section("setpoint"));
-    let stable_ms = |age_ms: f64| 1e3 * bounded_age_s(1e-3 * age_ms, &realtime, &control, &drive);
+    let stable_ms = |age_ms: f64| 1e3 * bounded_age_s(1e-3 * age_ms, &realtime, &control, &drive, &limits);
     let timeouts = timeouts(root.section("timeouts"), rate_hz, setpoint.on_violation, stable_ms);
     Deployment {
         control,
@@ -130,7 +131,8 @@ fn timeouts(
     let mut measured_ms = default_timeout_ms(MAX_DEFAULT_MEASURED_MS, rate_hz);
     if !section.has("measured_ms") {
         // Without measurements the platform is controlled for no longer than the loop stands.
-        measured_ms = stable_ms(measured_ms).max(MIN_MEASURED_PERIODS * 1e3 / rate_hz);
+        let stable_ms = stable_ms(measured_ms).max(MIN_MEASURED_PERIODS * 1e3 / rate_hz);
+        measured_ms = if stable_ms < measured_ms { rounded_down(stable_ms) } else { measured_ms };
     }
     let timeouts = Timeouts {
         setpoint_s: timeout_s(&mut section, "setpoint_ms", default_timeout_ms(setpoint_ms, rate_hz), rate_hz),

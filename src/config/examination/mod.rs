@@ -72,6 +72,10 @@ fn examine_loops(examiner: &mut Examiner) {
         let ControlLoop { name, bandwidth_hz, .. } = control_loop;
         // Both bandwidths of the legs are those of the position.
         let axis = if name == "orientation" { name } else { "position" };
+        if let Some(pole) = control_loop.beyond_held_pole() {
+            examiner.error("limits.condition", format!("{}", deployment.limits.condition), pole);
+            break;
+        }
         if let Some(warning) = control_loop.warning() {
             examiner.warn(&format!("control.{axis}_bandwidth_hz"), format!("{bandwidth_hz}"), warning);
         }

@@ -1,6 +1,7 @@
 //! One connection of the control socket: lines in, answers out, without ever blocking.
 
-use std::io::{self, ErrorKind, Read, Write};
+use std::fs::File;
+use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 
@@ -8,8 +9,10 @@ use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use nix::unistd::{Uid, User};
 use tracing::warn;
 
+use super::last_seconds::LastSeconds;
 use super::order::{PendingOrder, is_stop};
 use super::protocol::{AnswerLine, RequestLine, RequestResult};
+use crate::realtime::file_passing;
 
 /// Longest line \[bytes\]: many times the longest request.
 pub const MAX_LINE_BYTES: usize = 4096;
@@ -75,6 +78,10 @@ pub struct Connection {
     pub line: Option<RequestLine>,
     /// Number of the reload that is not answered yet.
     pub reload: Option<u64>,
+    /// The recording that is not written yet.
+    pub last_seconds: Option<LastSeconds>,
+    /// The last file that came with a line.
+    pub file: Option<File>,
     /// Whether its client wants lines before the answer.
     pub wants_progress: bool,
     buffer: Vec<u8>,
@@ -107,6 +114,8 @@ impl Connection {
             pending: None,
             line: None,
             reload: None,
+            last_seconds: None,
+            file: None,
             wants_progress: false,
             buffer: Vec::new(),
             line_since_ns: Some(now_ns),
@@ -118,16 +127,20 @@ impl Connection {
 
     /// Whether an answer is to come.
     pub fn is_waiting(&self) -> bool {
-        self.pending.is_some() || self.line.is_some() || self.reload.is_some()
+        let Self { pending, line, reload, last_seconds, .. } = self;
+        pending.is_some() || line.is_some() || reload.is_some() || last_seconds.is_some()
     }
 
     /// Reads what there is, up to one line's length, and returns the next complete line.
     pub fn receive(&mut self, now_ns: u64) -> Received {
         let mut bytes = [0; MAX_LINE_BYTES];
         if !self.has_ended && !self.buffer.contains(&b'\n') {
-            match self.stream.read(&mut bytes) {
-                Ok(0) => self.has_ended = true,
-                Ok(count) => self.buffer.extend(bytes.iter().take(count)),
+            match file_passing::receive(&self.stream, &mut bytes) {
+                Ok((0, _)) => self.has_ended = true,
+                Ok((count, file)) => {
+                    self.buffer.extend(bytes.iter().take(count));
+                    self.file = file.or(self.file.take());
+                }
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
                 Err(_) => self.has_ended = true,
             }

@@ -9,7 +9,7 @@
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::os::fd::AsFd;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender};
+use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -18,12 +18,14 @@ use tracing::{debug, info, warn};
 
 pub use self::connection::user_name;
 use self::connection::{Connection, Received};
+use self::last_seconds::{LastSeconds, RECORD};
 use self::location::ControlSocket;
 use self::order::{Order, PendingOrder, Step};
 use self::protocol::{AnswerLine, RequestLine, RequestResult};
 use self::reload::RELOAD;
 use self::status::StatusSource;
 use super::cycle::MAX_REQUEST_AGE_NS;
+use super::recorder::WindowOrder;
 use super::reload::{Loaded, Reloaded, Requester};
 use super::snapshot::Snapshot;
 use crate::control::diagnostic::DiagnosticCode;
@@ -34,6 +36,7 @@ use crate::realtime::request_word::RequestWord;
 use crate::realtime::triple_buffer::Reader;
 
 mod connection;
+mod last_seconds;
 pub mod location;
 mod order;
 pub mod protocol;
@@ -73,13 +76,15 @@ pub(super) struct ControlLinks<'a> {
     /// To the reload thread, and back.
     pub request_reload: Sender<Requester>,
     pub reloaded: Receiver<Reloaded>,
+    /// To the recorder.
+    pub windows: SyncSender<WindowOrder>,
     /// Set when the daemon is to end.
     pub is_ending: &'a AtomicBool,
 }
 
 /// Serves clients until `stop`.
 pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBool) {
-    let ControlLinks { socket, snapshots, word, request_reload, reloaded, is_ending } = links;
+    let ControlLinks { socket, snapshots, word, request_reload, reloaded, windows, is_ending } = links;
     let mut server = Server {
         socket,
         snapshots,
@@ -87,6 +92,7 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         request_reload,
         reloaded,
         reloads: 0,
+        windows,
         is_ending,
         connections: Vec::with_capacity(2 * MAX_CONNECTIONS),
         status: StatusSource::new(loaded),
@@ -117,6 +123,7 @@ struct Server<'a> {
     reloaded: Receiver<Reloaded>,
     /// Requests to reload so far.
     reloads: u64,
+    windows: SyncSender<WindowOrder>,
     is_ending: &'a AtomicBool,
     connections: Vec<Connection>,
     status: StatusSource,
@@ -259,10 +266,19 @@ impl Server<'_> {
             info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RELOAD}");
             return self.begin_reload(connection, line, snapshot);
         }
+        if line.request == RECORD {
+            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RECORD}");
+            return match LastSeconds::order(&self.windows, connection.file.take(), line.last_s) {
+                Ok(ordered) => connection.last_seconds.replace(ordered).is_none(),
+                Err(reason) => connection.send(&AnswerLine::invalid(reason)),
+            };
+        }
         let Some(request) = line.controller_request() else {
             let names = Request::ALL.map(Request::name).join(", ");
-            let text =
-                format!("unknown request {:?}; must be one of status, {RELOAD}, {names}", line.request);
+            let text = format!(
+                "unknown request {:?}; must be one of status, {RECORD}, {RELOAD}, {names}",
+                line.request
+            );
             return connection.send(&AnswerLine::invalid(text));
         };
         // Before anything else, also before the log, which may block.
@@ -327,7 +343,14 @@ impl Server<'_> {
     /// Looks at every pending request and answers.
     fn advance(&mut self) {
         let (snapshot, now_ns, word) = (*self.snapshots.read(), monotonic_ns(), self.word);
+        let state = snapshot.status.state().unwrap_or_default();
         self.connections.retain_mut(|connection| {
+            if let Some(answer) = connection.last_seconds.as_ref().and_then(|it| it.answer(state)) {
+                connection.last_seconds = None;
+                if !connection.send(&answer) {
+                    return false;
+                }
+            }
             let Some(pending) = &mut connection.pending else { return true };
             match pending.step(&snapshot, word, now_ns) {
                 Step::Wait => true,

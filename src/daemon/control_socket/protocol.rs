@@ -20,7 +20,7 @@ const DEFAULT_WITHIN_S: f64 = 30.0;
 pub struct RequestLine {
     /// Version of the protocol.
     pub version: u32,
-    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload` or `status`.
+    /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status` or `record`.
     pub request: String,
     /// Whether the answer comes only when the request is completed: its state reached, or another.
     #[serde(default)]
@@ -34,6 +34,9 @@ pub struct RequestLine {
     /// Longest time to wait \[s\].
     #[serde(default = "default_within_s")]
     pub within_s: f64,
+    /// Length of a recording \[s\]; `None` for all that is kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub last_s: Option<f64>,
 }
 
 fn default_within_s() -> f64 {
@@ -51,6 +54,7 @@ impl RequestLine {
             until_ready,
             progress,
             within_s: DEFAULT_WITHIN_S,
+            last_s: None,
         }
     }
 

@@ -12,6 +12,7 @@ use heapless::spsc::Producer;
 use self::inputs::{InputFilter, Inputs};
 use self::outputs::{OutputSettings, Outputs};
 use super::cycle::{CycleOutput, IoSide, WORD_EPOCH};
+use super::emergency_latch::LatchLink;
 use super::reload::timeouts::{MessageTimeouts, TimeoutsNs};
 use super::snapshot::Snapshot;
 use super::supervision::Progress;
@@ -53,6 +54,8 @@ pub struct IoLinks<'a> {
     pub statistics: Reader<Statistics>,
     /// To the control thread, every cycle.
     pub snapshots: Writer<Snapshot>,
+    /// To the thread that keeps an emergency stop, if there is one.
+    pub latch: Option<LatchLink>,
     /// Requests of the control thread and of signals.
     pub word: &'static RequestWord,
     /// A reload changes them.
@@ -248,6 +251,9 @@ impl IoThread<'_> {
         if counters.cycles > self.published {
             self.published = counters.cycles;
             self.publish();
+            if let Some(latch) = &mut self.links.latch {
+                latch.send(&output, due_ns);
+            }
         }
         due_ns
     }

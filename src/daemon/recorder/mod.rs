@@ -2,7 +2,7 @@
 //!
 //! The log thread hands over each cycle through a bounded queue. A disk that stalls holds this thread alone; when the queue
 //! is full cycles are lost, which the recording says. The thread computes each cycle again in a replica of the controller:
-//! so it has the controller's memory at any cycle, and the real-time thread copies none of it.
+//! so it has the controller's memory at any cycle, and the real-time thread copies its own only after cycles were lost.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -12,13 +12,14 @@ use std::thread;
 use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
-use tracing::{info, warn};
 
-use self::fault_watch::FaultWatch;
+use self::continuous::Continuous;
 use self::folder::Folder;
 use self::replica::Replica;
-use self::stream::Stream;
 use self::tape::Tape;
+pub use self::windows::WindowOrder;
+use self::windows::Windows;
+use super::memory_queue::MemoryConsumer;
 use super::reload::Loaded;
 use crate::config::Config;
 use crate::messages::CycleMessage;
@@ -28,27 +29,31 @@ use crate::realtime::usage::ThreadUsage;
 use crate::recording::RunInfo;
 use crate::recording::scene::Scene;
 
+mod continuous;
 mod fault_watch;
 pub mod folder;
 mod replica;
 mod stream;
 mod tape;
+mod windows;
 
 /// How often the queue is emptied, as by the log thread.
 const PERIOD: Duration = Duration::from_millis(20);
+/// The same while a window is written: other threads must not wait for its end.
+const WINDOW_PERIOD: Duration = Duration::from_millis(1);
 
 /// Cycles that the queue holds \[s\]: disks were seen to stall for 25 ms, and busy ones stall for longer.
 const QUEUE_S: f64 = 2.0;
 /// Bound on the queue: 35 MB, all of it locked.
 const MAX_QUEUE: usize = 32_768;
 
-/// Cycles taken from the queue, or written of a window, in one step: some milliseconds.
+/// Cycles taken from the queue in one step: some milliseconds.
 const CYCLES_PER_STEP: usize = 2048;
 
-/// Most windows of one run.
-const MAX_WINDOWS: u32 = 100;
+/// Most orders of operators that wait.
+const MAX_ORDERS: usize = 4;
 
-/// Where the recorder writes.
+/// Where the recorder writes; what has no folder stays in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Folders {
     /// For every cycle.
@@ -57,13 +62,6 @@ pub struct Folders {
     pub faults: Option<PathBuf>,
     /// Bounds on the sizes of the files in each.
     pub bounds: folder::Bounds,
-}
-
-impl Folders {
-    /// Whether there is anything to record for.
-    pub fn is_empty(&self) -> bool {
-        self.record.is_none() && self.faults.is_none()
-    }
 }
 
 /// Numbers of a recording over a run.
@@ -93,17 +91,25 @@ pub enum Recorded {
     Configuration(Arc<Loaded>),
 }
 
+/// Ends of the queues to the recorder.
+pub struct RecorderLinks {
+    /// For the log thread. When it is full, cycles are lost.
+    pub cycles: SyncSender<Recorded>,
+    /// For the control thread.
+    pub orders: SyncSender<WindowOrder>,
+}
+
 /// The recorder of a daemon.
-pub struct Recorder {
+pub struct Recorder<'a> {
     queue: Receiver<Recorded>,
+    memories: MemoryConsumer<'a>,
     context: Context,
     tape: Tape,
     replica: Replica,
-    recording: Option<Stream>,
-    faults: Option<Folder>,
-    watch: FaultWatch,
-    window: Option<Stream>,
-    windows: u32,
+    /// Before this cycle the replica does not go on from another memory of the real-time thread.
+    resume_cycle: u64,
+    recording: Option<Continuous>,
+    windows: Windows,
     report: RecorderReport,
 }
 
@@ -115,33 +121,36 @@ pub(super) struct Context {
     rate: u64,
 }
 
-impl Recorder {
-    /// Allocates all memory but that of the files; `None` if there is nothing to record for. The log thread has the other end
-    /// of the queue.
-    pub fn new(loaded: &Loaded, folders: &Folders) -> Option<(Self, SyncSender<Recorded>)> {
-        if folders.is_empty() {
-            return None;
-        }
-        let config = &loaded.config;
+impl Context {
+    /// Whether a second of the run begins with a cycle.
+    fn begins_second(&self, cycle: u64) -> bool {
+        cycle % self.rate == 1 % self.rate
+    }
+}
+
+impl<'a> Recorder<'a> {
+    /// Allocates all memory but that of the files.
+    pub fn new(loaded: &Loaded, memories: MemoryConsumer<'a>, folders: &Folders) -> (Self, RecorderLinks) {
+        let Loaded { config, controller, .. } = loaded;
         let rate_hz = config.deployment.realtime.rate_hz;
-        let (sender, queue) = sync_channel(((QUEUE_S * rate_hz) as usize).clamp(1024, MAX_QUEUE));
+        let (cycles, queue) = sync_channel(((QUEUE_S * rate_hz) as usize).clamp(1024, MAX_QUEUE));
+        let (order_sender, orders) = sync_channel(MAX_ORDERS);
         let info = info(loaded);
         let context = Context { info, scene: Scene::new(&config.machine), rate: (rate_hz as u64).max(1) };
         let started_s = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |it| it.as_secs());
         let folder = |path: &PathBuf| Folder::new(path, &config.name, started_s, folders.bounds);
         let recorder = Self {
             queue,
-            tape: Tape::new(rate_hz),
-            replica: Replica::new(loaded.controller.clone()),
-            recording: folders.record.as_ref().map(|path| Stream::recording(folder(path))),
-            faults: folders.faults.as_ref().map(folder),
-            watch: FaultWatch::new(context.rate),
-            window: None,
-            windows: 0,
+            memories,
+            tape: Tape::new(rate_hz, controller.memory()),
+            replica: Replica::new(controller.clone()),
+            resume_cycle: 0,
+            recording: folders.record.as_ref().map(|path| Continuous::new(folder(path))),
+            windows: Windows::new(folders.faults.as_ref().map(folder), context.rate, orders),
             report: RecorderReport::default(),
             context,
         };
-        Some((recorder, sender))
+        (recorder, RecorderLinks { cycles, orders: order_sender })
     }
 
     /// Runs until the log thread has ended and everything is written.
@@ -150,17 +159,25 @@ impl Recorder {
         let at_start = ThreadUsage::of_this_thread();
         loop {
             let (received, is_open) = self.receive();
-            self.write();
+            if let Some(recording) = &mut self.recording {
+                recording.advance(&self.context, &self.tape);
+            }
+            self.windows.advance(&self.context, &self.tape);
             if !is_open {
                 break;
             }
-            if received < CYCLES_PER_STEP && self.window.is_none() {
-                thread::sleep(PERIOD);
+            if received < CYCLES_PER_STEP {
+                thread::sleep(if self.windows.is_writing() { WINDOW_PERIOD } else { PERIOD });
             }
         }
-        self.finish();
+        self.windows.finish(&self.context, &self.tape);
+        let mut bytes = self.windows.bytes();
+        if let Some(recording) = &mut self.recording {
+            recording.finish(&self.context, &self.tape);
+            bytes += recording.bytes();
+        }
         let usage = ThreadUsage::of_this_thread().since(&at_start);
-        RecorderReport { is_repeatable: self.replica.is_in_step(), usage, ..self.report }
+        RecorderReport { bytes, is_repeatable: self.replica.has_repeated_all(), usage, ..self.report }
     }
 
     /// Takes cycles from the queue: how many, and whether more may come.
@@ -176,101 +193,42 @@ impl Recorder {
     }
 
     fn add(&mut self, cycle: &CycleMessage) {
-        self.report.missing += cycle.cycle.saturating_sub(self.replica.next_cycle());
+        self.report.missing += self.replica.skip_to(cycle.cycle);
         self.report.cycles += 1;
-        let is_due = self.tape.is_empty() || (cycle.cycle - 1).is_multiple_of(self.context.rate);
-        let memory = if is_due { self.replica.memory_before(cycle) } else { None };
-        self.tape.push(cycle, memory);
+        let is_resumed = !self.replica.is_in_step() && self.resume(cycle.cycle);
+        let is_kept = is_resumed || self.tape.is_empty() || self.context.begins_second(cycle.cycle);
+        self.tape.push(cycle, self.replica.memory().filter(|_| is_kept));
         self.replica.step(cycle);
-        self.watch.add(cycle);
-        if self.window.is_none()
-            && let Some((code, fault)) = self.watch.due(false)
-        {
-            self.begin_window(code, fault);
-        }
+        self.windows.add(&self.context, &self.tape, cycle);
     }
 
     /// Goes on with another configuration, in new files: each has one, so that its replay needs no other.
     fn reconfigure(&mut self, loaded: &Loaded) {
-        self.write();
-        self.finish_windows();
+        self.windows.finish(&self.context, &self.tape);
+        if let Some(recording) = &mut self.recording {
+            recording.finish(&self.context, &self.tape);
+            recording.begin_at(self.replica.next_cycle());
+        }
         let RunInfo { clock_offset_ns, .. } = self.context.info;
         self.context.info = RunInfo { clock_offset_ns, ..info(loaded) };
         self.replica.reconfigure(loaded.controller.clone());
         self.tape.clear();
-        if let Some(recording) = &mut self.recording
-            && let Err(error) = recording.end_file()
-        {
-            warn!("the recording is not complete: {error}; `hexad recover` completes it");
-        }
     }
 
-    fn begin_window(&mut self, code: u32, fault: u64) {
-        let Some(folder) = self.faults.as_ref().filter(|_| self.windows < MAX_WINDOWS) else { return };
-        self.windows += 1;
-        if self.windows == MAX_WINDOWS {
-            warn!("this was fault number {MAX_WINDOWS}: the cycles of later ones are not written");
+    /// Lets the replica go on where the real-time thread has copied its memory, at most once a second; whether it does.
+    fn resume(&mut self, cycle: u64) -> bool {
+        if cycle < self.resume_cycle {
+            return false;
         }
-        let window = Stream::window(folder, &self.context, &self.tape, code, fault);
-        self.window = window.map_err(|error| warn!("the cycles around the fault are lost: {error}")).ok();
-    }
-
-    /// Writes what has been received, and some of a window.
-    fn write(&mut self) {
-        if let Some(recording) = &mut self.recording
-            && let Err(error) = recording.advance(&self.context, &self.tape, usize::MAX)
-        {
-            let bytes = recording.bytes();
-            self.report.bytes += bytes;
-            self.recording = None;
-            warn!(
-                "the recording has ended: {error}; free space and restart the daemon; `hexad recover` completes the file"
-            );
+        // An older copy makes room for a new one.
+        while self.memories.peek().is_some_and(|copy| copy.cycle < cycle) {
+            let _ = self.memories.dequeue();
         }
-        let Some(window) = &mut self.window else { return };
-        match window.advance(&self.context, &self.tape, CYCLES_PER_STEP) {
-            Ok(false) => {}
-            Ok(true) => self.finish_window(),
-            Err(error) => {
-                warn!("the cycles around the fault are lost: {error}");
-                self.window = None;
-            }
-        }
-    }
-
-    fn finish_window(&mut self) {
-        let Some(window) = self.window.take() else { return };
-        self.report.bytes += window.bytes();
-        match window.finish() {
-            Ok(Some(path)) => info!("the cycles around the fault are in {}", path.display()),
-            Ok(None) => {}
-            Err(error) => warn!("the cycles around the fault are lost: {error}"),
-        }
-    }
-
-    /// Writes the windows of all faults so far.
-    fn finish_windows(&mut self) {
-        while self.window.is_some() {
-            self.write();
-        }
-        if let Some((code, fault)) = self.watch.due(true) {
-            self.begin_window(code, fault);
-        }
-        while self.window.is_some() {
-            self.write();
-        }
-    }
-
-    fn finish(&mut self) {
-        self.finish_windows();
-        if let Some(recording) = self.recording.take() {
-            self.report.bytes += recording.bytes();
-            match recording.finish() {
-                Ok(Some(path)) => info!("the recording is in {}", path.display()),
-                Ok(None) => {}
-                Err(error) => warn!("the recording is not complete: {error}; `hexad recover` completes it"),
-            }
-        }
+        let Some(copy) = self.memories.peek().filter(|copy| copy.cycle == cycle) else { return false };
+        self.replica.resume(&copy.memory);
+        self.resume_cycle = cycle + self.context.rate;
+        let _ = self.memories.dequeue();
+        true
     }
 }
 

@@ -6,17 +6,19 @@ use crate::control::controller::{Controller, Memory};
 use crate::messages::CycleMessage;
 use crate::messages::layout::Declared as _;
 
-/// Repeats the cycles of the real-time thread, as long as none is missing.
+/// Repeats the cycles of the real-time thread. Behind a missing cycle it goes on from a memory of that thread.
 pub struct Replica {
     controller: Controller,
     next_cycle: u64,
     is_in_step: bool,
+    /// Cycles that it did not repeat to the bit.
+    unrepeated: u64,
 }
 
 impl Replica {
     /// Begins with a controller before its first cycle.
     pub fn new(controller: Controller) -> Self {
-        Self { controller, next_cycle: 1, is_in_step: true }
+        Self { controller, next_cycle: 1, is_in_step: true, unrepeated: 0 }
     }
 
     /// Exchanges the constants, as the real-time thread does.
@@ -29,41 +31,58 @@ impl Replica {
         self.next_cycle
     }
 
-    /// Whether it has repeated every cycle to the bit.
+    /// Whether its memory is that of the real-time thread before the next cycle.
     pub fn is_in_step(&self) -> bool {
         self.is_in_step
     }
 
-    /// Memory before a cycle; `None` if it is unknown.
-    pub fn memory_before(&self, cycle: &CycleMessage) -> Option<&Memory> {
-        (self.is_in_step && cycle.cycle == self.next_cycle).then(|| self.controller.memory())
+    /// Whether it has repeated every cycle to the bit.
+    pub fn has_repeated_all(&self) -> bool {
+        self.unrepeated == 0
     }
 
-    /// Repeats a cycle.
-    pub fn step(&mut self, cycle: &CycleMessage) {
-        let missing = cycle.cycle.saturating_sub(self.next_cycle);
-        self.next_cycle = cycle.cycle + 1;
-        if !self.is_in_step {
-            return;
-        }
+    /// Memory before the next cycle; `None` if it is unknown.
+    pub fn memory(&self) -> Option<&Memory> {
+        self.is_in_step.then(|| self.controller.memory())
+    }
+
+    /// Skips the cycles before another one: how many are missing.
+    pub fn skip_to(&mut self, cycle: u64) -> u64 {
+        let missing = cycle.saturating_sub(self.next_cycle);
         if missing > 0 {
-            self.is_in_step = false;
-            warn!(
-                cycle = cycle.cycle,
-                missing, "cycles are missing in the recording: from here on it cannot be replayed"
-            );
-            return;
+            if self.unrepeated == 0 {
+                warn!(cycle, missing, "cycles are missing in the recording; the report counts all of them");
+            }
+            (self.next_cycle, self.is_in_step) = (cycle, false);
+            self.unrepeated += missing;
         }
-        let repeated = cycle.input().map(|input| (input, self.controller.step(&input)));
+        missing
+    }
+
+    /// Goes on from the memory before the next cycle.
+    pub fn resume(&mut self, memory: &Memory) {
+        self.controller.set_memory(memory.clone());
+        self.is_in_step = true;
+    }
+
+    /// Repeats the next cycle.
+    pub fn step(&mut self, cycle: &CycleMessage) {
+        self.next_cycle = cycle.cycle + 1;
+        let input = cycle.input().filter(|_| self.is_in_step);
+        let repeated = input.map(|input| (input, self.controller.step(&input)));
         let is_equal = repeated.is_some_and(|(input, output)| {
             CycleMessage::new(&input, &output).timed_as(cycle).bytes() == cycle.bytes()
         });
-        if !is_equal {
-            self.is_in_step = false;
+        if is_equal {
+            return;
+        }
+        if self.is_in_step {
             warn!(
                 cycle = cycle.cycle,
                 "the replica of the controller has another result: report this, with the recording"
             );
         }
+        self.is_in_step = false;
+        self.unrepeated += 1;
     }
 }

@@ -9,26 +9,25 @@ use crate::messages::CycleMessage;
 const TAPE_S: f64 = 30.0;
 /// Bound on their memory, all of it locked \[bytes\]: 30 s at 4 kHz.
 const MAX_TAPE_BYTES: usize = 128 << 20;
-/// Memories kept: one a second.
-const MEMORIES: usize = TAPE_S as usize;
+/// Memories kept: one a second, and as many behind gaps.
+const MEMORIES: usize = 2 * TAPE_S as usize;
 
 /// The last cycles.
 pub struct Tape {
     cycles: VecDeque<CycleMessage>,
     capacity: usize,
-    /// Each with the cycle before which the controller had it.
+    /// Each with the cycle before which the controller had it; 0 before there was one.
     memories: VecDeque<(u64, Box<Memory>)>,
 }
 
 impl Tape {
-    /// Allocates all memory but that of the memories.
-    pub fn new(rate_hz: f64) -> Self {
+    /// Allocates all memory, and writes to all of it: a host that lacks it shows this at the start. `memory` is any.
+    pub fn new(rate_hz: f64, memory: &Memory) -> Self {
         let capacity = ((TAPE_S * rate_hz) as usize).clamp(1, MAX_TAPE_BYTES / size_of::<CycleMessage>());
-        Self {
-            cycles: VecDeque::with_capacity(capacity),
-            capacity,
-            memories: VecDeque::with_capacity(MEMORIES),
-        }
+        let mut cycles = VecDeque::from(vec![CycleMessage::default(); capacity]);
+        cycles.clear();
+        let memories = (0..MEMORIES).map(|_| (0, Box::new(memory.clone()))).collect();
+        Self { cycles, capacity, memories }
     }
 
     /// Adds a cycle, with the memory before it.
@@ -38,16 +37,18 @@ impl Tape {
         }
         self.cycles.push_back(*cycle);
         let Some(memory) = memory else { return };
-        let oldest = if self.memories.len() == MEMORIES { self.memories.pop_front() } else { None };
-        let mut kept = oldest.map_or_else(|| Box::new(memory.clone()), |(_, kept)| kept);
-        (*kept).clone_from(memory);
-        self.memories.push_back((cycle.cycle, kept));
+        if let Some((_, mut kept)) = self.memories.pop_front() {
+            (*kept).clone_from(memory);
+            self.memories.push_back((cycle.cycle, kept));
+        }
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.cycles.clear();
-        self.memories.clear();
+        for (cycle, _) in &mut self.memories {
+            *cycle = 0;
+        }
     }
 
     /// Whether there is no cycle.
@@ -66,13 +67,17 @@ impl Tape {
         self.memories.iter().find(|(kept, _)| *kept == cycle).map(|(_, memory)| &**memory)
     }
 
-    /// The first cycle from which on a replay is possible; the oldest if none is.
-    pub fn first_repeatable(&self) -> u64 {
-        let oldest = self.cycles.front().map_or(1, |cycle| cycle.cycle);
-        self.memories.iter().map(|(cycle, _)| *cycle).find(|cycle| *cycle >= oldest).unwrap_or(oldest)
+    /// The cycle at which a replay of those from a number on begins: the last with a memory up to it, else the first behind it,
+    /// else the oldest kept. 0 if there is none.
+    pub fn first_repeatable(&self, from: u64) -> u64 {
+        let oldest = self.cycles.front().map_or(0, |cycle| cycle.cycle);
+        let with_memory =
+            || self.memories.iter().map(|(cycle, _)| *cycle).filter(|cycle| *cycle >= oldest.max(1));
+        let before = with_memory().filter(|cycle| *cycle <= from).max();
+        before.or_else(|| with_memory().min()).unwrap_or(oldest)
     }
 
-    /// Number of the newest cycle.
+    /// Number of the newest cycle; 0 if there is none.
     pub fn newest(&self) -> u64 {
         self.cycles.back().map_or(0, |cycle| cycle.cycle)
     }

@@ -1,46 +1,81 @@
 use core::ops::RangeInclusive;
+use std::fs::{self, File};
+use std::sync::mpsc::channel;
 
 use super::*;
 use crate::control::controller::{Controller, Input, Measurement};
-use crate::daemon::replay::{recorded_controller, replay};
+use crate::daemon::memory_queue::{CycleMemory, MemoryProducer, MemoryQueue};
+use crate::daemon::replay::{Replay, recorded_controller, replay};
 use crate::messages::GapMessage;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::machine::Machine;
+use crate::model::task::TaskState;
 use crate::recording::Item;
 use crate::recording::reader::Recording;
 
-/// The cycles of a run without messages.
-fn cycles(controller: &mut Controller, numbers: RangeInclusive<u64>) -> Vec<CycleMessage> {
-    let cycle = |cycle: u64| {
-        let release_ns = cycle * 1_000_000;
-        // Without rates: their estimator has gains of its own.
-        let length = [1.2 + 1e-4 * (cycle as f64 * 0.1).sin(); 6];
-        let measurement = Some(Measurement { time_ns: release_ns, length, ..Measurement::default() });
-        let input = Input { release_ns, measurement, ..Input::default() };
-        let message = CycleMessage::new(&input, &controller.step(&input));
-        CycleMessage { cycle, due_ns: input.release_ns, ..message }
-    };
-    numbers.map(cycle).collect()
+/// What a test looks at: the items of the only file, and its replay.
+struct Outcome {
+    report: RecorderReport,
+    items: Vec<Item>,
+    replay: Replay,
 }
-
-/// What a recorder was given: its report, and of each file the items and the numbers of its replay.
-type Recordings = (RecorderReport, Vec<(Vec<Item>, [u64; 3])>);
 
 fn loaded(gains: &str) -> Loaded {
     let text = include_str!("../../../config/fried2008.toml");
     Loaded::new(Config::parse(&format!("{text}\n[control]\n{gains}"), "a test").unwrap())
 }
 
-fn recorded(loaded: &Loaded, handed: Vec<Recorded>) -> Recordings {
+/// Input of a cycle: the platform is moved by hand, so that the memory of each cycle is another.
+fn input(machine: &Machine, cycle: u64) -> Input {
+    let mut x = machine.home;
+    x[3] += 1e-3 * (cycle as f64 * 0.01).sin();
+    let length = leg_lengths(machine, &TaskState::at_rest(x).motion().pose);
+    let release_ns = cycle * 1_000_000;
+    let measurement = Some(Measurement { time_ns: release_ns, length, ..Measurement::default() });
+    Input { release_ns, measurement, ..Input::default() }
+}
+
+/// The real-time thread and the log thread: runs cycles, and hands over those that are not lost, each changed
+/// by `change`.
+fn run_cycles(
+    controller: &mut Controller,
+    memories: &mut MemoryProducer<'_>,
+    queue: &SyncSender<Recorded>,
+    numbers: RangeInclusive<u64>,
+    is_lost: impl Fn(u64) -> bool,
+    change: impl Fn(&mut CycleMessage),
+) {
+    let machine = loaded("").config.machine;
+    for cycle in numbers {
+        let input = input(&machine, cycle);
+        memories.begin_cycle(controller.memory());
+        let message = CycleMessage::new(&input, &controller.step(&input));
+        let mut message = CycleMessage { cycle, due_ns: input.release_ns, ..message };
+        change(&mut message);
+        if !is_lost(cycle) {
+            queue.send(Recorded::Cycle(message)).unwrap();
+        }
+    }
+}
+
+/// Records what is handed over; the report, and of each file the items and the replay.
+fn files_of(
+    loaded: &Loaded,
+    hand_over: impl FnOnce(&mut Controller, &mut MemoryProducer<'_>, &SyncSender<Recorded>),
+) -> (RecorderReport, Vec<(Vec<Item>, Replay)>) {
     let folder = tempfile::tempdir().unwrap();
     let folders = Folders { record: Some(folder.path().into()), ..Folders::default() };
-    let (recorder, queue) = Recorder::new(loaded, &folders).unwrap();
+    let mut memory_queue = MemoryQueue::new();
+    let (memories, consumer) = memory_queue.split();
+    let (recorder, links) = Recorder::new(loaded, consumer, &folders);
     let report = thread::scope(|threads| {
         let recorder = threads.spawn(|| recorder.run());
-        handed.into_iter().for_each(|item| queue.send(item).unwrap());
-        drop(queue);
+        let mut memories = MemoryProducer::new(memories);
+        hand_over(&mut loaded.controller.clone(), &mut memories, &links.cycles);
+        drop(links);
         recorder.join().unwrap()
     });
-    let mut paths: Vec<_> =
-        std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut paths: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     let file = |path: &PathBuf| {
         let recording = Recording::open(path).unwrap();
@@ -49,53 +84,142 @@ fn recorded(loaded: &Loaded, handed: Vec<Recorded>) -> Recordings {
         let info = recording.summary().unwrap().info;
         let config = Config::parse(&info.configuration, "a recording").unwrap();
         let (_, replay) = replay(&recording, recorded_controller(&info, &config)).unwrap();
-        (items, [replay.compared, replay.unknown, replay.different])
+        (items, replay)
     };
     (report, paths.iter().map(file).collect())
 }
 
 /// Records cycles without those that `is_lost`.
-fn recorded_cycles(count: u64, is_lost: impl Fn(u64) -> bool) -> (RecorderReport, Vec<Item>, [u64; 3]) {
-    let loaded = loaded("");
-    let kept = cycles(&mut loaded.controller.clone(), 1..=count).into_iter();
-    let kept = kept.filter(|cycle| !is_lost(cycle.cycle)).map(Recorded::Cycle).collect();
-    let (report, mut files) = recorded(&loaded, kept);
-    let (items, replayed) = files.pop().unwrap();
+fn recorded(count: u64, is_lost: impl Fn(u64) -> bool, change: impl Fn(&mut CycleMessage)) -> Outcome {
+    let (report, mut files) = files_of(&loaded(""), |controller, memories, queue| {
+        run_cycles(controller, memories, queue, 1..=count, is_lost, change);
+    });
+    let (items, replay) = files.pop().unwrap();
     assert!(files.is_empty());
-    (report, items, replayed)
+    Outcome { report, items, replay }
 }
 
-#[test]
-fn lost_cycles_are_counted_and_marked_where_they_are_missing() {
-    let (report, items, replayed) = recorded_cycles(3000, |cycle| (1501..=1510).contains(&cycle));
-    assert_eq!((report.cycles, report.missing, report.is_repeatable), (2990, 10, false));
-    let mark = Item::Gap(GapMessage { first_cycle: 1501, cycles: 10 });
-    let gap = items.iter().position(|item| *item == mark).unwrap();
-    assert!(matches!(&items[gap + 1], Item::Cycle(after) if after.cycle == 1511));
-    let memories = items.iter().filter(|item| matches!(item, Item::Memory { .. })).count();
-    assert_eq!([memories, items.len()], [2, 2 + 1 + 2990], "behind the gap the memory is unknown");
-    assert_eq!(replayed, [1500, 1490, 0]);
+fn numbers(replay: &Replay) -> [u64; 3] {
+    [replay.compared, replay.unknown_count(), replay.different]
 }
 
 #[test]
 fn a_whole_recording_is_repeated() {
-    let (report, items, replayed) = recorded_cycles(3000, |_| false);
+    let Outcome { report, items, replay } = recorded(3000, |_| false, |_| ());
     assert_eq!((report.cycles, report.missing, report.is_repeatable), (3000, 0, true));
-    assert_eq!((items.len(), replayed), (3003, [3000, 0, 0]));
+    assert_eq!((items.len(), numbers(&replay)), (3003, [3000, 0, 0]));
+}
+
+#[test]
+fn lost_cycles_are_counted_and_marked_and_the_replay_goes_on_behind_them() {
+    // The queue holds 2000 cycles: so far the copy of the memory may be ahead of the recorder.
+    let Outcome { report, items, replay } = recorded(9000, |cycle| (1501..=1510).contains(&cycle), |_| ());
+    assert_eq!((report.cycles, report.missing, report.is_repeatable), (8990, 10, false));
+    let mark = Item::Gap(GapMessage { first_cycle: 1501, cycles: 10 });
+    let gap = items.iter().position(|item| *item == mark).unwrap();
+    assert!(matches!(&items[gap + 1], Item::Cycle(after) if after.cycle == 1511));
+    let [compared, unknown, different] = numbers(&replay);
+    assert_eq!((compared + unknown, different), (8990, 0));
+    assert!((1500 + 4000..8990).contains(&compared), "{compared} compared");
+    let resumed = items.iter().find_map(|item| match item {
+        Item::Memory { cycle, .. } if *cycle > 1501 => Some(*cycle),
+        _ => None,
+    });
+    assert_eq!(resumed, Some(1511 + unknown), "from this memory on everything is compared");
+    assert_eq!(replay.unknown, [1511..=1510 + unknown]);
+}
+
+#[test]
+fn an_output_that_differs_behind_a_gap_is_noticed() {
+    let change = |cycle: &mut CycleMessage| {
+        if cycle.cycle == 8500 {
+            cycle.force_n[2] = f64::from_bits(cycle.force_n[2].to_bits() ^ 1);
+        }
+    };
+    let Outcome { report, replay, .. } = recorded(9000, |cycle| cycle == 1501, change);
+    assert!(!report.is_repeatable);
+    assert_eq!(replay.different, 1);
+    let first = replay.first.unwrap();
+    assert_eq!((first.cycle, first.field.as_str()), (8500, "force_n_3"));
 }
 
 #[test]
 fn both_sides_of_a_reload_are_repeated_and_each_has_its_configuration() {
     let (before, after) = (loaded(""), Arc::new(loaded("position_bandwidth_hz = 3.0")));
-    let mut controller = before.controller.clone();
-    let mut handed: Vec<_> = cycles(&mut controller, 1..=1500).into_iter().map(Recorded::Cycle).collect();
-    controller.exchange_constants(&mut after.controller.clone());
-    handed.push(Recorded::Configuration(after));
-    handed.extend(cycles(&mut controller, 1501..=3000).into_iter().map(Recorded::Cycle));
-    let (report, files) = recorded(&before, handed);
+    let (report, files) = files_of(&before, |controller, memories, queue| {
+        run_cycles(controller, memories, queue, 1..=1500, |_| false, |_| ());
+        controller.exchange_constants(&mut after.controller.clone());
+        queue.send(Recorded::Configuration(after)).unwrap();
+        run_cycles(controller, memories, queue, 1501..=3000, |_| false, |_| ());
+    });
     assert!(report.is_repeatable && report.missing == 0, "{report:?}");
-    let replayed: Vec<_> = files.iter().map(|(_, replayed)| *replayed).collect();
+    let replayed: Vec<_> = files.iter().map(|(_, replay)| numbers(replay)).collect();
     assert_eq!(replayed, [[1500, 0, 0], [1500, 0, 0]]);
     let [_, (items, _)] = files.as_slice() else { return };
     assert!(matches!(items.first(), Some(Item::Memory { cycle: 1501, .. })), "{:?}", items.first());
+}
+
+/// A recorder without folders, by hand.
+fn in_memory(count: u64) -> (Recorder<'static>, SyncSender<WindowOrder>) {
+    let loaded = loaded("");
+    let queue: &'static mut MemoryQueue = Box::leak(Box::new(MemoryQueue::new()));
+    let (memories, consumer) = queue.split();
+    let (mut recorder, links) = Recorder::new(&loaded, consumer, &Folders::default());
+    let mut memories = MemoryProducer::new(memories);
+    let (sender, cycles) = sync_channel(count as usize);
+    run_cycles(&mut loaded.controller.clone(), &mut memories, &sender, 1..=count, |_| false, |_| ());
+    for handed in cycles.try_iter() {
+        if let Recorded::Cycle(cycle) = handed {
+            recorder.add(&cycle);
+        }
+    }
+    (recorder, links.orders)
+}
+
+/// The cycles of a window of the last seconds, which a replay repeats.
+fn window(recorder: &mut Recorder<'_>, orders: &SyncSender<WindowOrder>, last_s: f64) -> Vec<u64> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("last.mcap");
+    let (answer, answered) = channel();
+    orders.send(WindowOrder { file: File::create(&path).unwrap(), last_s, answer }).unwrap();
+    recorder.windows.advance(&recorder.context, &recorder.tape);
+    recorder.windows.finish(&recorder.context, &recorder.tape);
+    let written = answered.recv().unwrap().unwrap();
+    let recording = Recording::open(&path).unwrap();
+    let mut cycles = vec![];
+    let summary = recording.each(|item| {
+        if let Item::Cycle(cycle) = item {
+            cycles.push(cycle.cycle);
+        }
+    });
+    assert_eq!((summary.unwrap().unfinished, cycles.len() as u64), (None, written));
+    let (_, replay) = replay(&recording, loaded("").controller).unwrap();
+    assert_eq!(numbers(&replay), [written, 0, 0], "last {last_s} s");
+    cycles
+}
+
+#[test]
+fn the_last_seconds_are_in_memory_without_a_folder() {
+    let (mut recorder, orders) = in_memory(40_500);
+    for (last_s, first) in [(1.0, 39_001), (2.6, 37_001), (30.0, 11_001), (1e9, 11_001)] {
+        let cycles = window(&mut recorder, &orders, last_s);
+        assert!(cycles.iter().copied().eq(first..=40_500), "{last_s} s: from {:?}", cycles.first());
+    }
+}
+
+#[test]
+fn the_copy_of_a_memory_is_that_before_its_cycle_and_is_made_only_where_there_is_room() {
+    let mut controller = loaded("").controller;
+    let mut queue = MemoryQueue::new();
+    let (producer, mut consumer) = queue.split();
+    let mut memories = MemoryProducer::new(producer);
+    let (sender, _cycles) = sync_channel(100);
+    run_cycles(&mut controller, &mut memories, &sender, 1..=50, |_| false, |_| ());
+    let CycleMemory { cycle, .. } = consumer.dequeue().unwrap();
+    assert_eq!(cycle, 1);
+    let before = crate::recording::memory_bytes(controller.memory());
+    memories.begin_cycle(controller.memory());
+    controller.step(&Input { release_ns: 51_000_000, ..Input::default() });
+    let copy = consumer.dequeue().unwrap();
+    assert_eq!((copy.cycle, crate::recording::memory_bytes(&copy.memory)), (51, before));
 }

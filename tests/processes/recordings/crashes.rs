@@ -1,16 +1,13 @@
 //! A daemon that is killed, and disks that are full: what is complete in a file is recovered.
 
 use std::path::Path;
-use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 use std::{env, fs};
 
-use hexad::daemon::report::Report;
-
 use super::{about, arguments, files, read, replays_exactly, start_recording};
-use crate::support::children::{Ended, HANG, Hexad, hexad};
-use crate::support::machine::{Machine, PATIENT};
+use crate::support::children::{Ended, HANG, Hexad};
+use crate::support::machine::Machine;
 use crate::support::random::Random;
 use crate::support::trio::start_plant;
 use crate::support::turns;
@@ -96,31 +93,6 @@ fn what_a_killed_daemon_has_recorded_is_recovered() {
     }
     println!("{recovered} of {kills} recovered; the others were killed before the first chunk");
     assert!(recovered * 2 > kills, "{recovered} of {kills}");
-}
-
-/// A limit on the size of files stands for a full disk: to the daemon both are a write that fails.
-#[test]
-fn a_full_disk_ends_the_recording_and_not_the_daemon() {
-    let _turn = turns::beside_others();
-    let machine = Machine::with("recorded-full", PATIENT);
-    let plant = start_plant(&machine);
-    let mut command = Command::new("sh");
-    // 8 MiB, in blocks of 512 bytes (or 16 MiB where the shell counts in 1024).
-    command.args(["-c", "ulimit -f 16384; exec \"$@\"", "sh"]);
-    command.arg(hexad().get_program()).args(["run", "--config"]).arg(&machine.file).args(arguments(&machine));
-    let mut daemon = Hexad::spawn(&machine, "run", command);
-    daemon.says("the recording has ended: ");
-    sleep(Duration::from_millis(500));
-    daemon.must_run();
-    let said = daemon.stops_on("TERM", HANG).stderr;
-    plant.stops_on("TERM", HANG);
-    assert_eq!(said.matches("the recording has ended: ").count(), 1, "{said}");
-    assert!(said.contains("free space and restart the daemon"), "{said}");
-    let recorded = files(&machine, "record");
-    assert!(is_recovered(&machine, &recorded[0]));
-    let (summary, _) = read(&recorded[0]);
-    let report = Report::read(&machine.path("report.json")).unwrap();
-    assert!(report.cycles > summary.cycles && summary.cycles > 1000, "{}: {}", report.cycles, summary.cycles);
 }
 
 #[test]

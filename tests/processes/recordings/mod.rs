@@ -11,6 +11,8 @@ use crate::support::children::{Ended, Hexad, run};
 use crate::support::machine::Machine;
 
 mod crashes;
+mod full_disk;
+mod last_seconds;
 mod python;
 mod reloads;
 mod replays;

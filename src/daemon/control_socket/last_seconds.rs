@@ -1,0 +1,85 @@
+//! The request `record`: the recorder writes the last seconds to a file that the client passes with the line.
+
+use std::fs::File;
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel};
+
+use super::protocol::{AnswerLine, RequestResult, VERSION};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::state::State;
+use crate::daemon::recorder::WindowOrder;
+
+/// Name of the request.
+pub const RECORD: &str = "record";
+
+/// Seconds where the request names none: all that the recorder keeps.
+const ALL_S: f64 = 1e9;
+
+/// Recording of the last seconds on its way.
+#[derive(Debug)]
+pub struct LastSeconds(Receiver<Result<u64, String>>);
+
+impl LastSeconds {
+    /// Passes a request on to the recorder; the error is a sentence for the client.
+    pub fn order(
+        windows: &SyncSender<WindowOrder>,
+        file: Option<File>,
+        last_s: Option<f64>,
+    ) -> Result<Self, String> {
+        let file =
+            file.ok_or("record needs an open file with its line (SCM_RIGHTS); see docs/operator.md")?;
+        // Whatever else it is may hold the recorder for ever.
+        if !file.metadata().is_ok_and(|it| it.is_file()) {
+            return Err("record needs a regular file".into());
+        }
+        let (answer, answered) = channel();
+        let order = WindowOrder { file, last_s: last_s.unwrap_or(ALL_S), answer };
+        windows.try_send(order).map_err(|_| "the recorder has other recordings to write; try again")?;
+        Ok(Self(answered))
+    }
+
+    /// The answer, once there is one.
+    pub fn answer(&self, state: State) -> Option<AnswerLine> {
+        let (result, text) = match self.0.try_recv() {
+            Ok(Ok(cycles)) => (RequestResult::Done, format!("{cycles} cycles")),
+            Ok(Err(why)) => (RequestResult::Failed, why),
+            Err(TryRecvError::Empty) => return None,
+            Err(TryRecvError::Disconnected) => {
+                (RequestResult::Failed, DiagnosticCode::DaemonEnding.name().into())
+            }
+        };
+        Some(AnswerLine {
+            version: VERSION,
+            result,
+            request: RECORD.into(),
+            state: state.name().into(),
+            diagnostic: Diagnostic::default().into(),
+            text,
+            status: None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::sync_channel;
+
+    #[test]
+    fn only_a_regular_file_is_written_and_the_answer_is_that_of_the_recorder() {
+        let (windows, orders) = sync_channel(1);
+        let refused = |file: Option<File>| LastSeconds::order(&windows, file, None).unwrap_err();
+        assert!(refused(None).starts_with("record needs an open file"));
+        assert_eq!(refused(Some(File::open("/dev/null").unwrap())), "record needs a regular file");
+        let file = || Some(tempfile::tempfile().unwrap());
+        let ordered = LastSeconds::order(&windows, file(), Some(2.0)).unwrap();
+        assert!(refused(file()).starts_with("the recorder has other recordings to write"));
+        assert_eq!(ordered.answer(State::Off), None);
+        let order: WindowOrder = orders.recv().unwrap();
+        assert_eq!(order.last_s, 2.0);
+        order.answer.send(Ok(7)).unwrap();
+        let answer = ordered.answer(State::Off).unwrap();
+        assert_eq!((answer.result, answer.text.as_str()), (RequestResult::Done, "7 cycles"));
+        drop(order);
+        assert_eq!(ordered.answer(State::Off).unwrap().result, RequestResult::Failed);
+    }
+}

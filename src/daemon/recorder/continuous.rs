@@ -1,0 +1,146 @@
+//! The recording of every cycle, in files that follow each other.
+//!
+//! A disk that takes nothing interrupts it. It then goes on in a new file once there is room, with the first cycle that is not
+//! surely on disk: as long as the tape holds that, none is lost.
+
+use std::fs;
+
+use tracing::{info, warn};
+
+use super::Context;
+use super::folder::Folder;
+use super::stream::Stream;
+use super::tape::Tape;
+use crate::messages::CycleMessage;
+use crate::recording::RecordingError;
+use crate::recording::file::RecordingFile;
+
+/// Time between two attempts while the disk takes nothing \[s\].
+const RETRY_S: u64 = 2;
+
+/// The recording of every cycle.
+pub struct Continuous {
+    folder: Folder,
+    files: u32,
+    /// Bytes in files that have ended.
+    ended_bytes: u64,
+    stream: Option<Stream>,
+    /// The first cycle that is not surely on disk: the first of a second, or of a file.
+    unsaved_cycle: u64,
+    /// Whether the disk has taken nothing of late.
+    is_interrupted: bool,
+    /// Nothing is tried before this cycle.
+    retry_cycle: u64,
+}
+
+impl Continuous {
+    /// Into a folder, from the first cycle on.
+    pub fn new(folder: Folder) -> Self {
+        Self {
+            folder,
+            files: 0,
+            ended_bytes: 0,
+            stream: None,
+            unsaved_cycle: 1,
+            is_interrupted: false,
+            retry_cycle: 0,
+        }
+    }
+
+    /// Bytes written, at most.
+    pub fn bytes(&self) -> u64 {
+        self.ended_bytes + self.stream.as_ref().map_or(0, |stream| stream.file().bytes())
+    }
+
+    /// Writes what the tape has received.
+    pub fn advance(&mut self, context: &Context, tape: &Tape) {
+        if tape.newest() < self.retry_cycle {
+            return;
+        }
+        if let Err(error) = self.write(context, tape) {
+            self.interrupt(&error);
+            self.retry_cycle = tape.newest() + RETRY_S * context.rate;
+        }
+    }
+
+    /// Begins another file with a cycle; what came before it is forgotten.
+    pub fn begin_at(&mut self, cycle: u64) {
+        self.unsaved_cycle = cycle;
+    }
+
+    /// Completes the last file.
+    pub fn finish(&mut self, context: &Context, tape: &Tape) {
+        self.retry_cycle = 0;
+        self.advance(context, tape);
+        let Some(stream) = self.stream.take() else { return };
+        self.ended_bytes += stream.file().bytes();
+        match stream.finish() {
+            Ok(path) => info!("the recording is in {}", path.display()),
+            Err(error) => warn!("the recording is not complete: {error}; `hexad recover` completes it"),
+        }
+    }
+
+    fn write(&mut self, context: &Context, tape: &Tape) -> Result<(), RecordingError> {
+        let next_cycle = self.stream.as_ref().map_or(self.unsaved_cycle, Stream::next_cycle);
+        for cycle in tape.from(next_cycle) {
+            if context.begins_second(cycle.cycle) {
+                self.end_second(cycle)?;
+            }
+            let stream = match &mut self.stream {
+                Some(stream) => stream,
+                None => self.stream.insert(Self::begin_file(
+                    &self.folder,
+                    &mut self.files,
+                    context,
+                    self.unsaved_cycle,
+                )?),
+            };
+            stream.write(context, tape, cycle)?;
+        }
+        Ok(())
+    }
+
+    /// Everything before the cycle is on disk; a full file ends.
+    fn end_second(&mut self, cycle: &CycleMessage) -> Result<(), RecordingError> {
+        let Some(stream) = &mut self.stream else { return Ok(()) };
+        stream.flush()?;
+        self.unsaved_cycle = cycle.cycle;
+        if self.is_interrupted {
+            self.is_interrupted = false;
+            info!("the recording goes on in {}", stream.file().path().display());
+        }
+        if let Some(full) = self.stream.take_if(|stream| stream.file().bytes() >= self.folder.file_bytes()) {
+            self.ended_bytes += full.file().bytes();
+            full.finish()?;
+        }
+        Ok(())
+    }
+
+    fn begin_file(
+        folder: &Folder,
+        files: &mut u32,
+        context: &Context,
+        first_cycle: u64,
+    ) -> Result<Stream, RecordingError> {
+        *files += 1;
+        let path = folder.next_path(&format!("{files:03}"));
+        Ok(Stream::new(RecordingFile::create(&path, &context.info, None)?, first_cycle))
+    }
+
+    fn interrupt(&mut self, error: &RecordingError) {
+        if !self.is_interrupted {
+            self.is_interrupted = true;
+            warn!("the recording is interrupted: {error}; it goes on in a new file once there is room");
+        }
+        let Some(stream) = self.stream.take() else { return };
+        let (path, bytes) = (stream.file().path().to_path_buf(), stream.file().bytes());
+        let is_saved = stream.first_cycle() < self.unsaved_cycle;
+        drop(stream);
+        if is_saved {
+            self.ended_bytes += bytes;
+        } else {
+            // Nothing in it is missing in memory.
+            let _ = fs::remove_file(&path);
+        }
+    }
+}
