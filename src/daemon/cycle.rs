@@ -42,9 +42,20 @@ pub struct RequestIntake {
     word: u64,
     /// The last message of the command topic that was seen.
     message: (u64, u64),
+    /// Longest time between two cycles \[ns\] behind which a request of the topic may begin control: it may have been received
+    /// before. 0 without a bound, in simulated time.
+    longest_pause_ns: u64,
+    /// When the last cycle woke.
+    woke_ns: u64,
 }
 
 impl RequestIntake {
+    /// Of a real-time thread whose cycles follow each other in real time, or in simulated time.
+    pub fn new(is_simulated: bool) -> Self {
+        let longest_pause_ns = if is_simulated { 0 } else { MAX_REQUEST_AGE_NS };
+        Self { longest_pause_ns, ..Self::default() }
+    }
+
     /// The request of a cycle that wakes at `now_ns`. Of two new ones that of higher precedence counts, of two equal
     /// ones the word. The other is lost if it may begin control or comes from the topic; a stop in the word counts in the
     /// next cycle.
@@ -59,6 +70,9 @@ impl RequestIntake {
         if let Some(request) = &from_topic {
             self.message = request.message;
         }
+        let pause_ns = now_ns.saturating_sub(core::mem::replace(&mut self.woke_ns, now_ns));
+        let was_held = self.longest_pause_ns > 0 && pause_ns > self.longest_pause_ns;
+        let from_topic = from_topic.filter(|topic| !(was_held && topic.request.can_begin_control()));
         let from_word = if word == self.word { None } else { of_word(word, now_ns) };
         match (from_topic, from_word) {
             (Some(topic), Some(new)) if topic.request > new.request => {
@@ -144,6 +158,25 @@ mod tests {
         let engage = word(Request::Engage, 1000);
         assert_eq!(chosen(&mut intake, topic(Request::Off, 2), engage), Some(Request::Off));
         assert_eq!(chosen(&mut intake, topic(Request::Off, 2), engage), None);
+    }
+
+    #[test]
+    fn behind_a_pause_a_request_of_the_topic_stops_and_does_not_begin_control() {
+        for (is_simulated, pause_ns, is_held) in [
+            (false, MAX_REQUEST_AGE_NS, false),
+            (false, MAX_REQUEST_AGE_NS + 1, true),
+            (true, 60 * MAX_REQUEST_AGE_NS, false),
+        ] {
+            for request in Request::ALL {
+                let mut intake = RequestIntake::new(is_simulated);
+                intake.next(None, 0, NOW_NS);
+                let now_ns = NOW_NS + pause_ns;
+                let found = intake.next(topic(request, 1), 0, now_ns);
+                let is_lost = is_held && request.can_begin_control();
+                assert_eq!(found.is_none(), is_lost, "{request:?} {is_simulated} {pause_ns}");
+                assert_eq!(intake.next(topic(request, 1), 0, now_ns + 1), None, "nor later");
+            }
+        }
     }
 
     #[test]

@@ -236,7 +236,8 @@ fn run_realtime(
     let _ = ThreadFiles::of_this_thread().map(|found| links.files.set(found));
     // No cycle begins before the main thread has accepted what all threads lack.
     links.go_ahead.recv().ok()?;
-    let (word, progress, mut intake) = (links.word, links.progress, RequestIntake::default());
+    let (word, progress, mut intake) =
+        (links.word, links.progress, RequestIntake::new(realtime.is_simulated()));
     let (mut handover, mut memories) = (links.handover, links.memories);
     let step = |input: &mut Input, woke_ns: u64| {
         progress.count_cycle();

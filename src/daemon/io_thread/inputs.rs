@@ -75,7 +75,7 @@ impl Inputs {
 
     /// Receives the newest message of each topic; true if a measurement is among them.
     pub fn receive(&mut self, filter: InputFilter) -> bool {
-        self.receive_requests(monotonic_ns(), filter);
+        self.receive_requests(monotonic_ns, filter);
         self.receive_setpoint(filter.has_control);
         let measured = self.measured.receive_latest(filter.has_control);
         self.cycle.input.measured_publishers = self.measured.publishers();
@@ -114,8 +114,9 @@ impl Inputs {
         self.cycle.input.setpoint_publishers = self.setpoints.publishers();
     }
 
-    /// Of the requests that are not yet answered the one of highest precedence counts.
-    pub fn receive_requests(&mut self, now_ns: u64, filter: InputFilter) {
+    /// Of the requests that are not yet answered the one of highest precedence counts. The clock is read behind each message: this
+    /// thread may have been held just before it.
+    pub fn receive_requests(&mut self, clock: impl Fn() -> u64, filter: InputFilter) {
         let InputFilter { answered, is_ending, word, word_ns, .. } = filter;
         if word != self.word {
             (self.word, self.cycle.input.request) = (word, None);
@@ -124,7 +125,7 @@ impl Inputs {
         for _ in 0..REQUESTS_PER_ROUND {
             let Some(message) = self.commands.receive_from_any() else { break };
             let Some(request) = message.request() else { continue };
-            let is_too_old = now_ns.abs_diff(message.header.time_ns) > MAX_REQUEST_AGE_NS;
+            let is_too_old = clock().abs_diff(message.header.time_ns) > MAX_REQUEST_AGE_NS;
             let is_overtaken = message.header.time_ns < word_ns;
             if request.request.can_begin_control() && (is_ending || is_too_old || is_overtaken) {
                 continue;
@@ -167,7 +168,7 @@ mod tests {
                 commands.publish(sent_ns, request.into()).unwrap();
                 let filter =
                     InputFilter { has_control: false, answered, is_ending: false, word: 0, word_ns: 0 };
-                inputs.receive_requests(sent_ns + age_ns, filter);
+                inputs.receive_requests(|| sent_ns + age_ns, filter);
                 let found = inputs.input().request.filter(|found| found.message == message);
                 let is_accepted = !(is_old && request.can_begin_control());
                 let expected = is_accepted.then_some(OperatorRequest { request, message });

@@ -213,7 +213,7 @@ impl IoThread<'_> {
             if setpoint.is_none() {
                 return;
             }
-            self.inputs.receive_requests(time_ns, self.input_filter());
+            self.inputs.receive_requests(|| time_ns, self.input_filter());
             self.hand_over_inputs();
             self.links.exchange.event.signal();
             let before = self.published;
