@@ -45,7 +45,7 @@ fn an_emergency_stop_needs_no_socket() {
     assert_eq!(ask(&name, "clear"), format!("NO_DAEMON no daemon runs for {name}"));
     // There is no other signal for `off`.
     assert_eq!(ask(&name, "off"), "OK");
-    assert_eq!(daemon.words().matches(STOPPED).count(), 2, "{}", daemon.words());
+    daemon.has_said(STOPPED, 2);
     assert_eq!(ask(&name, "estop"), "OK");
     daemon.stops();
     assert_eq!(ask(&name, "estop"), format!("NO_DAEMON no daemon runs for {name}"));

@@ -31,8 +31,13 @@ impl Process {
 
     /// Waits for words in its output.
     pub fn says(&self, words: &str) {
+        self.has_said(words, 1);
+    }
+
+    /// Waits until its output has words so many times.
+    pub fn has_said(&self, words: &str, times: usize) {
         let began = Instant::now();
-        while !self.words().contains(words) {
+        while self.words().matches(words).count() < times {
             assert!(began.elapsed() < HANG, "it must say {words:?}, and said:\n{}", self.words());
             sleep(Duration::from_millis(2));
         }
