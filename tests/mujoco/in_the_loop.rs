@@ -307,7 +307,8 @@ fn a_platform_in_mujoco_tracks_as_well_as_our_own() {
 }
 
 /// The drives are the clock, and time is everybody's. While the host holds somebody the platform drifts, rightly: the
-/// typical error counts. Where it held somebody for longer than a driver waits, it is tried again.
+/// typical error counts. Where it held somebody for longer than a driver waits, or a driver in Python got too little of it, it is
+/// tried again.
 #[test]
 fn a_platform_in_mujoco_moves_in_real_time() {
     if python::is_lacking() {
@@ -320,6 +321,9 @@ fn a_platform_in_mujoco_moves_in_real_time() {
         let run = catch_unwind(|| stage.with_mujoco());
         let held = host.largest();
         match run {
+            Ok(run) if run.periods <= (SECONDS / PERIOD_S) as usize / 2 && attempt < ATTEMPTS => {
+                println!("attempt {attempt}: {} periods", run.periods);
+            }
             Ok(run) => {
                 run.print("fried2008 in MuJoCo, in real time");
                 println!("typically {:.1e} m off; the host held somebody for {held:?}", run.typical_position);

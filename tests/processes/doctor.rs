@@ -128,7 +128,7 @@ fn a_controller_at_work_is_not_disturbed_unasked() {
     let machine = Machine::patient("doctor-running");
     let plant = start_plant(&machine);
     let daemon = start_daemon(&machine);
-    daemon.says("running");
+    daemon.says("INFO running");
     let Ended { status, stdout, stderr } = run(&machine, &["doctor", "--seconds", "1"]);
     assert_eq!(status.code(), Some(2), "{stderr}");
     assert!(stderr.starts_with("hexad: not measured: it would delay the controller of process "), "{stderr}");
