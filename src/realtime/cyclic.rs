@@ -22,9 +22,8 @@ use super::usage::ThreadUsage;
 use super::waiter::Waiter;
 use crate::messages::LoopCounters;
 
-/// Length of the queue of records to the log thread: 200 ms at 20 kHz, ten periods of the log. A busy processor may keep the log
-/// from its work for 50 ms and more.
-pub const RECORDS: usize = 4096;
+/// Length of the queue of records to the log thread: 50 ms at 20 kHz, two periods of the log.
+pub const RECORDS: usize = 1024;
 
 /// When cycles are released and which are late.
 #[derive(Clone, Copy, Debug)]
