@@ -62,14 +62,18 @@ pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
     prepare(realtime.io_cpu, scheduled)
 }
 
-/// FIFO priority of the threads of requests, log and recorder: above ordinary processes, below everything else in real time.
-const SUPPORT_PRIORITY: i32 = 1;
+/// FIFO priority of the thread of requests: above ordinary processes and all that writes files, so that an emergency stop waits
+/// for neither.
+pub(super) const REQUESTS_PRIORITY: i32 = 2;
 
-/// Prepares the calling thread to answer requests and to keep up with the loop on a busy host, where it may: without it
+/// FIFO priority of log and recorder: above ordinary processes, below everything else in real time.
+pub(super) const RECORDS_PRIORITY: i32 = 1;
+
+/// Prepares the calling thread to answer requests or to keep up with the loop on a busy host, where it may: without it
 /// requests wait and cycles are missing in the recording, and nothing else. It never has the priority of the loop.
-pub(super) fn prepare_support(realtime: &Realtime) {
-    if !realtime.is_simulated() && realtime.priority.min(realtime.io_priority) > SUPPORT_PRIORITY {
-        let _ = scheduling::fifo_priority(SUPPORT_PRIORITY);
+pub(super) fn prepare_support(realtime: &Realtime, priority: i32) {
+    if !realtime.is_simulated() && realtime.priority.min(realtime.io_priority) > priority {
+        let _ = scheduling::fifo_priority(priority);
     }
 }
 

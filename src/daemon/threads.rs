@@ -27,7 +27,9 @@ use super::reload::timeouts::MessageTimeouts;
 use super::reload::{self, Loaded, ReloadLinks, Requester};
 use super::report::Report;
 use super::snapshot::Snapshot;
-use super::start::{Ready, prepare_io, prepare_loop, prepare_simulated, prepare_support, start, warm_up};
+use super::start::{
+    RECORDS_PRIORITY, REQUESTS_PRIORITY, Ready, prepare_io, prepare_loop, prepare_simulated, prepare_support, start, warm_up,
+};
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
 use crate::config::Config;
@@ -152,13 +154,13 @@ pub(super) fn run(
         let _stop_all = StopOnDrop(flags);
         let realtime = &config.deployment.realtime;
         let run_control = || {
-            prepare_support(realtime);
+            prepare_support(realtime, REQUESTS_PRIORITY);
             control_socket::run(loaded.clone(), control_links, &flags.stop_control);
         };
         spawn(threads, "hexad-reload", || reload::run(loaded.clone(), &mut offer, reload_links))?;
         let control = spawn(threads, "hexad-control", run_control)?;
         let recorder = spawn(threads, "hexad-recorder", || {
-            prepare_support(realtime);
+            prepare_support(realtime, RECORDS_PRIORITY);
             recorder.run()
         })?;
         let latch = latch
@@ -167,7 +169,7 @@ pub(super) fn run(
             })
             .transpose()?;
         let log = spawn(threads, "hexad-log", || {
-            prepare_support(realtime);
+            prepare_support(realtime, RECORDS_PRIORITY);
             log_thread::run(log_links, &flags.stop_log)
         })?;
         let cyclic = spawn(threads, REALTIME_THREAD, || {

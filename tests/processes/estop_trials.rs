@@ -9,8 +9,8 @@ use std::env;
 use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::process::{Child, Command};
-use std::thread::{self, sleep};
+use std::process::{Child, ChildStdout, Command};
+use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hexad::control::diagnostic::DiagnosticCode;
@@ -19,7 +19,6 @@ use hexad::daemon::cycle::WORD_EPOCH;
 use hexad::messages::ForceMessage;
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::request_word;
-use hexad::realtime::setup::scheduling;
 use serde_json::{Value, json};
 
 use crate::common::not_run::lacking;
@@ -53,11 +52,14 @@ const WITHIN_US: u64 = 60_000;
 /// The situation of a process in a namespace of its own, and the number of its trials.
 const PART: &str = "HEXAD_TEST_FULL";
 
-/// As the group of the daemon; before everything ordinary, as an emergency-stop button would run.
+/// Before everything ordinary and the threads that serve requests, as an emergency-stop button would run. It is a process of its own:
+/// in this one it would wait for the memory of whatever records or floods.
+const BUTTON: &[&str] = &["chrt", "-f", "3"];
+/// The same as the group of the daemon.
 const MEMBER: &[&str] =
-    &["chrt", "-f", "2", "setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"];
+    &["chrt", "-f", "3", "setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"];
 
-/// A client in another process: path of the socket; a line with the time and one with the answer for each line that it reads.
+/// Its program: path of the socket; for each line that it reads a line with the time and the answer.
 const PYTHON_CLIENT: &str = r#"
 import socket, sys, time
 for _ in sys.stdin:
@@ -120,34 +122,31 @@ fn with_full_file_systems() {
     run(Situation::Full, trials);
 }
 
-/// Sends `estop`; the instant before it connected \[ns\].
-enum Button {
-    Own,
-    Member(Child, BufReader<std::process::ChildStdout>),
+/// Sends `estop` from a process of its own.
+struct Button {
+    child: Child,
+    words: BufReader<ChildStdout>,
 }
 
 impl Button {
-    fn press(&mut self, socket: &Path) -> u64 {
-        match self {
-            Self::Own => {
-                // A thread of its own: what others start must not inherit its priority.
-                let press = || {
-                    let _ = scheduling::fifo_priority(2);
-                    let sent_ns = monotonic_ns();
-                    let answer = ask(socket, "estop", true);
-                    assert_eq!(answer["result"], "done", "{answer}");
-                    sent_ns
-                };
-                thread::scope(|threads| threads.spawn(press).join().expect("an answer"))
-            }
-            Self::Member(child, words) => {
-                child.stdin.as_mut().expect("a pipe").write_all(b"\n").expect("to write");
-                let line = line_of(words);
-                let (sent_ns, answer) = line.split_once(' ').unwrap_or_else(|| panic!("{line:?}"));
-                assert!(answer.contains("\"result\":\"done\""), "{answer}");
-                sent_ns.parse().expect("an instant")
-            }
-        }
+    fn connect(user: &[&str], socket: &Path) -> Self {
+        let mut child = python(user, PYTHON_CLIENT, socket);
+        let words = BufReader::new(child.stdout.take().expect("a pipe"));
+        Self { child, words }
+    }
+
+    /// The instant before it connected \[ns\].
+    fn press(&mut self) -> u64 {
+        self.child.stdin.as_mut().expect("a pipe").write_all(b"\n").expect("to write");
+        let line = line_of(&mut self.words);
+        let (sent_ns, answer) = line.split_once(' ').unwrap_or_else(|| panic!("{line:?}"));
+        assert!(answer.contains("\"result\":\"done\""), "{answer}");
+        sent_ns.parse().expect("an instant")
+    }
+
+    fn finish(mut self) {
+        drop(self.child.stdin.take());
+        self.child.wait().expect("its end");
     }
 }
 
@@ -193,8 +192,11 @@ type Tally = BTreeMap<String, BTreeMap<u64, usize>>;
 
 fn run(situation: Situation, trials: usize) {
     let Some(witness) = Witness::start() else { return lacking("the right to real-time priority") };
-    let group = if situation == Situation::Member { "[operator]\ngroup = \"nogroup\"\n" } else { "" };
-    if situation == Situation::Member && cannot(&[MEMBER]) {
+    let (user, group) = match situation {
+        Situation::Member => (MEMBER, "[operator]\ngroup = \"nogroup\"\n"),
+        _ => (BUTTON, ""),
+    };
+    if cannot(&[user]) {
         return;
     }
     let seed = env::var("HEXAD_SEED").ok().and_then(|seed| seed.parse().ok()).unwrap_or_else(monotonic_ns);
@@ -204,18 +206,12 @@ fn run(situation: Situation, trials: usize) {
     let daemon = start_daemon(&machine);
     let socket = path_of(&daemon);
     let Controlled { peer: _peer, daemon, plant, machine } = Controlled::with(machine, daemon);
-    let mut button = if situation == Situation::Member {
-        let mut child = python(MEMBER, PYTHON_CLIENT, &socket);
-        let words = BufReader::new(child.stdout.take().expect("a pipe"));
-        Button::Member(child, words)
-    } else {
-        Button::Own
-    };
+    let mut button = Button::connect(user, &socket);
     let disturbance = Disturbance::begin(situation, &machine.name, &socket);
     let (mut tally, mut paused, mut longest_ns, mut posted_ns) = (Tally::new(), 0, 0, 0);
     for trial in 0..trials {
         bring_to(STATES[trial % STATES.len()], &socket, &mut random);
-        let sent_ns = button.press(&socket);
+        let sent_ns = button.press();
         let found = Trial::find(&recorder, sent_ns);
         let paused_ns = witness.paused_ns(sent_ns, found.invalid_ns);
         let bound = if situation == Situation::Connections { MAX_CYCLES_IN_FLOOD } else { MAX_CYCLES };
@@ -234,10 +230,7 @@ fn run(situation: Situation, trials: usize) {
         *tally.entry(found.state.name().into()).or_default().entry(found.valid).or_default() += 1;
     }
     disturbance.end();
-    if let Button::Member(mut child, _) = button {
-        drop(child.stdin.take());
-        child.wait().expect("its end");
-    }
+    button.finish();
     println!(
         "{situation:?}: {trials} trials, {paused} with a pause of the host; longest of the others {longest_ns} ns, of them until posted {posted_ns} ns"
     );

@@ -36,7 +36,7 @@ fn priorities_and_the_processor_of_the_loop_alone() {
         ("hexad", OTHER, &everywhere),
         ("hexad-log", (FIFO, 1), &everywhere),
         ("hexad-recorder", (FIFO, 1), &everywhere),
-        ("hexad-control", (FIFO, 1), &everywhere),
+        ("hexad-control", (FIFO, 2), &everywhere),
         ("hexad-io", (FIFO, 79), &everywhere),
         ("hexad-rt", (FIFO, 80), &"0".to_owned()),
     ] {

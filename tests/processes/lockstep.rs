@@ -191,13 +191,13 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     let machine = Machine::with("lock-step-operated", LOCKSTEP);
     let daemon = Hexad::start::<&str>(&machine, "run", &[]);
     let plant = Hexad::start::<&str>(&machine, "plant", &[]);
-    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "10000"]);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "1000"]);
     // Before that it checks the whole motion, and the daemon would engage onto home, where it has no setpoint yet.
     source.says("the setpoints stand where the platform stands");
     operator::engage(&machine);
     operator::does(&machine, "stop", &[], &["standby"]);
     player_ended(source);
-    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "10000"]);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "1000"]);
     source.says("the setpoints stand where the platform stands");
     operator::engage(&machine);
     let ended = daemon.stops_on("TERM", HANG);

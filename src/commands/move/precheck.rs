@@ -8,6 +8,7 @@ use core::ops::ControlFlow;
 
 use nalgebra::Vector6;
 
+use crate::commands::progress::time_bar;
 use crate::config::Config;
 use crate::control::controller::Setpoint;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
@@ -24,6 +25,9 @@ use crate::model::task::TaskState;
 /// Share of each limit that a built-in motion may use; the rest is reserve, as the instant between two setpoints at
 /// which a cycle begins is not known in advance.
 const USABLE_SHARE: f64 = 0.95;
+
+/// Cycles between two updates of the progress bar: about a millisecond.
+const CYCLES_PER_UPDATE: u64 = 1024;
 
 /// Check of setpoints by the rule and the parameters of the daemon.
 pub struct Precheck<'a> {
@@ -81,7 +85,11 @@ impl<'a> Precheck<'a> {
         let mut before = now;
         reference.start(&constants, 0, &now.motion);
         let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
+        let bar = time_bar(to - from).with_message("checking the whole motion");
         for k in 0..=steps {
+            if k % CYCLES_PER_UPDATE == 0 {
+                bar.set_position((1e3 * self.time(0.0, k)) as u64);
+            }
             let SetpointCheck { active_limits, result } =
                 check_setpoint(self.machine, &self.parameters, &now);
             let result = result.and_then(|()| check_deviation(&self.parameters, &reference, &before, &now));
@@ -89,13 +97,14 @@ impl<'a> Precheck<'a> {
                 let active_limits = active_limits.union(reference.active_limits());
                 let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits };
                 if refused(refusal).is_break() {
-                    return;
+                    break;
                 }
                 reference.start(&constants, k * period_ns, &now.motion);
             }
             reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
             (before, now) = (now, setpoint(k + 1));
         }
+        bar.finish_and_clear();
     }
 
     /// Time of the k-th cycle \[s\].
