@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
-use std::{env, thread};
+use std::{env, fs, thread};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
@@ -64,8 +64,9 @@ impl Build {
         (daemon, self.start(machine, &motion))
     }
 
-    /// All forces of a run whose plant is this process, until control has ended; and how long it took.
+    /// All forces of a run whose plant is this process, until control has ended; and the time of processors that it took.
     fn forces_for_us(self) -> (Vec<ForceMessage>, Duration) {
+        let before = processor_time();
         // In a thread of its own, whose processor ends with it.
         let run = move || {
             self.cpu.map_or(Ok(()), scheduling::bind_to_cpu).expect("the processor");
@@ -78,7 +79,6 @@ impl Build {
             let mut driver = driver.subscriber::<ForceMessage>(1).expect("to subscribe");
             let (daemon, source) = self.start_both(&machine);
             let mut said: Vec<ForceMessage> = vec![];
-            let mut began = Instant::now();
             for time_ns in (0..).step_by(PERIOD_NS as usize) {
                 let (length_m, length_rate_m_s) = hardware.measure();
                 let message = MeasuredMessage {
@@ -111,17 +111,15 @@ impl Build {
                 if ended {
                     break;
                 }
-                // From the first answer on: processes take a while to start.
-                began = if said.len() == 1 { Instant::now() } else { began };
             }
-            let took = began.elapsed();
             assert_eq!(driver.receive_latest(), None, "a driver of the same machine");
             assert_eq!(source.ends_within(HANG).status.code(), Some(0));
             let ended = daemon.stops_on("TERM", HANG);
             assert!(ended.stderr.contains("TIME IS SIMULATED"), "{}", ended.stderr);
-            (said, took)
+            said
         };
-        thread::spawn(run).join().expect("the plant")
+        let said = thread::spawn(run).join().expect("the plant");
+        (said, processor_time() - before)
     }
 
     /// Forces of a run of which all parts are processes of this build, as far as somebody who listens hears
@@ -137,6 +135,16 @@ impl Build {
         daemon.stops_on("TERM", HANG);
         recorder.finish().forces
     }
+}
+
+/// Time of processors that this process and its children that have ended have used. How long they wait for a processor
+/// depends on who else wants it.
+fn processor_time() -> Duration {
+    const TICK: Duration = Duration::from_millis(10);
+    let line = fs::read_to_string("/proc/self/stat").expect("the usage of this process");
+    // Behind the name: from the state on, the 12th to the 15th.
+    let (_, fields) = line.rsplit_once(')').expect("the name of this process");
+    fields.split_whitespace().skip(11).take(4).map(|ticks| ticks.parse::<u32>().expect("ticks") * TICK).sum()
 }
 
 /// As it is in memory.
@@ -173,7 +181,7 @@ fn in_lock_step_the_forces_are_the_same_bytes_on_one_processor_and_on_two() {
     let _turn = turns::alone();
     let (first, took) = Build::this(None).forces_for_us();
     let simulated = Duration::from_nanos(PERIOD_NS * first.len() as u64);
-    println!("{simulated:?} of simulated time in {took:?}");
+    println!("{simulated:?} of simulated time in {took:?} of processors");
     let valid = first.iter().filter(|force| force.valid == 1).count();
     assert!(valid > LEAST, "{valid} cycles under control");
     assert!(took < simulated, "slower than real time: {took:?} for {simulated:?}");
