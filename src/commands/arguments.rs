@@ -1,7 +1,7 @@
 //! Arguments that several commands share, and their value parsers.
 
 use core::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
@@ -17,20 +17,47 @@ pub const DEFAULT_CONFIG_NAME: &str = "fried2008.toml";
 
 // Doc comments of fields are the help texts.
 #[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
 pub struct MachineFile {
     /// Machine file (TOML)
+    #[arg(value_name = "MACHINE")]
+    argument: Option<PathBuf>,
+    /// The same as an option
     #[arg(long = "config", value_name = "FILE")]
-    path: PathBuf,
+    option: Option<PathBuf>,
 }
 
 impl MachineFile {
     pub fn load(&self) -> Result<Config, ConfigError> {
-        Config::load(&self.path)
+        Config::load(self.path())
     }
 
     /// Identity of the machine, also if the rest of the file is not valid.
     pub fn identity(&self) -> Result<Identity, ConfigError> {
-        Identity::load(&self.path)
+        Identity::load(self.path())
+    }
+
+    fn path(&self) -> &Path {
+        // One of them is there: the group is required.
+        self.argument.as_deref().or(self.option.as_deref()).unwrap_or(Path::new(""))
+    }
+}
+
+/// Machine file of commands that do without.
+#[derive(Debug, Args)]
+#[group(multiple = false)]
+pub struct OptionalMachineFile {
+    /// Machine file (TOML); without it, the built-in fried2008 or, for `status`, every machine of this host
+    #[arg(value_name = "MACHINE")]
+    argument: Option<PathBuf>,
+    /// The same as an option
+    #[arg(long = "config", value_name = "FILE")]
+    option: Option<PathBuf>,
+}
+
+impl OptionalMachineFile {
+    pub fn path(&self) -> Option<&Path> {
+        self.argument.as_deref().or(self.option.as_deref())
     }
 }
 

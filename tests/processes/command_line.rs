@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::Path;
 use std::process::Stdio;
 
-use crate::support::children::{HANG, hexad, run};
+use crate::support::children::{Ended, HANG, hexad, run};
 use crate::support::machine::Machine;
 use crate::support::trio::start_daemon;
 
@@ -43,6 +43,27 @@ fn what_is_typed_wrong_is_refused() {
     );
     refused(&["move", "--config", "FILE", "--motion", "waltz"], &["'waltz'", "sines"]);
     refused(&["run", "--config", "FILE", "--fast"], &["unexpected argument '--fast'"]);
+    refused(&["check", "FILE", "--config", "FILE"], &["'[MACHINE]' cannot be used with '--config <FILE>'"]);
+    refused(&["status", "--watch"], &["<MACHINE|--config <FILE>>"]);
+}
+
+/// As an argument it is the same as as an option.
+#[test]
+fn a_machine_file_is_an_argument_too() {
+    let machine = Machine::new("argument");
+    let file = machine.file.to_str().expect("a plain name");
+    let said = |arguments: &[&str]| {
+        let Ended { status, stdout, stderr } = run(&machine, arguments);
+        (status.code(), stdout, stderr)
+    };
+    let by_option = said(&["check", "--config", file]);
+    assert_eq!(by_option.0, Some(0), "{}", by_option.2);
+    assert_eq!(said(&["check", file]), by_option);
+    for command in ["status", "estop"] {
+        assert_eq!(said(&[command, file]), said(&[command, "--config", file]), "{command}");
+    }
+    // What is after it is its own.
+    assert_eq!(said(&["move", file, "--motion", "waltz"]).0, Some(2));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use tracing::warn;
 use self::children::ChildProcess;
 use self::recording::{Recording, TopicRecorder};
 use self::summary::Summary;
-use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, duration};
+use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, duration};
 use super::failure::{CommandError, Failure};
 use super::in_step::Operator;
 use super::progress::time_bar;
@@ -59,9 +59,8 @@ const MAX_ORIENTATION_ERROR_RAD: f64 = 0.02;
 
 #[derive(Debug, Args)]
 pub struct DemoArguments {
-    /// Machine file [default: the built-in fried2008]
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    machine: OptionalMachineFile,
     /// Machine file of the plant, if it shall differ from the controller's
     #[arg(long, value_name = "FILE")]
     plant_config: Option<PathBuf>,
@@ -177,7 +176,7 @@ impl Stage {
     /// Copies the configurations under a name of their own, so that a demonstration never meets a daemon
     /// in service, nor another demonstration.
     fn new(demo: &DemoArguments) -> Result<Self, DemoError> {
-        let (text, place) = read(demo.config.as_deref())?;
+        let (text, place) = read(demo.machine.path())?;
         // Error texts about the user's files show the names of those files.
         let original = Config::parse(&text, &place)?;
         for warning in original.examine().into_result(&original)? {

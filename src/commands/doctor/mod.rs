@@ -15,7 +15,7 @@ use self::files::HostFiles;
 use self::latency::measured_mode;
 use self::text::TextStyle;
 use self::verdict::{Feasibility, HostConditions, RateVerdict, assess};
-use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, duration};
+use super::arguments::{DEFAULT_CONFIG, DEFAULT_CONFIG_NAME, OptionalMachineFile, duration};
 use super::failure::{CommandError, Failure};
 use crate::config::deployment::{Deployment, Realtime, Scheduler};
 use crate::config::{Config, ConfigError};
@@ -42,9 +42,8 @@ const SCHEMA: u32 = 1;
 
 #[derive(Debug, Args)]
 pub struct DoctorArguments {
-    /// Machine file whose CPU, priority and rate are meant [default: the built-in fried2008]
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    machine: OptionalMachineFile,
     /// CPU of the real-time thread, instead of the configured one
     #[arg(long)]
     cpu: Option<usize>,
@@ -120,7 +119,7 @@ pub struct Diagnosis {
 
 /// Examines the host, measures, and prints facts and verdicts.
 fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
-    let config = match &doctor.config {
+    let config = match doctor.machine.path() {
         Some(path) => Config::load(path)?,
         None => Config::parse(DEFAULT_CONFIG, DEFAULT_CONFIG_NAME)?,
     };

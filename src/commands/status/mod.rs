@@ -1,13 +1,14 @@
 //! `hexad status`: the state of a running daemon, once or again and again, or of all that run on this host.
 
 use std::io::{self, IsTerminal};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::thread::sleep;
 use std::time::Duration;
 
 use clap::Args;
 
 use self::screen::Screen;
+use super::arguments::OptionalMachineFile;
 use super::failure::Failure;
 use super::operate;
 use crate::config::identity::Identity;
@@ -28,11 +29,10 @@ const CLEAR_BELOW: &str = "\x1b[J";
 
 #[derive(Debug, Args)]
 pub struct StatusArguments {
-    /// Machine file (TOML); without it, all machines that run on this host
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    machine: OptionalMachineFile,
     /// Show it again and again, until Ctrl-C
-    #[arg(long, requires = "config")]
+    #[arg(long, requires = "OptionalMachineFile")]
     watch: bool,
     /// Print the daemon's answer as JSON, one line for each
     #[arg(long)]
@@ -41,7 +41,7 @@ pub struct StatusArguments {
 
 impl StatusArguments {
     pub fn execute(self) -> Result<(), Failure> {
-        match &self.config {
+        match self.machine.path() {
             Some(path) => self.show_machine(path),
             None => hosted::show(self.json),
         }

@@ -180,11 +180,15 @@ impl Server<'_> {
         self.woke_ns = now_ns;
     }
 
-    /// Accepts what waits.
+    /// Accepts who waits, and reads at once: a stop does not wait until what all others have sent is read.
     fn accept(&mut self) {
+        let snapshot = *self.snapshots.read();
         for _ in 0..MAX_CONNECTIONS {
             let Ok((stream, _)) = self.socket.listener.accept() else { return };
-            self.connections.extend(Connection::new(stream, self.woke_ns));
+            let Ok(mut connection) = Connection::new(stream, self.woke_ns) else { continue };
+            if self.receive(&mut connection, &snapshot) {
+                self.connections.push(connection);
+            }
         }
     }
 
