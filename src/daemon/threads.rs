@@ -28,7 +28,8 @@ use super::reload::{self, Loaded, ReloadLinks, Requester};
 use super::report::Report;
 use super::snapshot::Snapshot;
 use super::start::{
-    RECORDS_PRIORITY, REQUESTS_PRIORITY, Ready, prepare_io, prepare_loop, prepare_simulated, prepare_support, start, warm_up,
+    RECORDS_PRIORITY, REQUESTS_PRIORITY, Ready, prepare_io, prepare_loop, prepare_simulated, prepare_support,
+    start, warm_up,
 };
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};

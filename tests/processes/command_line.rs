@@ -50,7 +50,7 @@ fn what_is_typed_wrong_is_refused() {
 /// As an argument it is the same as as an option.
 #[test]
 fn a_machine_file_is_an_argument_too() {
-    let machine = Machine::new("argument");
+    let machine = Machine::patient("argument");
     let file = machine.file.to_str().expect("a plain name");
     let said = |arguments: &[&str]| {
         let Ended { status, stdout, stderr } = run(&machine, arguments);
