@@ -39,6 +39,7 @@ mod locked_memory;
 mod lockstep;
 mod modes;
 mod orderly_stop;
+mod other_version;
 mod overruns;
 mod pages;
 mod paused;

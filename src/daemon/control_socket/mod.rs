@@ -1,7 +1,8 @@
 //! The control thread: requests of operators over a Unix socket, one JSON object per line.
 //!
-//! It is neither the real-time thread nor the I/O thread. Its priority is the lowest of those in real time, so that no ordinary
-//! process delays a stop, and it rests between its rounds: clients that mean no good leave some of the processor to others.
+//! It is neither the real-time thread nor the I/O thread. Its priority is below theirs and above everything ordinary and the threads
+//! that write files, so that none of these delays a stop; it rests between its rounds: clients that mean no good leave some of the
+//! processor to others.
 //! Stops are served before everything else. Requests reach the real-time thread
 //! through the request word, answers come from the snapshot that the I/O thread writes in every cycle. Number of
 //! connections, length of a line and time for it are bounded, and nothing here waits for a client.

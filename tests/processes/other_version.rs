@@ -1,0 +1,77 @@
+//! A participant with another version of iceoryx2, which a program gets that takes the newest from PyPI.
+
+use std::fs;
+use std::io::BufReader;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use crate::common::not_run::lacking;
+use crate::common::python::environment;
+use crate::support::children::{HANG, Hexad, hexad};
+use crate::support::disturbance::line_of;
+use crate::support::machine::Machine;
+use crate::support::turns;
+
+/// Takes part until its input ends: folder of the shared memory, topic. Says whether it could.
+const PARTICIPANT: &str = r#"
+import ctypes, sys
+import iceoryx2 as iox2
+folder, topic = sys.argv[1:]
+config = iox2.config.default()
+config.global_cfg.root_path = iox2.Path.new(folder + "/iceoryx2")
+config.global_cfg.prefix = iox2.FileName.new(open(folder + "/prefix").read())
+class Message(ctypes.Structure):
+    _fields_ = [("bytes", ctypes.c_uint64 * 20)]
+node = iox2.NodeBuilder.new().config(config).create(iox2.ServiceType.Ipc)
+try:
+    service = node.service_builder(iox2.ServiceName.new(topic)).publish_subscribe(Message).open_or_create()
+    print("takes part", flush=True)
+    sys.stdin.read()
+except Exception as error:
+    print(f"refused: {error!r}", flush=True)
+"#;
+
+fn participant(python: &Path, folder: &Path, machine: &Machine) -> (Child, String) {
+    let mut command = Command::new(python.join("bin/python"));
+    command.args(["-c", PARTICIPANT]).arg(folder).arg(format!("hexad/{}/measured", machine.name));
+    let mut child =
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("a Python");
+    let said = line_of(&mut BufReader::new(child.stdout.take().expect("a pipe")));
+    (child, said)
+}
+
+#[test]
+fn a_participant_with_another_version_of_iceoryx2_is_named() {
+    let _turn = turns::beside_others();
+    let python = match environment(&["iceoryx2==0.10.0".into()]) {
+        Ok(python) => python,
+        Err(why) => return lacking(&why),
+    };
+    let machine = Machine::patient("other-version");
+    // Shared memory of their own: what the other version leaves must not meet the other tests.
+    let places = machine.path("places");
+    fs::create_dir(&places).expect("a folder");
+    let daemon = || {
+        let mut command = hexad();
+        command.arg("run").arg("--config").arg(&machine.file).env("XDG_RUNTIME_DIR", &places);
+        Hexad::spawn(&machine, "run", command)
+    };
+    let folder = places.join("hexad");
+
+    let first = daemon();
+    first.says("running");
+    let (mut refused, said) = participant(&python, &folder, &machine);
+    assert!(said.starts_with("refused: ") && said.contains("ServiceInCorruptedState"), "{said}");
+    refused.wait().expect("its end");
+    first.stops_on("TERM", HANG);
+
+    let (mut other, said) = participant(&python, &folder, &machine);
+    assert_eq!(said, "takes part");
+    let ended = daemon().ends_within(HANG);
+    drop(other.stdin.take());
+    other.wait().expect("its end");
+    assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);
+    let words =
+        "another participant has another version of iceoryx2: every participant needs iceoryx2 0.9.3 exactly";
+    assert!(ended.stderr.contains(words), "{}", ended.stderr);
+}
