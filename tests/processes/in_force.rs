@@ -57,7 +57,7 @@ fn sched_deadline_for_the_loop_alone() {
     let threads = threads(&daemon);
     let classes: Vec<_> =
         ["hexad", "hexad-control", "hexad-io", "hexad-rt"].iter().map(|name| threads[*name].class).collect();
-    assert_eq!(classes, [OTHER, (FIFO, 1), (FIFO, 79), (DEADLINE, 0)]);
+    assert_eq!(classes, [OTHER, (FIFO, 2), (FIFO, 79), (DEADLINE, 0)]);
     daemon.stops_on("TERM", HANG);
 }
 
