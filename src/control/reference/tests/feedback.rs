@@ -1,12 +1,16 @@
-//! The bound of the feedback, against its definition: the largest share within the bound, and the time of saturation.
+//! The bound of the feedback, against its definition: the largest share within the bound, and the time of saturation. And the last
+//! check of its forces.
 
 use nalgebra::Vector6;
 
 use super::*;
 use crate::control::controller::Cycle;
+use crate::control::diagnostic::DiagnosticCode;
 use crate::control::feedback_bound::FeedbackBound;
+use crate::control::forces::forces;
 use crate::control::state::State;
-use crate::model::rigid::Acceleration;
+use crate::model::rigid::{Acceleration, Motion};
+use crate::model::task::TaskState;
 
 fn constants(mode: ControlMode) -> Constants {
     let machine = machine(&mut Samples::new(41));
@@ -87,4 +91,28 @@ fn saturation_that_lasts_is_a_fault() {
     assert!(matches!(found, Some(305..=307)), "{found:?}");
     // One cycle in 20 is more than is forgotten, one in 50 is less.
     assert!(run(&|k| k % 20 == 0, 20_000).is_some() && run(&|k| k % 50 == 0, 20_000).is_none());
+}
+
+/// In every mode, for every leg and kind of number.
+#[test]
+fn a_force_that_is_not_finite_is_refused() {
+    for mode in ControlMode::ALL {
+        let constants = constants(mode);
+        let motion = TaskState::at_rest(constants.machine().home).motion();
+        let with = |motion: &Motion, acceleration| forces(&constants, motion, &acceleration);
+        assert!(with(&motion, Vector6::zeros()).is_ok(), "{mode:?}");
+        for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            for k in 0..6 {
+                let (mut acceleration, mut moved) = (Vector6::zeros(), motion);
+                acceleration[k] = number;
+                moved.acceleration.linear[k % 3] = number;
+                let found = if mode.acts_on_legs() {
+                    with(&motion, acceleration)
+                } else {
+                    with(&moved, Vector6::zeros())
+                };
+                assert_eq!(found, Err(DiagnosticCode::ForceNotFinite.into()), "{mode:?}: {number} in {k}");
+            }
+        }
+    }
 }
