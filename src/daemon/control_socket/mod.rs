@@ -15,22 +15,18 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use tracing::{debug, info, warn};
+use tracing::warn;
 
 pub use self::connection::user_name;
 use self::connection::{Connection, Received};
-use self::last_seconds::{LastSeconds, RECORD};
 use self::location::ControlSocket;
-use self::order::{Order, PendingOrder, Step};
-use self::protocol::{AnswerLine, RequestLine, RequestResult};
-use self::reload::RELOAD;
+use self::order::Step;
+use self::protocol::{AnswerLine, RequestLine};
 use self::status::StatusSource;
 use super::cycle::MAX_REQUEST_AGE_NS;
 use super::recorder::WindowOrder;
 use super::reload::{Loaded, Reloaded, Requester};
 use super::snapshot::Snapshot;
-use crate::control::diagnostic::DiagnosticCode;
-use crate::control::state::Request;
 use crate::messages::Rejection;
 use crate::messages::clock::monotonic_ns;
 use crate::realtime::request_word::RequestWord;
@@ -42,6 +38,7 @@ pub mod location;
 mod order;
 pub mod protocol;
 mod reload;
+mod respond;
 pub mod status;
 
 /// Most connections. One more closes the first in the order of [`Connection::rank`].
@@ -252,83 +249,6 @@ impl Server<'_> {
             warn!(user = %peer.user(), process = peer.process_id, count, "control socket: closed: {reason}");
             (self.warned_ns, self.closed) = (self.woke_ns, 0);
         }
-    }
-
-    /// Responds to a line; false if the connection is of no more use. `status` is the answer to `status` in this round.
-    fn respond(
-        &mut self,
-        connection: &mut Connection,
-        line: &RequestLine,
-        snapshot: &Snapshot,
-        status: &mut Option<AnswerLine>,
-    ) -> bool {
-        if line.request == "status" {
-            let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
-            debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
-            return connection.send(answer);
-        }
-        if line.request == RELOAD {
-            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RELOAD}");
-            return self.begin_reload(connection, line, snapshot);
-        }
-        if line.request == RECORD {
-            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RECORD}");
-            return match LastSeconds::order(&self.windows, connection.file.take(), line.last_s) {
-                Ok(ordered) => connection.last_seconds.replace(ordered).is_none(),
-                Err(reason) => connection.send(&AnswerLine::invalid(reason)),
-            };
-        }
-        let Some(request) = line.controller_request() else {
-            let names = Request::ALL.map(Request::name).join(", ");
-            let text = format!(
-                "unknown request {:?}; must be one of status, {RECORD}, {RELOAD}, {names}",
-                line.request
-            );
-            return connection.send(&AnswerLine::invalid(text));
-        };
-        // Before anything else, also before the log, which may block.
-        let answer = self.begin(connection, request, line, snapshot);
-        info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {}", request.name());
-        answer.is_none_or(|answer| {
-            connection.peer.log_failure(&answer);
-            connection.send(&answer)
-        })
-    }
-
-    /// Posts a request, or returns why not.
-    fn begin(
-        &mut self,
-        connection: &mut Connection,
-        request: Request,
-        line: &RequestLine,
-        snapshot: &Snapshot,
-    ) -> Option<AnswerLine> {
-        let replaced = connection.pending.take();
-        if request.can_begin_control() {
-            let state = snapshot.status.state().unwrap_or_default();
-            let answer = |result, code: DiagnosticCode, text: String| {
-                Some(AnswerLine::new(result, request, state, code.into(), text))
-            };
-            if self.is_ending.load(Ordering::Relaxed) {
-                let code = DiagnosticCode::DaemonEnding;
-                return answer(RequestResult::Refused, code, code.name().into());
-            }
-            if self.woke_ns < self.stale_until_ns {
-                let text = "the daemon was held and the request may be old; send it again";
-                return answer(RequestResult::Stale, DiagnosticCode::None, text.into());
-            }
-        }
-        let within_ns = (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64;
-        let order = Order {
-            request,
-            waits: line.wait,
-            is_patient: line.until_ready,
-            deadline_ns: self.woke_ns + within_ns,
-        };
-        connection.wants_progress = line.progress;
-        let pending = PendingOrder::post(order, snapshot, self.word, monotonic_ns());
-        connection.pending = Some(pending);
-        replaced.map(|replaced| replaced.superseded(snapshot))
     }
 
     /// Logs each mistake of a sender when it is first seen.

@@ -1,0 +1,95 @@
+//! What a line of a client asks for: answered at once, or begun.
+
+use core::sync::atomic::Ordering;
+
+use tracing::{debug, info};
+
+use super::connection::Connection;
+use super::last_seconds::{LastSeconds, RECORD};
+use super::order::{Order, PendingOrder};
+use super::protocol::{AnswerLine, RequestLine, RequestResult};
+use super::reload::RELOAD;
+use super::{MAX_WITHIN_S, Server};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::state::Request;
+use crate::daemon::snapshot::Snapshot;
+use crate::messages::clock::monotonic_ns;
+
+impl Server<'_> {
+    /// Responds to a line; false if the connection is of no more use. `status` is the answer to `status` in this round.
+    pub(super) fn respond(
+        &mut self,
+        connection: &mut Connection,
+        line: &RequestLine,
+        snapshot: &Snapshot,
+        status: &mut Option<AnswerLine>,
+    ) -> bool {
+        if line.request == "status" {
+            let answer = status.get_or_insert_with(|| self.status.answer(snapshot, self.woke_ns));
+            debug!(user = %connection.peer.user(), process = connection.peer.process_id, "status");
+            return connection.send(answer);
+        }
+        if line.request == RELOAD {
+            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RELOAD}");
+            return self.begin_reload(connection, line, snapshot);
+        }
+        if line.request == RECORD {
+            info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {RECORD}");
+            return match LastSeconds::order(&self.windows, connection.file.take(), line.last_s) {
+                Ok(ordered) => connection.last_seconds.replace(ordered).is_none(),
+                Err(reason) => connection.send(&AnswerLine::invalid(reason)),
+            };
+        }
+        let Some(request) = line.controller_request() else {
+            let names = Request::ALL.map(Request::name).join(", ");
+            let text = format!(
+                "unknown request {:?}; must be one of status, {RECORD}, {RELOAD}, {names}",
+                line.request
+            );
+            return connection.send(&AnswerLine::invalid(text));
+        };
+        // Before anything else, also before the log, which may block.
+        let answer = self.begin(connection, request, line, snapshot);
+        info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {}", request.name());
+        answer.is_none_or(|answer| {
+            connection.peer.log_failure(&answer);
+            connection.send(&answer)
+        })
+    }
+
+    /// Posts a request, or returns why not.
+    fn begin(
+        &mut self,
+        connection: &mut Connection,
+        request: Request,
+        line: &RequestLine,
+        snapshot: &Snapshot,
+    ) -> Option<AnswerLine> {
+        let replaced = connection.pending.take();
+        if request.can_begin_control() {
+            let state = snapshot.status.state().unwrap_or_default();
+            let answer = |result, code: DiagnosticCode, text: String| {
+                Some(AnswerLine::new(result, request, state, code.into(), text))
+            };
+            if self.is_ending.load(Ordering::Relaxed) {
+                let code = DiagnosticCode::DaemonEnding;
+                return answer(RequestResult::Refused, code, code.name().into());
+            }
+            if self.woke_ns < self.stale_until_ns {
+                let text = "the daemon was held and the request may be old; send it again";
+                return answer(RequestResult::Stale, DiagnosticCode::None, text.into());
+            }
+        }
+        let within_ns = (line.within_s.clamp(0.0, MAX_WITHIN_S) * 1e9) as u64;
+        let order = Order {
+            request,
+            waits: line.wait,
+            is_patient: line.until_ready,
+            deadline_ns: self.woke_ns + within_ns,
+        };
+        connection.wants_progress = line.progress;
+        let pending = PendingOrder::post(order, snapshot, self.word, monotonic_ns());
+        connection.pending = Some(pending);
+        replaced.map(|replaced| replaced.superseded(snapshot))
+    }
+}
