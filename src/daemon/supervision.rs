@@ -14,10 +14,14 @@ use super::reload::Requester;
 use crate::control::controller::Output;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
+use crate::messages::Remains;
 use crate::realtime::stop_request::Hangups;
 
 /// Time between two looks at the progress of the threads: many within the time-out of any watchdog.
 pub const SUPERVISION_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Time between two looks for what killed participants have left: longer than one needs to join or to leave.
+const CLEANING_INTERVAL: Duration = Duration::from_secs(2);
 
 /// A thread without progress for this long is reported: longer than a host takes a processor away.
 const REPORTED_AFTER: Duration = Duration::from_secs(1);
@@ -103,6 +107,9 @@ pub struct Supervision<'a> {
     /// SIGHUP reloads the machine file.
     hangups: Option<Hangups>,
     request_reload: &'a Sender<Requester>,
+    /// What killed participants leave; `None` where it cannot be found.
+    remains: Option<Remains>,
+    cleaned: Instant,
 }
 
 impl<'a> Supervision<'a> {
@@ -127,6 +134,10 @@ impl<'a> Supervision<'a> {
             looked: Instant::now(),
             hangups,
             request_reload,
+            remains: Remains::open()
+                .inspect_err(|error| warn!("killed participants leave files: {error}"))
+                .ok(),
+            cleaned: Instant::now(),
         }
     }
 
@@ -147,6 +158,10 @@ impl<'a> Supervision<'a> {
         if self.hangups.as_mut().is_some_and(Hangups::has_new) {
             // Nobody serves it when the daemon ends.
             let _ = self.request_reload.send(None);
+        }
+        if let Some(remains) = self.remains.as_mut().filter(|_| self.cleaned.elapsed() >= CLEANING_INTERVAL) {
+            remains.remove();
+            self.cleaned = Instant::now();
         }
     }
 

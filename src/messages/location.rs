@@ -33,7 +33,7 @@ const PREFIX_FILE: &str = "prefix";
 const PREFIX_BYTES: usize = 8;
 /// Longest prefix that is read \[bytes\].
 const MAX_PREFIX_BYTES: u64 = 64;
-const SEGMENTS: &str = "/dev/shm";
+pub(super) const SEGMENTS: &str = "/dev/shm";
 
 /// A port that cannot be opened must not block the I/O thread for the default second.
 const CREATION_TIMEOUT: Duration = Duration::from_millis(5);

@@ -52,6 +52,7 @@ pub mod lockstep;
 mod measured;
 mod publisher;
 mod rejection;
+mod remains;
 mod reservation;
 mod setpoint;
 mod statistics;
@@ -67,6 +68,7 @@ pub use self::header::Header;
 pub use self::measured::MeasuredMessage;
 pub use self::publisher::Publisher;
 pub use self::rejection::Rejection;
+pub use self::remains::Remains;
 pub use self::setpoint::SetpointMessage;
 pub use self::statistics::{
     IoCounters, LoopCounters, LoopTimes, RejectionCounts, Statistics, Times, WORST_CYCLES, WorstCycle,

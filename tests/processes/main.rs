@@ -49,6 +49,7 @@ mod recordings;
 mod refusals;
 mod released;
 mod reload;
+mod remains;
 mod requests;
 mod rounds;
 mod stale;

@@ -1,0 +1,80 @@
+//! Participants that are killed while they join, while they run and between: the daemon removes what they leave.
+//!
+//! 60 of them, or 1,000 with `HEXAD_LONG=1`.
+
+use std::collections::BTreeSet;
+use std::fs::{self, read_dir, read_to_string};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::support::children::{HANG, Hexad, hexad};
+use crate::support::machine::Machine;
+use crate::support::turns;
+
+/// Delays of the kills: before a participant joins, until it publishes.
+const FIRST_MS: u64 = 10;
+const STEP_MS: u64 = 7;
+const DELAYS: u64 = 23;
+
+/// Segments in `/dev/shm` and book-keeping of a folder.
+fn entries(folder: &Path) -> BTreeSet<PathBuf> {
+    let prefix = read_to_string(folder.join("prefix")).expect("the prefix");
+    let mut found = BTreeSet::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(next) = folders.pop() {
+        for entry in read_dir(next).into_iter().flatten().flatten() {
+            folders.extend(entry.path().is_dir().then(|| entry.path()));
+            found.insert(entry.path());
+        }
+    }
+    let segments = read_dir("/dev/shm").expect("shared memory").flatten().map(|entry| entry.path());
+    found.extend(segments.filter(|it| it.to_string_lossy().contains(&prefix)));
+    found
+}
+
+#[test]
+fn killed_participants_leave_nothing() {
+    let _turn = turns::beside_others();
+    let kills = if std::env::var_os("HEXAD_LONG").is_some_and(|value| value == "1") { 1000 } else { 60 };
+    let machine = Machine::patient("remains");
+    // Shared memory of their own: the other tests have participants, too.
+    let places = machine.path("places");
+    fs::create_dir(&places).expect("a folder");
+    let command = |arguments: &[&str]| {
+        let mut command = hexad();
+        command.args(arguments).arg("--config").arg(&machine.file).env("XDG_RUNTIME_DIR", &places);
+        command
+    };
+    let daemon = Hexad::spawn(&machine, "run", command(&["run"]));
+    daemon.says("running");
+    let folder = places.join("hexad");
+    let before = entries(&folder);
+    for k in 0..kills {
+        let arguments: &[&str] = if k % 2 == 0 { &["plant"] } else { &["move", "--motion", "settle"] };
+        kill_after(command(arguments), Duration::from_millis(FIRST_MS + STEP_MS * (k % DELAYS)));
+    }
+    let began = Instant::now();
+    let left = loop {
+        let left: Vec<_> = entries(&folder).difference(&before).cloned().collect();
+        if left.is_empty() || began.elapsed() > HANG {
+            break left;
+        }
+        sleep(Duration::from_millis(100));
+    };
+    daemon.stops_on("TERM", HANG);
+    assert!(left.is_empty(), "{left:#?}");
+}
+
+fn kill_after(mut command: Command, delay: Duration) {
+    let mut child = command
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .expect("hexad");
+    sleep(delay);
+    // It may have ended by itself.
+    let _ = child.kill();
+    child.wait().expect("its end");
+}
