@@ -104,7 +104,8 @@ type Terms = SVector<f64, TERMS>;
 
 /// Delay of the drives of a machine from a recorded motion; `None` if too little was recorded, or it does not move enough.
 pub fn drive_delay(machine: &Machine, stretches: &[RecordedStretch]) -> Option<DriveDelay> {
-    let frictionless = without_friction(machine);
+    let mut frictionless = machine.clone();
+    (frictionless.actuator.coulomb_friction, frictionless.actuator.viscous_friction) = (0.0, 0.0);
     let model = InverseDynamics::new(&frictionless);
     let recorded: Vec<_> = stretches.iter().map(|stretch| Instants::new(&model, stretch)).collect();
     let count = recorded.iter().map(|recorded| recorded.instants.len()).sum::<usize>();
@@ -142,13 +143,6 @@ fn combined(delay_s: &Vector6<f64>, without: &[Vector6<f64>], duration_s: f64) -
     DriveDelay { mean: Estimate { delay_s: mean(delay_s), deviation_s: deviation(&mean) }, legs, duration_s }
 }
 
-fn without_friction(machine: &Machine) -> Machine {
-    let mut machine = machine.clone();
-    machine.actuator.coulomb_friction = 0.0;
-    machine.actuator.viscous_friction = 0.0;
-    machine
-}
-
 /// One instant of the equations, in seconds from the first release of its stretch.
 struct Instant {
     /// Three samples, by the middle one of which it is named \[s\].
@@ -177,18 +171,15 @@ impl Instants {
         let span_s = ends.map_or(0.0, |(first, last)| seconds(last.time_ns) - seconds(first.time_ns));
         let period_s = span_s / measured.len().saturating_sub(1).max(1) as f64;
         let half = ((HALF_WIDTH_S / period_s).round() as usize).clamp(2, 1000);
-        let stride = (half / INSTANTS_PER_HALF_WIDTH).max(1);
-        let has_forces = |first_s: f64| first_s > MAX_DELAY_S;
-        let mut instants = vec![];
+        let (stride, mut instants) = ((half / INSTANTS_PER_HALF_WIDTH).max(1), vec![]);
         for window in measured.windows(2 * half + 1).step_by(stride) {
             let (Some(first), Some(middle), Some(last)) = (window.first(), window.get(half), window.last())
             else {
                 continue;
             };
             let samples = [first, middle, last];
-            let times = samples.map(|sample| seconds(sample.time_ns));
-            let [begin, _, end] = times;
-            if has_forces(begin) && end - begin < 3.0 * half as f64 * period_s {
+            let times @ [begin, _, end] = samples.map(|sample| seconds(sample.time_ns));
+            if begin > MAX_DELAY_S && end - begin < 3.0 * half as f64 * period_s {
                 instants.extend(Instant::new(model, times, samples));
             }
         }
@@ -210,8 +201,7 @@ impl Instant {
         let acceleration = kinematics.twist(machine, &(second - by_velocity).into())?.vector();
         let motion = Motion { acceleration: Acceleration::from_vector(&acceleration), ..coasting };
         let force = |sample: &MeasuredMotion| model.forces::<Exact>(&sample.reference).map(Vector6::from);
-        let [begin, _, end] = times;
-        let force_rate = (force(last)? - force(first)?) / (end - begin);
+        let force_rate = (force(last)? - force(first)?) / (last.time_ns - first.time_ns) as f64 * 1e9;
         Some(Self {
             times,
             model: model.forces::<Exact>(&motion)?.into(),
@@ -226,10 +216,15 @@ fn terms(machine: &Machine, motion: &Motion, force_rate: &Vector6<f64>) -> Optio
     let regressor = regressor(machine, motion)?;
     let rates = Vector6::from(leg_motion(machine, motion).rate);
     Some(core::array::from_fn(|leg| {
-        let (mut terms, rate) = (Terms::zeros(), rates[leg]);
+        let (mut terms, rate) = (Terms::zeros(), value(&rates, leg));
         terms.fixed_rows_mut::<COMMON>(0).copy_from(&regressor.fixed_view::<1, COMMON>(leg, 0).transpose());
         let sign = (rate / FRICTION_SMOOTHING_M_S).clamp(-1.0, 1.0);
-        terms.fixed_rows_mut::<OWN>(COMMON).copy_from(&SVector::from([force_rate[leg], rate, sign, 1.0]));
+        terms.fixed_rows_mut::<OWN>(COMMON).copy_from(&SVector::from([
+            value(force_rate, leg),
+            rate,
+            sign,
+            1.0,
+        ]));
         terms
     }))
 }
@@ -287,6 +282,10 @@ impl ForceIntegrals {
     }
 }
 
+fn value(values: &Vector6<f64>, leg: usize) -> f64 {
+    values.get(leg).copied().unwrap_or_default()
+}
+
 /// Sums of the equations times their instruments, of each leg and part.
 struct Sums {
     legs: Vec<[(SMatrix<f64, TERMS, TERMS>, Terms); PARTS]>,
@@ -300,12 +299,12 @@ impl Sums {
             let part = index * PARTS / count;
             let terms = instant.measured.iter().zip(&instant.instruments);
             for (leg, (sums, (measured, instruments))) in legs.iter_mut().zip(terms).enumerate() {
-                let (mean, force_rate) = sent.mean(&instant.times, delay_s[leg]);
+                let (mean, force_rate) = sent.mean(&instant.times, value(delay_s, leg));
                 let mut measured = *measured;
-                measured[COMMON] = force_rate[leg];
+                measured.fixed_rows_mut::<1>(COMMON).fill(value(&force_rate, leg));
                 if let Some((normal, right)) = sums.get_mut(part) {
                     *normal += instruments * measured.transpose();
-                    *right += instruments * (mean[leg] - instant.model[leg]);
+                    *right += instruments * (value(&mean, leg) - value(&instant.model, leg));
                 }
             }
         }
@@ -319,21 +318,25 @@ impl Sums {
         for (leg, parts) in self.legs.iter().enumerate() {
             let place = |term: usize| if term < COMMON { term } else { term + leg * OWN };
             for (_, sums) in parts.iter().enumerate().filter(|(part, _)| Some(*part) != left_out) {
-                for row in 0..TERMS {
-                    right[place(row)] += sums.1[row];
-                    (0..TERMS)
-                        .for_each(|column| normal[(place(row), place(column))] += sums.0[(row, column)]);
+                for (row, sum) in sums.1.iter().enumerate() {
+                    right.row_mut(place(row)).add_scalar_mut(*sum);
+                }
+                for (column, part) in sums.0.column_iter().enumerate() {
+                    let mut column = normal.column_mut(place(column));
+                    for (row, sum) in part.iter().enumerate() {
+                        column.row_mut(place(row)).add_scalar_mut(*sum);
+                    }
                 }
             }
         }
-        // The terms differ by many powers of ten.
+        // Scaled, as the terms differ by many powers of ten.
         let largest = |values: &mut dyn Iterator<Item = f64>| {
             1.0 / values.fold(f64::MIN_POSITIVE, |most, value| most.max(value.abs()))
         };
         for row in 0..UNKNOWNS {
             let scale = largest(&mut normal.row(row).iter().copied());
             normal.row_mut(row).scale_mut(scale);
-            right[row] *= scale;
+            right.row_mut(row).scale_mut(scale);
         }
         let mut scales = DVector::<f64>::zeros(UNKNOWNS);
         for (mut column, scale) in normal.column_iter_mut().zip(scales.iter_mut()) {
@@ -341,7 +344,7 @@ impl Sums {
             column.scale_mut(*scale);
         }
         let solution = normal.full_piv_lu().solve(&right)?.component_mul(&scales);
-        let steps = Vector6::from_fn(|leg, _| solution[COMMON + leg * OWN]);
+        let steps = Vector6::from_fn(|leg, _| solution.get(COMMON + leg * OWN).copied().unwrap_or(f64::NAN));
         steps.iter().all(|step| step.is_finite()).then_some(steps)
     }
 }
