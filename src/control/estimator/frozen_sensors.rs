@@ -32,7 +32,7 @@ const STICTION_RATIO: f64 = 0.0015;
 const LONG_S: f64 = 0.05;
 /// And from this motion of the reference on \[m\], or in steps of the sensor.
 const LEAST_MOTION_M: f64 = 5e-6;
-const LEAST_MOTION_STEPS: f64 = 3.0;
+const LEAST_MOTION_STEPS: f64 = 10.0;
 /// Equal readings in a row of a sensor whose noise is one step, and of any with noise: by chance at most once in 1e12, with one
 /// step also if the noise is a third of the configured one.
 const MAX_EQUAL_AT_ONE_STEP: f64 = 100.0;
