@@ -11,6 +11,7 @@ mod closed_loop {
     mod assessment;
     mod built_in;
     mod disturbances;
+    mod drive_delay;
     mod drive_status;
     mod estimator;
     mod evidence;

@@ -10,6 +10,7 @@ pub mod assembly_modes;
 pub mod batch;
 pub mod clearance;
 pub mod drive_capability;
+pub mod drive_delay;
 pub mod envelope;
 pub mod fidelity_choice;
 pub mod fidelity_error;

@@ -307,7 +307,7 @@ impl Controller {
                 sent +=
                     constants.input_matrix.acceleration_of(constants.machine(), &motion.pose, wrench_error);
             }
-            errors.record_sent(begin_ns, &sent);
+            errors.record_sent(begin_ns, &sent, &limited.force);
             Ok(limited)
         };
         let limited = if next.has_control() { actuate() } else { Ok(LimitedForces::default()) };

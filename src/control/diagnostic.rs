@@ -217,8 +217,8 @@ codes! {
     DriveNotReady = 130, Brake, absolute("time without enabled drive and open brake", "s", "exceeds", "drive.ready_timeout_ms, or once it was ready 20 ms:"), "drive not ready", "enable the drive and check its brake";
     /// A drive reports a fault.
     DriveFault = 131, Brake, NO_NUMBER, "drive reports a fault", "see the display of the drive";
-    /// The actual force of a drive is not the commanded one.
-    DriveForceMissing = 132, Brake, absolute("difference of the actual force from the commanded one", "N", "exceeds", "a fifth of the command and a fiftieth of actuator.max_force_n,"), "actual force not as commanded", "check the drive of this leg";
+    /// The actual force of a drive is not the commanded one, as the driver reports it or as the platform moves.
+    DriveForceMissing = 132, Brake, absolute("difference of the actual force from the commanded one", "N", "exceeds", "what noise and friction explain,"), "actual force not as commanded", "check the drive of this leg";
     /// The daemon did not run for so long that its last measurement is too old: it was stopped, or the host took the processor.
     DaemonHeld = 133, Brake, absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"), "daemon held", "find out what stopped the daemon or took its processor; hexad doctor";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.

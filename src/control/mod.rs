@@ -19,6 +19,7 @@ mod assessment;
 pub mod controller;
 pub mod diagnostic;
 pub mod drive_monitor;
+mod drive_response;
 pub mod estimator;
 mod external_pose;
 mod feedback_bound;

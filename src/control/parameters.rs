@@ -1,8 +1,9 @@
 //! Parameters of a controller, and all that stays constant while it runs.
 
+use super::drive_response::least_disturbance;
 use super::estimator::covariance::NoiseModel;
 use super::estimator::input_matrix::InputMatrix;
-use super::estimator::{EstimatorConstants, Readings};
+use super::estimator::{EstimatorConstants, FrozenLegBounds, Readings};
 use super::law::Law;
 use super::limits::Limits;
 use super::supervisor::AfterStop;
@@ -127,6 +128,10 @@ pub struct Constants {
     pub input_matrix: InputMatrix,
     /// Of the estimator under control.
     pub estimator: EstimatorConstants,
+    /// Square of the least disturbance that may be a force that a drive does not deliver; infinite where the law leaves forces to feedback.
+    pub least_missing_squared: f64,
+    /// What equal readings of one leg allow.
+    pub(super) frozen_leg: FrozenLegBounds,
     /// Of the estimator of the rates of the legs.
     pub leg_rates: EstimatorConstants,
     /// Largest condition of the reference: below that of the platform, for the following error.
@@ -150,10 +155,23 @@ impl Constants {
         let input_matrix = InputMatrix::at_home(machine, &parameters.law, parameters.fidelity);
         let Law { saturation, compensates_disturbance, .. } = &parameters.law;
         let disturbance = input_matrix.largest_disturbance(saturation);
+        let acts_on_legs = parameters.law.mode.acts_on_legs();
+        let least_missing = least_disturbance(
+            &input_matrix.acceleration_by_force(machine, home.pose()),
+            if acts_on_legs { 1.0 } else { arm },
+            machine.actuator.max_force,
+        );
+        let expects_forces = parameters.law.mode.includes_inertia();
         let unbounded = Vector6::repeat(f64::INFINITY);
         Self {
             dynamics: InverseDynamics::new(machine),
             input_matrix,
+            least_missing_squared: if expects_forces { least_missing * least_missing } else { f64::INFINITY },
+            frozen_leg: FrozenLegBounds::new(
+                parameters.law.position.stiffness,
+                machine.actuator.max_force,
+                period_s,
+            ),
             estimator: EstimatorConstants::new(
                 parameters.noise,
                 parameters.readings,
@@ -168,6 +186,11 @@ impl Constants {
             reference_condition,
             universal_sine,
         }
+    }
+
+    /// Length by which angles of the error become distances \[m\]; errors of legs have no angles.
+    pub(super) fn error_arm(&self) -> f64 {
+        if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm }
     }
 
     /// The machine.

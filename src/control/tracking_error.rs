@@ -9,6 +9,7 @@ use nalgebra::Vector6;
 
 use super::controller::Cycle;
 use super::diagnostic::{Diagnostic, DiagnosticCode};
+use super::drive_response::DriveResponse;
 use super::estimator::{ErrorState, Estimator, FrozenSensors};
 use super::input_validation::ValidatedSetpoint;
 use super::localization::{Localization, Located};
@@ -108,6 +109,10 @@ pub(super) fn setpoint_error(
 pub(super) struct ErrorTracker {
     estimator: Estimator,
     sensors: FrozenSensors,
+    drives: DriveResponse,
+    /// Force that was sent last \[N\], and the acceleration by feedback.
+    sent: [f64; LEGS],
+    sent_acceleration: Vector6<f64>,
     /// Measured; while there is no new measurement, predicted.
     error: TrackingError,
     /// Measured minus estimated, after the last measurement has corrected the estimate.
@@ -121,7 +126,7 @@ impl ErrorTracker {
     /// has then. Returns the error.
     pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> TrackingError {
         self.estimator.start(&constants.estimator, measured_ns, begin_ns, &FeedbackError::default());
-        (self.sensors, self.trust) = (FrozenSensors::default(), None);
+        (self.sensors, self.drives, self.trust) = (FrozenSensors::default(), DriveResponse::default(), None);
         (self.error, self.residual) = (TrackingError::default(), Vector6::zeros());
         self.error
     }
@@ -135,7 +140,7 @@ impl ErrorTracker {
         localization: &Localization,
         located: &mut Located<'_>,
     ) -> TrackingError {
-        let Self { estimator, sensors, .. } = self;
+        let Self { estimator, sensors, drives, sent, sent_acceleration, .. } = self;
         let constants = cycle.constants;
         let time_ns = located.measurement.time_ns;
         let desired = reference.motion_at(time_ns);
@@ -146,10 +151,22 @@ impl ErrorTracker {
         let is_new = innovation.is_some();
         if let Some(innovation) = innovation {
             self.residual = deviation.value - estimator.state().value;
-            let lengths = || leg_lengths(constants.machine(), &desired.pose);
+            let legs = || {
+                let feedback = feedback_forces(constants, sent_acceleration, &desired.pose);
+                [leg_lengths(constants.machine(), &desired.pose), feedback]
+            };
             self.trust = sensors
-                .check(&located.measurement.length, &constants.estimator.readings, lengths)
+                .check(
+                    &located.measurement.length,
+                    &constants.estimator.readings,
+                    &constants.frozen_leg,
+                    legs,
+                )
                 .and_then(|()| check_innovation(constants, &innovation, interval_s, located))
+                .and_then(|()| {
+                    let disturbance = &estimator.state().disturbance;
+                    drives.check(constants, disturbance, sent, &located.platform.pose, interval_s)
+                })
                 .err();
         }
         // A measurement from before control began shows another motion.
@@ -188,10 +205,21 @@ impl ErrorTracker {
         FeedbackError { value: predicted.value + self.residual, rate: predicted.rate }
     }
 
-    /// Records the acceleration that feedback sends, after all limits, and the instant from which on it acts.
-    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
+    /// Records the acceleration that feedback sends, after all limits, with the force, and the instant from which on it acts.
+    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>, force: &[f64; LEGS]) {
+        (self.sent, self.sent_acceleration) = (*force, *acceleration);
         self.estimator.record_sent(begin_ns, acceleration);
     }
+}
+
+/// Forces on the legs by an acceleration of feedback, each as if the others stayed as they are.
+fn feedback_forces(constants: &Constants, acceleration: &Vector6<f64>, pose: &Pose) -> [f64; LEGS] {
+    let law = &constants.parameters.law;
+    let of_legs = match law.mode.acts_on_legs() {
+        true => *acceleration,
+        false => leg_wrenches(constants.machine(), pose).tr_mul(acceleration),
+    };
+    law.feedback_leg_forces(&of_legs)
 }
 
 /// Whether each leg is where the prediction has it. Its innovation is `N^T nu`, at most `|nu_p| + r |nu_R|`.

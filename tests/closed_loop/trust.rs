@@ -82,8 +82,11 @@ fn sensors_that_freeze_in_motion_end_the_forces_before_the_platform_is_off_its_p
                 [vec![0, 1, 2, 3, 4, 5], vec![0], vec![3]].map(|legs| (share, noise, legs))
             })
         }) {
-            for phase in 0..6 {
-                let from_s = 3.5 + 0.13 * f64::from(phase) / share.sqrt();
+            // One quiet leg of a slow platform may be anywhere near its turnaround.
+            let is_slow_leg = legs.len() == 1 && share < 1.0 && noise == 0.0;
+            let (phases, step_s) = if is_slow_leg { (24, 0.0325) } else { (6, 0.13) };
+            for phase in 0..phases {
+                let from_s = 3.5 + step_s * f64::from(phase) / share.sqrt();
                 let (output, time_s, farthest) = freeze(&config, share, &legs, noise, from_s);
                 println!(
                     "{machine}, speed {share}, noise {noise:e}, legs {legs:?}: {:?} leg {} after {:.0} ms, {:.3} mm",
@@ -102,7 +105,7 @@ fn sensors_that_freeze_in_motion_end_the_forces_before_the_platform_is_off_its_p
                 // One leg near its own turnaround is crawling, however fast the platform is: the others do not show its fault.
                 let rates = leg_motion(&config.machine, &scene(&config, share)(from_s).motion()).rate;
                 let is_crawling = legs.len() == 1 && rates[legs[0]].abs() < CRAWLING_M_S;
-                let bound = if is_crawling { 5e-3 } else { 0.5e-3 };
+                let bound = if is_crawling { 2e-3 } else { 0.5e-3 };
                 assert!(farthest < bound, "{machine} {share} {legs:?}, {rates:?} m/s: {farthest} m");
             }
         }

@@ -191,9 +191,7 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
     }
     let is_pd = mode == ControlMode::JointPd;
     let cell = match (name, situation, mode.includes_inertia()) {
-        ("a leg without force", Engaging | AtRest | InMotion | Parking, true) => {
-            Brake(MeasurementImplausible)
-        }
+        ("a leg without force", Engaging, true) => Brake(MeasurementImplausible),
         ("a leg without force", AtRest | Parking, false) if is_pd => Brake(FollowingError),
         ("a leg without force", AtRest | InMotion | Parking, false) => Brake(FeedbackSaturated),
         ("a leg without force", Engaging, false) if is_pd => {
@@ -201,6 +199,9 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
         }
         ("a leg without force", Engaging, false) => {
             Path(&[(State::Active, DiagnosticCode::None), (State::Fault, FeedbackSaturated)])
+        }
+        ("a leg without force", Stopping, false) | ("a drive reports half of its force", Stopping, false) => {
+            On
         }
         ("the drives brake by themselves" | "the drives brake and setpoints end", Stopping, true) => {
             Brake(MeasurementImplausible)

@@ -1,11 +1,12 @@
 //! The rows of the table: every fault, and what becomes of it in every state.
 
 use hexad::control::diagnostic::DiagnosticCode::{
-    self, DaemonHeld, DeadlineMissed, EmergencyStop, HoldingPose, LengthOutOfStroke, MeasurementImplausible,
-    MeasurementJumped, MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, OperatorRequest,
+    self, DaemonHeld, DeadlineMissed, DriveFault, DriveForceMissing, DriveNotReady, EmergencyStop,
+    ExternalPoseMismatch, HoldingPose, LengthOutOfStroke, MeasurementImplausible, MeasurementJumped,
+    MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, MeasurementTooOld, OperatorRequest,
     RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointEnded,
     SetpointJumped, SetpointLost, SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach,
-    SetpointStampInvalid, SetpointTooFast, VelocityError,
+    SetpointStampInvalid, SetpointTooFast, StampClockInvalid, VelocityError,
 };
 use hexad::control::state::State;
 
@@ -15,7 +16,7 @@ use super::cells::{
     MISSED, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED, Row, SWITCHED_OFF, TOO_FAR, UNSEEN,
     unusable_measurement, unusable_setpoint, wrong_in_motion,
 };
-use super::disturbances::{host, machine, measurements, operator, setpoints, together};
+use super::disturbances::{host, machine, measurements, operator, reports, setpoints, together};
 use super::sequences;
 
 /// Engaged, without a fault, and never on the setpoint.
@@ -59,6 +60,13 @@ pub const ROWS: &[Row] = &[
     ("measurements' stamps run backward", measurements::stamps_run_backward, GENTLE, unusable_measurement(MeasurementStampInvalid)),
     ("counts of 1 um, noise of 1 mm/s", measurements::noise_of_encoders, ENDLESS, EVERYWHERE),
     ("rates filtered with 5 ms", measurements::filtered_rates, LONG, EVERYWHERE),
+    ("measurements older than the loop stands", measurements::older_than_the_loop_stands, GENTLE, unusable_measurement(MeasurementTooOld)),
+    ("stamps at half of the clock's speed", measurements::stamps_at_half_speed, GENTLE, [On, Brake(StampClockInvalid), Brake(StampClockInvalid), Brake(StampClockInvalid), Brake(StampClockInvalid), Brake(StampClockInvalid), On]),
+    // What a driver reports beside lengths.
+    ("an external pose 2 mm beside the lengths", reports::external_pose_beside, GENTLE, [Idle(State::Standby, ExternalPoseMismatch), Brake(ExternalPoseMismatch), Brake(ExternalPoseMismatch), Brake(ExternalPoseMismatch), Brake(ExternalPoseMismatch), Brake(ExternalPoseMismatch), On]),
+    ("a drive reports that it is disabled", reports::drive_disabled, GENTLE, [On, Brake(DriveNotReady), Brake(DriveNotReady), Brake(DriveNotReady), Brake(DriveNotReady), Brake(DriveNotReady), On]),
+    ("a drive reports a fault", reports::drive_fault, GENTLE, [Idle(State::Standby, DriveFault), Brake(DriveFault), Brake(DriveFault), Brake(DriveFault), Brake(DriveFault), Brake(DriveFault), On]),
+    ("a drive reports half of its force", reports::half_of_a_force, GENTLE, [On, Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), On]),
     // Setpoints.
     ("setpoints end", setpoints::end, GENTLE, [Idle(State::Standby, SetpointEnded), End(SetpointEnded), End(SetpointEnded), Stop(SetpointLost), On, On, On]),
     ("setpoints pause for 30 ms", setpoints::pause_30_ms, LONG, EVERYWHERE),
@@ -97,7 +105,7 @@ pub const ROWS: &[Row] = &[
     // The machine.
     ("collision", machine::collision, GENTLE, [On, Brake(SensorFrozen), On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
     ("the drives brake by themselves", machine::braked, GENTLE, [On, Brake(SensorFrozen), On, Brake(MeasurementImplausible), Brake(SensorFrozen), Brake(MeasurementImplausible), On]),
-    ("a leg without force", machine::leg_without_force, Bounds { jerk: 1.12, rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(VelocityError), Brake(VelocityError), On, Brake(VelocityError), On]),
+    ("a leg without force", machine::leg_without_force, Bounds { jerk: 1.12, rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), On]),
     ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, EVERYWHERE),
     ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), On]),
     // The host.

@@ -2,6 +2,7 @@
 
 use hexad::analysis::envelope;
 use hexad::config::Config;
+use hexad::control::controller::Controller;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
 use hexad::control::limits::DerivativeLimits;
@@ -66,8 +67,10 @@ impl Situation {
         if self == Self::Engaging {
             config.deployment.limits.reference.autonomous_scale = SLOW_SCALE;
         }
-        let parameters = parameters(&config);
-        let mut world = World::new(Rig::new(&config, &config.machine), &config.machine, parameters);
+        let parameters = Parameters { max_measured_age_ns: MAX_MEASURED_AGE_NS, ..parameters(&config) };
+        let mut rig = Rig::new(&config, &config.machine);
+        rig.controller = Controller::new(&config.machine, parameters);
+        let mut world = World::new(rig, &config.machine, parameters);
         let mut home = TaskState::at_rest(config.machine.home);
         match self {
             Self::Standby => {
@@ -131,6 +134,9 @@ pub fn machine(mode: ControlMode) -> (Config, Parameters) {
     let parameters = parameters(&config);
     (config, parameters)
 }
+
+/// Less than the timeout of measurements, as in loops with higher bandwidths.
+const MAX_MEASURED_AGE_NS: u64 = 12_000_000;
 
 /// With this share of the limits it engages so slowly that every timeout is over before.
 const SLOW_SCALE: f64 = 0.02;

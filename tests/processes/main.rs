@@ -27,6 +27,7 @@ mod control_socket;
 mod demo;
 mod doctor;
 mod doubted;
+mod drive_delay;
 mod estop_trials;
 mod examined;
 mod external;

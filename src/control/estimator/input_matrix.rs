@@ -68,6 +68,13 @@ impl InputMatrix {
         if self.acts_on_legs { leg_wrenches(machine, pose).tr_mul(&acceleration) } else { acceleration }
     }
 
+    /// Acceleration by a unit force of each leg at a pose, a column for each, in the coordinates of the error.
+    pub fn acceleration_by_force(&self, machine: &Machine, pose: &Pose) -> Matrix6<f64> {
+        let wrenches = leg_wrenches(machine, pose);
+        let by_force = self.mobility * wrenches;
+        if self.acts_on_legs { wrenches.tr_mul(&by_force) } else { by_force }
+    }
+
     /// The acceleration that the law must command for one of the platform.
     pub fn command(&self, acceleration: &Vector6<f64>) -> Vector6<f64> {
         self.by_command.map_or(*acceleration, |[_, inverse]| inverse * acceleration)

@@ -29,7 +29,7 @@ mod sent_accelerations;
 use nalgebra::Vector6;
 
 use self::covariance::{Covariance, NoiseModel};
-pub(super) use self::frozen_sensors::FrozenSensors;
+pub(super) use self::frozen_sensors::{FrozenLegBounds, FrozenSensors};
 pub(super) use self::leg_rates::LegRateEstimator;
 pub use self::sent_accelerations::CAPACITY as SENT_ACCELERATIONS;
 use self::sent_accelerations::SentAccelerations;

@@ -86,6 +86,17 @@ pub fn stamps_1_s_ahead(m: &mut Moment) {
     m.measured().time_ns += 1_000_000_000;
 }
 
+/// The way from the sensors has become longer.
+pub fn older_than_the_loop_stands(m: &mut Moment) {
+    let age_ns = m.world.parameters.max_measured_age_ns + 1_000_000;
+    m.measured().time_ns -= age_ns;
+}
+
+/// Of the daemon's clock two milliseconds pass in each cycle.
+pub fn stamps_at_half_speed(m: &mut Moment) {
+    m.input.clock_offset_ns = -1_000_000 * (m.cycle as i64 + 1);
+}
+
 pub fn stamps_of_nothing(m: &mut Moment) {
     m.measured().time_ns = 0;
 }

@@ -9,6 +9,7 @@ pub mod host;
 pub mod machine;
 pub mod measurements;
 pub mod operator;
+pub mod reports;
 pub mod setpoints;
 pub mod together;
 

@@ -1,0 +1,110 @@
+//! Delay of the drives from a motion under control, which does not know it.
+
+use hexad::analysis::drive_delay::{DriveDelay, MeasuredMotion, RecordedStretch, SentForce, drive_delay};
+use hexad::config::Config;
+use hexad::control::state::State;
+use hexad::motion::built_in::{BuiltInMotion, fit};
+use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfections, SensorErrors};
+
+use super::common::hardware_loop::{HardwareLoop, SENDING, configured};
+
+/// Duration of the motion \[s\].
+const MOTION_S: f64 = 20.0;
+/// From the start to the motion \[s\].
+const SETTLING_S: f64 = 1.0;
+
+/// A cautious loop that does not know its delay.
+fn config(machine: &str, rate_hz: f64) -> Config {
+    configured(
+        machine,
+        &format!(
+            "[realtime]\nrate_hz = {rate_hz:?}\n[control]\nposition_bandwidth_hz = 3.0\norientation_bandwidth_hz = 3.0"
+        ),
+    )
+}
+
+/// Moves the platform and measures the delay of its drives.
+fn measured(config: &Config, imperfections: &Imperfections) -> Option<DriveDelay> {
+    drive_delay(&config.machine, &[recorded(config, imperfections, BuiltInMotion::Sines)])
+}
+
+fn recorded(config: &Config, imperfections: &Imperfections, motion: BuiltInMotion) -> RecordedStretch {
+    let mut control = HardwareLoop::new(config, &config.machine, imperfections);
+    let motion = fit(&config.machine, motion, MOTION_S);
+    let mut stretch = RecordedStretch::default();
+    while control.time_s() < SETTLING_S + MOTION_S {
+        let input = control.input(&motion.at(control.time_s() - SETTLING_S));
+        let output = control.cycle(&input);
+        if control.time_s() > SETTLING_S {
+            assert_eq!(output.state, State::Active, "{:?}", output.diagnostic);
+        }
+        if output.state == State::Active {
+            let measurement = input.measurement.unwrap();
+            stretch.sent.push(SentForce { release_ns: input.release_ns, force: output.force });
+            stretch.measured.push(MeasuredMotion {
+                time_ns: measurement.time_ns,
+                length: measurement.length,
+                pose: output.platform.unwrap().pose,
+                reference: output.reference.unwrap(),
+            });
+        }
+    }
+    stretch
+}
+
+#[test]
+fn the_delay_of_the_drives_is_measured() {
+    // Friction as a share of the largest force, which on the light machine is many times its weight.
+    for (machine, rate_hz, friction) in
+        [("motion_base", 1000.0, 0.01), ("fried2008", 1000.0, 0.001), ("motion_base", 250.0, 0.003)]
+    {
+        let config = config(machine, rate_hz);
+        let most = config.machine.actuator.max_force;
+        for dead_ms in [0.0, 2.0, 5.0, 10.0] {
+            for is_imperfect in [false, true] {
+                let drive = DriveErrors { dead_time_ns: (1e6 * dead_ms) as u64, ..DriveErrors::default() };
+                let mut imperfections = Imperfections { seed: 1, drive, ..Imperfections::default() };
+                if is_imperfect {
+                    imperfections.sensor =
+                        SensorErrors { length_noise: 2e-6, length_step: 1e-6, ..SensorErrors::default() };
+                    imperfections.friction = Friction {
+                        coulomb: friction * most,
+                        viscous: friction * most,
+                        ..Friction::default()
+                    };
+                    imperfections.build = BuildErrors {
+                        payload: 0.1 * config.machine.platform.mass,
+                        payload_at: config.machine.platform.center_of_mass
+                            + nalgebra::Vector3::new(0.1, 0.05, 0.0),
+                        ..BuildErrors::default()
+                    };
+                }
+                let expected_s = 1e-3 * dead_ms + SENDING / rate_hz;
+                let DriveDelay { mean, legs, .. } = measured(&config, &imperfections).unwrap();
+                let error_s = (mean.delay_s - expected_s).abs();
+                println!(
+                    "{machine} {rate_hz} Hz, {dead_ms} ms, imperfect {is_imperfect}: {:.3} of {:.3} ms, deviation {:.3}; {:?}",
+                    1e3 * mean.delay_s,
+                    1e3 * expected_s,
+                    1e3 * mean.deviation_s,
+                    legs.map(|leg| (1e6 * leg.delay_s) as i64)
+                );
+                let bound_s = if is_imperfect { (0.1 * expected_s).max(1e-4) } else { 2e-5 };
+                assert!(error_s < bound_s, "{machine} {dead_ms} ms: {mean:?}");
+                assert!(error_s < 2e-5 + 3.0 * mean.deviation_s && mean.deviation_s < 2.5e-4, "{mean:?}");
+            }
+        }
+    }
+}
+
+/// A platform that stands shows no delay: no wrong number either.
+#[test]
+fn without_motion_there_is_no_delay() {
+    let config = config("motion_base", 1000.0);
+    let sensor = SensorErrors { length_noise: 2e-6, ..SensorErrors::default() };
+    let imperfections = Imperfections { seed: 1, sensor, ..Imperfections::default() };
+    let found = recorded(&config, &imperfections, BuiltInMotion::Settle);
+    let found = drive_delay(&config.machine, &[found]);
+    assert!(found.is_none_or(|found| !(found.mean.deviation_s < 2.5e-4)), "{found:?}");
+    assert_eq!(drive_delay(&config.machine, &[]), None);
+}

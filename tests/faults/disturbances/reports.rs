@@ -1,0 +1,29 @@
+//! What a driver reports of its drives, and the pose of another sensor.
+
+use hexad::control::drive_monitor::DriveStatus;
+use hexad::model::machine::LEGS;
+
+use super::Moment;
+
+const ALL: u32 = (1 << LEGS) - 1;
+const LEG: usize = 2;
+
+pub fn external_pose_beside(m: &mut Moment) {
+    let mut x = m.world.x();
+    x[5] += 0.002;
+    m.measured().pose = Some(x.into());
+}
+
+pub fn drive_disabled(m: &mut Moment) {
+    m.measured().drives = DriveStatus { enabled: Some(ALL & !(1 << LEG)), ..DriveStatus::default() };
+}
+
+pub fn drive_fault(m: &mut Moment) {
+    m.measured().drives = DriveStatus { fault: Some(1 << LEG), ..DriveStatus::default() };
+}
+
+pub fn half_of_a_force(m: &mut Moment) {
+    let mut force = m.world.rig.force.unwrap_or_default();
+    force[LEG] *= 0.5;
+    m.measured().drives = DriveStatus { force: Some(force), ..DriveStatus::default() };
+}
