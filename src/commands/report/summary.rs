@@ -109,7 +109,7 @@ fn configurations(run: &Run) -> Option<Fact> {
         .skip(1)
         .map(|part| format!("at {:.3} s (cycle {}) {}", part.from_s, part.first_cycle, part.changes));
     let text = later.collect::<Vec<_>>().join(". Then ");
-    (!text.is_empty()).then(|| Fact { name: "Reloads", text, is_bad: false })
+    (!text.is_empty()).then_some(Fact { name: "Reloads", text, is_bad: false })
 }
 
 fn lost(history: &History) -> Fact {

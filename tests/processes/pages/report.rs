@@ -209,7 +209,7 @@ fn files_of_two_runs_are_refused() {
 fn a_run_over_reloads_is_one_page() {
     let machine = Machine::with("report-reloads", "");
     let old = config(&machine);
-    let text = format!("{}\n[control]\nposition_bandwidth_hz = 7.0\n", old.text);
+    let text = format!("{}\n[control]\nposition_bandwidth_hz = 1.0\n", old.text);
     let new = Config::parse(&text, "the test").unwrap();
     let mut files = vec![];
     for (k, (config, part)) in
@@ -227,7 +227,7 @@ fn a_run_over_reloads_is_one_page() {
     let head: Value = serde_json::from_str(head.split("</script>").next().unwrap()).unwrap();
     let fact = head["facts"].as_array().unwrap().iter().find(|fact| fact["name"] == "Reloads").unwrap();
     let (there, back) =
-        ("control.position_bandwidth_hz: default -> 7.0", "control.position_bandwidth_hz: 7.0 -> default");
+        ("control.position_bandwidth_hz: default -> 1.0", "control.position_bandwidth_hz: 1.0 -> default");
     let [to_new, to_old] = [300, 600].map(|number| format!("at {:.3} s (cycle {number})", seconds(number)));
     assert_eq!(fact["text"], format!("{to_new} {there}. Then {to_old} {back}"));
     let track = head["tracks"].as_array().unwrap().iter().find(|it| it["group"] == "configuration").unwrap();
