@@ -5,6 +5,7 @@
 
 #![allow(dead_code, reason = "each bench uses a part")]
 
+pub mod log_axis;
 pub mod scatter;
 
 use std::error::Error;

@@ -265,20 +265,19 @@ impl<C: Clock, I: CyclicInput, O: Copy, S: FnMut(&mut I, u64) -> O> Cycles<'_, C
         counters.allocations = ThreadUsage::allocations_of_this_thread() - self.allocations;
         self.side.outputs.write(CycleOutput { due_ns, release_ns, output, counters: *counters });
         let done_ns = self.clock.now_ns();
-        let next_ns = due_ns + period_ns;
-        counters.overruns += u64::from(woke_ns < next_ns && done_ns >= next_ns);
-        let record = CycleRecord {
-            cycle: counters.cycles,
-            due_ns,
-            wakeup_ns,
-            compute_ns: done_ns.saturating_sub(woke_ns),
-            io_late,
-            input,
-            output,
-        };
+        let (behind_ns, compute_ns) = (woke_ns.saturating_sub(due_ns), done_ns.saturating_sub(woke_ns));
+        counters.overruns += u64::from(is_overrun(behind_ns, compute_ns, period_ns));
+        let record =
+            CycleRecord { cycle: counters.cycles, due_ns, wakeup_ns, compute_ns, io_late, input, output };
         counters.records_lost += u64::from(!hand_over(&mut self.records, record));
         done_ns
     }
+}
+
+/// Whether a cycle that began `behind_ns` after its release was still computing at the next one. A cycle that began later than
+/// that is none: what it missed is counted as skipped or caught up.
+pub fn is_overrun(behind_ns: u64, compute_ns: u64, period_ns: u64) -> bool {
+    behind_ns < period_ns && behind_ns + compute_ns >= period_ns
 }
 
 /// False if the record is lost. A queue of another length than [`RECORDS`] takes nothing. There is none; but a

@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use super::history::{Bars, History};
 use super::levels::Extent;
+use super::run::Run;
 use super::signals::{COLUMNS, SIGNALS};
 use super::summary::{Fact, facts};
 use super::track::Track;
 use crate::config::Config;
 use crate::control::state::State;
 use crate::model::machine::{LEGS, Machine};
-use crate::recording::RunInfo;
 
 /// Head of a page.
 #[derive(Serialize)]
@@ -46,12 +46,8 @@ pub struct Events<'a> {
 
 impl<'a> Events<'a> {
     /// Of a run.
-    pub fn new(config: &Config, info: &RunInfo, history: &'a History) -> Self {
-        Self {
-            facts: facts(config, info, history),
-            tracks: history.tracks(),
-            distributions: history.distributions(),
-        }
+    pub fn new(run: &Run, history: &'a History) -> Self {
+        Self { facts: facts(run), tracks: history.tracks(), distributions: history.distributions() }
     }
 }
 
@@ -73,23 +69,25 @@ struct MachineHead {
 }
 
 /// Head of a page about a recording.
-pub fn of_recording(
-    config: &Config,
-    info: &RunInfo,
-    history: &History,
-    extents: &[Extent],
-    kept: &str,
-) -> String {
+pub fn of_recording(run: &Run, extents: &[Extent], kept: &str) -> String {
+    let (config, history) = (run.config(), &run.history);
     let period_s = config.deployment.realtime.period_s();
     let level = |extent: &Extent| LevelHead {
         from: extent.first as f64 * period_s,
         step: extent.step as f64 * period_s,
         samples: extent.samples,
     };
-    let run = Events::new(config, info, history);
+    let (events, configuration) = (Events::new(run, history), run.configurations());
     let levels = extents.iter().map(level).collect();
-    let begin_s = history.begin_ns().wrapping_add(info.clock_offset_ns) as f64 * 1e-9;
-    json(&Head { begin_s, length_s: history.length_s(), levels, kept, ..head(config, run) })
+    let begin_s = history.begin_ns().wrapping_add(run.info().clock_offset_ns) as f64 * 1e-9;
+    json(&Head {
+        begin_s,
+        length_s: history.length_s(),
+        levels,
+        kept,
+        configuration: &configuration,
+        ..head(config, events)
+    })
 }
 
 /// Head of a page that a server feeds.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::deadlines::Deadlines;
 use super::signals::norms;
 use super::track::Track;
 use crate::config::Config;
@@ -12,19 +13,9 @@ use crate::control::state::{Request, State};
 use crate::daemon::report::TrackingSum;
 use crate::daemon::time_histogram::TimeHistogram;
 use crate::messages::{CycleMessage, Times};
-use crate::realtime::cyclic::ReleaseMode;
 
 /// Bars of a distribution for each decade of time.
 const BARS_PER_DECADE: f64 = 20.0;
-
-/// Timing that the configuration expects of the cycles.
-#[derive(Clone, Copy, Debug)]
-struct Expected {
-    period_s: f64,
-    late_wakeup_s: f64,
-    /// Whether cycles are released by a grid of instants: only then a release can be skipped.
-    has_grid: bool,
-}
 
 /// Distribution of a time.
 #[derive(Default)]
@@ -56,7 +47,8 @@ pub struct Fault {
 
 /// History of a run.
 pub struct History {
-    expected: Expected,
+    period_s: f64,
+    deadlines: Deadlines,
     first: CycleMessage,
     last: CycleMessage,
     /// Number of cycles.
@@ -70,6 +62,9 @@ pub struct History {
     /// Number of cycles in each state.
     in_state: [u64; State::ALL.len()],
     states: Track,
+    /// Number of the configuration and what changed with it, where there are several.
+    configuration: Option<(u32, String)>,
+    configurations: Track,
     diagnostics: Track,
     requests: Track,
     limits: Vec<(Limit, Track)>,
@@ -88,17 +83,13 @@ const MAX_CHANGES: usize = 64;
 impl History {
     /// Without cycles.
     pub fn new(config: &Config) -> Self {
-        let realtime = &config.deployment.realtime;
-        let expected = Expected {
-            period_s: realtime.period_s(),
-            late_wakeup_s: realtime.late_wakeup_s,
-            has_grid: matches!(realtime.release, ReleaseMode::Sleep | ReleaseMode::Hybrid),
-        };
+        let period_s = config.deployment.realtime.period_s();
         // Cycles follow each other, however much their releases vary.
-        let gap = 1.5 * expected.period_s;
+        let gap = 1.5 * period_s;
         let missed = ["late wake-up", "overrun", "release skipped", "inputs late"];
         Self {
-            expected,
+            period_s,
+            deadlines: Deadlines::new(config),
             first: CycleMessage::default(),
             last: CycleMessage::default(),
             cycles: 0,
@@ -108,6 +99,8 @@ impl History {
             in_state: [0; State::ALL.len()],
             // A state lasts until the next one, also where releases are skipped.
             states: Track::new("state", "state", f64::INFINITY),
+            configuration: None,
+            configurations: Track::new("configuration", "configuration", f64::INFINITY),
             diagnostics: Track::new("diagnostic", "diagnostic", gap),
             requests: Track::new("requests", "request", gap),
             limits: Limit::ALL.map(|limit| (limit, Track::new("limits reached", limit.name(), gap))).into(),
@@ -121,6 +114,12 @@ impl History {
         }
     }
 
+    /// Another configuration holds from the next cycle on; `changes` are those of the reload, empty for the first.
+    pub fn begin_configuration(&mut self, number: u32, changes: &str) {
+        let text = if changes.is_empty() { "as started".into() } else { format!("reloaded: {changes}") };
+        self.configuration = Some((number, text));
+    }
+
     /// Instant of a cycle \[s\], from the first one.
     pub fn seconds(&self, cycle: &CycleMessage) -> f64 {
         seconds_between(self.first.release_ns, cycle.release_ns)
@@ -128,7 +127,7 @@ impl History {
 
     /// Index of a cycle on the grid of the releases.
     pub fn index(&self, cycle: &CycleMessage) -> u64 {
-        (self.seconds(cycle) / self.expected.period_s).round().max(0.0) as u64
+        (self.seconds(cycle) / self.period_s).round().max(0.0) as u64
     }
 
     /// CLOCK_MONOTONIC instant of the first cycle \[ns\].
@@ -162,7 +161,8 @@ impl History {
     }
 
     fn add_timing(&mut self, cycle: &CycleMessage, t: f64) {
-        let Expected { period_s, late_wakeup_s, has_grid } = self.expected;
+        let period_s = self.period_s;
+        let missed = self.deadlines.check(cycle);
         let output_ns = cycle.wakeup_ns + cycle.compute_ns;
         let age_ns =
             (cycle.has_measurement == 1).then(|| cycle.release_ns.saturating_sub(cycle.measured_time_ns));
@@ -175,10 +175,10 @@ impl History {
         }
         let micros = |time_ns: u64| format!("{:.1} µs", time_ns as f64 * 1e-3);
         let [late, overrun, skipped, inputs] = &mut self.missed;
-        if cycle.wakeup_ns as f64 * 1e-9 > late_wakeup_s {
+        if missed.is_late {
             late.add(t, t, 1, || format!("cycle {} woke {} late", cycle.cycle, micros(cycle.wakeup_ns)));
         }
-        if output_ns as f64 * 1e-9 > period_s {
+        if missed.is_overrun {
             overrun.add(t, t, 1, || {
                 format!("cycle {} had its output {} after its release", cycle.cycle, micros(output_ns))
             });
@@ -194,7 +194,7 @@ impl History {
             if lost > 0 {
                 self.lost_track.add(before + period_s, t, 1, || format!("{lost} cycles are missing"));
                 self.lost += lost;
-            } else if has_grid && without > 0 {
+            } else if self.deadlines.has_grid() && without > 0 {
                 skipped.add(before + period_s, t, 1, || format!("no cycle at {without} releases"));
                 skipped.count += without - 1;
             }
@@ -209,6 +209,9 @@ impl History {
         let state = State::from_number(cycle.state).unwrap_or_default();
         self.states.add(t, t, cycle.state, || state.name().into());
         self.in_state.get_mut(state as usize).into_iter().for_each(|cycles| *cycles += 1);
+        if let Some((number, text)) = &self.configuration {
+            self.configurations.add(t, t, *number, || text.clone());
+        }
         let diagnostic = cycle.diagnostic.diagnostic().unwrap_or_default();
         if diagnostic.code != DiagnosticCode::None {
             let key = 1000 * diagnostic.index + diagnostic.code as u32;
@@ -244,7 +247,8 @@ impl History {
     /// Tracks that have at least one interval, states first. Every interval ends where its last cycle does.
     pub fn tracks(&self) -> Vec<&Track> {
         let limits = self.limits.iter().map(|(_, track)| track);
-        let all = [&self.states, &self.diagnostics, &self.requests].into_iter().chain(limits);
+        let all =
+            [&self.states, &self.configurations, &self.diagnostics, &self.requests].into_iter().chain(limits);
         all.chain(&self.missed)
             .chain([&self.lost_track])
             .filter(|track| !track.intervals.is_empty())
@@ -258,7 +262,7 @@ impl History {
 
     /// Time in each state that occurred \[s\].
     pub fn time_in_states(&self) -> Vec<(State, f64)> {
-        let lengths = self.in_state.iter().map(|cycles| *cycles as f64 * self.expected.period_s);
+        let lengths = self.in_state.iter().map(|cycles| *cycles as f64 * self.period_s);
         State::ALL.into_iter().zip(lengths).filter(|(_, length)| *length > 0.0).collect()
     }
 

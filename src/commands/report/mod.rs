@@ -5,19 +5,20 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use self::history::History;
 use self::levels::{Extent, Level};
-use self::signals::Signals;
+use self::run::Run;
 use super::failure::{CommandError, Failure};
 use crate::config::{Config, ConfigError};
 use crate::output::files::{FileError, print, write_whole};
 use crate::output::page::page;
-use crate::recording::reader::{Recording, Summary};
-use crate::recording::{Item, RecordingError, RunInfo};
+use crate::recording::RecordingError;
 
+pub mod deadlines;
 pub mod head;
 pub mod history;
 pub mod levels;
+pub mod references;
+pub mod run;
 pub mod signals;
 pub mod summary;
 pub mod track;
@@ -45,7 +46,7 @@ pub enum ReportError {
     Config(#[from] ConfigError),
     #[error(transparent)]
     File(#[from] FileError),
-    #[error("{}: of another configuration or version than {}; report each run alone", .0.display(), .1.display())]
+    #[error("{}: of another run than {}; report each run alone", .0.display(), .1.display())]
     OtherRun(PathBuf, PathBuf),
 }
 
@@ -61,79 +62,16 @@ impl ReportArguments {
 /// Writes the page of a run that is recorded in some files; returns what it contains, in words.
 pub fn write(recordings: &[PathBuf], output: &Path) -> Result<String, ReportError> {
     let run = Run::read(recordings)?;
-    let levels = run.levels()?;
+    let levels = run.levels(MAX_SAMPLE_BYTES)?;
     let extents: Vec<Extent> = levels.iter().map(|level| level.extent).collect();
-    let kept = kept(&extents, run.history.span(), &run.config);
+    let kept = kept(&extents, run.history.span(), run.config());
     let samples: Vec<u8> = levels.iter().flat_map(Level::bytes).collect();
-    let head = head::of_recording(&run.config, &run.info, &run.history, &extents, &kept);
-    let title = format!("{}: recording", run.info.name);
+    let head = head::of_recording(&run, &extents, &kept);
+    let title = format!("{}: recording", run.info().name);
     let text = page(&title, &head, &samples, false);
     write_whole(output, text.as_bytes())?;
     let megabytes = text.len() as f64 * 1e-6;
     Ok(format!("{} cycles, {megabytes:.1} MB; {kept}", run.history.cycles))
-}
-
-/// A run in its files.
-struct Run {
-    /// In the order of time.
-    files: Vec<PathBuf>,
-    info: RunInfo,
-    config: Config,
-    history: History,
-}
-
-impl Run {
-    /// Reads what happened, and where all files are of one run.
-    fn read(recordings: &[PathBuf]) -> Result<Self, ReportError> {
-        let mut files = vec![];
-        for path in recordings {
-            let Summary { info, first, .. } = Recording::open(path)?.summary()?;
-            files.push((first.release_ns, path.clone(), info));
-        }
-        files.sort_by_key(|(begin_ns, ..)| *begin_ns);
-        let Some((_, first, info)) = files.first().cloned() else {
-            return Err(RecordingError::Empty(PathBuf::new()).into());
-        };
-        for (_, path, other) in &files {
-            if *other != info {
-                return Err(ReportError::OtherRun(path.clone(), first));
-            }
-        }
-        let config = Config::parse(&info.configuration, "configuration of the recording")?;
-        let history = History::new(&config);
-        let files = files.into_iter().map(|(_, path, _)| path).collect();
-        let mut run = Self { files, info, config, history };
-        for file in &run.files {
-            Recording::open(file)?.each(|item| {
-                if let Item::Cycle(cycle) = item {
-                    run.history.add(&cycle);
-                }
-            })?;
-        }
-        Ok(run)
-    }
-
-    /// The samples that are kept.
-    fn levels(&self) -> Result<Vec<Level>, ReportError> {
-        let Self { history, config, .. } = self;
-        let rate_hz = config.deployment.realtime.rate_hz;
-        let extents = levels::plan(history.span(), &history.events(), rate_hz, MAX_SAMPLE_BYTES);
-        let mut levels: Vec<_> = extents.into_iter().map(Level::new).collect();
-        let mut signals = Signals::new(&config.machine);
-        let mut last = 0;
-        for file in &self.files {
-            Recording::open(file)?.each(|item| {
-                if let Item::Cycle(cycle) = item
-                    && cycle.cycle > last
-                {
-                    last = cycle.cycle;
-                    let (index, row) = (history.index(&cycle), signals.row(&cycle));
-                    levels.iter_mut().for_each(|level| level.add(index, &row));
-                }
-            })?;
-        }
-        Ok(levels)
-    }
 }
 
 /// Description of the samples that a page keeps.

@@ -1,6 +1,9 @@
 //! The curves of a page: numbers of one cycle, in the units in which they are drawn.
 
+use super::references::References;
+use crate::config::Config;
 use crate::control::input_validation::seconds_between;
+use crate::daemon::nanoseconds;
 use crate::messages::CycleMessage;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
@@ -9,7 +12,9 @@ use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Pose, Twist};
 use crate::model::task::task_coordinates;
 
-/// Names of the signals and their components, in the order of a [`Row`]. `_ref` is the reference of the controller.
+/// Names of the signals and their components, in the order of a [`Row`]. `_ref` is the reference of the controller at the
+/// instant of what it is compared with: of the measurement, of the middle between two of them for accelerations, and of the
+/// middle of the hold for forces.
 pub const SIGNALS: &[(&str, usize)] = &[
     ("angle", 3),
     ("position", 3),
@@ -47,9 +52,29 @@ pub const COLUMNS: usize = 97;
 /// Numbers of one cycle; NaN where there is none.
 pub type Row = [f32; COLUMNS];
 
+/// Instants after the release of a cycle \[ns\].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CycleInstants {
+    /// Of its reference: the end of the hold of its force.
+    pub reference_ns: u64,
+    /// The middle of that hold.
+    pub force_ns: u64,
+}
+
+impl CycleInstants {
+    /// Of a controller.
+    pub fn of_controller(config: &Config) -> Self {
+        let period_ns = nanoseconds(config.deployment.realtime.period_s());
+        let begin_ns = nanoseconds(config.deployment.drive.total_delay_s());
+        Self { reference_ns: begin_ns + period_ns, force_ns: begin_ns + period_ns / 2 }
+    }
+}
+
 /// Computes the rows of consecutive cycles.
 pub struct Signals<'a> {
     machine: &'a Machine,
+    instants: CycleInstants,
+    references: References,
     model: InverseDynamics,
     /// Instant of the measurement \[ns\], twist and rates of the legs of the cycle before.
     before: Option<(u64, [f64; 6], [f64; LEGS])>,
@@ -57,8 +82,9 @@ pub struct Signals<'a> {
 
 impl<'a> Signals<'a> {
     /// Signals of a machine.
-    pub fn new(machine: &'a Machine) -> Self {
-        Self { machine, model: InverseDynamics::new(machine), before: None }
+    pub fn new(machine: &'a Machine, instants: CycleInstants) -> Self {
+        let model = InverseDynamics::new(machine);
+        Self { machine, instants, references: References::default(), model, before: None }
     }
 
     /// Row of a cycle. Accelerations are differences to the measurement before.
@@ -69,36 +95,44 @@ impl<'a> Signals<'a> {
         let none = [f64::NAN; 6];
         let coordinates = |pose: &Pose| degrees(task_coordinates(pose, home));
         let platform = output.platform.as_ref();
-        let reference = output.reference.as_ref();
+        let CycleInstants { reference_ns, force_ns } = self.instants;
+        self.references.add(cycle.release_ns + reference_ns, output.reference.as_ref());
+        let has_measurement = cycle.has_measurement == 1;
+        let instant_ns = if has_measurement { cycle.measured_time_ns } else { cycle.release_ns };
+        let reference = self.references.at(instant_ns);
         let twist: Option<[f64; 6]> = platform.map(|it| it.twist.vector().into());
         row.six(platform.map(|it| coordinates(&it.pose)));
         row.six(reference.map(|it| coordinates(&it.pose)));
         row.six(twist.map(degrees));
         row.six(reference.map(|it| degrees(it.twist.vector().into())));
 
-        let has_rates = cycle.has_measurement == 1 && cycle.rates_valid == 1;
+        let has_rates = has_measurement && cycle.rates_valid == 1;
         let rates = if has_rates { cycle.measured_length_rate_m_s } else { none };
         let (mut accelerations, mut leg_accelerations) = (none, none);
+        let mut middle_ns = instant_ns;
         if let Some((before_ns, twist_before, rates_before)) = self.before {
             // Without a new measurement there is no change.
             let dt = seconds_between(before_ns, cycle.measured_time_ns);
             let dt = if dt > 0.0 { dt } else { f64::NAN };
+            middle_ns = if dt > 0.0 { before_ns.midpoint(cycle.measured_time_ns) } else { instant_ns };
             accelerations = rate_of_change(twist_before, twist.unwrap_or(none), dt);
             leg_accelerations = rate_of_change(rates_before, rates, dt);
         }
         self.before = Some((cycle.measured_time_ns, twist.unwrap_or(none), rates));
         row.six(Some(degrees(accelerations)));
-        row.six(reference.map(|it| degrees(it.acceleration.vector().into())));
+        let between = self.references.at(middle_ns);
+        row.six(between.map(|it| degrees(it.acceleration.vector().into())));
 
-        let legs = reference.map(|it| leg_motion(self.machine, it));
-        row.six((cycle.has_measurement == 1).then_some(cycle.measured_length_m));
+        let legs = reference.map(|it| leg_motion(self.machine, &it));
+        row.six(has_measurement.then_some(cycle.measured_length_m));
         row.six(legs.as_ref().map(|it| it.length));
         row.six(Some(rates));
         row.six(legs.as_ref().map(|it| it.rate));
         row.six(Some(leg_accelerations));
-        row.six(legs.as_ref().map(|it| it.accel));
+        row.six(between.map(|it| leg_motion(self.machine, &it).accel));
         let applied = output.state.has_control().then_some(output.force);
-        let computed = reference.and_then(|it| self.model.forces::<Exact>(it));
+        let held = self.references.at(cycle.release_ns + force_ns);
+        let computed = held.and_then(|it| self.model.forces::<Exact>(&it));
         row.six(applied);
         row.six(computed);
         row.six(applied.zip(computed).map(|(applied, computed)| difference(applied, computed)));
@@ -110,7 +144,7 @@ impl<'a> Signals<'a> {
         row.one(Some(cycle.wakeup_ns as f64 * 1e-3));
         row.one(Some(cycle.compute_ns as f64 * 1e-3));
         let age_ms = |time_ns: u64| 1e3 * seconds_between(time_ns, cycle.release_ns);
-        row.one((cycle.has_measurement == 1).then(|| age_ms(cycle.measured_time_ns)));
+        row.one(has_measurement.then(|| age_ms(cycle.measured_time_ns)));
         row.one((cycle.has_setpoint == 1).then(|| age_ms(cycle.setpoint_time_ns)));
         row.finish()
     }
@@ -173,6 +207,73 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::controller::{Input, Measurement, Output};
+    use crate::control::localization::PlatformState;
+    use crate::model::rigid::Motion;
+    use crate::model::task::TaskState;
+
+    /// Column of the first component of a signal.
+    fn column(name: &str) -> usize {
+        SIGNALS.iter().take_while(|(other, _)| *other != name).map(|(_, components)| components).sum()
+    }
+
+    /// A platform that follows its reference exactly, measured 1.7 ms before the release.
+    #[test]
+    fn the_reference_is_that_of_the_instant_of_the_measurement() {
+        const AGE_NS: u64 = 1_700_000;
+        let text = include_str!("../../../config/fried2008.toml");
+        let config = Config::parse(&format!("{text}\n[realtime]\nrate_hz = 1000\n"), "a test").unwrap();
+        let instants = CycleInstants::of_controller(&config);
+        let mut signals = Signals::new(&config.machine, instants);
+        let motion = |time_ns: u64| {
+            let mut state = TaskState::at_rest(config.machine.home);
+            let (w, t) = (5.0, time_ns as f64 * 1e-9);
+            for (axis, size) in [(0, 0.1), (2, -0.1), (3, 0.05), (5, 0.03)] {
+                state.x[axis] += size * (w * t).sin();
+                state.xd[axis] = size * w * (w * t).cos();
+                state.xdd[axis] = -size * w * w * (w * t).sin();
+            }
+            state.motion()
+        };
+        for number in 10..60 {
+            let release_ns = number * 1_000_000;
+            let time_ns = release_ns - AGE_NS;
+            let Motion { pose, twist, .. } = motion(time_ns);
+            let legs = leg_motion(&config.machine, &motion(time_ns));
+            let (length, rate) = (legs.length, Some(legs.rate));
+            let measurement = Some(Measurement { time_ns, length, rate, ..Measurement::default() });
+            let platform =
+                Some(PlatformState { pose, twist, condition: 1.0, time_to_singularity: f64::INFINITY });
+            let reference = Some(motion(release_ns + instants.reference_ns));
+            let output = Output { platform, reference, ..Output::default() };
+            let input = Input { release_ns, measurement, ..Input::default() };
+            let row = signals.row(&CycleMessage::new(&input, &output));
+            if number < 15 {
+                continue;
+            }
+            // As many digits as the numbers of a page have; without alignment the lengths differ by 0.4 mm.
+            for (signal, components, tolerance) in [
+                ("position", 3, 1e-6),
+                ("angle", 3, 1e-5),
+                ("velocity", 3, 1e-6),
+                ("angular_velocity", 3, 1e-4),
+                ("acceleration", 3, 1e-3),
+                ("length", 6, 1e-6),
+                ("leg_rate", 6, 1e-6),
+                ("leg_acceleration", 6, 1e-3),
+            ] {
+                let [actual, reference] =
+                    [signal.into(), format!("{signal}_ref")].map(|name: String| column(&name));
+                for k in 0..components {
+                    let [actual, reference] = [row[actual + k], row[reference + k]];
+                    assert!(
+                        (actual - reference).abs() < tolerance,
+                        "{number} {signal}: {actual} {reference}"
+                    );
+                }
+            }
+        }
+    }
 
     #[test]
     fn the_columns_are_the_components_of_the_signals() {

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::history::History;
+use super::run::Run;
 use crate::config::Config;
 use crate::messages::Times;
-use crate::recording::RunInfo;
 
 /// Most faults that are described; the axis of time shows all.
 const MAX_FAULTS: usize = 20;
@@ -22,13 +22,15 @@ pub struct Fact {
 }
 
 /// The run in words.
-pub fn facts(config: &Config, info: &RunInfo, history: &History) -> Vec<Fact> {
+pub fn facts(run: &Run) -> Vec<Fact> {
+    let (config, info, history) = (run.config(), run.info(), &run.history);
     let commit = if info.commit.is_empty() { "unknown" } else { &info.commit };
     let software = format!(
         "hexad {} (commit {commit}), fidelity {}, instruction set {}",
         info.version, info.fidelity, info.instruction_set
     );
     let mut facts = live_facts(config, history, &history.times());
+    facts.extend(configurations(run));
     facts.extend([lost(history), Fact { name: "Software", text: software, is_bad: false }]);
     facts
 }
@@ -98,6 +100,16 @@ fn times_in_words([wakeup, compute]: &[Times; 2]) -> String {
         format!("{p50:.1} / {p99:.1} / {max:.1} µs")
     };
     format!("p50 / p99 / largest: wake-up {}, computation {}", words(wakeup), words(compute))
+}
+
+/// Changes of the configuration, if there are any.
+fn configurations(run: &Run) -> Option<Fact> {
+    let later = run
+        .parts()
+        .skip(1)
+        .map(|part| format!("at {:.3} s (cycle {}) {}", part.from_s, part.first_cycle, part.changes));
+    let text = later.collect::<Vec<_>>().join(". Then ");
+    (!text.is_empty()).then_some(Fact { name: "Reloads", text, is_bad: false })
 }
 
 fn lost(history: &History) -> Fact {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::commands::report::head::json;
 use crate::commands::report::history::{Bars, History};
 use crate::commands::report::levels::{Extent, Level};
-use crate::commands::report::signals::Signals;
+use crate::commands::report::signals::{CycleInstants, Signals};
 use crate::commands::report::summary::{Fact, live_facts};
 use crate::commands::report::track::Track;
 use crate::config::Config;
@@ -62,7 +62,8 @@ impl<'a> Live<'a> {
         Self {
             config,
             history: History::new(config),
-            signals: Signals::new(&config.machine),
+            // The reference is the setpoint at the release.
+            signals: Signals::new(&config.machine, CycleInstants::default()),
             step: (SAMPLE_S * rate_hz).round().max(1.0) as u64,
             pair: None,
             pairs: VecDeque::new(),

@@ -31,6 +31,10 @@ pub struct Continuous {
     is_interrupted: bool,
     /// Nothing is tried before this cycle.
     retry_cycle: u64,
+    /// Cycles that the disk did not take before memory had no room for them, or before the run ended.
+    unwritten: u64,
+    /// Those before this cycle are counted.
+    counted_cycle: u64,
 }
 
 impl Continuous {
@@ -44,12 +48,19 @@ impl Continuous {
             unsaved_cycle: 1,
             is_interrupted: false,
             retry_cycle: 0,
+            unwritten: 0,
+            counted_cycle: 0,
         }
     }
 
     /// Bytes written, at most.
     pub fn bytes(&self) -> u64 {
         self.ended_bytes + self.stream.as_ref().map_or(0, |stream| stream.file().bytes())
+    }
+
+    /// Cycles that were not written in time.
+    pub fn unwritten(&self) -> u64 {
+        self.unwritten
     }
 
     /// Writes what the tape has received.
@@ -72,6 +83,10 @@ impl Continuous {
     pub fn finish(&mut self, context: &Context, tape: &Tape) {
         self.retry_cycle = 0;
         self.advance(context, tape);
+        if self.is_interrupted && self.stream.is_none() {
+            let lost = self.count_unwritten(tape.newest() + 1);
+            warn!(lost, "the recording ends with cycles that are not on disk");
+        }
         let Some(stream) = self.stream.take() else { return };
         self.ended_bytes += stream.file().bytes();
         match stream.finish() {
@@ -81,6 +96,9 @@ impl Continuous {
     }
 
     fn write(&mut self, context: &Context, tape: &Tape) -> Result<(), RecordingError> {
+        if self.is_interrupted && self.stream.is_none() {
+            self.count_unwritten(tape.oldest());
+        }
         let next_cycle = self.stream.as_ref().map_or(self.unsaved_cycle, Stream::next_cycle);
         for cycle in tape.from(next_cycle) {
             if context.begins_second(cycle.cycle) {
@@ -100,6 +118,14 @@ impl Continuous {
         Ok(())
     }
 
+    /// Counts the cycles before another one that are not on disk, once each; returns how many are new.
+    fn count_unwritten(&mut self, before: u64) -> u64 {
+        let lost = before.saturating_sub(self.unsaved_cycle.max(self.counted_cycle));
+        self.unwritten += lost;
+        self.counted_cycle = self.counted_cycle.max(before);
+        lost
+    }
+
     /// Everything before the cycle is on disk; a full file ends.
     fn end_second(&mut self, cycle: &CycleMessage) -> Result<(), RecordingError> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
@@ -107,7 +133,8 @@ impl Continuous {
         self.unsaved_cycle = cycle.cycle;
         if self.is_interrupted {
             self.is_interrupted = false;
-            info!("the recording goes on in {}", stream.file().path().display());
+            let (path, unwritten) = (stream.file().path().display(), self.unwritten);
+            info!(unwritten, "the recording goes on in {path}");
         }
         if let Some(full) = self.stream.take_if(|stream| stream.file().bytes() >= self.folder.file_bytes()) {
             self.ended_bytes += full.file().bytes();

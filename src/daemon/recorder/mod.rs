@@ -71,6 +71,9 @@ pub struct RecorderReport {
     pub cycles: u64,
     /// Cycles that are missing, because a queue was full.
     pub missing: u64,
+    /// Cycles that the disk did not take before memory had no room for them, or before the run ended.
+    #[serde(default)]
+    pub unwritten: u64,
     /// Bytes written, at most.
     pub bytes: u64,
     /// Whether the replica computed every cycle as the real-time thread did.
@@ -171,13 +174,20 @@ impl<'a> Recorder<'a> {
             }
         }
         self.windows.finish(&self.context, &self.tape);
-        let mut bytes = self.windows.bytes();
+        let (mut bytes, mut unwritten) = (self.windows.bytes(), 0);
         if let Some(recording) = &mut self.recording {
             recording.finish(&self.context, &self.tape);
             bytes += recording.bytes();
+            unwritten = recording.unwritten();
         }
         let usage = ThreadUsage::of_this_thread().since(&at_start);
-        RecorderReport { bytes, is_repeatable: self.replica.has_repeated_all(), usage, ..self.report }
+        RecorderReport {
+            bytes,
+            unwritten,
+            is_repeatable: self.replica.has_repeated_all(),
+            usage,
+            ..self.report
+        }
     }
 
     /// Takes cycles from the queue: how many, and whether more may come.

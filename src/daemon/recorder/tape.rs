@@ -70,11 +70,16 @@ impl Tape {
     /// The cycle at which a replay of those from a number on begins: the last with a memory up to it, else the first behind it,
     /// else the oldest kept. 0 if there is none.
     pub fn first_repeatable(&self, from: u64) -> u64 {
-        let oldest = self.cycles.front().map_or(0, |cycle| cycle.cycle);
+        let oldest = self.oldest();
         let with_memory =
             || self.memories.iter().map(|(cycle, _)| *cycle).filter(|cycle| *cycle >= oldest.max(1));
         let before = with_memory().filter(|cycle| *cycle <= from).max();
         before.or_else(|| with_memory().min()).unwrap_or(oldest)
+    }
+
+    /// Number of the oldest cycle; 0 if there is none.
+    pub fn oldest(&self) -> u64 {
+        self.cycles.front().map_or(0, |cycle| cycle.cycle)
     }
 
     /// Number of the newest cycle; 0 if there is none.

@@ -223,3 +223,46 @@ fn the_copy_of_a_memory_is_that_before_its_cycle_and_is_made_only_where_there_is
     let copy = consumer.dequeue().unwrap();
     assert_eq!((copy.cycle, crate::recording::memory_bytes(&copy.memory)), (51, before));
 }
+
+/// A disk that takes nothing for longer than memory lasts.
+#[test]
+fn a_long_outage_of_the_disk_is_counted_and_the_recording_goes_on() {
+    const OUTAGE: u64 = 45_000;
+    const END: u64 = 50_000;
+    let folder = tempfile::tempdir().unwrap();
+    let record = folder.path().join("record");
+    let loaded = loaded("");
+    let folders = Folders { record: Some(record.clone()), ..Folders::default() };
+    let mut memory_queue = MemoryQueue::new();
+    let (memories, consumer) = memory_queue.split();
+    let (recorder, links) = Recorder::new(&loaded, consumer, &folders);
+    let _ = fs::remove_dir_all(&record);
+    fs::write(&record, "no folder").unwrap();
+    let report = thread::scope(|threads| {
+        let recorder = threads.spawn(|| recorder.run());
+        let mut memories = MemoryProducer::new(memories);
+        let controller = &mut loaded.controller.clone();
+        run_cycles(controller, &mut memories, &links.cycles, 1..=OUTAGE, |_| false, |_| ());
+        fs::remove_file(&record).unwrap();
+        fs::create_dir(&record).unwrap();
+        run_cycles(controller, &mut memories, &links.cycles, OUTAGE + 1..=END, |_| false, |_| ());
+        drop(links);
+        recorder.join().unwrap()
+    });
+    let paths: Vec<_> = fs::read_dir(&record).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let [path] = paths.as_slice() else { panic!("one file: {paths:?}") };
+    let mut gaps = vec![];
+    let add_gap = |item| {
+        if let Item::Gap(gap) = item {
+            gaps.push(gap);
+        }
+    };
+    let summary = Recording::open(path).unwrap().each(add_gap).unwrap();
+    let RecorderReport { cycles, missing, unwritten, is_repeatable, .. } = report;
+    assert_eq!((cycles, missing, is_repeatable), (END, 0, true));
+    assert_eq!((summary.first.cycle, summary.cycles), (unwritten + 1, END - unwritten));
+    assert_eq!(gaps, [GapMessage { first_cycle: 1, cycles: unwritten }], "the file says so, too");
+    // Memory holds 30 s, the queue 2 s, and the disk is tried again every 2 s.
+    let least = OUTAGE - 30_000 - 2_000 - 1_000;
+    assert!((least..=OUTAGE - 30_000 + 2_100).contains(&unwritten), "{unwritten}");
+}

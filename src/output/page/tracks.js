@@ -13,6 +13,7 @@ let tracks = HEAD.tracks;
 
 function intervalColor(track, interval) {
   if (track.group === "state") return color(HEAD.states[interval.key]);
+  if (track.group === "configuration") return color(interval.key % 2 === 1 ? "stopping" : "accent");
   if (track.group === "diagnostic") return interval.key % 1000 >= 100 ? color("fault") : color("engaging");
   if (["late wake-up", "inputs late"].includes(track.name)) return color("engaging");
   if (track.group === "missed deadlines" || track.group === "recording") return color("fault");
@@ -57,7 +58,7 @@ function drawTrack(pen, track, top, width) {
     pen.fillRect(left, top + 1, long, ROW_PX - 3);
     const shownLeft = Math.max(left, Y_AXIS_PX);
     const room = Math.min(left + long, Y_AXIS_PX + width) - shownLeft - 10;
-    if (["state", "diagnostic"].includes(track.group) && pen.measureText(interval.text).width < room) {
+    if (["state", "configuration", "diagnostic"].includes(track.group) && pen.measureText(interval.text).width < room) {
       pen.fillStyle = "#ffffff";
       pen.fillText(interval.text, shownLeft + 5, top + ROW_PX / 2);
     }

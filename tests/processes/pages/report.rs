@@ -94,7 +94,18 @@ fn cycle(config: &Config, number: u64) -> CycleMessage {
 
 /// Writes cycles to files; returns the files.
 fn write(machine: &Machine, config: &Config, parts: &[core::ops::Range<u64>]) -> Vec<PathBuf> {
-    let info = RunInfo { name: "an-hour".into(), configuration: config.text.clone(), ..RunInfo::default() };
+    write_of_run(machine, config, 1, parts)
+}
+
+/// Files of the run of a daemon that has started at an instant.
+fn write_of_run(
+    machine: &Machine,
+    config: &Config,
+    clock_offset_ns: u64,
+    parts: &[core::ops::Range<u64>],
+) -> Vec<PathBuf> {
+    let (name, configuration) = ("an-hour".into(), config.text.clone());
+    let info = RunInfo { name, configuration, clock_offset_ns, ..RunInfo::default() };
     let write_part = |(k, part): (usize, &core::ops::Range<u64>)| {
         let path = machine.path(&format!("part-{k}.mcap"));
         let mut file = RecordingFile::create(&path, &info, None).unwrap();
@@ -180,16 +191,61 @@ fn an_hour_opens_shows_everything_and_zooms_to_single_cycles_of_a_fault() {
 #[test]
 fn files_of_two_runs_are_refused() {
     let machine = Machine::with("report-two", "");
-    let mut config = config(&machine);
-    let files = write(&machine, &config, &[1..5, 5..10]);
+    let config = config(&machine);
+    let files = write(&machine, &config, &[1..5]);
     let first = machine.path("first.mcap");
     fs::rename(&files[0], &first).unwrap();
-    config.text += "\n# Another deployment.\n";
-    let files = write(&machine, &config, &[10..15, 15..20]);
+    let files = write_of_run(&machine, &config, 2, &[10..15]);
     let arguments = [first.to_str().unwrap(), files[0].to_str().unwrap()];
     let page = machine.path("report.html");
     let Ended { status, stderr, .. } =
         run(&machine, &[&["report", "-o", page.to_str().unwrap()], &arguments[..]].concat());
     assert!(status.code() == Some(2) && stderr.contains("report each run alone"), "{stderr}");
     assert!(!page.exists());
+}
+
+/// Files on both sides of two reloads, in any order, are one page that shows both.
+#[test]
+fn a_run_over_reloads_is_one_page() {
+    let machine = Machine::with("report-reloads", "");
+    let old = config(&machine);
+    let text = format!("{}\n[control]\nposition_bandwidth_hz = 1.0\n", old.text);
+    let new = Config::parse(&text, "the test").unwrap();
+    let mut files = vec![];
+    for (k, (config, part)) in
+        [(&new, 300..600), (&old, 1..100), (&old, 600..800), (&old, 100..300)].iter().enumerate()
+    {
+        let written = write(&machine, config, core::slice::from_ref(part));
+        let path = machine.path(&format!("file-{k}.mcap"));
+        fs::rename(&written[0], &path).unwrap();
+        files.push(path);
+    }
+    let page = machine.path("report.html");
+    assert!(report(&machine, &files, &page).contains("799 cycles"));
+    let text = fs::read_to_string(&page).unwrap();
+    let (_, head) = text.split_once("id=\"head\">").unwrap();
+    let head: Value = serde_json::from_str(head.split("</script>").next().unwrap()).unwrap();
+    let fact = head["facts"].as_array().unwrap().iter().find(|fact| fact["name"] == "Reloads").unwrap();
+    let (there, back) =
+        ("control.position_bandwidth_hz: default -> 1.0", "control.position_bandwidth_hz: 1.0 -> default");
+    let [to_new, to_old] = [300, 600].map(|number| format!("at {:.3} s (cycle {number})", seconds(number)));
+    assert_eq!(fact["text"], format!("{to_new} {there}. Then {to_old} {back}"));
+    let track = head["tracks"].as_array().unwrap().iter().find(|it| it["group"] == "configuration").unwrap();
+    let shown: Vec<_> = track["intervals"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|it| (it["from"].clone(), it["text"].clone()))
+        .collect();
+    let expected = [
+        (1, "as started".to_string()),
+        (300, format!("reloaded: {there}")),
+        (600, format!("reloaded: {back}")),
+    ];
+    assert_eq!(shown, expected.map(|(number, text)| (json!(seconds(number)), json!(text))));
+    let texts = head["configuration"].as_str().unwrap();
+    for (k, number) in [(1, 1), (2, 300), (3, 600)] {
+        let line = format!("# Configuration {k}, from {:.3} s (cycle {number})", seconds(number));
+        assert!(texts.contains(&line), "{line}");
+    }
 }

@@ -1,0 +1,54 @@
+//! The reference of a recording at any instant: its cycles have it at the end of the hold of their forces.
+
+use std::collections::VecDeque;
+
+use crate::control::input_validation::seconds_between;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+
+/// References kept: more periods than a measurement is old.
+const KEPT: usize = 256;
+
+/// Longest time between references that belong together \[s\].
+const MAX_INTERVAL_S: f64 = 0.1;
+
+/// The last references with their instants \[ns\].
+#[derive(Default)]
+pub struct References {
+    motions: VecDeque<(u64, Motion)>,
+}
+
+impl References {
+    /// Adds the reference at a later instant; those before a pause, or before control ended, count no more.
+    pub fn add(&mut self, instant_ns: u64, motion: Option<&Motion>) {
+        let is_continued = |(before_ns, _): &(u64, Motion)| {
+            let interval_s = seconds_between(*before_ns, instant_ns);
+            interval_s > 0.0 && interval_s <= MAX_INTERVAL_S
+        };
+        if motion.is_none() || !self.motions.back().is_some_and(is_continued) {
+            self.motions.clear();
+        }
+        if self.motions.len() == KEPT {
+            self.motions.pop_front();
+        }
+        self.motions.extend(motion.map(|motion| (instant_ns, *motion)));
+    }
+
+    /// The reference at an instant: with constant jerk from one to the next, as the controller moves it; with constant
+    /// acceleration before the first and behind the last.
+    pub fn at(&self, instant_ns: u64) -> Option<Motion> {
+        let behind = self.motions.partition_point(|(begin_ns, _)| *begin_ns <= instant_ns);
+        let (begin_ns, motion) = self.motions.get(behind.saturating_sub(1))?;
+        let t = seconds_between(*begin_ns, instant_ns);
+        let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
+        let next = self.motions.get(behind).filter(|_| behind > 0);
+        let jerk = next.map_or_else(Default::default, |(end_ns, next)| {
+            (next.acceleration.vector() - a) / seconds_between(*begin_ns, *end_ns)
+        });
+        let displacement = Twist::from_vector(&((v + (a / 2.0 + jerk * (t / 6.0)) * t) * t));
+        Some(Motion {
+            pose: motion.pose.extrapolated(&displacement),
+            twist: Twist::from_vector(&(v + (a + jerk * (0.5 * t)) * t)),
+            acceleration: Acceleration::from_vector(&(a + jerk * t)),
+        })
+    }
+}
