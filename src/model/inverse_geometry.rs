@@ -147,6 +147,24 @@ pub fn leg_lengths_and_rates(machine: &Machine, pose: &Pose, twist: &Twist) -> (
     })
 }
 
+/// Lengths of [`leg_lengths`] in lanes, for a loop over poses that is one piece of code for each instruction set.
+#[inline(always)]
+pub(crate) fn length_lanes<S: Simd>(simd: S, machine: &Machine, pose: &Pose) -> LegLanes {
+    LegGeometry::new(simd, &machine.joints, pose).length.into()
+}
+
+/// Lengths and rates of [`leg_lengths_and_rates`] in lanes.
+#[inline(always)]
+pub(crate) fn length_and_rate_lanes<S: Simd>(
+    simd: S,
+    machine: &Machine,
+    pose: &Pose,
+    twist: &Twist,
+) -> (LegLanes, LegLanes) {
+    let legs = LegGeometry::new(simd, &machine.joints, pose);
+    (legs.length.into(), legs.velocity(simd, twist).rate.into())
+}
+
 /// Directions `n_i` of the six legs at a pose: unit vectors from base to platform, base axes.
 pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
     dispatch!(machine.level, simd => {

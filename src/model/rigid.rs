@@ -121,6 +121,7 @@ impl Pose {
     }
 
     /// The same without bringing R back: for a pose from which no further one follows.
+    #[inline(always)]
     pub fn extrapolated(&self, displacement: &Twist) -> Self {
         Self {
             rotation: exp(&displacement.angular) * self.rotation,
@@ -138,6 +139,7 @@ impl Pose {
 }
 
 /// Rotation by the rotation vector `w`: Rodrigues' formula, exact for every angle.
+#[inline(always)]
 pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
     let x = w.norm_squared();
     // Below 0.05 rad the series is exact to rounding, and takes a third of the time.

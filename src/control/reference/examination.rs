@@ -14,21 +14,22 @@
 //! Between knots a length may exceed its bound by 2.5e-5 of the stroke, an angle by as much at the outermost joint.
 //! An axis of the envelope narrower than four times the bound between knots is examined at the knots only.
 
+use fearless_simd::{Simd, dispatch};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
 use super::pose_bounds::PoseBounds;
-use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
+use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced_to_knot};
 use super::regularity::{RegularBalls, Regularity};
 use super::stop::Stop;
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
-use crate::model::inverse_geometry::{leg_lengths, leg_lengths_and_rates};
-use crate::model::machine::LEGS;
+use crate::model::inverse_geometry::{length_and_rate_lanes, length_lanes};
 use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
+use crate::model::triples::LegLanes;
 
 /// Departure of a length from its chord that decides the number of knots \[m\].
 const CHORD_DEPARTURE_M: f64 = 1e-4;
@@ -38,7 +39,7 @@ const RATE_DEPARTURE_RATIO: f64 = 0.01;
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: f64 = 20.0;
 /// Most knots of a stop for which a pose is factorized: bounds the work of a cycle. The balls that were found remain for the
-/// next one.
+/// next one. With two a reference that is beyond its condition by rounding would not come back.
 const MAX_FACTORIZATIONS: u32 = 5;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
@@ -70,6 +71,11 @@ pub(super) struct Examination<'a> {
     start_regularity: Option<Regularity>,
     /// Knots so far that no ball of earlier ones covers.
     factorizations: u32,
+    /// Index of the ball that covered the last knot.
+    ball: usize,
+    /// Bounds of the lengths, in lanes.
+    shortest: LegLanes,
+    longest: LegLanes,
 }
 
 impl<'a> Examination<'a> {
@@ -129,32 +135,58 @@ impl<'a> Examination<'a> {
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
             factorizations: 0,
+            ball: 0,
+            shortest: constants.machine().joints.triples.pack(&bounds.shortest),
+            longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
         })
     }
 
-    /// Examines every knot.
+    /// Examines every knot, in one piece of code for each instruction set.
+    #[inline(never)]
     pub fn run(&mut self, balls: &mut RegularBalls, start: &Pose) -> Result<(), Limit> {
-        let mut pose = *start;
-        let mut state = self.stop.at(0.0);
-        self.check(balls, &pose, &state)?;
-        for k in 1..=self.intervals as u32 {
-            let next = self.stop.at(f64::from(k) * self.dt);
-            pose = advanced(&pose, &state, &next, self.dt);
-            state = next;
-            self.check(balls, &pose, &state)?;
-        }
-        Ok(())
+        dispatch!(self.constants.machine().level, simd => self.run_in_lanes(simd, balls, start))
     }
 
-    fn check(&mut self, balls: &mut RegularBalls, pose: &Pose, state: &PoseStopState) -> Result<(), Limit> {
-        let lengths = self.check_rates(pose, state)?;
-        let Self { bounds, length_slack, length_excess, .. } = *self;
-        let legs = lengths.iter().zip(bounds.shortest.iter().zip(&bounds.longest));
-        for (length, (shortest, longest)) in legs {
-            if !((length - shortest).min(longest - length) >= length_slack - length_excess) {
-                return Err(Limit::Stroke);
+    #[inline(always)]
+    fn run_in_lanes<S: Simd>(
+        &mut self,
+        simd: S,
+        balls: &mut RegularBalls,
+        start: &Pose,
+    ) -> Result<(), Limit> {
+        let mut pose = *start;
+        let mut state = self.stop.at(0.0);
+        let mut k = 0;
+        loop {
+            self.check(simd, balls, &pose, &state)?;
+            k += 1;
+            if k > self.intervals as u32 {
+                return Ok(());
             }
+            let next = self.stop.at(f64::from(k) * self.dt);
+            pose = advanced_to_knot(&pose, &state, &next, self.dt);
+            state = next;
+        }
+    }
+
+    #[inline(always)]
+    fn check<S: Simd>(
+        &mut self,
+        simd: S,
+        balls: &mut RegularBalls,
+        pose: &Pose,
+        state: &PoseStopState,
+    ) -> Result<(), Limit> {
+        let lengths = self.check_rates(simd, pose, state)?;
+        let Self { bounds, length_slack, length_excess, .. } = *self;
+        let legs = lengths.0.iter().zip(self.shortest.0.iter().zip(&self.longest.0));
+        let room = length_slack - length_excess;
+        let has_room = legs.fold(true, |has_room, (length, (shortest, longest))| {
+            has_room & ((length - shortest).min(longest - length) >= room)
+        });
+        if !has_room {
+            return Err(Limit::Stroke);
         }
         if let Some(envelope) = &bounds.envelope {
             self.check_envelope(envelope, pose, state)?;
@@ -163,13 +195,14 @@ impl<'a> Examination<'a> {
     }
 
     /// Whether the poses around a knot are regular and keep the limit of the condition.
+    #[inline(always)]
     fn check_condition(&mut self, balls: &mut RegularBalls, pose: &Pose) -> Result<(), Limit> {
         let constants = self.constants;
         // Half of an interval on either side.
         let (v, w) = (self.stop.position.peak_velocity, self.stop.orientation.peak_velocity);
         let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
         let around = constants.parameters.condition;
-        let cover = balls.knot_cover(constants, pose, reach);
+        let cover = balls.knot_cover(constants, pose, reach, &mut self.ball);
         if cover.is_complete() {
             return Ok(());
         }
@@ -178,6 +211,7 @@ impl<'a> Examination<'a> {
             return Err(Limit::Condition);
         }
         let regularity = balls.cover_by_new(constants, pose, reach, around).ok_or(Limit::Condition)?;
+        self.ball = 0;
         let at_knot = Regularity::of_reference(constants);
         if cover.knot || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
@@ -196,15 +230,17 @@ impl<'a> Examination<'a> {
     }
 
     /// The lengths at a knot, if the rates keep their limit.
-    fn check_rates(&self, pose: &Pose, state: &PoseStopState) -> Result<[f64; LEGS], Limit> {
+    #[inline(always)]
+    fn check_rates<S: Simd>(&self, simd: S, pose: &Pose, state: &PoseStopState) -> Result<LegLanes, Limit> {
         let machine = self.constants.machine();
         if !self.needs_rates {
-            return Ok(leg_lengths(machine, pose));
+            return Ok(length_lanes(simd, machine, pose));
         }
         let twist = Twist { angular: state.orientation.velocity, linear: state.position.velocity };
-        let (lengths, rates) = leg_lengths_and_rates(machine, pose, &twist);
+        let (lengths, rates) = length_and_rate_lanes(simd, machine, pose, &twist);
         let limit = machine.actuator.max_rate - self.rate_slack;
-        if rates.iter().all(|rate| rate.abs() <= limit) { Ok(lengths) } else { Err(Limit::LegRate) }
+        let are_kept = rates.0.iter().fold(true, |are_kept, rate| are_kept & (rate.abs() <= limit));
+        if are_kept { Ok(lengths) } else { Err(Limit::LegRate) }
     }
 
     fn check_envelope(&self, envelope: &Envelope, pose: &Pose, state: &PoseStopState) -> Result<(), Limit> {

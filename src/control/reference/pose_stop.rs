@@ -57,6 +57,7 @@ impl PoseStop {
     }
 
     /// State `t` seconds after the start.
+    #[inline(always)]
     pub fn at(&self, t: f64) -> PoseStopState {
         PoseStopState { orientation: self.orientation.at(t), position: self.position.at(t) }
     }
@@ -64,10 +65,18 @@ impl PoseStop {
 
 /// Pose after the part of a stop from one state to the next, `dt` seconds later.
 pub(super) fn advanced(pose: &Pose, from: &PoseStopState, to: &PoseStopState, dt: f64) -> Pose {
+    pose.displaced(&displacement(from, to, dt))
+}
+
+/// The same without bringing the rotation back to an orthonormal matrix: for the few knots of an examination.
+#[inline(always)]
+pub(super) fn advanced_to_knot(pose: &Pose, from: &PoseStopState, to: &PoseStopState, dt: f64) -> Pose {
+    pose.extrapolated(&displacement(from, to, dt))
+}
+
+#[inline(always)]
+fn displacement(from: &PoseStopState, to: &PoseStopState, dt: f64) -> Twist {
     let turn = to.orientation.displacement - from.orientation.displacement;
     let commutator = from.orientation.velocity.cross(&to.orientation.velocity) * (dt * dt / 12.0);
-    pose.displaced(&Twist {
-        angular: turn - commutator,
-        linear: to.position.displacement - from.position.displacement,
-    })
+    Twist { angular: turn - commutator, linear: to.position.displacement - from.position.displacement }
 }

@@ -104,10 +104,22 @@ impl Ball {
     }
 
     /// How a pose differs from the centre; `None` if the ball does not cover it.
+    #[inline(always)]
     fn displacement(&self, constants: &Constants, pose: &Pose) -> Option<Displacement> {
-        let chord = ((pose.rotation - self.center.rotation).norm_squared() * 0.5).sqrt();
-        let (shift, turn) = ((pose.position - self.center.position).norm(), ANGLE_PER_CHORD * chord);
-        // D at least, times L / sqrt 6, as q >= s / L: most balls are elsewhere.
+        // D at least, times L / sqrt 6, as q >= s / L: most balls are elsewhere. First without roots, which leaves out the
+        // turn or the products of shift and turn.
+        let shift_squared = (pose.position - self.center.position).norm_squared();
+        if 2.0 * shift_squared > self.largest_change {
+            return None;
+        }
+        let (lever, reach) = (constants.arm, self.shortest + constants.arm);
+        let chord_squared = (pose.rotation - self.center.rotation).norm_squared() * 0.5;
+        let turn_squared = ANGLE_PER_CHORD * ANGLE_PER_CHORD * chord_squared;
+        if 2.0 * shift_squared + (lever * lever + reach * reach) * turn_squared > self.largest_change {
+            return None;
+        }
+        let chord = chord_squared.sqrt();
+        let (shift, turn) = (shift_squared.sqrt(), ANGLE_PER_CHORD * chord);
         let joint = shift + constants.arm * turn;
         let arm = turn * self.shortest + joint;
         let is_elsewhere = joint * joint + arm * arm > self.largest_change;
@@ -115,6 +127,7 @@ impl Ball {
     }
 
     /// Whether every pose within a reach of a displaced one is regular and has at most a condition.
+    #[inline(always)]
     fn covers(&self, constants: &Constants, displacement: &Displacement, reach: Reach, limit: f64) -> bool {
         let Self { norm, inverse_norm, shortest, universal_sine, .. } = self;
         let [shift, turn] = reach;
@@ -137,12 +150,13 @@ impl Ball {
             .is_some_and(|displacement| self.covers(constants, &displacement, reach, limit))
     }
 
-    /// What of a knot it covers.
-    fn knot_cover(&self, constants: &Constants, pose: &Pose, reach: Reach) -> KnotCover {
-        self.displacement(constants, pose).map_or_else(KnotCover::default, |displacement| KnotCover {
-            knot: self.covers(constants, &displacement, [0.0; 2], constants.reference_condition),
-            surroundings: self.covers(constants, &displacement, reach, constants.parameters.condition),
-        })
+    /// Adds what of a knot it covers.
+    #[inline(always)]
+    fn add_cover(&self, constants: &Constants, pose: &Pose, reach: Reach, cover: &mut KnotCover) {
+        let Some(displacement) = self.displacement(constants, pose) else { return };
+        let covers = |reach, limit| self.covers(constants, &displacement, reach, limit);
+        cover.knot = cover.knot || covers([0.0; 2], constants.reference_condition);
+        cover.surroundings = cover.surroundings || covers(reach, constants.parameters.condition);
     }
 }
 
@@ -169,10 +183,6 @@ impl KnotCover {
     /// Whether nothing is missing.
     pub fn is_complete(&self) -> bool {
         self.knot && self.surroundings
-    }
-
-    fn or(&self, other: &Self) -> Self {
-        Self { knot: self.knot || other.knot, surroundings: self.surroundings || other.surroundings }
     }
 }
 
@@ -209,23 +219,30 @@ impl RegularBalls {
         false
     }
 
-    /// What of a knot the balls that are kept cover.
-    pub fn knot_cover(&mut self, constants: &Constants, pose: &Pose, reach: Reach) -> KnotCover {
-        let by = |ball: &Option<Ball>| {
-            ball.as_ref().map_or_else(KnotCover::default, |ball| ball.knot_cover(constants, pose, reach))
-        };
-        let [last, others @ ..] = &mut self.balls;
-        let mut cover = by(last).or(&by(&self.too_small));
-        for ball in others {
-            if cover.is_complete() {
-                break;
+    /// What of a knot the balls that are kept cover. `first` is the index of the ball that covered the knot before: the search
+    /// begins there and goes on to newer ones, as they were found along the way.
+    #[inline(always)]
+    pub fn knot_cover(
+        &self,
+        constants: &Constants,
+        pose: &Pose,
+        reach: Reach,
+        first: &mut usize,
+    ) -> KnotCover {
+        let mut cover = KnotCover::default();
+        let begin = *first + BALL_COUNT;
+        for age in 0..BALL_COUNT {
+            let index = (begin - age) % BALL_COUNT;
+            if let Some(Some(ball)) = self.balls.get(index) {
+                ball.add_cover(constants, pose, reach, &mut cover);
+                if cover.is_complete() {
+                    *first = index;
+                    return cover;
+                }
             }
-            let next = by(ball);
-            // The next knot is near this one: its ball is tried first.
-            if next.surroundings && !cover.surroundings {
-                core::mem::swap(last, ball);
-            }
-            cover = cover.or(&next);
+        }
+        if let Some(ball) = &self.too_small {
+            ball.add_cover(constants, pose, reach, &mut cover);
         }
         cover
     }

@@ -91,6 +91,7 @@ pub(super) struct StopState {
 
 impl StopState {
     /// After `dt` seconds of constant jerk.
+    #[inline(always)]
     fn after(&self, jerk: &Vector3<f64>, dt: f64) -> Self {
         let Self { displacement, velocity, acceleration } = self;
         Self {
@@ -182,6 +183,7 @@ impl Stop {
     }
 
     /// State `t` seconds after the start; at rest from the end on.
+    #[inline(always)]
     pub fn at(&self, t: f64) -> StopState {
         let mut present = &Piece::default();
         for piece in self.pieces.iter().take(self.count) {

@@ -78,16 +78,17 @@ fn has_room(
         .map(|(length, (shortest, longest))| (length - shortest).min(longest - length))
         .fold(f64::INFINITY, f64::min)
         >= need;
-    let Some(envelope) = &bounds.envelope else { return is_within_stroke };
+    let Some(envelope) = bounds.envelope.as_ref().filter(|_| is_within_stroke) else {
+        return is_within_stroke;
+    };
     let x = task_coordinates(pose, &constants.machine().home);
     let [_, beta, ..] = x;
     let c = (beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2).cos();
     let turned = turn.length / c + slack / constants.arm;
     let needs = [turned, turned, turned, shift.length + slack, shift.length + slack, shift.length + slack];
     let Envelope { lowest, highest } = envelope;
-    is_within_stroke
-        && x.iter()
-            .zip(needs)
-            .zip(lowest.iter().zip(highest))
-            .all(|((x, need), (low, high))| (x - low).min(high - x) >= need)
+    x.iter()
+        .zip(needs)
+        .zip(lowest.iter().zip(highest))
+        .all(|((x, need), (low, high))| (x - low).min(high - x) >= need)
 }
