@@ -11,9 +11,8 @@ use serde::Deserialize;
 
 use super::methods::BASELINE;
 use super::results::{FILE, PAPER};
-use super::support::scatter::{
-    Grid, Label, Line, Mark, Point, Sample, Scatter, Width, log_range, pareto_front,
-};
+use super::support::log_axis::log_range;
+use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, pareto_front};
 use super::support::{Failure, Figures, chart};
 
 const HEXAD: usize = 0;

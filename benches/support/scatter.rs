@@ -276,11 +276,9 @@ fn draw_labels(root: &Area, points: &[(&Point, (i32, i32))]) -> Result<(), DrawE
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-
     #[test]
     fn the_front_keeps_what_nothing_beats() {
         let points = [(3.0, 1.0), (1.0, 5.0), (2.0, 6.0), (4.0, 0.9)];
-        assert_eq!(pareto_front(points.into_iter(), 0.8), [(1.0, 5.0), (3.0, 5.0), (3.0, 1.0)]);
+        assert_eq!(super::pareto_front(points.into_iter(), 0.8), [(1.0, 5.0), (3.0, 5.0), (3.0, 1.0)]);
     }
 }
