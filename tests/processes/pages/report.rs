@@ -192,10 +192,10 @@ fn an_hour_opens_shows_everything_and_zooms_to_single_cycles_of_a_fault() {
 fn files_of_two_runs_are_refused() {
     let machine = Machine::with("report-two", "");
     let config = config(&machine);
-    let files = write(&machine, &config, &[1..5]);
+    let files = write(&machine, &config, core::slice::from_ref(&(1..5)));
     let first = machine.path("first.mcap");
     fs::rename(&files[0], &first).unwrap();
-    let files = write_of_run(&machine, &config, 2, &[10..15]);
+    let files = write_of_run(&machine, &config, 2, core::slice::from_ref(&(10..15)));
     let arguments = [first.to_str().unwrap(), files[0].to_str().unwrap()];
     let page = machine.path("report.html");
     let Ended { status, stderr, .. } =
