@@ -31,6 +31,7 @@ mod measurements;
 mod motion;
 mod regularity;
 mod setpoints;
+mod tracking;
 mod universal;
 mod verification;
 
