@@ -94,23 +94,6 @@ fn a_stop_takes_little_more_than_the_shortest_way() {
     }
 }
 
-/// Where releasing the acceleration just ends at rest, whatever the rounding of `v = a^2 / 2J`.
-#[test]
-fn a_stop_that_only_releases_the_acceleration_takes_the_time_to_release_it() {
-    let mut samples = Samples::new(5);
-    let limits = DerivativeLimits { velocity: 1.0, acceleration: 6.0, jerk: 150.0 };
-    for _ in 0..20_000 {
-        let a = limits.acceleration * (0.1 + 0.9 * samples.uniform());
-        let exact = a * a / (2.0 * limits.jerk);
-        for v in [exact.next_down(), exact, exact.next_up()] {
-            let stop = Stop::planar(&(Vector3::x() * v), &(Vector3::x() * -a), &limits);
-            let release = a / limits.jerk;
-            assert!((stop.duration - release).abs() < 1e-6, "{v} {a}: {} {release}", stop.duration);
-            assert!(stop.at(0.999_999 * release).velocity.norm() < 1e-6, "{v} {a}");
-        }
-    }
-}
-
 /// The bound on the velocity is that of both parts, and no larger.
 #[test]
 fn the_peak_velocity_of_a_planar_stop_is_that_of_its_parts() {
