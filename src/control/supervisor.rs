@@ -304,4 +304,26 @@ mod tests {
         mode = after(mode, &Findings { has_ended: true, ..IN_ORDER });
         assert_eq!((mode.state, mode.diagnostic), (State::Fault, cause));
     }
+
+    #[test]
+    fn a_stop_that_ends_in_a_fault_keeps_its_cause_beside_a_later_one() {
+        let stopping = stop(FOUND, AfterStop::Fault);
+        let later = Findings { tracking: Err(DiagnosticCode::SetpointTooFast.into()), ..IN_ORDER };
+        assert_eq!(after(stopping, &later), stopping);
+        // A stop for another reason becomes one that ends in a fault.
+        let mode = after(stop(REQUESTED, AfterStop::Standby), &later);
+        assert_eq!(mode, stop(DiagnosticCode::SetpointTooFast.into(), AfterStop::Fault));
+    }
+
+    /// The reason of a stop with the value of this cycle, if it still prevents control.
+    #[test]
+    fn standby_after_a_stop_shows_the_present_value_of_its_reason() {
+        let ended = Findings { has_ended: true, ..IN_ORDER };
+        let stopping = stop(Diagnostic { value: 0.5, ..FOUND }, AfterStop::Standby);
+        let of_code = Diagnostic::from(FOUND.code);
+        for (engagement, shown) in [(Ok(()), of_code), (Err(FOUND), FOUND), (Err(OTHER), of_code)] {
+            let mode = after(stopping, &Findings { engagement, ..ended });
+            assert_eq!((mode.state, mode.diagnostic), (State::Standby, shown));
+        }
+    }
 }

@@ -93,3 +93,13 @@ fn a_stop_takes_little_more_than_the_shortest_way() {
         assert!((ways[0] - planar).abs() < 1.0 && (ways[1] - release_first).abs() < 1.0, "{a:?} {ways:?}");
     }
 }
+
+/// The bound on the velocity is that of both parts, and no larger.
+#[test]
+fn the_peak_velocity_of_a_planar_stop_is_that_of_its_parts() {
+    let [limits, ..] = LIMITS;
+    let stop = Stop::planar(&Vector3::new(0.5, 0.0, 0.0), &Vector3::new(0.0, 5.0, 0.0), &limits);
+    // Across `c^2 / 2 Jc` with `Jc = 0.8 J`.
+    let across = 25.0 / (2.0 * 400.0);
+    assert!((stop.peak_velocity - 0.5_f64.hypot(across)).abs() < 1e-12, "{}", stop.peak_velocity);
+}

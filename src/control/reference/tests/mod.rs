@@ -20,12 +20,18 @@ use crate::model::machine::{
 use crate::model::rigid::{Pose, exp};
 
 mod approach;
+mod assessment;
 mod between_knots;
 mod feedback;
+mod free_motion;
 mod generator;
 mod generator_bounds;
+mod knots;
+mod measurements;
 mod motion;
 mod regularity;
+mod setpoints;
+mod tracking;
 mod universal;
 mod verification;
 

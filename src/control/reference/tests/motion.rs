@@ -5,6 +5,7 @@ use nalgebra::Vector6;
 use super::super::constant_jerk::moved;
 use super::super::history::History;
 use super::super::pose_bounds::PoseBounds;
+use super::super::pose_stop::{PoseStop, StopKind, advanced};
 use super::super::target::at_rest;
 use super::super::{ReferenceGenerator, Target};
 use super::*;
@@ -214,5 +215,25 @@ fn a_long_step_turns_as_its_angular_velocity_says() {
         let Acceleration { angular, linear } = motion.acceleration;
         let found = moved(&motion, &angular, &linear, h);
         assert_near(&found, &integrated(&motion, &Vector6::zeros(), h), [6e-8, 1e-12, 1e-9]);
+    }
+}
+
+/// A part of a stop also: the sign of the commutator shows.
+#[test]
+fn a_part_of_a_stop_turns_as_its_angular_velocity_says() {
+    let mut samples = Samples::new(36);
+    let machine = machine(&mut samples);
+    let constants = Constants::new(&machine, parameters(&machine));
+    for _ in 0..200 {
+        let motion = moving(&mut samples, &constants);
+        let stop = PoseStop::new(StopKind::ReleaseFirst, &motion, &LIMITS);
+        // Less than the time in which the acceleration is released: the jerk is constant.
+        let h = 0.9 * 0.01_f64.min(motion.acceleration.angular.norm() / LIMITS.orientation.jerk);
+        let found = advanced(&motion.pose, &stop.at(0.0), &stop.at(h), h);
+        let jerk = motion.acceleration.angular.normalize() * -LIMITS.orientation.jerk;
+        let jerk = if h > 0.0 { jerk } else { Vector3::zeros() };
+        let whole = Acceleration { angular: jerk, linear: Vector3::zeros() };
+        let expected = integrated(&motion, &whole.vector(), h).pose;
+        assert!(found.displacement_to(&expected).angular.norm() < 2e-9, "{h}");
     }
 }

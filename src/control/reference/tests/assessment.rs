@@ -1,0 +1,218 @@
+//! Assessment of a cycle: each finding alone decides.
+
+use super::super::{ReferenceGenerator, Target};
+use super::*;
+use crate::control::assessment::{Evidence, assess};
+use crate::control::controller::{Cycle, Input, Measurement, Publishers, Setpoint, SetpointKind};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::feedback_bound::FeedbackBound;
+use crate::control::input_validation::{SetpointMotion, ValidatedSetpoint};
+use crate::control::limits::LimitSet;
+use crate::control::localization::{Localization, Located, PlatformState};
+use crate::control::state::State;
+use crate::control::supervisor::Findings;
+use crate::control::tracking_error::TrackingError;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::task::TaskState;
+use nalgebra::Vector6;
+
+/// What an assessment is made from; in order by default.
+struct Scene {
+    input: Input,
+    status: Result<(), Diagnostic>,
+    kind: SetpointKind,
+    error: Option<TrackingError>,
+    feedback: FeedbackBound,
+    trust: Result<(), Diagnostic>,
+    reports: Result<(), Diagnostic>,
+    is_ready: bool,
+    twist: Option<Twist>,
+    is_located: bool,
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self {
+            input: Input::default(),
+            status: Ok(()),
+            kind: SetpointKind::Motion,
+            error: Some(TrackingError::default()),
+            feedback: FeedbackBound::default(),
+            trust: Ok(()),
+            reports: Ok(()),
+            is_ready: true,
+            twist: Some(Twist::default()),
+            is_located: true,
+        }
+    }
+}
+
+/// A diagnostic that no check of an assessment finds itself.
+const FOUND: Diagnostic =
+    Diagnostic { code: DiagnosticCode::SetpointEnded, value: 3.0, bound: 2.0, index: 4 };
+
+impl Scene {
+    fn assess(&self, state: State) -> Findings {
+        let machine = machine(&mut Samples::new(61));
+        let constants = Constants::new(&machine, parameters(&machine));
+        let pose = *constants.home.pose();
+        let cycle = Cycle { constants: &constants, release_ns: 0, state };
+        let task = TaskState::at_rest(machine.home);
+        let motion = SetpointMotion::new(Setpoint { kind: self.kind, ..Setpoint::motion(0, task) });
+        let setpoint = ValidatedSetpoint {
+            valid: Some(&motion),
+            target: Some(Target::Motion(&motion)),
+            status: self.status,
+            active_limits: LimitSet::default(),
+        };
+        let measurement = Measurement::default();
+        let platform = PlatformState {
+            pose,
+            twist: Twist::default(),
+            condition: 2.0,
+            time_to_singularity: f64::INFINITY,
+        };
+        let located = Located { measurement: &measurement, rate: [0.0; LEGS], platform };
+        let free_motion =
+            self.twist.map(|twist| Motion { pose, twist, acceleration: Acceleration::default() });
+        let evidence = Evidence {
+            input: &self.input,
+            setpoint: &setpoint,
+            located: if self.is_located { Ok(&located) } else { Err(FOUND) },
+            error: self.error.as_ref(),
+            feedback: &self.feedback,
+            trust: self.trust,
+            reports: self.reports,
+            is_ready: self.is_ready,
+            free_motion: free_motion.as_ref(),
+        };
+        let mut reference = ReferenceGenerator::new(&constants);
+        assess(&cycle, &evidence, &Localization::new(&constants), &mut reference).0
+    }
+
+    fn tracking(&self, state: State) -> Option<DiagnosticCode> {
+        self.assess(state).tracking.err().map(|found| found.code)
+    }
+
+    /// Of the start and of the engagement, on standby.
+    fn beginning(&self) -> [Option<DiagnosticCode>; 2] {
+        let Findings { start, engagement, .. } = self.assess(State::Standby);
+        [start, engagement].map(|result| result.err().map(|found| found.code))
+    }
+}
+
+/// An error along one axis of its four parts.
+fn error(part: usize, size: f64) -> TrackingError {
+    let mut error = TrackingError::default();
+    let TrackingError { pose, twist } = &mut error;
+    let parts = [&mut pose.linear, &mut pose.angular, &mut twist.linear, &mut twist.angular];
+    parts.into_iter().nth(part).unwrap().y = size;
+    error
+}
+
+#[test]
+fn each_finding_alone_ends_the_tracking() {
+    const CONTROLLED: [State; 4] = [State::Engaging, State::Active, State::Stopping, State::Parking];
+    for state in CONTROLLED {
+        assert_eq!(Scene::default().tracking(state), None);
+        assert_eq!(Scene { error: None, ..Scene::default() }.tracking(state), None);
+        let found = Some(FOUND.code);
+        assert_eq!(Scene { reports: Err(FOUND), ..Scene::default() }.tracking(state), found);
+        assert_eq!(Scene { trust: Err(FOUND), ..Scene::default() }.tracking(state), found);
+        let input = Input { deadline_missed: true, ..Input::default() };
+        let late = Some(DiagnosticCode::DeadlineMissed);
+        assert_eq!(Scene { input, ..Scene::default() }.tracking(state), late);
+        // A setpoint matters where it is followed.
+        let is_followed = matches!(state, State::Engaging | State::Active);
+        let lost = Scene { status: Err(FOUND), ..Scene::default() };
+        assert_eq!(lost.tracking(state), found.filter(|_| is_followed));
+        for (part, code) in [
+            (0, DiagnosticCode::FollowingError),
+            (1, DiagnosticCode::FollowingError),
+            (2, DiagnosticCode::VelocityError),
+            (3, DiagnosticCode::VelocityError),
+        ] {
+            let bound = if part < 2 { 0.05 } else { 0.3 };
+            let found = |share: f64| {
+                Scene { error: Some(error(part, share * bound)), ..Scene::default() }.tracking(state)
+            };
+            assert_eq!((found(0.99), found(1.01)), (None, Some(code)), "{part}");
+        }
+        let mut feedback = FeedbackBound::default();
+        let machine = machine(&mut Samples::new(61));
+        let constants = Constants::new(&machine, parameters(&machine));
+        let cycle = Cycle { constants: &constants, release_ns: 0, state };
+        for _ in 0..102 {
+            feedback.limit(&cycle, &Acceleration::default(), &Vector6::repeat(1e3));
+        }
+        let saturated = Some(DiagnosticCode::FeedbackSaturated);
+        assert_eq!(Scene { feedback, ..Scene::default() }.tracking(state), saturated);
+    }
+    // Without control nothing is tracked.
+    assert_eq!(Scene { trust: Err(FOUND), ..Scene::default() }.tracking(State::Standby), None);
+}
+
+#[test]
+fn each_finding_alone_prevents_control() {
+    assert_eq!(Scene::default().beginning(), [None; 2]);
+    let both = |code: DiagnosticCode| [Some(code); 2];
+    assert_eq!(Scene { reports: Err(FOUND), ..Scene::default() }.beginning(), both(FOUND.code));
+    let two = Publishers { counting: 7, ignored: 8 };
+    let input = Input { measured_publishers: two, ..Input::default() };
+    let code = DiagnosticCode::TwoMeasuredSources;
+    assert_eq!(Scene { input, ..Scene::default() }.beginning(), both(code));
+    // What a drive reports comes before what is said of the setpoint.
+    let reports = Err(DiagnosticCode::MeasurementLost.into());
+    let scene = Scene { reports, status: Err(FOUND), ..Scene::default() };
+    assert_eq!(scene.beginning(), both(DiagnosticCode::MeasurementLost));
+    // The first reason is that of the engagement.
+    assert_eq!(Scene { input, status: Err(FOUND), ..Scene::default() }.beginning(), both(code));
+    let input = Input { setpoint_publishers: two, ..Input::default() };
+    let code = DiagnosticCode::TwoSetpointSources;
+    assert_eq!(Scene { input, ..Scene::default() }.beginning(), [None, Some(code)]);
+    assert_eq!(Scene { status: Err(FOUND), ..Scene::default() }.beginning(), [None, Some(FOUND.code)]);
+    let code = DiagnosticCode::PlatformMoving;
+    assert_eq!(Scene { twist: None, ..Scene::default() }.beginning(), both(code));
+    let fast = Twist { linear: Vector3::x() * 2.0, ..Twist::default() };
+    assert_eq!(Scene { twist: Some(fast), ..Scene::default() }.beginning(), both(code));
+    assert_eq!(
+        Scene { is_located: false, ..Scene::default() }.assess(State::Standby).localization,
+        Err(FOUND)
+    );
+    assert_eq!(
+        Scene { error: None, ..Scene::default() }.beginning(),
+        [None, Some(DiagnosticCode::NoSetpoint)]
+    );
+}
+
+#[test]
+fn control_begins_on_a_motion_within_the_tolerance_and_on_any_target() {
+    let machine = machine(&mut Samples::new(61));
+    let law = parameters(&machine).law;
+    let (shift, turn) = (law.position.stiffness.sqrt(), law.orientation.stiffness.sqrt());
+    for (part, wn) in [(0, 1.0), (1, 1.0), (2, shift), (3, turn)] {
+        for kind in [SetpointKind::Motion, SetpointKind::Target] {
+            let found = |share: f64| {
+                let error = Some(error(part, share * 0.01 * wn));
+                Scene { error, kind, ..Scene::default() }.beginning()[1]
+            };
+            let too_far = (kind == SetpointKind::Motion).then_some(DiagnosticCode::SetpointTooFar);
+            assert_eq!((found(0.99), found(1.01)), (None, too_far), "{part} {kind:?}");
+        }
+    }
+}
+
+#[test]
+fn engaging_ends_on_the_setpoint_once_the_drives_are_ready() {
+    for (state, is_ready, has_ended) in [
+        (State::Engaging, true, true),
+        (State::Engaging, false, false),
+        (State::Parking, true, true),
+        (State::Parking, false, true),
+        (State::Stopping, false, true),
+        (State::Active, true, false),
+        (State::Standby, true, false),
+    ] {
+        assert_eq!(Scene { is_ready, ..Scene::default() }.assess(state).has_ended, has_ended, "{state:?}");
+    }
+}

@@ -1,0 +1,81 @@
+//! Regularity at the knots of a stop near a bound: of the pose itself, of the poses around it, and the work for it.
+
+use super::super::pose_bounds::PoseBounds;
+use super::super::pose_stop::StopKind;
+use super::super::regularity::{KnotCover, RegularBalls};
+use super::super::target::at_rest;
+use super::super::verification::{Step, verify};
+use super::verification::Scene;
+use super::*;
+use crate::control::limits::Limit;
+use crate::model::inverse_geometry::universal_sine;
+
+/// Between knots a leg may come half as near to the first axis of its universal joint, at a knot it may not: but for the return
+/// of a reference that is there already.
+#[test]
+fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
+    let mut samples = Samples::new(91);
+    for _ in 0..20 {
+        let machine = machine(&mut samples);
+        let mut constants = Constants::new(&machine, parameters(&machine));
+        let pose = pose(&mut samples, &constants);
+        (constants.reference_condition, constants.parameters.condition) = (1e4, 1e9);
+        let mut bounds = PoseBounds::nominal(&constants);
+        (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
+        let verified = |constants: &Constants, from: Option<&Pose>| {
+            let step = Step { from, ..Step::default() };
+            verify(constants, &bounds, &mut RegularBalls::default(), &at_rest(&pose), &step)
+        };
+        let sine = universal_sine(&machine, &pose);
+        constants.universal_sine = 0.99 * sine;
+        assert_eq!(verified(&constants, None), Ok(StopKind::ReleaseFirst));
+        constants.universal_sine = 1.01 * sine;
+        assert_eq!(verified(&constants, None), Err(Limit::Condition));
+        assert_eq!(verified(&constants, Some(&pose)), Ok(StopKind::Planar));
+        constants.universal_sine = 2.02 * sine;
+        assert_eq!(verified(&constants, Some(&pose)), Err(Limit::Condition));
+    }
+}
+
+/// A ball that covers a knot and not the poses around it leaves a knot to examine.
+#[test]
+fn a_knot_is_covered_with_the_poses_around_it() {
+    let mut samples = Samples::new(92);
+    for _ in 0..20 {
+        let machine = machine(&mut samples);
+        let constants = Constants::new(&machine, parameters(&machine));
+        let pose = pose(&mut samples, &constants);
+        let covered = |balls: &mut RegularBalls, reach: f64| {
+            let cover = balls.knot_cover(&constants, &pose, [reach, 0.0]);
+            [cover.knot, cover.surroundings, cover.is_complete()]
+        };
+        let mut balls = RegularBalls::default();
+        assert_eq!(covered(&mut balls, 0.0), [false; 3]);
+        // Too small for its reach, it is kept all the same for the knot itself.
+        assert!(!balls.cover(&constants, &pose, [10.0, 0.0], constants.reference_condition));
+        assert_eq!(covered(&mut balls, 0.0), [true; 3]);
+        assert_eq!(covered(&mut balls, 10.0), [true, false, false]);
+    }
+    for (knot, surroundings) in [(false, false), (false, true), (true, false), (true, true)] {
+        assert_eq!(KnotCover { knot, surroundings }.is_complete(), knot && surroundings);
+    }
+}
+
+/// A stop that needs more balls than a cycle may compute is refused, and accepted in a later cycle with those that were kept.
+#[test]
+fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
+    let mut samples = Samples::new(93);
+    let mut later = 0;
+    for _ in 0..2000 {
+        let mut scene = Scene::new(&mut samples);
+        scene.constants.parameters.condition = 60.0;
+        scene.constants.reference_condition = 50.0;
+        let mut balls = RegularBalls::default();
+        let mut verified =
+            || verify(&scene.constants, &scene.bounds, &mut balls, &scene.motion, &Step::default());
+        if verified() == Err(Limit::Condition) {
+            later += u32::from((0..3).any(|_| verified().is_ok()));
+        }
+    }
+    assert!(later > 4, "{later}");
+}

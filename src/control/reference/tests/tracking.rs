@@ -1,0 +1,79 @@
+//! Errors under control: a measurement that leaves the prediction ends the trust, one that is not new changes no error.
+
+use nalgebra::Vector6;
+
+use super::super::ReferenceGenerator;
+use super::super::target::at_rest;
+use super::*;
+use crate::control::controller::{Cycle, Measurement};
+use crate::control::diagnostic::DiagnosticCode;
+use crate::control::localization::{Localization, Located, PlatformState};
+use crate::control::state::State;
+use crate::control::tracking_error::{ErrorTracker, TrackingError};
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::rigid::Twist;
+
+const MS: u64 = 1_000_000;
+
+/// Updates of a tracker that began at 0: the error, for each a time stamp \[ms\] and a displacement from home.
+fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, Twist)]) -> TrackingError {
+    let home = *constants.home.pose();
+    let mut reference = ReferenceGenerator::new(constants);
+    reference.start(constants, 0, &at_rest(&home));
+    tracker.start(constants, 0, 0);
+    let mut error = TrackingError::default();
+    for (k, (time_ms, displacement)) in measured.iter().enumerate() {
+        let pose = home.displaced(displacement);
+        let length = leg_lengths(constants.machine(), &pose);
+        let measurement =
+            Measurement { time_ns: time_ms * MS, length, rate: Some([0.0; LEGS]), ..Measurement::default() };
+        let platform = PlatformState {
+            pose,
+            twist: Twist::default(),
+            condition: 2.0,
+            time_to_singularity: f64::INFINITY,
+        };
+        let mut located = Located { measurement: &measurement, rate: [0.0; LEGS], platform };
+        let cycle = Cycle { constants, release_ns: (k as u64 + 1) * MS, state: State::Active };
+        error = tracker.update(&cycle, &reference, &Localization::new(constants), &mut located);
+    }
+    error
+}
+
+#[test]
+fn a_leg_that_leaves_the_prediction_ends_the_trust() {
+    let machine = machine(&mut Samples::new(74));
+    let constants = Constants::new(&machine, parameters(&machine));
+    let bound = constants.estimator.innovation_bound(1e-3);
+    for axis in 0..3 {
+        let direction = Vector3::ith(axis, 1.0);
+        let mut unit = Vector6::zeros();
+        unit.fixed_rows_mut::<3>(3).copy_from(&direction);
+        let of_legs = leg_wrenches(&machine, constants.home.pose()).tr_mul(&unit).abs();
+        let largest = of_legs.max();
+        // The last two: the platform is farther away than the bound, then also its farthest leg.
+        for (distance, is_trusted) in [(0.99, true), (0.97 / largest, true), (1.03 / largest, false)] {
+            let mut tracker = ErrorTracker::default();
+            let displacement = Twist { linear: direction * (distance * bound), ..Twist::default() };
+            updated(&constants, &mut tracker, &[(1, displacement)]);
+            let found = tracker.check_trust().err();
+            assert_eq!(found.is_none(), is_trusted, "{axis} {distance}");
+            if let Some(found) = found {
+                assert_eq!(found.code, DiagnosticCode::MeasurementImplausible);
+                assert!(of_legs[found.index as usize - 1] > 0.99 * largest, "{axis}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn in_modes_on_legs_the_error_stays_that_of_the_last_measurement() {
+    let machine = machine(&mut Samples::new(74));
+    let mut parameters = parameters(&machine);
+    parameters.law.mode = ControlMode::JointPd;
+    let constants = Constants::new(&machine, parameters);
+    let displacement = Twist { linear: Vector3::new(1e-3, -2e-3, 3e-3), ..Twist::default() };
+    let error = updated(&constants, &mut ErrorTracker::default(), &[(1, displacement); 3]);
+    assert!((error.pose.linear + displacement.linear).norm() < 1e-12, "{error:?}");
+    assert!(error.pose.angular.norm() < 1e-12 && error.twist.vector().norm() < 1e-12, "{error:?}");
+}
