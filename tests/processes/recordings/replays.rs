@@ -16,7 +16,7 @@ use hexad::recording::RunInfo;
 use hexad::recording::reader::Recording;
 
 use super::{about, files, read, replays_exactly, start_recording};
-use crate::support::children::{Ended, HANG, Hexad, hexad};
+use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::operator::ask;
 use crate::support::trio::start_plant;
@@ -65,7 +65,6 @@ fn holds(machine: &Machine) {
     let (_, cycles) = read(file);
     let seen: BTreeSet<u32> = cycles.iter().map(|cycle| cycle.state).collect();
     other_processors_repeat(file);
-    another_system_repeats(machine, file);
     for state in [State::Active, State::Fault] {
         assert!(seen.contains(&(state as u32)), "{state:?} in {seen:?}");
     }
@@ -171,15 +170,6 @@ fn other_processors_repeat(file: &Path) {
 
 #[cfg(not(target_arch = "x86_64"))]
 fn other_processors_repeat(_: &Path) {}
-
-/// So does a system whose C library may use neither AVX2 nor FMA, and rounds its functions in other places.
-fn another_system_repeats(machine: &Machine, file: &Path) {
-    let mut command = hexad();
-    command.arg("replay").arg(file).env("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F");
-    let Ended { status, stdout, stderr } = Hexad::spawn(machine, "replay", command).ends_within(HANG);
-    assert_eq!(status.code(), Some(0), "{stdout}{stderr}");
-    assert!(stdout.contains("repeated: every output is the same to the bit\n"), "{stdout}");
-}
 
 fn a_window_becomes_a_table(machine: &Machine, window: &Path) {
     let table = machine.path("window.csv");
