@@ -46,7 +46,7 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         let constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
         let covered = |balls: &mut RegularBalls, reach: f64| {
-            let cover = balls.knot_cover(&constants, &pose, [reach, 0.0]);
+            let cover = balls.knot_cover(&constants, &pose, [reach, 0.0], &mut 0);
             [cover.knot, cover.surroundings, cover.is_complete()]
         };
         let mut balls = RegularBalls::default();
