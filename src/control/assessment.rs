@@ -4,7 +4,7 @@ use super::controller::{Cycle, Input, Publishers, SetpointKind};
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::feedback_bound::FeedbackBound;
 use super::input_validation::ValidatedSetpoint;
-use super::limits::{Limit, LimitSet};
+use super::limits::{Limit, LimitSet, largest_ratio};
 use super::localization::{Localization, Located};
 use super::parameters::Parameters;
 use super::reference::{ReferenceGenerator, Target};
@@ -141,19 +141,19 @@ fn check_following_error(
     let Some(TrackingError { pose, twist }) = error else { return Ok(()) };
     let Parameters { following_position, following_orientation, .. } = parameters;
     let Parameters { following_velocity, following_angular_velocity, .. } = parameters;
-    let distances = [pose.linear.norm() / following_position, pose.angular.norm() / following_orientation];
-    let rates = [twist.linear.norm() / following_velocity, twist.angular.norm() / following_angular_velocity];
-    for (ratios, code) in
-        [(distances, DiagnosticCode::FollowingError), (rates, DiagnosticCode::VelocityError)]
-    {
-        // One after the other: the larger of a number and none is the number.
-        for ratio in ratios {
-            if !active.check(Limit::Following, ratio) {
-                return Err(Diagnostic::new(code, ratio, 1.0));
-            }
-        }
+    let ratio =
+        largest_ratio([pose.linear.norm() / following_position, pose.angular.norm() / following_orientation]);
+    if !active.check(Limit::Following, ratio) {
+        return Err(Diagnostic::new(DiagnosticCode::FollowingError, ratio, 1.0));
     }
-    Ok(())
+    let ratio = largest_ratio([
+        twist.linear.norm() / following_velocity,
+        twist.angular.norm() / following_angular_velocity,
+    ]);
+    if active.check(Limit::Following, ratio) {
+        return Ok(());
+    }
+    Err(Diagnostic::new(DiagnosticCode::VelocityError, ratio, 1.0))
 }
 
 fn check_deadline(input: &Input) -> Result<(), Diagnostic> {

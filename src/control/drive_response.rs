@@ -10,10 +10,9 @@
 //! ```
 //!
 //! d is what has changed lately: a payload and friction change slowly, or are there when control begins. Angles count by the radius of the
-//! platform. A force is missing if `cos` is near 1 and f_i a good part of what was sent before, against noise, friction and payloads. All
-//! are missing if d is that part of `B Gamma`.
+//! platform. A force is missing if `cos` is near 1 and f_i a good part of what was sent before, against noise, friction and payloads.
 //!
-//! It does not see a leg that carries little: friction may be as large. That the drive of a leg pushes more than it should shows in the
+//! It does not see a leg that carries little, as friction may be as large, nor several drives at once. That the drive of a leg pushes more than it should shows in the
 //! lengths.
 
 use nalgebra::{Matrix6, Vector6};
@@ -114,14 +113,6 @@ impl DriveResponse {
             if along * along >= least * square && force >= bound && force <= MOST_MISSING_RATIO * sent.abs() {
                 missing = Some(Diagnostic::new(DiagnosticCode::DriveForceMissing, force, bound).at(leg));
             }
-        }
-        let of_all = by_force * self.usual_force;
-        let (along, square) = (of_all.dot(sudden), of_all.norm_squared());
-        let largest = self.usual_force.amax();
-        if along * along >= least * square && along >= LEAST_MISSING_RATIO * square {
-            let force = along / square * largest;
-            let bound = LEAST_MISSING_RATIO * largest;
-            missing = Some(Diagnostic::new(DiagnosticCode::DriveForceMissing, force, bound));
         }
         self.missing_s = if missing.is_some() { self.missing_s + dt } else { 0.0 };
         missing.filter(|_| self.missing_s > LEAST_MISSING_S).map_or(Ok(()), Err)

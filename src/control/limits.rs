@@ -81,6 +81,14 @@ impl Limit {
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct LimitSet(pub u32);
 
+/// The largest of quantities over their bounds. No number if any is none: `f64::max` would take the number, and a check would
+/// pass.
+pub fn largest_ratio<const N: usize>(ratios: [f64; N]) -> f64 {
+    let larger =
+        |largest: f64, ratio: f64| if largest.is_nan() || ratio <= largest { largest } else { ratio };
+    ratios.into_iter().fold(0.0, larger)
+}
+
 /// Part of a bound from which on its limit is in the set: the operator is warned before the bound is exceeded.
 const WARNING_RATIO: f64 = 0.9;
 

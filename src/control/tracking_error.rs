@@ -12,6 +12,7 @@ use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::drive_response::DriveResponse;
 use super::estimator::{ErrorState, Estimator, FrozenSensors};
 use super::input_validation::ValidatedSetpoint;
+use super::limits::largest_ratio;
 use super::localization::{Localization, Located};
 use super::parameters::{Constants, Parameters};
 use super::reference::ReferenceGenerator;
@@ -46,16 +47,13 @@ impl TrackingError {
     /// divided by `wn = sqrt(Kp)`, so that it compares with a pose error.
     pub(super) fn tolerance_ratio(&self, parameters: &Parameters) -> f64 {
         let Parameters { law, engage_position, engage_orientation, .. } = parameters;
-        let ratio = |pose: f64, rate: f64, tolerance: f64, stiffness: f64| {
-            pose.max(rate / stiffness.sqrt()) / tolerance
-        };
         let Self { pose, twist } = self;
-        ratio(pose.linear.norm(), twist.linear.norm(), *engage_position, law.position.stiffness).max(ratio(
-            pose.angular.norm(),
-            twist.angular.norm(),
-            *engage_orientation,
-            law.orientation.stiffness,
-        ))
+        largest_ratio([
+            pose.linear.norm() / engage_position,
+            pose.angular.norm() / engage_orientation,
+            twist.linear.norm() / (law.position.stiffness.sqrt() * engage_position),
+            twist.angular.norm() / (law.orientation.stiffness.sqrt() * engage_orientation),
+        ])
     }
 }
 

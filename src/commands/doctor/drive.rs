@@ -27,6 +27,8 @@ enum DriveError {
         "too little motion under control is recorded; record 20 s or more of `hexad move --motion sines`"
     )]
     TooLittle,
+    #[error("recordings of two machines: {0} and {1}; measure each alone")]
+    TwoMachines(String, String),
     #[error(
         "the motion does not show the delay: {:.2} ms with a standard deviation of {:.2} ms; record a longer or faster one, such as \
          `hexad move --motion sines`, with larger [limits]", 1e3 * .0.delay_s, 1e3 * .0.deviation_s
@@ -52,7 +54,7 @@ struct Report {
 
 /// Measures the delay, and prints it or writes it as JSON.
 pub fn run(recordings: &[PathBuf], json: bool, report: Option<&PathBuf>) -> Result<(), Failure> {
-    let (mut stretches, mut config) = (vec![], None);
+    let (mut stretches, mut config): (_, Option<Config>) = (vec![], None);
     for path in recordings {
         let recording = Recording::open(path)?;
         let mut reader = StretchReader::default();
@@ -63,7 +65,11 @@ pub fn run(recordings: &[PathBuf], json: bool, report: Option<&PathBuf>) -> Resu
         })?;
         reader.end();
         stretches.append(&mut reader.stretches);
-        config = Some(Config::parse(&summary.info.configuration, "configuration of the recording")?);
+        let recorded = Config::parse(&summary.info.configuration, "configuration of the recording")?;
+        if let Some(other) = config.filter(|other| other.name != recorded.name) {
+            return Err(DriveError::TwoMachines(other.name, recorded.name).into());
+        }
+        config = Some(recorded);
     }
     let config = config.ok_or(DriveError::TooLittle)?;
     let found = drive_delay(&config.machine, &stretches).ok_or(DriveError::TooLittle)?;

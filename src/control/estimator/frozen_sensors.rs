@@ -17,20 +17,20 @@ use crate::model::machine::LEGS;
 
 /// Equal readings in a row from which on a sensor may be frozen: fewer happen by chance with coarse steps.
 const MIN_EQUAL_READINGS: u32 = 3;
-/// Motion of the reference that six equal lengths allow, and one in a loop of 10 Hz \[m\]. A drive with stiction of a thousandth of its
-/// largest force leaves 6 and 33 um.
+/// Motion of the reference that six equal lengths allow, and one in a loop of 10 Hz \[m\]. A drive with stiction of a
+/// thousandth of its largest force leaves 6 and 33 um.
 const ALL_LEGS_BOUND_M: f64 = 15e-6;
 const ONE_LEG_BOUND_M: f64 = 45e-6;
 /// Natural frequency of that loop squared \[1/s^2\].
 const BOUND_STIFFNESS: f64 = 3948.0;
 /// Most for a loop with less.
 const MAX_ONE_LEG_BOUND_M: f64 = 1.5e-4;
-/// Stiction that the model may lack, as a ratio of the largest force: of a platform that crawls, feedback for the false error of a frozen sensor
-/// is more long before the reference has moved that far.
+/// Stiction that the model may lack, as a ratio of the largest force. While a platform crawls, feedback pushes a leg whose
+/// sensor is frozen harder than this long before the reference has moved by the bounds above.
 const STICTION_RATIO: f64 = 0.0015;
-/// From then on such a force counts \[s\]: in faster motion a leg does not stay within a step for so long.
+/// A force beyond that ends control only after readings were equal for so long \[s\]: a leg that is not frozen leaves its step sooner.
 const LONG_S: f64 = 0.05;
-/// And from this motion of the reference on \[m\], or in steps of the sensor.
+/// The reference has to have moved as well: by this length \[m\], and by so many steps of the sensor.
 const LEAST_MOTION_M: f64 = 5e-6;
 const LEAST_MOTION_STEPS: f64 = 10.0;
 /// Equal readings in a row of a sensor whose noise is one step, and of any with noise: by chance at most once in 1e12, with one

@@ -13,7 +13,7 @@ use super::setpoint_motion::SetpointMotion;
 use super::{LastValid, check_stroke, check_time_stamp, seconds_between};
 use crate::control::controller::{Cycle, Setpoint, SetpointKind};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::limits::{Limit, LimitSet, Limits};
+use crate::control::limits::{Limit, LimitSet, Limits, largest_ratio};
 use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::pose_samples::PoseSamples;
 use crate::control::reference::{ReferenceGenerator, Target};
@@ -231,9 +231,12 @@ fn check_velocity_and_acceleration(
 ) -> Result<(), Diagnostic> {
     let Motion { twist, acceleration, .. } = motion;
     let Limits { orientation, position, .. } = &parameters.limits;
-    let velocity = (twist.angular.norm() / orientation.velocity).max(twist.linear.norm() / position.velocity);
-    let acceleration = (acceleration.angular.norm() / orientation.acceleration)
-        .max(acceleration.linear.norm() / position.acceleration);
+    let velocity =
+        largest_ratio([twist.angular.norm() / orientation.velocity, twist.linear.norm() / position.velocity]);
+    let acceleration = largest_ratio([
+        acceleration.angular.norm() / orientation.acceleration,
+        acceleration.linear.norm() / position.acceleration,
+    ]);
     for (limit, ratio) in [(Limit::Velocity, velocity), (Limit::Acceleration, acceleration)] {
         if !active.check(limit, ratio) {
             return Err(Diagnostic::new(DiagnosticCode::SetpointTooFast, ratio, 1.0));

@@ -39,7 +39,7 @@ const RATE_DEPARTURE_RATIO: f64 = 0.01;
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: f64 = 20.0;
 /// Most knots of a stop for which a pose is factorized: bounds the work of a cycle. The balls that were found remain for the
-/// next one. With two a reference that is beyond its condition by rounding would not come back.
+/// next one.
 const MAX_FACTORIZATIONS: u32 = 5;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.

@@ -137,6 +137,7 @@ fn each_finding_alone_ends_the_tracking() {
                 Scene { error: Some(error(part, share * bound)), ..Scene::default() }.tracking(state)
             };
             assert_eq!((found(0.99), found(1.01)), (None, Some(code)), "{part}");
+            assert_eq!(found(f64::NAN), Some(code), "{part}: no number in one part alone");
         }
         let mut feedback = FeedbackBound::default();
         let machine = machine(&mut Samples::new(61));
