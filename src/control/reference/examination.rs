@@ -19,8 +19,9 @@ use fearless_simd::{Simd, dispatch};
 use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
+use super::angle_ranges::{AngleRanges, MAX_SLACK_RATIO, cosine_of_beta};
 use super::pose_bounds::PoseBounds;
-use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced_to_knot};
+use super::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
 use super::regularity::{RegularBalls, Regularity};
 use super::stop::Stop;
 use super::verification::Step;
@@ -35,44 +36,44 @@ use crate::model::triples::LegLanes;
 const CHORD_DEPARTURE_M: f64 = 1e-4;
 /// Departure of a leg's rate from its chord that does so, over the largest rate.
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
-/// Bounds on the number of intervals between knots: the last bounds the work of a cycle.
+/// Bounds on the number of intervals between knots.
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: f64 = 20.0;
-/// Most knots of a stop for which a pose is factorized: bounds the work of a cycle. The balls that were found remain for the
-/// next one.
-const MAX_FACTORIZATIONS: u32 = 5;
+/// Most work of an examination, in knots; that of a knot that no ball covers, beyond it: its pose is factorized. Together
+/// they bound the longest cycle. The balls that were found remain for the next one.
+const MAX_WORK: u32 = 27;
+const FACTORIZATION_WORK: u32 = 2;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;
 /// Relative allowance for rounding.
 const ROUNDING: f64 = 1e-9;
-/// Part of the width of an axis of the envelope that the bound between knots may use.
-const MAX_SLACK_RATIO: f64 = 0.25;
+/// Allowance for the rounding of an angle \[rad\].
+const ANGLE_ROUNDING: f64 = 1e-15;
 
 /// Examination of a planar stop at knots.
 pub(super) struct Examination<'a> {
     constants: &'a Constants,
     bounds: &'a PoseBounds,
-    stop: PoseStop,
+    stop: &'a PoseStop,
     intervals: f64,
     dt: f64,
     /// Departures of a length \[m\] and of a rate \[m/s\] from their chords, and of C per coordinate \[m\].
     length_slack: f64,
     rate_slack: f64,
     position_slack: Vector3<f64>,
-    /// Whether rates could exceed their limit, and angles leave the envelope.
+    /// Whether rates could exceed their limit, and the ranges of the angles if they could leave the envelope.
     needs_rates: bool,
-    needs_angles: bool,
+    angles: Option<AngleRanges>,
     /// The pose from which the step leads. Where rounding left it beyond a bound, a stop may be as far beyond: or the
     /// reference could not return.
     from: Option<&'a Pose>,
     length_excess: f64,
-    /// Its regularity, once it is needed.
+    /// Its regularity, and the envelope with room for it, once they are needed.
     start_regularity: Option<Regularity>,
-    /// Knots so far that no ball of earlier ones covers.
-    factorizations: u32,
-    /// Index of the ball that covered the last knot.
-    ball: usize,
+    relaxed: Option<(Envelope, AngleRanges)>,
+    /// What is left of the work.
+    work: u32,
     /// Bounds of the lengths, in lanes.
     shortest: LegLanes,
     longest: LegLanes,
@@ -82,12 +83,12 @@ impl<'a> Examination<'a> {
     pub fn new(
         constants: &'a Constants,
         bounds: &'a PoseBounds,
+        stop: &'a PoseStop,
         motion: &Motion,
         step: &Step<'a>,
     ) -> Result<Self, Limit> {
         let limits = &constants.parameters.limits;
         let Limits { orientation, position, .. } = limits;
-        let stop = PoseStop::new(StopKind::Planar, motion, limits);
         let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
         let allowed = 1.0 + ROUNDING;
         let [angular_bulge, linear_bulge] = step.bulge();
@@ -128,14 +129,14 @@ impl<'a> Examination<'a> {
             rate_slack: rate_curvature * chord,
             position_slack: position_curvature * chord,
             needs_rates,
-            needs_angles: bounds.envelope.as_ref().is_some_and(|envelope| {
-                !have_angles_room(constants, envelope, &motion.pose, &stop.orientation)
+            angles: bounds.envelope.as_ref().and_then(|envelope| {
+                angles_without_room(constants, envelope, &motion.pose, &stop.orientation)
             }),
             from: step.from,
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
-            factorizations: 0,
-            ball: 0,
+            relaxed: None,
+            work: MAX_WORK.saturating_sub(intervals as u32 + 1),
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
@@ -191,27 +192,28 @@ impl<'a> Examination<'a> {
         if let Some(envelope) = &bounds.envelope {
             self.check_envelope(envelope, pose, state)?;
         }
-        self.check_condition(balls, pose)
+        self.check_condition(simd, balls, pose)
     }
 
     /// Whether the poses around a knot are regular and keep the limit of the condition.
     #[inline(always)]
-    fn check_condition(&mut self, balls: &mut RegularBalls, pose: &Pose) -> Result<(), Limit> {
+    fn check_condition<S: Simd>(
+        &mut self,
+        simd: S,
+        balls: &mut RegularBalls,
+        pose: &Pose,
+    ) -> Result<(), Limit> {
         let constants = self.constants;
         // Half of an interval on either side.
         let (v, w) = (self.stop.position.peak_velocity, self.stop.orientation.peak_velocity);
         let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
         let around = constants.parameters.condition;
-        let cover = balls.knot_cover(constants, pose, reach, &mut self.ball);
+        let cover = balls.knot_cover(simd, constants, pose, reach);
         if cover.is_complete() {
             return Ok(());
         }
-        self.factorizations += 1;
-        if self.factorizations > MAX_FACTORIZATIONS {
-            return Err(Limit::Condition);
-        }
+        self.work = self.work.checked_sub(FACTORIZATION_WORK).ok_or(Limit::Condition)?;
         let regularity = balls.cover_by_new(constants, pose, reach, around).ok_or(Limit::Condition)?;
-        self.ball = 0;
         let at_knot = Regularity::of_reference(constants);
         if cover.knot || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
@@ -243,50 +245,79 @@ impl<'a> Examination<'a> {
         if are_kept { Ok(lengths) } else { Err(Limit::LegRate) }
     }
 
-    fn check_envelope(&self, envelope: &Envelope, pose: &Pose, state: &PoseStopState) -> Result<(), Limit> {
-        let p = &self.position_slack;
-        let slacks = [p.x, p.y, p.z];
-        let mut axes = pose.position.iter().zip(slacks).zip(ranges(envelope).skip(3));
-        let is_within = axes.all(|((x, slack), range)| is_inside(*x, slack, range));
-        if is_within && !self.needs_angles {
-            return Ok(());
-        }
-        let x = task_coordinates(pose, &self.constants.machine().home);
-        let [_, beta, ..] = x;
-        let (s, c) = (beta.sin().abs(), beta.cos().abs());
-        let w = state.orientation.velocity.norm()
-            + self.constants.parameters.limits.orientation.acceleration * self.dt;
-        let angular = self.stop.orientation.peak_velocity.min(w);
-        let alpha = self.constants.parameters.limits.orientation.acceleration;
-        let is_turning = self.stop.orientation.duration > 0.0;
-        let curvature = alpha / c + angular * angular * (1.0 + c + 3.0 * s) / (c * c);
-        let room = ROOM_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
-        let turned = if is_turning { (curvature * self.dt * self.dt / 8.0 - room).max(0.0) } else { 0.0 };
-        let is_within = is_within
-            && x.iter().zip(ranges(envelope)).take(3).all(|(x, range)| is_inside(*x, turned, range));
-        if is_within || self.is_nearer_than_start(envelope, &x) { Ok(()) } else { Err(Limit::Envelope) }
+    #[inline(always)]
+    fn check_envelope(
+        &mut self,
+        envelope: &Envelope,
+        pose: &Pose,
+        state: &PoseStopState,
+    ) -> Result<(), Limit> {
+        let is_within = is_position_inside(envelope, pose, &self.position_slack)
+            && self.angles.is_none_or(|angles| angles.contain(&pose.rotation, self.angle_slack(pose, state)));
+        if is_within || self.is_nearer_than_start(envelope, pose) { Ok(()) } else { Err(Limit::Envelope) }
     }
 
-    /// Whether the start of the step is beyond the envelope, and X no farther beyond it.
+    /// Departure of the angles from their chords around a knot \[rad\].
+    #[inline(always)]
+    fn angle_slack(&self, pose: &Pose, state: &PoseStopState) -> f64 {
+        if !(self.stop.orientation.duration > 0.0) {
+            return 0.0;
+        }
+        let (s, c) = (pose.rotation.m13.abs(), cosine_of_beta(&pose.rotation));
+        let alpha = self.constants.parameters.limits.orientation.acceleration;
+        let w = state.orientation.velocity.norm() + alpha * self.dt;
+        let w = self.stop.orientation.peak_velocity.min(w);
+        let curvature = alpha / c + w * w * (1.0 + c + 3.0 * s) / (c * c);
+        let room = ROOM_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
+        (curvature * self.dt * self.dt / 8.0 - room).max(0.0)
+    }
+
+    /// Whether the start of the step is beyond the envelope, and a pose no farther beyond it.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    fn is_nearer_than_start(&self, envelope: &Envelope, x: &[f64; 6]) -> bool {
+    fn is_nearer_than_start(&mut self, envelope: &Envelope, pose: &Pose) -> bool {
         let Some(from) = self.from else { return false };
-        let from = task_coordinates(from, &self.constants.machine().home);
-        let excess = |x: f64, (low, high): (&f64, &f64)| (low - x).max(x - high);
-        let mut axes = from.iter().zip(x).zip(ranges(envelope));
-        axes.all(|((from, x), range)| excess(*x, range) <= excess(*from, range).max(0.0))
-            && from.iter().zip(ranges(envelope)).any(|(from, range)| excess(*from, range) > 0.0)
+        let home = &self.constants.machine().home;
+        let (relaxed, angles) = self.relaxed.get_or_insert_with(|| {
+            let x = task_coordinates(from, home);
+            let relaxed = relaxed(envelope, &x);
+            (relaxed, AngleRanges::new(&relaxed, &x))
+        });
+        relaxed != envelope
+            && is_position_inside(relaxed, pose, &Vector3::zeros())
+            && angles.contain(&pose.rotation, -ANGLE_ROUNDING)
     }
 }
 
-/// Whether the angles have room for every rotation of a stop, in any direction.
-fn have_angles_room(constants: &Constants, envelope: &Envelope, pose: &Pose, stop: &Stop) -> bool {
+/// The ranges of the angles, if they lack room for some rotation of a stop.
+fn angles_without_room(
+    constants: &Constants,
+    envelope: &Envelope,
+    pose: &Pose,
+    stop: &Stop,
+) -> Option<AngleRanges> {
     let x = task_coordinates(pose, &constants.machine().home);
     let [_, beta, ..] = x;
     let turn = stop.peak_velocity * stop.duration;
     let need = turn / (beta.abs() + turn).min(core::f64::consts::FRAC_PI_2).cos();
-    x.iter().zip(ranges(envelope)).take(3).all(|(x, (low, high))| (x - low).min(high - x) >= need)
+    let have_room =
+        x.iter().zip(ranges(envelope)).take(3).all(|(x, (low, high))| (x - low).min(high - x) >= need);
+    (!have_room).then(|| AngleRanges::new(envelope, &x))
+}
+
+/// An envelope with room for X.
+fn relaxed(envelope: &Envelope, x: &[f64; 6]) -> Envelope {
+    let mut relaxed = *envelope;
+    relaxed.lowest.iter_mut().zip(x).for_each(|(low, x)| *low = low.min(*x));
+    relaxed.highest.iter_mut().zip(x).for_each(|(high, x)| *high = high.max(*x));
+    relaxed
+}
+
+#[inline(always)]
+fn is_position_inside(envelope: &Envelope, pose: &Pose, slack: &Vector3<f64>) -> bool {
+    let Envelope { lowest: [_, _, _, x0, y0, z0], highest: [_, _, _, x1, y1, z1] } = envelope;
+    let p = &pose.position;
+    is_inside(p.x, slack.x, (x0, x1)) & is_inside(p.y, slack.y, (y0, y1)) & is_inside(p.z, slack.z, (z0, z1))
 }
 
 /// Whether a coordinate has a distance from both ends of its range, or a part of the range that is narrower.

@@ -23,15 +23,18 @@ pub(super) enum Phase {
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct HeldStop {
     pub(super) phase: Phase,
-    /// While it is followed.
+    /// Of a planar stop, or while it is followed: the other is planned once it is needed.
     pub(super) stop: PoseStop,
     state: PoseStopState,
     pub(super) elapsed_s: f64,
 }
 
 impl HeldStop {
-    /// Holds the stop of a kind, verified from the present motion on.
-    pub fn hold(&mut self, kind: StopKind) {
+    /// Holds the stop of a kind, verified from the present motion on; a planar one as it was planned.
+    pub fn hold(&mut self, kind: StopKind, planar: &mut PoseStop) {
+        if let StopKind::Planar = kind {
+            core::mem::swap(&mut self.stop, planar);
+        }
         self.phase = Phase::Verified(kind);
     }
 
@@ -50,7 +53,10 @@ impl HeldStop {
     pub fn acceleration(&self, motion: &Motion, limits: &Limits, h: f64) -> Acceleration {
         let PoseStopState { orientation, position } = match self.phase {
             Phase::AtRest => PoseStopState::default(),
-            Phase::Verified(kind) => PoseStop::new(kind, motion, limits).at(h),
+            Phase::Verified(StopKind::ReleaseFirst) => {
+                PoseStop::new(StopKind::ReleaseFirst, motion, limits).at(h)
+            }
+            Phase::Verified(StopKind::Planar) => self.stop.at(h),
             Phase::Followed => self.stop.at(self.elapsed_s + h),
         };
         Acceleration { angular: orientation.acceleration, linear: position.acceleration }
@@ -60,11 +66,10 @@ impl HeldStop {
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
     pub fn follow(&mut self, motion: &Motion, limits: &Limits, h: f64) -> Motion {
-        if let Phase::AtRest = self.phase {
-            self.begin(PoseStop::new(StopKind::ReleaseFirst, &at_rest(&motion.pose), limits));
-        }
-        if let Phase::Verified(kind) = self.phase {
-            self.begin(PoseStop::new(kind, motion, limits));
+        match self.phase {
+            Phase::AtRest => self.begin(StopKind::ReleaseFirst, &at_rest(&motion.pose), limits),
+            Phase::Verified(kind) => self.begin(kind, motion, limits),
+            Phase::Followed => {}
         }
         self.elapsed_s += h;
         let next = self.stop.at(self.elapsed_s);
@@ -78,7 +83,10 @@ impl HeldStop {
         }
     }
 
-    fn begin(&mut self, stop: PoseStop) {
-        *self = Self { phase: Phase::Followed, state: stop.at(0.0), elapsed_s: 0.0, stop };
+    fn begin(&mut self, kind: StopKind, motion: &Motion, limits: &Limits) {
+        if let StopKind::ReleaseFirst = kind {
+            self.stop = PoseStop::new(kind, motion, limits);
+        }
+        (self.phase, self.state, self.elapsed_s) = (Phase::Followed, self.stop.at(0.0), 0.0);
     }
 }

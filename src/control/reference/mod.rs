@@ -13,6 +13,7 @@
 //! | `stop` | stop of a vector in closed form |
 //! | `verification` | whether a stop keeps the limits along its way |
 //! | `examination` | a stop near a bound, knot by knot |
+//! | `angle_ranges` | whether angles are within their ranges |
 //! | `pose_stop` | stop of position and orientation |
 //! | `held_stop` | the stop that is held ready, and followed |
 //! | `regularity` | balls of poses proved regular, for the limit of the condition |
@@ -34,10 +35,9 @@ use self::held_stop::HeldStop;
 use self::history::History;
 use self::pose_bounds::PoseBounds;
 use self::pose_stop::StopKind;
-use self::regularity::RegularBalls;
 pub use self::target::Target;
 use self::target::at_rest;
-use self::verification::{Step, verify};
+use self::verification::{Step, Verifier};
 use self::walls::Walls;
 use super::input_validation::{SetpointMotion, seconds_between};
 use super::limits::{Limit, LimitSet};
@@ -45,6 +45,7 @@ use super::parameters::{Constants, Parameters, ViolationPolicy};
 use super::tracking_error::TrackingError;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
+mod angle_ranges;
 mod approach;
 mod components;
 mod constant_jerk;
@@ -80,7 +81,7 @@ pub struct ReferenceGenerator {
     mean_acceleration: Acceleration,
     stop: HeldStop,
     bounds: PoseBounds,
-    balls: RegularBalls,
+    verifier: Verifier,
     history: History,
     /// Share of the limits for closing the distance to a target.
     closing_scale: f64,
@@ -98,7 +99,7 @@ impl ReferenceGenerator {
             mean_acceleration: Acceleration::default(),
             stop: HeldStop::default(),
             bounds: PoseBounds::nominal(constants),
-            balls: RegularBalls::default(),
+            verifier: Verifier::default(),
             history: History::default(),
             closing_scale: 1.0,
             active_limits: LimitSet::default(),
@@ -111,7 +112,7 @@ impl ReferenceGenerator {
     pub fn check_start(&mut self, constants: &Constants, pose: &Pose, twist: &Twist) -> Result<(), Limit> {
         let motion = Motion { twist: *twist, ..at_rest(pose) };
         let bounds = PoseBounds::around(constants, pose);
-        verify(constants, &bounds, &mut self.balls, &motion, &Step::default()).map(drop)
+        self.verifier.verify(constants, &bounds, &motion, &Step::default()).map(drop)
     }
 
     /// Begins with a motion at an instant. A stop must exist for it.
@@ -120,8 +121,8 @@ impl ReferenceGenerator {
     pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
         (self.motion, self.time_ns) = (*motion, time_ns);
         self.bounds = PoseBounds::around(constants, &motion.pose);
-        let verified = verify(constants, &self.bounds, &mut self.balls, &self.motion, &Step::default());
-        self.stop.hold(verified.unwrap_or(StopKind::Planar));
+        let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &Step::default());
+        self.stop.hold(verified.unwrap_or(StopKind::Planar), &mut self.verifier.planar);
         self.history.clear();
     }
 
@@ -212,7 +213,7 @@ impl ReferenceGenerator {
             let (now, next) = (&self.motion.acceleration, &motion.acceleration);
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
             let step = Step { from: Some(&self.motion.pose), duration: step_s, change };
-            match verify(constants, &self.bounds, &mut self.balls, &motion, &step) {
+            match self.verifier.verify(constants, &self.bounds, &motion, &step) {
                 Ok(kind) => Some((motion, kind)),
                 Err(limit) => {
                     self.active_limits = self.active_limits.with(limit, true);
@@ -223,7 +224,7 @@ impl ReferenceGenerator {
         self.components = self.components.after(verified.is_some());
         let next = match verified {
             Some((motion, kind)) => {
-                self.stop.hold(kind);
+                self.stop.hold(kind, &mut self.verifier.planar);
                 motion
             }
             None => self.stop.follow(&self.motion, &constants.parameters.limits, step_s),
@@ -267,7 +268,7 @@ impl ReferenceGenerator {
         }
         if constants.parameters.on_violation == ViolationPolicy::Limit {
             let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
-            let restricting = walls.restrict(&mut turn, &mut shift);
+            let restricting = walls.restrict(constants.machine().level, &mut turn, &mut shift);
             if !restricting.is_empty() {
                 turning.limit_velocity(&mut turn);
                 shifting.limit_velocity(&mut shift);

@@ -14,9 +14,9 @@
 //! ```
 //!
 //! The same bounds as those of a cell in the search for the workspace. A ball found once holds for many cycles.
+//! All balls of a group are tried at once: a lane each, without a branch, so that the work does not depend on which one covers.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 
 use crate::control::parameters::Constants;
 use crate::model::inverse_geometry::universal_sine;
@@ -24,8 +24,10 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
 
-/// Balls kept: those along one stop.
-const BALL_COUNT: usize = 16;
+/// Balls side by side: one in each lane.
+const LANES: usize = 8;
+/// Of the balls that are kept: those along one stop.
+const GROUPS: usize = 2;
 
 /// Square of the largest Frobenius norm of N: six directions, and six arms whose mean square is 1.
 const MAX_WRENCH_NORM_SQUARED: f64 = 12.0;
@@ -46,7 +48,7 @@ pub(super) struct Regularity {
 impl Regularity {
     /// That of a pose.
     pub fn at(constants: &Constants, pose: &Pose) -> Self {
-        Ball::new(constants, pose).regularity()
+        Ball::new(constants, pose).regularity
     }
 
     /// What the reference must keep.
@@ -68,19 +70,98 @@ impl Regularity {
     }
 }
 
-/// Centre of a ball.
-#[derive(Clone, Copy, Debug)]
+/// Balls in lanes: a column holds the same number of each. One without legs covers nothing.
+#[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-struct Ball {
-    center: Pose,
+struct BallGroup {
+    /// Centre: position, and rotation column by column.
+    position: [[f64; LANES]; 3],
+    rotation: [[f64; LANES]; 9],
     /// F, B, and the length of the shortest leg \[m\].
+    norm: [f64; LANES],
+    inverse_norm: [f64; LANES],
+    shortest: [f64; LANES],
+    /// Least sine of the angle between a leg and the first axis of its universal joint.
+    universal_sine: [f64; LANES],
+}
+
+impl BallGroup {
+    /// Puts a ball around a pose into a lane.
+    fn set(&mut self, lane: usize, center: &Pose, ball: &Ball) {
+        let put = |column: &mut [f64; LANES], number: f64| {
+            if let Some(lane) = column.get_mut(lane) {
+                *lane = number;
+            }
+        };
+        self.position.iter_mut().zip(center.position.as_slice()).for_each(|(column, x)| put(column, *x));
+        self.rotation.iter_mut().zip(center.rotation.as_slice()).for_each(|(column, r)| put(column, *r));
+        put(&mut self.norm, ball.norm);
+        put(&mut self.inverse_norm, ball.inverse_norm);
+        put(&mut self.shortest, ball.shortest);
+        put(&mut self.universal_sine, ball.regularity.universal_sine);
+    }
+
+    /// How far a pose is from each centre.
+    #[inline(always)]
+    fn displacements<S: Simd>(&self, simd: S, pose: &Pose) -> Displacements<S> {
+        let squared = |columns: &[[f64; LANES]], numbers: &[f64]| {
+            let columns = columns.iter().zip(numbers);
+            let differences = columns
+                .map(|(center, number)| f64x8::splat(simd, *number) - f64x8::load_array(simd, *center));
+            differences.fold(f64x8::splat(simd, 0.0), |sum, difference| sum + difference * difference)
+        };
+        let shift = squared(&self.position, pose.position.as_slice()).sqrt();
+        let half = f64x8::splat(simd, 0.5);
+        let chord = (squared(&self.rotation, pose.rotation.as_slice()) * half).sqrt();
+        let turn = chord * f64x8::splat(simd, ANGLE_PER_CHORD);
+        Displacements { shift, turn, chord }
+    }
+
+    /// Whether every pose within a reach of a displaced one is regular and has at most a condition, by any ball.
+    #[inline(always)]
+    fn covers<S: Simd>(
+        &self,
+        simd: S,
+        constants: &Constants,
+        displacements: &Displacements<S>,
+        [shift, turn]: Reach,
+        limit: f64,
+    ) -> bool {
+        let splat = |number: f64| f64x8::splat(simd, number);
+        let load = |column: &[f64; LANES]| f64x8::load_array(simd, *column);
+        let (norm, inverse_norm) = (load(&self.norm), load(&self.inverse_norm));
+        let (shortest, universal_sine) = (load(&self.shortest), load(&self.universal_sine));
+        let turn = displacements.turn + splat(turn);
+        let moved = displacements.shift + splat(shift) + splat(constants.arm) * turn;
+        let left = shortest - moved;
+        let turned_squared = moved * moved / (shortest * left);
+        let turned_leg = turned_squared.sqrt();
+        let turned_arm = turn + turned_leg;
+        let change = (splat(6.0) * (turned_squared + turned_arm * turned_arm)).sqrt();
+        let largest_norm = (norm + change).min(splat(MAX_WRENCH_NORM_SQUARED.sqrt()));
+        let least_sine = splat(least_universal_sine(constants, limit));
+        let is_covered = left.simd_gt(splat(0.0))
+            & displacements.chord.simd_le(splat(MAX_CHORD))
+            & (universal_sine - turned_leg).simd_ge(least_sine)
+            & (largest_norm * inverse_norm).simd_le(splat(limit) * (splat(1.0) - inverse_norm * change));
+        is_covered.any_true()
+    }
+}
+
+/// Bounds on how far a pose is from each centre: shift \[m\] and turn \[rad\], and the chord of the turn.
+struct Displacements<S: Simd> {
+    shift: f64x8<S>,
+    turn: f64x8<S>,
+    chord: f64x8<S>,
+}
+
+/// A ball without its centre.
+struct Ball {
     norm: f64,
     inverse_norm: f64,
     shortest: f64,
-    /// Least sine of the angle between a leg and the first axis of its universal joint.
-    universal_sine: f64,
-    /// Square of the largest D for the loosest limit of the condition, times `L^2 / 6`.
-    largest_change: f64,
+    /// Of the centre.
+    regularity: Regularity,
 }
 
 impl Ball {
@@ -89,86 +170,13 @@ impl Ball {
         let kinematic_state = KinematicState::new(machine, *center);
         let Sensitivity { condition, norm, .. } = *kinematic_state.sensitivity();
         let shortest = kinematic_state.lengths(machine).into_iter().fold(f64::INFINITY, f64::min);
-        let universal_sine = universal_sine(machine, center);
-        let inverse_norm = condition / norm;
-        let limit = constants.parameters.condition.max(constants.reference_condition);
-        let change = ((limit - condition) / (inverse_norm * (1.0 + limit)))
-            .max(1.0 / inverse_norm - MAX_WRENCH_NORM_SQUARED.sqrt() / limit);
-        let largest_change = change.max(0.0).powi(2) * shortest * shortest / 6.0;
-        Self { center: *center, norm, inverse_norm, shortest, universal_sine, largest_change }
-    }
-
-    /// Of the centre.
-    fn regularity(&self) -> Regularity {
-        Regularity { condition: self.norm * self.inverse_norm, universal_sine: self.universal_sine }
-    }
-
-    /// How a pose differs from the centre; `None` if the ball does not cover it.
-    #[inline(always)]
-    fn displacement(&self, constants: &Constants, pose: &Pose) -> Option<Displacement> {
-        // D at least, times L / sqrt 6, as q >= s / L: most balls are elsewhere. First without roots, which leaves out the
-        // turn or the products of shift and turn.
-        let shift_squared = (pose.position - self.center.position).norm_squared();
-        if 2.0 * shift_squared > self.largest_change {
-            return None;
-        }
-        let (lever, reach) = (constants.arm, self.shortest + constants.arm);
-        let chord_squared = (pose.rotation - self.center.rotation).norm_squared() * 0.5;
-        let turn_squared = ANGLE_PER_CHORD * ANGLE_PER_CHORD * chord_squared;
-        if 2.0 * shift_squared + (lever * lever + reach * reach) * turn_squared > self.largest_change {
-            return None;
-        }
-        let chord = chord_squared.sqrt();
-        let (shift, turn) = (shift_squared.sqrt(), ANGLE_PER_CHORD * chord);
-        let joint = shift + constants.arm * turn;
-        let arm = turn * self.shortest + joint;
-        let is_elsewhere = joint * joint + arm * arm > self.largest_change;
-        (!is_elsewhere && chord <= MAX_CHORD).then_some(Displacement { shift, turn })
-    }
-
-    /// Whether every pose within a reach of a displaced one is regular and has at most a condition.
-    #[inline(always)]
-    fn covers(&self, constants: &Constants, displacement: &Displacement, reach: Reach, limit: f64) -> bool {
-        let Self { norm, inverse_norm, shortest, universal_sine, .. } = self;
-        let [shift, turn] = reach;
-        let turn = displacement.turn + turn;
-        let moved = displacement.shift + shift + constants.arm * turn;
-        let left = shortest - moved;
-        let turned_squared = moved * moved / (shortest * left);
-        let turned_leg = turned_squared.sqrt();
-        let turned_arm = turn + turned_leg;
-        let change = (6.0 * (turned_squared + turned_arm * turned_arm)).sqrt();
-        let largest_norm = (norm + change).min(MAX_WRENCH_NORM_SQUARED.sqrt());
-        let least_sine = least_universal_sine(constants, limit);
-        left > 0.0
-            && universal_sine - turned_leg >= least_sine
-            && largest_norm * inverse_norm <= limit * (1.0 - inverse_norm * change)
-    }
-
-    fn covers_pose(&self, constants: &Constants, pose: &Pose, reach: Reach, limit: f64) -> bool {
-        self.displacement(constants, pose)
-            .is_some_and(|displacement| self.covers(constants, &displacement, reach, limit))
-    }
-
-    /// Adds what of a knot it covers.
-    #[inline(always)]
-    fn add_cover(&self, constants: &Constants, pose: &Pose, reach: Reach, cover: &mut KnotCover) {
-        let Some(displacement) = self.displacement(constants, pose) else { return };
-        let covers = |reach, limit| self.covers(constants, &displacement, reach, limit);
-        cover.knot = cover.knot || covers([0.0; 2], constants.reference_condition);
-        cover.surroundings = cover.surroundings || covers(reach, constants.parameters.condition);
+        let regularity = Regularity { condition, universal_sine: universal_sine(machine, center) };
+        Self { norm, inverse_norm: condition / norm, shortest, regularity }
     }
 }
 
 /// Poses around one: a shift \[m\] and a turn \[rad\].
 pub(super) type Reach = [f64; 2];
-
-/// Bounds on how far a pose is from the centre of a ball: shift \[m\] and turn \[rad\].
-#[derive(Clone, Copy, Debug)]
-struct Displacement {
-    shift: f64,
-    turn: f64,
-}
 
 /// What of a knot is proved to be regular.
 #[derive(Clone, Copy, Debug, Default)]
@@ -190,9 +198,11 @@ impl KnotCover {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct RegularBalls {
-    balls: [Option<Ball>; BALL_COUNT],
-    /// Around the pose that was tried last, if it was too small for its reach.
-    too_small: Option<Ball>,
+    groups: [BallGroup; GROUPS],
+    /// Index of the group that covered the last pose.
+    recent: usize,
+    /// Number of balls that were kept, modulo those that can be: the next one takes the place of the oldest.
+    kept: usize,
 }
 
 impl RegularBalls {
@@ -204,45 +214,47 @@ impl RegularBalls {
 
     /// The same by the balls that are kept.
     fn cover_by_known(&mut self, constants: &Constants, pose: &Pose, reach: Reach, limit: f64) -> bool {
-        let [last, others @ ..] = &mut self.balls;
-        let covers = |ball: &Option<Ball>| {
-            ball.as_ref().is_some_and(|ball| ball.covers_pose(constants, pose, reach, limit))
-        };
-        if covers(last) {
-            return true;
-        }
-        // The next pose is near this one: its ball is tried first.
-        if let Some(ball) = others.iter_mut().find(|ball| covers(ball)) {
-            core::mem::swap(last, ball);
-            return true;
-        }
-        false
+        dispatch!(constants.machine().level, simd => {
+            for index in self.recent_first() {
+                if let Some(group) = self.groups.get(index) {
+                    let displacements = group.displacements(simd, pose);
+                    if group.covers(simd, constants, &displacements, reach, limit) {
+                        self.recent = index;
+                        return true;
+                    }
+                }
+            }
+            false
+        })
     }
 
-    /// What of a knot the balls that are kept cover. `first` is the index of the ball that covered the knot before: the search
-    /// begins there and goes on to newer ones, as they were found along the way.
+    /// The groups: next to a pose there is another of the same way, so the last one that covered is tried first.
     #[inline(always)]
-    pub fn knot_cover(
-        &self,
+    fn recent_first(&self) -> impl Iterator<Item = usize> + use<> {
+        let recent = self.recent;
+        (0..GROUPS).map(move |k| (recent + k) % GROUPS)
+    }
+
+    /// What of a knot the balls that are kept cover.
+    #[inline(always)]
+    pub fn knot_cover<S: Simd>(
+        &mut self,
+        simd: S,
         constants: &Constants,
         pose: &Pose,
         reach: Reach,
-        first: &mut usize,
     ) -> KnotCover {
         let mut cover = KnotCover::default();
-        let begin = *first + BALL_COUNT;
-        for age in 0..BALL_COUNT {
-            let index = (begin - age) % BALL_COUNT;
-            if let Some(Some(ball)) = self.balls.get(index) {
-                ball.add_cover(constants, pose, reach, &mut cover);
-                if cover.is_complete() {
-                    *first = index;
-                    return cover;
-                }
+        for index in self.recent_first() {
+            let Some(group) = self.groups.get(index) else { continue };
+            let displacements = group.displacements(simd, pose);
+            let covers = |reach, limit| group.covers(simd, constants, &displacements, reach, limit);
+            cover.knot = cover.knot || covers([0.0; 2], constants.reference_condition);
+            cover.surroundings = cover.surroundings || covers(reach, constants.parameters.condition);
+            if cover.is_complete() {
+                self.recent = index;
+                return cover;
             }
-        }
-        if let Some(ball) = &self.too_small {
-            ball.add_cover(constants, pose, reach, &mut cover);
         }
         cover
     }
@@ -258,15 +270,20 @@ impl RegularBalls {
         limit: f64,
     ) -> Option<Regularity> {
         let ball = Ball::new(constants, pose);
-        if !ball.covers_pose(constants, pose, reach, limit) {
-            self.too_small = Some(ball);
+        let index = self.kept / LANES;
+        let group = self.groups.get_mut(index)?;
+        group.set(self.kept % LANES, pose, &ball);
+        // No other ball of the group does. One that is too small for its reach may cover a knot: it stays until the next one.
+        let is_covered = dispatch!(constants.machine().level, simd => {
+            let displacements = group.displacements(simd, pose);
+            group.covers(simd, constants, &displacements, reach, limit)
+        });
+        if !is_covered {
             return None;
         }
-        self.balls.rotate_right(1);
-        if let Some(first) = self.balls.first_mut() {
-            *first = Some(ball);
-        }
-        Some(ball.regularity())
+        self.recent = index;
+        self.kept = (self.kept + 1) % (GROUPS * LANES);
+        Some(ball.regularity)
     }
 }
 

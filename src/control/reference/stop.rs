@@ -106,7 +106,6 @@ impl StopState {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Piece {
-    begin: f64,
     state: StopState,
     jerk: Vector3<f64>,
 }
@@ -117,6 +116,8 @@ struct Piece {
 pub(super) struct Stop {
     pieces: [Piece; MAX_PIECES],
     count: usize,
+    /// When each piece begins \[s\]; infinite where there is none.
+    begins: [f64; MAX_PIECES],
     /// Bound on the velocity.
     pub peak_velocity: f64,
     /// \[s\]
@@ -185,14 +186,13 @@ impl Stop {
     /// State `t` seconds after the start; at rest from the end on.
     #[inline(always)]
     pub fn at(&self, t: f64) -> StopState {
-        let mut present = &Piece::default();
-        for piece in self.pieces.iter().take(self.count) {
-            if piece.begin > t {
-                break;
-            }
-            present = piece;
+        // All are compared, without a branch: most are called one after the other, at knots in different pieces.
+        let begun = self.begins.iter().map(|begin| usize::from(*begin <= t)).sum::<usize>();
+        let index = begun.saturating_sub(1);
+        match (self.pieces.get(index), self.begins.get(index)) {
+            (Some(Piece { state, jerk }), Some(begin)) => state.after(jerk, t - begin),
+            _ => StopState::default(),
         }
-        present.state.after(&present.jerk, t - present.begin)
     }
 }
 
@@ -205,7 +205,8 @@ struct Pieces {
 impl Pieces {
     fn new(v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
         let end = StopState { velocity: *v, acceleration: *a, ..StopState::default() };
-        Self { stop: Stop::default(), end }
+        let stop = Stop { begins: [f64::INFINITY; MAX_PIECES], ..Stop::default() };
+        Self { stop, end }
     }
 
     /// Appends a piece.
@@ -213,9 +214,9 @@ impl Pieces {
         if !(dt > 0.0) {
             return;
         }
-        let Self { stop: Stop { pieces, count, duration, .. }, end } = self;
-        if let Some(piece) = pieces.get_mut(*count) {
-            *piece = Piece { begin: *duration, state: *end, jerk };
+        let Self { stop: Stop { pieces, count, begins, duration, .. }, end } = self;
+        if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
+            (*piece, *begin) = (Piece { state: *end, jerk }, *duration);
             *count += 1;
             *duration += dt;
             *end = end.after(&jerk, dt);
@@ -239,9 +240,9 @@ impl Pieces {
     /// Ends at rest.
     fn finish(mut self, peak_velocity: f64) -> Stop {
         let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
-        let Stop { pieces, count, duration, .. } = &mut self.stop;
-        if let Some(piece) = pieces.get_mut(*count) {
-            *piece = Piece { begin: *duration, state: rest, jerk: Vector3::zeros() };
+        let Stop { pieces, count, begins, duration, .. } = &mut self.stop;
+        if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
+            (*piece, *begin) = (Piece { state: rest, jerk: Vector3::zeros() }, *duration);
             *count += 1;
         }
         Stop { peak_velocity, ..self.stop }

@@ -8,7 +8,7 @@ use nalgebra::ComplexField as _;
 
 use super::examination::{Examination, curvature};
 use super::pose_bounds::PoseBounds;
-use super::pose_stop::StopKind;
+use super::pose_stop::{PoseStop, StopKind};
 use super::regularity::RegularBalls;
 use super::stop::{StopExtent, release_first_extent};
 use crate::control::limits::{Limit, Limits};
@@ -35,30 +35,43 @@ impl Step<'_> {
     }
 }
 
-/// Verifies a step and the stop from the motion at its end. Returns which stop, or the limit that no stop was proved to keep.
-pub(super) fn verify(
-    constants: &Constants,
-    bounds: &PoseBounds,
-    balls: &mut RegularBalls,
-    motion: &Motion,
-    step: &Step<'_>,
-) -> Result<StopKind, Limit> {
-    let Limits { orientation, position, .. } = &constants.parameters.limits;
-    let Motion { pose, twist, acceleration } = motion;
-    let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
-    let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
-    let [angular_bulge, linear_bulge] = step.bulge();
-    let is_free = shift.peak_velocity + linear_bulge <= position.velocity
-        && turn.peak_velocity + angular_bulge <= orientation.velocity
-        && shift.peak_velocity + constants.arm * turn.peak_velocity <= constants.machine().actuator.max_rate
-        && has_room(constants, bounds, pose, &shift, &turn, step.duration)
-        && balls.cover(constants, pose, [shift.length, turn.length], constants.reference_condition);
-    if is_free {
-        return Ok(StopKind::ReleaseFirst);
+/// What verifications leave for the next one.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Verifier {
+    pub balls: RegularBalls,
+    /// The planar stop that was examined last.
+    pub planar: PoseStop,
+}
+
+impl Verifier {
+    /// Verifies a step and the stop from the motion at its end. Returns which stop, or the limit that no stop was proved to
+    /// keep.
+    pub fn verify(
+        &mut self,
+        constants: &Constants,
+        bounds: &PoseBounds,
+        motion: &Motion,
+        step: &Step<'_>,
+    ) -> Result<StopKind, Limit> {
+        let Limits { orientation, position, .. } = &constants.parameters.limits;
+        let Motion { pose, twist, acceleration } = motion;
+        let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
+        let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
+        let [angular_bulge, linear_bulge] = step.bulge();
+        let is_free = shift.peak_velocity + linear_bulge <= position.velocity
+            && turn.peak_velocity + angular_bulge <= orientation.velocity
+            && shift.peak_velocity + constants.arm * turn.peak_velocity
+                <= constants.machine().actuator.max_rate
+            && has_room(constants, bounds, pose, &shift, &turn, step.duration)
+            && self.balls.cover(constants, pose, [shift.length, turn.length], constants.reference_condition);
+        if is_free {
+            return Ok(StopKind::ReleaseFirst);
+        }
+        self.planar = PoseStop::new(StopKind::Planar, motion, &constants.parameters.limits);
+        Examination::new(constants, bounds, &self.planar, motion, step)?.run(&mut self.balls, pose)?;
+        Ok(StopKind::Planar)
     }
-    let mut examination = Examination::new(constants, bounds, motion, step)?;
-    examination.run(balls, pose)?;
-    Ok(StopKind::Planar)
 }
 
 /// Whether legs and envelope have room for the whole length of a stop, in any direction.

@@ -14,6 +14,7 @@
 //!
 //! Used under `on_violation = "limit"` only: a certified trajectory may go as near to a bound as it can be stopped.
 
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::{Vector3, Vector6};
@@ -37,6 +38,8 @@ const SWEEPS: u32 = 8;
 /// Slowness of the return from a gap that is negative, over that of the approach.
 const RETURN_RATIO: f64 = 4.0;
 
+/// Of a gradient, in memory.
+const LANES: usize = 8;
 /// Every leg and every coordinate.
 const WALL_COUNT: usize = 12;
 
@@ -67,7 +70,8 @@ impl Side {
 struct Wall {
     /// Bit of the limit that it stands for.
     limit: LimitSet,
-    gradient: Vector6<f64>,
+    /// Six numbers, and zeros.
+    gradient: [f64; LANES],
     /// Of the square of its norm.
     inverse_square: f64,
     /// Against the gradient, along it.
@@ -166,7 +170,7 @@ impl Walls {
             *wall = Wall {
                 limit: LimitSet::default().with(limit, true),
                 inverse_square: 1.0 / gradient.norm_squared().max(f64::MIN_POSITIVE),
-                gradient,
+                gradient: padded(&gradient),
                 sides,
                 multiplier: 0.0,
             };
@@ -176,21 +180,42 @@ impl Walls {
 
     /// Changes the wanted velocities of rotation and translation least, so that no wall is approached too fast. Returns the
     /// limits that required it.
-    pub fn restrict(&mut self, turn: &mut WantedVelocity, shift: &mut WantedVelocity) -> LimitSet {
-        let mut velocity = stacked(&(turn.velocity * self.radius), &shift.velocity);
+    pub fn restrict(
+        &mut self,
+        level: Level,
+        turn: &mut WantedVelocity,
+        shift: &mut WantedVelocity,
+    ) -> LimitSet {
+        dispatch!(level, simd => self.restrict_in_lanes(simd, turn, shift))
+    }
+
+    #[inline(always)]
+    fn restrict_in_lanes<S: Simd>(
+        &mut self,
+        simd: S,
+        turn: &mut WantedVelocity,
+        shift: &mut WantedVelocity,
+    ) -> LimitSet {
+        let load = |turn: &Vector3<f64>, shift: &Vector3<f64>| {
+            f64x8::load_array(simd, padded(&stacked(&(turn * self.radius), shift)))
+        };
+        let mut velocity = load(&turn.velocity, &shift.velocity);
         let mut active = LimitSet::default();
         for _ in 0..SWEEPS {
             let mut is_changed = false;
             for wall in self.walls.iter_mut().take(self.count) {
                 let [against, along] = &wall.sides;
+                let gradient = f64x8::load_array(simd, wall.gradient);
                 // The closing rate without this wall, and what of it is beyond the ends.
-                let rate = wall.gradient.dot(&velocity) * wall.inverse_square + wall.multiplier;
+                let rate = dot(gradient, velocity) * wall.inverse_square + wall.multiplier;
                 let allowed =
                     rate.min(along.rate * wall.inverse_square).max(-against.rate * wall.inverse_square);
                 let multiplier = rate - allowed;
-                velocity -= wall.gradient * (multiplier - wall.multiplier);
-                is_changed |= multiplier != wall.multiplier;
-                wall.multiplier = multiplier;
+                if multiplier != wall.multiplier {
+                    velocity = velocity - gradient * f64x8::splat(simd, multiplier - wall.multiplier);
+                    wall.multiplier = multiplier;
+                    is_changed = true;
+                }
             }
             if !is_changed {
                 break;
@@ -202,19 +227,36 @@ impl Walls {
         if active.is_empty() {
             return active;
         }
-        let mut derivative = stacked(&(turn.derivative * self.radius), &shift.derivative);
+        let mut derivative = load(&turn.derivative, &shift.derivative);
         for _ in 0..SWEEPS {
             for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier != 0.0) {
                 let [against, along] = &wall.sides;
+                let gradient = f64x8::load_array(simd, wall.gradient);
                 let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
-                let excess = (wall.gradient.dot(&derivative) - wanted) * wall.inverse_square;
-                derivative -= wall.gradient * excess;
+                let excess = (dot(gradient, derivative) - wanted) * wall.inverse_square;
+                derivative = derivative - gradient * f64x8::splat(simd, excess);
             }
         }
-        (turn.velocity, shift.velocity) = (upper(&velocity) / self.radius, lower(&velocity));
-        (turn.derivative, shift.derivative) = (upper(&derivative) / self.radius, lower(&derivative));
+        let store = |lanes: f64x8<S>, turn: &mut Vector3<f64>, shift: &mut Vector3<f64>| {
+            let [mx, my, mz, x, y, z, ..] = lanes.to_array();
+            (*turn, *shift) = (Vector3::new(mx, my, mz) / self.radius, Vector3::new(x, y, z));
+        };
+        store(velocity, &mut turn.velocity, &mut shift.velocity);
+        store(derivative, &mut turn.derivative, &mut shift.derivative);
         active
     }
+}
+
+/// The sum of the products, in the same order on every processor.
+#[inline(always)]
+fn dot<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64 {
+    let [mx, my, mz, x, y, z, ..] = (a * b).to_array();
+    (mx + my) + (mz + x) + (y + z)
+}
+
+fn padded(v: &Vector6<f64>) -> [f64; LANES] {
+    let [a, b, c, d, e, f] = (*v).into();
+    [a, b, c, d, e, f, 0.0, 0.0]
 }
 
 /// Duration of the stop from a twist \[s\].
@@ -227,14 +269,6 @@ fn stop_time_s(limits: &Limits, twist: &Twist) -> f64 {
 
 fn stacked(first: &Vector3<f64>, second: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(first.x, first.y, first.z, second.x, second.y, second.z)
-}
-
-fn upper(v: &Vector6<f64>) -> Vector3<f64> {
-    v.fixed_rows::<3>(0).into()
-}
-
-fn lower(v: &Vector6<f64>) -> Vector3<f64> {
-    v.fixed_rows::<3>(3).into()
 }
 
 #[cfg(test)]

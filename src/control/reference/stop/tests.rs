@@ -32,7 +32,7 @@ fn a_stop_keeps_acceleration_jerk_and_its_peak_velocity_and_ends_at_rest() {
                 let stop = plan(&v, &a, &limits);
                 let first = stop.at(0.0);
                 assert!((first.velocity - v).norm() <= 1e-12 && (first.acceleration - a).norm() <= 1e-12);
-                let last = stop.pieces[stop.count - 1].begin;
+                let last = stop.begins[stop.count - 1];
                 assert_eq!(last, stop.duration);
                 let before = stop.at(stop.duration * (1.0 - 1e-12));
                 let mut check = |k: usize, ratio: f64| worst[k] = worst[k].max(ratio);

@@ -4,7 +4,7 @@ use super::super::pose_bounds::PoseBounds;
 use super::super::pose_stop::StopKind;
 use super::super::regularity::{KnotCover, RegularBalls};
 use super::super::target::at_rest;
-use super::super::verification::{Step, verify};
+use super::super::verification::{Step, Verifier};
 use super::verification::Scene;
 use super::*;
 use crate::control::limits::Limit;
@@ -24,7 +24,7 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
         (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
         let verified = |constants: &Constants, from: Option<&Pose>| {
             let step = Step { from, ..Step::default() };
-            verify(constants, &bounds, &mut RegularBalls::default(), &at_rest(&pose), &step)
+            Verifier::default().verify(constants, &bounds, &at_rest(&pose), &step)
         };
         let sine = universal_sine(&machine, &pose);
         constants.universal_sine = 0.99 * sine;
@@ -46,7 +46,7 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         let constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
         let covered = |balls: &mut RegularBalls, reach: f64| {
-            let cover = balls.knot_cover(&constants, &pose, [reach, 0.0], &mut 0);
+            let cover = fearless_simd::dispatch!(machine.level, simd => balls.knot_cover(simd, &constants, &pose, [reach, 0.0]));
             [cover.knot, cover.surroundings, cover.is_complete()]
         };
         let mut balls = RegularBalls::default();
@@ -70,9 +70,9 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
         let mut scene = Scene::new(&mut samples);
         scene.constants.parameters.condition = 60.0;
         scene.constants.reference_condition = 50.0;
-        let mut balls = RegularBalls::default();
+        let mut verifier = Verifier::default();
         let mut verified =
-            || verify(&scene.constants, &scene.bounds, &mut balls, &scene.motion, &Step::default());
+            || verifier.verify(&scene.constants, &scene.bounds, &scene.motion, &Step::default());
         if verified() == Err(Limit::Condition) {
             later += u32::from((0..3).any(|_| verified().is_ok()));
         }

@@ -25,7 +25,7 @@ struct End {
 fn ends(walls: &Walls) -> Vec<End> {
     let of = |wall: &Wall, sign: f64, side: Side| End {
         limit: wall.limit,
-        gradient: wall.gradient * sign,
+        gradient: Vector6::from_row_slice(&wall.gradient[..6]) * sign,
         side,
         multiplier: (wall.multiplier * sign).max(0.0),
     };
@@ -159,7 +159,7 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
         };
         let [turn, shift] = [wanted(1.2), wanted(1.2)];
         let (mut new_turn, mut new_shift) = (turn, shift);
-        let limits = walls.restrict(&mut new_turn, &mut new_shift);
+        let limits = walls.restrict(scene.constants.machine().level, &mut new_turn, &mut new_shift);
         let of = |first: &Vector3<f64>, second: &Vector3<f64>| stacked(&(first * walls.radius), second);
         let [before, after] = [(&turn, &shift), (&new_turn, &new_shift)]
             .map(|(turn, shift)| of(&turn.velocity, &shift.velocity));
@@ -206,7 +206,7 @@ fn two_walls_at_60_degrees_converge() {
         let gradient = stacked(&Vector3::zeros(), &direction);
         let free = Side { rate: f64::INFINITY, derivative: 0.0 };
         *wall = Wall {
-            gradient,
+            gradient: padded(&gradient),
             inverse_square: 1.0,
             limit: LimitSet(4),
             sides: [free, Side::default()],
@@ -217,7 +217,7 @@ fn two_walls_at_60_degrees_converge() {
         WantedVelocity { velocity: Vector3::zeros(), derivative: Vector3::zeros(), is_limited: false };
     let along = directions[0] + directions[1];
     let (mut turn, mut shift) = (still, WantedVelocity { velocity: along, derivative: along * 3.0, ..still });
-    walls.restrict(&mut turn, &mut shift);
+    walls.restrict(scene.constants.machine().level, &mut turn, &mut shift);
     for direction in directions {
         assert!(direction.dot(&shift.velocity).abs() < 1e-4, "{}", shift.velocity);
         assert!(direction.dot(&shift.derivative).abs() < 1e-4, "{}", shift.derivative);
