@@ -88,7 +88,7 @@ impl HeldForces {
             return None;
         }
         let eigenvalues = Schur::try_new(growth, f64::EPSILON, MAX_ITERATIONS)?.complex_eigenvalues();
-        Some(eigenvalues.iter().map(|eigenvalue| eigenvalue.sqrt().re).fold(0.0, f64::max))
+        Some(eigenvalues.iter().map(|eigenvalue| real_root(eigenvalue.re, eigenvalue.im)).fold(0.0, f64::max))
     }
 
     /// What holds the platform at rest \[N m\], \[N\].
@@ -142,6 +142,13 @@ impl HeldForces {
         found.push(SurveyedPose { pose: *pose, condition, pole: self.pole(pose)? });
         Some(condition)
     }
+}
+
+/// Real part of the root of `re + i im` that is not negative.
+fn real_root(re: f64, im: f64) -> f64 {
+    let size = libm::hypot(re, im);
+    // The sum would cancel where the number is nearly real and negative.
+    if re >= 0.0 { (0.5 * (size + re)).sqrt() } else { im.abs() / (2.0 * (size - re)).sqrt() }
 }
 
 /// Evenly spread displacement, of which the largest coordinate is 1.

@@ -242,6 +242,7 @@ fn a_table_leads_to_the_instructions_in_it() {
     const TABLE: &[u8] = &[0x48, 0x8D, 0x35, 0xF9, 0x0F, 0, 0]; // lea rsi, [0x2000]
     const DISTANCE: &[u8] = &[0x48, 0x63, 0x04, 0x86]; // movsxd rax, [rsi + 4 rax]
     const NO_DISTANCE: &[u8] = &[0x48, 0x63, 0x04, 0x46]; // movsxd rax, [rsi + 2 rax]
+    const NEXT_TABLE: &[u8] = &[0x48, 0x8D, 0x35, 0xF2, 0x0F, 0, 0]; // lea rsi, [0x2004], behind DISTANCE
     const SUM: &[u8] = &[0x48, 0x01, 0xF0]; // add rax, rsi
     const OTHER_SUM: &[u8] = &[0x48, 0x01, 0xC6, 0x48, 0x89, 0xF0]; // add rsi, rax; mov rax, rsi
     const TWICE: &[u8] = &[0x48, 0x01, 0xC0]; // add rax, rax
@@ -261,6 +262,7 @@ fn a_table_leads_to_the_instructions_in_it() {
         ("beyond the table", &[DISTANCE, SUM], &[LOAD, 1000, CALL], true, true),
         ("another scale", &[NO_DISTANCE, SUM], &[LOAD], true, false),
         ("another sum", &[DISTANCE, TWICE], &[LOAD], true, false),
+        ("of two tables", &[DISTANCE, NEXT_TABLE, SUM], &[LOAD, LOAD], true, false),
         ("of other functions", &[DISTANCE, SUM], &[1000, LOAD], false, true),
         ("overwritten", &[DISTANCE, SUM, OTHER_RAX], &[LOAD], false, true),
     ] {

@@ -78,7 +78,7 @@ impl FrozenLegBounds {
 /// That shall be the same for all loops. A leg that friction holds moves no less far before the force of feedback frees it, with
 /// less stiffness farther.
 fn motion_bound(stiffness: f64) -> f64 {
-    (ONE_LEG_BOUND_M * (BOUND_STIFFNESS / stiffness).cbrt()).min(MAX_ONE_LEG_BOUND_M)
+    (ONE_LEG_BOUND_M * libm::cbrt(BOUND_STIFFNESS / stiffness)).min(MAX_ONE_LEG_BOUND_M)
 }
 
 /// Readings that did not change, and where the reference was at the first of them.

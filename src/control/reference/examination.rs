@@ -253,7 +253,7 @@ impl<'a> Examination<'a> {
         }
         let x = task_coordinates(pose, &self.constants.machine().home);
         let [_, beta, ..] = x;
-        let (s, c) = (beta.sin().abs(), beta.cos().abs());
+        let (s, c) = (libm::sin(beta).abs(), libm::cos(beta).abs());
         let w = state.orientation.velocity.norm()
             + self.constants.parameters.limits.orientation.acceleration * self.dt;
         let angular = self.stop.orientation.peak_velocity.min(w);
@@ -285,7 +285,7 @@ fn have_angles_room(constants: &Constants, envelope: &Envelope, pose: &Pose, sto
     let x = task_coordinates(pose, &constants.machine().home);
     let [_, beta, ..] = x;
     let turn = stop.peak_velocity * stop.duration;
-    let need = turn / (beta.abs() + turn).min(core::f64::consts::FRAC_PI_2).cos();
+    let need = turn / libm::cos((beta.abs() + turn).min(core::f64::consts::FRAC_PI_2));
     x.iter().zip(ranges(envelope)).take(3).all(|(x, (low, high))| (x - low).min(high - x) >= need)
 }
 

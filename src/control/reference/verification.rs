@@ -83,7 +83,7 @@ fn has_room(
     };
     let x = task_coordinates(pose, &constants.machine().home);
     let [_, beta, ..] = x;
-    let c = (beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2).cos();
+    let c = libm::cos((beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2));
     let turned = turn.length / c + slack / constants.arm;
     let needs = [turned, turned, turned, shift.length + slack, shift.length + slack, shift.length + slack];
     let Envelope { lowest, highest } = envelope;
