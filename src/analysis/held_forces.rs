@@ -156,3 +156,19 @@ fn direction(k: u32) -> Vector6<f64> {
     let point = MotionEnvelope::spread(k + 1).fixed_rows::<6>(0).map(|share| 2.0 * share - 1.0);
     point / point.amax()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Complex;
+
+    #[test]
+    fn the_real_part_of_a_root_loses_no_digits() {
+        for (re, im) in [(4.0, 0.0), (-4.0, 0.0), (0.0, 0.0), (3.0, -4.0), (-3.0, 4.0), (-0.5, 1.5)] {
+            let expected = Complex::new(re, im).sqrt().re;
+            assert!((real_root(re, im) - expected).abs() <= 1e-15, "{re} {im}");
+        }
+        // Next to the negative axis: im / 2.
+        assert!((real_root(-1.0, 1e-9) / 5e-10 - 1.0).abs() < 1e-15);
+    }
+}

@@ -21,8 +21,7 @@ const DETERMINANT_ROUNDING: f64 = 32.0 * f64::EPSILON;
 /// Field that is a quotient of a rate that may be zero.
 const TIME_TO_SINGULARITY: &str = "time_to_singularity_s";
 
-/// Largest difference between two instruction sets, which add the same numbers in another order, for what is no difference over
-/// a cycle.
+/// Largest difference between two instruction sets that round in other places, for what is no difference over a cycle.
 const TOLERANCE: f64 = 1e-12;
 
 /// One number of an output that a replay computes differently.
@@ -53,7 +52,7 @@ impl Difference {
         if difference.is_nan() { f64::INFINITY } else { difference }
     }
 
-    /// Largest size that another instruction set explains, at a period \[s\].
+    /// Largest size that an instruction set which rounds in other places explains, at a period \[s\].
     ///
     /// The reference moves from pose to pose: of a pose with the relative rounding e, its velocity has e / h, and its
     /// acceleration e / h^2, which the forces contain. The time to a singularity is that of a determinant, by its change over h.

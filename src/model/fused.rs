@@ -80,7 +80,7 @@ pub(super) fn mul_add<const LANES: usize>(
         // A zero added to a zero would lose its sign.
         let once = if v == 0.0 { s } else { s + v };
         // Halves and errors of what is not finite are not numbers.
-        *result = if once - once == 0.0 { once } else { a * b + c };
+        *result = if once.is_finite() { once } else { a * b + c };
     }
     results
 }
