@@ -16,14 +16,14 @@
 //! Range: the same bits as the instruction where `a b` and `c` are zero or from 1e-280 to 1e280, and where the result is not
 //! finite. Outside, the error of two roundings.
 
-use fearless_simd::{Level, Simd};
+use fearless_simd::Simd;
 
 /// Whether the lanes use the processor's own multiplication and addition. A constant in the function that was dispatched.
 #[inline(always)]
 pub(super) fn is_native<S: Simd>(simd: S) -> bool {
     let level = simd.level();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    return !matches!(level, Level::Sse2(_));
+    return !matches!(level, fearless_simd::Level::Sse2(_));
     #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
     return !level.is_fallback();
 }

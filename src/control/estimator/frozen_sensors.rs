@@ -8,9 +8,6 @@
 //! resolution, may: a leg that freezes at rest cannot be distinguished then, and the platform drifts away. An independent pose
 //! or a second encoder closes that.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
-
 use super::Readings;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::machine::LEGS;

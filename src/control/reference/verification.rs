@@ -3,9 +3,6 @@
 //! In free space one pose is enough: every margin exceeds the length of the way, in any direction. Near a bound the stop is
 //! examined knot by knot, see [`super::examination`].
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
-
 use super::examination::{Examination, curvature};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::StopKind;
