@@ -123,7 +123,9 @@ fn items(rows_of_all: &[Row]) -> Vec<Item> {
         };
         let times = rows.iter().map(|row| row.ns_median);
         let (color, side) = match fidelity {
-            true => (HEXAD, if exact && isa == BASELINE { Side::Flag } else { Side::Left }),
+            true => {
+                (HEXAD, if exact && [BASELINE, "sse4_2"].contains(&isa) { Side::Flag } else { Side::Left })
+            }
             false => (if peer { PEER } else { DENSE }, Side::Flag),
         };
         let name = if exact { format!("exact, {}", written(isa)) } else { written(method) };
@@ -149,6 +151,7 @@ fn written(name: &str) -> String {
     let known = [
         ("avx512", "AVX-512"),
         ("avx2", "AVX2"),
+        ("sse4_2", "SSE4.2"),
         ("sse2", "SSE2"),
         ("neon", "NEON"),
         ("hand-lanes", "C++ by hand, lanes"),

@@ -88,7 +88,7 @@ impl HeldForces {
             return None;
         }
         let eigenvalues = Schur::try_new(growth, f64::EPSILON, MAX_ITERATIONS)?.complex_eigenvalues();
-        Some(eigenvalues.iter().map(|eigenvalue| eigenvalue.sqrt().re).fold(0.0, f64::max))
+        Some(eigenvalues.iter().map(|eigenvalue| real_root(eigenvalue.re, eigenvalue.im)).fold(0.0, f64::max))
     }
 
     /// What holds the platform at rest \[N m\], \[N\].
@@ -144,8 +144,31 @@ impl HeldForces {
     }
 }
 
+/// Real part of the root of `re + i im` that is not negative.
+fn real_root(re: f64, im: f64) -> f64 {
+    let size = libm::hypot(re, im);
+    // The sum would cancel where the number is nearly real and negative.
+    if re >= 0.0 { (0.5 * (size + re)).sqrt() } else { im.abs() / (2.0 * (size - re)).sqrt() }
+}
+
 /// Evenly spread displacement, of which the largest coordinate is 1.
 fn direction(k: u32) -> Vector6<f64> {
     let point = MotionEnvelope::spread(k + 1).fixed_rows::<6>(0).map(|share| 2.0 * share - 1.0);
     point / point.amax()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Complex;
+
+    #[test]
+    fn the_real_part_of_a_root_loses_no_digits() {
+        for (re, im) in [(4.0, 0.0), (-4.0, 0.0), (0.0, 0.0), (3.0, -4.0), (-3.0, 4.0), (-0.5, 1.5)] {
+            let expected = Complex::new(re, im).sqrt().re;
+            assert!((real_root(re, im) - expected).abs() <= 1e-15, "{re} {im}");
+        }
+        // Next to the negative axis: im / 2.
+        assert!((real_root(-1.0, 1e-9) / 5e-10 - 1.0).abs() < 1e-15);
+    }
 }

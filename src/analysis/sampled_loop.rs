@@ -98,8 +98,8 @@ impl Axis {
         let Self { e, v, pole, .. } = *self;
         let half = 0.5 * pole * dt;
         // sinh x / x
-        let by_half = if half < 1e-4 { 1.0 } else { half.sinh() / half };
-        let (cosh, sinh_over_pole) = (1.0 + 2.0 * (half * by_half).powi(2), dt * by_half * half.cosh());
+        let by_half = if half < 1e-4 { 1.0 } else { libm::sinh(half) / half };
+        let (cosh, sinh_over_pole) = (1.0 + 2.0 * (half * by_half).powi(2), dt * by_half * libm::cosh(half));
         let growth = pole * pole * sinh_over_pole;
         self.e = e * cosh + v * sinh_over_pole + 0.5 * a * (dt * by_half).powi(2);
         self.v = e * growth + v * cosh + a * sinh_over_pole;
@@ -205,11 +205,13 @@ impl SampledLoop {
             if !(norm > 0.0 && norm.is_finite()) {
                 return if norm == 0.0 { 0.0 } else { f64::INFINITY };
             }
-            logarithm += norm.ln() / 2.0_f64.powi(squaring);
+            logarithm += libm::log(norm) / 2.0_f64.powi(squaring);
             matrix /= norm;
-            matrix = &matrix * &matrix;
+            // By columns: the product of two matrices rounds differently where the processor has FMA.
+            let columns: Vec<_> = matrix.column_iter().map(|column| &matrix * column).collect();
+            matrix = DMatrix::from_columns(&columns);
         }
-        logarithm.exp()
+        libm::exp(logarithm)
     }
 
     /// The loop of a mode in which feedback has so many times its gain, and the estimator knows it.

@@ -5,11 +5,13 @@ use core::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use clap::Args;
+use fearless_simd::Level;
 
 use super::failure::{CommandError, Failure};
 use crate::config::Config;
 use crate::daemon::recorder::instruction_set;
-use crate::daemon::replay::{Replay, other_controller, recorded_controller, replay};
+use crate::daemon::replay::{Replay, other_controller, recorded_config, recorded_controller, replay};
+use crate::model::machine::at_most_256_bits;
 use crate::output::files::print;
 use crate::recording::Item;
 use crate::recording::copy::copy;
@@ -75,7 +77,7 @@ impl ReplayArguments {
             return Ok(print(format_args!("{}: {messages} messages\n", output.display()))?);
         }
         let info = recording.summary()?.info;
-        let recorded = Config::parse(&info.configuration, "configuration of the recording")?;
+        let recorded = recorded_config(&info, processor())?;
         let other = self.config.as_deref().map(Config::load).transpose()?;
         let controller = match &other {
             Some(config) => other_controller(config),
@@ -86,13 +88,18 @@ impl ReplayArguments {
         if replay.compared == 0 {
             return Err(ReplayError::Unknown(info.version).into());
         }
-        let is_tolerated = info.instruction_set != instruction_set(&recorded)
+        let is_tolerated = info.instruction_set != instruction_set(recorded.machine.level)
             && replay.is_rounding(recorded.deployment.realtime.period_s());
         if replay.different > 0 && other.is_none() && !is_tolerated {
             return Err(ReplayError::Different(replay.different).into());
         }
         Ok(())
     }
+}
+
+/// What the daemon would run on.
+fn processor() -> Level {
+    at_most_256_bits(Level::new())
 }
 
 /// Range of `log_time` \[ns\] of a part, from where a replay can begin.
@@ -134,9 +141,9 @@ fn description(recording: &Recording, summary: &Summary, replay: &Replay, config
     if let Some(why) = unfinished {
         let _ = writeln!(text, "the file is not complete ({why}); `hexad recover` makes it so");
     }
-    let instruction_set = instruction_set(config);
-    if info.instruction_set != instruction_set {
-        let _ = writeln!(text, "the instruction set is another one here: {instruction_set}");
+    let [here, used] = [processor(), config.machine.level].map(instruction_set);
+    if info.instruction_set != here {
+        let _ = writeln!(text, "the instruction set is another one here: {here}; computed with {used}");
     }
     if info.version != env!("CARGO_PKG_VERSION") {
         let _ = writeln!(text, "the version is another one here: {}", env!("CARGO_PKG_VERSION"));

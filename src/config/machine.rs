@@ -9,9 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::bound::Bound;
 use super::geometry;
 use super::reader::SectionReader;
-use crate::model::machine::{
-    Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia, at_most_256_bits,
-};
+use crate::model::machine::{Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia};
 use crate::model::task::TaskState;
 
 /// Largest gravity \[m/s^2\]: ten times the Earth's is a wrong unit, not a site.
@@ -31,7 +29,7 @@ pub(super) struct LegSection<'t> {
 }
 
 /// Reads and checks the machine. Rejected values are NaN.
-pub(super) fn read(root: &mut SectionReader) -> Machine {
+pub(super) fn read(root: &mut SectionReader, level: Level) -> Machine {
     let gravity = Vector3::from(root.vector("gravity_m_s2"));
     if gravity.norm() > MAX_GRAVITY_M_S2 {
         root.reject("gravity_m_s2", format!("must be at most {MAX_GRAVITY_M_S2} long"));
@@ -52,7 +50,6 @@ pub(super) fn read(root: &mut SectionReader) -> Machine {
         &of_leg(|leg| leg.universal_axis),
         &TaskState::at_rest(home_pose).motion().pose,
     );
-    let level = at_most_256_bits(Level::new());
     let machine = Machine { gravity, platform, joints, cylinder, rod, actuator, home: home_pose, level };
     geometry::check(&machine, &legs, &home);
     home.finish();

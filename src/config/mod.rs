@@ -9,12 +9,13 @@
 use std::path::{Path, PathBuf, absolute};
 use std::{fmt, io};
 
+use fearless_simd::Level;
 use serde::Serialize;
 use thiserror::Error;
 use toml::de::DeTable;
 
 use crate::messages::{Bus, PortError};
-use crate::model::machine::Machine;
+use crate::model::machine::{Machine, at_most_256_bits};
 
 use self::deployment::Deployment;
 use self::identity::Identity;
@@ -99,12 +100,17 @@ impl Config {
 
     /// Validates a text; error texts name it `place`.
     pub fn parse(original: &str, place: &str) -> Result<Self, ConfigError> {
+        Self::parse_on(at_most_256_bits(Level::new()), original, place)
+    }
+
+    /// The same where the lanes run on an instruction set, with which defaults are computed as well.
+    pub fn parse_on(level: Level, original: &str, place: &str) -> Result<Self, ConfigError> {
         let (text, syntax_errors) = syntax::without_broken_lines(original);
         let (table, _) = DeTable::parse_recoverable(&text);
         let log = ViolationLog::new(&text, syntax_errors);
         let mut root = SectionReader::root(&log, table.get_ref());
         let name = root.name("name", MAX_NAME_LENGTH);
-        let machine = machine::read(&mut root);
+        let machine = machine::read(&mut root, level);
         let deployment = deployment::read(&mut root, &machine);
         root.finish();
         match log.into_violations() {

@@ -3,7 +3,9 @@
 use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
 
-use crate::config::{Config, fidelity};
+use fearless_simd::Level;
+
+use crate::config::{Config, ConfigError, fidelity};
 use crate::control::controller::Controller;
 use crate::daemon::parameters;
 use crate::messages::CycleMessage;
@@ -19,8 +21,7 @@ const DETERMINANT_ROUNDING: f64 = 32.0 * f64::EPSILON;
 /// Field that is a quotient of a rate that may be zero.
 const TIME_TO_SINGULARITY: &str = "time_to_singularity_s";
 
-/// Largest difference between two instruction sets, which add the same numbers in another order, for what is no difference over
-/// a cycle.
+/// Largest difference between two instruction sets that round in other places, for what is no difference over a cycle.
 const TOLERANCE: f64 = 1e-12;
 
 /// One number of an output that a replay computes differently.
@@ -51,7 +52,7 @@ impl Difference {
         if difference.is_nan() { f64::INFINITY } else { difference }
     }
 
-    /// Largest size that another instruction set explains, at a period \[s\].
+    /// Largest size that an instruction set which rounds in other places explains, at a period \[s\].
     ///
     /// The reference moves from pose to pose: of a pose with the relative rounding e, its velocity has e / h, and its
     /// acceleration e / h^2, which the forces contain. The time to a singularity is that of a determinant, by its change over h.
@@ -79,6 +80,32 @@ pub struct Replay {
     pub first: Option<Difference>,
     /// The largest difference of each field.
     pub largest: BTreeMap<String, Difference>,
+}
+
+/// The instruction set on which the lanes repeat the bits of a recorded one: itself, or any that rounds as often
+/// (`model::fused`). Without one, that of the processor.
+pub fn repeating_level(recorded: &str, level: Level) -> Level {
+    #[cfg(target_arch = "x86_64")]
+    {
+        let rounds_twice = recorded == "Sse4_2";
+        let wanted = match (rounds_twice, level.as_avx2()) {
+            (true, _) => level.as_sse4_2().map(Level::Sse4_2),
+            (false, Some(avx2)) => Some(Level::Avx2(avx2)),
+            (false, None) => level.as_sse2().map(Level::Sse2),
+        };
+        wanted.unwrap_or(level)
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let _ = recorded;
+        level
+    }
+}
+
+/// Configuration of a recording, on what repeats its bits on a processor that has `level`.
+pub fn recorded_config(info: &RunInfo, level: Level) -> Result<Config, ConfigError> {
+    let level = repeating_level(&info.instruction_set, level);
+    Config::parse_on(level, &info.configuration, "configuration of the recording")
 }
 
 /// Controller as it was recorded.
@@ -196,6 +223,31 @@ impl Replay {
             self.largest.entry(array(&difference.field).into()).or_insert_with(|| difference.clone());
         if difference.size() > largest.size() {
             *largest = difference;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_rounding_is_explained_by_another_processor() {
+        let is_rounding = |field: &str, size: f64| {
+            let (field, recorded) = (field.to_string(), 1.0);
+            let difference =
+                Difference { cycle: 1, time_s: 0.0, field, recorded, replayed: 1.0 + size, scale: 1.0 };
+            let largest = BTreeMap::from([(difference.field.clone(), difference)]);
+            Replay { largest, ..Replay::default() }.is_rounding(1e-3)
+        };
+        // Of a pose nearly nothing, of a velocity 2e-13 more, of an acceleration and of forces 2e-10 at 1 kHz.
+        for (field, tolerated, refused) in [
+            ("position_m_2", 9e-13, 2e-12),
+            ("reference_twist_1", 1.1e-12, 2e-12),
+            ("reference_acceleration_6", 2e-10, 3e-10),
+            ("force_n_3", 2e-10, 1e-5),
+        ] {
+            assert_eq!([tolerated, refused].map(|size| is_rounding(field, size)), [true, false], "{field}");
         }
     }
 }

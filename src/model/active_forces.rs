@@ -19,6 +19,7 @@ use super::fidelity::{
     Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
 };
 use super::inverse_geometry::LegGeometry;
+use super::lanes::LaneArithmetic as _;
 use super::leg::{LegConstants, LegReaction};
 use super::machine::{Actuator, Joints, LEGS, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
@@ -163,8 +164,8 @@ impl InverseDynamics {
         let splat = |value: f64| f64x8::splat(simd, value);
         let one = splat(1.0);
         let sign = (rate * splat(self.inverse_smoothing)).max(-one).min(one);
-        let friction = splat(viscous_friction).mul_add(rate, splat(coulomb_friction) * sign);
-        splat(reflected_mass).mul_add(accel, friction)
+        let friction = splat(viscous_friction).fused_mul_add(rate, splat(coulomb_friction) * sign);
+        splat(reflected_mass).fused_mul_add(accel, friction)
     }
 }
 

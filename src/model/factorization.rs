@@ -22,7 +22,7 @@ use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
 use super::inverse_geometry::LegGeometry;
-use super::lanes::Triple;
+use super::lanes::{LaneArithmetic as _, Triple};
 use super::lanes3::{Lanes3, broadcasts};
 use super::lu;
 use super::machine::{Joints, LEGS};
@@ -214,7 +214,7 @@ impl<S: Simd> LaneTwist<S> {
     #[inline(always)]
     pub fn size_squared(&self, linear_weight: f64x4<S>) -> f64 {
         let linear = self.linear.dot(self.linear);
-        linear.mul_add(linear_weight, self.angular.dot(self.angular)).first()
+        linear.fused_mul_add(linear_weight, self.angular.dot(self.angular)).first()
     }
 
     /// The twist itself.

@@ -13,6 +13,7 @@
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix3, Vector3};
 
+use super::lanes::LaneArithmetic as _;
 use super::lanes3::Lanes3;
 use super::machine::{Joints, LEGS, Machine};
 use super::platform::acceleration_map;
@@ -88,7 +89,7 @@ impl<S: Simd> LegGeometry<S> {
     #[inline(always)]
     pub fn accel(&self, velocity: &LegVelocity<S>, joint_acceleration: Lanes3<f64x8<S>>) -> f64x8<S> {
         let turn = velocity.direction;
-        self.length.mul_add(turn.dot(turn), self.direction.dot(joint_acceleration))
+        self.length.fused_mul_add(turn.dot(turn), self.direction.dot(joint_acceleration))
     }
 }
 

@@ -13,26 +13,36 @@ use core::ops::{Add, Mul, Neg, Sub};
 
 use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 
+use super::fused;
+
 /// Arithmetic on all lanes of a vector, whatever their number.
 pub(super) trait LaneArithmetic:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// `self a + b`, fused where the processor can.
-    fn mul_add(self, a: Self, b: Self) -> Self;
-    /// `self a - b`, fused where the processor can.
-    fn mul_sub(self, a: Self, b: Self) -> Self;
+    /// `self a + b`, rounded once but on SSE4.2, see `super::fused`.
+    fn fused_mul_add(self, a: Self, b: Self) -> Self;
+    /// `self a - b`, rounded once but on SSE4.2, see `super::fused`.
+    fn fused_mul_sub(self, a: Self, b: Self) -> Self;
 }
 
 macro_rules! lane_arithmetic {
     ($($vector:ident),*) => {$(
         impl<S: Simd> LaneArithmetic for $vector<S> {
             #[inline(always)]
-            fn mul_add(self, a: Self, b: Self) -> Self {
-                SimdFloat::mul_add(self, a, b)
+            fn fused_mul_add(self, a: Self, b: Self) -> Self {
+                if fused::is_native(self.simd) {
+                    SimdFloat::mul_add(self, a, b)
+                } else {
+                    Self::load_array(self.simd, fused::mul_add(&self.to_array(), &a.to_array(), &b.to_array()))
+                }
             }
             #[inline(always)]
-            fn mul_sub(self, a: Self, b: Self) -> Self {
-                SimdFloat::mul_sub(self, a, b)
+            fn fused_mul_sub(self, a: Self, b: Self) -> Self {
+                if fused::is_native(self.simd) {
+                    SimdFloat::mul_sub(self, a, b)
+                } else {
+                    Self::load_array(self.simd, fused::mul_add(&self.to_array(), &a.to_array(), &(-b).to_array()))
+                }
             }
         }
     )*};

@@ -20,23 +20,27 @@ impl<V: LaneArithmetic> Lanes3<V> {
     /// `self . b`
     #[inline(always)]
     pub fn dot(self, b: Self) -> V {
-        self.x.mul_add(b.x, self.y.mul_add(b.y, self.z * b.z))
+        self.x.fused_mul_add(b.x, self.y.fused_mul_add(b.y, self.z * b.z))
     }
 
     /// `self x b`
     #[inline(always)]
     pub fn cross(self, b: Self) -> Self {
         Self {
-            x: self.y.mul_sub(b.z, self.z * b.y),
-            y: self.z.mul_sub(b.x, self.x * b.z),
-            z: self.x.mul_sub(b.y, self.y * b.x),
+            x: self.y.fused_mul_sub(b.z, self.z * b.y),
+            y: self.z.fused_mul_sub(b.x, self.x * b.z),
+            z: self.x.fused_mul_sub(b.y, self.y * b.x),
         }
     }
 
     /// `self + s b`
     #[inline(always)]
     pub fn plus_scaled(self, s: V, b: Self) -> Self {
-        Self { x: s.mul_add(b.x, self.x), y: s.mul_add(b.y, self.y), z: s.mul_add(b.z, self.z) }
+        Self {
+            x: s.fused_mul_add(b.x, self.x),
+            y: s.fused_mul_add(b.y, self.y),
+            z: s.fused_mul_add(b.z, self.z),
+        }
     }
 
     /// `self - s b`

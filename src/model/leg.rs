@@ -35,6 +35,7 @@ use fearless_simd::{Simd, f64x8, prelude::*};
 
 use super::fidelity::{LegInertia, ModelTerms};
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
+use super::lanes::LaneArithmetic as _;
 use super::lanes3::Lanes3;
 use super::machine::{LEGS, Machine};
 use super::triples::{LegLanes, Triples};
@@ -140,8 +141,8 @@ impl<S: Simd> LegReaction<S> {
         let [jt2, jt1, jt0] = constants.jt.each_ref().map(load);
         let (m2, m2_e2) = (load(&constants.rod_mass), load(&constants.rod_moment));
 
-        let j = jt2.mul_add(length, jt1).mul_add(length, jt0) * inverse_length * inverse_length;
-        let mu = m2.mul_add(length, load(&constants.first_moment)) * inverse_length;
+        let j = jt2.fused_mul_add(length, jt1).fused_mul_add(length, jt0) * inverse_length * inverse_length;
+        let mu = m2.fused_mul_add(length, load(&constants.first_moment)) * inverse_length;
         let mut transverse = (joint_acceleration * j).minus_scaled(mu, gravity);
         if M::VELOCITY {
             let m2_r_over_l = m2 - m2_e2 * inverse_length;
@@ -156,7 +157,7 @@ impl<S: Simd> LegReaction<S> {
         transverse = transverse.minus_scaled(transverse.dot(n) * load(&constants.legs_only), n);
         let mut axial = m2 * (joint_acceleration - gravity).dot(n);
         if M::VELOCITY {
-            axial = m2_e2.mul_add(n_rate.dot(n_rate), axial);
+            axial = m2_e2.fused_mul_add(n_rate.dot(n_rate), axial);
         }
         Self { transverse, axial }
     }
@@ -183,6 +184,6 @@ fn spin<S: Simd>(
     let un_over_yy = un * inverse_yy;
     let wx = un_over_yy * p;
     let wx_un = wx * un;
-    let wx_rate = un_rate.mul_add(p + wx_un + wx_un, un * p_rate) * inverse_yy;
+    let wx_rate = un_rate.fused_mul_add(p + wx_un + wx_un, un * p_rate) * inverse_yy;
     sum.plus_scaled(ix_over_l * wx, n_rate.cross(n)).plus_scaled(ix_over_l * un_over_yy * wx_rate, k)
 }

@@ -38,6 +38,7 @@ pub mod active_forces;
 mod factorization;
 pub mod fidelity;
 pub mod forward_kinematics;
+mod fused;
 pub mod inverse_geometry;
 pub mod inverse_jacobian;
 pub mod kinematic_state;

@@ -1,7 +1,7 @@
 //! Pose, twist, acceleration and wrench of the mobile platform: distinct types for distinct things.
 
 #[cfg(not(feature = "client"))]
-use nalgebra::{ComplexField as _, RealField as _};
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 /// Pose of the platform: orientation and position in the base frame.
@@ -150,7 +150,7 @@ pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
         )
     } else {
         let angle = x.sqrt();
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         (sin / angle, (1.0 - cos) / x)
     };
     // I + a w~ + b w~^2 with w~^2 = w w^T - |w|^2 I.
@@ -183,7 +183,7 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
         return axial * (0.5 + x * (1.0 / 12.0 + x * (3.0 / 80.0 + x * (5.0 / 224.0))));
     }
     let twice_sin = axial.norm();
-    let angle = twice_sin.atan2(twice_cos);
+    let angle = libm::atan2(twice_sin, twice_cos);
     if twice_sin > 1e-4 {
         return axial * (angle / twice_sin);
     }

@@ -15,7 +15,7 @@ use nalgebra::{Matrix6, Vector6};
 
 use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
-use super::lanes::Triple;
+use super::lanes::{LaneArithmetic as _, Triple};
 use super::lu;
 use super::machine::Joints;
 
@@ -58,7 +58,7 @@ impl Sensitivity {
     ) -> Self {
         let inverse_radius = f64x8::splat(simd, 1.0 / joints.radius);
         let (share, arm_curvature) = (joints.arm_share.load(simd), joints.arm_curvature.load(simd));
-        let curvature = arm_curvature.mul_add(legs.inverse_length, share);
+        let curvature = arm_curvature.fused_mul_add(legs.inverse_length, share);
         let moment = legs.arm.cross(legs.direction) * inverse_radius;
         let (curvature, wrench) =
             (sum_legs(curvature * curvature), sum_legs(moment.dot(moment) + f64x8::splat(simd, 1.0)));
@@ -103,7 +103,7 @@ fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeo
     let force_a = factorization.inverse_a.minus_scaled(x0, p0).minus_scaled(x1, p1).minus_scaled(x2, p2);
     let torques = t.dot(t) + torque_a.dot(torque_a);
     let forces = p.dot(p) + force_a.dot(force_a);
-    (torques * r).mul_add(r, forces).legs().into_iter().sum()
+    (torques * r).fused_mul_add(r, forces).legs().into_iter().sum()
 }
 
 /// The same by LU with partial pivoting.

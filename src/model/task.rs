@@ -5,8 +5,8 @@
 //! beta = +-90 deg: nothing in the loop needs it, angles are only read at its edges.
 
 #[cfg(not(feature = "client"))]
-use nalgebra::{ComplexField as _, RealField as _};
-use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
+use nalgebra::ComplexField as _;
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 
@@ -52,7 +52,7 @@ impl TaskState {
         let [alpha, beta, gamma, x, y, z] = self.x.into();
         let [alpha_rate, beta_rate, gamma_rate, vx, vy, vz] = self.xd.into();
         let [alpha_accel, beta_accel, gamma_accel, ax, ay, az] = self.xdd.into();
-        let [(sa, ca), (sb, cb), (sg, cg)] = [alpha, beta, gamma].map(|angle| angle.sin_cos());
+        let [(sa, ca), (sb, cb), (sg, cg)] = [alpha, beta, gamma].map(libm::sincos);
         let (sa_sb, ca_sb) = (sa * sb, ca * sb);
         // Columns of E, and the angular velocity of each.
         let e1 = Vector3::x();
@@ -101,14 +101,14 @@ impl TaskState {
 pub fn task_coordinates(pose: &Pose, near: &[f64; 6]) -> [f64; 6] {
     let r = &pose.rotation;
     let [near_alpha, near_beta, near_gamma, ..] = *near;
-    let cos_beta = r.m11.hypot(r.m12);
-    let beta = r.m13.atan2(cos_beta);
+    let cos_beta = libm::hypot(r.m11, r.m12);
+    let beta = libm::atan2(r.m13, cos_beta);
     let (alpha, gamma) = if cos_beta > 1e-12 {
-        ((-r.m23).atan2(r.m33), (-r.m12).atan2(r.m11))
+        (libm::atan2(-r.m23, r.m33), libm::atan2(-r.m12, r.m11))
     } else {
         // R = Rx(alpha) Ry(+-90 deg) Rz(gamma): row 2 and 3 hold alpha +- gamma.
         let rest = rotation_y(-beta) * rotation_x(-near_alpha) * r;
-        (near_alpha, rest.m21.atan2(rest.m22))
+        (near_alpha, libm::atan2(rest.m21, rest.m22))
     };
     let pi = core::f64::consts::PI;
     let nearest = |angle: f64, near: f64| angle + ((near - angle) / (2.0 * pi)).round() * 2.0 * pi;
@@ -124,11 +124,13 @@ pub fn task_coordinates(pose: &Pose, near: &[f64; 6]) -> [f64; 6] {
 }
 
 fn rotation_x(angle: f64) -> Matrix3<f64> {
-    Rotation3::from_axis_angle(&Vector3::x_axis(), angle).into_inner()
+    let (s, c) = libm::sincos(angle);
+    Matrix3::new(1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c)
 }
 
 fn rotation_y(angle: f64) -> Matrix3<f64> {
-    Rotation3::from_axis_angle(&Vector3::y_axis(), angle).into_inner()
+    let (s, c) = libm::sincos(angle);
+    Matrix3::new(c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c)
 }
 
 #[cfg(test)]

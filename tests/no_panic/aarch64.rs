@@ -1,9 +1,9 @@
 //! Where AArch64 code leaves a function. All instructions are words; the bits are those of the Arm
 //! Architecture Reference Manual, C4.1 (branches, exceptions, system), and no branch hides elsewhere.
 
-use crate::executable::{Leap, Leaps};
+use crate::executable::{Constants, Leap, Leaps};
 
-pub fn leaps(code: &[u8], address: u64) -> Leaps {
+pub fn leaps(code: &[u8], address: u64, _: &Constants) -> Leaps {
     let words: Vec<u32> =
         code.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().unwrap())).collect();
     let leap = |index: usize| {

@@ -34,6 +34,7 @@ controls! {
     lock: "std::sys::",
     print: "std::io::",
     other_import: "getppid",
+    arithmetic_of_the_system: "atan2",
     system_call: "trap or system call",
     pointer: "call through a pointer",
     pointer_that_may_change: "code without a name",
@@ -49,15 +50,15 @@ pub mod clean {
 
     #[inline(never)]
     pub fn computes(x: f64, index: usize) -> f64 {
-        let (sin, cos) = x.sin_cos();
-        [sin, cos, x.atan2(2.0), cos.atan2(sin)][index % 4]
+        let (sin, cos) = libm::sincos(x);
+        [sin, cos, libm::atan2(x, 2.0), libm::atan2(cos, sin)][index % 4]
     }
 
     /// Arms that differ too much for anything but a jump table.
     #[inline(never)]
     pub fn matches(which: u8, x: f64) -> f64 {
         match which {
-            0 => x.atan2(2.0),
+            0 => libm::atan2(x, 2.0),
             1 => black_box(x) + 1.0,
             2 => (x * 3.0).sqrt(),
             3 => black_box(7.0) / x,
@@ -156,6 +157,11 @@ fn print(value: u64) {
 fn other_import() -> i32 {
     // SAFETY: has no conditions.
     unsafe { libc::getppid() }
+}
+
+#[inline(never)]
+fn arithmetic_of_the_system() -> f64 {
+    black_box(1.0_f64).atan2(black_box(2.0))
 }
 
 #[inline(never)]

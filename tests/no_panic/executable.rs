@@ -28,6 +28,21 @@ pub enum Leap {
 /// Where the instructions of one function leap, each with its own address.
 pub type Leaps = Vec<(u64, Leap)>;
 
+/// Data that nobody writes, by address.
+#[derive(Default)]
+pub struct Constants(pub Vec<(u64, Vec<u8>)>);
+
+impl Constants {
+    /// The signed number of 32 bits at an address.
+    pub fn word(&self, address: u64) -> Option<i32> {
+        let word = |(start, data): &(u64, Vec<u8>)| {
+            let offset = usize::try_from(address.checked_sub(*start)?).ok()?;
+            Some(i32::from_le_bytes(data.get(offset..)?.first_chunk().copied()?))
+        };
+        self.0.iter().find_map(word)
+    }
+}
+
 /// A function with a name in the symbol table.
 pub struct Function {
     pub name: String,
@@ -45,7 +60,8 @@ pub enum Place<'a> {
 
 /// An executable in memory.
 pub struct Executable {
-    leaps: fn(&[u8], u64) -> Leaps,
+    leaps: fn(&[u8], u64, &Constants) -> Leaps,
+    constants: Constants,
     /// By address.
     functions: BTreeMap<u64, Function>,
     /// The linker's stubs for calls to shared libraries, which have no names.
@@ -68,7 +84,13 @@ impl Executable {
             Architecture::Aarch64 => aarch64::leaps,
             other => panic!("no decoder for {other:?}: write one beside x86_64.rs"),
         };
-        Self { leaps, functions: functions(&file), stubs: stubs(&file), pointers: pointers(&file) }
+        Self {
+            leaps,
+            constants: constants(&file),
+            functions: functions(&file),
+            stubs: stubs(&file),
+            pointers: pointers(&file),
+        }
     }
 
     /// The functions whose path is `path`, whatever their type parameters.
@@ -79,7 +101,7 @@ impl Executable {
 
     /// Where `function` leaps, but for places within itself.
     pub fn leaps(&self, function: &Function) -> Leaps {
-        let mut leaps = (self.leaps)(&function.code, function.address);
+        let mut leaps = (self.leaps)(&function.code, function.address, &self.constants);
         leaps.retain(|(_, leap)| !matches!(leap, Leap::To(address) if function.contains(*address)));
         leaps
     }
@@ -106,7 +128,7 @@ impl Executable {
             return Place::Unknown;
         };
         // A stub ends with its first leap.
-        let stub = (self.leaps)(&code[(address - range.start) as usize..], address);
+        let stub = (self.leaps)(&code[(address - range.start) as usize..], address, &self.constants);
         stub.first().map_or(Place::Unknown, |(_, leap)| match leap {
             Leap::ThroughPointerAt(_) => self.place(*leap),
             _ => Place::Unknown,
@@ -132,6 +154,13 @@ fn functions(file: &object::File) -> BTreeMap<u64, Function> {
         Some((address, Function { name, address, code }))
     };
     symbols.filter_map(function).collect()
+}
+
+fn constants(file: &object::File) -> Constants {
+    // Where linkers merge strings, tables are among them.
+    let is_constant = |kind| matches!(kind, SectionKind::ReadOnlyData | SectionKind::ReadOnlyString);
+    let sections = file.sections().filter(|section| is_constant(section.kind()));
+    Constants(sections.map(|section| (section.address(), section.data().unwrap().to_vec())).collect())
 }
 
 fn stubs(file: &object::File) -> Vec<(Range<u64>, Vec<u8>)> {

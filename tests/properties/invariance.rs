@@ -2,9 +2,11 @@
 
 use fearless_simd::Level;
 use hexad::model::active_forces::inverse_dynamics;
-use hexad::model::fidelity::Exact;
+use hexad::model::fidelity::{Exact, LumpedLegs, MasslessLegs, NoVelocity, RigidLegs};
+use hexad::model::forward_kinematics::refine;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::inverse_jacobian::condition;
+use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::{LEGS, Link, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
@@ -117,6 +119,26 @@ fn levels() -> Vec<Level> {
     [Some(Level::baseline()), Some(best)].into_iter().chain(others).flatten().collect()
 }
 
+/// The bits of what the lanes compute: forces of every fidelity, legs, condition, and the pose of the legs found from another.
+fn all_results(machine: &Machine, motion: &Motion, start: &Pose) -> Vec<u64> {
+    let legs = leg_motion(machine, motion);
+    let fidelities = [
+        inverse_dynamics::<Exact>(machine, motion),
+        inverse_dynamics::<RigidLegs>(machine, motion),
+        inverse_dynamics::<NoVelocity>(machine, motion),
+        inverse_dynamics::<LumpedLegs>(machine, motion),
+        inverse_dynamics::<MasslessLegs>(machine, motion),
+    ];
+    let mut state = KinematicState::new(machine, *start);
+    let report = refine(machine, &mut state, &legs.length);
+    let found = state.pose();
+    let found = found.rotation.iter().chain(found.position.iter()).chain([&report.step_ratio]);
+    let forces = fidelities.iter().flatten().flatten();
+    let legs = [&legs.length, &legs.rate, &legs.accel].into_iter().flatten();
+    let condition = condition(machine, &motion.pose);
+    forces.chain(legs).chain(found).chain([&condition]).map(|number| number.to_bits()).collect()
+}
+
 proptest! {
     #![proptest_config(cases(1000))]
 
@@ -167,16 +189,18 @@ proptest! {
         prop_assert_eq!(leg_motion(&other, &motion).accel, expected, "a lane is a lane");
     }
 
+    /// To the bit: a recording is replayed on another processor. SSE4.2 rounds products on their own.
     #[test]
-    fn instruction_sets_do_not_matter((machine, _, motion) in machine_in_motion()) {
+    fn instruction_sets_do_not_matter((machine, _, motion) in machine_in_motion(), off in vector3()) {
         let reference = Machine { level: Level::baseline(), ..machine.clone() };
+        let start = Pose { position: motion.pose.position + off * (1e-3 * machine.joints.radius), ..motion.pose };
         for level in levels() {
             let other = Machine { level, ..machine.clone() };
-            prop_assert!(relative(&forces(&other, &motion), &forces(&reference, &motion)) < 1e-12);
-            let (a, b) = (leg_motion(&other, &motion), leg_motion(&reference, &motion));
-            prop_assert!(relative(&a.length, &b.length) < 1e-14);
-            prop_assert!(relative(&a.rate, &b.rate) < 1e-13);
-            prop_assert!(relative(&a.accel, &b.accel) < 1e-13);
+            if matches!(format!("{level:?}"), name if name.starts_with("Sse4_2")) {
+                prop_assert!(relative(&forces(&other, &motion), &forces(&reference, &motion)) < 1e-12);
+                continue;
+            }
+            prop_assert_eq!(all_results(&other, &motion, &start), all_results(&reference, &motion, &start), "{:?}", level);
         }
     }
 }

@@ -191,7 +191,7 @@ impl Plant<'_> {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();
         let intensity = disturbance * disturbance / (noise.length_m * noise.length_m * period_s);
-        let asked_hz = intensity.powf(1.0 / 6.0) / TAU;
+        let asked_hz = libm::pow(intensity, 1.0 / 6.0) / TAU;
         let ratio = if drive.delay_s.is_some() { ESTIMATOR_RATIO } else { ESTIMATOR_RATIO_DELAY_UNKNOWN };
         let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(asked_hz, f64::min);
         // Something else of the file is wrong.

@@ -107,7 +107,7 @@ fn lesser(tolerated: f64, possible: f64) -> f64 {
 
 /// A positive number rounded down to two significant digits, as it would be written.
 pub(super) fn rounded_down(x: f64) -> f64 {
-    let digit = 10_f64.powf(x.log10().floor() - 1.0);
+    let digit = libm::pow(10.0, libm::log10(x).floor() - 1.0);
     // A number of two digits is itself, whatever the quotient is rounded to.
     let text = format!("{:.1e}", (x / digit * (1.0 + 1e-9)).floor() * digit);
     text.parse().unwrap_or(x)

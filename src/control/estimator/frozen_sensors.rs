@@ -8,9 +8,6 @@
 //! resolution, may: a leg that freezes at rest cannot be distinguished then, and the platform drifts away. An independent pose
 //! or a second encoder closes that.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
-
 use super::Readings;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::machine::LEGS;
@@ -78,7 +75,7 @@ impl FrozenLegBounds {
 /// That shall be the same for all loops. A leg that friction holds moves no less far before the force of feedback frees it, with
 /// less stiffness farther.
 fn motion_bound(stiffness: f64) -> f64 {
-    (ONE_LEG_BOUND_M * (BOUND_STIFFNESS / stiffness).cbrt()).min(MAX_ONE_LEG_BOUND_M)
+    (ONE_LEG_BOUND_M * libm::cbrt(BOUND_STIFFNESS / stiffness)).min(MAX_ONE_LEG_BOUND_M)
 }
 
 /// Readings that did not change, and where the reference was at the first of them.

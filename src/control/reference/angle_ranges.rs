@@ -38,7 +38,7 @@ struct End {
 impl End {
     /// At an angle; one that is too far to be reached needs no slack.
     fn new(angle: f64, is_reached: bool, slack: f64) -> Self {
-        let (sine, cosine) = angle.sin_cos();
+        let (sine, cosine) = libm::sincos(angle);
         Self { sine, cosine, slack: if is_reached { slack } else { 0.0 } }
     }
 
@@ -95,7 +95,7 @@ impl AngleRanges {
     pub fn new(Envelope { lowest, highest }: &Envelope, [alpha, beta, gamma, ..]: &[f64; 6]) -> Self {
         let ([a0, b0, g0, ..], [a1, b1, g1, ..]) = (*lowest, *highest);
         let ranges = [Range::new(a0, a1, *alpha), Range::new(b0, b1, *beta), Range::new(g0, g1, *gamma)];
-        Self { ranges, sign: 1.0_f64.copysign(beta.cos()) }
+        Self { ranges, sign: 1.0_f64.copysign(libm::cos(*beta)) }
     }
 
     /// Whether each angle of a rotation has a distance from the ends of its range \[rad\], or a part of it that is narrower.

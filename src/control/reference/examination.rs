@@ -299,7 +299,7 @@ fn angles_without_room(
     let x = task_coordinates(pose, &constants.machine().home);
     let [_, beta, ..] = x;
     let turn = stop.peak_velocity * stop.duration;
-    let need = turn / (beta.abs() + turn).min(core::f64::consts::FRAC_PI_2).cos();
+    let need = turn / libm::cos((beta.abs() + turn).min(core::f64::consts::FRAC_PI_2));
     let have_room =
         x.iter().zip(ranges(envelope)).take(3).all(|(x, (low, high))| (x - low).min(high - x) >= need);
     (!have_room).then(|| AngleRanges::new(envelope, &x))

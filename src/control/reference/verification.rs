@@ -3,9 +3,6 @@
 //! In free space one pose is enough: every margin exceeds the length of the way, in any direction. Near a bound the stop is
 //! examined knot by knot, see [`super::examination`].
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
-
 use super::examination::{Examination, curvature};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, StopKind};
@@ -96,7 +93,7 @@ fn has_room(
     };
     let x = task_coordinates(pose, &constants.machine().home);
     let [_, beta, ..] = x;
-    let c = (beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2).cos();
+    let c = libm::cos((beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2));
     let turned = turn.length / c + slack / constants.arm;
     let needs = [turned, turned, turned, shift.length + slack, shift.length + slack, shift.length + slack];
     let Envelope { lowest, highest } = envelope;

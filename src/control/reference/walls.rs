@@ -140,8 +140,8 @@ impl Walls {
         let [alpha, beta, ..] = x;
         let radius = self.radius;
         // Rates of the Bryan angles: alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w / c^2.
-        let (e1, e2) = (Vector3::x(), Vector3::new(0.0, alpha.cos(), alpha.sin()));
-        let (s, c) = (beta.sin(), beta.cos());
+        let (e1, e2) = (Vector3::x(), Vector3::new(0.0, libm::cos(alpha), libm::sin(alpha)));
+        let (s, c) = (libm::sin(beta), libm::cos(beta));
         let n = e1 * s + e1.cross(&e2) * c;
         let zero = Vector3::zeros();
         let gradients = [

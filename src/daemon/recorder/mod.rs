@@ -11,6 +11,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread;
 use std::time::SystemTime;
 
+use fearless_simd::Level;
 use serde::{Deserialize, Serialize};
 
 use self::continuous::Continuous;
@@ -21,7 +22,6 @@ pub use self::windows::WindowOrder;
 use self::windows::Windows;
 use super::memory_queue::MemoryConsumer;
 use super::reload::Loaded;
-use crate::config::Config;
 use crate::messages::CycleMessage;
 use crate::messages::clock::monotonic_ns;
 use crate::realtime::setup::denormals;
@@ -249,7 +249,7 @@ fn info(Loaded { config, fidelity, .. }: &Loaded) -> RunInfo {
         name: config.name.clone(),
         version: env!("CARGO_PKG_VERSION").into(),
         commit: env!("HEXAD_COMMIT").into(),
-        instruction_set: instruction_set(config),
+        instruction_set: instruction_set(config.machine.level),
         fidelity: fidelity.name().into(),
         configuration: config.text.clone(),
         machine: format!("{:#?}", config.machine),
@@ -257,9 +257,9 @@ fn info(Loaded { config, fidelity, .. }: &Loaded) -> RunInfo {
     }
 }
 
-/// Name of the instruction set that the lanes of a machine run on.
-pub fn instruction_set(config: &Config) -> String {
-    let level = format!("{:?}", config.machine.level);
+/// Name of an instruction set in recordings.
+pub fn instruction_set(level: Level) -> String {
+    let level = format!("{level:?}");
     level.split('(').next().unwrap_or_default().into()
 }
 

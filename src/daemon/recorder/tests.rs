@@ -3,6 +3,7 @@ use std::fs::{self, File};
 use std::sync::mpsc::channel;
 
 use super::*;
+use crate::config::Config;
 use crate::control::controller::{Controller, Input, Measurement};
 use crate::daemon::memory_queue::{CycleMemory, MemoryProducer, MemoryQueue};
 use crate::daemon::replay::{Replay, recorded_controller, replay};

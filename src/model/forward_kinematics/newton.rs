@@ -9,7 +9,7 @@ use super::{MAX_CONDITION, MAX_NEWTON_STEPS, NewtonReport, Outcome};
 use crate::model::factorization::{Factorization, LaneTwist};
 use crate::model::inverse_geometry::LegGeometry;
 use crate::model::kinematic_state::{KinematicState, StoredLegs};
-use crate::model::lanes::Triple;
+use crate::model::lanes::{LaneArithmetic as _, Triple};
 use crate::model::lanes3::Lanes3;
 use crate::model::machine::Joints;
 use crate::model::rigid::Pose;
@@ -161,7 +161,7 @@ impl<'a, S: Simd> Newton<'a, S> {
     /// `(L^2 - |s|^2) / 2 L`
     #[inline(always)]
     fn residual(&self, s: Lanes3<f64x8<S>>) -> f64x8<S> {
-        self.target.mul_sub(self.target, s.dot(s)) * self.inverse_target * f64x8::splat(self.simd, 0.5)
+        self.target.fused_mul_sub(self.target, s.dot(s)) * self.inverse_target * f64x8::splat(self.simd, 0.5)
     }
 
     /// Stores the last step, which brings the pose to the target lengths and changes the directions of the legs by rounding
@@ -177,7 +177,7 @@ impl<'a, S: Simd> Newton<'a, S> {
     ) -> Outcome {
         let Self { simd, joints, target, inverse_target } = *self;
         legs.length = target;
-        legs.inverse_length = (residual * inverse_target).mul_add(inverse_target, inverse_target);
+        legs.inverse_length = (residual * inverse_target).fused_mul_add(inverse_target, inverse_target);
         let sensitivity = Sensitivity::new(simd, joints, &legs, factorization);
         // That K grows along the step could lead across, if anything could.
         let same_side = sensitivity.determinant * kinematic_state.sensitivity.determinant > 0.0;

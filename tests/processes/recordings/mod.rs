@@ -12,6 +12,8 @@ use crate::support::machine::Machine;
 
 mod crashes;
 mod full_disk;
+#[cfg(target_arch = "x86_64")]
+mod instruction_sets;
 mod last_seconds;
 mod python;
 mod reloads;
