@@ -58,7 +58,8 @@ pub(super) struct DriveMonitor {
     missing_s: [f64; LEGS],
     /// When all were ready last, or control began \[ns\].
     ready_ns: u64,
-    clock_ns: u64,
+    /// Of the newest measurement \[ns\].
+    measured_ns: u64,
     /// Whether all drives were ready since control began.
     has_been_ready: bool,
     /// Whether all are ready now, or nothing is reported.
@@ -69,9 +70,10 @@ impl DriveMonitor {
     /// Checks the status of a measurement.
     #[inline(never)]
     pub fn check(&mut self, cycle: &Cycle<'_>, measurement: Option<&Measurement>) -> Result<(), Diagnostic> {
-        let dt = seconds_between(self.clock_ns, cycle.release_ns).clamp(0.0, FORCE_TIME_CONSTANT_S);
-        self.clock_ns = cycle.release_ns;
-        let Some(Measurement { drives, .. }) = measurement else { return Ok(()) };
+        let Some(Measurement { drives, time_ns, .. }) = measurement else { return Ok(()) };
+        // A driver that is silent says nothing about the force that is sent meanwhile.
+        let dt = seconds_between(self.measured_ns, *time_ns).clamp(0.0, FORCE_TIME_CONSTANT_S);
+        self.measured_ns = *time_ns;
         let unready = drives.unready();
         self.is_ready = unready.is_none();
         if let Some(leg) = drives.faulty() {
@@ -79,7 +81,8 @@ impl DriveMonitor {
         }
         if !cycle.state.has_control() {
             let ready_ns = cycle.release_ns;
-            *self = Self { ready_ns, clock_ns: ready_ns, is_ready: self.is_ready, ..Self::default() };
+            let Self { measured_ns, is_ready, .. } = *self;
+            *self = Self { ready_ns, measured_ns, is_ready, ..Self::default() };
             return Ok(());
         }
         self.check_ready(cycle, unready)?;

@@ -125,6 +125,11 @@ impl Simulator {
         self.brakes
     }
 
+    /// Forces of the drives that act now \[N\]; none with closed brakes.
+    pub fn forces(&self) -> [f64; LEGS] {
+        self.push
+    }
+
     /// The simulated machine, with its friction; without drives where legs are elastic.
     pub fn machine(&self) -> &Machine {
         self.dynamics.machine()
@@ -185,6 +190,7 @@ impl Simulator {
         if let Some(leg) = lengths.iter().position(|length| !self.machine().actuator.contains(*length)) {
             self.state.platform.twist = Twist::default();
             self.state.drives.rate.fill(0.0);
+            self.push = [0.0; LEGS];
             self.brakes = Brakes::EndStop { leg };
         }
     }

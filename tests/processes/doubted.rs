@@ -5,10 +5,10 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hexad::config::Config;
-use hexad::messages::Bus;
-use hexad::messages::Message;
+use hexad::messages::{Bus, MeasuredMessage, Message};
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
+use hexad::model::machine::LEGS;
 use hexad::model::task::TaskState;
 
 use crate::support::children::{HANG, Hexad};
@@ -84,6 +84,36 @@ fn a_driver_goes_by_good_messages_only() {
         assert!(words.contains(&format!("rejected in total: forces {reason}")), "{reason}: {words}");
         assert_eq!(words.matches(&format!("rejected: a force {reason}")).count(), 1, "{reason}: {words}");
     }
+}
+
+/// Closed brakes before the first force; then all drives enabled, all brakes open, and the force that was sent.
+#[test]
+fn a_plant_reports_its_drives() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("reporting");
+    let plant = start_plant(&machine);
+    plant.says("plant at rest");
+    let bus = Bus::join(&machine.name).expect("to join");
+    let mut measured = bus.subscriber::<MeasuredMessage>(8).expect("a subscriber");
+    let mut reports = |force_n: [f64; LEGS], drive_enabled: u32, brake_open: u32| {
+        let began = Instant::now();
+        let mut forger = Forger::new(&bus, force_n);
+        loop {
+            if drive_enabled != 0 {
+                send(&mut forger, |_| {});
+            }
+            let Some(message) = measured.receive_latest() else { continue };
+            let status =
+                (message.drive_valid, message.drive_fault, message.drive_enabled, message.brake_open);
+            if (status, message.force_n) == ((15, 0, drive_enabled, brake_open), force_n) {
+                return;
+            }
+            assert!(began.elapsed() < HANG, "{status:?}, {:?}", message.force_n);
+        }
+    };
+    reports([0.0; LEGS], 0, 0);
+    reports(holding(&machine), 0b11_1111, 0b11_1111);
+    plant.stops_on("TERM", HANG);
 }
 
 /// What holds the platform up at home.

@@ -15,6 +15,7 @@ use crate::commands::failure::CommandError;
 use crate::config::Config;
 use crate::control::controller::Measurement;
 use crate::control::diagnostic::DiagnosticCode;
+use crate::control::drive_monitor::DriveStatus;
 use crate::control::input_validation::seconds_between;
 use crate::control::state::State;
 use crate::daemon::nanoseconds;
@@ -36,6 +37,9 @@ mod validation;
 
 /// Forces kept between two ticks: 12.8 ms at 20 kHz, so that a late plant still applies each in its turn.
 const FORCE_DEPTH: usize = 256;
+
+/// A bit for each leg.
+const ALL_LEGS: u32 = (1 << LEGS) - 1;
 
 /// After a longer pause (the process was stopped) simulated time continues from now, instead of a second of simulation
 /// that all participants would wait for.
@@ -209,8 +213,21 @@ impl DrivenPlant {
                 time_ns: self.time_ns,
                 length,
                 rate: Some(rate),
+                drives: self.drive_status(),
                 ..Measurement::default()
             })
+        }
+    }
+
+    /// What drives report: enabled while a valid force is commanded, the brakes and the forces as they are.
+    fn drive_status(&self) -> DriveStatus {
+        let simulator = self.hardware.simulator();
+        let all_if = |is_set: bool| Some(if is_set { ALL_LEGS } else { 0 });
+        DriveStatus {
+            enabled: all_if(self.force.is_some()),
+            brake_open: all_if(simulator.brakes() == Brakes::Open),
+            fault: Some(0),
+            force: Some(simulator.forces()),
         }
     }
 }
