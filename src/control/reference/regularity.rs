@@ -29,8 +29,8 @@ const LANES: usize = 8;
 /// Of the balls that are kept: those along one stop.
 const GROUPS: usize = 2;
 
-/// Square of the largest Frobenius norm of N: six directions, and six arms whose mean square is 1.
-const MAX_WRENCH_NORM_SQUARED: f64 = 12.0;
+/// Largest Frobenius norm of N, the root of 12: six directions, and six arms whose mean square is 1.
+const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_754_4;
 
 /// Largest `|R - R0| / sqrt 2` for which an angle is bounded, and its ratio to the angle's bound: `2 asin(1/2)`.
 const MAX_CHORD: f64 = 1.0;
@@ -138,7 +138,7 @@ impl BallGroup {
         let turned_leg = turned_squared.sqrt();
         let turned_arm = turn + turned_leg;
         let change = (splat(6.0) * (turned_squared + turned_arm * turned_arm)).sqrt();
-        let largest_norm = (norm + change).min(splat(MAX_WRENCH_NORM_SQUARED.sqrt()));
+        let largest_norm = (norm + change).min(splat(MAX_WRENCH_NORM));
         let least_sine = splat(least_universal_sine(constants, limit));
         let is_covered = left.simd_gt(splat(0.0))
             & displacements.chord.simd_le(splat(MAX_CHORD))

@@ -212,7 +212,7 @@ impl Walls {
                     rate.min(along.rate * wall.inverse_square).max(-against.rate * wall.inverse_square);
                 let multiplier = rate - allowed;
                 if multiplier != wall.multiplier {
-                    velocity = velocity - gradient * f64x8::splat(simd, multiplier - wall.multiplier);
+                    velocity -= gradient * f64x8::splat(simd, multiplier - wall.multiplier);
                     wall.multiplier = multiplier;
                     is_changed = true;
                 }
@@ -234,7 +234,7 @@ impl Walls {
                 let gradient = f64x8::load_array(simd, wall.gradient);
                 let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
                 let excess = (dot(gradient, derivative) - wanted) * wall.inverse_square;
-                derivative = derivative - gradient * f64x8::splat(simd, excess);
+                derivative -= gradient * f64x8::splat(simd, excess);
             }
         }
         let store = |lanes: f64x8<S>, turn: &mut Vector3<f64>, shift: &mut Vector3<f64>| {
