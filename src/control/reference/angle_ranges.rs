@@ -8,9 +8,8 @@
 //! the same, or where cos d <= 0 or cos e <= 0 instead     =>  d, e >= slack      pi <= w <= 5
 //! ```
 //!
-//! as `asin(slack) >= slack`. A range ends at most 2.5 rad from where a motion begins, without slack there, so that full turns do not
-//! matter. That is 24 products
-//! for three angles, where each arc tangent takes 100 instructions: an examination asks at every knot.
+//! as `asin(slack) >= slack`. A range ends at most 2.5 rad from where a motion begins, without slack there, so that full turns do
+//! not matter. That is 24 products for three angles, where each arc tangent takes 100 instructions: an examination asks at every knot.
 
 use core::f64::consts::PI;
 
