@@ -263,7 +263,7 @@ fn a_long_outage_of_the_disk_is_counted_and_the_recording_goes_on() {
     assert_eq!((cycles, missing, is_repeatable), (END, 0, true));
     assert_eq!((summary.first.cycle, summary.cycles), (unwritten + 1, END - unwritten));
     assert_eq!(gaps, [GapMessage { first_cycle: 1, cycles: unwritten }], "the file says so, too");
-    // Memory holds 30 s, the queue 2 s, and the disk is tried again every 2 s.
+    // Memory holds 30 s. The disk is tried again 2 s later, behind what a busy recorder takes at once: at most the queue, 2 s.
     let least = OUTAGE - 30_000 - 2_000 - 1_000;
-    assert!((least..=OUTAGE - 30_000 + 2_100).contains(&unwritten), "{unwritten}");
+    assert!((least..=OUTAGE - 30_000 + 2_000 + 2_000).contains(&unwritten), "{unwritten}");
 }
