@@ -36,9 +36,7 @@ use crate::model::inverse_jacobian::{leg_wrenches, scaled_wrenches};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::Pose;
-
-/// Largest Frobenius norm of N, as no moment exceeds its arm: six directions, and six arms whose mean square is 1.
-const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_755;
+use crate::model::sensitivity::MAX_WRENCH_NORM;
 
 /// Smallest usual share of the linear part in the bound of a change. Only the computing time depends on it.
 const MIN_LINEAR_SHARE: f64 = 0.1;

@@ -18,7 +18,7 @@
 //! determinants are at hand) LU with partial pivoting takes over: over many poses
 //! no worse than twice that method.
 
-use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
+use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
 use super::inverse_geometry::LegGeometry;
@@ -155,7 +155,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         let triples = &self.joints.triples;
         if !self.is_regular {
             let n = wrench_columns(triples, legs);
-            let forces = forces_by_lu(&n, &wrench.sum(), &triples.unpack(&axial.into()))?;
+            let forces = forces_by_lu(simd.level(), &n, &wrench.sum(), &triples.unpack(&axial.into()))?;
             return Some(triples.pack(&forces));
         }
         let force = wrench.force.total();
@@ -177,7 +177,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         if !self.is_regular {
             let triples = &self.joints.triples;
             let n = wrench_columns(triples, legs);
-            return twist_by_lu(&n, &triples.unpack(&rates.into())).map(
+            return twist_by_lu(simd.level(), &n, &triples.unpack(&rates.into())).map(
                 #[inline(always)]
                 |twist| LaneTwist::splat(simd, &twist),
             );
@@ -234,17 +234,17 @@ impl<S: Simd> LaneWrench<S> {
 /// By LU with partial pivoting.
 #[cold]
 #[inline(never)]
-fn forces_by_lu(n: &Matrix6<f64>, wrench: &Wrench, axial: &[f64; LEGS]) -> Option<[f64; LEGS]> {
-    let balancing = lu::solve(&n.transpose().into(), &wrench.vector().into())?;
+fn forces_by_lu(level: Level, n: &Matrix6<f64>, wrench: &Wrench, axial: &[f64; LEGS]) -> Option<[f64; LEGS]> {
+    let balancing = lu::solve(level, &n.transpose().into(), &wrench.vector().into())?;
     Some((Vector6::from(balancing) + Vector6::from(*axial)).into())
 }
 
 /// By LU with partial pivoting.
 #[cold]
 #[inline(never)]
-fn twist_by_lu(n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
+fn twist_by_lu(level: Level, n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
     // The columns of N are the rows of its transpose.
-    lu::solve(&(*n).into(), rates).map(|twist| Twist::from_vector(&twist.into()))
+    lu::solve(level, &(*n).into(), rates).map(|twist| Twist::from_vector(&twist.into()))
 }
 
 /// N, columns in the order of the legs.

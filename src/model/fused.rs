@@ -120,10 +120,8 @@ mod tests {
                 });
             }
             let expected: [f64; 8] = core::array::from_fn(|lane| a[lane].mul_add(b[lane], c[lane]));
-            {
-                let found = mul_add(&a, &b, &c);
-                assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{a:?} {b:?} {c:?}");
-            }
+            let found = mul_add(&a, &b, &c);
+            assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits), "{a:?} {b:?} {c:?}");
             rounded_twice += (0..8).filter(|lane| a[*lane] * b[*lane] + c[*lane] != expected[*lane]).count();
         }
         assert!(rounded_twice > 100_000, "{rounded_twice}");
@@ -148,14 +146,12 @@ mod tests {
         let a = [inf, -inf, nan, 1.0, 1e300, -0.0, 0.0, 1e200];
         let b = [2.0, 2.0, 1.0, 3.0, 1e300, 1.0, -1.0, -1e200];
         let c = [1.0, inf, 1.0, -inf, 1.0, -0.0, 0.0, 1.0];
-        {
-            for (lane, found) in mul_add(&a, &b, &c).into_iter().enumerate() {
-                let expected = a[lane].mul_add(b[lane], c[lane]);
-                assert!(
-                    found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan(),
-                    "{lane}: {found}"
-                );
-            }
+        for (lane, found) in mul_add(&a, &b, &c).into_iter().enumerate() {
+            let expected = a[lane].mul_add(b[lane], c[lane]);
+            assert!(
+                found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan(),
+                "{lane}: {found}"
+            );
         }
     }
 }

@@ -9,6 +9,8 @@
 //! found by an index: there is nothing to check, and so nothing that could panic. That is why it is not
 //! nalgebra's.
 
+use fearless_simd::{Level, dispatch};
+
 use super::machine::LEGS;
 
 /// Coefficients from the diagonal on, then zeros; and the right-hand sides.
@@ -19,15 +21,21 @@ struct Row<const R: usize> {
 }
 
 /// x of `A x = b`; `None` if a pivot is zero. A is given by rows.
-pub(super) fn solve(a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<[f64; LEGS]> {
-    solve_columns(a, &b.map(|b| [b])).map(|x| x.map(|[x]| x))
+pub(super) fn solve(level: Level, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<[f64; LEGS]> {
+    solve_columns(level, a, &b.map(|b| [b])).map(|x| x.map(|[x]| x))
 }
 
-/// X of `A X = B`; all given by rows.
+/// X of `A X = B`; all given by rows. The instruction set changes the time, not one bit of the result.
 pub(super) fn solve_columns<const R: usize>(
+    level: Level,
     a: &[[f64; LEGS]; LEGS],
     b: &[[f64; R]; LEGS],
 ) -> Option<[[f64; R]; LEGS]> {
+    dispatch!(level, _simd => solved(a, b))
+}
+
+#[inline(always)]
+fn solved<const R: usize>(a: &[[f64; LEGS]; LEGS], b: &[[f64; R]; LEGS]) -> Option<[[f64; R]; LEGS]> {
     let mut rows = [Row { left: [0.0; LEGS], right: [0.0; R] }; LEGS];
     for (row, (left, right)) in rows.iter_mut().zip(a.iter().zip(b)) {
         *row = Row { left: *left, right: *right };
@@ -36,6 +44,7 @@ pub(super) fn solve_columns<const R: usize>(
     back_substitute(&rows)
 }
 
+#[inline(always)]
 fn triangulate<const R: usize>(rows: &mut [Row<R>; LEGS]) {
     let mut rest = rows.as_mut_slice();
     while let Some((top, below)) = rest.split_first_mut() {
@@ -64,6 +73,7 @@ fn triangulate<const R: usize>(rows: &mut [Row<R>; LEGS]) {
     }
 }
 
+#[inline(always)]
 fn back_substitute<const R: usize>(rows: &[Row<R>; LEGS]) -> Option<[[f64; R]; LEGS]> {
     // The unknowns found so far come first.
     let mut x = [[0.0; R]; LEGS];

@@ -8,7 +8,7 @@
 //! Frobenius norms, torques about the mean of the joints and divided by the radius. Valid at every pose; at a singular one
 //! the condition is not finite and the trusted step is zero or not a number.
 
-use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
+use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix6, Vector6};
@@ -18,6 +18,9 @@ use super::inverse_geometry::LegGeometry;
 use super::lanes::{LaneArithmetic as _, Triple};
 use super::lu;
 use super::machine::Joints;
+
+/// Largest Frobenius norm of N, the root of 12, as no moment exceeds its arm: six directions, and six arms whose mean square is 1.
+pub(crate) const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_755;
 
 /// Meaning of the condition, for people.
 pub const CONDITION_MEANING: &str = "6 is best; errors and forces grow with it";
@@ -90,7 +93,7 @@ fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeo
     let simd = factorization.simd;
     if !factorization.is_regular {
         let n = wrench_columns(&factorization.joints.triples, legs);
-        return inverse_norm_squared_by_lu(&n, factorization.joints.radius);
+        return inverse_norm_squared_by_lu(simd.level(), &n, factorization.joints.radius);
     }
     let r = f64x4::splat(simd, factorization.joints.radius);
     let [i0, i1, i2] = factorization.inverse_a.broadcasts();
@@ -109,8 +112,8 @@ fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeo
 /// The same by LU with partial pivoting.
 #[cold]
 #[inline(never)]
-fn inverse_norm_squared_by_lu(n: &Matrix6<f64>, radius: f64) -> f64 {
+fn inverse_norm_squared_by_lu(level: Level, n: &Matrix6<f64>, radius: f64) -> f64 {
     let scale = Matrix6::from_diagonal(&Vector6::new(radius, radius, radius, 1.0, 1.0, 1.0));
-    lu::solve_columns(&n.transpose().into(), &scale.into())
+    lu::solve_columns(level, &n.transpose().into(), &scale.into())
         .map_or(f64::INFINITY, |inverse| Matrix6::from(inverse).norm_squared())
 }

@@ -26,7 +26,7 @@ use super::regularity::{RegularBalls, Regularity};
 use super::stop::Stop;
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
-use crate::control::parameters::{Constants, Envelope};
+use crate::control::parameters::{Constants, Envelope, ViolationPolicy};
 use crate::model::inverse_geometry::{length_and_rate_lanes, length_lanes};
 use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
@@ -36,12 +36,15 @@ use crate::model::triples::LegLanes;
 const CHORD_DEPARTURE_M: f64 = 1e-4;
 /// Departure of a leg's rate from its chord that does so, over the largest rate.
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
-/// Bounds on the number of intervals between knots.
+/// Bounds on the number of intervals between knots. Under `"limit"` the [walls](super::walls) take time and keep more distance than
+/// fewer knots need.
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: f64 = 20.0;
-/// Most work of an examination, in knots; that of a knot that no ball covers, beyond it: its pose is factorized. Together
-/// they bound the longest cycle. The balls that were found remain for the next one.
-const MAX_WORK: u32 = 27;
+const MAX_INTERVALS_WITH_WALLS: f64 = 14.0;
+/// Work beside the knots of the longest stop, in knots; and that of a knot that no ball covers: its pose is factorized. Together
+/// they bound the longest cycle. The balls that were found remain for the next one. In the longest stop three may be new: with two
+/// a reference that is beyond its condition by rounding would not come back.
+const SPARE_WORK: f64 = 6.0;
 const FACTORIZATION_WORK: u32 = 2;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
@@ -111,7 +114,11 @@ impl<'a> Examination<'a> {
             if needs_rates { rate_curvature / (RATE_DEPARTURE_RATIO * actuator.max_rate) } else { 0.0 };
         let density = (curvature / CHORD_DEPARTURE_M).max(rates);
         let knots = (stop.duration() * (density / 8.0).sqrt()).ceil();
-        let intervals = knots.clamp(MIN_INTERVALS, MAX_INTERVALS);
+        let max_intervals = match constants.parameters.on_violation {
+            ViolationPolicy::Stop => MAX_INTERVALS,
+            ViolationPolicy::Limit => MAX_INTERVALS_WITH_WALLS,
+        };
+        let intervals = knots.clamp(MIN_INTERVALS, max_intervals);
         let dt = stop.duration() / intervals;
         let chord = dt.max(step.duration).powi(2) / 8.0;
         let room = ROOM_RATIO * actuator.stroke();
@@ -136,7 +143,7 @@ impl<'a> Examination<'a> {
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
             relaxed: None,
-            work: MAX_WORK.saturating_sub(intervals as u32 + 1),
+            work: (max_intervals - intervals + SPARE_WORK) as u32,
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
@@ -253,7 +260,10 @@ impl<'a> Examination<'a> {
         state: &PoseStopState,
     ) -> Result<(), Limit> {
         let is_within = is_position_inside(envelope, pose, &self.position_slack)
-            && self.angles.is_none_or(|angles| angles.contain(&pose.rotation, self.angle_slack(pose, state)));
+            && self
+                .angles
+                .as_ref()
+                .is_none_or(|angles| angles.contain(&pose.rotation, self.angle_slack(pose, state)));
         if is_within || self.is_nearer_than_start(envelope, pose) { Ok(()) } else { Err(Limit::Envelope) }
     }
 

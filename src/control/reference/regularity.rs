@@ -22,15 +22,12 @@ use crate::control::parameters::Constants;
 use crate::model::inverse_geometry::universal_sine;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::rigid::Pose;
-use crate::model::sensitivity::Sensitivity;
+use crate::model::sensitivity::{MAX_WRENCH_NORM, Sensitivity};
 
 /// Balls side by side: one in each lane.
 const LANES: usize = 8;
 /// Of the balls that are kept: those along one stop.
 const GROUPS: usize = 2;
-
-/// Largest Frobenius norm of N, the root of 12: six directions, and six arms whose mean square is 1.
-const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_754_4;
 
 /// Largest `|R - R0| / sqrt 2` for which an angle is bounded, and its ratio to the angle's bound: `2 asin(1/2)`.
 const MAX_CHORD: f64 = 1.0;
@@ -273,7 +270,8 @@ impl RegularBalls {
         let index = self.kept / LANES;
         let group = self.groups.get_mut(index)?;
         group.set(self.kept % LANES, pose, &ball);
-        // No other ball of the group does. One that is too small for its reach may cover a knot: it stays until the next one.
+        // By any ball of the group, which is as good. A new one that is too small for its reach may cover a knot: it stays until
+        // the next one.
         let is_covered = dispatch!(constants.machine().level, simd => {
             let displacements = group.displacements(simd, pose);
             group.covers(simd, constants, &displacements, reach, limit)

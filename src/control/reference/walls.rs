@@ -33,8 +33,12 @@ use crate::model::task::task_coordinates;
 const CLOSING_SHARE: f64 = 0.6;
 /// Distance kept from a bound, so that the examination of the stop between knots finds room, as a ratio of the stroke.
 const KEPT_RATIO: f64 = 5e-3;
-/// Sweeps over the walls: two walls at 60 degrees converge to 1e-4.
-const SWEEPS: u32 = 8;
+/// Sweeps over the walls: two walls at 60 degrees converge to 1e-4. Fewer where many walls are active, as this many visits of
+/// them bound the longest cycle: six hold every direction, more contradict each other.
+const SWEEPS: usize = 8;
+const MAX_VISITS: usize = 24;
+/// One sweep of so many is over all walls, the others over the active ones.
+const FULL_SWEEP: usize = 3;
 /// Slowness of the return from a gap that is negative, over that of the approach.
 const RETURN_RATIO: f64 = 4.0;
 
@@ -189,6 +193,12 @@ impl Walls {
         dispatch!(level, simd => self.restrict_in_lanes(simd, turn, shift))
     }
 
+    /// The walls that change the wanted velocity.
+    #[inline(always)]
+    fn active(&self) -> impl Iterator<Item = &Wall> {
+        self.walls.iter().take(self.count).filter(|wall| wall.multiplier != 0.0)
+    }
+
     #[inline(always)]
     fn restrict_in_lanes<S: Simd>(
         &mut self,
@@ -201,9 +211,13 @@ impl Walls {
         };
         let mut velocity = load(&turn.velocity, &shift.velocity);
         let mut active = LimitSet::default();
-        for _ in 0..SWEEPS {
+        let mut sweeps = SWEEPS;
+        let mut sweep = 0;
+        while sweep < sweeps {
             let mut is_changed = false;
-            for wall in self.walls.iter_mut().take(self.count) {
+            let is_full = sweep % FULL_SWEEP == 0;
+            let visited = |wall: &&mut Wall| is_full || wall.multiplier != 0.0;
+            for wall in self.walls.iter_mut().take(self.count).filter(visited) {
                 let [against, along] = &wall.sides;
                 let gradient = f64x8::load_array(simd, wall.gradient);
                 // The closing rate without this wall, and what of it is beyond the ends.
@@ -217,19 +231,21 @@ impl Walls {
                     is_changed = true;
                 }
             }
-            if !is_changed {
+            if is_full && !is_changed {
                 break;
             }
+            sweep += 1;
+            sweeps = SWEEPS.min(MAX_VISITS / self.active().count().max(1));
         }
-        for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier != 0.0) {
+        for wall in self.active() {
             active = active.union(wall.limit);
         }
         if active.is_empty() {
             return active;
         }
         let mut derivative = load(&turn.derivative, &shift.derivative);
-        for _ in 0..SWEEPS {
-            for wall in self.walls.iter().take(self.count).filter(|wall| wall.multiplier != 0.0) {
+        for _ in 0..sweeps {
+            for wall in self.active() {
                 let [against, along] = &wall.sides;
                 let gradient = f64x8::load_array(simd, wall.gradient);
                 let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
