@@ -12,7 +12,7 @@ use super::common::extremes::Quantity;
 use super::genome::Genome;
 use super::machines::MACHINES;
 use super::run::{Doctor, Outcome, run};
-use super::table::Row;
+use super::table::{self, Row};
 
 /// Genomes that are kept of each quantity and policy.
 const KEPT: usize = 4;
@@ -122,7 +122,8 @@ impl Search {
     fn next(&self, seed: u64) -> Genome {
         let machine = self.row.machine;
         let mut random = Random::new(seed ^ self.row.runs << 8 ^ (machine as u64) << 56);
-        let policy = if random.uniform() < 0.5 { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
+        let [stop, limit] = self.row.cycles;
+        let policy = if stop <= limit { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
         let is_frozen = random.uniform() < FROZEN;
         let pools = &self.pools[policy as usize];
         let quantity = (random.uniform() * Quantity::ALL.len() as f64) as usize;
@@ -176,6 +177,8 @@ pub fn search(known: &[Genome], seed: u64, budget: Budget) -> Vec<Search> {
             let mut search = Search::new(machine);
             known.iter().filter(|genome| genome.machine == machine).for_each(|genome| search.add(genome));
             search.climb(seed, budget);
+            // A long search shows how far it is.
+            println!("{}", table::text(std::slice::from_ref(&search.row)));
             searches.lock().unwrap().push(search);
         }
     };

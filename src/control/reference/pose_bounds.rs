@@ -9,6 +9,9 @@ use crate::model::task::task_coordinates;
 /// Room around a pose beyond the nominal bounds, in which the reference may begin to move back, as a ratio of the stroke:
 /// above the noise of lengths.
 const START_ROOM_RATIO: f64 = 2.5e-5;
+/// Distance of relaxed bounds from the end stops, in such rooms: one that a length may use between knots, and one for the following
+/// error. A platform that stands nearer may come back, one that moves on towards the end stop may not begin.
+const END_ROOMS: f64 = 2.0;
 
 /// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
 const ROUNDING: f64 = 1e-9;
@@ -44,19 +47,23 @@ impl PoseBounds {
     /// The nominal bounds, relaxed where a pose exceeds them.
     pub fn around(constants: &Constants, pose: &Pose) -> Self {
         let mut bounds = Self::nominal(constants);
-        let stroke_room = START_ROOM_RATIO * constants.machine().actuator.stroke();
-        for (bound, length) in bounds.shortest.iter_mut().zip(leg_lengths(constants.machine(), pose)) {
-            bounds.is_relaxed |= relax(bound, length, -stroke_room);
+        let actuator = &constants.machine().actuator;
+        let stroke_room = START_ROOM_RATIO * actuator.stroke();
+        let (lengths, end_room) = (leg_lengths(constants.machine(), pose), END_ROOMS * stroke_room);
+        let (low_end, high_end) = (actuator.min_length + end_room, actuator.max_length - end_room);
+        for (bound, length) in bounds.shortest.iter_mut().zip(lengths) {
+            bounds.is_relaxed |= relax(bound, length, -stroke_room, low_end);
         }
-        for (bound, length) in bounds.longest.iter_mut().zip(leg_lengths(constants.machine(), pose)) {
-            bounds.is_relaxed |= relax(bound, length, stroke_room);
+        for (bound, length) in bounds.longest.iter_mut().zip(lengths) {
+            bounds.is_relaxed |= relax(bound, length, stroke_room, high_end);
         }
         if let Some(Envelope { lowest, highest }) = &mut bounds.envelope {
             let x = task_coordinates(pose, &constants.machine().home);
             let turn_room = stroke_room / constants.machine().joints.radius;
             let rooms = [turn_room, turn_room, turn_room, stroke_room, stroke_room, stroke_room];
             for ((low, high), (x, room)) in lowest.iter_mut().zip(highest).zip(x.iter().zip(rooms)) {
-                bounds.is_relaxed |= relax(low, *x, -room) | relax(high, *x, room);
+                bounds.is_relaxed |=
+                    relax(low, *x, -room, f64::NEG_INFINITY) | relax(high, *x, room, f64::INFINITY);
             }
         }
         bounds
@@ -90,11 +97,13 @@ impl PoseBounds {
     }
 }
 
-/// Moves a bound to `room` beyond `value` if the value exceeds it, outward in the direction of `room`. True if so.
-fn relax(bound: &mut f64, value: f64, room: f64) -> bool {
+/// Moves a bound to `room` beyond `value` if the value exceeds it, outward in the direction of `room`, but no farther than an end; to
+/// the value itself where that is beyond the end. True if it exceeds it.
+fn relax(bound: &mut f64, value: f64, room: f64, end: f64) -> bool {
     let is_beyond = (value - *bound) * room > 0.0;
     if is_beyond {
-        *bound = value + room;
+        let wanted = value + room;
+        *bound = if room > 0.0 { wanted.min(end.max(value)) } else { wanted.max(end.min(value)) };
     }
     is_beyond
 }

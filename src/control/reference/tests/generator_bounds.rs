@@ -8,7 +8,7 @@ use super::generator::{MS, constants, run, standing, started, x};
 use super::*;
 use crate::control::limits::Limit;
 use crate::control::parameters::Envelope;
-use crate::model::rigid::Twist;
+use crate::model::rigid::{Motion, Twist};
 use crate::model::task::task_coordinates;
 
 /// A platform that is beyond the envelope when control begins comes back, and does not go there again.
@@ -64,6 +64,45 @@ fn a_start_is_refused_with_the_limit_that_no_stop_keeps() {
     let constants = constants(|_, _| ());
     let mut reference = ReferenceGenerator::new(&constants);
     assert_eq!(reference.check_start(&constants, constants.home.pose(), &twist), Ok(()));
+}
+
+/// A platform that brakes have carried beyond the margin: at rest it may begin and comes back, from a step of the room of its bounds
+/// off the end stop it may not begin with a motion that ends at the stop.
+#[test]
+fn a_start_beside_an_end_stop_never_leads_into_it() {
+    let mut samples = Samples::new(31);
+    let (mut refused, mut begun) = (0, 0);
+    for _ in 0..2000 {
+        let free = constants(|_, parameters| parameters.stroke_margin = 0.01);
+        let mut machine = free.machine().clone();
+        let stroke = machine.actuator.stroke();
+        let pose = pose(&mut samples, &free);
+        // The end stop is as near to the longest leg as a start has room, or nearer.
+        let longest = leg_lengths(&machine, &pose).into_iter().fold(0.0, f64::max);
+        let gap = 4e-4 * stroke * samples.uniform() * samples.uniform();
+        machine.actuator.max_length = longest + gap;
+        machine.actuator.min_length = machine.actuator.max_length - stroke;
+        let at_end = Constants::new(&machine, free.parameters);
+        let speed = 0.03 * samples.uniform() * samples.uniform();
+        let twist = Twist { angular: Vector3::zeros(), linear: Vector3::new(0.0, 0.0, speed) };
+        let mut reference = ReferenceGenerator::new(&at_end);
+        assert_ne!(reference.check_start(&at_end, &pose, &Twist::default()), Err(Limit::Stroke), "at rest");
+        if reference.check_start(&at_end, &pose, &twist).is_err() {
+            refused += 1;
+            continue;
+        }
+        begun += 1;
+        reference.start(&at_end, 0, &Motion { twist, ..at_rest(&pose) });
+        let mut time_ns = 0;
+        while !reference.is_at_rest() {
+            time_ns += MS / 10;
+            reference.advance(&at_end, time_ns, None);
+            let lengths = leg_lengths(&machine, &reference.motion().pose);
+            let excess = lengths.into_iter().fold(0.0, f64::max) - machine.actuator.max_length;
+            assert!(excess <= 0.0, "{excess:e} m beyond the end stop, {gap:e} m from it at the start");
+        }
+    }
+    assert!(refused > 300 && begun > 200, "{refused} {begun}");
 }
 
 /// Both ends of the step keep the limit of velocity, its middle exceeds it by `J h^2 / 8`.

@@ -165,6 +165,9 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
     let [shortest, longest] = [machine.actuator.min_length + 0.1, machine.actuator.max_length - 0.1];
     assert_eq!((nominal.shortest, nominal.longest), ([shortest; LEGS], [longest; LEGS]));
     let room = 2.5e-5 * machine.actuator.stroke();
+    // Two rooms before the end stops.
+    let (low, high) = (machine.actuator.min_length + 2.0 * room, machine.actuator.max_length - 2.0 * room);
+    let stops = [low, f64::NEG_INFINITY, -high, f64::NEG_INFINITY];
     let ends = |bounds: &PoseBounds| {
         let envelope = bounds.envelope.unwrap();
         [bounds.shortest, envelope.lowest, bounds.longest.map(|x| -x), envelope.highest.map(|x| -x)]
@@ -192,7 +195,8 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
                 for axis in 0..6 {
                     let is_angle = kind % 2 == 1 && axis < 3;
                     let room = if is_angle { room / machine.joints.radius } else { room };
-                    let expected = nominal[axis].min(values[kind][axis] - room).max(before[axis]);
+                    let (value, end) = (values[kind][axis], stops[kind]);
+                    let expected = nominal[axis].min((value - room).max(end.min(value))).max(before[axis]);
                     let expected = if values[kind][axis] < nominal[axis] { expected } else { nominal[axis] };
                     assert!((now[axis] - expected).abs() < 1e-12, "{kind} {axis} {share}");
                 }
