@@ -8,6 +8,7 @@ mod closed_loop {
     use super::*;
 
     mod ages;
+    mod allowed_disturbances;
     mod assessment;
     mod built_in;
     mod disturbances;

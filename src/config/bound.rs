@@ -6,7 +6,7 @@ use toml::de::DeValue;
 
 use crate::output::numbers::{MAX_MAGNITUDE, MIN_POSITIVE_VALUE};
 
-/// Bound of a number that must be finite.
+/// Bound of a number. All but one admit finite numbers only.
 #[derive(Clone, Copy)]
 pub(super) enum Bound {
     Finite,
@@ -14,6 +14,8 @@ pub(super) enum Bound {
     Positive,
     NotNegative,
     NotPositive,
+    /// At least [`MIN_POSITIVE_VALUE`], or infinite: without a bound.
+    PositiveOrInfinite,
     /// At least [`MIN_POSITIVE_VALUE`] and up to the limit.
     UpTo(f64),
     /// Both ends included.
@@ -31,7 +33,7 @@ impl Bound {
         };
         let admits = match self {
             Self::Finite => true,
-            Self::Positive => x >= MIN_POSITIVE_VALUE,
+            Self::Positive | Self::PositiveOrInfinite => x >= MIN_POSITIVE_VALUE,
             Self::NotNegative => x >= 0.0,
             Self::NotPositive => x <= 0.0,
             Self::UpTo(high) => x >= MIN_POSITIVE_VALUE && x <= high,
@@ -43,6 +45,9 @@ impl Bound {
                 Some(format!("must be at least {MIN_POSITIVE_VALUE:e}"))
             }
             (true, false) => Some(format!("must be {self}")),
+            (false, _) if matches!(self, Self::PositiveOrInfinite) => {
+                (x != f64::INFINITY).then(|| format!("must be {self}"))
+            }
             (false, _) => Some(format!("must be a finite number, at most {MAX_MAGNITUDE:e} in magnitude")),
         }
     }
@@ -53,6 +58,7 @@ impl fmt::Display for Bound {
         match self {
             Self::Finite => write!(f, "a finite number"),
             Self::Positive => write!(f, "greater than 0"),
+            Self::PositiveOrInfinite => write!(f, "greater than 0 and at most {MAX_MAGNITUDE:e}, or inf"),
             Self::NotNegative => write!(f, "at least 0"),
             Self::NotPositive => write!(f, "at most 0"),
             Self::UpTo(high) => write!(f, "greater than 0 and at most {high}"),

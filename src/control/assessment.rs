@@ -27,6 +27,8 @@ pub(super) struct Evidence<'a> {
     pub feedback: &'a FeedbackBound,
     /// Whether the measurements agree with the prediction.
     pub trust: Result<(), Diagnostic>,
+    /// Whether payload and surroundings are as before, and the platform does not oscillate.
+    pub change: Result<(), Diagnostic>,
     /// Whether drives and external sensors report nothing that contradicts.
     pub reports: Result<(), Diagnostic>,
     /// Whether the drives are ready, or nothing else is reported.
@@ -45,7 +47,7 @@ pub(super) fn assess(
     reference: &mut ReferenceGenerator,
 ) -> (Findings, LimitSet) {
     let parameters = &cycle.constants.parameters;
-    let Evidence { input, setpoint, located, error, feedback, trust, reports, is_ready, free_motion } =
+    let Evidence { input, setpoint, located, error, feedback, trust, change, reports, is_ready, free_motion } =
         evidence;
     let (mut active_limits, conditioned) = localization.check_condition(parameters.condition);
     let (mut tracking, mut start) = (conditioned, Ok(()));
@@ -54,6 +56,7 @@ pub(super) fn assess(
             .and(*trust)
             .and_then(|()| check_following_error(parameters, *error, &mut active_limits))
             .and_then(|()| feedback.check())
+            .and(*change)
             .and_then(|()| check_deadline(input))
             .and(match cycle.state {
                 State::Engaging | State::Active => setpoint.status,

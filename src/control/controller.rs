@@ -264,6 +264,7 @@ impl Controller {
             error: error.as_ref(),
             feedback,
             trust: errors.check_trust(),
+            change: errors.check_change(),
             reports,
             is_ready: drives.is_ready,
             free_motion: free_motion.as_ref(),

@@ -221,6 +221,14 @@ codes! {
     DriveForceMissing = 132, Brake, absolute("difference of the actual force from the commanded one", "N", "exceeds", "what noise and friction explain,"), "actual force not as commanded", "check the drive of this leg";
     /// The daemon did not run for so long that its last measurement is too old: it was stopped, or the host took the processor.
     DaemonHeld = 133, Brake, absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"), "daemon held", "find out what stopped the daemon or took its processor; hexad doctor";
+    /// The platform oscillates about its reference.
+    Oscillation = 134, Brake, absolute("amplitude", "m", "exceeds", "what the motion explains,"), "the platform oscillates", "lower the bandwidths; check [drive] delay_us, the time stamps and the drives";
+    /// The payload changed under control.
+    PayloadChanged = 135, Stop, absolute("change", "kg", "is outside", "limits.payload_change_kg:"), "payload changed", "look for what fell off or came on, then clear; limits.payload_change_kg";
+    /// Something struck the platform.
+    Impact = 136, Stop, absolute("sudden disturbance", "m/s^2", "exceeds", "limits.disturbance_step_m_s2"), "impact", "check for a collision, then clear; limits.disturbance_step_m_s2";
+    /// A disturbance as large as an impact that does not end.
+    DisturbanceLasting = 137, Brake, absolute("time", "s", "exceeds", "the longest of an impact,"), "sudden disturbance that lasts", "check for a collision; check all drives; limits.disturbance_step_m_s2";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.

@@ -12,8 +12,8 @@
 //! d is what has changed lately: a payload and friction change slowly, or are there when control begins. Angles count by the radius of the
 //! platform. A force is missing if `cos` is near 1 and f_i a good part of what was sent before, against noise, friction and payloads.
 //!
-//! It does not see a leg that carries little, as friction may be as large, nor several drives at once. That the drive of a leg pushes more than it should shows in the
-//! lengths.
+//! It does not see a leg that carries little, as friction may be as large, nor several drives at once. That the drive of a leg pushes
+//! more than it should shows in the lengths.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -45,6 +45,8 @@ pub(super) struct DriveResponse {
     usual_force: Vector6<f64>,
     since_start_s: f64,
     missing_s: f64,
+    /// Square of the disturbance beyond the usual one, weighted; 0 where the force of one leg explains it.
+    pub unexplained_squared: f64,
 }
 
 /// The least disturbance that may be a missing force, weighted as [`weighted`] does it; evaluated at home.
@@ -78,7 +80,8 @@ impl DriveResponse {
         self.usual_force += (sent - self.usual_force) * share;
         let arm = constants.error_arm();
         let sudden = weighted(&sudden, arm);
-        if is_starting || sudden.norm_squared() < constants.least_missing_squared {
+        self.unexplained_squared = if is_starting { 0.0 } else { sudden.norm_squared() };
+        if is_starting || self.unexplained_squared < constants.least_missing_squared {
             self.missing_s = 0.0;
             return Ok(());
         }
@@ -109,8 +112,12 @@ impl DriveResponse {
         let forces = sent.iter().zip(&self.usual_force);
         for (leg, ((along, square), (sent, usual))) in along.iter().zip(&squares).zip(forces).enumerate() {
             let force = along / square * if *sent < 0.0 { -1.0 } else { 1.0 };
+            let explains = along * along >= least * square;
+            if explains {
+                self.unexplained_squared = 0.0;
+            }
             let bound = (LEAST_MISSING_RATIO * usual.abs()).max(LEAST_FORCE_RATIO * max_force);
-            if along * along >= least * square && force >= bound && force <= MOST_MISSING_RATIO * sent.abs() {
+            if explains && force >= bound && force <= MOST_MISSING_RATIO * sent.abs() {
                 missing = Some(Diagnostic::new(DiagnosticCode::DriveForceMissing, force, bound).at(leg));
             }
         }

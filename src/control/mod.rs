@@ -11,13 +11,14 @@
 //! | reference | [`mod@reference`] |
 //! | control law | [`law`] with its [`gains`] and [`leg_masses`] |
 //! | forces | `forces` |
-//! | checks | `feedback_bound`, `force_limits` |
+//! | checks | `drive_response`, `disturbance_monitor`, `feedback_bound`, `force_limits` |
 //!
 //! The checks of all stages return a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
 
 mod assessment;
 pub mod controller;
 pub mod diagnostic;
+pub mod disturbance_monitor;
 pub mod drive_monitor;
 mod drive_response;
 pub mod estimator;

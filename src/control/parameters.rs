@@ -1,5 +1,6 @@
 //! Parameters of a controller, and all that stays constant while it runs.
 
+use super::disturbance_monitor::DisturbanceBounds;
 use super::drive_response::least_disturbance;
 use super::estimator::covariance::NoiseModel;
 use super::estimator::input_matrix::InputMatrix;
@@ -42,6 +43,10 @@ pub struct Parameters {
     pub on_violation: ViolationPolicy,
     /// Acceleration that feedback may add to the limits, as a ratio of them.
     pub feedback_scale: f64,
+    /// Change of the payload under control that is no fault \[kg\]; `None`: the default of the machine.
+    pub payload_change_kg: Option<f64>,
+    /// Sudden disturbance that is no impact \[m/s^2\]; `None` is the default, which follows from the limit of acceleration.
+    pub disturbance_step: Option<f64>,
     /// Distance that the reference keeps from the ends of the stroke \[m\].
     pub stroke_margin: f64,
     /// Largest velocity error while active \[m/s\].
@@ -130,6 +135,8 @@ pub struct Constants {
     pub estimator: EstimatorConstants,
     /// Square of the least disturbance that may be a force that a drive does not deliver; infinite where the law leaves forces to feedback.
     pub least_missing_squared: f64,
+    /// Changes of the disturbance that are no fault.
+    pub disturbance_bounds: DisturbanceBounds,
     /// What equal readings of one leg allow.
     pub(super) frozen_leg: FrozenLegBounds,
     /// Of the estimator of the rates of the legs.
@@ -163,7 +170,15 @@ impl Constants {
         );
         let expects_forces = parameters.law.mode.includes_inertia();
         let unbounded = Vector6::repeat(f64::INFINITY);
+        let disturbance_bounds = DisturbanceBounds::new(
+            machine,
+            &parameters,
+            &input_matrix,
+            least_missing,
+            if acts_on_legs { 1.0 } else { arm },
+        );
         Self {
+            disturbance_bounds,
             dynamics: InverseDynamics::new(machine),
             input_matrix,
             least_missing_squared: if expects_forces { least_missing * least_missing } else { f64::INFINITY },

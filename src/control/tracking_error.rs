@@ -9,6 +9,7 @@ use nalgebra::Vector6;
 
 use super::controller::Cycle;
 use super::diagnostic::{Diagnostic, DiagnosticCode};
+use super::disturbance_monitor::DisturbanceMonitor;
 use super::drive_response::DriveResponse;
 use super::estimator::{ErrorState, Estimator, FrozenSensors};
 use super::input_validation::ValidatedSetpoint;
@@ -108,6 +109,7 @@ pub(super) struct ErrorTracker {
     estimator: Estimator,
     sensors: FrozenSensors,
     drives: DriveResponse,
+    disturbance: DisturbanceMonitor,
     /// Force that was sent last \[N\], and the acceleration by feedback.
     sent: [f64; LEGS],
     sent_acceleration: Vector6<f64>,
@@ -117,6 +119,8 @@ pub(super) struct ErrorTracker {
     residual: Vector6<f64>,
     /// Whether the measurements agree with the prediction.
     trust: Option<Diagnostic>,
+    /// Whether nothing has changed on the platform.
+    change: Option<Diagnostic>,
 }
 
 impl ErrorTracker {
@@ -125,6 +129,7 @@ impl ErrorTracker {
     pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> TrackingError {
         self.estimator.start(&constants.estimator, measured_ns, begin_ns, &FeedbackError::default());
         (self.sensors, self.drives, self.trust) = (FrozenSensors::default(), DriveResponse::default(), None);
+        (self.disturbance, self.change) = (DisturbanceMonitor::default(), None);
         (self.error, self.residual) = (TrackingError::default(), Vector6::zeros());
         self.error
     }
@@ -138,7 +143,7 @@ impl ErrorTracker {
         localization: &Localization,
         located: &mut Located<'_>,
     ) -> TrackingError {
-        let Self { estimator, sensors, drives, sent, sent_acceleration, .. } = self;
+        let Self { estimator, sensors, drives, disturbance, sent, sent_acceleration, .. } = self;
         let constants = cycle.constants;
         let time_ns = located.measurement.time_ns;
         let desired = reference.motion_at(time_ns);
@@ -166,6 +171,15 @@ impl ErrorTracker {
                     drives.check(constants, disturbance, sent, &located.platform.pose, interval_s)
                 })
                 .err();
+            self.change = disturbance
+                .check(
+                    &constants.disturbance_bounds,
+                    estimator.state(),
+                    &desired,
+                    drives.unexplained_squared,
+                    interval_s,
+                )
+                .err();
         }
         // A measurement from before control began shows another motion.
         if located.measurement.rate.is_none() && interval_s >= 0.0 {
@@ -190,6 +204,11 @@ impl ErrorTracker {
     /// Whether the last measurement agrees with the prediction, and the sensors are alive.
     pub fn check_trust(&self) -> Result<(), Diagnostic> {
         self.trust.map_or(Ok(()), Err)
+    }
+
+    /// Whether nothing has changed on the platform, and it does not oscillate.
+    pub fn check_change(&self) -> Result<(), Diagnostic> {
+        self.change.map_or(Ok(()), Err)
     }
 
     /// The estimate at the instant at which a force begins.

@@ -61,6 +61,8 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         after_loss: control.on_setpoint_lost,
         on_violation: deployment.setpoint.on_violation,
         feedback_scale: limits.feedback_scale,
+        payload_change_kg: limits.payload_change_kg,
+        disturbance_step: limits.disturbance_step_m_s2,
         stroke_margin: limits.stroke_margin_m,
         following_velocity: control.following_velocity_m_s,
         following_angular_velocity: control.following_velocity_rad_s,

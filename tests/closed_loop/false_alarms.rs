@@ -29,7 +29,7 @@ fn episode(seed: u64) -> Result<(), String> {
     let delay_us = between(100.0, 5000.0).round();
     // Shares of the largest force: what the model has, and what the drive has. With more stiction than 0.2 % beyond the model a leg of
     // a light machine sticks at a crawl for longer than a sensor may be silent.
-    let (modelled, friction, stiction) = (between(0.0, 0.005), between(0.9, 1.1), between(0.0, 0.0005));
+    let (modelled, friction, stiction) = (between(0.0, 0.005), between(0.8, 1.2), between(0.0, 0.0005));
     let mut config = configured(
         machine,
         &format!(

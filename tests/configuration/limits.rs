@@ -77,6 +77,30 @@ fn feedback_may_add_half_of_the_limits_unless_given() {
 }
 
 #[test]
+fn disturbances_are_allowed_as_given_or_all() {
+    let allowed = |text: &str| {
+        let limits = deployment(text).limits;
+        (limits.payload_change_kg, limits.disturbance_step_m_s2)
+    };
+    assert_eq!(allowed(""), (None, None));
+    assert_eq!(
+        allowed("[limits]\npayload_change_kg = 0.001\ndisturbance_step_m_s2 = 1e12\n"),
+        (Some(0.001), Some(1e12))
+    );
+    let all = "[limits]\npayload_change_kg = inf\ndisturbance_step_m_s2 = +inf\n";
+    assert_eq!(allowed(all), (Some(f64::INFINITY), Some(f64::INFINITY)));
+    for key in ["payload_change_kg", "disturbance_step_m_s2"] {
+        for value in ["0", "-1", "-inf", "nan", "1e13"] {
+            let bound = "must be greater than 0 and at most 1e12, or inf";
+            refused("limits", &format!("{key} = {value}"), bound);
+        }
+        let bound = "must be a number, greater than 0 and at most 1e12, or inf";
+        refused("limits", &format!("{key} = \"inf\""), bound);
+        refused("limits", &format!("{key} = 1e-13"), "must be at least 1e-12");
+    }
+}
+
+#[test]
 fn the_margin_of_the_stroke_is_at_most_that_of_home() {
     let margin = |text: &str| deployment(text).limits.stroke_margin_m;
     // Half a percent of 0.85 m to 1.6 m.

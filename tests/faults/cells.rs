@@ -84,6 +84,11 @@ pub const PULLED: Bounds = Bounds { acceleration: 1.05, ..LONG };
 pub const MISSED: Bounds = Bounds { jerk: 1.31, ..LONG };
 /// Within what is believed to be noise of an encoder.
 pub const UNSEEN: Bounds = Bounds { acceleration: 1.03, jerk: 1.6, ..GENTLE };
+/// By 1 g beside what the reference does.
+pub const STRUCK: Bounds = Bounds { acceleration: 3.2, jerk: 23.0, ..LONG };
+pub const SHAKEN: Bounds = Bounds { acceleration: 2.2, jerk: 6.4, rest_s: 1.4 };
+/// A fifth of its weight, within a cycle.
+pub const LOADED: Bounds = Bounds { acceleration: 1.1, ..PULLED };
 /// Ten times the weight of the platform: it falls.
 pub const LOAD: Bounds = Bounds { acceleration: 10.8, jerk: 6.4, rest_s: 0.2 };
 
@@ -189,8 +194,18 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
     if mode == ControlMode::ComputedTorque || matches!(situation, Standby | Fault) {
         return None;
     }
+    const LASTING: Cell = Path(&[
+        (State::Stopping, DiagnosticCode::Impact),
+        (State::Fault, DiagnosticCode::DisturbanceLasting),
+    ]);
     let is_pd = mode == ControlMode::JointPd;
     let cell = match (name, situation, mode.includes_inertia()) {
+        // What accelerates the platform is known only where the model has its inertia.
+        ("a load of a fifth of the platform" | "struck with 1 g for 10 ms", _, false)
+        | ("a drive shakes by a tenth at 30 Hz", Stopping | Parking, false) => On,
+        ("a drive shakes by a tenth at 30 Hz", Engaging, false) => {
+            Path(&[(State::Active, DiagnosticCode::None), (State::Fault, DiagnosticCode::Oscillation)])
+        }
         ("a leg without force", Engaging, true) => Brake(MeasurementImplausible),
         ("a leg without force", AtRest | Parking, false) if is_pd => Brake(FollowingError),
         ("a leg without force", AtRest | InMotion | Parking, false) => Brake(FeedbackSaturated),
@@ -203,8 +218,9 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
         ("a leg without force", Stopping, false) | ("a drive reports half of its force", Stopping, false) => {
             On
         }
-        ("the drives brake by themselves" | "the drives brake and setpoints end", Stopping, true) => {
-            Brake(MeasurementImplausible)
+        ("the drives brake by themselves" | "the drives brake and setpoints end", Parking, true) => LASTING,
+        ("the drives brake by themselves" | "the drives brake and setpoints end", Stopping, false) => {
+            Brake(SensorFrozen)
         }
         ("the drives brake by themselves" | "the drives brake and setpoints end", InMotion, false) => {
             Brake(VelocityError)

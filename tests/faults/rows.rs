@@ -1,20 +1,21 @@
 //! The rows of the table: every fault, and what becomes of it in every state.
 
 use hexad::control::diagnostic::DiagnosticCode::{
-    self, DaemonHeld, DeadlineMissed, DriveFault, DriveForceMissing, DriveNotReady, EmergencyStop,
-    ExternalPoseMismatch, HoldingPose, LengthOutOfStroke, MeasurementImplausible, MeasurementJumped,
-    MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, MeasurementTooOld, OperatorRequest,
-    RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointEnded,
-    SetpointJumped, SetpointLost, SetpointNotFinite, SetpointOutOfEnvelope, SetpointOutOfReach,
-    SetpointStampInvalid, SetpointTooFast, StampClockInvalid, VelocityError,
+    self, DaemonHeld, DeadlineMissed, DisturbanceLasting, DriveFault, DriveForceMissing, DriveNotReady,
+    EmergencyStop, ExternalPoseMismatch, HoldingPose, Impact, LengthOutOfStroke, MeasurementImplausible,
+    MeasurementJumped, MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, MeasurementTooOld,
+    OperatorRequest, Oscillation, PayloadChanged, RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen,
+    SetpointBeyondLimits, SetpointEnded, SetpointJumped, SetpointLost, SetpointNotFinite,
+    SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFast, StampClockInvalid,
+    VelocityError,
 };
 use hexad::control::state::State;
 
 use super::cells::Cell::{self, Brake, End, Full, Idle, On, Path, Stop};
 use super::cells::{
-    ACCELERATED, AT_FORCE_LIMIT, Bounds, ENDLESS, EVERYWHERE, FULL_STOP, GENTLE, LATE, LATE_STOP, LOAD, LONG,
-    MISSED, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED, Row, SWITCHED_OFF, TOO_FAR, UNSEEN,
-    unusable_measurement, unusable_setpoint, wrong_in_motion,
+    ACCELERATED, AT_FORCE_LIMIT, Bounds, ENDLESS, EVERYWHERE, FULL_STOP, GENTLE, LATE, LATE_STOP, LOAD,
+    LOADED, LONG, MISSED, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED, Row, SHAKEN, STRUCK,
+    SWITCHED_OFF, TOO_FAR, UNSEEN, unusable_measurement, unusable_setpoint, wrong_in_motion,
 };
 use super::disturbances::{host, machine, measurements, operator, reports, setpoints, together};
 use super::sequences;
@@ -34,6 +35,10 @@ const PARKS_AFTER_ESTOP: Cell = Full(&[
     (State::Parking, OperatorRequest),
     (State::Off, OperatorRequest),
 ]);
+
+/// First it looks like an impact.
+const STRUCK_IMPLAUSIBLE: Cell = Path(&[(State::Stopping, Impact), (State::Fault, MeasurementImplausible)]);
+const STRUCK_FOR_LONG: Cell = Path(&[(State::Stopping, Impact), (State::Fault, DisturbanceLasting)]);
 
 /// In the columns: standby, engaging, active at rest, active in motion, stopping, parking, fault.
 #[rustfmt::skip]
@@ -104,10 +109,13 @@ pub const ROWS: &[Row] = &[
     ("engage far away", operator::engage_far_away, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), On, On, On, On]),
     // The machine.
     ("collision", machine::collision, GENTLE, [On, Brake(SensorFrozen), On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake by themselves", machine::braked, GENTLE, [On, Brake(SensorFrozen), On, Brake(MeasurementImplausible), Brake(SensorFrozen), Brake(MeasurementImplausible), On]),
+    ("the drives brake by themselves", machine::braked, GENTLE, [On, Brake(SensorFrozen), On, STRUCK_IMPLAUSIBLE, STRUCK_FOR_LONG, STRUCK_IMPLAUSIBLE, On]),
     ("a leg without force", machine::leg_without_force, Bounds { jerk: 1.12, rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), On]),
     ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, EVERYWHERE),
-    ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), Brake(MeasurementImplausible), On]),
+    ("a load of a fifth of the platform", machine::load_of_a_fifth, LOADED, [On, On, On, Stop(PayloadChanged), Stop(PayloadChanged), Stop(PayloadChanged), On]),
+    ("struck with 1 g for 10 ms", machine::struck, STRUCK, [On, On, Stop(Impact), Stop(Impact), Stop(Impact), Stop(Impact), On]),
+    ("a drive shakes by a tenth at 30 Hz", machine::shaking_drive, SHAKEN, [On, Path(&[(State::Active, DiagnosticCode::None), (State::Fault, DriveForceMissing)]), Brake(Oscillation), Brake(Oscillation), Brake(DriveForceMissing), Brake(DriveForceMissing), On]),
+    ("a load of ten platforms", machine::load_of_ten, LOAD, [On, Brake(MeasurementImplausible), Stop(Impact), STRUCK_IMPLAUSIBLE, STRUCK_IMPLAUSIBLE, STRUCK_IMPLAUSIBLE, On]),
     // The host.
     ("deadline missed", host::deadline_missed, GENTLE, [On, Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), Stop(DeadlineMissed), On]),
     ("daemon held for 1 s", host::held_1_s, GENTLE, [On, Brake(DaemonHeld), Brake(DaemonHeld), Brake(DaemonHeld), Brake(DaemonHeld), Brake(DaemonHeld), On]),
@@ -121,7 +129,7 @@ pub const ROWS: &[Row] = &[
     ("estop without measurements", together::estop_without_measurement, GENTLE, [FULL_STOP; 7]),
     ("off without measurements", together::off_without_measurement, GENTLE, [SWITCHED_OFF, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
     ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), Brake(MeasurementImplausible), Brake(SensorFrozen), Brake(MeasurementImplausible), On]),
+    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), STRUCK_IMPLAUSIBLE, STRUCK_FOR_LONG, STRUCK_IMPLAUSIBLE, On]),
     ("stop every 10 ms", together::stop_every_10_ms, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
     ("estop, then engage", together::estop_then_engage, GENTLE, [FULL_STOP; 7]),
     // One after the other.

@@ -4,7 +4,7 @@ use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoin
 use hexad::control::parameters::Parameters;
 use hexad::control::state::Request;
 use hexad::model::active_forces::InverseDynamics;
-use hexad::model::fidelity::Gravity;
+use hexad::model::fidelity::{Exact, Gravity};
 use hexad::model::machine::{LEGS, Machine};
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::{TaskState, task_coordinates};
@@ -38,6 +38,8 @@ pub enum Grip {
     Dead(usize),
     /// The weight of a load that the controller does not know.
     Load(Box<[InverseDynamics; 2]>),
+    /// Forces beside those of the drives.
+    Beside([f64; LEGS]),
     /// The process of the daemon stands still, for so many more cycles. The drives apply its last force
     /// for so many of them, then brake.
     DaemonHeld {
@@ -171,6 +173,15 @@ impl World {
         self.grip = Grip::Load(Box::new(models));
     }
 
+    /// Something pushes with this acceleration from now on.
+    pub fn push(&mut self, acceleration: [f64; 6]) {
+        let model = InverseDynamics::new(&self.machine);
+        let acceleration = Acceleration::from_vector(&acceleration.into());
+        let motions = [Motion { acceleration, ..self.motion() }, self.motion()];
+        let [pushed, usual] = motions.map(|motion| model.forces::<Exact>(&motion).unwrap());
+        self.grip = Grip::Beside(core::array::from_fn(|leg| pushed[leg] - usual[leg]));
+    }
+
     /// The daemon is gone, and a new one takes its place.
     pub fn restart_daemon(&mut self) {
         self.rig.controller = Controller::new(&self.machine, self.parameters);
@@ -189,6 +200,7 @@ impl World {
             Grip::Free | Grip::DaemonHeld { .. } => {}
             Grip::Held => return None,
             Grip::Dead(leg) => force[*leg] = 0.0,
+            Grip::Beside(beside) => force = core::array::from_fn(|leg| force[leg] + beside[leg]),
             Grip::Load(models) => {
                 let motion = Motion { twist: Default::default(), ..self.motion() };
                 let [heavy, light] = models.each_ref().map(|model| model.forces::<Gravity>(&motion).unwrap());

@@ -7,8 +7,10 @@ use crate::config::control_loops::{ControlLoop, longest_age_s, loops};
 use crate::config::deployment::default_limits::{DerivedLimit, derived_limits};
 use crate::config::examination::Examination;
 use crate::config::{Config, Violation};
+use crate::control::parameters::Constants;
+use crate::daemon;
 use crate::model::active_forces::inverse_dynamics;
-use crate::model::fidelity::Exact;
+use crate::model::fidelity::{Exact, Fidelity};
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::LEGS;
@@ -43,6 +45,9 @@ pub struct CheckReport {
     pub control_mode: &'static str,
     pub estimator_hz: f64,
     pub compensates_disturbances: bool,
+    /// Changes of what acts on the platform that are no fault; null if any is allowed.
+    pub payload_change_kg: f64,
+    pub disturbance_step_m_s2: f64,
     /// Slowest and fastest mode of legs that are controlled each by itself.
     pub leg_modes_hz: Option<[f64; 2]>,
     pub loops: Vec<LoopMargins>,
@@ -98,6 +103,7 @@ impl CheckReport {
         let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
         let masses = &control.leg_masses;
         let leg_modes_hz = [root(masses.softest), root(masses.stiffest)];
+        let constants = Constants::new(machine, daemon::parameters(machine, deployment, Fidelity::Exact));
         Self {
             schema: SCHEMA,
             machine: name.clone(),
@@ -118,6 +124,8 @@ impl CheckReport {
             control_mode: control.mode.name(),
             estimator_hz: control.estimator_bandwidth_hz,
             compensates_disturbances: control.compensate_disturbances,
+            payload_change_kg: constants.disturbance_bounds.payload,
+            disturbance_step_m_s2: constants.disturbance_bounds.impact,
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
             stable_age_s: longest_age_s(deployment),

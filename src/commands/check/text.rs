@@ -54,6 +54,11 @@ impl CheckReport {
             "control mode {}, estimator {:.2} Hz{compensated}",
             self.control_mode, self.estimator_hz
         )?;
+        writeln!(
+            f,
+            "disturbances that are no fault: up to {:.2} kg of changed payload, a sudden push of up to {:.2} m/s^2",
+            self.payload_change_kg, self.disturbance_step_m_s2
+        )?;
         if let Some([softest, stiffest]) = self.leg_modes_hz {
             writeln!(f, "legs         coupled, they move with {softest:.2} to {stiffest:.2} Hz")?;
         }

@@ -35,6 +35,10 @@ pub struct DeploymentLimits {
     pub reference: ReferenceLimits,
     /// Acceleration that feedback may add to the limits, as a ratio of them.
     pub feedback_scale: f64,
+    /// Change of the payload under control that is no fault \[kg\]; `None`: the default of the machine.
+    pub payload_change_kg: Option<f64>,
+    /// Sudden disturbance that is no impact \[m/s^2\]; `None` is the default, which follows from the limit of acceleration.
+    pub disturbance_step_m_s2: Option<f64>,
     /// Distance that the reference keeps from the ends of the stroke.
     pub stroke_margin_m: f64,
     /// Largest change of a force.
@@ -60,6 +64,8 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     let force_rate_n_s =
         section.number_or("force_rate_n_s", machine.actuator.max_force / FORCE_RISE_S, Bound::Positive);
     let feedback_scale = section.number_or("feedback_scale", 0.5, Bound::Positive);
+    let payload_change_kg = allowed(&mut section, "payload_change_kg");
+    let disturbance_step_m_s2 = allowed(&mut section, "disturbance_step_m_s2");
     let stroke_margin_m = stroke_margin_m(&mut section, machine);
     let turning = turning_condition(machine, realtime, &position, feedback_scale);
     let (condition, held_pole) = condition(&mut section, machine, realtime, turning);
@@ -67,11 +73,19 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     DeploymentLimits {
         reference: ReferenceLimits { position, orientation, autonomous_scale },
         feedback_scale,
+        payload_change_kg,
+        disturbance_step_m_s2,
         stroke_margin_m,
         force_rate_n_s,
         condition,
         held_pole,
     }
+}
+
+/// A bound of the disturbance, if it is given. The default follows from the controller's model, which is built later.
+fn allowed(section: &mut SectionReader, key: &'static str) -> Option<f64> {
+    let given = section.number_or(key, f64::INFINITY, Bound::PositiveOrInfinite);
+    section.has(key).then_some(given)
 }
 
 /// Distance from the ends of the stroke. Home must keep it, or the platform could not park.

@@ -75,6 +75,16 @@ impl InputMatrix {
         if self.acts_on_legs { wrenches.tr_mul(&by_force) } else { by_force }
     }
 
+    /// The wrench about C that a disturbance, in the coordinates of the error, would need at home.
+    pub fn wrench_of_disturbance(&self, machine: &Machine) -> Matrix6<f64> {
+        let inertia = self.mobility.try_inverse().unwrap_or_default();
+        if !self.acts_on_legs {
+            return inertia;
+        }
+        let of_legs = leg_wrenches(machine, &machine.home_pose()).transpose();
+        inertia * of_legs.try_inverse().unwrap_or_default()
+    }
+
     /// The acceleration that the law must command for one of the platform.
     pub fn command(&self, acceleration: &Vector6<f64>) -> Vector6<f64> {
         self.by_command.map_or(*acceleration, |[_, inverse]| inverse * acceleration)

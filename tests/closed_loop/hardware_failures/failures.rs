@@ -2,7 +2,11 @@
 
 use hexad::control::controller::Measurement;
 use hexad::control::drive_monitor::DriveStatus;
+use hexad::model::active_forces::InverseDynamics;
+use hexad::model::fidelity::Exact;
 use hexad::model::machine::{LEGS, Machine};
+use hexad::model::rigid::{Acceleration, Motion};
+use hexad::model::task::TaskState;
 use hexad::plant::random::Random;
 
 /// What a failure can know.
@@ -28,6 +32,27 @@ impl Context<'_> {
 
     fn sent_before(&self, cycles: usize) -> [f64; LEGS] {
         self.sent[self.sent.len().saturating_sub(1 + cycles)]
+    }
+
+    /// Forces of rest, with this acceleration of a platform of so many times its mass.
+    fn forces(&self, mass_ratio: f64, acceleration: [f64; 6]) -> [f64; LEGS] {
+        let mut machine = self.machine.clone();
+        machine.platform.mass *= mass_ratio;
+        let motion = TaskState::at_rest(self.x).motion();
+        let acceleration = Acceleration::from_vector(&acceleration.into());
+        InverseDynamics::new(&machine).forces::<Exact>(&Motion { acceleration, ..motion }).unwrap()
+    }
+
+    /// The platform carries so many times its mass more than before.
+    fn loads(&self, force: &mut [f64; LEGS], ratio: f64) {
+        let [loaded, usual] = [1.0 + ratio, 1.0].map(|ratio| self.forces(ratio, [0.0; 6]));
+        *force = core::array::from_fn(|leg| force[leg] - loaded[leg] + usual[leg]);
+    }
+
+    /// Something pushes the platform with this acceleration.
+    fn pushes(&self, force: &mut [f64; LEGS], acceleration: [f64; 6]) {
+        let [pushed, usual] = [acceleration, [0.0; 6]].map(|acceleration| self.forces(1.0, acceleration));
+        *force = core::array::from_fn(|leg| force[leg] + pushed[leg] - usual[leg]);
     }
 
     fn most(&self) -> f64 {
@@ -115,7 +140,21 @@ pub const FAILURES: &[(&str, Part)] = &[
     drive("all drives with 20 % less", |f, _| *f = f.map(|force| 0.8 * force)),
     drive("all drives hold their last forces", |f, c| *f = c.sent_before((1e3 * c.since_s) as usize)),
     drive("forces 5 ms late", |f, c| *f = c.sent_before(5 * PER_MS)),
+    drive("forces 4 ms late: the loop oscillates", |f, c| *f = c.sent_before(4 * PER_MS)),
     drive("forces 20 ms late", |f, c| *f = c.sent_before(20 * PER_MS)),
+    drive("a load of 20 % of the platform falls off", |f, c| c.loads(f, -0.2)),
+    drive("a load of 20 % of the platform comes on", |f, c| c.loads(f, 0.2)),
+    drive("a load of 5 % of the platform comes on", |f, c| c.loads(f, 0.05)),
+    drive("an impact of 1 g for 10 ms, sideways", |f, c| {
+        if c.since_s < 0.0095 {
+            c.pushes(f, [0.0, 0.0, 0.0, 9.81, 0.0, 0.0]);
+        }
+    }),
+    drive("an impact of 1 g for 10 ms, from below", |f, c| {
+        if c.since_s < 0.0095 {
+            c.pushes(f, [0.0, 0.0, 0.0, 0.0, 0.0, 9.81]);
+        }
+    }),
     ("one drive reports a fault", Part::Reported(|_, _| {}, |d, _| d.fault = Some(1 << LEG))),
     (
         "one drive disabled, reported",

@@ -53,9 +53,9 @@ impl Situation {
 /// What became of a failure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// What ended the forces, and after which time \[s\]; `None` if nothing did.
+    /// The fault that ended the forces or began a stop, and after which time \[s\]; `None` if nothing did.
     pub noticed: Option<(DiagnosticCode, f64)>,
-    /// Largest distance of the true position from the setpoint while there were forces \[m\].
+    /// Largest distance of the true position from the setpoint until then \[m\].
     pub farthest: f64,
 }
 
@@ -114,7 +114,8 @@ fn cell(config: &Config, part: &Part, situation: Situation) -> Cell {
         if let Some((begin_s, _)) = began {
             let apart = control.hardware.simulator().state().pose.position - task.motion().pose.position;
             farthest = farthest.max(if before.has_control() { apart.norm() } else { 0.0 });
-            if !has_control && output.state != State::Standby {
+            let stops = output.state == State::Stopping && output.diagnostic.code.is_fault();
+            if stops || !has_control && output.state != State::Standby {
                 return Cell { noticed: Some((output.diagnostic.code, time_s - begin_s)), farthest };
             }
             if time_s > begin_s + WATCHED_S {

@@ -24,6 +24,7 @@ struct Scene {
     error: Option<TrackingError>,
     feedback: FeedbackBound,
     trust: Result<(), Diagnostic>,
+    change: Result<(), Diagnostic>,
     reports: Result<(), Diagnostic>,
     is_ready: bool,
     twist: Option<Twist>,
@@ -39,6 +40,7 @@ impl Default for Scene {
             error: Some(TrackingError::default()),
             feedback: FeedbackBound::default(),
             trust: Ok(()),
+            change: Ok(()),
             reports: Ok(()),
             is_ready: true,
             twist: Some(Twist::default()),
@@ -82,6 +84,7 @@ impl Scene {
             error: self.error.as_ref(),
             feedback: &self.feedback,
             trust: self.trust,
+            change: self.change,
             reports: self.reports,
             is_ready: self.is_ready,
             free_motion: free_motion.as_ref(),
@@ -119,6 +122,12 @@ fn each_finding_alone_ends_the_tracking() {
         let found = Some(FOUND.code);
         assert_eq!(Scene { reports: Err(FOUND), ..Scene::default() }.tracking(state), found);
         assert_eq!(Scene { trust: Err(FOUND), ..Scene::default() }.tracking(state), found);
+        assert_eq!(Scene { change: Err(FOUND), ..Scene::default() }.tracking(state), found);
+        // A stop for a change hides no reason to brake.
+        let impact = Err(DiagnosticCode::Impact.into());
+        let following = Some(DiagnosticCode::FollowingError);
+        let far = Some(error(0, 0.06));
+        assert_eq!(Scene { change: impact, error: far, ..Scene::default() }.tracking(state), following);
         let input = Input { deadline_missed: true, ..Input::default() };
         let late = Some(DiagnosticCode::DeadlineMissed);
         assert_eq!(Scene { input, ..Scene::default() }.tracking(state), late);

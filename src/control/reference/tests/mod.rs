@@ -101,6 +101,8 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         force_rate: 1e6,
         on_violation: ViolationPolicy::Stop,
         feedback_scale: 0.5,
+        payload_change_kg: None,
+        disturbance_step: None,
         stroke_margin: 0.0,
         following_velocity: 0.3,
         following_angular_velocity: 0.3,
