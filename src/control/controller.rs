@@ -304,9 +304,10 @@ impl Controller {
             let force = forces(constants, &motion, &acceleration)?;
             let limited = limiter.limit(&cycle, &force, &motion)?;
             if limited.force != force {
-                let LimitedForces { wrench_error, .. } = &limited;
-                sent +=
-                    constants.input_matrix.acceleration_of(constants.machine(), &motion.pose, wrench_error);
+                let (machine, missing) = (constants.machine(), &limited.wrench_error);
+                let acceleration = constants.input_matrix.acceleration_of(machine, &motion.pose, missing);
+                sent += acceleration;
+                errors.record_limited(constants, &acceleration);
             }
             errors.record_sent(begin_ns, &sent, &limited.force);
             Ok(limited)

@@ -16,7 +16,8 @@
 //! control, and stops. Angles count by the radius of the platform.
 //!
 //! Where the reference shakes, the error shakes as well, as masses are not known exactly; where `[limits]` allows a sudden
-//! disturbance, that shakes the platform, too. Both parts are allowed.
+//! disturbance, that shakes the platform, too. Both parts are allowed. Forces that limits took away are known only as well as the
+//! inertia at home is that of the pose: a payload and an impact are beyond the bound by more than those would accelerate.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -39,6 +40,8 @@ const START_S: f64 = 1.0;
 /// the model lacks looks like a payload.
 const PAYLOAD_RATIO: f64 = 0.1;
 const HIDDEN_LIFT_RATIO: f64 = 0.02;
+/// Time constant in which forces that limits took away are forgotten \[s\]: that of the usual payload.
+const LIMITED_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
 /// Least weight in a motion over that at rest: a platform that falls has no weight to compare with.
 const LEAST_WEIGHT_RATIO: f64 = 0.3;
 
@@ -76,6 +79,8 @@ const FORGETTING_RATIO: f64 = 0.3;
 pub struct DisturbanceBounds {
     /// Payload for a unit disturbance \[kg / (m/s^2)\].
     payload_by_disturbance: Vector6<f64>,
+    /// The largest for a disturbance in any direction.
+    payload_by_norm: f64,
     /// Gravity over its square \[s^2/m\].
     gravity: Vector3<f64>,
     /// Of a change of the payload \[kg\].
@@ -117,8 +122,11 @@ impl DisturbanceBounds {
         let swing = (SWING_M * softness * softness).min(MAX_SWING_M);
         let by_step = SWING_BY_STEP * disturbance_step.unwrap_or(0.0) / softest;
         let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
+        let payload_by_disturbance = -input_matrix.wrench_of_disturbance(machine).tr_mul(&along_gravity);
+        let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm;
         Self {
-            payload_by_disturbance: -input_matrix.wrench_of_disturbance(machine).tr_mul(&along_gravity),
+            payload_by_disturbance,
+            payload_by_norm: by_angles.hypot(payload_by_disturbance.fixed_rows::<3>(3).norm()),
             gravity,
             payload: if has_weight { payload_change_kg.unwrap_or(default_kg) } else { f64::INFINITY },
             impact: if expects_forces { disturbance_step.unwrap_or(default_step) } else { f64::INFINITY },
@@ -143,6 +151,8 @@ pub(super) struct DisturbanceMonitor {
     payload: f64,
     usual_payload: f64,
     impact_s: f64,
+    /// Acceleration by forces that limits took away lately \[m/s^2\].
+    limited: f64,
     oscillation: Oscillation,
 }
 
@@ -163,6 +173,11 @@ struct Oscillation {
 }
 
 impl DisturbanceMonitor {
+    /// Records the acceleration by forces that limits took away.
+    pub fn record_limited(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
+        self.limited = self.limited.max(bounds.norm_squared(acceleration).sqrt());
+    }
+
     /// Checks the estimate after a measurement, `dt` seconds after the last one. `sudden` is the square of the disturbance without its
     /// mean; zero if the force of one leg explains it.
     pub fn check(
@@ -174,6 +189,7 @@ impl DisturbanceMonitor {
         dt: f64,
     ) -> Result<(), Diagnostic> {
         self.since_start_s += dt;
+        self.limited *= 1.0 - (dt / LIMITED_TIME_CONSTANT_S).min(1.0);
         let payload = self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, dt);
         let impact = self.check_impact(bounds, sudden_squared, dt);
         let oscillation =
@@ -197,10 +213,11 @@ impl DisturbanceMonitor {
         let is_starting = self.since_start_s < START_S;
         let share = if is_starting { 1.0 } else { (dt / USUAL_PAYLOAD_TIME_CONSTANT_S).min(1.0) };
         self.usual_payload += change * share;
-        if is_starting || change.abs() <= bounds.payload {
+        let bound = bounds.payload + bounds.payload_by_norm * self.limited;
+        if is_starting || change.abs() <= bound {
             return Ok(());
         }
-        Err(Diagnostic::new(DiagnosticCode::PayloadChanged, change, bounds.payload.copysign(change)))
+        Err(Diagnostic::new(DiagnosticCode::PayloadChanged, change, bound.copysign(change)))
     }
 
     fn check_impact(
@@ -209,7 +226,8 @@ impl DisturbanceMonitor {
         sudden_squared: f64,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        if sudden_squared <= bounds.impact * bounds.impact {
+        let bound = bounds.impact + self.limited;
+        if sudden_squared <= bound * bound {
             self.impact_s = 0.0;
             return Ok(());
         }
@@ -217,7 +235,7 @@ impl DisturbanceMonitor {
         if self.impact_s > MAX_IMPACT_S {
             return Err(Diagnostic::new(DiagnosticCode::DisturbanceLasting, self.impact_s, MAX_IMPACT_S));
         }
-        Err(Diagnostic::new(DiagnosticCode::Impact, sudden_squared.sqrt(), bounds.impact))
+        Err(Diagnostic::new(DiagnosticCode::Impact, sudden_squared.sqrt(), bound))
     }
 }
 

@@ -222,6 +222,11 @@ impl ErrorTracker {
         FeedbackError { value: predicted.value + self.residual, rate: predicted.rate }
     }
 
+    /// Records the acceleration by forces that limits take away.
+    pub fn record_limited(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
+        self.disturbance.record_limited(&constants.disturbance_bounds, acceleration);
+    }
+
     /// Records the acceleration that feedback sends, after all limits, with the force, and the instant from which on it acts.
     pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>, force: &[f64; LEGS]) {
         (self.sent, self.sent_acceleration) = (*force, *acceleration);

@@ -91,10 +91,10 @@ fn the_reference_comes_to_rest_before_the_axis_of_a_joint() {
         config.deployment.control.fidelity = FidelityChoice::Fixed(fidelity);
         // Forces are what is limited here, and not feedback.
         config.deployment.limits.feedback_scale = 1e6;
-        // What they leave out looks like a payload or an impact, which would end control sooner.
+        // On the machine that is controlled the joint gives way, and the force for a spin that it does not need looks like a payload
+        // or an impact.
         config.deployment.limits.payload_change_kg = Some(f64::INFINITY);
         config.deployment.limits.disturbance_step_m_s2 = Some(f64::INFINITY);
-        // On the machine that is controlled the joint gives way.
         let mut rig = Rig::new(&config, &deployed("motion_base").machine);
         rig.engage(&TaskState::at_rest(config.machine.home));
         let (mut cut, mut most, mut has_stopped) = (0, 0.0_f64, false);

@@ -206,9 +206,6 @@ fn saturation_on_the_way_is_told_and_ends_in_a_fault() {
             let what = format!("{distance} rad, {time_s} s");
             let mut config = motion_base(ANY);
             config.machine.actuator.max_force = 20e3;
-            // What limited forces leave out looks like a payload or an impact, which would end control sooner.
-            config.deployment.limits.payload_change_kg = Some(f64::INFINITY);
-            config.deployment.limits.disturbance_step_m_s2 = Some(f64::INFINITY);
             let more = (0..)
                 .position(|k| {
                     let task = there_and_back(f64::from(k) * 1e-3, time_s, distance);

@@ -7,6 +7,7 @@ use crate::model::task::TaskState;
 
 const BOUNDS: DisturbanceBounds = DisturbanceBounds {
     payload_by_disturbance: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.2),
+    payload_by_norm: 0.2,
     gravity: Vector3::new(0.0, 0.0, -1.0 / 9.81),
     payload: 0.1,
     impact: 2.0,
@@ -81,4 +82,34 @@ fn an_impact_is_brief() {
     let codes: [_; 25] = core::array::from_fn(lasting);
     assert_eq!(codes[15], Some(DiagnosticCode::Impact));
     assert_eq!(codes[24], Some(DiagnosticCode::DisturbanceLasting));
+}
+
+#[test]
+fn what_limits_took_away_is_no_change() {
+    let along_z = |value: f64| Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value);
+    let changed = |limited: f64, disturbance: f64| {
+        let mut monitor = DisturbanceMonitor::default();
+        (0..2000).find_map(|cycle| {
+            let is_cut = cycle >= 1500;
+            if is_cut {
+                monitor.record_limited(&BOUNDS, &along_z(limited));
+            }
+            let disturbance = if is_cut { disturbance } else { 0.0 };
+            let reference = TaskState::at_rest([0.0; 6]).motion();
+            let found =
+                monitor.check(&BOUNDS, &with(0.0, disturbance), &reference, disturbance * disturbance, 1e-3);
+            found.err().map(|found| found.code)
+        })
+    };
+    assert_eq!(changed(0.0, 1.0), Some(DiagnosticCode::PayloadChanged));
+    assert_eq!(changed(1.0, 1.0), None);
+    assert_eq!(changed(2.0, 2.4), None);
+    assert_eq!(changed(2.0, 4.1), Some(DiagnosticCode::Impact));
+    // Forgotten after some seconds.
+    let mut monitor = DisturbanceMonitor::default();
+    monitor.record_limited(&BOUNDS, &along_z(1e3));
+    assert_eq!(monitor.limited, 1e3);
+    let rest = TaskState::at_rest([0.0; 6]).motion();
+    (0..12_000).for_each(|_| assert_eq!(monitor.check(&BOUNDS, &with(0.0, 0.0), &rest, 0.0, 1e-3), Ok(())));
+    assert!(monitor.limited < 0.01, "{}", monitor.limited);
 }

@@ -33,7 +33,8 @@ pub fn all_repeat(file: &Path) {
     assert!(matches!(repeating_level("Neon", best), Level::Avx2(_)));
 
     let sse4_2 = on(best.as_sse4_2().map(Level::Sse4_2).unwrap());
-    assert!(sse4_2.different > 0 && sse4_2.is_rounding(1e-3), "{:?}", sse4_2.largest());
+    let beyond = sse4_2.largest.values().filter(|it| it.size() > it.tolerance(1e-3)).collect::<Vec<_>>();
+    assert!(sse4_2.different > 0 && sse4_2.is_rounding(1e-3), "{beyond:?}");
     let of_sse4_2 = RunInfo { instruction_set: "Sse4_2".into(), ..info.clone() };
     let repeated = replayed(&recorded_config(&of_sse4_2, best).unwrap());
     assert_eq!((repeated.different, repeated.largest), (sse4_2.different, sse4_2.largest));

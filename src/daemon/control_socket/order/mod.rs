@@ -223,9 +223,12 @@ fn outcome(request: Request, state: State) -> Option<bool> {
     }
 }
 
-/// Whether the reason of a refusal may disappear without a correction: a source that was lost may be about to return.
+/// Whether the reason of a refusal may disappear without a correction: a source that was lost may be about to return, and the last
+/// message before it was lost has an old time stamp.
 fn may_resolve(code: DiagnosticCode) -> bool {
-    !code.is_fault() || matches!(code, DiagnosticCode::SetpointLost | DiagnosticCode::MeasurementLost)
+    use DiagnosticCode::{MeasurementLost, MeasurementStampInvalid, SetpointLost, SetpointStampInvalid};
+    let may_return = [MeasurementLost, MeasurementStampInvalid, SetpointLost, SetpointStampInvalid];
+    !code.is_fault() || may_return.contains(&code)
 }
 
 fn state(snapshot: &Snapshot) -> State {

@@ -89,6 +89,12 @@ fn a_patient_order_says_once_why_it_waits_and_tries_again() {
     assert_ne!(word.load(), first);
     let again = snapshot(State::Standby, word.load(), DiagnosticCode::NoSetpoint.into());
     assert_eq!(result(&pending.step(&again, &word, RETRY_INTERVAL_NS + 3000)), None, "the same reason");
+    // The last message of a source that was away, before it sends again.
+    word.set_seen(word.load());
+    assert_eq!(result(&pending.step(&again, &word, 2 * RETRY_INTERVAL_NS + 4000)), None);
+    let old = snapshot(State::Standby, word.load(), DiagnosticCode::SetpointStampInvalid.into());
+    let step = pending.step(&old, &word, 2 * RETRY_INTERVAL_NS + 5000);
+    assert_eq!(result(&step), Some(RequestResult::Waiting), "{step:?}");
     let fault = snapshot(State::Fault, word.load(), DiagnosticCode::InvalidInState.into());
     let mut impatient = PendingOrder::post(order(Request::Engage, true), &first_cycle(), &word, 0);
     assert_eq!(result(&impatient.step(&fault, &word, 1)), Some(RequestResult::Refused));
