@@ -67,6 +67,27 @@ proptest! {
         prop_assert!((derivative(displaced) - n.transpose() * towards).amax() < bound);
     }
 
+    /// Down to the rounding of the lengths: what is left out of a slow motion would depend on the instruction set.
+    #[test]
+    fn the_smallest_motions_are_followed(
+        (machine, _, motion) in machine_in_motion(),
+        towards in vector6(),
+        exponent in -14.0..-10.0,
+    ) {
+        let r = machine.joints.radius;
+        prop_assume!(towards.norm() > 0.1);
+        let way = towards.normalize() * 10.0_f64.powf(exponent);
+        let step = Twist { angular: way.fixed_rows::<3>(0).into(), linear: way.fixed_rows::<3>(3) * r };
+        let moved = motion.pose.displaced(&step);
+        let mut tracker = Tracker::new(&machine, motion.pose);
+        let (result, _) = tracker.advance(&machine, &leg_lengths(&machine, &moved));
+        prop_assert_eq!(result, TrackingResult::Found);
+        let size = 1.0 + motion.pose.position.norm() / r;
+        let rounding = 64.0 * f64::EPSILON * size * condition(&machine, &motion.pose);
+        let apart = machine.joints.distance(&tracker.pose, &moved);
+        prop_assert!(apart < rounding, "{apart:e} {rounding:e}");
+    }
+
     #[test]
     fn twists_follow_from_rates((machine, _, motion) in machine_in_motion()) {
         let rates = leg_motion(&machine, &motion).rate;

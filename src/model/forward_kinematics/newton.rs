@@ -104,7 +104,8 @@ impl<'a, S: Simd> Newton<'a, S> {
         mut factorization: Factorization<'a, S>,
     ) -> NewtonReport {
         let Self { simd, joints, target, inverse_target } = *self;
-        let last = square(last_step(joints, kinematic_state)); // All sizes are squares.
+        let rounding = rounding(joints, kinematic_state);
+        let last = square(rounding.max(CONVERGED_STEP)); // All sizes are squares.
         let linear_weight = f64x4::splat(simd, 1.0 / square(joints.radius));
         let mut at = Iterate::start(simd, joints, &kinematic_state.pose);
         let mut residual = target - legs.length;
@@ -132,8 +133,9 @@ impl<'a, S: Simd> Newton<'a, S> {
                 } else if !(size <= longest) {
                     return report;
                 }
-                if size <= last && report.iterations == 1 {
-                    // Already at the pose. Steps smaller than rounding in the legs would add up over the cycles.
+                if size <= square(rounding) && report.iterations == 1 {
+                    // Already at the pose. Steps smaller than rounding in the legs would add up over the cycles. Longer ones are taken:
+                    // whether a step is just below a bound is a matter of rounding, and an instruction set must not decide what is left out.
                     let is_regular = kinematic_state.sensitivity.condition <= MAX_CONDITION;
                     report.outcome = if is_regular { Outcome::Solved } else { Outcome::NearSingular };
                     return report;
@@ -192,12 +194,11 @@ impl<'a, S: Simd> Newton<'a, S> {
     }
 }
 
-/// The larger of [`CONVERGED_STEP`] and the rounding of differences of coordinates.
+/// Size of a step by the rounding of differences of coordinates.
 #[inline(always)]
-fn last_step(joints: &Joints, start: &KinematicState) -> f64 {
+fn rounding(joints: &Joints, start: &KinematicState) -> f64 {
     let size = start.pose.position.norm() / joints.radius;
-    CONVERGED_STEP
-        .max(f64::EPSILON * ROUNDING_ERRORS_PER_RESIDUAL * (1.0 + size) * start.sensitivity.condition)
+    f64::EPSILON * ROUNDING_ERRORS_PER_RESIDUAL * (1.0 + size) * start.sensitivity.condition
 }
 
 fn square(x: f64) -> f64 {
