@@ -9,17 +9,24 @@
 //! speed(t) = |v| + d t, at least 0       d = (|v| - |v0|) / (t - t0), along the twist, as all legs come to rest at once
 //! ```
 //!
-//! Until there are two, the motion of a platform that moves is unknown, and control does not begin.
+//! Until there are two, the motion of a platform that moves is unknown, and control does not begin. Nor does it where brakes take a
+//! large part of the velocity limit within a period: until the force acts, which may be some part of a period late, the platform would
+//! have another velocity than its reference. Such brakes soon have it at rest.
 
 use super::controller::Cycle;
 use super::input_validation::seconds_between;
+use super::limits::largest_ratio;
 use super::localization::{Located, PlatformState};
-use super::parameters::Constants;
+use super::parameters::{Constants, Parameters};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
 /// Speed of a joint at which a platform without force counts as standing, as a ratio of the velocity limit: above the noise
 /// of rates, and below what feedback could not take up at once.
 const STANDING_RATIO: f64 = 1e-3;
+
+/// Largest change of the twist within a period with which control begins, over the limits of velocity: a force that acts a fifth of a
+/// period late makes 2 % of them.
+const MAX_CHANGE_RATIO: f64 = 0.1;
 
 /// What a measurement without force has shown.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +93,16 @@ impl FreeMotion {
         let moves_s = if change < 0.0 { age_s.min(last.speed / -change) } else { age_s };
         let share = if last.speed > 0.0 { (1.0 + change * moves_s / last.speed).max(0.0) } else { 0.0 };
         let scaled = |factor: f64| Twist::from_vector(&(last.twist.vector() * factor));
+        let Parameters { limits, period_ns, .. } = &constants.parameters;
+        let in_period = scaled(change / last.speed * *period_ns as f64 * 1e-9);
+        let change_ratio = largest_ratio([
+            in_period.linear.norm() / limits.position.velocity,
+            in_period.angular.norm() / limits.orientation.velocity,
+        ]);
+        // Of a platform that will be at rest, the speed is known.
+        if share > 0.0 && change_ratio > MAX_CHANGE_RATIO {
+            return None;
+        }
         Some(Motion {
             pose: last.pose.displaced(&scaled(0.5 * (1.0 + share) * moves_s)),
             twist: scaled(share),

@@ -50,6 +50,24 @@ fn two_measurements_without_force_give_the_deceleration() {
     }
 }
 
+/// From 0.5 m/s, in periods of 1 ms: a tenth of the velocity limit in each, or a little more.
+#[test]
+fn control_begins_after_hard_brakes_and_not_under_them() {
+    let mut constants = constants();
+    (constants.parameters.period_ns, constants.parameters.limits.position.velocity) = (MS, 1.0);
+    for (deceleration, is_known) in [(99.0, true), (101.0, false)] {
+        let mut free = FreeMotion::default();
+        let mut at = |ms: u64, speed: f64| {
+            update(&mut free, &constants, ((20 + ms) * MS, State::Standby), Some(((20 + ms) * MS, speed)))
+        };
+        assert!(at(0, 0.5).is_none());
+        assert_eq!(at(1, 0.5 - 1e-3 * deceleration).is_some(), is_known, "{deceleration}");
+        // At rest before the force begins 2 ms later.
+        assert!(at(4, 0.5 - 4e-3 * deceleration).is_some_and(|motion| motion.twist.linear.norm() < 1e-12));
+        assert!(at(10, 0.0).is_some());
+    }
+}
+
 #[test]
 fn a_measurement_counts_once_and_only_if_no_force_acted_when_it_was_taken() {
     let constants = constants();
