@@ -8,6 +8,8 @@ use crate::control::input_validation::seconds_between;
 /// Accelerations kept, a power of two: at 10 kHz those of 25 ms, the longest delay of the drives with the age of a measurement.
 pub const CAPACITY: usize = 256;
 
+const ZERO: Vector6<f64> = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+
 /// An acceleration and the instant from which on it acts.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
@@ -57,24 +59,23 @@ impl SentAccelerations {
     /// Moves an error from an instant to a later one, under the accelerations that act between them.
     pub fn advance(&self, state: &mut ErrorState, from_ns: u64, to_ns: u64) {
         let mut age = 0;
-        while self.recorded(age).is_some_and(|sent| seconds_between(sent.begin_ns, from_ns) < 0.0) {
+        while self.recorded(age).is_some_and(|sent| sent.begin_ns > from_ns) {
             age += 1;
         }
-        let mut now_ns = from_ns;
+        let (mut acting, mut now_ns) = (self.recorded(age), from_ns);
         loop {
-            // Before the first none acts.
-            let acceleration = self.recorded(age).map_or_else(Vector6::zeros, |sent| sent.acceleration);
-            let next = age.checked_sub(1).and_then(|age| self.recorded(age));
-            let end_ns = next.map_or(to_ns, |next| next.begin_ns).min(to_ns);
-            let dt = seconds_between(now_ns, end_ns);
-            if dt > 0.0 {
-                state.advance(dt, &acceleration);
+            let next = age.checked_sub(1).and_then(|age| Some((age, self.recorded(age)?)));
+            let end_ns = next.map_or(to_ns, |(_, next)| next.begin_ns.min(to_ns));
+            if end_ns > now_ns {
+                // Before the first none acts.
+                let acceleration = acting.map_or(&ZERO, |sent| &sent.acceleration);
+                state.advance(seconds_between(now_ns, end_ns), acceleration);
                 now_ns = end_ns;
             }
-            if age == 0 || end_ns >= to_ns {
-                return;
+            match next {
+                Some((next_age, next)) if end_ns < to_ns => (acting, age) = (Some(next), next_age),
+                _ => return,
             }
-            age -= 1;
         }
     }
 }
