@@ -90,7 +90,7 @@ pub struct SensorErrors {
 /// Differences of the machine as built from the machine as configured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BuildErrors {
-    /// Point mass on the platform \[kg\].
+    /// Point mass on the platform \[kg\]; negative where the machine lacks what its configuration has.
     pub payload: f64,
     /// Its place, platform axes \[m\].
     pub payload_at: Vector3<f64>,
@@ -163,7 +163,7 @@ impl BuildErrors {
     /// The machine as built, its joints displaced by random numbers.
     pub fn built(&self, machine: &Machine, random: &mut Random) -> Machine {
         let mut built = machine.clone();
-        if self.payload > 0.0 {
+        if self.payload != 0.0 {
             self.load(&mut built);
         }
         if self.joints > 0.0 {

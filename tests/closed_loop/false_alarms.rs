@@ -50,7 +50,7 @@ fn episode(seed: u64) -> Result<(), String> {
         },
         sensor: SensorErrors { length_step: step, length_noise: noise, ..SensorErrors::default() },
         build: BuildErrors {
-            payload: between(0.0, 0.2) * platform.platform.mass,
+            payload: between(-0.2, 0.2) * platform.platform.mass,
             payload_at: platform.platform.center_of_mass,
             ..BuildErrors::default()
         },
