@@ -17,11 +17,12 @@
 use nalgebra::{Matrix6, Schur, Vector6};
 
 use super::envelope::MotionEnvelope;
+use crate::control::limits::Limits;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::Machine;
+use crate::model::machine::{LEGS, Machine};
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::sensitivity::Sensitivity;
@@ -73,6 +74,31 @@ impl HeldForces {
     /// assert!(pole > 2.0 && pole < 20.0);
     /// ```
     pub fn pole(&self, pose: &Pose) -> Option<f64> {
+        let growth = self.growth(pose)?;
+        let eigenvalues = Schur::try_new(growth, f64::EPSILON, MAX_ITERATIONS)?.complex_eigenvalues();
+        Some(eigenvalues.iter().map(|eigenvalue| real_root(eigenvalue.re, eigenvalue.im)).fold(0.0, f64::max))
+    }
+
+    /// Bounds of the angular \[rad/s^3\] and linear \[m/s^3\] jerk of the platform while forces are held: `|A v|` for velocities v within
+    /// the limits and within the largest rates of the legs, the lesser of both bounds; `None` at a singular pose.
+    pub fn jerk_bounds(&self, pose: &Pose, limits: &Limits) -> Option<[f64; 2]> {
+        let (machine, growth) = (self.model.machine(), self.growth(pose)?);
+        let by_rates = growth * leg_wrenches(machine, pose).transpose().try_inverse()?;
+        Some([0, 3].map(|row| {
+            let block = |column| growth.fixed_view::<3, 3>(row, column).into_owned().singular_values().max();
+            let by_limits = block(0) * limits.orientation.velocity + block(3) * limits.position.velocity;
+            // The largest norm is in a corner of the rates.
+            let corners = (0..1_u32 << LEGS).map(|signs| {
+                let sign = |leg: usize| if signs >> leg & 1 == 1 { 1.0 } else { -1.0 };
+                let jerk = by_rates * Vector6::from_fn(|leg, _| sign(leg) * machine.actuator.max_rate);
+                jerk.fixed_rows::<3>(row).norm()
+            });
+            by_limits.min(corners.fold(0.0, f64::max))
+        }))
+    }
+
+    /// A \[1/s^2\]; `None` at a singular pose.
+    fn growth(&self, pose: &Pose) -> Option<Matrix6<f64>> {
         let forces = leg_wrenches(self.model.machine(), pose).lu().solve(&self.load(pose))?;
         let unbalanced = |pose: &Pose| leg_wrenches(self.model.machine(), pose) * forces - self.load(pose);
         let radius = self.model.machine().joints.radius;
@@ -84,11 +110,7 @@ impl HeldForces {
                 .copy_from(&((unbalanced(&displaced(step)) - unbalanced(&displaced(-step))) / (2.0 * step)));
         }
         let growth = self.mass.at(pose).cholesky()?.solve(&stiffness);
-        if !growth.iter().all(|x| x.is_finite()) {
-            return None;
-        }
-        let eigenvalues = Schur::try_new(growth, f64::EPSILON, MAX_ITERATIONS)?.complex_eigenvalues();
-        Some(eigenvalues.iter().map(|eigenvalue| real_root(eigenvalue.re, eigenvalue.im)).fold(0.0, f64::max))
+        growth.iter().all(|x| x.is_finite()).then_some(growth)
     }
 
     /// What holds the platform at rest \[N m\], \[N\].
@@ -160,7 +182,36 @@ fn direction(k: u32) -> Vector6<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::Config;
+    use crate::control::limits::DerivativeLimits;
+    use crate::plant::forward_dynamics::ForwardDynamics;
     use nalgebra::Complex;
+
+    /// Against the dynamics of the simulated platform: no motion changes its acceleration faster, and one nearly so.
+    #[test]
+    fn held_forces_change_an_acceleration_within_the_bounds_of_the_jerk() {
+        let machine = Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
+        let (held_forces, plant) = (HeldForces::new(&machine), ForwardDynamics::new(&machine));
+        let rest = Twist::default();
+        let of = |velocity| DerivativeLimits { velocity, acceleration: 1.0, jerk: 1.0 };
+        let limits = Limits { position: of(0.3), orientation: of(0.5), autonomous_scale: 1.0 };
+        let pose = machine.home_pose().displaced(&Twist::from_vector(&(direction(7) * 0.1)));
+        let forces = leg_wrenches(&machine, &pose).lu().solve(&held_forces.load(&pose)).unwrap().into();
+        let [angular, linear] = held_forces.jerk_bounds(&pose, &limits).unwrap();
+        let (mut most, dt) = ([0.0_f64; 2], 1e-5);
+        for k in 0..20_000 {
+            let velocity = Twist::from_vector(&direction(k));
+            let rates = leg_wrenches(&machine, &pose).tr_mul(&velocity.vector());
+            let slower = (0.5 / velocity.angular.norm())
+                .min(0.3 / velocity.linear.norm())
+                .min(machine.actuator.max_rate / rates.amax());
+            let later = pose.displaced(&Twist::from_vector(&(velocity.vector() * (slower * dt))));
+            let change = plant.acceleration(&later, &rest, &forces).unwrap();
+            most = [most[0].max(change.angular.norm() / dt), most[1].max(change.linear.norm() / dt)];
+        }
+        assert!((0.8..1.001).contains(&(most[0] / angular)), "{most:?} {angular}");
+        assert!((0.8..1.001).contains(&(most[1] / linear)), "{most:?} {linear}");
+    }
 
     #[test]
     fn the_real_part_of_a_root_loses_no_digits() {

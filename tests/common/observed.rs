@@ -152,6 +152,7 @@ impl Observed {
         let (period_ns, release_ns) = (self.parameters.period_ns, self.release_ns());
         let after_ns = period_ns - self.phase_ns;
         let delay_ns = self.force_delay_ns.min(after_ns);
+        self.meter.late_s = delay_ns.saturating_sub(self.parameters.force_delay_ns) as f64 * 1e-9;
         let next = output.state.has_control().then_some(output.force);
         self.advance(self.phase_ns);
         self.meter.at_release(&self.simulator, self.force.as_ref(), release_ns);

@@ -22,6 +22,9 @@ use super::extremes::{Extremes, Quantity};
 /// A force is held for a period while the reference's acceleration changes with the jerk J: the velocity differs from the
 /// reference's by up to this times J h^2, whatever the control law. 0.1 mm/s at 1 kHz, 12 mm/s at 100 Hz, by default.
 const HELD_FORCE_RATIO: f64 = 0.25;
+/// Forces that arrive d later than the controller knows: the velocity differs from the reference's by up to this times d A. The
+/// platform keeps each acceleration for d longer, from -A to A, and feedback, which learns of it late, adds as much.
+const LATE_FORCE_RATIO: f64 = 4.0;
 /// Distance by which the true pose may leave the envelope \[m\]: the following error of a plant without flaws.
 pub const ENVELOPE_ALLOWANCE_M: f64 = 50e-6;
 /// The same for an angle \[rad\].
@@ -50,6 +53,8 @@ pub struct Meter {
     pub cycles: u64,
     /// Speed of the fastest leg before it met its end stop \[m/s\].
     pub impact_m_s: Option<f64>,
+    /// By how much later than the controller knows the forces arrive \[s\].
+    pub late_s: f64,
     parameters: Parameters,
     machine: Machine,
     dynamics: ForwardDynamics,
@@ -79,6 +84,7 @@ impl Meter {
             hardest_m_s2: 0.0,
             cycles: 0,
             impact_m_s: None,
+            late_s: 0.0,
             parameters: *parameters,
             machine: machine.clone(),
             dynamics: ForwardDynamics::new(plant),
@@ -149,7 +155,8 @@ impl Meter {
         let (omega, v) = (twist.angular.norm(), twist.linear.norm());
         self.fastest_m_s = self.fastest_m_s.max(v);
         let ratio = |velocity: f64, limits: &DerivativeLimits| {
-            (velocity - held_velocity(&self.parameters, limits)) / limits.velocity
+            let late = LATE_FORCE_RATIO * self.late_s * limits.acceleration;
+            (velocity - held_velocity(&self.parameters, limits) - late) / limits.velocity
         };
         self.extremes.add(Quantity::Velocity, ratio(v, &limits.position), now_ns);
         self.extremes.add(Quantity::AngularVelocity, ratio(omega, &limits.orientation), now_ns);

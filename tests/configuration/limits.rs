@@ -137,6 +137,29 @@ fn a_home_near_the_end_of_the_stroke_has_a_smaller_default_and_one_beyond_is_rep
 }
 
 /// With the delay of a slow loop an error near a singular pose grows faster than feedback acts.
+/// Legs of 0.12 m at 250 Hz: the adversary's platform had 6.6 rad/s^2 where 6 were allowed.
+#[test]
+fn a_limit_of_acceleration_that_held_forces_exceed_is_refused() {
+    let text = include_str!("../data/tabletop.toml");
+    let with = |acceleration: f64, rate_hz: f64| {
+        let velocities = "velocity_m_s = 1.0\nvelocity_rad_s = 2.0\nacceleration_m_s2 = 1.0";
+        format!(
+            "{text}[realtime]\nrate_hz = {rate_hz}\n[limits]\n{velocities}\nacceleration_rad_s2 = {acceleration}\n"
+        )
+    };
+    let found = violations(&with(4.0, 250.0));
+    let [violation] = found.as_slice() else { panic!("{found:#?}") };
+    assert_eq!(violation.key, "limits.acceleration_rad_s2");
+    let bound = violation.bound.strip_prefix("must be at least ").unwrap();
+    let (bound, of) = bound.split_once(": ").unwrap();
+    assert!(of.starts_with("forces held for 0.004 s turn with the legs and change it by 2."), "{of}");
+    let bound: f64 = bound.parse().unwrap();
+    assert!((5.5..5.6).contains(&bound), "{bound}");
+    assert_eq!(violations(&with(bound, 250.0)), []);
+    assert_eq!(violations(&with(0.999 * bound, 250.0)).len(), 1);
+    assert_eq!(violations(&with(4.0, 500.0)), []);
+}
+
 #[test]
 fn the_default_condition_is_less_at_slow_rates_and_leaves_room_around_home() {
     let condition = |text: &str| deployment(text).limits.condition;

@@ -20,6 +20,9 @@ const DEFAULT_CONDITION: f64 = 100.0;
 /// Largest exponent of the growth of a displacement under held forces, until a force computed from it acts. With it a loop with the
 /// default gains of a slow rate stands 0.7 of the modelled mass, as without growth.
 const MAX_GROWTH_EXPONENT: f64 = 0.2;
+/// Part of the bound on the change of an acceleration within a hold that motions reach: in the worst direction at the largest velocity
+/// no stop from the worst pose would be verified. The largest found by a search of 1e7 cycles was 0.12.
+const TURNING_SHARE: f64 = 0.125;
 /// From the beginning of a hold to its middle, in periods.
 const MIDDLE_OF_HOLD: f64 = 0.5;
 /// Least default of the condition over that of home: else the platform could not leave it.
@@ -68,10 +71,13 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     let disturbance_step_m_s2 = allowed(&mut section, "disturbance_step_m_s2");
     let stroke_margin_m = stroke_margin_m(&mut section, machine);
     let turning = turning_condition(machine, realtime, &position, feedback_scale);
-    let (condition, held_pole) = condition(&mut section, machine, realtime, turning);
+    let (condition, survey) = condition(&mut section, machine, realtime, turning);
+    let held_pole = survey.iter().map(|pose| pose.pole).fold(0.0, f64::max);
+    let reference = ReferenceLimits { position, orientation, autonomous_scale };
+    check_turning(&section, machine, realtime, &survey, &reference, feedback_scale);
     section.finish();
     DeploymentLimits {
-        reference: ReferenceLimits { position, orientation, autonomous_scale },
+        reference,
         feedback_scale,
         payload_change_kg,
         disturbance_step_m_s2,
@@ -122,7 +128,7 @@ fn turning_condition(
     feedback_scale * position.acceleration / (position.velocity * middle_s) * shortest / load
 }
 
-/// Largest condition, and the largest pole under held forces within it. The default is less where the rate is slow, so that no
+/// Largest condition, and poses within it. The default is less where the rate is slow, so that no
 /// displacement grows far before a force answers it, and leaves room around a home that is badly conditioned; home must
 /// keep the limit.
 fn condition(
@@ -130,11 +136,11 @@ fn condition(
     machine: &Machine,
     realtime: &Realtime,
     turning: f64,
-) -> (f64, f64) {
+) -> (f64, Vec<SurveyedPose>) {
     let at_home = KinematicState::new(machine, machine.home_pose()).sensitivity().condition;
     let usual = DEFAULT_CONDITION.max(2.0 * at_home);
     let given = section.has("condition").then(|| section.number_or("condition", usual, Bound::Positive));
-    let survey = HeldForces::new(machine).survey(given.unwrap_or(usual));
+    let mut survey = HeldForces::new(machine).survey(given.unwrap_or(usual));
     let delay_s = (realtime.longest_delay() + MIDDLE_OF_HOLD) * realtime.period_s();
     let is_fast = |pose: &&SurveyedPose| pose.pole * delay_s > MAX_GROWTH_EXPONENT;
     let first_fast = survey.iter().filter(is_fast).map(|pose| pose.condition).fold(f64::INFINITY, f64::min);
@@ -146,6 +152,40 @@ fn condition(
         let bound = format!("must be at least {} (that of home)", rounded(at_home));
         section.reject("condition", bound);
     }
-    let within = survey.iter().filter(|pose| pose.condition <= limit.max(at_home));
-    (limit, within.map(|pose| pose.pole).fold(0.0, f64::max))
+    survey.retain(|pose| pose.condition <= limit.max(at_home));
+    (limit, survey)
+}
+
+/// Rejects limits of acceleration that forces exceed because they turn with the legs while they are held: within half of a period
+/// the acceleration then departs from its mean by more than feedback may add. Defaults follow from the machine; one whose
+/// joints are wrong is examined as a whole.
+fn check_turning(
+    section: &SectionReader,
+    machine: &Machine,
+    realtime: &Realtime,
+    survey: &[SurveyedPose],
+    limits: &ReferenceLimits,
+    feedback_scale: f64,
+) {
+    let held_forces = HeldForces::new(machine);
+    let jerks = survey.iter().filter_map(|pose| held_forces.jerk_bounds(&pose.pose, limits));
+    let [angular, linear] = jerks.fold([0.0_f64; 2], |[a, b], [c, d]| [a.max(c), b.max(d)]);
+    for (key, jerk, unit, limits) in [
+        ("acceleration_rad_s2", angular, "rad/s^2", &limits.orientation),
+        ("acceleration_m_s2", linear, "m/s^2", &limits.position),
+    ] {
+        let change = TURNING_SHARE * jerk * MIDDLE_OF_HOLD * realtime.period_s();
+        let least = change / feedback_scale;
+        if section.has(key) && limits.acceleration < least {
+            // Rounded up, so that the number in the message is accepted.
+            let least = rounded(least * (1.0 + 5e-6));
+            let bound = format!(
+                "must be at least {least}: forces held for {} s turn with the legs and change it by {} {unit}, more \
+                 than feedback_scale adds; raise [realtime] rate_hz, or reduce velocity_* or [actuator] max_rate_m_s",
+                rounded(realtime.period_s()),
+                rounded(change),
+            );
+            section.reject(key, bound);
+        }
+    }
 }
