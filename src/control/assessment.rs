@@ -25,12 +25,12 @@ pub(super) struct Evidence<'a> {
     pub located: Result<&'a Located<'a>, Diagnostic>,
     pub error: Option<&'a TrackingError>,
     pub feedback: &'a FeedbackBound,
-    /// Whether the measurements agree with the prediction.
-    pub trust: Result<(), Diagnostic>,
-    /// Whether payload and surroundings are as before, and the platform does not oscillate.
-    pub change: Result<(), Diagnostic>,
+    /// What the measurements and the prediction disagree in.
+    pub distrust: Option<&'a Diagnostic>,
+    /// What has changed of payload and surroundings, or that the platform oscillates.
+    pub change: Option<&'a Diagnostic>,
     /// Whether drives and external sensors report nothing that contradicts.
-    pub reports: Result<(), Diagnostic>,
+    pub reports: &'a [Result<(), Diagnostic>; 2],
     /// Whether the drives are ready, or nothing else is reported.
     pub is_ready: bool,
     /// The motion with which control would begin, if it is known.
@@ -45,44 +45,75 @@ pub(super) fn assess(
     evidence: &Evidence<'_>,
     localization: &Localization,
     reference: &mut ReferenceGenerator,
-) -> (Findings, LimitSet) {
-    let parameters = &cycle.constants.parameters;
-    let Evidence { input, setpoint, located, error, feedback, trust, change, reports, is_ready, free_motion } =
-        evidence;
-    let (mut active_limits, conditioned) = localization.check_condition(parameters.condition);
-    let (mut tracking, mut start) = (conditioned, Ok(()));
-    if cycle.state.has_control() {
-        tracking = reports
-            .and(*trust)
-            .and_then(|()| check_following_error(parameters, *error, &mut active_limits))
-            .and_then(|()| feedback.check())
-            .and(*change)
-            .and_then(|()| check_deadline(input))
-            .and(match cycle.state {
-                State::Engaging | State::Active => setpoint.status,
-                _ => Ok(()),
-            })
-            .and(conditioned);
-    } else if located.is_ok() {
-        start = check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)
-            .and(*reports)
-            .and_then(|()| check_start(cycle, reference, *free_motion));
-    }
+    active_limits: &mut LimitSet,
+) -> Findings {
+    let Evidence { setpoint, located, is_ready, .. } = evidence;
+    let conditioned = localization.check_condition(cycle.constants.parameters.condition, active_limits);
+    let tracking = match cycle.state.has_control() {
+        true => check_tracking(cycle, evidence, &conditioned, active_limits),
+        false => conditioned,
+    };
+    let start = match cycle.state.has_control() || located.is_err() {
+        true => Ok(()),
+        false => check_start(cycle, evidence, reference),
+    };
     // Nothing depends on it while the setpoint is followed.
     let engagement = match cycle.state {
         State::Engaging | State::Active => Ok(()),
-        _ => check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)
-            .and_then(|()| check_publishers(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers))
-            .and(*reports)
-            .and(conditioned)
-            .and(setpoint.status)
-            .and_then(|()| check_engage_tolerance(parameters, setpoint, *error))
-            .and(start),
+        _ => check_engagement(cycle, evidence, &conditioned, &start),
     };
     let is_waiting = cycle.state == State::Engaging && !is_ready;
     let has_ended = !is_waiting && has_ended(cycle, setpoint, reference);
     let localization = located.map(drop);
-    (Findings { localization, start, engagement, tracking, has_ended }, active_limits)
+    Findings { localization, start, engagement, tracking, has_ended }
+}
+
+// In the checks each result is looked at where it is, as copies of many that are in order take time.
+/// Whether the reference can be followed further.
+fn check_tracking(
+    cycle: &Cycle<'_>,
+    evidence: &Evidence<'_>,
+    conditioned: &Result<(), Diagnostic>,
+    active_limits: &mut LimitSet,
+) -> Result<(), Diagnostic> {
+    let Evidence { input, setpoint, error, feedback, distrust, change, .. } = evidence;
+    check_reports(evidence)?;
+    if let Some(distrust) = distrust {
+        return Err(**distrust);
+    }
+    check_following_error(&cycle.constants.parameters, *error, active_limits)?;
+    feedback.check()?;
+    if let Some(change) = change {
+        return Err(**change);
+    }
+    check_deadline(input)?;
+    if let State::Engaging | State::Active = cycle.state {
+        setpoint.status?;
+    }
+    *conditioned
+}
+
+/// Whether control may begin on the setpoint.
+fn check_engagement(
+    cycle: &Cycle<'_>,
+    evidence: &Evidence<'_>,
+    conditioned: &Result<(), Diagnostic>,
+    start: &Result<(), Diagnostic>,
+) -> Result<(), Diagnostic> {
+    let Evidence { input, setpoint, error, .. } = evidence;
+    check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)?;
+    check_publishers(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers)?;
+    check_reports(evidence)?;
+    (*conditioned)?;
+    setpoint.status?;
+    check_engage_tolerance(&cycle.constants.parameters, setpoint, *error)?;
+    *start
+}
+
+fn check_reports(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
+    let [drives, external_pose] = evidence.reports;
+    (*drives)?;
+    *external_pose
 }
 
 /// Whether the motion of the state has come to its end.
@@ -126,11 +157,13 @@ fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), 
 /// Control may begin if the motion without force is known and a stop from it was verified.
 fn check_start(
     cycle: &Cycle<'_>,
+    evidence: &Evidence<'_>,
     reference: &mut ReferenceGenerator,
-    free_motion: Option<&Motion>,
 ) -> Result<(), Diagnostic> {
+    check_publishers(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
+    check_reports(evidence)?;
     let moving = Diagnostic::from(DiagnosticCode::PlatformMoving);
-    let motion = free_motion.ok_or(moving)?;
+    let motion = evidence.free_motion.ok_or(moving)?;
     reference
         .check_start(cycle.constants, &motion.pose, &motion.twist)
         .map_err(|limit| moving.at(limit as usize))

@@ -239,7 +239,7 @@ impl Controller {
         let measurement = clock.and(measurements.validate(&cycle, input.measurement.as_ref()));
         let setpoint = setpoints.validate(&cycle, input.setpoint.as_ref(), reference);
         let reported = measurement.as_ref().ok().copied();
-        let reports = drives.check(&cycle, reported).and(external_pose.check(&cycle, reported));
+        let reports = [drives.check(&cycle, reported), external_pose.check(&cycle, reported)];
 
         // Locate platform.
         let mut located = measurement.and_then(|measurement| {
@@ -263,13 +263,14 @@ impl Controller {
             located: located.as_ref().map_err(|diagnostic| *diagnostic),
             error: error.as_ref(),
             feedback,
-            trust: errors.check_trust(),
-            change: errors.check_change(),
-            reports,
+            distrust: errors.distrust(),
+            change: errors.change(),
+            reports: &reports,
             is_ready: drives.is_ready,
             free_motion: free_motion.as_ref(),
         };
-        let (findings, assessed_limits) = assess(&cycle, &evidence, localization, reference);
+        let mut assessed_limits = LimitSet::default();
+        let findings = assess(&cycle, &evidence, localization, reference, &mut assessed_limits);
         let next = supervisor.decide(request, &findings, parameters.after_loss);
         if request.is_some_and(|new| new.request == Request::Clear) {
             localization.clear_assembly_mode_fault(&constants.home);
@@ -292,6 +293,7 @@ impl Controller {
         }
 
         // Control law, forces, checks.
+        let mut limited = LimitedForces::default();
         let mut actuate = || {
             let desired = reference.motion_of_hold(begin_ns.saturating_add(parameters.period_ns / 2));
             let at_begin = errors.predicted(begin_ns);
@@ -302,7 +304,7 @@ impl Controller {
             let motion =
                 parameters.law.dynamics_motion(desired, &errors.without_lag(&in_middle), &acceleration);
             let force = forces(constants, &motion, &acceleration)?;
-            let limited = limiter.limit(&cycle, &force, &motion)?;
+            limiter.limit(&cycle, &force, &motion, &mut limited)?;
             if limited.force != force {
                 let (machine, missing) = (constants.machine(), &limited.wrench_error);
                 let acceleration = constants.input_matrix.acceleration_of(machine, &motion.pose, missing);
@@ -310,13 +312,13 @@ impl Controller {
                 errors.record_limited(constants, &acceleration);
             }
             errors.record_sent(begin_ns, &sent, &limited.force);
-            Ok(limited)
+            Ok(())
         };
-        let limited = if next.has_control() { actuate() } else { Ok(LimitedForces::default()) };
-        let LimitedForces { force, wrench_error, active_limits } = limited.unwrap_or_else(|diagnostic| {
+        let actuated = if next.has_control() { actuate() } else { Ok(()) };
+        if let Err(diagnostic) = actuated {
             supervisor.fail(diagnostic);
-            LimitedForces::default()
-        });
+        }
+        let LimitedForces { force, wrench_error, active_limits } = limited;
         drives.record_sent(&force);
         let platform = located.ok().map(|located| located.platform);
         Output {

@@ -196,7 +196,9 @@ impl DisturbanceMonitor {
             self.oscillation.check(bounds, &estimate.value, &reference.acceleration.vector(), dt);
         // Control begins with an unknown payload, and rings.
         let oscillation = if self.since_start_s < START_S { Ok(()) } else { oscillation };
-        oscillation.and(impact).and(payload)
+        oscillation?;
+        impact?;
+        payload
     }
 
     fn check_payload(

@@ -16,7 +16,7 @@ use crate::model::rigid::{Motion, Pose, Wrench};
 pub(super) struct LimitedForces {
     /// \[N\]
     pub force: [f64; LEGS],
-    /// Wrench of these forces minus that of the commanded ones, about C.
+    /// Wrench of these forces minus that of the commanded ones, about C; zero if they are not limited.
     pub wrench_error: Wrench,
     pub active_limits: LimitSet,
 }
@@ -32,25 +32,26 @@ pub(super) struct ForceLimiter {
 }
 
 impl ForceLimiter {
-    /// Limits the forces for a motion. The rate is limited from the second cycle under control on.
+    /// Limits the forces for a motion, unless they cannot be computed. The rate is limited from the second cycle under control on.
     pub fn limit(
         &mut self,
         cycle: &Cycle<'_>,
         commanded: &[f64; LEGS],
         motion: &Motion,
-    ) -> Result<LimitedForces, Diagnostic> {
+        limited: &mut LimitedForces,
+    ) -> Result<(), Diagnostic> {
         let Cycle { constants, state, .. } = *cycle;
         let possible = limit_magnitude(constants, commanded, motion)?;
         let force = if state.has_control() { self.limit_rate(constants, &possible) } else { possible };
-        let active_limits = LimitSet::default()
+        limited.force = force;
+        limited.active_limits = LimitSet::default()
             .with(Limit::Force, possible != *commanded)
             .with(Limit::ForceRate, force != possible);
         (self.last, self.is_limited) = (force, force != *commanded);
-        let wrench_error = match self.is_limited {
-            true => wrench_error(constants, &motion.pose, &force, commanded),
-            false => Wrench::default(),
-        };
-        Ok(LimitedForces { force, wrench_error, active_limits })
+        if self.is_limited {
+            limited.wrench_error = wrench_error(constants, &motion.pose, &force, commanded);
+        }
+        Ok(())
     }
 
     /// Limits the change since the last cycle, by the same factor for every leg.

@@ -138,12 +138,12 @@ impl Localization {
     }
 
     /// Whether the pose is far enough from singular ones.
-    pub fn check_condition(&self, bound: f64) -> (LimitSet, Result<(), Diagnostic>) {
+    pub fn check_condition(&self, bound: f64, active: &mut LimitSet) -> Result<(), Diagnostic> {
         let condition = self.tracker.kinematic_state().sensitivity().condition;
-        let mut active = LimitSet::default();
-        let is_kept = active.check(Limit::Condition, condition / bound);
-        let result = || Diagnostic::new(DiagnosticCode::NearSingular, condition, bound);
-        (active, if is_kept { Ok(()) } else { Err(result()) })
+        if active.check(Limit::Condition, condition / bound) {
+            return Ok(());
+        }
+        Err(Diagnostic::new(DiagnosticCode::NearSingular, condition, bound))
     }
 
     /// Starts again at home, the one pose of which the assembly mode is known.

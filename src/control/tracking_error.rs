@@ -11,7 +11,7 @@ use super::controller::Cycle;
 use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::disturbance_monitor::DisturbanceMonitor;
 use super::drive_response::DriveResponse;
-use super::estimator::{ErrorState, Estimator, FrozenSensors};
+use super::estimator::{ErrorState, Estimator, EstimatorConstants, FrozenSensors};
 use super::input_validation::ValidatedSetpoint;
 use super::limits::largest_ratio;
 use super::localization::{Localization, Located};
@@ -117,9 +117,9 @@ pub(super) struct ErrorTracker {
     error: TrackingError,
     /// Measured minus estimated, after the last measurement has corrected the estimate.
     residual: Vector6<f64>,
-    /// Whether the measurements agree with the prediction.
-    trust: Option<Diagnostic>,
-    /// Whether nothing has changed on the platform.
+    /// What the last measurement and the prediction disagree in.
+    distrust: Option<Diagnostic>,
+    /// What has changed on the platform.
     change: Option<Diagnostic>,
 }
 
@@ -128,7 +128,8 @@ impl ErrorTracker {
     /// has then. Returns the error.
     pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> TrackingError {
         self.estimator.start(&constants.estimator, measured_ns, begin_ns, &FeedbackError::default());
-        (self.sensors, self.drives, self.trust) = (FrozenSensors::default(), DriveResponse::default(), None);
+        (self.sensors, self.drives, self.distrust) =
+            (FrozenSensors::default(), DriveResponse::default(), None);
         (self.disturbance, self.change) = (DisturbanceMonitor::default(), None);
         (self.error, self.residual) = (TrackingError::default(), Vector6::zeros());
         self.error
@@ -158,19 +159,14 @@ impl ErrorTracker {
                 let feedback = feedback_forces(constants, sent_acceleration, &desired.pose);
                 [leg_lengths(constants.machine(), &desired.pose), feedback]
             };
-            self.trust = sensors
-                .check(
-                    &located.measurement.length,
-                    &constants.estimator.readings,
-                    &constants.frozen_leg,
-                    legs,
-                )
-                .and_then(|()| check_innovation(constants, &innovation, interval_s, located))
-                .and_then(|()| {
-                    let disturbance = &estimator.state().disturbance;
-                    drives.check(constants, disturbance, sent, &located.platform.pose, interval_s)
-                })
-                .err();
+            let EstimatorConstants { readings, .. } = &constants.estimator;
+            let disturbance_now = &estimator.state().disturbance;
+            let mut check = || {
+                sensors.check(&located.measurement.length, readings, &constants.frozen_leg, legs)?;
+                check_innovation(constants, &innovation, interval_s, located)?;
+                drives.check(constants, disturbance_now, sent, &located.platform.pose, interval_s)
+            };
+            self.distrust = check().err();
             self.change = disturbance
                 .check(
                     &constants.disturbance_bounds,
@@ -201,14 +197,14 @@ impl ErrorTracker {
         self.error
     }
 
-    /// Whether the last measurement agrees with the prediction, and the sensors are alive.
-    pub fn check_trust(&self) -> Result<(), Diagnostic> {
-        self.trust.map_or(Ok(()), Err)
+    /// What the last measurement and the prediction disagree in, or which sensor is frozen.
+    pub fn distrust(&self) -> Option<&Diagnostic> {
+        self.distrust.as_ref()
     }
 
-    /// Whether nothing has changed on the platform, and it does not oscillate.
-    pub fn check_change(&self) -> Result<(), Diagnostic> {
-        self.change.map_or(Ok(()), Err)
+    /// What has changed on the platform, or that it oscillates.
+    pub fn change(&self) -> Option<&Diagnostic> {
+        self.change.as_ref()
     }
 
     /// The estimate at the instant at which a force begins.

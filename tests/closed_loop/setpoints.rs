@@ -3,6 +3,7 @@
 use hexad::control::controller::Setpoint;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::input_validation::{SetpointMotion, check_setpoint};
+use hexad::control::limits::LimitSet;
 use hexad::control::parameters::{Envelope, Parameters};
 use hexad::control::state::{Request, State};
 use hexad::model::inverse_geometry::leg_motion;
@@ -18,7 +19,7 @@ fn a_setpoint_is_checked_against_each_limit() {
     let wide = Parameters { envelope: None, ..parameters(&config) };
     let check = |machine: &_, parameters: &Parameters, task: TaskState| {
         let setpoint = SetpointMotion::new(Setpoint::motion(0, task));
-        check_setpoint(machine, parameters, &setpoint).result.map_err(|found| found.code)
+        check_setpoint(machine, parameters, &setpoint, &mut LimitSet::default()).map_err(|found| found.code)
     };
     for axis in 0..6 {
         let limits = if axis < 3 { wide.limits.orientation } else { wide.limits.position };

@@ -12,7 +12,7 @@ use crate::commands::progress::time_bar;
 use crate::config::Config;
 use crate::control::controller::Setpoint;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::input_validation::{SetpointCheck, SetpointMotion, check_deviation, check_setpoint};
+use crate::control::input_validation::{SetpointMotion, check_deviation, check_setpoint};
 use crate::control::limits::{Limit, LimitSet};
 use crate::control::parameters::{Constants, Envelope, Parameters};
 use crate::control::reference::{ReferenceGenerator, Target};
@@ -90,9 +90,9 @@ impl<'a> Precheck<'a> {
             if k % CYCLES_PER_UPDATE == 0 {
                 bar.set_position((1e3 * self.time(0.0, k)) as u64);
             }
-            let SetpointCheck { active_limits, result } =
-                check_setpoint(self.machine, &self.parameters, &now);
-            let result = result.and_then(|()| check_deviation(&self.parameters, &reference, &before, &now));
+            let mut active_limits = LimitSet::default();
+            let result = check_setpoint(self.machine, &self.parameters, &now, &mut active_limits)
+                .and_then(|()| check_deviation(&self.parameters, &reference, &before, &now));
             if let Err(diagnostic) = result {
                 let active_limits = active_limits.union(reference.active_limits());
                 let refusal = SetpointRefusal { t: self.time(from, k), diagnostic, active_limits };

@@ -68,10 +68,10 @@ impl ErrorState {
     }
 
     /// Corrects it by gains times differences of a reading from the prediction.
-    fn correct(&mut self, [by_e, by_w, by_d]: covariance::Gains, period_s: f64, innovation: &Vector6<f64>) {
+    fn correct(&mut self, [by_e, by_w, by_d]: covariance::Gains, rate_hz: f64, innovation: &Vector6<f64>) {
         self.value += innovation * by_e;
-        self.rate += innovation * (by_w / period_s);
-        self.disturbance += innovation * (by_d / (period_s * period_s));
+        self.rate += innovation * (by_w * rate_hz);
+        self.disturbance += innovation * (by_d * rate_hz * rate_hz);
     }
 }
 
@@ -100,12 +100,13 @@ impl Filter {
     ) -> Vector6<f64> {
         let EstimatorConstants { noise, saturation, .. } = constants;
         let Self { state, covariance, .. } = self;
-        covariance.advance(noise, seconds_between(self.time_ns, time_ns) / noise.period_s);
+        let rate_hz = 1.0 / noise.period_s;
+        covariance.advance(noise, seconds_between(self.time_ns, time_ns) * rate_hz);
         let innovation = measured.value - state.value;
-        state.correct(covariance.correct_length(), noise.period_s, &innovation);
+        state.correct(covariance.correct_length(), rate_hz, &innovation);
         if let Some(variance) = noise.rate_noise() {
             let difference = (measured.rate - state.rate) * noise.period_s;
-            state.correct(covariance.correct_rate(variance), noise.period_s, &difference);
+            state.correct(covariance.correct_rate(variance), rate_hz, &difference);
         }
         state.disturbance = state.disturbance.sup(&-saturation).inf(saturation);
         self.time_ns = time_ns;

@@ -155,68 +155,74 @@ impl MeasurementValidator {
         let window_s = self.last.plausibility_window_s(now_ns, parameters.period_ns);
         let is_binding = |valid: &&Measurement| has_control || now_ns.abs_diff(valid.time_ns) <= timeout_ns;
         let before = self.last.valid.as_ref().filter(is_binding);
-        let result =
-            check_time_stamp(DiagnosticCode::MeasurementStampInvalid, new.time_ns, now_ns, timeout_ns)
-                .and_then(|()| check_lead(new.time_ns, now_ns, parameters.period_ns))
-                .and_then(|()| check_age_at_arrival(new.time_ns, now_ns, parameters.max_measured_age_ns))
-                .and_then(|()| self.check(cycle, new, before, window_s));
-        if let Ok(consistency) = &result {
-            self.consistency = *consistency;
-        }
-        let result = result.map(drop);
+        let consistency = &mut self.consistency;
+        let mut check = || {
+            check_time_stamp(DiagnosticCode::MeasurementStampInvalid, new.time_ns, now_ns, timeout_ns)?;
+            check_lead(new.time_ns, now_ns, parameters.period_ns)?;
+            check_age_at_arrival(new.time_ns, now_ns, parameters.max_measured_age_ns)?;
+            check_measurement(cycle, new, before, window_s, consistency)
+        };
+        let result = check();
         self.last.record(new, result.map(|()| new), now_ns, has_control);
         result
     }
+}
 
-    /// Whether the legs can be where a measurement says after `before`; the consistency of the rates up to it.
-    fn check(
-        &self,
-        cycle: &Cycle<'_>,
-        now: &Measurement,
-        before: Option<&Measurement>,
-        window_s: f64,
-    ) -> Result<RateConsistency, Diagnostic> {
-        let actuator = &cycle.constants.machine().actuator;
-        if now.length.iter().chain(now.rate.iter().flatten()).any(|value| !value.is_finite()) {
-            return Err(DiagnosticCode::MeasurementNotFinite.into());
+/// Whether the legs can be where a measurement says after `before`, and the rates are consistent up to it.
+fn check_measurement(
+    cycle: &Cycle<'_>,
+    now: &Measurement,
+    before: Option<&Measurement>,
+    window_s: f64,
+    consistency: &mut RateConsistency,
+) -> Result<(), Diagnostic> {
+    let actuator = &cycle.constants.machine().actuator;
+    if now.length.iter().chain(now.rate.iter().flatten()).any(|value| !value.is_finite()) {
+        return Err(DiagnosticCode::MeasurementNotFinite.into());
+    }
+    check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
+    let Some(before) = before else {
+        *consistency = RateConsistency::default();
+        return Ok(());
+    };
+    let dt = seconds_between(before.time_ns, now.time_ns);
+    if dt < 0.0 {
+        return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
+    }
+    let noise = LENGTH_NOISE_RATIO * actuator.stroke();
+    let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
+    check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
+    match (&now.rate, &before.rate) {
+        (Some(rate), Some(before_rate)) => {
+            check_rates(cycle, [now, before], [rate, before_rate], dt.min(window_s), consistency)
         }
-        check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
-        let Some(before) = before else { return Ok(RateConsistency::default()) };
-        let dt = seconds_between(before.time_ns, now.time_ns);
-        if dt < 0.0 {
-            return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
-        }
-        let noise = LENGTH_NOISE_RATIO * actuator.stroke();
-        let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
-        check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
-        match (&now.rate, &before.rate) {
-            (Some(rate), Some(before_rate)) => {
-                self.check_rates(cycle, [now, before], [rate, before_rate], dt.min(window_s))
-            }
-            _ => Ok(RateConsistency::default()),
+        _ => {
+            *consistency = RateConsistency::default();
+            Ok(())
         }
     }
+}
 
-    /// Whether measured rates change as actuators can, and are the derivatives of the lengths.
-    fn check_rates(
-        &self,
-        cycle: &Cycle<'_>,
-        [now, before]: [&Measurement; 2],
-        [rate, before_rate]: [&[f64; LEGS]; 2],
-        plausible_s: f64,
-    ) -> Result<RateConsistency, Diagnostic> {
-        let actuator = &cycle.constants.machine().actuator;
-        let limits = &cycle.constants.parameters.limits;
-        let acceleration =
-            MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
-        let bound = acceleration * plausible_s + RATE_NOISE_RATIO * actuator.max_rate;
-        check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
-        let consistency = self.consistency.updated(now, before, [rate, before_rate]);
-        // J dt^3 / 12 per step, over the steps of the time constant.
-        let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
-        consistency.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * plausible_s.powi(2) / 12.0)?;
-        Ok(consistency)
-    }
+/// Whether measured rates change as actuators can, and are the derivatives of the lengths.
+fn check_rates(
+    cycle: &Cycle<'_>,
+    [now, before]: [&Measurement; 2],
+    [rate, before_rate]: [&[f64; LEGS]; 2],
+    plausible_s: f64,
+    consistency: &mut RateConsistency,
+) -> Result<(), Diagnostic> {
+    let actuator = &cycle.constants.machine().actuator;
+    let limits = &cycle.constants.parameters.limits;
+    let acceleration =
+        MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
+    let bound = acceleration * plausible_s + RATE_NOISE_RATIO * actuator.max_rate;
+    check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
+    let updated = consistency.updated(now, before, [rate, before_rate]);
+    // J dt^3 / 12 per step, over the steps of the time constant.
+    let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
+    updated.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * plausible_s.powi(2) / 12.0)?;
+    *consistency = updated;
+    Ok(())
 }
 
 /// Whether a stamp is not of the future.

@@ -8,8 +8,8 @@ mod setpoint;
 mod setpoint_motion;
 
 pub(super) use measurement::MeasurementValidator;
-pub use setpoint::{SetpointCheck, check_deviation, check_setpoint};
 pub(super) use setpoint::{SetpointValidator, ValidatedSetpoint};
+pub use setpoint::{check_deviation, check_setpoint};
 pub use setpoint_motion::SetpointMotion;
 
 use super::diagnostic::{Diagnostic, DiagnosticCode};

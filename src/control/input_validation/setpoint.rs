@@ -108,20 +108,20 @@ impl SetpointValidator {
         let parameters = &constants.parameters;
         let followed = self.last.valid.as_ref().filter(|_| is_following(cycle.state));
         let timeout_ns = parameters.setpoint_timeout_ns;
-        self.active_limits = LimitSet::default();
-        let result =
-            check_time_stamp(DiagnosticCode::SetpointStampInvalid, new.setpoint.time_ns, now_ns, timeout_ns)
-                .and_then(|()| check_kind(parameters, &new.setpoint))
-                .and_then(|()| check_order(new, followed))
-                .and_then(|()| match parameters.on_violation {
-                    ViolationPolicy::Limit => Ok(()),
-                    ViolationPolicy::Stop => {
-                        let SetpointCheck { active_limits, result } =
-                            check_setpoint(constants.machine(), parameters, new);
-                        self.active_limits = active_limits;
-                        result.and_then(|()| check_continuation(cycle, new, followed, reference))
-                    }
-                });
+        let mut active_limits = LimitSet::default();
+        let mut check = || {
+            let (code, time_ns) = (DiagnosticCode::SetpointStampInvalid, new.setpoint.time_ns);
+            check_time_stamp(code, time_ns, now_ns, timeout_ns)?;
+            check_kind(parameters, &new.setpoint)?;
+            check_order(new, followed)?;
+            if parameters.on_violation == ViolationPolicy::Stop {
+                check_setpoint(constants.machine(), parameters, new, &mut active_limits)?;
+                check_continuation(cycle, new, followed, reference)?;
+            }
+            Ok(())
+        };
+        let result = check();
+        self.active_limits = active_limits;
         if result.is_ok() && new.setpoint.kind == SetpointKind::Pose {
             self.samples.push(now_ns, new.setpoint.time_ns, &new.motion.pose);
         }
@@ -193,27 +193,8 @@ fn jump_ratio(parameters: &Parameters, before: &SetpointMotion, setpoint: &Setpo
     TrackingError::new(&setpoint.motion, &continued.pose, &continued.twist).tolerance_ratio(parameters)
 }
 
-/// Result of the checks of one setpoint.
-#[derive(Clone, Copy, Debug)]
-pub struct SetpointCheck {
-    /// The limits that the setpoint is near to, up to the check that failed.
-    pub active_limits: LimitSet,
-    /// `Ok` if the setpoint passed every check, else the diagnostic of the first that failed.
-    pub result: Result<(), Diagnostic>,
-}
-
-/// Checks that a setpoint keeps the limits at its instant.
+/// Checks that a setpoint keeps the limits at its instant. Adds those that it is near to, up to the check that failed.
 pub fn check_setpoint(
-    machine: &Machine,
-    parameters: &Parameters,
-    setpoint: &SetpointMotion,
-) -> SetpointCheck {
-    let mut active_limits = LimitSet::default();
-    let result = check_limits(machine, parameters, setpoint, &mut active_limits);
-    SetpointCheck { active_limits, result }
-}
-
-fn check_limits(
     machine: &Machine,
     parameters: &Parameters,
     SetpointMotion { setpoint, motion, .. }: &SetpointMotion,

@@ -118,14 +118,15 @@ impl Approach {
             let v = 2.0 * distance / (linear + (linear * linear + 2.0 * distance / a).sqrt());
             (v, 1.0 / (linear + v / a))
         } else {
-            let root_jerk = jerk.sqrt();
+            // One division a step, as each waits for the one before.
+            let by_root_jerk = 1.0 / jerk.sqrt();
             let mut root = (distance / self.outer_s).sqrt();
             for _ in 0..NEWTON_STEPS {
-                let excess = (self.outer_s + root / root_jerk) * root * root - distance;
-                root -=
-                    excess / (root * (2.0 * self.outer_s + 3.0 * root / root_jerk)).max(f64::MIN_POSITIVE);
+                let way_s = self.outer_s + root * by_root_jerk;
+                let slope = root * (3.0 * way_s - self.outer_s);
+                root -= (way_s * root * root - distance) / slope.max(f64::MIN_POSITIVE);
             }
-            (root * root, 1.0 / (self.outer_s + 1.5 * root / root_jerk))
+            (root * root, 1.0 / (self.outer_s + 1.5 * root * by_root_jerk))
         };
         if v > limit { (limit, 0.0) } else { (v, slope) }
     }

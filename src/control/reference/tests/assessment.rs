@@ -23,9 +23,9 @@ struct Scene {
     kind: SetpointKind,
     error: Option<TrackingError>,
     feedback: FeedbackBound,
-    trust: Result<(), Diagnostic>,
-    change: Result<(), Diagnostic>,
-    reports: Result<(), Diagnostic>,
+    distrust: Option<Diagnostic>,
+    change: Option<Diagnostic>,
+    reports: [Result<(), Diagnostic>; 2],
     is_ready: bool,
     twist: Option<Twist>,
     is_located: bool,
@@ -39,9 +39,9 @@ impl Default for Scene {
             kind: SetpointKind::Motion,
             error: Some(TrackingError::default()),
             feedback: FeedbackBound::default(),
-            trust: Ok(()),
-            change: Ok(()),
-            reports: Ok(()),
+            distrust: None,
+            change: None,
+            reports: [Ok(()); 2],
             is_ready: true,
             twist: Some(Twist::default()),
             is_located: true,
@@ -83,14 +83,15 @@ impl Scene {
             located: if self.is_located { Ok(&located) } else { Err(FOUND) },
             error: self.error.as_ref(),
             feedback: &self.feedback,
-            trust: self.trust,
-            change: self.change,
-            reports: self.reports,
+            distrust: self.distrust.as_ref(),
+            change: self.change.as_ref(),
+            reports: &self.reports,
             is_ready: self.is_ready,
             free_motion: free_motion.as_ref(),
         };
         let mut reference = ReferenceGenerator::new(&constants);
-        assess(&cycle, &evidence, &Localization::new(&constants), &mut reference).0
+        let localization = Localization::new(&constants);
+        assess(&cycle, &evidence, &localization, &mut reference, &mut LimitSet::default())
     }
 
     fn tracking(&self, state: State) -> Option<DiagnosticCode> {
@@ -120,11 +121,13 @@ fn each_finding_alone_ends_the_tracking() {
         assert_eq!(Scene::default().tracking(state), None);
         assert_eq!(Scene { error: None, ..Scene::default() }.tracking(state), None);
         let found = Some(FOUND.code);
-        assert_eq!(Scene { reports: Err(FOUND), ..Scene::default() }.tracking(state), found);
-        assert_eq!(Scene { trust: Err(FOUND), ..Scene::default() }.tracking(state), found);
-        assert_eq!(Scene { change: Err(FOUND), ..Scene::default() }.tracking(state), found);
+        for reports in [[Err(FOUND), Ok(())], [Ok(()), Err(FOUND)]] {
+            assert_eq!(Scene { reports, ..Scene::default() }.tracking(state), found);
+        }
+        assert_eq!(Scene { distrust: Some(FOUND), ..Scene::default() }.tracking(state), found);
+        assert_eq!(Scene { change: Some(FOUND), ..Scene::default() }.tracking(state), found);
         // A stop for a change hides no reason to brake.
-        let impact = Err(DiagnosticCode::Impact.into());
+        let impact = Some(DiagnosticCode::Impact.into());
         let following = Some(DiagnosticCode::FollowingError);
         let far = Some(error(0, 0.06));
         assert_eq!(Scene { change: impact, error: far, ..Scene::default() }.tracking(state), following);
@@ -159,20 +162,20 @@ fn each_finding_alone_ends_the_tracking() {
         assert_eq!(Scene { feedback, ..Scene::default() }.tracking(state), saturated);
     }
     // Without control nothing is tracked.
-    assert_eq!(Scene { trust: Err(FOUND), ..Scene::default() }.tracking(State::Standby), None);
+    assert_eq!(Scene { distrust: Some(FOUND), ..Scene::default() }.tracking(State::Standby), None);
 }
 
 #[test]
 fn each_finding_alone_prevents_control() {
     assert_eq!(Scene::default().beginning(), [None; 2]);
     let both = |code: DiagnosticCode| [Some(code); 2];
-    assert_eq!(Scene { reports: Err(FOUND), ..Scene::default() }.beginning(), both(FOUND.code));
+    assert_eq!(Scene { reports: [Ok(()), Err(FOUND)], ..Scene::default() }.beginning(), both(FOUND.code));
     let two = Publishers { counting: 7, ignored: 8 };
     let input = Input { measured_publishers: two, ..Input::default() };
     let code = DiagnosticCode::TwoMeasuredSources;
     assert_eq!(Scene { input, ..Scene::default() }.beginning(), both(code));
     // What a drive reports comes before what is said of the setpoint.
-    let reports = Err(DiagnosticCode::MeasurementLost.into());
+    let reports = [Err(DiagnosticCode::MeasurementLost.into()), Ok(())];
     let scene = Scene { reports, status: Err(FOUND), ..Scene::default() };
     assert_eq!(scene.beginning(), both(DiagnosticCode::MeasurementLost));
     // The first reason is that of the engagement.
