@@ -14,6 +14,7 @@ mod plant {
     mod energy;
     mod friction;
     mod hardware;
+    mod held_forces;
     mod imperfect;
     mod integration;
     mod power;

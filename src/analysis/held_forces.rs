@@ -182,36 +182,7 @@ fn direction(k: u32) -> Vector6<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
-    use crate::control::limits::DerivativeLimits;
-    use crate::plant::forward_dynamics::ForwardDynamics;
     use nalgebra::Complex;
-
-    /// Against the dynamics of the simulated platform: no motion changes its acceleration faster, and one nearly so.
-    #[test]
-    fn held_forces_change_an_acceleration_within_the_bounds_of_the_jerk() {
-        let machine = Config::load("config/tsai2000.toml".as_ref()).unwrap().machine;
-        let (held_forces, plant) = (HeldForces::new(&machine), ForwardDynamics::new(&machine));
-        let rest = Twist::default();
-        let of = |velocity| DerivativeLimits { velocity, acceleration: 1.0, jerk: 1.0 };
-        let limits = Limits { position: of(0.3), orientation: of(0.5), autonomous_scale: 1.0 };
-        let pose = machine.home_pose().displaced(&Twist::from_vector(&(direction(7) * 0.1)));
-        let forces = leg_wrenches(&machine, &pose).lu().solve(&held_forces.load(&pose)).unwrap().into();
-        let [angular, linear] = held_forces.jerk_bounds(&pose, &limits).unwrap();
-        let (mut most, dt) = ([0.0_f64; 2], 1e-5);
-        for k in 0..20_000 {
-            let velocity = Twist::from_vector(&direction(k));
-            let rates = leg_wrenches(&machine, &pose).tr_mul(&velocity.vector());
-            let slower = (0.5 / velocity.angular.norm())
-                .min(0.3 / velocity.linear.norm())
-                .min(machine.actuator.max_rate / rates.amax());
-            let later = pose.displaced(&Twist::from_vector(&(velocity.vector() * (slower * dt))));
-            let change = plant.acceleration(&later, &rest, &forces).unwrap();
-            most = [most[0].max(change.angular.norm() / dt), most[1].max(change.linear.norm() / dt)];
-        }
-        assert!((0.8..1.001).contains(&(most[0] / angular)), "{most:?} {angular}");
-        assert!((0.8..1.001).contains(&(most[1] / linear)), "{most:?} {linear}");
-    }
 
     #[test]
     fn the_real_part_of_a_root_loses_no_digits() {

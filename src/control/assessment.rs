@@ -154,7 +154,7 @@ fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), 
     if ignored == 0 { Ok(()) } else { Err(Diagnostic::new(code, counting.into(), ignored.into())) }
 }
 
-/// Control may begin if the motion without force is known and a stop from it was verified.
+/// Control may begin if the motion without force is known and a stop from it was verified. Places the reference there.
 fn check_start(
     cycle: &Cycle<'_>,
     evidence: &Evidence<'_>,
@@ -164,9 +164,7 @@ fn check_start(
     check_reports(evidence)?;
     let moving = Diagnostic::from(DiagnosticCode::PlatformMoving);
     let motion = evidence.free_motion.ok_or(moving)?;
-    reference
-        .check_start(cycle.constants, &motion.pose, &motion.twist)
-        .map_err(|limit| moving.at(limit as usize))
+    reference.place(cycle.constants, motion).map_err(|limit| moving.at(limit as usize))
 }
 
 fn check_following_error(

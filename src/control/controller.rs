@@ -279,14 +279,15 @@ impl Controller {
         // Reference.
         let begin_ns = cycle.release_ns.saturating_add(parameters.force_delay_ns);
         let begins = next.has_control() && !cycle.state.has_control();
-        if let Some(motion) = free_motion.as_ref().filter(|_| begins) {
-            reference.start(constants, begin_ns, motion);
+        if begins {
+            reference.begin(begin_ns);
             let measured_ns = located.as_ref().map_or(begin_ns, |located| located.measurement.time_ns);
             error = Some(errors.start(constants, measured_ns, begin_ns));
         }
         if next.has_control() {
-            // Until the drives are ready it stays where it is, or comes to rest.
-            let is_waiting = next == State::Engaging && !drives.is_ready;
+            // Until the drives are ready it stays where it is, or comes to rest. So it does in the first cycle, in which its stop
+            // was verified: there is one examination in a cycle.
+            let is_waiting = begins || next == State::Engaging && !drives.is_ready;
             let target = Target::of_state(constants, next, &setpoint).filter(|_| !is_waiting);
             reference.set_closing_scale(closing_scale(parameters, next));
             reference.advance(constants, begin_ns.saturating_add(parameters.period_ns), target.as_ref());

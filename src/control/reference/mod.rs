@@ -43,7 +43,7 @@ use super::input_validation::{SetpointMotion, seconds_between};
 use super::limits::{Limit, LimitSet};
 use super::parameters::{Constants, Parameters, ViolationPolicy};
 use super::tracking_error::TrackingError;
-use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+use crate::model::rigid::{Acceleration, Motion, Twist};
 
 mod angle_ranges;
 mod approach;
@@ -107,23 +107,28 @@ impl ReferenceGenerator {
         }
     }
 
-    /// Whether a verified stop exists for a platform that moves without force. If not, the limit that none was proved to
-    /// keep.
-    pub fn check_start(&mut self, constants: &Constants, pose: &Pose, twist: &Twist) -> Result<(), Limit> {
-        let motion = Motion { twist: *twist, ..at_rest(pose) };
-        let bounds = PoseBounds::around(constants, pose);
-        self.verifier.verify(constants, &bounds, &motion, &Step::default()).map(drop)
-    }
-
-    /// Begins with a motion at an instant. A stop must exist for it.
+    /// Places the reference at a motion, as that of a platform without force, and holds the stop from there. If none was verified,
+    /// the limit that none was proved to keep: it must not begin there.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
-        (self.motion, self.time_ns) = (*motion, time_ns);
+    pub fn place(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Limit> {
+        self.motion = *motion;
         self.bounds = PoseBounds::around(constants, &motion.pose);
         let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &Step::default());
         self.stop.hold(verified.unwrap_or(StopKind::Planar), &mut self.verifier.planar);
+        verified.map(drop)
+    }
+
+    /// Begins at an instant with the motion at which it was placed.
+    pub fn begin(&mut self, time_ns: u64) {
+        self.time_ns = time_ns;
         self.history.clear();
+    }
+
+    /// Begins at an instant with a motion for which a stop exists.
+    pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
+        self.place(constants, motion).ok();
+        self.begin(time_ns);
     }
 
     /// Sets the share of the limits with which the distance to a target is closed.

@@ -24,7 +24,7 @@ fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
     let beyond = standing(&constants, [0.0, 0.0, 0.0, 0.12, 0.0, 0.0]);
     let home = standing(&constants, [0.0; 6]);
     let mut reference = started(&constants, &at_rest(&beyond.motion.pose));
-    assert_eq!(reference.check_start(&constants, &beyond.motion.pose, &Twist::default()), Ok(()));
+    assert_eq!(reference.place(&constants, &at_rest(&beyond.motion.pose)), Ok(()));
     run(&constants, &mut reference, &Target::Motion(&beyond), 200);
     assert!((x(&constants, &reference)[3] - 0.12).abs() < 1e-4);
     // At some millimetres per second, as the bounds follow closely.
@@ -59,11 +59,14 @@ fn a_start_is_refused_with_the_limit_that_no_stop_keeps() {
     for limit in [Limit::Stroke, Limit::LegRate, Limit::Envelope, Limit::Velocity, Limit::Condition] {
         let constants = constants(change(limit));
         let mut reference = ReferenceGenerator::new(&constants);
-        assert_eq!(reference.check_start(&constants, constants.home.pose(), &twist), Err(limit));
+        assert_eq!(
+            reference.place(&constants, &Motion { twist, ..at_rest(constants.home.pose()) }),
+            Err(limit)
+        );
     }
     let constants = constants(|_, _| ());
     let mut reference = ReferenceGenerator::new(&constants);
-    assert_eq!(reference.check_start(&constants, constants.home.pose(), &twist), Ok(()));
+    assert_eq!(reference.place(&constants, &Motion { twist, ..at_rest(constants.home.pose()) }), Ok(()));
 }
 
 /// A platform that brakes have carried beyond the margin: at rest it may begin and comes back, from a step of the room of its bounds
@@ -86,8 +89,8 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
         let speed = 0.03 * samples.uniform() * samples.uniform();
         let twist = Twist { angular: Vector3::zeros(), linear: Vector3::new(0.0, 0.0, speed) };
         let mut reference = ReferenceGenerator::new(&at_end);
-        assert_ne!(reference.check_start(&at_end, &pose, &Twist::default()), Err(Limit::Stroke), "at rest");
-        if reference.check_start(&at_end, &pose, &twist).is_err() {
+        assert_ne!(reference.place(&at_end, &at_rest(&pose)), Err(Limit::Stroke), "at rest");
+        if reference.place(&at_end, &Motion { twist, ..at_rest(&pose) }).is_err() {
             refused += 1;
             continue;
         }
