@@ -102,3 +102,16 @@ fn a_jump_while_engaging_is_refused_beyond_the_tolerance() {
         assert_eq!(output.missed_setpoints - before.missed_setpoints, missed, "{share}");
     }
 }
+
+/// There is one examination in a cycle: in the first under control the reference follows the stop that was verified to begin.
+#[test]
+fn the_reference_moves_from_the_second_cycle_under_control_on() {
+    let config = deployed("motion_base");
+    let mut near = TaskState::at_rest(config.machine.home);
+    near.x[3] += 0.5 * parameters(&config).engage_position;
+    let mut rig = Rig::new(&config, &config.machine);
+    rig.ask(Request::Engage);
+    let [first, second] = [0; 2].map(|_| rig.cycle(&rig.input(&near)).reference.unwrap());
+    assert_eq!(first.acceleration.linear.norm(), 0.0);
+    assert!(second.acceleration.linear.norm() > 0.0);
+}
