@@ -121,7 +121,7 @@ impl ReferenceGenerator {
 
     /// Begins at an instant with the motion at which it was placed.
     pub fn begin(&mut self, time_ns: u64) {
-        self.time_ns = time_ns;
+        (self.time_ns, self.components) = (time_ns, Components::default());
         self.history.clear();
     }
 
@@ -226,7 +226,10 @@ impl ReferenceGenerator {
                 }
             }
         });
-        self.components = self.components.after(verified.is_some());
+        // Without a target nothing was refused.
+        if proposed.is_some() {
+            self.components = self.components.after(verified.is_some());
+        }
         let next = match verified {
             Some((motion, kind)) => {
                 self.stop.hold(kind, &mut self.verifier.planar);

@@ -328,3 +328,14 @@ fn without_a_target_the_reference_ends_where_its_stop_does() {
     reference.advance(&constants, MS, None);
     assert!(reference.is_at_rest() && reference.motion() == &at_rest(constants.home.pose()));
 }
+
+/// A cycle without a target, as before the drives are ready, is no step that was refused: translation and rotation then move at once.
+#[test]
+fn both_components_move_after_a_cycle_without_a_target() {
+    let constants = constants(|_, _| {});
+    let mut reference = started(&constants, &at_rest(constants.home.pose()));
+    reference.advance(&constants, MS, None);
+    let aside = standing(&constants, [0.01, 0.0, 0.0, 0.01, 0.0, 0.0]);
+    let speeds = run(&constants, &mut reference, &Target::Motion(&aside), 1);
+    assert!(speeds.iter().all(|speed| *speed > 0.0), "{speeds:?}");
+}
