@@ -175,7 +175,7 @@ pub fn in_mode(
         ("daemon restarted", Engaging) if is_pd => (bounds, TOO_FAR),
         // What the reference does with all that the limits allow, and on both sides of them.
         _ if policy == ViolationPolicy::Limit && (is_gravity || is_pd) => {
-            let wider = wider(1.8, if is_pd { 6.3 } else { 2.0 });
+            let wider = wider(1.82, if is_pd { 6.3 } else { 2.0 });
             (Bounds { rest_s: if bounds.rest_s > 0.5 { f64::INFINITY } else { 0.4 }, ..wider }, cell)
         }
         // It falls by its sag when control begins, and further where an error that holds it up is not measured.

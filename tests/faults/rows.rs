@@ -109,7 +109,7 @@ pub const ROWS: &[Row] = &[
     ("engage far away", operator::engage_far_away, GENTLE, [TOO_FAR, Stop(SetpointJumped), Stop(SetpointJumped), On, On, On, On]),
     // The machine.
     ("collision", machine::collision, GENTLE, [On, Brake(SensorFrozen), On, Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake by themselves", machine::braked, GENTLE, [On, Brake(SensorFrozen), On, STRUCK_IMPLAUSIBLE, STRUCK_FOR_LONG, STRUCK_IMPLAUSIBLE, On]),
+    ("the drives brake by themselves", machine::braked, GENTLE, [On, Brake(SensorFrozen), On, STRUCK_IMPLAUSIBLE, STRUCK_FOR_LONG, STRUCK_FOR_LONG, On]),
     ("a leg without force", machine::leg_without_force, Bounds { jerk: 1.12, rest_s: 0.25, ..GENTLE }, [On, Brake(VelocityError), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), Brake(DriveForceMissing), On]),
     ("a load of a tenth of the platform", machine::load_of_a_tenth, PULLED, EVERYWHERE),
     ("a load of a fifth of the platform", machine::load_of_a_fifth, LOADED, [On, On, On, Stop(PayloadChanged), Stop(PayloadChanged), Stop(PayloadChanged), On]),
@@ -129,7 +129,7 @@ pub const ROWS: &[Row] = &[
     ("estop without measurements", together::estop_without_measurement, GENTLE, [FULL_STOP; 7]),
     ("off without measurements", together::off_without_measurement, GENTLE, [SWITCHED_OFF, Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), Brake(MeasurementLost), On]),
     ("collision and setpoints end", together::collision_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), Brake(RateJumped), Brake(RateJumped), Brake(RateJumped), On]),
-    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), STRUCK_IMPLAUSIBLE, STRUCK_FOR_LONG, STRUCK_IMPLAUSIBLE, On]),
+    ("the drives brake and setpoints end", together::braked_and_setpoint_ends, GENTLE, [Idle(State::Standby, SetpointEnded), Brake(SensorFrozen), End(SetpointEnded), STRUCK_IMPLAUSIBLE, STRUCK_FOR_LONG, STRUCK_FOR_LONG, On]),
     ("stop every 10 ms", together::stop_every_10_ms, GENTLE, [On, End(OperatorRequest), End(OperatorRequest), End(OperatorRequest), On, End(OperatorRequest), On]),
     ("estop, then engage", together::estop_then_engage, GENTLE, [FULL_STOP; 7]),
     // One after the other.
