@@ -23,7 +23,7 @@ use super::extremes::{Extremes, Quantity};
 /// reference's by up to this times J h^2, whatever the control law. 0.1 mm/s at 1 kHz, 12 mm/s at 100 Hz, by default.
 const HELD_FORCE_RATIO: f64 = 0.25;
 /// Forces that arrive d later than the controller knows: the velocity differs from the reference's by up to this times d A. The
-/// platform keeps each acceleration for d longer, from -A to A, and feedback, which learns of it late, adds as much.
+/// platform keeps each acceleration for d longer, from -A to A, and feedback, which learns of it late, adds as much: found, not proved.
 const LATE_FORCE_RATIO: f64 = 4.0;
 /// Distance by which the true pose may leave the envelope \[m\]: the following error of a plant without flaws.
 pub const ENVELOPE_ALLOWANCE_M: f64 = 50e-6;
