@@ -73,7 +73,7 @@ pub(super) struct StoredFactorization {
     /// 1 / dS, twice.
     inverse_d_s: LegLanes,
     determinants: [f64; 2],
-    is_regular: bool,
+    pub is_regular: bool,
 }
 
 /// A wrench about C as the sum of four lanes.

@@ -95,6 +95,11 @@ impl KinematicState {
         &self.sensitivity
     }
 
+    /// Whether the blocks of the factorization are too near to singular, so that it is LU with pivoting instead.
+    pub(crate) fn is_pivoted(&self) -> bool {
+        !self.factorization.is_regular
+    }
+
     /// The twist that gives the measured leg rates, see [`super::inverse_jacobian::twist_from_rates`].
     pub fn twist(&self, machine: &Machine, rates: &[f64; LEGS]) -> Option<Twist> {
         let joints = &machine.joints;

@@ -22,11 +22,11 @@ use nalgebra::Vector3;
 use super::angle_ranges::{AngleRanges, MAX_SLACK_RATIO, cosine_of_beta};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
-use super::regularity::{RegularBalls, Regularity};
+use super::regularity::{REGULARITY_WORK, RegularBalls, Regularity};
 use super::stop::Stop;
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
-use crate::control::parameters::{Constants, Envelope, ViolationPolicy};
+use crate::control::parameters::{Constants, Envelope};
 use crate::model::inverse_geometry::{length_and_rate_lanes, length_lanes};
 use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
@@ -36,16 +36,13 @@ use crate::model::triples::LegLanes;
 const CHORD_DEPARTURE_M: f64 = 1e-4;
 /// Departure of a leg's rate from its chord that does so, over the largest rate.
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
-/// Bounds on the number of intervals between knots. Under `"limit"` the [walls](super::walls) take time and keep more distance than
-/// fewer knots need.
+/// Bounds on the number of intervals between knots.
 const MIN_INTERVALS: f64 = 3.0;
-const MAX_INTERVALS: f64 = 20.0;
-const MAX_INTERVALS_WITH_WALLS: f64 = 14.0;
-/// Work beside the knots of the longest stop, in knots; and that of a knot that no ball covers: its pose is factorized. Together
-/// they bound the longest cycle. The balls that were found remain for the next one. In the longest stop three may be new: with two
-/// a reference that is beyond its condition by rounding would not come back.
-const SPARE_WORK: f64 = 6.0;
-const FACTORIZATION_WORK: u32 = 2;
+const MAX_INTERVALS: u32 = 12;
+/// Work that a verification may do, in knots: those of the longest stop, three new balls, and the start of the step. It bounds the
+/// longest cycle. The balls that were found remain for the next one. With two a reference that is beyond its condition by rounding
+/// would not come back.
+pub(super) const MAX_WORK: u32 = MAX_INTERVALS + 4 * REGULARITY_WORK;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;
@@ -88,7 +85,9 @@ impl<'a> Examination<'a> {
         bounds: &'a PoseBounds,
         stop: &'a PoseStop,
         motion: &Motion,
+        x: Option<&[f64; 6]>,
         step: &Step<'a>,
+        work: u32,
     ) -> Result<Self, Limit> {
         let limits = &constants.parameters.limits;
         let Limits { orientation, position, .. } = limits;
@@ -114,11 +113,7 @@ impl<'a> Examination<'a> {
             if needs_rates { rate_curvature / (RATE_DEPARTURE_RATIO * actuator.max_rate) } else { 0.0 };
         let density = (curvature / CHORD_DEPARTURE_M).max(rates);
         let knots = (stop.duration() * (density / 8.0).sqrt()).ceil();
-        let max_intervals = match constants.parameters.on_violation {
-            ViolationPolicy::Stop => MAX_INTERVALS,
-            ViolationPolicy::Limit => MAX_INTERVALS_WITH_WALLS,
-        };
-        let intervals = knots.clamp(MIN_INTERVALS, max_intervals);
+        let intervals = knots.clamp(MIN_INTERVALS, f64::from(MAX_INTERVALS));
         let dt = stop.duration() / intervals;
         let chord = dt.max(step.duration).powi(2) / 8.0;
         let room = ROOM_RATIO * actuator.stroke();
@@ -136,14 +131,16 @@ impl<'a> Examination<'a> {
             rate_slack: rate_curvature * chord,
             position_slack: position_curvature * chord,
             needs_rates,
-            angles: bounds.envelope.as_ref().and_then(|envelope| {
-                angles_without_room(constants, envelope, &motion.pose, &stop.orientation)
-            }),
+            angles: bounds
+                .envelope
+                .as_ref()
+                .zip(x)
+                .and_then(|(envelope, x)| angles_without_room(envelope, x, &stop.orientation)),
             from: step.from,
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
             relaxed: None,
-            work: (max_intervals - intervals + SPARE_WORK) as u32,
+            work: work.saturating_sub(intervals as u32),
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
@@ -219,8 +216,8 @@ impl<'a> Examination<'a> {
         if cover.is_complete() {
             return Ok(());
         }
-        self.work = self.work.checked_sub(FACTORIZATION_WORK).ok_or(Limit::Condition)?;
-        let regularity = balls.cover_by_new(constants, pose, reach, around).ok_or(Limit::Condition)?;
+        let regularity =
+            balls.cover_by_new(constants, pose, reach, around, &mut self.work).ok_or(Limit::Condition)?;
         let at_knot = Regularity::of_reference(constants);
         if cover.knot || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
@@ -232,10 +229,12 @@ impl<'a> Examination<'a> {
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
     fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> bool {
-        let Self { constants, from, .. } = *self;
-        let Some(from) = from else { return false };
-        let start = *self.start_regularity.get_or_insert_with(|| Regularity::at(constants, from));
-        Regularity::of_reference(constants).or_less(&start).is_kept_by(regularity)
+        let Self { constants, from: Some(from), .. } = *self else { return false };
+        if self.start_regularity.is_none() {
+            self.start_regularity = Regularity::at(constants, from, &mut self.work);
+        }
+        let at_knot = Regularity::of_reference(constants);
+        self.start_regularity.is_some_and(|start| at_knot.or_less(&start).is_kept_by(regularity))
     }
 
     /// The lengths at a knot, if the rates keep their limit.
@@ -300,19 +299,13 @@ impl<'a> Examination<'a> {
 }
 
 /// The ranges of the angles, if they lack room for some rotation of a stop.
-fn angles_without_room(
-    constants: &Constants,
-    envelope: &Envelope,
-    pose: &Pose,
-    stop: &Stop,
-) -> Option<AngleRanges> {
-    let x = task_coordinates(pose, &constants.machine().home);
+fn angles_without_room(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<AngleRanges> {
     let [_, beta, ..] = x;
     let turn = stop.peak_velocity * stop.duration;
     let need = turn / libm::cos((beta.abs() + turn).min(core::f64::consts::FRAC_PI_2));
     let have_room =
         x.iter().zip(ranges(envelope)).take(3).all(|(x, (low, high))| (x - low).min(high - x) >= need);
-    (!have_room).then(|| AngleRanges::new(envelope, &x))
+    (!have_room).then(|| AngleRanges::new(envelope, x))
 }
 
 /// An envelope with room for X.

@@ -85,7 +85,7 @@ impl HeldStop {
 
     fn begin(&mut self, kind: StopKind, motion: &Motion, limits: &Limits) {
         if let StopKind::ReleaseFirst = kind {
-            self.stop = PoseStop::new(kind, motion, limits);
+            self.stop.plan(kind, motion, limits);
         }
         (self.phase, self.state, self.elapsed_s) = (Phase::Followed, self.stop.at(0.0), 0.0);
     }

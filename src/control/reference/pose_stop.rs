@@ -39,16 +39,22 @@ pub(super) struct PoseStopState {
 impl PoseStop {
     /// The stop of a kind from a motion.
     pub fn new(kind: StopKind, motion: &Motion, limits: &Limits) -> Self {
+        let mut stop = Self::default();
+        stop.plan(kind, motion, limits);
+        stop
+    }
+
+    /// Becomes the stop of a kind from a motion.
+    pub fn plan(&mut self, kind: StopKind, motion: &Motion, limits: &Limits) {
         let Motion { twist, acceleration, .. } = motion;
         // No pointer to a function: the proof on the machine code does not follow calls through pointers.
-        let of = |v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits| match kind {
-            StopKind::ReleaseFirst => Stop::release_first(v, a, limits),
-            StopKind::Planar => Stop::planar(v, a, limits),
+        let plan = |stop: &mut Stop, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits| match kind
+        {
+            StopKind::ReleaseFirst => stop.release_first(v, a, limits),
+            StopKind::Planar => stop.planar(v, a, limits),
         };
-        Self {
-            orientation: of(&twist.angular, &acceleration.angular, &limits.orientation),
-            position: of(&twist.linear, &acceleration.linear, &limits.position),
-        }
+        plan(&mut self.orientation, &twist.angular, &acceleration.angular, &limits.orientation);
+        plan(&mut self.position, &twist.linear, &acceleration.linear, &limits.position);
     }
 
     /// Time to rest \[s\].

@@ -33,6 +33,10 @@ const GROUPS: usize = 2;
 const MAX_CHORD: f64 = 1.0;
 const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
 
+/// Work for the regularity of a pose, in knots of an [examination](super::examination), and more where its factorization has pivots.
+pub(super) const REGULARITY_WORK: u32 = 1;
+const PIVOTING_WORK: u32 = 2;
+
 /// How regular a pose is, or must be at least.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Regularity {
@@ -43,9 +47,9 @@ pub(super) struct Regularity {
 }
 
 impl Regularity {
-    /// That of a pose.
-    pub fn at(constants: &Constants, pose: &Pose) -> Self {
-        Ball::new(constants, pose).regularity
+    /// That of a pose, if so much work may be done.
+    pub fn at(constants: &Constants, pose: &Pose, work: &mut u32) -> Option<Self> {
+        Ball::new(constants, pose, work).map(|ball| ball.regularity)
     }
 
     /// What the reference must keep.
@@ -162,13 +166,18 @@ struct Ball {
 }
 
 impl Ball {
-    fn new(constants: &Constants, center: &Pose) -> Self {
+    /// If so much work may be done; pivots are known only afterwards.
+    fn new(constants: &Constants, center: &Pose, work: &mut u32) -> Option<Self> {
+        *work = work.checked_sub(REGULARITY_WORK)?;
         let machine = constants.machine();
         let kinematic_state = KinematicState::new(machine, *center);
+        if kinematic_state.is_pivoted() {
+            *work = work.saturating_sub(PIVOTING_WORK);
+        }
         let Sensitivity { condition, norm, .. } = *kinematic_state.sensitivity();
         let shortest = kinematic_state.lengths(machine).into_iter().fold(f64::INFINITY, f64::min);
         let regularity = Regularity { condition, universal_sine: universal_sine(machine, center) };
-        Self { norm, inverse_norm: condition / norm, shortest, regularity }
+        Some(Self { norm, inverse_norm: condition / norm, shortest, regularity })
     }
 }
 
@@ -203,10 +212,18 @@ pub(super) struct RegularBalls {
 }
 
 impl RegularBalls {
-    /// Whether every pose within a reach of a pose is regular and has at most a condition. `false` is no proof of the contrary.
-    pub fn cover(&mut self, constants: &Constants, pose: &Pose, reach: Reach, limit: f64) -> bool {
+    /// Whether every pose within a reach of a pose is regular and has at most a condition, by work that may be done. `false` is no
+    /// proof of the contrary.
+    pub fn cover(
+        &mut self,
+        constants: &Constants,
+        pose: &Pose,
+        reach: Reach,
+        limit: f64,
+        work: &mut u32,
+    ) -> bool {
         self.cover_by_known(constants, pose, reach, limit)
-            || self.cover_by_new(constants, pose, reach, limit).is_some()
+            || self.cover_by_new(constants, pose, reach, limit, work).is_some()
     }
 
     /// The same by the balls that are kept.
@@ -265,8 +282,9 @@ impl RegularBalls {
         pose: &Pose,
         reach: Reach,
         limit: f64,
+        work: &mut u32,
     ) -> Option<Regularity> {
-        let ball = Ball::new(constants, pose);
+        let ball = Ball::new(constants, pose, work)?;
         let index = self.kept / LANES;
         let group = self.groups.get_mut(index)?;
         group.set(self.kept % LANES, pose, &ball);

@@ -125,10 +125,10 @@ pub(super) struct Stop {
 }
 
 impl Stop {
-    /// The stop that releases the acceleration first.
-    pub fn release_first(v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) -> Self {
+    /// Becomes the stop that releases the acceleration first. In place, as a stop is large.
+    pub fn release_first(&mut self, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) {
         let DerivativeLimits { acceleration: limit, jerk, .. } = *limits;
-        let mut pieces = Pieces::new(v, a);
+        let mut pieces = Pieces::new(self, v, a);
         let magnitude = a.norm();
         if magnitude > 0.0 {
             pieces.push(magnitude / jerk, -a * (jerk / magnitude));
@@ -139,11 +139,11 @@ impl Stop {
         for (dt, jerk) in brake(speed, 0.0, jerk, limit, |_| jerk) {
             pieces.push(dt, u * jerk);
         }
-        pieces.finish(v.norm().max(speed))
+        pieces.finish(v.norm().max(speed));
     }
 
-    /// The planar stop.
-    pub fn planar(v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) -> Self {
+    /// Becomes the planar stop.
+    pub fn planar(&mut self, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) {
         let DerivativeLimits { acceleration: limit, jerk, .. } = *limits;
         let (speed, magnitude) = (v.norm(), a.norm());
         let u = if speed > NEGLIGIBLE_RATIO * limits.velocity {
@@ -155,7 +155,7 @@ impl Stop {
         };
         let rest = a - u * a.dot(&u);
         let c = rest.norm();
-        let mut pieces = Pieces::new(v, a);
+        let mut pieces = Pieces::new(self, v, a);
         let (mut across_speed, mut peak) = (0.0, 0.0);
         if c > NEGLIGIBLE_RATIO * limit {
             let across_jerk = ACROSS_JERK_RATIO * jerk * c / limit;
@@ -180,7 +180,7 @@ impl Stop {
         for (dt, jerk) in plan {
             pieces.push(dt, u * jerk);
         }
-        pieces.finish((peak * peak + across_speed * across_speed).sqrt())
+        pieces.finish((peak * peak + across_speed * across_speed).sqrt());
     }
 
     /// State `t` seconds after the start; at rest from the end on.
@@ -197,15 +197,15 @@ impl Stop {
 }
 
 /// Pieces in the making, and the state at their end.
-struct Pieces {
-    stop: Stop,
+struct Pieces<'a> {
+    stop: &'a mut Stop,
     end: StopState,
 }
 
-impl Pieces {
-    fn new(v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
+impl<'a> Pieces<'a> {
+    fn new(stop: &'a mut Stop, v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
         let end = StopState { velocity: *v, acceleration: *a, ..StopState::default() };
-        let stop = Stop { begins: [f64::INFINITY; MAX_PIECES], ..Stop::default() };
+        (stop.count, stop.begins, stop.duration) = (0, [f64::INFINITY; MAX_PIECES], 0.0);
         Self { stop, end }
     }
 
@@ -238,14 +238,14 @@ impl Pieces {
     }
 
     /// Ends at rest.
-    fn finish(mut self, peak_velocity: f64) -> Stop {
+    fn finish(self, peak_velocity: f64) {
         let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
-        let Stop { pieces, count, begins, duration, .. } = &mut self.stop;
+        let Stop { pieces, count, begins, duration, .. } = self.stop;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
             (*piece, *begin) = (Piece { state: rest, jerk: Vector3::zeros() }, *duration);
             *count += 1;
         }
-        Stop { peak_velocity, ..self.stop }
+        self.stop.peak_velocity = peak_velocity;
     }
 }
 

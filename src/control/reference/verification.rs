@@ -3,7 +3,7 @@
 //! In free space one pose is enough: every margin exceeds the length of the way, in any direction. Near a bound the stop is
 //! examined knot by knot, see [`super::examination`].
 
-use super::examination::{Examination, curvature};
+use super::examination::{Examination, MAX_WORK, curvature};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, StopKind};
 use super::regularity::RegularBalls;
@@ -56,17 +56,20 @@ impl Verifier {
         let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
         let [angular_bulge, linear_bulge] = step.bulge();
+        let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
+        let (reach, mut work) = ([shift.length, turn.length], MAX_WORK);
         let is_free = shift.peak_velocity + linear_bulge <= position.velocity
             && turn.peak_velocity + angular_bulge <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity
                 <= constants.machine().actuator.max_rate
-            && has_room(constants, bounds, pose, &shift, &turn, step.duration)
-            && self.balls.cover(constants, pose, [shift.length, turn.length], constants.reference_condition);
+            && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)
+            && self.balls.cover(constants, pose, reach, constants.reference_condition, &mut work);
         if is_free {
             return Ok(StopKind::ReleaseFirst);
         }
-        self.planar = PoseStop::new(StopKind::Planar, motion, &constants.parameters.limits);
-        Examination::new(constants, bounds, &self.planar, motion, step)?.run(&mut self.balls, pose)?;
+        self.planar.plan(StopKind::Planar, motion, &constants.parameters.limits);
+        Examination::new(constants, bounds, &self.planar, motion, x.as_ref(), step, work)?
+            .run(&mut self.balls, pose)?;
         Ok(StopKind::Planar)
     }
 }
@@ -76,6 +79,7 @@ fn has_room(
     constants: &Constants,
     bounds: &PoseBounds,
     pose: &Pose,
+    x: Option<&[f64; 6]>,
     shift: &StopExtent,
     turn: &StopExtent,
     step_s: f64,
@@ -88,10 +92,9 @@ fn has_room(
         .map(|(length, (shortest, longest))| (length - shortest).min(longest - length))
         .fold(f64::INFINITY, f64::min)
         >= need;
-    let Some(envelope) = bounds.envelope.as_ref().filter(|_| is_within_stroke) else {
+    let Some((envelope, x)) = bounds.envelope.as_ref().zip(x).filter(|_| is_within_stroke) else {
         return is_within_stroke;
     };
-    let x = task_coordinates(pose, &constants.machine().home);
     let [_, beta, ..] = x;
     let c = libm::cos((beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2));
     let turned = turn.length / c + slack / constants.arm;

@@ -52,7 +52,7 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         let mut balls = RegularBalls::default();
         assert_eq!(covered(&mut balls, 0.0), [false; 3]);
         // Too small for its reach, it is kept all the same for the knot itself.
-        assert!(!balls.cover(&constants, &pose, [10.0, 0.0], constants.reference_condition));
+        assert!(!is_covered(&mut balls, &constants, &pose, [10.0, 0.0]));
         assert_eq!(covered(&mut balls, 0.0), [true; 3]);
         assert_eq!(covered(&mut balls, 10.0), [true, false, false]);
     }

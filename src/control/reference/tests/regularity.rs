@@ -57,13 +57,12 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
             let ratio = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
             // The ball that is asked about is beside the one that is kept.
             let mut balls = RegularBalls::default();
-            if !balls.cover(&constants, &near, [0.0; 2], constants.reference_condition) {
+            if !is_covered(&mut balls, &constants, &near, [0.0; 2]) {
                 continue;
             }
             let reach = |size: f64| ratio.map(|ratio| ratio * size);
-            let size = bisected(0.0, 2.0, |size| {
-                { balls }.cover(&constants, &center, reach(size), constants.reference_condition)
-            });
+            let size =
+                bisected(0.0, 2.0, |size| is_covered(&mut { balls }, &constants, &center, reach(size)));
             let found = worst(&mut samples, &constants, &center, reach(size));
             let used = 1.0 / (found * constants.reference_condition);
             assert!(
@@ -103,20 +102,18 @@ fn a_ball_ends_where_its_equations_say() {
             let reach = |size: f64| ratio.map(|ratio| ratio * size);
             // Beside the centre of a ball that is kept: by this ball or by a new one.
             let mut balls = RegularBalls::default();
-            assert!(balls.cover(&constants, &center, [0.0; 2], constants.reference_condition));
+            assert!(is_covered(&mut balls, &constants, &center, [0.0; 2]));
             let offset = Twist { angular: samples.vector(0.05), linear: samples.vector(0.05) };
             let beside = center.displaced(&offset);
-            let size = bisected(0.0, 2.0, |size| {
-                { balls }.cover(&constants, &beside, reach(size), constants.reference_condition)
-            });
-            if { balls }.cover(&constants, &beside, reach(size), constants.reference_condition) {
+            let size =
+                bisected(0.0, 2.0, |size| is_covered(&mut { balls }, &constants, &beside, reach(size)));
+            if is_covered(&mut { balls }, &constants, &beside, reach(size)) {
                 let [d, t] = reach(size * (1.0 - 1e-9));
                 let from_kept = [d + offset.linear.norm(), t + offset.angular.norm()];
                 assert!(holds(&center, from_kept) || holds(&beside, [d, t]), "{size}");
             }
-            let cover = |size: f64| {
-                RegularBalls::default().cover(&constants, &center, reach(size), constants.reference_condition)
-            };
+            let cover =
+                |size: f64| is_covered(&mut RegularBalls::default(), &constants, &center, reach(size));
             let expected = bisected(0.0, 2.0, |size| holds(&center, reach(size)));
             let own = bisected(0.0, 2.0, cover);
             assert!((own - expected).abs() < 1e-7, "{own} {expected}");

@@ -33,7 +33,7 @@ fn no_leg_of_a_ball_just_accepted_is_nearer_to_its_axis_than_the_limit() {
         let ratio = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
         let reach = |size: f64| ratio.map(|ratio| ratio * size);
         let size = bisected(0.0, 2.0, |size| {
-            RegularBalls::default().cover(&constants, &center, reach(size), constants.reference_condition)
+            is_covered(&mut RegularBalls::default(), &constants, &center, reach(size))
         });
         let found = least(&mut samples, &constants, &center, reach(size)) / constants.universal_sine;
         assert!(found >= 1.0 - 1e-9, "{found}, {size}, {ratio:?}, {center:?}");
