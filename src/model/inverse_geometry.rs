@@ -147,22 +147,16 @@ pub fn leg_lengths_and_rates(machine: &Machine, pose: &Pose, twist: &Twist) -> (
     })
 }
 
-/// Lengths of [`leg_lengths`] in lanes, for a loop over poses that is one piece of code for each instruction set.
-#[inline(always)]
-pub(crate) fn length_lanes<S: Simd>(simd: S, machine: &Machine, pose: &Pose) -> LegLanes {
-    LegGeometry::new(simd, &machine.joints, pose).length.into()
-}
-
-/// Lengths and rates of [`leg_lengths_and_rates`] in lanes.
+/// Lengths and rates of [`leg_lengths_and_rates`] in lanes, for a loop over poses that is one piece of code for each instruction set.
 #[inline(always)]
 pub(crate) fn length_and_rate_lanes<S: Simd>(
     simd: S,
     machine: &Machine,
     pose: &Pose,
     twist: &Twist,
-) -> (LegLanes, LegLanes) {
+) -> (f64x8<S>, f64x8<S>) {
     let legs = LegGeometry::new(simd, &machine.joints, pose);
-    (legs.length.into(), legs.velocity(simd, twist).rate.into())
+    (legs.length, legs.velocity(simd, twist).rate)
 }
 
 /// Directions `n_i` of the six legs at a pose: unit vectors from base to platform, base axes.

@@ -1,20 +1,32 @@
 //! Examination of a stop near a bound: at instants ("knots") `dt` apart.
 //!
-//! Between knots quantities leave their chords by at most `M dt^2 / 8`, M the largest second derivative. With the arm r of
-//! the outermost joint and the peaks v, w of the stop:
+//! With the arm r of the outermost joint and the peaks v, w of the stop, a joint moves at most at V = v + r w, and
 //!
 //! ```text
-//! |L''|     <= A + r (Ar + w^2) + (v + r w)^2 / L                              M of lengths
-//! |L'''|    <= J + r (Jr + 3 w Ar + w^3) + 3 (v + r w)(A + r (Ar + w^2)) / L   M of rates, to first order in v / L
-//! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2,   s, c = |sin|, cos of beta   M of the Bryan angles
-//! |x''|     <= 2 A |u| + |a0|  per axis, u the direction of v                  M of a coordinate of C
+//! |s''|     <= A + r (Ar + w^2)                                       of a joint
+//! |s'''|    <= J + r (Jr + 3 w Ar + w^3)
+//! |L''|     <= |s''| + V^2 / L
+//! |L'''|    <= |s'''| + 3 V |s''| / L + 2 V^3 / sqrt(3) L^2
+//! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2     s, c = |sin|, cos of beta; of the Bryan angles
+//! |x'''|    <= J (2 |u| + |e|)                      u, e the directions of v, a; of a coordinate of C
 //! ```
+//!
+//! Between two knots a quantity f with `|f'''| <= K` differs from the cubic with its values and rates at both by at most
+//! `K dt^3 / 96`, its rate from that of the cubic by `K dt^2 / 30` (the integrals of Peano's kernels, the second rounded up). A cubic is
+//! within the hull of its Bezier points, and so is its rate:
+//!
+//! ```text
+//! f0,  f0 + f0' dt / 3,  f1 - f1' dt / 3,  f1              f0',  3 (f1 - f0) / dt - f0' - f1',  f1'
+//! ```
+//!
+//! These points are examined for lengths, their rates and the coordinates of C. Angles leave their chords by at most
+//! `|angle''| dt^2 / 8`, and so does every quantity in the step that leads to the motion.
 //!
 //! The attitude at the knots is that of the stop that would be followed.
 //! Between knots a length may exceed its bound by 2.5e-5 of the stroke, an angle by as much at the outermost joint.
 //! An axis of the envelope narrower than four times the bound between knots is examined at the knots only.
 
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
@@ -27,18 +39,23 @@ use super::stop::Stop;
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
-use crate::model::inverse_geometry::{length_and_rate_lanes, length_lanes};
+use crate::model::inverse_geometry::length_and_rate_lanes;
 use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
 use crate::model::triples::LegLanes;
 
-/// Departure of a length from its chord that decides the number of knots \[m\].
-const CHORD_DEPARTURE_M: f64 = 1e-4;
-/// Departure of a leg's rate from its chord that does so, over the largest rate.
+/// Departure of a length from its cubic that decides the number of knots \[m\].
+const LENGTH_DEPARTURE_M: f64 = 2e-5;
+/// Departure of a leg's rate from that of its cubic that does so, over the largest rate.
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
+/// Largest departures from a cubic with the same values and rates at both ends, for a third derivative of one and a unit of time.
+const CUBIC_DEPARTURE: f64 = 1.0 / 96.0;
+const CUBIC_RATE_DEPARTURE: f64 = 1.0 / 30.0;
+/// `2 / sqrt 3`: of the third derivative of a length by the turning of its leg alone.
+const TURNING_SHARE: f64 = 1.154_700_538_379_251_7;
 /// Bounds on the number of intervals between knots.
 const MIN_INTERVALS: f64 = 3.0;
-const MAX_INTERVALS: u32 = 12;
+const MAX_INTERVALS: u32 = 10;
 /// Work that a verification may do, in knots: those of the longest stop, three new balls, and the start of the step. It bounds the
 /// longest cycle. The balls that were found remain for the next one. With two a reference that is beyond its condition by rounding
 /// would not come back.
@@ -51,6 +68,9 @@ const ROUNDING: f64 = 1e-9;
 /// Allowance for the rounding of an angle \[rad\].
 const ANGLE_ROUNDING: f64 = 1e-15;
 
+/// Lengths and rates of the legs, in lanes.
+type Legs<S> = (f64x8<S>, f64x8<S>);
+
 /// Examination of a planar stop at knots.
 pub(super) struct Examination<'a> {
     constants: &'a Constants,
@@ -58,7 +78,7 @@ pub(super) struct Examination<'a> {
     stop: &'a PoseStop,
     intervals: f64,
     dt: f64,
-    /// Departures of a length \[m\] and of a rate \[m/s\] from their chords, and of C per coordinate \[m\].
+    /// Departures between knots: of a length \[m\], of a rate \[m/s\], and of C per coordinate \[m\].
     length_slack: f64,
     rate_slack: f64,
     position_slack: Vector3<f64>,
@@ -106,30 +126,31 @@ impl<'a> Examination<'a> {
         let (arm, joint) = (constants.arm, v + constants.arm * w);
         let needs_rates = joint > actuator.max_rate;
         let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);
-        let rate_curvature = position.jerk
-            + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w)
-            + 3.0 * joint * joint_acceleration / actuator.min_length;
-        let rates =
-            if needs_rates { rate_curvature / (RATE_DEPARTURE_RATIO * actuator.max_rate) } else { 0.0 };
-        let density = (curvature / CHORD_DEPARTURE_M).max(rates);
-        let knots = (stop.duration() * (density / 8.0).sqrt()).ceil();
+        let joint_jerk =
+            position.jerk + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w);
+        let turning = joint / actuator.min_length;
+        let length_jerk = joint_jerk + turning * (3.0 * joint_acceleration + TURNING_SHARE * turning * joint);
+        let lengths = libm::cbrt(CUBIC_DEPARTURE * length_jerk / LENGTH_DEPARTURE_M);
+        let rates = CUBIC_RATE_DEPARTURE * length_jerk / (RATE_DEPARTURE_RATIO * actuator.max_rate);
+        let density = if needs_rates { lengths.max(rates.sqrt()) } else { lengths };
+        let knots = (stop.duration() * density).ceil();
         let intervals = knots.clamp(MIN_INTERVALS, f64::from(MAX_INTERVALS));
         let dt = stop.duration() / intervals;
-        let chord = dt.max(step.duration).powi(2) / 8.0;
+        let (cubic, chord) = (CUBIC_DEPARTURE * dt * dt * dt, step.duration * step.duration / 8.0);
         let room = ROOM_RATIO * actuator.stroke();
         // Along the velocity and, across it, along the rest of the present acceleration.
         let Motion { twist, acceleration, .. } = motion;
         let u = twist.linear.try_normalize(0.0).unwrap_or_default();
         let e = acceleration.linear.try_normalize(0.0).unwrap_or_default();
-        let position_curvature = (u.abs() * 2.0 + e.abs()) * position.acceleration;
+        let directions = u.abs() * 2.0 + e.abs();
         Ok(Self {
             constants,
             bounds,
             intervals,
             dt,
-            length_slack: (curvature * chord - room).max(0.0),
-            rate_slack: rate_curvature * chord,
-            position_slack: position_curvature * chord,
+            length_slack: ((length_jerk * cubic).max(curvature * chord) - room).max(0.0),
+            rate_slack: length_jerk * (CUBIC_RATE_DEPARTURE * dt * dt).max(chord),
+            position_slack: directions * (position.jerk * cubic).max(position.acceleration * chord),
             needs_rates,
             angles: bounds
                 .envelope
@@ -162,9 +183,10 @@ impl<'a> Examination<'a> {
     ) -> Result<(), Limit> {
         let mut pose = *start;
         let mut state = self.stop.at(0.0);
+        let mut before = None;
         let mut k = 0;
         loop {
-            self.check(simd, balls, &pose, &state)?;
+            before = Some(self.check(simd, balls, &pose, &state, before)?);
             k += 1;
             if k > self.intervals as u32 {
                 return Ok(());
@@ -175,6 +197,7 @@ impl<'a> Examination<'a> {
         }
     }
 
+    /// Checks a knot, and the Bezier points between it and the one before. Returns its lengths and rates.
     #[inline(always)]
     fn check<S: Simd>(
         &mut self,
@@ -182,21 +205,38 @@ impl<'a> Examination<'a> {
         balls: &mut RegularBalls,
         pose: &Pose,
         state: &PoseStopState,
-    ) -> Result<(), Limit> {
-        let lengths = self.check_rates(simd, pose, state)?;
-        let Self { bounds, length_slack, length_excess, .. } = *self;
-        let legs = lengths.0.iter().zip(self.shortest.0.iter().zip(&self.longest.0));
-        let room = length_slack - length_excess;
-        let has_room = legs.fold(true, |has_room, (length, (shortest, longest))| {
-            has_room & ((length - shortest).min(longest - length) >= room)
-        });
-        if !has_room {
+        before: Option<Legs<S>>,
+    ) -> Result<Legs<S>, Limit> {
+        let twist = Twist { angular: state.orientation.velocity, linear: state.position.velocity };
+        let legs @ (length, rate) = length_and_rate_lanes(simd, self.constants.machine(), pose, &twist);
+        if self.needs_rates && !self.are_rates_kept(simd, &legs, before.as_ref()) {
+            return Err(Limit::LegRate);
+        }
+        // Before the first knot there is no Bezier point.
+        let back = if before.is_some() { -self.dt / 3.0 } else { 0.0 };
+        let splat = |number: f64| f64x8::splat(simd, number);
+        let load = |lanes: &LegLanes| f64x8::load_array(simd, lanes.0);
+        let (next, last) = (rate * splat(self.dt / 3.0), rate * splat(back));
+        let (short, long) = (length + next.min(last), length + next.max(last));
+        let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
+        if !room.simd_ge(splat(self.length_slack - self.length_excess)).all_true() {
             return Err(Limit::Stroke);
         }
-        if let Some(envelope) = &bounds.envelope {
-            self.check_envelope(envelope, pose, state)?;
+        if let Some(envelope) = &self.bounds.envelope {
+            self.check_envelope(envelope, pose, state, back)?;
         }
-        self.check_condition(simd, balls, pose)
+        self.check_condition(simd, balls, pose, state)?;
+        Ok(legs)
+    }
+
+    /// Whether the rates at a knot and between it and the one before keep their limit.
+    #[inline(always)]
+    fn are_rates_kept<S: Simd>(&self, simd: S, (length, rate): &Legs<S>, before: Option<&Legs<S>>) -> bool {
+        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - self.rate_slack);
+        let between = before.map_or(*rate, |(length_before, rate_before)| {
+            (*length - *length_before) * f64x8::splat(simd, 3.0 / self.dt) - *rate_before - *rate
+        });
+        rate.abs().max(between.abs()).simd_le(limit).all_true()
     }
 
     /// Whether the poses around a knot are regular and keep the limit of the condition.
@@ -206,11 +246,19 @@ impl<'a> Examination<'a> {
         simd: S,
         balls: &mut RegularBalls,
         pose: &Pose,
+        state: &PoseStopState,
     ) -> Result<(), Limit> {
         let constants = self.constants;
+        let Limits { orientation, position, .. } = &constants.parameters.limits;
         // Half of an interval on either side.
-        let (v, w) = (self.stop.position.peak_velocity, self.stop.orientation.peak_velocity);
-        let reach = [0.5 * v * self.dt, 0.5 * w * self.dt];
+        let half = 0.5 * self.dt;
+        let way = |velocity: &Vector3<f64>, peak: f64, acceleration: f64| {
+            half * peak.min(velocity.norm() + half * acceleration)
+        };
+        let shift = way(&state.position.velocity, self.stop.position.peak_velocity, position.acceleration);
+        let turn =
+            way(&state.orientation.velocity, self.stop.orientation.peak_velocity, orientation.acceleration);
+        let reach = [shift, turn];
         let around = constants.parameters.condition;
         let cover = balls.knot_cover(simd, constants, pose, reach);
         if cover.is_complete() {
@@ -237,28 +285,18 @@ impl<'a> Examination<'a> {
         self.start_regularity.is_some_and(|start| at_knot.or_less(&start).is_kept_by(regularity))
     }
 
-    /// The lengths at a knot, if the rates keep their limit.
-    #[inline(always)]
-    fn check_rates<S: Simd>(&self, simd: S, pose: &Pose, state: &PoseStopState) -> Result<LegLanes, Limit> {
-        let machine = self.constants.machine();
-        if !self.needs_rates {
-            return Ok(length_lanes(simd, machine, pose));
-        }
-        let twist = Twist { angular: state.orientation.velocity, linear: state.position.velocity };
-        let (lengths, rates) = length_and_rate_lanes(simd, machine, pose, &twist);
-        let limit = machine.actuator.max_rate - self.rate_slack;
-        let are_kept = rates.0.iter().fold(true, |are_kept, rate| are_kept & (rate.abs() <= limit));
-        if are_kept { Ok(lengths) } else { Err(Limit::LegRate) }
-    }
-
     #[inline(always)]
     fn check_envelope(
         &mut self,
         envelope: &Envelope,
         pose: &Pose,
         state: &PoseStopState,
+        back: f64,
     ) -> Result<(), Limit> {
-        let is_within = is_position_inside(envelope, pose, &self.position_slack)
+        let at = |t: f64| pose.position + state.position.velocity * t;
+        let (next, last) = (at(self.dt / 3.0), at(back));
+        let is_within = is_position_inside(envelope, &next, &self.position_slack)
+            && is_position_inside(envelope, &last, &self.position_slack)
             && self
                 .angles
                 .as_ref()
@@ -293,7 +331,7 @@ impl<'a> Examination<'a> {
             (relaxed, AngleRanges::new(&relaxed, &x))
         });
         relaxed != envelope
-            && is_position_inside(relaxed, pose, &Vector3::zeros())
+            && is_position_inside(relaxed, &pose.position, &Vector3::zeros())
             && angles.contain(&pose.rotation, -ANGLE_ROUNDING)
     }
 }
@@ -317,9 +355,8 @@ fn relaxed(envelope: &Envelope, x: &[f64; 6]) -> Envelope {
 }
 
 #[inline(always)]
-fn is_position_inside(envelope: &Envelope, pose: &Pose, slack: &Vector3<f64>) -> bool {
+fn is_position_inside(envelope: &Envelope, p: &Vector3<f64>, slack: &Vector3<f64>) -> bool {
     let Envelope { lowest: [_, _, _, x0, y0, z0], highest: [_, _, _, x1, y1, z1] } = envelope;
-    let p = &pose.position;
     is_inside(p.x, slack.x, (x0, x1)) & is_inside(p.y, slack.y, (y0, y1)) & is_inside(p.z, slack.z, (z0, z1))
 }
 
