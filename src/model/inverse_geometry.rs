@@ -11,6 +11,8 @@
 //! Valid for L > 0. No leg angles appear, hence no joint-angle singularity.
 
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3};
 
 use super::lanes::LaneArithmetic as _;
@@ -63,6 +65,14 @@ impl<S: Simd> LegGeometry<S> {
         let length = s.dot(s).sqrt();
         let inverse_length = f64x8::splat(simd, 1.0) / length;
         Self { arm, direction: s * inverse_length, length, inverse_length }
+    }
+
+    /// See [`universal_sine`].
+    #[inline(always)]
+    pub fn universal_sine(&self, simd: S, joints: &Joints) -> f64 {
+        let normal = self.direction.cross(Lanes3::load(simd, &joints.universal_axis));
+        let squares = joints.triples.unpack(&normal.dot(normal).into());
+        squares.into_iter().fold(1.0, f64::min).sqrt()
     }
 
     /// L' and n'.
@@ -170,8 +180,6 @@ pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
 /// Least sine of the angle between a leg and the first axis of its universal joint, over the six legs: 0 where one is in
 /// line with it.
 pub fn universal_sine(machine: &Machine, pose: &Pose) -> f64 {
-    let axes = machine.joints.triples.unpack_vectors(&machine.joints.universal_axis);
-    let sines =
-        leg_directions(machine, pose).into_iter().zip(axes).map(|(leg, axis)| leg.cross(&axis).norm());
-    sines.fold(1.0, f64::min)
+    let joints = &machine.joints;
+    dispatch!(machine.level, simd => LegGeometry::new(simd, joints, pose).universal_sine(simd, joints))
 }

@@ -9,10 +9,12 @@
 //! ```
 //!
 //! as `asin(slack) >= slack`. A range ends at most 2.5 rad from where a motion begins, without slack there, so that full turns do
-//! not matter. That is 24 products for three angles, where each arc tangent takes 100 instructions: an examination asks at every knot.
+//! not matter. That is a few products for all ends at once, where each arc tangent takes 100 instructions: an examination asks at
+//! every knot.
 
 use core::f64::consts::PI;
 
+use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Matrix3;
@@ -25,86 +27,83 @@ pub(super) const MAX_SLACK_RATIO: f64 = 0.25;
 /// Largest change of an angle along a motion \[rad\].
 const MAX_CHANGE: f64 = 2.5;
 
-/// One end of a range.
-#[derive(Clone, Copy, Debug, Default)]
-struct End {
-    sine: f64,
-    cosine: f64,
-    /// Most slack that is kept from it \[rad\].
-    slack: f64,
-}
+/// Low ends of the three ranges and a zero, high ends and a zero.
+const LANES: usize = 8;
 
-impl End {
-    /// At an angle; one that is too far to be reached needs no slack.
-    fn new(angle: f64, is_reached: bool, slack: f64) -> Self {
-        let (sine, cosine) = libm::sincos(angle);
-        Self { sine, cosine, slack: if is_reached { slack } else { 0.0 } }
-    }
-
-    /// Whether an angle keeps a distance from this end, given sine and cosine of the distance times `c >= 0`.
-    #[inline(always)]
-    fn is_kept(&self, (sine, cosine): (f64, f64), c: f64, slack: f64, is_wide: bool) -> bool {
-        (sine >= slack.min(self.slack) * c) | (is_wide & (cosine <= 0.0))
-    }
-}
-
-/// Range of an angle.
-#[derive(Clone, Copy, Debug, Default)]
-struct Range {
-    low: End,
-    high: End,
-    width: f64,
-}
-
-impl Range {
-    /// `x` is where the motion begins.
-    fn new(low: f64, high: f64, x: f64) -> Self {
-        let slack = (MAX_SLACK_RATIO * (high - low)).min(1.0);
-        let (lowest, highest) = (x - MAX_CHANGE, x + MAX_CHANGE);
-        Self {
-            low: End::new(low.max(lowest), low > lowest, slack),
-            high: End::new(high.min(highest), high < highest, slack),
-            width: high.min(highest) - low.max(lowest),
-        }
-    }
-
-    /// For sine and cosine of an angle, both times `c >= 0`.
-    #[inline(always)]
-    fn contains(&self, sine: f64, cosine: f64, c: f64, slack: f64) -> bool {
-        let Self { low, high, width } = self;
-        let from_low = (sine * low.cosine - cosine * low.sine, cosine * low.cosine + sine * low.sine);
-        let from_high = (cosine * high.sine - sine * high.cosine, cosine * high.cosine + sine * high.sine);
-        let is_wide = *width >= PI;
-        low.is_kept(from_low, c, slack, is_wide)
-            & high.is_kept(from_high, c, slack, is_wide)
-            & (*width >= 0.0)
-    }
-}
-
-/// Ranges of alpha, beta and gamma.
-#[derive(Clone, Copy, Debug, Default)]
+/// Ranges of the angles, an end in each lane.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct AngleRanges {
-    ranges: [Range; 3],
+    /// Sine and cosine of each end; of the high ones with the opposite sign, as their distance has.
+    sine: [f64; LANES],
+    cosine: [f64; LANES],
+    /// Most slack that is kept from each \[rad\].
+    slack: [f64; LANES],
+    /// Sign of the distance where the range is wide, else 0; and the cosine of a distance that is large then, else none.
+    wide: [f64; LANES],
+    far: [f64; LANES],
     /// Sign of `cos(beta)`: of the two triples of angles that give the same rotation.
     sign: f64,
+    /// Whether no range ends before it begins.
+    is_possible: bool,
 }
 
 impl AngleRanges {
     /// Those of an envelope, for a motion from X.
-    pub fn new(Envelope { lowest, highest }: &Envelope, [alpha, beta, gamma, ..]: &[f64; 6]) -> Self {
-        let ([a0, b0, g0, ..], [a1, b1, g1, ..]) = (*lowest, *highest);
-        let ranges = [Range::new(a0, a1, *alpha), Range::new(b0, b1, *beta), Range::new(g0, g1, *gamma)];
-        Self { ranges, sign: 1.0_f64.copysign(libm::cos(*beta)) }
+    pub fn new(Envelope { lowest, highest }: &Envelope, x: &[f64; 6]) -> Self {
+        let [_, beta, ..] = *x;
+        let zeros = [0.0; LANES];
+        let mut ranges = Self {
+            sine: zeros,
+            cosine: zeros,
+            slack: zeros,
+            wide: zeros,
+            far: [f64::NEG_INFINITY; LANES],
+            sign: 1.0_f64.copysign(libm::cos(beta)),
+            is_possible: true,
+        };
+        for (axis, (x, (low, high))) in x.iter().zip(lowest.iter().zip(highest)).take(3).enumerate() {
+            let slack = (MAX_SLACK_RATIO * (high - low)).min(1.0);
+            let (reached_low, reached_high) = (low.max(x - MAX_CHANGE), high.min(x + MAX_CHANGE));
+            let width = reached_high - reached_low;
+            ranges.is_possible &= width >= 0.0;
+            // An end that is too far to be reached needs no slack.
+            let slacks = [(low, reached_low), (high, reached_high)]
+                .map(|(end, reached)| if *end == reached { slack } else { 0.0 });
+            ranges.set_end(axis, reached_low, 1.0, slacks[0], width >= PI);
+            ranges.set_end(axis + LANES / 2, reached_high, -1.0, slacks[1], width >= PI);
+        }
+        ranges
+    }
+
+    fn set_end(&mut self, lane: usize, angle: f64, sign: f64, slack: f64, is_wide: bool) {
+        let (sine, cosine) = libm::sincos(angle);
+        let (wide, far) = if is_wide { (sign, 0.0) } else { (0.0, f64::NEG_INFINITY) };
+        let lanes = [&mut self.sine, &mut self.cosine, &mut self.slack, &mut self.wide, &mut self.far];
+        for (lanes, number) in lanes.into_iter().zip([sign * sine, sign * cosine, slack, wide, far]) {
+            if let Some(slot) = lanes.get_mut(lane) {
+                *slot = number;
+            }
+        }
     }
 
     /// Whether each angle of a rotation has a distance from the ends of its range \[rad\], or a part of it that is narrower.
     #[inline(always)]
-    pub fn contain(&self, r: &Matrix3<f64>, slack: f64) -> bool {
-        let Self { ranges: [alpha, beta, gamma], sign } = self;
+    pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, slack: f64) -> bool {
         let c = cosine_of_beta(r);
-        alpha.contains(-r.m23 * sign, r.m33 * sign, c, slack)
-            & beta.contains(r.m13, c * sign, 1.0, slack)
-            & gamma.contains(-r.m12 * sign, r.m11 * sign, c, slack)
+        let both = |lanes: [f64; LANES / 2]| {
+            let lanes = f64x4::load_array(simd, lanes);
+            lanes.combine(lanes)
+        };
+        let load = |lanes: &[f64; LANES]| f64x8::load_array(simd, *lanes);
+        // Of the angles, those of alpha and gamma times c.
+        let sine = both([-r.m23 * self.sign, r.m13, -r.m12 * self.sign, 0.0]);
+        let cosine = both([r.m33 * self.sign, c * self.sign, r.m11 * self.sign, 0.0]);
+        let (end_sine, end_cosine) = (load(&self.sine), load(&self.cosine));
+        let distance_sine = sine * end_cosine - cosine * end_sine;
+        let distance_cosine = (cosine * end_cosine + sine * end_sine) * load(&self.wide);
+        let slack = load(&self.slack).min(f64x8::splat(simd, slack)) * both([c, 1.0, c, 0.0]);
+        let is_kept = distance_sine.simd_ge(slack) | distance_cosine.simd_le(load(&self.far));
+        is_kept.all_true() & self.is_possible
     }
 }
 
@@ -116,14 +115,18 @@ pub(super) fn cosine_of_beta(r: &Matrix3<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use fearless_simd::{Level, dispatch};
+
     use super::super::samples::Samples;
     use super::*;
+    use crate::model::machine::at_most_256_bits;
     use crate::model::task::{TaskState, task_coordinates};
 
     /// Ranges around random angles, narrow and wide, on both sides of 90 degrees.
     #[test]
     fn a_rotation_is_inside_exactly_where_its_angles_are() {
         let mut samples = Samples::new(1);
+        let level = at_most_256_bits(Level::new());
         let (mut inside, mut outside) = (0, 0);
         for k in 0..200_000 {
             let home_beta = if k % 2 == 0 { 0.0 } else { PI };
@@ -156,7 +159,8 @@ mod tests {
             for (x, size) in start.iter_mut().zip([0.5, 0.05, 0.5]) {
                 *x += size * (2.0 * samples.uniform() - 1.0);
             }
-            let is_contained = AngleRanges::new(&envelope, &start).contain(&pose.rotation, slack);
+            let ranges = AngleRanges::new(&envelope, &start);
+            let is_contained = dispatch!(level, simd => ranges.contain(simd, &pose.rotation, slack));
             assert!(!is_contained || room(slack) > -1e-12, "{x:?} {envelope:?} {slack}");
             assert!(is_contained || room(slack * (1.0 + slack * slack)) < 1e-6, "{x:?} {envelope:?} {slack}");
             if is_contained { inside += 1 } else { outside += 1 }

@@ -40,6 +40,7 @@ use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
 use crate::model::inverse_geometry::length_and_rate_lanes;
+use crate::model::machine::Machine;
 use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
 use crate::model::triples::LegLanes;
@@ -223,7 +224,7 @@ impl<'a> Examination<'a> {
             return Err(Limit::Stroke);
         }
         if let Some(envelope) = &self.bounds.envelope {
-            self.check_envelope(envelope, pose, state, back)?;
+            self.check_envelope(simd, envelope, pose, state, back)?;
         }
         self.check_condition(simd, balls, pose, state)?;
         Ok(legs)
@@ -286,8 +287,9 @@ impl<'a> Examination<'a> {
     }
 
     #[inline(always)]
-    fn check_envelope(
+    fn check_envelope<S: Simd>(
         &mut self,
+        simd: S,
         envelope: &Envelope,
         pose: &Pose,
         state: &PoseStopState,
@@ -300,7 +302,7 @@ impl<'a> Examination<'a> {
             && self
                 .angles
                 .as_ref()
-                .is_none_or(|angles| angles.contain(&pose.rotation, self.angle_slack(pose, state)));
+                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_slack(pose, state)));
         if is_within || self.is_nearer_than_start(envelope, pose) { Ok(()) } else { Err(Limit::Envelope) }
     }
 
@@ -324,15 +326,15 @@ impl<'a> Examination<'a> {
     #[inline(never)]
     fn is_nearer_than_start(&mut self, envelope: &Envelope, pose: &Pose) -> bool {
         let Some(from) = self.from else { return false };
-        let home = &self.constants.machine().home;
+        let Machine { home, level, .. } = *self.constants.machine();
         let (relaxed, angles) = self.relaxed.get_or_insert_with(|| {
-            let x = task_coordinates(from, home);
+            let x = task_coordinates(from, &home);
             let relaxed = relaxed(envelope, &x);
             (relaxed, AngleRanges::new(&relaxed, &x))
         });
         relaxed != envelope
             && is_position_inside(relaxed, &pose.position, &Vector3::zeros())
-            && angles.contain(&pose.rotation, -ANGLE_ROUNDING)
+            && dispatch!(level, simd => angles.contain(simd, &pose.rotation, -ANGLE_ROUNDING))
     }
 }
 

@@ -19,7 +19,6 @@
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 
 use crate::control::parameters::Constants;
-use crate::model::inverse_geometry::universal_sine;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::{MAX_WRENCH_NORM, Sensitivity};
@@ -176,7 +175,8 @@ impl Ball {
         }
         let Sensitivity { condition, norm, .. } = *kinematic_state.sensitivity();
         let shortest = kinematic_state.lengths(machine).into_iter().fold(f64::INFINITY, f64::min);
-        let regularity = Regularity { condition, universal_sine: universal_sine(machine, center) };
+        let universal_sine = kinematic_state.universal_sine(machine);
+        let regularity = Regularity { condition, universal_sine };
         Some(Self { norm, inverse_norm: condition / norm, shortest, regularity })
     }
 }
