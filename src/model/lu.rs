@@ -5,20 +5,16 @@
 //! then:   x_k = (b_k - sum_j>k a_kj x_j) / a_kk,   last to first
 //! ```
 //!
-//! Each elimination drops the column it cleared, so that the pivot is always in the first place and nothing is
-//! found by an index: there is nothing to check, and so nothing that could panic. That is why it is not
-//! nalgebra's.
+//! A row holds its coefficients, its right-hand sides and zeros. All of it is changed in each step, in lanes, also the columns
+//! that are cleared already and never read again: without a branch that is faster. Nothing is found by an index that could be
+//! out of range, and so nothing could panic. That is why it is not nalgebra's.
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
 
 use super::machine::LEGS;
 
-/// Coefficients from the diagonal on, then zeros; and the right-hand sides.
-#[derive(Clone, Copy)]
-struct Row<const R: usize> {
-    left: [f64; LEGS],
-    right: [f64; R],
-}
+/// Numbers in a vector of lanes.
+const LANES: usize = 4;
 
 /// x of `A x = b`; `None` if a pivot is zero. A is given by rows.
 pub(super) fn solve(level: Level, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<[f64; LEGS]> {
@@ -31,72 +27,94 @@ pub(super) fn solve_columns<const R: usize>(
     a: &[[f64; LEGS]; LEGS],
     b: &[[f64; R]; LEGS],
 ) -> Option<[[f64; R]; LEGS]> {
-    dispatch!(level, _simd => solved(a, b))
+    dispatch!(level, simd => {
+        if R <= 2 { solved::<_, R, 2>(simd, a, b) } else { solved::<_, R, 3>(simd, a, b) }
+    })
 }
 
+/// A row in memory.
+type Row<const V: usize> = [[f64; LANES]; V];
+
+/// With rows of V vectors, which hold `LEGS + R` numbers.
 #[inline(always)]
-fn solved<const R: usize>(a: &[[f64; LEGS]; LEGS], b: &[[f64; R]; LEGS]) -> Option<[[f64; R]; LEGS]> {
-    let mut rows = [Row { left: [0.0; LEGS], right: [0.0; R] }; LEGS];
+fn solved<S: Simd, const R: usize, const V: usize>(
+    simd: S,
+    a: &[[f64; LEGS]; LEGS],
+    b: &[[f64; R]; LEGS],
+) -> Option<[[f64; R]; LEGS]> {
+    let mut rows = [[[0.0; LANES]; V]; LEGS];
     for (row, (left, right)) in rows.iter_mut().zip(a.iter().zip(b)) {
-        *row = Row { left: *left, right: *right };
+        row.as_flattened_mut().iter_mut().zip(left.iter().chain(right)).for_each(|(slot, x)| *slot = *x);
     }
-    triangulate(&mut rows);
-    back_substitute(&rows)
+    // Each column is a constant of its own code, so that every place in the rows is known.
+    eliminate::<_, V, 0>(simd, &mut rows);
+    eliminate::<_, V, 1>(simd, &mut rows);
+    eliminate::<_, V, 2>(simd, &mut rows);
+    eliminate::<_, V, 3>(simd, &mut rows);
+    eliminate::<_, V, 4>(simd, &mut rows);
+    substitute::<_, V, 5>(simd, &mut rows)?;
+    substitute::<_, V, 4>(simd, &mut rows)?;
+    substitute::<_, V, 3>(simd, &mut rows)?;
+    substitute::<_, V, 2>(simd, &mut rows)?;
+    substitute::<_, V, 1>(simd, &mut rows)?;
+    substitute::<_, V, 0>(simd, &mut rows)?;
+    let right = |row: Row<V>| {
+        let mut x = [0.0; R];
+        x.iter_mut().zip(row.as_flattened().iter().skip(LEGS)).for_each(|(x, number)| *x = *number);
+        x
+    };
+    Some(rows.map(right))
+}
+
+/// Clears a column below its row, the one with the largest number first.
+#[inline(always)]
+fn eliminate<S: Simd, const V: usize, const COLUMN: usize>(simd: S, rows: &mut [Row<V>; LEGS]) {
+    let (_, rest) = rows.split_at_mut(COLUMN);
+    let Some((top, below)) = rest.split_first_mut() else { return };
+    for row in below.iter_mut() {
+        if number::<V, COLUMN>(row).abs() > number::<V, COLUMN>(top).abs() {
+            // Vector by vector: of a whole row it would be a call.
+            row.iter_mut().zip(top.iter_mut()).for_each(|(a, b)| core::mem::swap(a, b));
+        }
+    }
+    for row in below.iter_mut() {
+        let factor = number::<V, COLUMN>(row) / number::<V, COLUMN>(top);
+        subtract(simd, row, factor, top);
+    }
+}
+
+/// The unknown of a column, in place of the right-hand side of its row, and out of the rows above.
+#[inline(always)]
+fn substitute<S: Simd, const V: usize, const COLUMN: usize>(
+    simd: S,
+    rows: &mut [Row<V>; LEGS],
+) -> Option<()> {
+    let (above, rest) = rows.split_at_mut(COLUMN);
+    let (row, _) = rest.split_first_mut()?;
+    let pivot = number::<V, COLUMN>(row);
+    if pivot == 0.0 {
+        return None;
+    }
+    for vector in row.iter_mut() {
+        *vector = (f64x4::load_array(simd, *vector) / f64x4::splat(simd, pivot)).to_array();
+    }
+    for other in above.iter_mut() {
+        let factor = number::<V, COLUMN>(other);
+        subtract(simd, other, factor, row);
+    }
+    Some(())
+}
+
+/// `row -= factor other`
+#[inline(always)]
+fn subtract<S: Simd, const V: usize>(simd: S, row: &mut Row<V>, factor: f64, other: &Row<V>) {
+    for (vector, other) in row.iter_mut().zip(other) {
+        let product = f64x4::load_array(simd, *other) * f64x4::splat(simd, factor);
+        *vector = (f64x4::load_array(simd, *vector) - product).to_array();
+    }
 }
 
 #[inline(always)]
-fn triangulate<const R: usize>(rows: &mut [Row<R>; LEGS]) {
-    let mut rest = rows.as_mut_slice();
-    while let Some((top, below)) = rest.split_first_mut() {
-        for row in below.iter_mut() {
-            if leading(row).abs() > leading(top).abs() {
-                core::mem::swap(row, top);
-            }
-        }
-        let [_, t1, t2, t3, t4, t5] = top.left;
-        for row in below.iter_mut() {
-            let factor = leading(row) / leading(top);
-            let [_, a1, a2, a3, a4, a5] = row.left;
-            row.left = [
-                a1 - factor * t1,
-                a2 - factor * t2,
-                a3 - factor * t3,
-                a4 - factor * t4,
-                a5 - factor * t5,
-                0.0,
-            ];
-            for (right, top) in row.right.iter_mut().zip(&top.right) {
-                *right -= factor * top;
-            }
-        }
-        rest = below;
-    }
-}
-
-#[inline(always)]
-fn back_substitute<const R: usize>(rows: &[Row<R>; LEGS]) -> Option<[[f64; R]; LEGS]> {
-    // The unknowns found so far come first.
-    let mut x = [[0.0; R]; LEGS];
-    for (found, Row { left: [pivot, rest @ ..], right }) in rows.iter().rev().enumerate() {
-        if *pivot == 0.0 {
-            return None;
-        }
-        let mut next = *right;
-        for (known, a) in x.iter().zip(rest).take(found) {
-            for (next, known) in next.iter_mut().zip(known) {
-                *next -= a * known;
-            }
-        }
-        for next in &mut next {
-            *next /= pivot;
-        }
-        let [x0, x1, x2, x3, x4, _] = x;
-        x = [next, x0, x1, x2, x3, x4];
-    }
-    Some(x)
-}
-
-fn leading<const R: usize>(row: &Row<R>) -> f64 {
-    let [first, ..] = row.left;
-    first
+fn number<const V: usize, const COLUMN: usize>(row: &Row<V>) -> f64 {
+    row.as_flattened().get(COLUMN).copied().unwrap_or_default()
 }

@@ -57,10 +57,9 @@ const TURNING_SHARE: f64 = 1.154_700_538_379_251_7;
 /// Bounds on the number of intervals between knots.
 const MIN_INTERVALS: f64 = 3.0;
 const MAX_INTERVALS: u32 = 10;
-/// Work that a verification may do, in knots: those of the longest stop, three new balls, and the start of the step. It bounds the
-/// longest cycle. The balls that were found remain for the next one. With two a reference that is beyond its condition by rounding
-/// would not come back.
-pub(super) const MAX_WORK: u32 = MAX_INTERVALS + 4 * REGULARITY_WORK;
+/// Work that a verification may do, in knots: those of the longest stop, and the regularity of three poses. It bounds the longest
+/// cycle. The balls that were found remain for the next one. With two a reference that is beyond its condition by rounding would not come back.
+pub(super) const MAX_WORK: u32 = MAX_INTERVALS + 3 * REGULARITY_WORK;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;

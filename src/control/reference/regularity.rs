@@ -16,7 +16,7 @@
 //! The same bounds as those of a cell in the search for the workspace. A ball found once holds for many cycles.
 //! All balls of a group are tried at once: a lane each, without a branch, so that the work does not depend on which one covers.
 
-use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
+use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 
 use crate::control::parameters::Constants;
 use crate::model::kinematic_state::KinematicState;
@@ -24,9 +24,9 @@ use crate::model::rigid::Pose;
 use crate::model::sensitivity::{MAX_WRENCH_NORM, Sensitivity};
 
 /// Balls side by side: one in each lane.
-const LANES: usize = 8;
+const LANES: usize = 4;
 /// Of the balls that are kept: those along one stop.
-const GROUPS: usize = 2;
+const GROUPS: usize = 3;
 
 /// Largest `|R - R0| / sqrt 2` for which an angle is bounded, and its ratio to the angle's bound: `2 asin(1/2)`.
 const MAX_CHORD: f64 = 1.0;
@@ -107,13 +107,13 @@ impl BallGroup {
         let squared = |columns: &[[f64; LANES]], numbers: &[f64]| {
             let columns = columns.iter().zip(numbers);
             let differences = columns
-                .map(|(center, number)| f64x8::splat(simd, *number) - f64x8::load_array(simd, *center));
-            differences.fold(f64x8::splat(simd, 0.0), |sum, difference| sum + difference * difference)
+                .map(|(center, number)| f64x4::splat(simd, *number) - f64x4::load_array(simd, *center));
+            differences.fold(f64x4::splat(simd, 0.0), |sum, difference| sum + difference * difference)
         };
         let shift = squared(&self.position, pose.position.as_slice()).sqrt();
-        let half = f64x8::splat(simd, 0.5);
+        let half = f64x4::splat(simd, 0.5);
         let chord = (squared(&self.rotation, pose.rotation.as_slice()) * half).sqrt();
-        let turn = chord * f64x8::splat(simd, ANGLE_PER_CHORD);
+        let turn = chord * f64x4::splat(simd, ANGLE_PER_CHORD);
         Displacements { shift, turn, chord }
     }
 
@@ -127,8 +127,8 @@ impl BallGroup {
         [shift, turn]: Reach,
         limit: f64,
     ) -> bool {
-        let splat = |number: f64| f64x8::splat(simd, number);
-        let load = |column: &[f64; LANES]| f64x8::load_array(simd, *column);
+        let splat = |number: f64| f64x4::splat(simd, number);
+        let load = |column: &[f64; LANES]| f64x4::load_array(simd, *column);
         let (norm, inverse_norm) = (load(&self.norm), load(&self.inverse_norm));
         let (shortest, universal_sine) = (load(&self.shortest), load(&self.universal_sine));
         let turn = displacements.turn + splat(turn);
@@ -150,9 +150,9 @@ impl BallGroup {
 
 /// Bounds on how far a pose is from each centre: shift \[m\] and turn \[rad\], and the chord of the turn.
 struct Displacements<S: Simd> {
-    shift: f64x8<S>,
-    turn: f64x8<S>,
-    chord: f64x8<S>,
+    shift: f64x4<S>,
+    turn: f64x4<S>,
+    chord: f64x4<S>,
 }
 
 /// A ball without its centre.

@@ -193,12 +193,6 @@ impl Walls {
         dispatch!(level, simd => self.restrict_in_lanes(simd, turn, shift))
     }
 
-    /// The walls that change the wanted velocity.
-    #[inline(always)]
-    fn active(&self) -> impl Iterator<Item = &Wall> {
-        self.walls.iter().take(self.count).filter(|wall| wall.multiplier != 0.0)
-    }
-
     #[inline(always)]
     fn restrict_in_lanes<S: Simd>(
         &mut self,
@@ -210,14 +204,16 @@ impl Walls {
             f64x8::load_array(simd, padded(&stacked(&(turn * self.radius), shift)))
         };
         let mut velocity = load(&turn.velocity, &shift.velocity);
-        let mut active = LimitSet::default();
+        let walls = self.walls.get_mut(..self.count).unwrap_or_default();
         let mut sweeps = SWEEPS;
         let mut sweep = 0;
         while sweep < sweeps {
-            let mut is_changed = false;
+            let (mut is_changed, mut active) = (false, 0);
             let is_full = sweep % FULL_SWEEP == 0;
-            let visited = |wall: &&mut Wall| is_full || wall.multiplier != 0.0;
-            for wall in self.walls.iter_mut().take(self.count).filter(visited) {
+            for wall in walls.iter_mut() {
+                if !is_full && wall.multiplier == 0.0 {
+                    continue;
+                }
                 let [against, along] = &wall.sides;
                 let gradient = f64x8::load_array(simd, wall.gradient);
                 // The closing rate without this wall, and what of it is beyond the ends.
@@ -230,22 +226,23 @@ impl Walls {
                     wall.multiplier = multiplier;
                     is_changed = true;
                 }
+                active += usize::from(multiplier != 0.0);
             }
             if is_full && !is_changed {
                 break;
             }
             sweep += 1;
-            sweeps = SWEEPS.min(MAX_VISITS / self.active().count().max(1));
+            sweeps = SWEEPS.min(MAX_VISITS / active.max(1));
         }
-        for wall in self.active() {
-            active = active.union(wall.limit);
-        }
-        if active.is_empty() {
-            return active;
+        let is_active = |wall: &&Wall| wall.multiplier != 0.0;
+        let restricting =
+            walls.iter().filter(is_active).fold(LimitSet::default(), |all, wall| all.union(wall.limit));
+        if restricting.is_empty() {
+            return restricting;
         }
         let mut derivative = load(&turn.derivative, &shift.derivative);
         for _ in 0..sweeps {
-            for wall in self.active() {
+            for wall in walls.iter().filter(is_active) {
                 let [against, along] = &wall.sides;
                 let gradient = f64x8::load_array(simd, wall.gradient);
                 let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
@@ -259,7 +256,7 @@ impl Walls {
         };
         store(velocity, &mut turn.velocity, &mut shift.velocity);
         store(derivative, &mut turn.derivative, &mut shift.derivative);
-        active
+        restricting
     }
 }
 
