@@ -244,7 +244,7 @@ fn forces_by_lu(level: Level, n: &Matrix6<f64>, wrench: &Wrench, axial: &[f64; L
 #[inline(never)]
 fn twist_by_lu(level: Level, n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
     // The columns of N are the rows of its transpose.
-    lu::solve(level, &(*n).into(), rates).map(|twist| Twist::from_vector(&twist.into()))
+    lu::solve(level, n.as_ref(), rates).map(|twist| Twist::from_vector(&twist.into()))
 }
 
 /// N, columns in the order of the legs.

@@ -31,9 +31,9 @@ pub(super) struct HeldStop {
 
 impl HeldStop {
     /// Holds the stop of a kind, verified from the present motion on; a planar one as it was planned.
-    pub fn hold(&mut self, kind: StopKind, planar: &mut PoseStop) {
+    pub fn hold(&mut self, kind: StopKind, planar: &PoseStop) {
         if let StopKind::Planar = kind {
-            core::mem::swap(&mut self.stop, planar);
+            self.stop = *planar;
         }
         self.phase = Phase::Verified(kind);
     }

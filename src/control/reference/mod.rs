@@ -115,7 +115,7 @@ impl ReferenceGenerator {
         self.motion = *motion;
         self.bounds = PoseBounds::around(constants, &motion.pose);
         let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &Step::default());
-        self.stop.hold(verified.unwrap_or(StopKind::Planar), &mut self.verifier.planar);
+        self.stop.hold(verified.unwrap_or(StopKind::Planar), &self.verifier.planar);
         verified.map(drop)
     }
 
@@ -232,7 +232,7 @@ impl ReferenceGenerator {
         }
         let next = match verified {
             Some((motion, kind)) => {
-                self.stop.hold(kind, &mut self.verifier.planar);
+                self.stop.hold(kind, &self.verifier.planar);
                 motion
             }
             None => self.stop.follow(&self.motion, &constants.parameters.limits, step_s),

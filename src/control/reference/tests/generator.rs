@@ -220,7 +220,7 @@ fn a_component_that_waits_follows_the_stop() {
             (reference.stop.stop, reference.stop.elapsed_s) = (stop, elapsed_s);
             reference.stop.phase = Phase::Followed;
         } else {
-            reference.stop.hold(StopKind::Planar, &mut { stop });
+            reference.stop.hold(StopKind::Planar, &stop);
         }
         let expected = stop.at(h + if is_followed { elapsed_s } else { 0.0 });
         let mut accelerations = |components| {
