@@ -123,13 +123,8 @@ impl<'a> Examination<'a> {
         }
         let curvature = curvature(constants, v, w);
         let actuator = &constants.machine().actuator;
-        let (arm, joint) = (constants.arm, v + constants.arm * w);
-        let needs_rates = joint > actuator.max_rate;
-        let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);
-        let joint_jerk =
-            position.jerk + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w);
-        let turning = joint / actuator.min_length;
-        let length_jerk = joint_jerk + turning * (3.0 * joint_acceleration + TURNING_SHARE * turning * joint);
+        let needs_rates = v + constants.arm * w > actuator.max_rate;
+        let length_jerk = length_jerk(constants, v, w);
         let lengths = libm::cbrt(CUBIC_DEPARTURE * length_jerk / LENGTH_DEPARTURE_M);
         let rates = CUBIC_RATE_DEPARTURE * length_jerk / (RATE_DEPARTURE_RATIO * actuator.max_rate);
         let density = if needs_rates { lengths.max(rates.sqrt()) } else { lengths };
@@ -368,6 +363,17 @@ fn is_inside(x: f64, slack: f64, (low, high): (&f64, &f64)) -> bool {
 
 fn ranges(Envelope { lowest, highest }: &Envelope) -> impl Iterator<Item = (&f64, &f64)> {
     lowest.iter().zip(highest)
+}
+
+/// Largest third derivative of a leg's length at peak velocities.
+pub(super) fn length_jerk(constants: &Constants, v: f64, w: f64) -> f64 {
+    let Limits { orientation, position, .. } = &constants.parameters.limits;
+    let (arm, joint) = (constants.arm, v + constants.arm * w);
+    let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);
+    let joint_jerk =
+        position.jerk + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w);
+    let turning = joint / constants.machine().actuator.min_length;
+    joint_jerk + turning * (3.0 * joint_acceleration + TURNING_SHARE * turning * joint)
 }
 
 /// Largest second derivative of a leg's length at peak velocities.
