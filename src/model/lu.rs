@@ -6,7 +6,7 @@
 //! ```
 //!
 //! A row holds its coefficients, its right-hand sides and zeros. All of it is changed in each step, in lanes, also the columns
-//! that are cleared already and never read again: without a branch that is faster. Nothing is found by an index that could be
+//! that are cleared already: without a branch that is faster. Nothing is found by an index that could be
 //! out of range, and so nothing could panic. That is why it is not nalgebra's.
 
 use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
@@ -47,11 +47,11 @@ fn solved<S: Simd, const R: usize, const V: usize>(
         row.as_flattened_mut().iter_mut().zip(left.iter().chain(right)).for_each(|(slot, x)| *slot = *x);
     }
     // Each column is a constant of its own code, so that every place in the rows is known.
-    eliminate::<_, V, 0>(simd, &mut rows);
-    eliminate::<_, V, 1>(simd, &mut rows);
-    eliminate::<_, V, 2>(simd, &mut rows);
-    eliminate::<_, V, 3>(simd, &mut rows);
-    eliminate::<_, V, 4>(simd, &mut rows);
+    eliminate::<_, V, 0>(simd, &mut rows)?;
+    eliminate::<_, V, 1>(simd, &mut rows)?;
+    eliminate::<_, V, 2>(simd, &mut rows)?;
+    eliminate::<_, V, 3>(simd, &mut rows)?;
+    eliminate::<_, V, 4>(simd, &mut rows)?;
     substitute::<_, V, 5>(simd, &mut rows)?;
     substitute::<_, V, 4>(simd, &mut rows)?;
     substitute::<_, V, 3>(simd, &mut rows)?;
@@ -68,19 +68,27 @@ fn solved<S: Simd, const R: usize, const V: usize>(
 
 /// Clears a column below its row, the one with the largest number first.
 #[inline(always)]
-fn eliminate<S: Simd, const V: usize, const COLUMN: usize>(simd: S, rows: &mut [Row<V>; LEGS]) {
+fn eliminate<S: Simd, const V: usize, const COLUMN: usize>(simd: S, rows: &mut [Row<V>; LEGS]) -> Option<()> {
     let (_, rest) = rows.split_at_mut(COLUMN);
-    let Some((top, below)) = rest.split_first_mut() else { return };
+    let (top, below) = rest.split_first_mut()?;
     for row in below.iter_mut() {
         if number::<V, COLUMN>(row).abs() > number::<V, COLUMN>(top).abs() {
             // Vector by vector: of a whole row it would be a call.
             row.iter_mut().zip(top.iter_mut()).for_each(|(a, b)| core::mem::swap(a, b));
         }
     }
-    for row in below.iter_mut() {
-        let factor = number::<V, COLUMN>(row) / number::<V, COLUMN>(top);
-        subtract(simd, row, factor, top);
+    let pivot = number::<V, COLUMN>(top);
+    if pivot == 0.0 {
+        return None;
     }
+    for row in below.iter_mut() {
+        subtract(simd, row, number::<V, COLUMN>(row) / pivot, top);
+        // Without what rounding leaves: the substitution changes whole rows.
+        if let Some(cleared) = row.as_flattened_mut().get_mut(COLUMN) {
+            *cleared = 0.0;
+        }
+    }
+    Some(())
 }
 
 /// The unknown of a column, in place of the right-hand side of its row, and out of the rows above.

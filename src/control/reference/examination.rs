@@ -1,26 +1,13 @@
 //! Examination of a stop near a bound: at instants ("knots") `dt` apart.
 //!
-//! With the arm r of the outermost joint and the peaks v, w of the stop, a joint moves at most at V = v + r w, and
+//! Between two knots lengths, their rates and the coordinates of C depart little from a cubic, and that is within the hull of its Bezier
+//! points, which are examined too (see [`super::cubic_departure`]). Angles leave their chords by at most `|angle''| dt^2 / 8`, and so does every
+//! quantity in the step that leads to the motion:
 //!
 //! ```text
-//! |s''|     <= A + r (Ar + w^2)                                       of a joint
-//! |s'''|    <= J + r (Jr + 3 w Ar + w^3)
-//! |L''|     <= |s''| + V^2 / L
-//! |L'''|    <= |s'''| + 3 V |s''| / L + 2 V^3 / sqrt(3) L^2
 //! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2     s, c = |sin|, cos of beta; of the Bryan angles
 //! |x'''|    <= J (2 |u| + |e|)                      u, e the directions of v, a; of a coordinate of C
 //! ```
-//!
-//! Between two knots a quantity f with `|f'''| <= K` differs from the cubic with its values and rates at both by at most
-//! `K dt^3 / 96`, its rate from that of the cubic by `K dt^2 / 30` (the integrals of Peano's kernels, the second rounded up). A cubic is
-//! within the hull of its Bezier points, and so is its rate:
-//!
-//! ```text
-//! f0,  f0 + f0' dt / 3,  f1 - f1' dt / 3,  f1              f0',  3 (f1 - f0) / dt - f0' - f1',  f1'
-//! ```
-//!
-//! These points are examined for lengths, their rates and the coordinates of C. Angles leave their chords by at most
-//! `|angle''| dt^2 / 8`, and so does every quantity in the step that leads to the motion.
 //!
 //! The attitude at the knots is that of the stop that would be followed.
 //! Between knots a length may exceed its bound by 2.5e-5 of the stroke, an angle by as much at the outermost joint.
@@ -32,6 +19,7 @@ use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
 use super::angle_ranges::{AngleRanges, MAX_SLACK_RATIO, cosine_of_beta};
+use super::cubic_departure::{CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
 use super::regularity::{REGULARITY_WORK, RegularBalls, Regularity};
@@ -49,17 +37,13 @@ use crate::model::triples::LegLanes;
 const LENGTH_DEPARTURE_M: f64 = 2e-5;
 /// Departure of a leg's rate from that of its cubic that does so, over the largest rate.
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
-/// Largest departures from a cubic with the same values and rates at both ends, for a third derivative of one and a unit of time.
-const CUBIC_DEPARTURE: f64 = 1.0 / 96.0;
-const CUBIC_RATE_DEPARTURE: f64 = 1.0 / 30.0;
-/// `2 / sqrt 3`: of the third derivative of a length by the turning of its leg alone.
-const TURNING_SHARE: f64 = 1.154_700_538_379_251_7;
 /// Bounds on the number of intervals between knots.
-const MIN_INTERVALS: f64 = 3.0;
+const MIN_INTERVALS: u32 = 3;
 const MAX_INTERVALS: u32 = 10;
-/// Work that a verification may do, in knots: those of the longest stop, and the regularity of three poses. It bounds the longest
-/// cycle. The balls that were found remain for the next one. With two a reference that is beyond its condition by rounding would not come back.
-pub(super) const MAX_WORK: u32 = MAX_INTERVALS + 3 * REGULARITY_WORK;
+/// Work that a verification may do, in knots: those of the longest stop, and the regularity of four poses. It bounds the longest
+/// cycle. The balls that were found remain for the next one. With three a reference that presses against its condition is refused in turns, and
+/// the platform jerks.
+pub(super) const MAX_WORK: u32 = MAX_INTERVALS + 4 * REGULARITY_WORK;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures from chords are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;
@@ -76,7 +60,7 @@ pub(super) struct Examination<'a> {
     constants: &'a Constants,
     bounds: &'a PoseBounds,
     stop: &'a PoseStop,
-    intervals: f64,
+    intervals: u32,
     dt: f64,
     /// Departures between knots: of a length \[m\], of a rate \[m/s\], and of C per coordinate \[m\].
     length_slack: f64,
@@ -125,12 +109,16 @@ impl<'a> Examination<'a> {
         let actuator = &constants.machine().actuator;
         let needs_rates = v + constants.arm * w > actuator.max_rate;
         let length_jerk = length_jerk(constants, v, w);
-        let lengths = libm::cbrt(CUBIC_DEPARTURE * length_jerk / LENGTH_DEPARTURE_M);
-        let rates = CUBIC_RATE_DEPARTURE * length_jerk / (RATE_DEPARTURE_RATIO * actuator.max_rate);
-        let density = if needs_rates { lengths.max(rates.sqrt()) } else { lengths };
-        let knots = (stop.duration() * density).ceil();
-        let intervals = knots.clamp(MIN_INTERVALS, f64::from(MAX_INTERVALS));
-        let dt = stop.duration() / intervals;
+        // As many that the departures of lengths, and of rates where these matter, are small enough.
+        let duration = stop.duration();
+        let (square, cube) = (duration * duration, duration * duration * duration);
+        let length_share = CUBIC_DEPARTURE * length_jerk * cube / LENGTH_DEPARTURE_M;
+        let max_departure = RATE_DEPARTURE_RATIO * actuator.max_rate;
+        let rate_share =
+            if needs_rates { CUBIC_RATE_DEPARTURE * length_jerk * square / max_departure } else { 0.0 };
+        let are_too_few = |n: &u32| f64::from(n * n * n) < length_share || f64::from(n * n) < rate_share;
+        let intervals = MIN_INTERVALS + (MIN_INTERVALS..MAX_INTERVALS).filter(are_too_few).count() as u32;
+        let dt = duration / f64::from(intervals);
         let (cubic, chord) = (CUBIC_DEPARTURE * dt * dt * dt, step.duration * step.duration / 8.0);
         let room = ROOM_RATIO * actuator.stroke();
         // Along the velocity and, across it, along the rest of the present acceleration.
@@ -156,7 +144,7 @@ impl<'a> Examination<'a> {
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
             relaxed: None,
-            work: work.saturating_sub(intervals as u32),
+            work: work.saturating_sub(intervals),
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
@@ -183,7 +171,7 @@ impl<'a> Examination<'a> {
         loop {
             before = Some(self.check(simd, balls, &pose, &state, before)?);
             k += 1;
-            if k > self.intervals as u32 {
+            if k > self.intervals {
                 return Ok(());
             }
             let next = self.stop.at(f64::from(k) * self.dt);
@@ -363,24 +351,4 @@ fn is_inside(x: f64, slack: f64, (low, high): (&f64, &f64)) -> bool {
 
 fn ranges(Envelope { lowest, highest }: &Envelope) -> impl Iterator<Item = (&f64, &f64)> {
     lowest.iter().zip(highest)
-}
-
-/// Largest third derivative of a leg's length at peak velocities.
-pub(super) fn length_jerk(constants: &Constants, v: f64, w: f64) -> f64 {
-    let Limits { orientation, position, .. } = &constants.parameters.limits;
-    let (arm, joint) = (constants.arm, v + constants.arm * w);
-    let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);
-    let joint_jerk =
-        position.jerk + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w);
-    let turning = joint / constants.machine().actuator.min_length;
-    joint_jerk + turning * (3.0 * joint_acceleration + TURNING_SHARE * turning * joint)
-}
-
-/// Largest second derivative of a leg's length at peak velocities.
-pub(super) fn curvature(constants: &Constants, v: f64, w: f64) -> f64 {
-    let Limits { orientation, position, .. } = &constants.parameters.limits;
-    let joint = v + constants.arm * w;
-    position.acceleration
-        + constants.arm * (orientation.acceleration + w * w)
-        + joint * joint / constants.machine().actuator.min_length
 }

@@ -13,6 +13,7 @@
 //! | `stop` | stop of a vector in closed form |
 //! | `verification` | whether a stop keeps the limits along its way |
 //! | `examination` | a stop near a bound, knot by knot |
+//! | `cubic_departure` | what may happen between two knots |
 //! | `angle_ranges` | whether angles are within their ranges |
 //! | `pose_stop` | stop of position and orientation |
 //! | `held_stop` | the stop that is held ready, and followed |
@@ -49,6 +50,7 @@ mod angle_ranges;
 mod approach;
 mod components;
 mod constant_jerk;
+mod cubic_departure;
 mod examination;
 mod held_stop;
 mod history;

@@ -3,7 +3,8 @@
 //! In free space one pose is enough: every margin exceeds the length of the way, in any direction. Near a bound the stop is
 //! examined knot by knot, see [`super::examination`].
 
-use super::examination::{Examination, MAX_WORK, curvature};
+use super::cubic_departure::curvature;
+use super::examination::{Examination, MAX_WORK};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, StopKind};
 use super::regularity::RegularBalls;

@@ -1,6 +1,5 @@
 //! Quantities whose extremes lie between the knots of an examined stop, or within the step before it.
 
-use super::super::examination::{curvature, length_jerk};
 use super::verification::{PlayedStep, Scene};
 use super::*;
 use crate::model::inverse_geometry::leg_motion;
@@ -11,7 +10,7 @@ use crate::model::task::task_coordinates;
 const ROOM_RATIO: f64 = 2.6e-5;
 
 /// Standing at home with limits of acceleration and jerk times factors, every bound wide.
-fn scene(samples: &mut Samples, acceleration: f64, jerk: f64) -> Scene {
+pub(super) fn scene(samples: &mut Samples, acceleration: f64, jerk: f64) -> Scene {
     let mut scene = Scene::new(samples);
     let limits = &mut scene.constants.parameters.limits;
     *limits = LIMITS;
@@ -233,91 +232,6 @@ fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
             "{part}: {bound}"
         );
     }
-}
-
-/// The largest second derivative of a length, for one limit or velocity at a time: each term is needed.
-#[test]
-fn no_length_is_curved_more_than_its_bound() {
-    let mut samples = Samples::new(85);
-    let mut used = [0.0_f64; 3];
-    for k in 0..6000 {
-        let (term, mut scene) = (k % 3, scene(&mut samples, 1.0, 1.0));
-        scene.motion.pose = pose(&mut samples, &scene.constants);
-        let limits = &mut scene.constants.parameters.limits;
-        let sizes = [[1.0, 1.0, 0.0, 0.0], [1e-3, 1e-3, 0.0, 1.0], [1e-3, 1e-3, 1.0, 0.0]][term];
-        limits.position.acceleration *= sizes[0];
-        limits.orientation.acceleration *= sizes[1];
-        let [a, alpha] = [limits.position.acceleration, limits.orientation.acceleration];
-        let unit = |samples: &mut Samples| samples.vector(1.0);
-        scene.motion.twist =
-            Twist { angular: unit(&mut samples) * sizes[3], linear: unit(&mut samples) * sizes[2] };
-        scene.motion.acceleration =
-            Acceleration { angular: unit(&mut samples) * alpha, linear: unit(&mut samples) * a };
-        let bound = curvature(&scene.constants, sizes[2], sizes[3]);
-        let legs = leg_motion(scene.constants.machine(), &scene.motion);
-        let largest = legs.accel.iter().fold(0.0_f64, |largest, accel| largest.max(accel.abs()));
-        used[term] = used[term].max(largest / bound);
-    }
-    assert!(used.iter().all(|used| (0.4..=1.0).contains(used)), "{used:?}");
-}
-
-/// The largest third derivative of a length, for one limit or velocity, or two that go together, at a time: each term is needed.
-#[test]
-fn no_length_has_a_third_derivative_beyond_its_bound() {
-    const H: f64 = 1e-4;
-    let mut samples = Samples::new(88);
-    let mut used = [0.0_f64; 5];
-    for k in 0..10_000 {
-        let (term, mut scene) = (k % 5, scene(&mut samples, 1.0, 1.0));
-        // Jerk, turning, shifting, both and acceleration, turning and acceleration.
-        let [jerk, acceleration, v, w] = [
-            [1.0, 1e-6, 0.0, 0.0],
-            [1e-6, 1e-6, 0.0, 2.0],
-            [1e-6, 1e-6, 2.0, 0.0],
-            [1e-6, 1.0, 2.0, 0.0],
-            [1e-6, 1.0, 0.0, 1.0],
-        ][term];
-        for limits in [
-            &mut scene.constants.parameters.limits.position,
-            &mut scene.constants.parameters.limits.orientation,
-        ] {
-            limits.jerk *= jerk;
-            limits.acceleration *= acceleration;
-        }
-        let Limits { position, orientation, .. } = scene.constants.parameters.limits;
-        let unit = |samples: &mut Samples| samples.vector(1.0).normalize();
-        let mut pair = |angular: f64, linear: f64| Twist {
-            angular: unit(&mut samples) * angular,
-            linear: unit(&mut samples) * linear,
-        };
-        let (velocity, change, jerk) = (
-            pair(w, v),
-            pair(orientation.acceleration, position.acceleration),
-            pair(orientation.jerk, position.jerk),
-        );
-        let pose = pose(&mut samples, &scene.constants);
-        let accel = |t: f64| {
-            let along = |a: f64, b: f64, c: f64| {
-                Twist::from_vector(&(velocity.vector() * a + change.vector() * b + jerk.vector() * c))
-            };
-            let acceleration = along(0.0, 1.0, t);
-            let motion = Motion {
-                pose: pose.displaced(&along(t, 0.5 * t * t, 0.0)),
-                twist: along(1.0, t, 0.5 * t * t),
-                acceleration: Acceleration { angular: acceleration.angular, linear: acceleration.linear },
-            };
-            leg_motion(scene.constants.machine(), &motion).accel
-        };
-        // The nearest of the legs decides.
-        let mut machine = scene.constants.machine().clone();
-        machine.actuator.min_length = leg_lengths(&machine, &pose).into_iter().fold(f64::INFINITY, f64::min);
-        let constants = Constants::new(&machine, scene.constants.parameters);
-        let bound = length_jerk(&constants, v, w);
-        let largest =
-            accel(H).into_iter().zip(accel(-H)).map(|(after, before)| ((after - before) / (2.0 * H)).abs());
-        used[term] = used[term].max(largest.fold(0.0, f64::max) / bound);
-    }
-    assert!(used.iter().all(|used| (0.3..=1.0).contains(used)), "{used:?}");
 }
 
 /// At knots the condition keeps the limit of the reference, whatever that of the platform.

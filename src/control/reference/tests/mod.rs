@@ -23,6 +23,7 @@ use crate::model::rigid::{Pose, exp};
 mod approach;
 mod assessment;
 mod between_knots;
+mod cubic_departure;
 mod feedback;
 mod free_motion;
 mod generator;
