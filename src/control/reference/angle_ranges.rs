@@ -12,13 +12,14 @@
 //! not matter. That is a few products for all ends at once, where each arc tangent takes 100 instructions: an examination asks at
 //! every knot.
 
-use core::f64::consts::PI;
+use core::f64::consts::{FRAC_PI_2, PI};
 
 use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Matrix3;
 
+use super::stop::Stop;
 use crate::control::parameters::Envelope;
 
 /// Part of the width of a range that a slack may use.
@@ -73,6 +74,17 @@ impl AngleRanges {
             ranges.set_end(axis + LANES / 2, reached_high, -1.0, slacks[1], width >= PI);
         }
         ranges
+    }
+
+    /// Those, if they lack room for some rotation of a stop from X.
+    pub fn without_room(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<Self> {
+        let Envelope { lowest, highest } = envelope;
+        let [_, beta, ..] = x;
+        let turn = stop.peak_velocity * stop.duration;
+        let need = turn / libm::cos((beta.abs() + turn).min(FRAC_PI_2));
+        let mut ranges = x.iter().zip(lowest.iter().zip(highest)).take(3);
+        let have_room = ranges.all(|(x, (low, high))| (x - low).min(high - x) >= need);
+        (!have_room).then(|| Self::new(envelope, x))
     }
 
     fn set_end(&mut self, lane: usize, angle: f64, sign: f64, slack: f64, is_wide: bool) {

@@ -14,16 +14,13 @@
 //! An axis of the envelope narrower than four times the bound between knots is examined at the knots only.
 
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
 use super::angle_ranges::{AngleRanges, MAX_SLACK_RATIO, cosine_of_beta};
 use super::cubic_departure::{CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
-use super::regularity::{REGULARITY_WORK, RegularBalls, Regularity};
-use super::stop::Stop;
+use super::regularity::{REGULARITY_WORK, RegularBalls, Regularity, Surroundings};
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
@@ -45,7 +42,7 @@ const MAX_INTERVALS: u32 = 10;
 /// the platform jerks.
 pub(super) const MAX_WORK: u32 = MAX_INTERVALS + 4 * REGULARITY_WORK;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
-/// it, as the departures from chords are bounded for the worst direction.
+/// it, as the departures are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;
 /// Relative allowance for rounding.
 const ROUNDING: f64 = 1e-9;
@@ -139,7 +136,7 @@ impl<'a> Examination<'a> {
                 .envelope
                 .as_ref()
                 .zip(x)
-                .and_then(|(envelope, x)| angles_without_room(envelope, x, &stop.orientation)),
+                .and_then(|(envelope, x)| AngleRanges::without_room(envelope, x, &stop.orientation)),
             from: step.from,
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
@@ -242,13 +239,12 @@ impl<'a> Examination<'a> {
         let turn =
             way(&state.orientation.velocity, self.stop.orientation.peak_velocity, orientation.acceleration);
         let reach = [shift, turn];
-        let around = constants.parameters.condition;
         let cover = balls.knot_cover(simd, constants, pose, reach);
         if cover.is_complete() {
             return Ok(());
         }
-        let regularity =
-            balls.cover_by_new(constants, pose, reach, around, &mut self.work).ok_or(Limit::Condition)?;
+        let around = Surroundings { pose, reach, condition: constants.parameters.condition };
+        let regularity = balls.cover_by_new(constants, &around, &mut self.work).ok_or(Limit::Condition)?;
         let at_knot = Regularity::of_reference(constants);
         if cover.knot || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
@@ -320,16 +316,6 @@ impl<'a> Examination<'a> {
     }
 }
 
-/// The ranges of the angles, if they lack room for some rotation of a stop.
-fn angles_without_room(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<AngleRanges> {
-    let [_, beta, ..] = x;
-    let turn = stop.peak_velocity * stop.duration;
-    let need = turn / libm::cos((beta.abs() + turn).min(core::f64::consts::FRAC_PI_2));
-    let have_room =
-        x.iter().zip(ranges(envelope)).take(3).all(|(x, (low, high))| (x - low).min(high - x) >= need);
-    (!have_room).then(|| AngleRanges::new(envelope, x))
-}
-
 /// An envelope with room for X.
 fn relaxed(envelope: &Envelope, x: &[f64; 6]) -> Envelope {
     let mut relaxed = *envelope;
@@ -347,8 +333,4 @@ fn is_position_inside(envelope: &Envelope, p: &Vector3<f64>, slack: &Vector3<f64
 /// Whether a coordinate has a distance from both ends of its range, or a part of the range that is narrower.
 fn is_inside(x: f64, slack: f64, (low, high): (&f64, &f64)) -> bool {
     (x - low).min(high - x) >= slack.min(MAX_SLACK_RATIO * (high - low))
-}
-
-fn ranges(Envelope { lowest, highest }: &Envelope) -> impl Iterator<Item = (&f64, &f64)> {
-    lowest.iter().zip(highest)
 }

@@ -181,8 +181,16 @@ impl Ball {
     }
 }
 
-/// Poses around one: a shift \[m\] and a turn \[rad\].
+/// Poses around one: within a shift \[m\] and a turn \[rad\].
 pub(super) type Reach = [f64; 2];
+
+/// Poses around one that shall be regular, each with at most a condition.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surroundings<'a> {
+    pub pose: &'a Pose,
+    pub reach: Reach,
+    pub condition: f64,
+}
 
 /// What of a knot is proved to be regular.
 #[derive(Clone, Copy, Debug, Default)]
@@ -212,27 +220,19 @@ pub(super) struct RegularBalls {
 }
 
 impl RegularBalls {
-    /// Whether every pose within a reach of a pose is regular and has at most a condition, by work that may be done. `false` is no
-    /// proof of the contrary.
-    pub fn cover(
-        &mut self,
-        constants: &Constants,
-        pose: &Pose,
-        reach: Reach,
-        limit: f64,
-        work: &mut u32,
-    ) -> bool {
-        self.cover_by_known(constants, pose, reach, limit)
-            || self.cover_by_new(constants, pose, reach, limit, work).is_some()
+    /// Whether the surroundings are regular, by work that may be done. `false` is no proof of the contrary.
+    pub fn cover(&mut self, constants: &Constants, around: &Surroundings<'_>, work: &mut u32) -> bool {
+        self.cover_by_known(constants, around) || self.cover_by_new(constants, around, work).is_some()
     }
 
     /// The same by the balls that are kept.
-    fn cover_by_known(&mut self, constants: &Constants, pose: &Pose, reach: Reach, limit: f64) -> bool {
+    fn cover_by_known(&mut self, constants: &Constants, around: &Surroundings<'_>) -> bool {
+        let Surroundings { pose, reach, condition } = *around;
         dispatch!(constants.machine().level, simd => {
             for index in self.recent_first() {
                 if let Some(group) = self.groups.get(index) {
                     let displacements = group.displacements(simd, pose);
-                    if group.covers(simd, constants, &displacements, reach, limit) {
+                    if group.covers(simd, constants, &displacements, reach, condition) {
                         self.recent = index;
                         return true;
                     }
@@ -273,17 +273,16 @@ impl RegularBalls {
         cover
     }
 
-    /// Covers by a new ball around the pose. Returns the regularity of the pose.
+    /// Covers the surroundings by a new ball. Returns the regularity of the pose.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
     pub fn cover_by_new(
         &mut self,
         constants: &Constants,
-        pose: &Pose,
-        reach: Reach,
-        limit: f64,
+        around: &Surroundings<'_>,
         work: &mut u32,
     ) -> Option<Regularity> {
+        let Surroundings { pose, reach, condition } = *around;
         let ball = Ball::new(constants, pose, work)?;
         let index = self.kept / LANES;
         let group = self.groups.get_mut(index)?;
@@ -292,7 +291,7 @@ impl RegularBalls {
         // the next one.
         let is_covered = dispatch!(constants.machine().level, simd => {
             let displacements = group.displacements(simd, pose);
-            group.covers(simd, constants, &displacements, reach, limit)
+            group.covers(simd, constants, &displacements, reach, condition)
         });
         if !is_covered {
             return None;

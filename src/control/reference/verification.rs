@@ -7,7 +7,7 @@ use super::cubic_departure::curvature;
 use super::examination::{Examination, MAX_WORK};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, StopKind};
-use super::regularity::RegularBalls;
+use super::regularity::{RegularBalls, Surroundings};
 use super::stop::{StopExtent, release_first_extent};
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
@@ -58,13 +58,18 @@ impl Verifier {
         let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
         let [angular_bulge, linear_bulge] = step.bulge();
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
-        let (reach, mut work) = ([shift.length, turn.length], MAX_WORK);
+        let around = Surroundings {
+            pose,
+            reach: [shift.length, turn.length],
+            condition: constants.reference_condition,
+        };
+        let mut work = MAX_WORK;
         let is_free = shift.peak_velocity + linear_bulge <= position.velocity
             && turn.peak_velocity + angular_bulge <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity
                 <= constants.machine().actuator.max_rate
             && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)
-            && self.balls.cover(constants, pose, reach, constants.reference_condition, &mut work);
+            && self.balls.cover(constants, &around, &mut work);
         if is_free {
             return Ok(StopKind::ReleaseFirst);
         }
