@@ -229,16 +229,8 @@ impl<'a> Examination<'a> {
         state: &PoseStopState,
     ) -> Result<(), Limit> {
         let constants = self.constants;
-        let Limits { orientation, position, .. } = &constants.parameters.limits;
         // Half of an interval on either side.
-        let half = 0.5 * self.dt;
-        let way = |velocity: &Vector3<f64>, peak: f64, acceleration: f64| {
-            half * peak.min(velocity.norm() + half * acceleration)
-        };
-        let shift = way(&state.position.velocity, self.stop.position.peak_velocity, position.acceleration);
-        let turn =
-            way(&state.orientation.velocity, self.stop.orientation.peak_velocity, orientation.acceleration);
-        let reach = [shift, turn];
+        let reach = self.stop.reach(state, 0.5 * self.dt, &constants.parameters.limits);
         let cover = balls.knot_cover(simd, constants, pose, reach);
         if cover.is_complete() {
             return Ok(());

@@ -5,6 +5,7 @@
 
 use nalgebra::Vector3;
 
+use super::regularity::Reach;
 use super::stop::{Stop, StopState};
 use crate::control::limits::{DerivativeLimits, Limits};
 use crate::model::rigid::{Motion, Pose, Twist};
@@ -66,6 +67,18 @@ impl PoseStop {
     #[inline(always)]
     pub fn at(&self, t: f64) -> PoseStopState {
         PoseStopState { orientation: self.orientation.at(t), position: self.position.at(t) }
+    }
+
+    /// Bounds on how far the stop moves within `dt` seconds after a state, or before it.
+    #[inline(always)]
+    pub fn reach(&self, state: &PoseStopState, dt: f64, limits: &Limits) -> Reach {
+        let way = |stop: &Stop, state: &StopState, limits: &DerivativeLimits| {
+            dt * stop.peak_velocity.min(state.velocity.norm() + 0.5 * dt * limits.acceleration)
+        };
+        [
+            way(&self.position, &state.position, &limits.position),
+            way(&self.orientation, &state.orientation, &limits.orientation),
+        ]
     }
 }
 

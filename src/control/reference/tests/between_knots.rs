@@ -137,14 +137,7 @@ fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {
         } else {
             scene.motion.twist.linear = direction * (0.5 * samples.uniform());
             scene.motion.acceleration.linear = direction * (limits.acceleration * samples.uniform());
-            let set = |scene: &mut Scene, bound| {
-                let mut machine = scene.constants.machine().clone();
-                machine.actuator.max_rate = bound;
-                let condition = scene.constants.reference_condition;
-                scene.constants = Constants::new(&machine, scene.constants.parameters);
-                scene.constants.reference_condition = condition;
-            };
-            let Some((extremes, bound)) = scene.tightened(100.0, 0.0, set) else { continue };
+            let Some((extremes, bound)) = scene.tightened(100.0, 0.0, Scene::set_max_rate) else { continue };
             assert!(extremes.rate <= bound * (1.0 + 1e-9), "{} {bound} {:?}", extremes.rate, scene.motion);
             largest[1] = largest[1].max(extremes.rate / bound - 1.0);
         }
@@ -231,6 +224,31 @@ fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
             (found / middle - 1.0).abs() < 1e-9 && (bound / middle - 1.0).abs() < 1e-8,
             "{part}: {bound}"
         );
+    }
+}
+
+/// A leg whose rate is largest in the middle of a long step: its acceleration changes sign there.
+#[test]
+fn the_rate_in_the_middle_of_a_long_step_is_within_a_limit_that_is_just_accepted() {
+    let mut samples = Samples::new(95);
+    for h in [0.03, 0.05] {
+        let mut scene = scene(&mut samples, 1.0, 1.0);
+        let (v, jerk) = (Vector3::z() * 0.3, Vector3::z() * -LIMITS.position.jerk);
+        let a = jerk * (0.5 * h);
+        let Motion { pose, twist, acceleration } = &mut scene.motion;
+        (twist.linear, acceleration.linear, scene.step.jerk.linear) = (v, a, jerk);
+        scene.step.duration = h;
+        // Backward from the end.
+        let t = -0.5 * h;
+        let middle = Motion {
+            pose: Pose { position: pose.position + (v + (a + jerk * (t / 3.0)) * (t / 2.0)) * t, ..*pose },
+            twist: Twist { linear: v + (a + jerk * (t / 2.0)) * t, ..*twist },
+            ..scene.motion
+        };
+        let rates = leg_motion(scene.constants.machine(), &middle).rate;
+        let rate = rates.into_iter().fold(0.0_f64, |largest, rate| largest.max(rate.abs()));
+        let (_, bound) = scene.tightened(100.0, 0.0, Scene::set_max_rate).unwrap();
+        assert!(rate <= bound && rate > 0.8 * bound, "{h}: {rate} {bound}");
     }
 }
 

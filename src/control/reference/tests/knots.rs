@@ -1,7 +1,7 @@
 //! Regularity at the knots of a stop near a bound: of the pose itself, of the poses around it, and the work for it.
 
 use super::super::pose_bounds::PoseBounds;
-use super::super::pose_stop::StopKind;
+use super::super::pose_stop::{PoseStop, StopKind};
 use super::super::regularity::{KnotCover, RegularBalls};
 use super::super::target::at_rest;
 use super::super::verification::{Step, Verifier};
@@ -9,6 +9,7 @@ use super::verification::Scene;
 use super::*;
 use crate::control::limits::Limit;
 use crate::model::inverse_geometry::universal_sine;
+use crate::model::rigid::{Acceleration, Motion, Twist};
 
 /// Between knots a leg may come half as near to the first axis of its universal joint, at a knot it may not: but for the return
 /// of a reference that is there already.
@@ -78,4 +79,43 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
         }
     }
     assert!(later > 4, "{later}");
+}
+
+/// No pose of a stop is farther from a state than the reach around it, and where the velocity is small some are almost as far.
+#[test]
+fn a_stop_moves_no_farther_than_its_reach() {
+    let mut samples = Samples::new(94);
+    let mut nearest = [0.0_f64; 2];
+    for _ in 0..3000 {
+        let part = samples.uniform();
+        let Limits { position, orientation, .. } = LIMITS;
+        let motion = Motion {
+            twist: Twist {
+                angular: samples.vector(part * orientation.velocity),
+                linear: samples.vector(part * position.velocity),
+            },
+            acceleration: Acceleration {
+                angular: samples.vector(orientation.acceleration),
+                linear: samples.vector(position.acceleration),
+            },
+            ..at_rest(&Pose { rotation: Matrix3::identity(), position: Vector3::zeros() })
+        };
+        let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
+        let (t, dt) = (samples.uniform() * stop.duration(), 0.03 * samples.uniform());
+        let state = stop.at(t);
+        let reach = stop.reach(&state, dt, &LIMITS);
+        for other in [(t - dt).max(0.0), t + dt].map(|t| stop.at(t)) {
+            let moved = [
+                (other.position.displacement - state.position.displacement).norm(),
+                (other.orientation.displacement - state.orientation.displacement).norm(),
+            ];
+            for ((nearest, moved), reach) in nearest.iter_mut().zip(moved).zip(reach) {
+                assert!(moved <= reach * (1.0 + 1e-9), "{moved} {reach} {motion:?}");
+                if state.position.velocity.norm().max(state.orientation.velocity.norm()) < 0.02 {
+                    *nearest = nearest.max(moved / reach);
+                }
+            }
+        }
+    }
+    assert!(nearest.iter().all(|nearest| *nearest > 0.9), "{nearest:?}");
 }

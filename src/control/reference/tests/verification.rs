@@ -167,6 +167,14 @@ impl Scene {
         Self { constants, bounds, motion, step, is_free: samples.below(3) == 0 }
     }
 
+    pub fn set_max_rate(&mut self, rate: f64) {
+        let mut machine = self.constants.machine().clone();
+        machine.actuator.max_rate = rate;
+        let condition = self.constants.reference_condition;
+        self.constants = Constants::new(&machine, self.constants.parameters);
+        self.constants.reference_condition = condition;
+    }
+
     /// In one of the cycles that share the work of a long stop.
     pub fn verify(&self) -> Result<StopKind, Limit> {
         let mut verifier = Verifier::default();
@@ -245,14 +253,7 @@ fn rates_stay_within_a_limit_that_is_just_accepted() {
     let mut uses = Uses::default();
     for _ in 0..400 {
         let mut scene = Scene::new(&mut samples);
-        let set = |scene: &mut Scene, bound| {
-            let mut machine = scene.constants.machine().clone();
-            machine.actuator.max_rate = bound;
-            let condition = scene.constants.reference_condition;
-            scene.constants = Constants::new(&machine, scene.constants.parameters);
-            scene.constants.reference_condition = condition;
-        };
-        let Some((extremes, bound)) = scene.tightened(100.0, 0.0, set) else { continue };
+        let Some((extremes, bound)) = scene.tightened(100.0, 0.0, Scene::set_max_rate) else { continue };
         assert!(extremes.rate <= bound * (1.0 + 1e-9), "{} {bound} {:?}", extremes.rate, scene.motion);
         uses.add(extremes.rate / bound - 1.0, 0.02);
     }
