@@ -229,8 +229,7 @@ impl<'a> Examination<'a> {
         state: &PoseStopState,
     ) -> Result<(), Limit> {
         let constants = self.constants;
-        // Half of an interval on either side.
-        let reach = self.stop.reach(state, 0.5 * self.dt, &constants.parameters.limits);
+        let reach = self.stop.reach(state, self.dt, &constants.parameters.limits);
         let cover = balls.knot_cover(simd, constants, pose, reach);
         if cover.is_complete() {
             return Ok(());

@@ -69,11 +69,12 @@ impl PoseStop {
         PoseStopState { orientation: self.orientation.at(t), position: self.position.at(t) }
     }
 
-    /// Bounds on how far the stop moves within `dt` seconds after a state, or before it.
+    /// Bounds on how far the stop moves within half of `dt` after a state, or before it: around one of the knots `dt` apart.
     #[inline(always)]
     pub fn reach(&self, state: &PoseStopState, dt: f64, limits: &Limits) -> Reach {
+        let half = 0.5 * dt;
         let way = |stop: &Stop, state: &StopState, limits: &DerivativeLimits| {
-            dt * stop.peak_velocity.min(state.velocity.norm() + 0.5 * dt * limits.acceleration)
+            half * stop.peak_velocity.min(state.velocity.norm() + 0.5 * half * limits.acceleration)
         };
         [
             way(&self.position, &state.position, &limits.position),

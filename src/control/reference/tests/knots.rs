@@ -101,10 +101,10 @@ fn a_stop_moves_no_farther_than_its_reach() {
             ..at_rest(&Pose { rotation: Matrix3::identity(), position: Vector3::zeros() })
         };
         let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
-        let (t, dt) = (samples.uniform() * stop.duration(), 0.03 * samples.uniform());
+        let (t, dt) = (samples.uniform() * stop.duration(), 0.06 * samples.uniform());
         let state = stop.at(t);
         let reach = stop.reach(&state, dt, &LIMITS);
-        for other in [(t - dt).max(0.0), t + dt].map(|t| stop.at(t)) {
+        for other in [(t - 0.5 * dt).max(0.0), t + 0.5 * dt].map(|t| stop.at(t)) {
             let moved = [
                 (other.position.displacement - state.position.displacement).norm(),
                 (other.orientation.displacement - state.orientation.displacement).norm(),
