@@ -1,13 +1,16 @@
-//! Six linear equations by LU with partial pivoting, the right-hand sides carried along.
+//! Six linear equations by LU with partial pivoting, and the norm of an inverse by Gauss-Jordan elimination.
 //!
 //! ```text
 //! step k: the row with the largest |a_kk| goes first; below, a_ij -= (a_ik / a_kk) a_kj
-//! then:   x_k = (b_k - sum_j>k a_kj x_j) / a_kk,   last to first
+//! LU:     the right-hand side carried along; then x_k = (b_k - sum_j>k a_kj x_j) / a_kk,   last to first
+//! G.-J.:  also above, and column k becomes that of the inverse: a_kk <- 1, row k / a_kk; a_ik <- 0, minus a_ik row k
 //! ```
 //!
-//! A row holds its coefficients, its right-hand sides and zeros. All of it is changed in each step, in lanes, also the columns
-//! that are cleared already: without a branch that is faster. Nothing is found by an index that could be
-//! out of range, and so nothing could panic. That is why it is not nalgebra's.
+//! In the end Gauss-Jordan leaves `A^-1` with its columns in the order of the pivots, which no norm sees.
+//!
+//! A row is changed as a whole in each step, in lanes, also the columns that are cleared already: without a branch that is
+//! faster. Nothing is found by an index that could be out of range, and so nothing could panic. That is why it is not nalgebra's.
+//! The instruction set changes the time, not one bit of a result.
 
 use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
 
@@ -16,106 +19,144 @@ use super::machine::LEGS;
 /// Numbers in a vector of lanes.
 const LANES: usize = 4;
 
+/// A row in memory: its coefficients, its right-hand side, and a zero.
+type Row = [[f64; LANES]; 2];
+
 /// x of `A x = b`; `None` if a pivot is zero. A is given by rows.
 pub(super) fn solve(level: Level, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<[f64; LEGS]> {
-    solve_columns(level, a, &b.map(|b| [b])).map(|x| x.map(|[x]| x))
+    dispatch!(level, simd => solved(simd, a, b))
 }
 
-/// X of `A X = B`; all given by rows. The instruction set changes the time, not one bit of the result.
-pub(super) fn solve_columns<const R: usize>(
+/// `|W A^-1|^2` (Frobenius) with the diagonal W of the weights; `None` if a pivot is zero. A is given by rows.
+pub(super) fn inverse_norm_squared(
     level: Level,
     a: &[[f64; LEGS]; LEGS],
-    b: &[[f64; R]; LEGS],
-) -> Option<[[f64; R]; LEGS]> {
-    dispatch!(level, simd => {
-        if R <= 2 { solved::<_, R, 2>(simd, a, b) } else { solved::<_, R, 3>(simd, a, b) }
-    })
+    weights: &[f64; LEGS],
+) -> Option<f64> {
+    dispatch!(level, simd => weighted_inverse(simd, a, weights))
 }
 
-/// A row in memory.
-type Row<const V: usize> = [[f64; LANES]; V];
-
-/// With rows of V vectors, which hold `LEGS + R` numbers.
 #[inline(always)]
-fn solved<S: Simd, const R: usize, const V: usize>(
-    simd: S,
-    a: &[[f64; LEGS]; LEGS],
-    b: &[[f64; R]; LEGS],
-) -> Option<[[f64; R]; LEGS]> {
-    let mut rows = [[[0.0; LANES]; V]; LEGS];
-    for (row, (left, right)) in rows.iter_mut().zip(a.iter().zip(b)) {
-        row.as_flattened_mut().iter_mut().zip(left.iter().chain(right)).for_each(|(slot, x)| *slot = *x);
-    }
+fn solved<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<[f64; LEGS]> {
+    let mut rows = rows_of(a, b);
     // Each column is a constant of its own code, so that every place in the rows is known.
-    eliminate::<_, V, 0>(simd, &mut rows)?;
-    eliminate::<_, V, 1>(simd, &mut rows)?;
-    eliminate::<_, V, 2>(simd, &mut rows)?;
-    eliminate::<_, V, 3>(simd, &mut rows)?;
-    eliminate::<_, V, 4>(simd, &mut rows)?;
-    substitute::<_, V, 5>(simd, &mut rows)?;
-    substitute::<_, V, 4>(simd, &mut rows)?;
-    substitute::<_, V, 3>(simd, &mut rows)?;
-    substitute::<_, V, 2>(simd, &mut rows)?;
-    substitute::<_, V, 1>(simd, &mut rows)?;
-    substitute::<_, V, 0>(simd, &mut rows)?;
-    let right = |row: Row<V>| {
-        let mut x = [0.0; R];
-        x.iter_mut().zip(row.as_flattened().iter().skip(LEGS)).for_each(|(x, number)| *x = *number);
-        x
-    };
-    Some(rows.map(right))
+    eliminate::<_, 0>(simd, &mut rows)?;
+    eliminate::<_, 1>(simd, &mut rows)?;
+    eliminate::<_, 2>(simd, &mut rows)?;
+    eliminate::<_, 3>(simd, &mut rows)?;
+    eliminate::<_, 4>(simd, &mut rows)?;
+    substitute::<_, 5>(simd, &mut rows)?;
+    substitute::<_, 4>(simd, &mut rows)?;
+    substitute::<_, 3>(simd, &mut rows)?;
+    substitute::<_, 2>(simd, &mut rows)?;
+    substitute::<_, 1>(simd, &mut rows)?;
+    substitute::<_, 0>(simd, &mut rows)?;
+    Some(rows.map(|row| number::<LEGS>(&row)))
 }
 
-/// Clears a column below its row, the one with the largest number first.
 #[inline(always)]
-fn eliminate<S: Simd, const V: usize, const COLUMN: usize>(simd: S, rows: &mut [Row<V>; LEGS]) -> Option<()> {
-    let (_, rest) = rows.split_at_mut(COLUMN);
+fn weighted_inverse<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], weights: &[f64; LEGS]) -> Option<f64> {
+    let mut rows = rows_of(a, &[0.0; LEGS]);
+    exchange::<_, 0>(simd, &mut rows)?;
+    exchange::<_, 1>(simd, &mut rows)?;
+    exchange::<_, 2>(simd, &mut rows)?;
+    exchange::<_, 3>(simd, &mut rows)?;
+    exchange::<_, 4>(simd, &mut rows)?;
+    exchange::<_, 5>(simd, &mut rows)?;
+    let mut sum = f64x4::splat(simd, 0.0);
+    for (row, weight) in rows.iter().zip(weights) {
+        for vector in row {
+            let weighted = f64x4::load_array(simd, *vector) * f64x4::splat(simd, *weight);
+            sum += weighted * weighted;
+        }
+    }
+    Some(sum.to_array().into_iter().sum())
+}
+
+#[inline(always)]
+fn rows_of(a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> [Row; LEGS] {
+    let mut rows = [Row::default(); LEGS];
+    for ((row, left), right) in rows.iter_mut().zip(a).zip(b) {
+        let numbers = left.iter().chain([right]);
+        row.as_flattened_mut().iter_mut().zip(numbers).for_each(|(slot, x)| *slot = *x);
+    }
+    rows
+}
+
+/// The row with the largest number in a column goes first, of those from the column's own on. Returns the others above and below, and
+/// that row.
+#[inline(always)]
+fn pivoted<const COLUMN: usize>(rows: &mut [Row; LEGS]) -> Option<(&mut [Row], &mut Row, &mut [Row])> {
+    let (above, rest) = rows.split_at_mut(COLUMN);
     let (top, below) = rest.split_first_mut()?;
     for row in below.iter_mut() {
-        if number::<V, COLUMN>(row).abs() > number::<V, COLUMN>(top).abs() {
+        if number::<COLUMN>(row).abs() > number::<COLUMN>(top).abs() {
             // Vector by vector: of a whole row it would be a call.
             row.iter_mut().zip(top.iter_mut()).for_each(|(a, b)| core::mem::swap(a, b));
         }
     }
-    let pivot = number::<V, COLUMN>(top);
-    if pivot == 0.0 {
-        return None;
-    }
+    (number::<COLUMN>(top) != 0.0).then_some((above, top, below))
+}
+
+/// Clears a column below its row.
+#[inline(always)]
+fn eliminate<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> Option<()> {
+    let (_, top, below) = pivoted::<COLUMN>(rows)?;
+    let pivot = number::<COLUMN>(top);
     for row in below.iter_mut() {
-        subtract(simd, row, number::<V, COLUMN>(row) / pivot, top);
+        subtract(simd, row, number::<COLUMN>(row) / pivot, top);
         // Without what rounding leaves: the substitution changes whole rows.
-        if let Some(cleared) = row.as_flattened_mut().get_mut(COLUMN) {
-            *cleared = 0.0;
-        }
+        change_column::<_, COLUMN>(simd, row, 0.0);
     }
     Some(())
+}
+
+/// Exchanges a column of the matrix for one of its inverse.
+#[inline(always)]
+fn exchange<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> Option<()> {
+    let (above, top, below) = pivoted::<COLUMN>(rows)?;
+    let pivot = number::<COLUMN>(top);
+    change_column::<_, COLUMN>(simd, top, 1.0);
+    divide(simd, top, pivot);
+    above.iter_mut().for_each(|row| exchange_row::<_, COLUMN>(simd, row, top));
+    below.iter_mut().for_each(|row| exchange_row::<_, COLUMN>(simd, row, top));
+    Some(())
+}
+
+#[inline(always)]
+fn exchange_row<S: Simd, const COLUMN: usize>(simd: S, row: &mut Row, top: &Row) {
+    let factor = number::<COLUMN>(row);
+    change_column::<_, COLUMN>(simd, row, 0.0);
+    subtract(simd, row, factor, top);
 }
 
 /// The unknown of a column, in place of the right-hand side of its row, and out of the rows above.
 #[inline(always)]
-fn substitute<S: Simd, const V: usize, const COLUMN: usize>(
-    simd: S,
-    rows: &mut [Row<V>; LEGS],
-) -> Option<()> {
+fn substitute<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> Option<()> {
     let (above, rest) = rows.split_at_mut(COLUMN);
     let (row, _) = rest.split_first_mut()?;
-    let pivot = number::<V, COLUMN>(row);
+    let pivot = number::<COLUMN>(row);
     if pivot == 0.0 {
         return None;
     }
-    for vector in row.iter_mut() {
-        *vector = (f64x4::load_array(simd, *vector) / f64x4::splat(simd, pivot)).to_array();
-    }
+    divide(simd, row, pivot);
     for other in above.iter_mut() {
-        let factor = number::<V, COLUMN>(other);
-        subtract(simd, other, factor, row);
+        subtract(simd, other, number::<COLUMN>(other), row);
     }
     Some(())
 }
 
+/// `row /= divisor`
+#[inline(always)]
+fn divide<S: Simd>(simd: S, row: &mut Row, divisor: f64) {
+    for vector in row {
+        *vector = (f64x4::load_array(simd, *vector) / f64x4::splat(simd, divisor)).to_array();
+    }
+}
+
 /// `row -= factor other`
 #[inline(always)]
-fn subtract<S: Simd, const V: usize>(simd: S, row: &mut Row<V>, factor: f64, other: &Row<V>) {
+fn subtract<S: Simd>(simd: S, row: &mut Row, factor: f64, other: &Row) {
     for (vector, other) in row.iter_mut().zip(other) {
         let product = f64x4::load_array(simd, *other) * f64x4::splat(simd, factor);
         *vector = (f64x4::load_array(simd, *vector) - product).to_array();
@@ -123,6 +164,17 @@ fn subtract<S: Simd, const V: usize>(simd: S, row: &mut Row<V>, factor: f64, oth
 }
 
 #[inline(always)]
-fn number<const V: usize, const COLUMN: usize>(row: &Row<V>) -> f64 {
+fn number<const COLUMN: usize>(row: &Row) -> f64 {
     row.as_flattened().get(COLUMN).copied().unwrap_or_default()
+}
+
+/// Puts a number into a column, with the vector that holds it: one of which a part was just written is read late.
+#[inline(always)]
+fn change_column<S: Simd, const COLUMN: usize>(simd: S, row: &mut Row, number: f64) {
+    let numbers = core::array::from_fn(|lane| if lane == COLUMN % LANES { number } else { 0.0 });
+    let others = core::array::from_fn(|lane| if lane == COLUMN % LANES { 0.0 } else { 1.0 });
+    if let Some(vector) = row.get_mut(COLUMN / LANES) {
+        let rest = f64x4::load_array(simd, *vector) * f64x4::load_array(simd, others);
+        *vector = (rest + f64x4::load_array(simd, numbers)).to_array();
+    }
 }

@@ -11,7 +11,7 @@
 use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Matrix6;
 
 use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
@@ -109,11 +109,11 @@ fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeo
     (torques * r).fused_mul_add(r, forces).legs().into_iter().sum()
 }
 
-/// The same by LU with partial pivoting.
+/// The same by elimination with partial pivoting.
 #[cold]
 #[inline(never)]
 fn inverse_norm_squared_by_lu(level: Level, n: &Matrix6<f64>, radius: f64) -> f64 {
-    let scale = Matrix6::from_diagonal(&Vector6::new(radius, radius, radius, 1.0, 1.0, 1.0));
-    lu::solve_columns(level, &n.transpose().into(), &scale.into())
-        .map_or(f64::INFINITY, |inverse| Matrix6::from(inverse).norm_squared())
+    // The columns of N are the rows of its transpose.
+    let weights = [radius, radius, radius, 1.0, 1.0, 1.0];
+    lu::inverse_norm_squared(level, n.as_ref(), &weights).unwrap_or(f64::INFINITY)
 }
