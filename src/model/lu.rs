@@ -33,7 +33,7 @@ pub(super) fn inverse_norm_squared(
     a: &[[f64; LEGS]; LEGS],
     weights: &[f64; LEGS],
 ) -> Option<f64> {
-    dispatch!(level, simd => weighted_inverse(simd, a, weights))
+    dispatch!(level, simd => weighted_inverse_norm(simd, a, weights))
 }
 
 #[inline(always)]
@@ -55,7 +55,7 @@ fn solved<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<
 }
 
 #[inline(always)]
-fn weighted_inverse<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], weights: &[f64; LEGS]) -> Option<f64> {
+fn weighted_inverse_norm<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], weights: &[f64; LEGS]) -> Option<f64> {
     let mut rows = rows_of(a, &[0.0; LEGS]);
     exchange::<_, 0>(simd, &mut rows)?;
     exchange::<_, 1>(simd, &mut rows)?;
@@ -176,5 +176,40 @@ fn change_column<S: Simd, const COLUMN: usize>(simd: S, row: &mut Row, number: f
     if let Some(vector) = row.get_mut(COLUMN / LANES) {
         let rest = f64x4::load_array(simd, *vector) * f64x4::load_array(simd, others);
         *vector = (rest + f64x4::load_array(simd, numbers)).to_array();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix6, Vector6};
+
+    use super::*;
+    use crate::model::machine::at_most_256_bits;
+    use crate::plant::random::Random;
+
+    /// Against nalgebra's, also where a zero stands in the place of a pivot; and a matrix without an inverse has none.
+    #[test]
+    fn solutions_and_norms_of_inverses_are_right() {
+        let (level, mut random) = (at_most_256_bits(Level::new()), Random::new(3));
+        for k in 0..2000 {
+            let mut a = Matrix6::from_fn(|_, _| 2.0 * random.uniform() - 1.0);
+            if k % 2 == 0 {
+                a.fill_diagonal(0.0);
+            }
+            let (b, weights) =
+                (Vector6::from_fn(|_, _| random.uniform()), Vector6::from_fn(|_, _| random.uniform()));
+            let rows: [[f64; LEGS]; LEGS] = a.transpose().into();
+            let inverse = a.try_inverse().unwrap();
+            let norm = (Matrix6::from_diagonal(&weights) * inverse).norm();
+            let rounding = 1e-14 * a.norm() * inverse.norm();
+            let found = inverse_norm_squared(level, &rows, &weights.into()).unwrap().sqrt();
+            assert!((found / norm - 1.0).abs() < rounding, "{found} {norm} {a}");
+            let x = Vector6::from(solve(level, &rows, &b.into()).unwrap());
+            assert!((x - inverse * b).norm() < rounding * inverse.norm() * b.norm(), "{x} {a}");
+            let mut singular = rows;
+            singular[k % LEGS] = [0.0; LEGS];
+            assert_eq!(inverse_norm_squared(level, &singular, &weights.into()), None);
+            assert_eq!(solve(level, &singular, &b.into()), None);
+        }
     }
 }
