@@ -182,34 +182,41 @@ fn change_column<S: Simd, const COLUMN: usize>(simd: S, row: &mut Row, number: f
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix6, Vector6};
+    use proptest::array::uniform6;
+    use proptest::prelude::*;
 
     use super::*;
     use crate::model::machine::at_most_256_bits;
-    use crate::plant::random::Random;
 
-    /// Against nalgebra's, also where a zero stands in the place of a pivot; and a matrix without an inverse has none.
-    #[test]
-    fn solutions_and_norms_of_inverses_are_right() {
-        let (level, mut random) = (at_most_256_bits(Level::new()), Random::new(3));
-        for k in 0..2000 {
-            let mut a = Matrix6::from_fn(|_, _| 2.0 * random.uniform() - 1.0);
-            if k % 2 == 0 {
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        /// Against nalgebra's, also where a zero stands in the place of a pivot; and a matrix without an inverse has none.
+        #[test]
+        fn solutions_and_norms_of_inverses_are_right(
+            numbers in uniform6(uniform6(-1.0..1.0_f64)),
+            zero_diagonal: bool,
+            b in uniform6(0.0..1.0_f64),
+            weights in uniform6(0.0..1.0_f64),
+            zero_row in 0..LEGS,
+        ) {
+            let level = at_most_256_bits(Level::new());
+            let mut a = Matrix6::from(numbers);
+            if zero_diagonal {
                 a.fill_diagonal(0.0);
             }
-            let (b, weights) =
-                (Vector6::from_fn(|_, _| random.uniform()), Vector6::from_fn(|_, _| random.uniform()));
             let rows: [[f64; LEGS]; LEGS] = a.transpose().into();
             let inverse = a.try_inverse().unwrap();
-            let norm = (Matrix6::from_diagonal(&weights) * inverse).norm();
+            let norm = (Matrix6::from_diagonal(&weights.into()) * inverse).norm();
             let rounding = 1e-14 * a.norm() * inverse.norm();
-            let found = inverse_norm_squared(level, &rows, &weights.into()).unwrap().sqrt();
-            assert!((found / norm - 1.0).abs() < rounding, "{found} {norm} {a}");
+            let found = inverse_norm_squared(level, &rows, &weights).unwrap().sqrt();
+            prop_assert!((found / norm - 1.0).abs() < rounding, "{found} {norm} {a}");
+            let b = Vector6::from(b);
             let x = Vector6::from(solve(level, &rows, &b.into()).unwrap());
-            assert!((x - inverse * b).norm() < rounding * inverse.norm() * b.norm(), "{x} {a}");
+            prop_assert!((x - inverse * b).norm() < rounding * inverse.norm() * b.norm(), "{x} {a}");
             let mut singular = rows;
-            singular[k % LEGS] = [0.0; LEGS];
-            assert_eq!(inverse_norm_squared(level, &singular, &weights.into()), None);
-            assert_eq!(solve(level, &singular, &b.into()), None);
+            singular[zero_row] = [0.0; LEGS];
+            prop_assert_eq!(inverse_norm_squared(level, &singular, &weights), None);
+            prop_assert_eq!(solve(level, &singular, &b.into()), None);
         }
     }
 }
