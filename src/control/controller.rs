@@ -83,6 +83,12 @@ pub struct Measurement {
     pub drives: DriveStatus,
 }
 
+impl AsRef<Self> for Measurement {
+    fn as_ref(&self) -> &Self {
+        self
+    }
+}
+
 /// Processes that publish an input: of the publisher that counts, and of another one that lives beside it. 0: none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Publishers {
@@ -321,8 +327,7 @@ impl Controller {
         }
         let LimitedForces { force, wrench_error, active_limits } = limited;
         drives.record_sent(&force);
-        let platform = located.ok().map(|located| located.platform);
-        Output {
+        let mut output = Output {
             state: supervisor.mode.state,
             diagnostic: supervisor.mode.diagnostic,
             answered: supervisor.answered,
@@ -334,12 +339,21 @@ impl Controller {
                 .union(assessed_limits)
                 .union(reference.active_limits())
                 .union(active_limits),
-            missed_measurements: measurements.missed,
+            missed_measurements: 0,
             missed_setpoints: setpoints.missed,
-            platform,
+            platform: None,
             error,
-            reference: supervisor.mode.state.has_control().then(|| *reference.motion()),
+            reference: None,
+        };
+        // The largest are written where they stay.
+        if let Ok(located) = &located {
+            output.platform = Some(located.platform);
         }
+        output.missed_measurements = measurements.missed;
+        if output.state.has_control() {
+            output.reference = Some(*reference.motion());
+        }
+        output
     }
 }
 

@@ -57,9 +57,10 @@ impl ErrorState {
     }
 
     /// It `dt` seconds later.
-    pub fn after(mut self, dt: f64, u: &Vector6<f64>) -> Self {
-        self.advance(dt, u);
-        self
+    pub fn after(&self, dt: f64, u: &Vector6<f64>) -> Self {
+        let mut after = *self;
+        after.advance(dt, u);
+        after
     }
 
     /// Without the disturbance.

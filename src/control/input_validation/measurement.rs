@@ -111,7 +111,7 @@ impl MeasurementValidator {
     ) -> Result<&Measurement, Diagnostic> {
         (self.released_before_ns, self.released_ns) = (self.released_ns, cycle.release_ns);
         let continuity = self.check_input_continuity(cycle);
-        let new = newest.filter(|newest| self.last.newest.as_ref() != Some(newest));
+        let new = newest.filter(|newest| self.last.is_new(newest));
         let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
         self.missed += u64::from(cycle.state.has_control() && !is_accepted);
         continuity?;

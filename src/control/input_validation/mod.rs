@@ -27,24 +27,29 @@ const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct LastValid<Input, Valid> {
     pub valid: Option<Valid>,
-    /// The last input, valid or not: each is validated once.
-    pub newest: Option<Input>,
-    /// Release of the cycle that validated it.
+    /// The last input since then, and why it was rejected, or the first of several.
+    rejected: Option<(Input, Diagnostic)>,
+    /// Release of the cycle that validated the last input.
     newest_ns: u64,
-    rejection: Option<Diagnostic>,
 }
 
 impl<Input, Valid> Default for LastValid<Input, Valid> {
     fn default() -> Self {
-        Self { valid: None, newest: None, newest_ns: 0, rejection: None }
+        Self { valid: None, rejected: None, newest_ns: 0 }
     }
 }
 
-impl<Input: Copy, Valid: Copy> LastValid<Input, Valid> {
+impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid> {
+    /// Whether an input is another than the last one, valid or not: each is validated once.
+    pub fn is_new(&self, input: &Input) -> bool {
+        let valid = || self.valid.as_ref().map(AsRef::as_ref);
+        self.rejected.as_ref().map(|(rejected, _)| rejected).or_else(valid) != Some(input)
+    }
+
     /// Upper bound on the time used for the plausible change \[s\]; infinite if no input was rejected since the last
     /// valid one.
     pub fn plausibility_window_s(&self, now_ns: u64, period_ns: u64) -> f64 {
-        if self.rejection.is_none() {
+        if self.rejected.is_none() {
             return f64::INFINITY;
         }
         let interval_ns = now_ns.saturating_sub(self.newest_ns).max(period_ns);
@@ -60,16 +65,19 @@ impl<Input: Copy, Valid: Copy> LastValid<Input, Valid> {
         now_ns: u64,
         keep_first: bool,
     ) {
-        (self.newest, self.newest_ns) = (Some(*input), now_ns);
+        self.newest_ns = now_ns;
         match result {
-            Ok(valid) => (self.valid, self.rejection) = (Some(*valid), None),
-            Err(diagnostic) => self.rejection = self.rejection.filter(|_| keep_first).or(Some(diagnostic)),
+            Ok(valid) => (self.valid, self.rejected) = (Some(*valid), None),
+            Err(diagnostic) => {
+                let first = self.rejected.filter(|_| keep_first).map(|(_, first)| first);
+                self.rejected = Some((*input, first.unwrap_or(diagnostic)));
+            }
         }
     }
 
     /// The last rejection, or `otherwise` if nothing was rejected since the last valid input.
     pub fn rejection_or(&self, otherwise: impl Into<Diagnostic>) -> Diagnostic {
-        self.rejection.unwrap_or_else(|| otherwise.into())
+        self.rejected.map_or_else(|| otherwise.into(), |(_, rejection)| rejection)
     }
 }
 

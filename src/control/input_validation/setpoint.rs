@@ -60,10 +60,11 @@ impl SetpointValidator {
         newest: Option<&Setpoint>,
         reference: &ReferenceGenerator,
     ) -> ValidatedSetpoint<'_> {
-        let new = newest.filter(|newest| self.last.newest.as_ref() != Some(newest));
+        let new = newest.filter(|newest| self.last.is_new(newest));
         let is_accepted = new.is_some_and(|new| {
             let parameters = &cycle.constants.parameters;
-            let new = SetpointMotion::new(*new).after(parameters, self.last.valid.as_ref());
+            let mut new = SetpointMotion::new(*new);
+            new.lead_on(parameters, self.last.valid.as_ref());
             self.accept(cycle, &new, reference)
         });
         self.missed += u64::from(cycle.state.has_control() && !is_accepted);

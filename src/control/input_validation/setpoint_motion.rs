@@ -35,23 +35,29 @@ pub(in crate::control) struct Continuation {
     pub acceleration: Vector6<f64>,
 }
 
+impl AsRef<Setpoint> for SetpointMotion {
+    fn as_ref(&self) -> &Setpoint {
+        &self.setpoint
+    }
+}
+
 impl SetpointMotion {
     /// Evaluates the motion of a setpoint. Poses alone have no derivatives.
     pub fn new(setpoint: Setpoint) -> Self {
-        let task = match setpoint.kind {
-            SetpointKind::Motion | SetpointKind::Unknown => setpoint.task,
-            SetpointKind::Pose | SetpointKind::Target => TaskState::at_rest(setpoint.task.x.into()),
+        let motion = match setpoint.kind {
+            SetpointKind::Motion | SetpointKind::Unknown => setpoint.task.motion(),
+            SetpointKind::Pose | SetpointKind::Target => TaskState::at_rest(setpoint.task.x.into()).motion(),
         };
-        Self { setpoint, motion: task.motion(), jerk: Vector6::zeros(), jerk_s: 0.0 }
+        Self { setpoint, motion, jerk: Vector6::zeros(), jerk_s: 0.0 }
     }
 
-    /// The same with the jerk that leads on from the setpoint before. Accelerations alone, carried on to the instant of the force,
+    /// Sets the jerk that leads on from the setpoint before. Accelerations alone, carried on to the instant of the force,
     /// would lag by the time between: `jerk dt / Kp` of error.
-    pub fn after(mut self, parameters: &Parameters, before: Option<&Self>) -> Self {
-        let Some(before) = before.filter(|_| self.setpoint.kind == SetpointKind::Motion) else { return self };
+    pub fn lead_on(&mut self, parameters: &Parameters, before: Option<&Self>) {
+        let Some(before) = before.filter(|_| self.setpoint.kind == SetpointKind::Motion) else { return };
         let dt = seconds_between(before.setpoint.time_ns, self.setpoint.time_ns);
         if !(dt > 0.0 && dt <= MAX_JERK_INTERVAL_S) || before.setpoint.kind != SetpointKind::Motion {
-            return self;
+            return;
         }
         let limits = &parameters.limits;
         let clamped = |change: Vector3<f64>, limit: f64| {
@@ -64,7 +70,6 @@ impl SetpointMotion {
         self.jerk = Acceleration { angular, linear }.vector();
         let ahead_s = parameters.force_delay_ns.saturating_add(parameters.period_ns) as f64 * 1e-9;
         self.jerk_s = JERK_INTERVALS * dt + ahead_s;
-        self
     }
 
     /// The motion `dt` seconds later, to first order in the angle between.

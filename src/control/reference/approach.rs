@@ -38,6 +38,8 @@ const MIN_OUTER_STEPS: f64 = 4.0;
 const INNER_TIME_RATIO: f64 = 0.5;
 /// Steps of Newton's method on the braking curve from above; each leaves less than half of the error.
 const NEWTON_STEPS: u32 = 4;
+/// Least root of a velocity: a step divides by it.
+const SMALLEST_ROOT: f64 = 1e-150;
 
 /// Target of one vector at the next instant, relative to where the present acceleration leads.
 #[derive(Clone, Copy, Debug)]
@@ -118,15 +120,17 @@ impl Approach {
             let v = 2.0 * distance / (linear + (linear * linear + 2.0 * distance / a).sqrt());
             (v, 1.0 / (linear + v / a))
         } else {
-            // One division a step, as each waits for the one before.
+            // Each step waits for the one before, so it is one division with short terms.
             let by_root_jerk = 1.0 / jerk.sqrt();
-            let mut root = (distance / self.outer_s).sqrt();
+            let linear_velocity = distance / self.outer_s;
+            let mut root = linear_velocity.sqrt().max(SMALLEST_ROOT);
             for _ in 0..NEWTON_STEPS {
-                let way_s = self.outer_s + root * by_root_jerk;
-                let slope = root * (3.0 * way_s - self.outer_s);
-                root -= (way_s * root * root - distance) / slope.max(f64::MIN_POSITIVE);
+                let ramp_s = root * by_root_jerk;
+                let square = root * root;
+                root = (square * (self.outer_s + 2.0 * ramp_s) + distance)
+                    / (root * (2.0 * self.outer_s + 3.0 * ramp_s));
             }
-            (root * root, 1.0 / (self.outer_s + 1.5 * root * by_root_jerk))
+            ((root * root).min(linear_velocity), 1.0 / (self.outer_s + 1.5 * root * by_root_jerk))
         };
         if v > limit { (limit, 0.0) } else { (v, slope) }
     }
@@ -142,7 +146,8 @@ impl Approach {
         let x = wanted.velocity - ahead;
         let time = INNER_TIME_RATIO * self.outer_s;
         let jerk = INNER_JERK_SHARE * self.limits.jerk;
-        let gain = 2.0 / (time * (1.0 + (1.0 + 2.0 * x.norm() / (jerk * time * time)).sqrt()));
+        let per_velocity = 2.0 / (jerk * time * time);
+        let gain = 2.0 / (time * (1.0 + (1.0 + x.norm() * per_velocity).sqrt()));
         let (aim, is_acceleration_limited) =
             limited(&(wanted.derivative + x * gain), self.limits.acceleration);
         let (change, is_jerk_limited) = limited(&(aim - present), self.limits.jerk * self.step_s);

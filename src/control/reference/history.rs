@@ -40,10 +40,9 @@ impl History {
 
     /// Records the segment from `motion` at `begin_ns` to another acceleration `dt` seconds later.
     pub fn record(&mut self, begin_ns: u64, motion: &Motion, next: &Acceleration, dt: f64) {
-        let change = (next.vector() - motion.acceleration.vector()) / dt;
-        let segment = Segment { begin_ns, motion: *motion, jerk: Acceleration::from_vector(&change) };
+        let jerk = Acceleration::from_vector(&((next.vector() - motion.acceleration.vector()) / dt));
         if let Some(slot) = self.segments.get_mut(self.count % SEGMENT_COUNT) {
-            *slot = Some(segment);
+            *slot = Some(Segment { begin_ns, motion: *motion, jerk });
         }
         self.count += 1;
     }

@@ -27,8 +27,6 @@
 //! | [`pose_samples`] | target through poses without derivatives |
 //! | `history` | the reference of the last cycles |
 
-use nalgebra::Vector6;
-
 use self::approach::{Approach, TargetOffset, limit_leg_rates};
 use self::components::Components;
 use self::constant_jerk::moved;
@@ -37,7 +35,7 @@ use self::history::History;
 use self::pose_bounds::PoseBounds;
 use self::pose_stop::StopKind;
 pub use self::target::Target;
-use self::target::at_rest;
+use self::target::{RelativeMotion, at_rest};
 use self::verification::{Step, Verifier};
 use self::walls::Walls;
 use super::input_validation::{SetpointMotion, seconds_between};
@@ -212,45 +210,44 @@ impl ReferenceGenerator {
     // Out of line: in the loop over the steps the limits would be kept in memory beside themselves.
     #[inline(never)]
     fn step(&mut self, constants: &Constants, end_ns: u64, target: Option<&Target<'_>>) {
-        let step_s = seconds_between(self.time_ns, end_ns);
-        let proposed = target
-            .and_then(|target| Some((target, target.displaced_at(&constants.parameters, end_ns)?)))
-            .map(|(target, desired)| self.proposed(constants, target, &desired, step_s));
-        let verified = proposed.and_then(|motion| {
-            let (now, next) = (&self.motion.acceleration, &motion.acceleration);
-            let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
-            let step = Step { from: Some(&self.motion.pose), duration: step_s, change };
-            match self.verifier.verify(constants, &self.bounds, &motion, &step) {
-                Ok(kind) => Some((motion, kind)),
-                Err(limit) => {
-                    self.active_limits = self.active_limits.with(limit, true);
-                    None
-                }
-            }
+        // The motion is written where it stays: copies of what was just written wait for it.
+        let (begin, begin_ns) = (self.motion, self.time_ns);
+        let step_s = seconds_between(begin_ns, end_ns);
+        let desired = target.and_then(|target| {
+            Some((target, target.relative_to(&begin.pose, &constants.parameters, end_ns)?))
         });
-        // Without a target nothing was refused.
-        if proposed.is_some() {
-            self.components = self.components.after(verified.is_some());
-        }
-        let next = match verified {
-            Some((motion, kind)) => {
-                self.stop.hold(kind, &self.verifier.planar);
-                motion
+        // Without a target nothing is refused.
+        let verified = desired.map(|(target, desired)| {
+            let Acceleration { angular, linear } = self.proposed(constants, target, &desired, step_s);
+            self.motion = moved(&begin, &angular, &linear, step_s);
+            let (now, next) = (&begin.acceleration, &self.motion.acceleration);
+            let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
+            let step = Step { from: Some(&begin.pose), duration: step_s, change };
+            let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step);
+            self.components = self.components.after(verified.is_ok());
+            verified
+        });
+        match verified {
+            Some(Ok(kind)) => self.stop.hold(kind, &self.verifier.planar),
+            refused => {
+                if let Some(Err(limit)) = refused {
+                    self.active_limits = self.active_limits.with(limit, true);
+                }
+                self.motion = self.stop.follow(&begin, &constants.parameters.limits, step_s);
             }
-            None => self.stop.follow(&self.motion, &constants.parameters.limits, step_s),
-        };
-        self.history.record(self.time_ns, &self.motion, &next.acceleration, step_s);
-        (self.motion, self.time_ns) = (next, end_ns);
+        }
+        self.history.record(begin_ns, &begin, &self.motion.acceleration, step_s);
+        self.time_ns = end_ns;
     }
 
-    /// A step of constant jerk towards the desired motion of the next instant.
+    /// Acceleration of the next instant, towards its desired motion.
     fn proposed(
         &mut self,
         constants: &Constants,
         target: &Target<'_>,
-        (desired, displacement): &(Motion, Vector6<f64>),
+        desired: &RelativeMotion,
         h: f64,
-    ) -> Motion {
+    ) -> Acceleration {
         let limits = target.limits(&constants.parameters.limits);
         let closing_scale = target.closing_scale(self.closing_scale);
         let approach = |limits| Approach::new(limits, closing_scale, h);
@@ -259,7 +256,7 @@ impl ReferenceGenerator {
         // Where the present acceleration leads: to first order in its displacement, which is exact on the target.
         let (v, a) = (twist.vector(), acceleration.vector());
         let led = Twist::from_vector(&(v + a * h));
-        let offset = pose.displacement_to(&desired.pose).vector() + displacement - (v + a * (0.5 * h)) * h;
+        let offset = desired.displacement - (v + a * (0.5 * h)) * h;
         let offset = Twist::from_vector(&offset);
         let orientation = TargetOffset {
             offset: offset.angular,
@@ -301,6 +298,6 @@ impl ReferenceGenerator {
             .with(Limit::Velocity, turn.is_limited | shift.is_limited)
             .with(Limit::Acceleration, by_acceleration)
             .with(Limit::Jerk, by_jerk);
-        moved(&self.motion, &angular, &linear, h)
+        Acceleration { angular, linear }
     }
 }

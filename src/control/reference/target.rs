@@ -21,6 +21,15 @@ pub enum Target<'a> {
     Pose(&'a Pose, f64),
 }
 
+/// A motion as seen from a pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RelativeMotion {
+    /// What leads from the pose to that of the motion \[rad\], \[m\].
+    pub displacement: Vector6<f64>,
+    pub twist: Twist,
+    pub acceleration: Acceleration,
+}
+
 /// Least share of the limits of autonomous motions: with less the numbers of the approach lose their digits.
 const MIN_TARGET_SPEED: f64 = 0.01;
 
@@ -60,27 +69,22 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// The motion at an instant, with the pose as a base pose and the displacement from it: cheaper, and the same to first
-    /// order in the displacement.
-    pub(super) fn displaced_at(
+    /// The motion at an instant as seen from a pose; a continuation is added to first order in its displacement.
+    pub(super) fn relative_to(
         &self,
+        pose: &Pose,
         parameters: &Parameters,
         instant_ns: u64,
-    ) -> Option<(Motion, Vector6<f64>)> {
-        match self {
-            Self::Motion(setpoint) => {
-                let continued = setpoint.continued(setpoint.extrapolation_s(parameters, instant_ns));
-                let led = Motion {
-                    pose: setpoint.motion.pose,
-                    twist: Twist::from_vector(&continued.twist),
-                    acceleration: Acceleration::from_vector(&continued.acceleration),
-                };
-                Some((led, continued.displacement))
-            }
-            Self::Samples(_) | Self::Pose(..) => {
-                Some((self.motion_at(parameters, instant_ns)?, Vector6::zeros()))
-            }
+    ) -> Option<RelativeMotion> {
+        if let Self::Motion(setpoint) = self {
+            let continued = setpoint.continued(setpoint.extrapolation_s(parameters, instant_ns));
+            let displacement = pose.displacement_to(&setpoint.motion.pose).vector() + continued.displacement;
+            let twist = Twist::from_vector(&continued.twist);
+            let acceleration = Acceleration::from_vector(&continued.acceleration);
+            return Some(RelativeMotion { displacement, twist, acceleration });
         }
+        let Motion { pose: desired, twist, acceleration } = self.motion_at(parameters, instant_ns)?;
+        Some(RelativeMotion { displacement: pose.displacement_to(&desired).vector(), twist, acceleration })
     }
 
     /// Share of its limits with which the distance is closed: those of a pose are scaled already.

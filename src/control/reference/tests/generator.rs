@@ -212,7 +212,7 @@ fn a_component_that_waits_follows_the_stop() {
     let (h, elapsed_s) = (1e-3, 7e-3);
     let setpoint = standing(&constants, [0.2, 0.2, 0.0, 0.2, 0.2, 0.2]);
     let target = Target::Motion(&setpoint);
-    let desired = target.displaced_at(&constants.parameters, MS).unwrap();
+    let desired = target.relative_to(&motion.pose, &constants.parameters, MS).unwrap();
     let mut reference = started(&constants, &motion);
     let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
     for is_followed in [false, true] {
@@ -225,7 +225,7 @@ fn a_component_that_waits_follows_the_stop() {
         let expected = stop.at(h + if is_followed { elapsed_s } else { 0.0 });
         let mut accelerations = |components| {
             reference.components = components;
-            reference.proposed(&constants, &target, &desired, h).acceleration
+            reference.proposed(&constants, &target, &desired, h)
         };
         let both = accelerations(Components::Both);
         let shifting = accelerations(Components::Translation { steps: 0 });

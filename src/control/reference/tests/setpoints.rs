@@ -60,8 +60,9 @@ fn the_jerk_of_a_setpoint_is_that_of_motions_without_a_gap() {
     };
     for (dt_ms, has_jerk) in [(0, false), (1, true), (25, true), (26, false), (1000, false), (-1, false)] {
         let before = motion(5000 * MS, 0.0);
-        let next = motion((5000 * MS).saturating_add_signed(dt_ms * 1_000_000), 0.05);
-        let after = next.after(&parameters, Some(&before)).continued(1e-3);
+        let mut next = motion((5000 * MS).saturating_add_signed(dt_ms * 1_000_000), 0.05);
+        next.lead_on(&parameters, Some(&before));
+        let after = next.continued(1e-3);
         let change = after.acceleration[3] - 0.05;
         let jerk = if has_jerk { 0.05 / (dt_ms as f64 * 1e-3) } else { 0.0 };
         assert!((change - 1e-3 * jerk).abs() < 1e-9, "{dt_ms}: {change}");
