@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::State;
+use hexad::messages::ForceMessage;
 
 use crate::support::machine::{PERIOD_NS, TIMEOUT_NS};
 use crate::support::recorder::Recording;
@@ -12,6 +13,9 @@ use crate::support::{operator, turns};
 
 /// Longer than every timeout of the machine file.
 const PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS + TIMEOUT_NS / 2);
+
+/// Longer than the loop stands old measurements, shorter than every timeout.
+const SHORT_PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS / 4);
 
 /// Grid points within the pause, less those that a signal needs to arrive.
 const LEAST_SKIPPED: u64 = (TIMEOUT_NS + TIMEOUT_NS / 2) / PERIOD_NS - 10;
@@ -39,6 +43,28 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
         after.counters.skipped - before.counters.skipped
     );
     brakes_held_until_control_was_taken_anew(from_ns, DiagnosticCode::DaemonHeld, &recording);
+}
+
+/// As a host that takes the processors away: the platform moves on under the last forces. The daemon is back before the
+/// plant, so that the measurement that waited is too old. Those after it are not.
+#[test]
+fn a_pause_shorter_than_the_timeouts_keeps_control() {
+    let _turn = turns::beside_others();
+    let trio = Trio::in_motion("paused-shortly");
+    trio.daemon.hold();
+    trio.plant.hold();
+    let (from_ns, _) = let_pass(SHORT_PAUSE);
+    trio.daemon.signal("CONT");
+    trio.recorder.until("the daemon is back", |recording| {
+        recording.forces.last().filter(|force| force.release_ns > from_ns + PERIOD_NS).map(drop)
+    });
+    trio.plant.signal("CONT");
+    let (_, after_ns) = let_pass(Duration::from_nanos(2 * TIMEOUT_NS));
+    trio.moves_after(after_ns);
+    let is_lost = |force: &&ForceMessage| force.release_ns > from_ns && force.valid == 0;
+    let lost = trio.recorder.so_far().forces.iter().find(is_lost).copied();
+    assert_eq!(lost, None);
+    trio.finish();
 }
 
 #[test]

@@ -19,7 +19,9 @@ use crate::model::machine::{Actuator, LEGS};
 const STROKE_TOLERANCE_RATIO: f64 = 0.02;
 
 /// The plausible change grows with the time since the last valid input, for at most this many intervals of the messages,
-/// so that a series of rejected inputs cannot widen it without limit. Two, as one message may get lost.
+/// so that a series of rejected inputs cannot widen it without limit. Two, as one message may get lost. The longest
+/// interval counts: after a pause of the loop the first message may be too old, and the next one shows the motion of the
+/// whole pause.
 const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
 
 /// The last valid input, and why the one after it was rejected. `Valid` is what a valid input stands for.
@@ -31,11 +33,13 @@ pub(super) struct LastValid<Input, Valid> {
     rejected: Option<(Input, Diagnostic)>,
     /// Release of the cycle that validated the last input.
     newest_ns: u64,
+    /// Longest time between two inputs since the last valid one \[ns\].
+    longest_interval_ns: u64,
 }
 
 impl<Input, Valid> Default for LastValid<Input, Valid> {
     fn default() -> Self {
-        Self { valid: None, rejected: None, newest_ns: 0 }
+        Self { valid: None, rejected: None, newest_ns: 0, longest_interval_ns: 0 }
     }
 }
 
@@ -52,8 +56,13 @@ impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid
         if self.rejected.is_none() {
             return f64::INFINITY;
         }
-        let interval_ns = now_ns.saturating_sub(self.newest_ns).max(period_ns);
+        let interval_ns = self.interval_ns(now_ns).max(period_ns);
         MAX_PLAUSIBLE_INTERVALS * (interval_ns as f64 * 1e-9)
+    }
+
+    /// The longest time between two inputs since the last valid one, if the next is now \[ns\].
+    fn interval_ns(&self, now_ns: u64) -> u64 {
+        now_ns.saturating_sub(self.newest_ns).max(self.longest_interval_ns)
     }
 
     /// Records an input with the result of its validation. With `keep_first` the first of several rejections stays:
@@ -65,14 +74,15 @@ impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid
         now_ns: u64,
         keep_first: bool,
     ) {
-        self.newest_ns = now_ns;
         match result {
-            Ok(valid) => (self.valid, self.rejected) = (Some(*valid), None),
+            Ok(valid) => (self.valid, self.rejected, self.longest_interval_ns) = (Some(*valid), None, 0),
             Err(diagnostic) => {
+                self.longest_interval_ns = self.interval_ns(now_ns);
                 let first = self.rejected.filter(|_| keep_first).map(|(_, first)| first);
                 self.rejected = Some((*input, first.unwrap_or(diagnostic)));
             }
         }
+        self.newest_ns = now_ns;
     }
 
     /// The last rejection, or `otherwise` if nothing was rejected since the last valid input.

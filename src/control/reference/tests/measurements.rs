@@ -157,6 +157,19 @@ fn rejected_measurements_do_not_widen_the_plausible_change() {
     }
 }
 
+/// After a pause within the timeout the measurement that waited is too old; the next one shows how far the legs moved
+/// meanwhile.
+#[test]
+fn a_measurement_that_waited_while_the_loop_paused_does_not_refuse_those_after_it() {
+    for (rate, is_accepted) in [(1.0, true), (2.0, false)] {
+        let mut bench = Bench::begun(State::Active, None);
+        let waited = bench.at(MS, rate * 1e-3);
+        assert!(!bench.accepts(8 * MS, &waited));
+        let fresh = bench.at(9 * MS, rate * 9e-3);
+        assert_eq!(bench.accepts(9 * MS, &fresh), is_accepted, "{rate}");
+    }
+}
+
 #[test]
 fn rates_change_no_faster_than_a_drive_accelerates_and_are_those_of_the_lengths() {
     let bound = 60.0 * 1e-3 + 0.02 * 1.0;
