@@ -345,7 +345,8 @@ impl Controller {
             error,
             reference: None,
         };
-        // The largest are written where they stay.
+        // Written where they stay: the largest fields, and the count, which `located` holds
+        // borrowed until here.
         if let Ok(located) = &located {
             output.platform = Some(located.platform);
         }
