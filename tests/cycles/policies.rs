@@ -58,6 +58,14 @@ fn each_delay_causes_exactly_the_misses_it_should() {
         (oversleep(3300), Fault, &[0, 1, 5, 6, 7, 8], [1, 0, 3, 0], &[2]),
         (oversleep(3300), catch_up(4), &[0, 1, 2, 3, 4, 5], [1, 0, 0, 3], &[]),
         (oversleep(3300), catch_up(2), &[0, 1, 3, 4, 5, 6], [1, 0, 1, 2], &[]),
+        // Woken less than five points late and done after the fifth: skipped by the cycle after the late one.
+        (
+            Script { latencies_ns: vec![10, 10, 4950], burns_ns: vec![100; 3] },
+            catch_up(4),
+            &[0, 1, 2, 4, 5, 6],
+            [1, 0, 1, 3],
+            &[],
+        ),
         // Woken late but in the period, and then computing beyond its end: both, once each.
         (
             Script { latencies_ns: vec![10, 10, 950], burns_ns: vec![100; 3] },

@@ -114,11 +114,14 @@ fn points_in(hold: &Hold) -> u64 {
 }
 
 /// Every cycle that was not in time has one reason, counted once: it was late to wake or the one before it
-/// computed too long.
+/// computed too long. A cycle that is caught up has the reason of the one it follows at once, which may be in
+/// the step before: woken just less than five points late, a cycle ends after the fifth, and it is skipped next.
 fn every_miss_has_its_reason(steps: &[Step]) {
+    let mut reason = false;
     for step in steps {
+        reason = step.late + step.overruns >= 1 || (step.caught_up > 0 && reason);
         assert!(step.late <= step.cycles, "a wake-up is late once: {step:#?}");
-        assert!(step.skipped == 0 || step.late + step.overruns >= 1, "skipped for no reason: {step:#?}");
+        assert!(step.skipped == 0 || reason, "skipped for no reason: {step:#?}");
     }
 }
 
