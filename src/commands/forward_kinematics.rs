@@ -70,7 +70,7 @@ pub fn forward_kinematics(
         let mut walker = tracker;
         let (tracked, iterations) = walker.find(machine, &six(row, 1));
         let converged = tracked == TrackingResult::Found;
-        let x = task_coordinates(&walker.pose, &near);
+        let x = task_coordinates(walker.pose(), &near);
         if converged {
             (tracker, near) = (walker, x);
         }

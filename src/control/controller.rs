@@ -303,7 +303,9 @@ impl Controller {
         let mut limited = LimitedForces::default();
         let mut actuate = || {
             let desired = reference.motion_of_hold(begin_ns.saturating_add(parameters.period_ns / 2));
-            let at_begin = errors.predicted(begin_ns);
+            let estimator = errors.estimator();
+            let mut at_begin = *estimator.state();
+            estimator.predict(&mut at_begin, begin_ns);
             let wanted = parameters.law.acceleration(&at_begin, &constants.input_matrix);
             let acceleration = feedback.limit(&cycle, &desired.acceleration, &wanted);
             let mut sent = constants.input_matrix.acceleration(&acceleration);

@@ -89,7 +89,7 @@ impl Localization {
         self.assembly_mode_fault.map_or(Ok(()), Err)?;
         let Cycle { constants, state, .. } = *cycle;
         let (machine, parameters) = (constants.machine(), &constants.parameters);
-        let start = self.tracker.pose;
+        let start = *self.tracker.pose();
         let start_length = self.tracker.kinematic_state().lengths(machine);
         let mut tracked = self.tracker.advance(machine, &measurement.length).0;
         for _ in 1..if state.has_control() { MAX_NEWTON_STEPS_PER_CYCLE } else { 1 } {
@@ -117,12 +117,16 @@ impl Localization {
                 return Err(DiagnosticCode::PoseNotFound.into());
             }
         }
-        let (pose, kinematic_state) = (self.tracker.pose, self.tracker.kinematic_state());
+        let kinematic_state = self.tracker.kinematic_state();
         let twist = kinematic_state.twist(machine, &rate).ok_or(DiagnosticCode::SingularPose)?;
         let Sensitivity { condition, determinant, .. } = *kinematic_state.sensitivity();
         let time_to_singularity = self.time_to_singularity(measurement.time_ns, determinant);
-        let platform = PlatformState { pose, twist, condition, time_to_singularity };
-        Ok(Located { measurement, rate, platform })
+        let pose = *self.tracker.pose();
+        Ok(Located {
+            measurement,
+            rate,
+            platform: PlatformState { pose, twist, condition, time_to_singularity },
+        })
     }
 
     /// The twist of the platform that gives these rates of the legs; `None` at a singular pose.

@@ -17,7 +17,7 @@ use super::limits::largest_ratio;
 use super::localization::{Localization, Located};
 use super::parameters::{Constants, Parameters};
 use super::reference::ReferenceGenerator;
-use crate::model::inverse_geometry::{LegMotion, leg_lengths, leg_motion};
+use crate::model::inverse_geometry::{leg_lengths, leg_lengths_and_rates};
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Motion, Pose, Twist};
@@ -71,7 +71,7 @@ pub struct FeedbackError {
 impl FeedbackError {
     /// Of the legs.
     pub fn of_legs(machine: &Machine, desired: &Motion, length: &[f64; LEGS], rate: &[f64; LEGS]) -> Self {
-        let LegMotion { length: desired, rate: desired_rate, .. } = leg_motion(machine, desired);
+        let (desired, desired_rate) = leg_lengths_and_rates(machine, &desired.pose, &desired.twist);
         Self {
             value: Vector6::from(desired) - Vector6::from(*length),
             rate: Vector6::from(desired_rate) - Vector6::from(*rate),
@@ -192,7 +192,9 @@ impl ErrorTracker {
         if is_new {
             self.error = error;
         } else if !acts_on_legs {
-            self.error = TrackingError::from(&estimator.predicted(cycle.release_ns).error());
+            let mut predicted = *estimator.state();
+            estimator.predict(&mut predicted, cycle.release_ns);
+            self.error = TrackingError::from(&predicted.error());
         }
         self.error
     }
@@ -207,9 +209,9 @@ impl ErrorTracker {
         self.change.as_ref()
     }
 
-    /// The estimate at the instant at which a force begins.
-    pub fn predicted(&self, begin_ns: u64) -> ErrorState {
-        self.estimator.predicted(begin_ns)
+    /// The estimator, after the last measurement.
+    pub fn estimator(&self) -> &Estimator {
+        &self.estimator
     }
 
     /// A predicted error with the value that was measured: where the legs are, by which forces act. The estimate follows it

@@ -63,8 +63,8 @@ proptest! {
         let mut found = Tracker::new(&machine, home);
         let (tracked, _) = found.find(&machine, &leg_lengths(&machine, &motion.pose));
         prop_assert_eq!(tracked, TrackingResult::Found);
-        prop_assert!((found.pose.position - motion.pose.position).norm() < 1e-12);
-        prop_assert!(angle_between(&found.pose.rotation, &motion.pose.rotation) < 1e-12);
-        prop_assert_eq!(Vector6::from(leg_lengths(&machine, &found.pose)).map(f64::is_finite), Vector6::repeat(true));
+        prop_assert!((found.pose().position - motion.pose.position).norm() < 1e-12);
+        prop_assert!(angle_between(&found.pose().rotation, &motion.pose.rotation) < 1e-12);
+        prop_assert_eq!(Vector6::from(leg_lengths(&machine, found.pose())).map(f64::is_finite), Vector6::repeat(true));
     }
 }

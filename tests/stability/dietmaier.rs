@@ -96,7 +96,7 @@ fn small_motions_stay_on_their_mode() {
             let there = mode.pose().displaced(&Twist { angular: Vector3::new(a, b, -b), linear: shift });
             let lengths = leg_lengths(&dietmaier, &there);
             assert_eq!(tracker.find(&dietmaier, &lengths).0, TrackingResult::Found, "mode {k}");
-            assert!(dietmaier.joints.distance(&tracker.pose, &there) < 1e-9, "mode {k}, step {step}");
+            assert!(dietmaier.joints.distance(tracker.pose(), &there) < 1e-9, "mode {k}, step {step}");
         }
     }
     assert_eq!(singular, 5);

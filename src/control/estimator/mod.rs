@@ -217,11 +217,9 @@ impl Estimator {
         &self.filter.state
     }
 
-    /// The estimate at a later instant.
-    pub fn predicted(&self, instant_ns: u64) -> ErrorState {
-        let mut state = self.filter.state;
-        self.sent.advance(&mut state, self.filter.time_ns, instant_ns);
-        state
+    /// Moves the estimate from the instant of the last measurement to a later one.
+    pub fn predict(&self, state: &mut ErrorState, instant_ns: u64) {
+        self.sent.advance(state, self.filter.time_ns, instant_ns);
     }
 
     /// Records the acceleration that feedback sends, after all limits, and the instant from which on it acts.

@@ -19,7 +19,7 @@ use crate::control::reference::pose_samples::PoseSamples;
 use crate::control::reference::{ReferenceGenerator, Target};
 use crate::control::state::State;
 use crate::control::tracking_error::TrackingError;
-use crate::model::inverse_geometry::leg_motion;
+use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::machine::Machine;
 use crate::model::rigid::Motion;
 
@@ -252,12 +252,12 @@ fn check_legs(
     active: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
     let actuator = &machine.actuator;
-    let legs = leg_motion(machine, motion);
-    for (leg, rate) in legs.rate.iter().enumerate() {
+    let (lengths, rates) = leg_lengths_and_rates(machine, &motion.pose, &motion.twist);
+    for (leg, rate) in rates.iter().enumerate() {
         let ratio = rate.abs() / actuator.max_rate;
         if !active.check(Limit::LegRate, ratio) {
             return Err(Diagnostic::new(DiagnosticCode::SetpointTooFast, ratio, 1.0).at(leg));
         }
     }
-    check_stroke(actuator, -parameters.stroke_margin, DiagnosticCode::SetpointOutOfReach, &legs.length)
+    check_stroke(actuator, -parameters.stroke_margin, DiagnosticCode::SetpointOutOfReach, &lengths)
 }

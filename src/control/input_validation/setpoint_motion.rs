@@ -6,7 +6,6 @@ use super::seconds_between;
 use crate::control::controller::{Setpoint, SetpointKind};
 use crate::control::parameters::Parameters;
 use crate::model::rigid::{Acceleration, Motion, Twist};
-use crate::model::task::TaskState;
 
 /// Longest interval of the messages over which their accelerations give a jerk \[s\].
 const MAX_JERK_INTERVAL_S: f64 = 0.025;
@@ -44,11 +43,12 @@ impl AsRef<Setpoint> for SetpointMotion {
 impl SetpointMotion {
     /// Evaluates the motion of a setpoint. Poses alone have no derivatives.
     pub fn new(setpoint: Setpoint) -> Self {
-        let motion = match setpoint.kind {
-            SetpointKind::Motion | SetpointKind::Unknown => setpoint.task.motion(),
-            SetpointKind::Pose | SetpointKind::Target => TaskState::at_rest(setpoint.task.x.into()).motion(),
-        };
-        Self { setpoint, motion, jerk: Vector6::zeros(), jerk_s: 0.0 }
+        let motion = setpoint.task.motion();
+        let mut new = Self { setpoint, motion, jerk: Vector6::zeros(), jerk_s: 0.0 };
+        if matches!(setpoint.kind, SetpointKind::Pose | SetpointKind::Target) {
+            (new.motion.twist, new.motion.acceleration) = (Twist::default(), Acceleration::default());
+        }
+        new
     }
 
     /// Sets the jerk that leads on from the setpoint before. Accelerations alone, carried on to the instant of the force,

@@ -78,11 +78,28 @@ impl Approach {
         Self { limits, closing: limits.scaled(closing_scale), step_s, outer_s }
     }
 
-    /// The velocity wanted where the present motion leads with the velocity `ahead`.
-    pub fn wanted(&self, target: &TargetOffset, ahead: &Vector3<f64>) -> WantedVelocity {
-        let TargetOffset { offset, velocity, acceleration } = target;
-        let distance = offset.norm();
-        let (closing, slope) = self.closing_velocity(distance);
+    /// The velocities of two vectors that are wanted where the present motion leads with the velocities `ahead`.
+    pub fn wanted(
+        approaches: [&Self; 2],
+        targets: [&TargetOffset; 2],
+        ahead: [&Vector3<f64>; 2],
+    ) -> [WantedVelocity; 2] {
+        let distances = targets.map(|target| target.offset.norm());
+        let roots = closing_roots(approaches, distances);
+        [
+            approaches[0].wanted_at(targets[0], ahead[0], distances[0], roots[0]),
+            approaches[1].wanted_at(targets[1], ahead[1], distances[1], roots[1]),
+        ]
+    }
+
+    fn wanted_at(
+        &self,
+        TargetOffset { offset, velocity, acceleration }: &TargetOffset,
+        ahead: &Vector3<f64>,
+        distance: f64,
+        root: f64,
+    ) -> WantedVelocity {
+        let (closing, slope) = self.closing_velocity_of(distance, || root);
         let ratio = if closing > 0.0 { closing / distance } else { slope };
         let direction = if distance > 0.0 { offset / distance } else { Vector3::zeros() };
         let relative = velocity - ahead;
@@ -113,24 +130,21 @@ impl Approach {
 
     /// phi and phi' at a distance.
     pub fn closing_velocity(&self, distance: f64) -> (f64, f64) {
+        self.closing_velocity_of(distance, || closing_roots([self], [distance])[0])
+    }
+
+    /// The same with the root of phi, which is needed below `a^2/j` only.
+    fn closing_velocity_of(&self, distance: f64, root: impl FnOnce() -> f64) -> (f64, f64) {
         let DerivativeLimits { velocity: limit, acceleration, jerk } = self.closing;
         let a = BRAKING_SHARE * acceleration;
-        let linear = self.outer_s + a / (2.0 * jerk);
         let (v, slope) = if distance * jerk >= a * a * (self.outer_s + a / jerk) {
+            let linear = self.outer_s + a / (2.0 * jerk);
             let v = 2.0 * distance / (linear + (linear * linear + 2.0 * distance / a).sqrt());
             (v, 1.0 / (linear + v / a))
         } else {
-            // Each step waits for the one before, so it is one division with short terms.
-            let by_root_jerk = 1.0 / jerk.sqrt();
-            let linear_velocity = distance / self.outer_s;
-            let mut root = linear_velocity.sqrt().max(SMALLEST_ROOT);
-            for _ in 0..NEWTON_STEPS {
-                let ramp_s = root * by_root_jerk;
-                let square = root * root;
-                root = (square * (self.outer_s + 2.0 * ramp_s) + distance)
-                    / (root * (2.0 * self.outer_s + 3.0 * ramp_s));
-            }
-            ((root * root).min(linear_velocity), 1.0 / (self.outer_s + 1.5 * root * by_root_jerk))
+            let root = root();
+            let v = (root * root).min(distance / self.outer_s);
+            (v, 1.0 / (self.outer_s + 1.5 * root / jerk.sqrt()))
         };
         if v > limit { (limit, 0.0) } else { (v, slope) }
     }
@@ -153,6 +167,26 @@ impl Approach {
         let (change, is_jerk_limited) = limited(&(aim - present), self.limits.jerk * self.step_s);
         (present + change, [is_acceleration_limited, is_jerk_limited])
     }
+}
+
+/// Roots of phi below `a^2/j` of some vectors, side by side. Each step of one waits for the one before, so it is one division with
+/// short terms; those of the others are done meanwhile.
+fn closing_roots<const N: usize>(approaches: [&Approach; N], distances: [f64; N]) -> [f64; N] {
+    let by_root_jerk = approaches.map(|approach| 1.0 / approach.closing.jerk.sqrt());
+    let outer_s = approaches.map(|approach| approach.outer_s);
+    let mut roots = [0.0; N];
+    for ((root, distance), outer_s) in roots.iter_mut().zip(&distances).zip(&outer_s) {
+        *root = (distance / outer_s).sqrt().max(SMALLEST_ROOT);
+    }
+    for _ in 0..NEWTON_STEPS {
+        let curves = distances.iter().zip(&outer_s).zip(&by_root_jerk);
+        for (root, ((distance, outer_s), by_root_jerk)) in roots.iter_mut().zip(curves) {
+            let ramp_s = *root * by_root_jerk;
+            let square = *root * *root;
+            *root = (square * (outer_s + 2.0 * ramp_s) + distance) / (*root * (2.0 * outer_s + 3.0 * ramp_s));
+        }
+    }
+    roots
 }
 
 /// Part of a leg's largest rate that is wanted: the velocity ends there without exceeding the limit.

@@ -29,7 +29,7 @@
 
 use self::approach::{Approach, TargetOffset, limit_leg_rates};
 use self::components::Components;
-use self::constant_jerk::moved;
+use self::constant_jerk::move_on;
 use self::held_stop::HeldStop;
 use self::history::History;
 use self::pose_bounds::PoseBounds;
@@ -210,7 +210,6 @@ impl ReferenceGenerator {
     // Out of line: in the loop over the steps the limits would be kept in memory beside themselves.
     #[inline(never)]
     fn step(&mut self, constants: &Constants, end_ns: u64, target: Option<&Target<'_>>) {
-        // The motion is written where it stays: copies of what was just written wait for it.
         let (begin, begin_ns) = (self.motion, self.time_ns);
         let step_s = seconds_between(begin_ns, end_ns);
         let desired = target.and_then(|target| {
@@ -219,7 +218,7 @@ impl ReferenceGenerator {
         // Without a target nothing is refused.
         let verified = desired.map(|(target, desired)| {
             let Acceleration { angular, linear } = self.proposed(constants, target, &desired, step_s);
-            self.motion = moved(&begin, &angular, &linear, step_s);
+            move_on(&mut self.motion, &angular, &linear, step_s);
             let (now, next) = (&begin.acceleration, &self.motion.acceleration);
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
             let step = Step { from: Some(&begin.pose), duration: step_s, change };
@@ -268,8 +267,8 @@ impl ReferenceGenerator {
             velocity: desired.twist.linear,
             acceleration: desired.acceleration.linear,
         };
-        let mut turn = turning.wanted(&orientation, &led.angular);
-        let mut shift = shifting.wanted(&position, &led.linear);
+        let [mut turn, mut shift] =
+            Approach::wanted([&turning, &shifting], [&orientation, &position], [&led.angular, &led.linear]);
         if limit_leg_rates(constants, pose, &mut turn, &mut shift) {
             self.active_limits = self.active_limits.with(Limit::LegRate, true);
         }

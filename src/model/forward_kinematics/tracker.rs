@@ -25,14 +25,12 @@ const MAX_TRACKING_STEPS: u32 = 2000;
 /// let mut tracker = Tracker::new(&machine, machine.home_pose());
 /// let (result, _) = tracker.find(&machine, &leg_lengths(&machine, &pose));
 /// assert_eq!(result, TrackingResult::Found);
-/// assert!((tracker.pose.position - pose.position).norm() < 1e-12);
+/// assert!((tracker.pose().position - pose.position).norm() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tracker {
-    /// Pose of the last converged step.
-    pub pose: Pose,
-    /// The same with its legs and factorization.
+    /// Of the last converged step.
     kinematic_state: KinematicState,
     outcome: Outcome,
 }
@@ -51,16 +49,20 @@ pub enum TrackingResult {
 impl Tracker {
     /// Starts at a pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
-        Self { pose, kinematic_state: KinematicState::new(machine, pose), outcome: Outcome::Solved }
+        Self { kinematic_state: KinematicState::new(machine, pose), outcome: Outcome::Solved }
     }
 
     /// Starts anew at a kinematic state.
     pub fn restart(&mut self, kinematic_state: &KinematicState) {
-        (self.pose, self.kinematic_state, self.outcome) =
-            (*kinematic_state.pose(), *kinematic_state, Outcome::Solved);
+        (self.kinematic_state, self.outcome) = (*kinematic_state, Outcome::Solved);
     }
 
-    /// The pose with its legs and factorization.
+    /// Pose of the last converged step.
+    pub fn pose(&self) -> &Pose {
+        self.kinematic_state.pose()
+    }
+
+    /// The same with its legs and factorization.
     pub fn kinematic_state(&self) -> &KinematicState {
         &self.kinematic_state
     }
@@ -87,7 +89,7 @@ impl Tracker {
     fn step(&mut self, machine: &Machine, lengths: &[f64; LEGS], iterations: &mut u32) -> NewtonReport {
         let report = refine(machine, &mut self.kinematic_state, lengths);
         *iterations += report.iterations;
-        (self.pose, self.outcome) = (*self.kinematic_state.pose(), report.outcome);
+        self.outcome = report.outcome;
         report
     }
 

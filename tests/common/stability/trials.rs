@@ -69,7 +69,7 @@ pub fn trial(machine: &Machine, method: Method, x: [f64; 6]) -> End {
     let found = match method {
         Method::Hexad => {
             let mut tracker = Tracker::new(machine, rigid(machine.home));
-            (tracker.find(machine, &lengths).0 == TrackingResult::Found).then_some(tracker.pose)
+            (tracker.find(machine, &lengths).0 == TrackingResult::Found).then_some(*tracker.pose())
         }
         Method::Rival(update) => {
             rivals::solve(machine, update, &machine.home, &lengths).map(|(x, _)| rigid(x))

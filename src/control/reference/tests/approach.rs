@@ -60,7 +60,8 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
         let at = |dt: f64| {
             let offset = offset + (velocity - ahead) * dt + acceleration * (0.5 * dt * dt);
             let target = TargetOffset { offset, velocity: velocity + acceleration * dt, acceleration };
-            approach.wanted(&target, &ahead)
+            let [wanted, _] = Approach::wanted([&approach; 2], [&target; 2], [&ahead; 2]);
+            wanted
         };
         if distance < 1e-3 || offset.norm() < 1e-3 {
             continue;
