@@ -5,7 +5,7 @@
 
 use super::assessment::{Evidence, assess};
 use super::diagnostic::Diagnostic;
-use super::drive_monitor::{DriveMonitor, DriveStatus};
+use super::drive_monitor::DriveMonitor;
 use super::estimator::LegRateEstimator;
 use super::external_pose::ExternalPose;
 use super::feedback_bound::FeedbackBound;
@@ -13,111 +13,17 @@ use super::force_limits::{ForceLimiter, LimitedForces};
 use super::forces::forces;
 use super::free_motion::FreeMotion;
 use super::input_validation::{MeasurementValidator, SetpointValidator};
+pub use super::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
 use super::limits::LimitSet;
 use super::localization::{Localization, PlatformState};
 use super::parameters::{Constants, Parameters};
 use super::reference::{ReferenceGenerator, Target};
 use super::stamp_clock::StampClock;
-use super::state::{OperatorRequest, Request, State};
+use super::state::{Request, State};
 use super::supervisor::Supervisor;
 use super::tracking_error::{ErrorTracker, TrackingError, setpoint_error};
 use crate::model::machine::{LEGS, Machine};
 use crate::model::rigid::{Motion, Wrench};
-use crate::model::task::TaskState;
-
-/// Meaning of the numbers of a setpoint, as the messages carry it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-#[repr(u32)]
-pub enum SetpointKind {
-    /// X, X' and X'' of a motion at one instant.
-    #[default]
-    Motion = 0,
-    /// X of a motion at one instant, without derivatives; the messages may arrive more slowly than the cycles.
-    Pose = 1,
-    /// X of a pose to move to and to stand at.
-    Target = 2,
-    /// No kind has the number of the message: the setpoint is rejected.
-    Unknown = 3,
-}
-
-impl SetpointKind {
-    /// The kinds that a message may have, in the order of their numbers.
-    pub const ALL: [Self; 3] = [Self::Motion, Self::Pose, Self::Target];
-}
-
-/// Task coordinates, with their derivatives, that the platform shall have at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-pub struct Setpoint {
-    /// Which of the numbers hold, and for how long.
-    pub kind: SetpointKind,
-    /// Instant for which the setpoint holds, on the clock of the releases \[ns\].
-    pub time_ns: u64,
-    /// X, X', X'' at that instant.
-    pub task: TaskState,
-    /// Share of the limits of autonomous motions with which a target is approached, up to 1; 0 is all of them.
-    pub target_speed: f64,
-}
-
-impl Setpoint {
-    /// X, X' and X'' of a motion at an instant.
-    pub fn motion(time_ns: u64, task: TaskState) -> Self {
-        Self { kind: SetpointKind::Motion, time_ns, task, target_speed: 0.0 }
-    }
-}
-
-/// Lengths \[m\] and rates \[m/s\] of the legs at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-pub struct Measurement {
-    /// Instant of the measurement, on the clock of the releases \[ns\].
-    pub time_ns: u64,
-    /// Measured leg lengths L, from base joint to platform joint \[m\].
-    pub length: [f64; LEGS],
-    /// Measured leg rates L' \[m/s\]; `None` if the driver does not measure them.
-    pub rate: Option<[f64; LEGS]>,
-    /// X by another sensor at the same instant; `None` if there is none.
-    pub pose: Option<[f64; 6]>,
-    /// Status of the drives.
-    pub drives: DriveStatus,
-}
-
-impl AsRef<Self> for Measurement {
-    fn as_ref(&self) -> &Self {
-        self
-    }
-}
-
-/// Processes that publish an input: of the publisher that counts, and of another one that lives beside it. 0: none.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Publishers {
-    /// Process whose messages count.
-    pub counting: u32,
-    /// Process whose messages are ignored.
-    pub ignored: u32,
-}
-
-/// Inputs of one cycle: with the controller's own state they determine its output.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Input {
-    /// The instant of release of this cycle, on the grid.
-    pub release_ns: u64,
-    /// The clock of the releases less the daemon's \[ns\]: not zero where measurements release the cycles.
-    pub clock_offset_ns: i64,
-    /// The newest setpoint; `None` if none ever arrived.
-    pub setpoint: Option<Setpoint>,
-    /// The newest measurement; `None` if none ever arrived.
-    pub measurement: Option<Measurement>,
-    /// The newest request; `None` if none ever arrived. Each is carried out once.
-    pub request: Option<OperatorRequest>,
-    /// Processes that publish setpoints.
-    pub setpoint_publishers: Publishers,
-    /// Processes that publish measurements.
-    pub measured_publishers: Publishers,
-    /// Whether cycles were missed since the last one, and the deployment makes that a fault.
-    pub deadline_missed: bool,
-}
 
 /// Result of one cycle: forces, state, and the numbers that explain them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

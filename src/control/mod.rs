@@ -29,6 +29,7 @@ mod forces;
 mod free_motion;
 pub mod gains;
 pub mod input_validation;
+mod inputs;
 pub mod law;
 pub mod leg_masses;
 pub mod limits;

@@ -53,14 +53,18 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
     let mut samples = Samples::new(51);
     let mut limited = 0;
     for _ in 0..2000 {
-        let approach = Approach::new(P, 0.9, 1e-3);
+        let (approach, other) = (Approach::new(P, 0.9, 1e-3), Approach::new(P, 0.4, 2e-3));
         let distance = 10.0_f64.powf(-3.0 * samples.uniform());
         let offset = samples.vector(distance);
         let [velocity, ahead, acceleration] = [0.8, 0.8, 5.0].map(|size| samples.vector(size));
         let at = |dt: f64| {
             let offset = offset + (velocity - ahead) * dt + acceleration * (0.5 * dt * dt);
             let target = TargetOffset { offset, velocity: velocity + acceleration * dt, acceleration };
-            let [wanted, _] = Approach::wanted([&approach; 2], [&target; 2], [&ahead; 2]);
+            // Whatever is beside it.
+            let beside = TargetOffset { offset: 3.0 * offset, ..target };
+            let [wanted, _] = Approach::wanted([&approach, &other], [&target, &beside], [&ahead; 2]);
+            let [_, second] = Approach::wanted([&other, &approach], [&beside, &target], [&ahead; 2]);
+            assert_eq!((wanted.velocity, wanted.derivative), (second.velocity, second.derivative));
             wanted
         };
         if distance < 1e-3 || offset.norm() < 1e-3 {
