@@ -15,7 +15,7 @@ use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::LaneArithmetic as _;
+use super::lanes::{LaneArithmetic as _, least_of_legs};
 use super::lanes3::Lanes3;
 use super::machine::{Joints, LEGS, Machine};
 use super::platform::acceleration_map;
@@ -71,8 +71,7 @@ impl<S: Simd> LegGeometry<S> {
     #[inline(always)]
     pub fn universal_sine(&self, simd: S, joints: &Joints) -> f64 {
         let normal = self.direction.cross(Lanes3::load(simd, &joints.universal_axis));
-        let squares = joints.triples.unpack(&normal.dot(normal).into());
-        squares.into_iter().fold(1.0, f64::min).sqrt()
+        least_of_legs(normal.dot(normal)).min(1.0).sqrt()
     }
 
     /// L' and n'.

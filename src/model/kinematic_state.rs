@@ -95,17 +95,6 @@ impl KinematicState {
         &self.sensitivity
     }
 
-    /// See [`super::inverse_geometry::universal_sine`].
-    pub(crate) fn universal_sine(&self, machine: &Machine) -> f64 {
-        let joints = &machine.joints;
-        dispatch!(machine.level, simd => self.legs.load(simd).universal_sine(simd, joints))
-    }
-
-    /// Whether the blocks of the factorization are too near to singular, so that it is LU with pivoting instead.
-    pub(crate) fn is_pivoted(&self) -> bool {
-        !self.factorization.is_regular
-    }
-
     /// The twist that gives the measured leg rates, see [`super::inverse_jacobian::twist_from_rates`].
     pub fn twist(&self, machine: &Machine, rates: &[f64; LEGS]) -> Option<Twist> {
         let joints = &machine.joints;

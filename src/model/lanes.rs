@@ -121,3 +121,11 @@ impl<S: Simd> Triple for f64x4<S> {
         a
     }
 }
+
+/// The least of the numbers of the six legs.
+#[inline(always)]
+pub(super) fn least_of_legs<S: Simd>(lanes: f64x8<S>) -> f64 {
+    let (first, second) = lanes.split();
+    let [a, b, c] = first.min(second).legs();
+    a.min(b).min(c)
+}

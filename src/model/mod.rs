@@ -12,7 +12,7 @@
 //! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
-//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], [`triples`], `lanes`, `lanes3`, `factorization`, `lu` |
+//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], [`triples`], `conditioning`, `lanes`, `lanes3`, `factorization`, `lu` |
 //!
 //! # Errata of the print
 //!
@@ -35,6 +35,7 @@
 //! refer to the platform origin C.
 
 pub mod active_forces;
+pub(crate) mod conditioning;
 mod factorization;
 pub mod fidelity;
 pub mod forward_kinematics;

@@ -1,8 +1,8 @@
-//! Examination of a stop near a bound: at instants ("knots") `dt` apart.
+//! Examination of a stop near a bound, at instants of its way: its [knots](super::knots).
 //!
 //! Between two knots lengths, their rates and the coordinates of C depart little from a cubic, and that is within the hull of its Bezier
-//! points, which are examined too (see [`super::cubic_departure`]). Angles leave their chords by at most `|angle''| dt^2 / 8`, and so does every
-//! quantity in the step that leads to the motion:
+//! points, which are examined too (see [`super::cubic_departure`]). Angles leave their chords by at most `|angle''| dt^2 / 8`, dt the longer
+//! interval beside a knot, and so does every quantity in the step that leads to the motion:
 //!
 //! ```text
 //! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2     s, c = |sin|, cos of beta; of the Bryan angles
@@ -18,6 +18,7 @@ use nalgebra::Vector3;
 
 use super::angle_ranges::{AngleRanges, MAX_SLACK_RATIO, cosine_of_beta};
 use super::cubic_departure::{CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk};
+use super::knots::{Beside, Knots, MAX_INTERVALS};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
 use super::regularity::{REGULARITY_WORK, RegularBalls, Regularity, Surroundings};
@@ -34,12 +35,9 @@ use crate::model::triples::LegLanes;
 const LENGTH_DEPARTURE_M: f64 = 2e-5;
 /// Departure of a leg's rate from that of its cubic that does so, over the largest rate.
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
-/// Bounds on the number of intervals between knots.
-const MIN_INTERVALS: u32 = 3;
-const MAX_INTERVALS: u32 = 10;
-/// Work that a verification may do, in knots: those of the longest stop, and the regularity of four poses. It bounds the longest
-/// cycle. The balls that were found remain for the next one. With three a reference that presses against its condition is refused in turns, and
-/// the platform jerks.
+/// Work that a step may do, in knots: those of the longest stop, and the regularity of four poses, of fewer where walls took
+/// their part. It bounds the longest cycle. The balls that were found remain for the next one. With three a reference that presses against its
+/// condition is refused in turns, and the platform jerks.
 pub(super) const MAX_WORK: u32 = MAX_INTERVALS + 4 * REGULARITY_WORK;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures are bounded for the worst direction.
@@ -57,12 +55,14 @@ pub(super) struct Examination<'a> {
     constants: &'a Constants,
     bounds: &'a PoseBounds,
     stop: &'a PoseStop,
-    intervals: u32,
-    dt: f64,
-    /// Departures between knots: of a length \[m\], of a rate \[m/s\], and of C per coordinate \[m\].
-    length_slack: f64,
-    rate_slack: f64,
-    position_slack: Vector3<f64>,
+    knots: Knots,
+    /// Largest third derivative of a length, and largest departures within the step that leads to the motion: of a length \[m\],
+    /// of a rate \[m/s\], and of a coordinate of C \[m\].
+    length_jerk: f64,
+    step_departure: [f64; 3],
+    step_s: f64,
+    /// Directions in which C may depart, per coordinate.
+    directions: Vector3<f64>,
     /// Whether rates could exceed their limit, and the ranges of the angles if they could leave the envelope.
     needs_rates: bool,
     angles: Option<AngleRanges>,
@@ -113,24 +113,20 @@ impl<'a> Examination<'a> {
         let max_departure = RATE_DEPARTURE_RATIO * actuator.max_rate;
         let rate_share =
             if needs_rates { CUBIC_RATE_DEPARTURE * length_jerk * square / max_departure } else { 0.0 };
-        let are_too_few = |n: &u32| f64::from(n * n * n) < length_share || f64::from(n * n) < rate_share;
-        let intervals = MIN_INTERVALS + (MIN_INTERVALS..MAX_INTERVALS).filter(are_too_few).count() as u32;
-        let dt = duration / f64::from(intervals);
-        let (cubic, chord) = (CUBIC_DEPARTURE * dt * dt * dt, step.duration * step.duration / 8.0);
-        let room = ROOM_RATIO * actuator.stroke();
+        let knots = Knots::new(duration, rate_share, length_share);
+        let chord = step.duration * step.duration / 8.0;
         // Along the velocity and, across it, along the rest of the present acceleration.
         let Motion { twist, acceleration, .. } = motion;
         let u = twist.linear.try_normalize(0.0).unwrap_or_default();
         let e = acceleration.linear.try_normalize(0.0).unwrap_or_default();
-        let directions = u.abs() * 2.0 + e.abs();
         Ok(Self {
             constants,
             bounds,
-            intervals,
-            dt,
-            length_slack: ((length_jerk * cubic).max(curvature * chord) - room).max(0.0),
-            rate_slack: length_jerk * (CUBIC_RATE_DEPARTURE * dt * dt).max(chord),
-            position_slack: directions * (position.jerk * cubic).max(position.acceleration * chord),
+            knots,
+            length_jerk,
+            step_departure: [curvature, length_jerk, position.acceleration].map(|bound| bound * chord),
+            step_s: step.duration,
+            directions: u.abs() * 2.0 + e.abs(),
             needs_rates,
             angles: bounds
                 .envelope
@@ -141,7 +137,7 @@ impl<'a> Examination<'a> {
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
             relaxed: None,
-            work: work.saturating_sub(intervals),
+            work: work.saturating_sub(knots.intervals),
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
@@ -163,21 +159,24 @@ impl<'a> Examination<'a> {
     ) -> Result<(), Limit> {
         let mut pose = *start;
         let mut state = self.stop.at(0.0);
-        let mut before = None;
+        let (mut t, mut beside, mut before) = (0.0, Beside::default(), None);
         let mut k = 0;
         loop {
-            before = Some(self.check(simd, balls, &pose, &state, before)?);
-            k += 1;
-            if k > self.intervals {
+            let next_t = self.knots.instant(k + 1);
+            let is_last = k == self.knots.intervals;
+            beside = Beside { before: beside.after, after: if is_last { 0.0 } else { next_t - t } };
+            before = Some(self.check(simd, balls, &pose, &state, beside, before)?);
+            if is_last {
                 return Ok(());
             }
-            let next = self.stop.at(f64::from(k) * self.dt);
-            pose = advanced_to_knot(&pose, &state, &next, self.dt);
-            state = next;
+            let next = self.stop.at(next_t);
+            pose = advanced_to_knot(&pose, &state, &next, beside.after);
+            (t, state) = (next_t, next);
+            k += 1;
         }
     }
 
-    /// Checks a knot, and the Bezier points between it and the one before. Returns its lengths and rates.
+    /// Checks a knot, and the Bezier points in the intervals `beside` it, before and after. Returns its lengths and rates.
     #[inline(always)]
     fn check<S: Simd>(
         &mut self,
@@ -185,36 +184,48 @@ impl<'a> Examination<'a> {
         balls: &mut RegularBalls,
         pose: &Pose,
         state: &PoseStopState,
+        beside: Beside,
         before: Option<Legs<S>>,
     ) -> Result<Legs<S>, Limit> {
+        let dt = beside.longest();
         let twist = Twist { angular: state.orientation.velocity, linear: state.position.velocity };
         let legs @ (length, rate) = length_and_rate_lanes(simd, self.constants.machine(), pose, &twist);
-        if self.needs_rates && !self.are_rates_kept(simd, &legs, before.as_ref()) {
+        if self.needs_rates && !self.are_rates_kept(simd, &legs, beside, before.as_ref()) {
             return Err(Limit::LegRate);
         }
-        // Before the first knot there is no Bezier point.
-        let back = if before.is_some() { -self.dt / 3.0 } else { 0.0 };
         let splat = |number: f64| f64x8::splat(simd, number);
         let load = |lanes: &LegLanes| f64x8::load_array(simd, lanes.0);
-        let (next, last) = (rate * splat(self.dt / 3.0), rate * splat(back));
+        let (next, last) = (rate * splat(beside.after / 3.0), rate * splat(-beside.before / 3.0));
         let (short, long) = (length + next.min(last), length + next.max(last));
         let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
-        if !room.simd_ge(splat(self.length_slack - self.length_excess)).all_true() {
+        let [in_step, ..] = self.step_departure;
+        let departure = (self.length_jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
+        let slack = (departure - ROOM_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
+        if !room.simd_ge(splat(slack - self.length_excess)).all_true() {
             return Err(Limit::Stroke);
         }
         if let Some(envelope) = &self.bounds.envelope {
-            self.check_envelope(simd, envelope, pose, state, back)?;
+            self.check_envelope(simd, envelope, pose, state, beside)?;
         }
-        self.check_condition(simd, balls, pose, state)?;
+        self.check_condition(simd, balls, pose, state, dt)?;
         Ok(legs)
     }
 
     /// Whether the rates at a knot and between it and the one before keep their limit.
     #[inline(always)]
-    fn are_rates_kept<S: Simd>(&self, simd: S, (length, rate): &Legs<S>, before: Option<&Legs<S>>) -> bool {
-        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - self.rate_slack);
+    fn are_rates_kept<S: Simd>(
+        &self,
+        simd: S,
+        (length, rate): &Legs<S>,
+        beside: Beside,
+        before: Option<&Legs<S>>,
+    ) -> bool {
+        let dt = beside.longest();
+        let [_, in_step, _] = self.step_departure;
+        let slack = (self.length_jerk * CUBIC_RATE_DEPARTURE * dt * dt).max(in_step);
+        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - slack);
         let between = before.map_or(*rate, |(length_before, rate_before)| {
-            (*length - *length_before) * f64x8::splat(simd, 3.0 / self.dt) - *rate_before - *rate
+            (*length - *length_before) * f64x8::splat(simd, 3.0 / beside.before) - *rate_before - *rate
         });
         rate.abs().max(between.abs()).simd_le(limit).all_true()
     }
@@ -227,9 +238,10 @@ impl<'a> Examination<'a> {
         balls: &mut RegularBalls,
         pose: &Pose,
         state: &PoseStopState,
+        dt: f64,
     ) -> Result<(), Limit> {
         let constants = self.constants;
-        let reach = self.stop.reach(state, self.dt, &constants.parameters.limits);
+        let reach = self.stop.reach(state, dt, &constants.parameters.limits);
         let cover = balls.knot_cover(simd, constants, pose, reach);
         if cover.is_complete() {
             return Ok(());
@@ -262,32 +274,36 @@ impl<'a> Examination<'a> {
         envelope: &Envelope,
         pose: &Pose,
         state: &PoseStopState,
-        back: f64,
+        beside: Beside,
     ) -> Result<(), Limit> {
+        let dt = beside.longest();
+        let [.., in_step] = self.step_departure;
+        let jerk = self.constants.parameters.limits.position.jerk;
+        let slack = self.directions * (jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
         let at = |t: f64| pose.position + state.position.velocity * t;
-        let (next, last) = (at(self.dt / 3.0), at(back));
-        let is_within = is_position_inside(envelope, &next, &self.position_slack)
-            && is_position_inside(envelope, &last, &self.position_slack)
+        let is_within = is_position_inside(envelope, &at(beside.after / 3.0), &slack)
+            && is_position_inside(envelope, &at(-beside.before / 3.0), &slack)
             && self
                 .angles
                 .as_ref()
-                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_slack(pose, state)));
+                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_slack(pose, state, dt)));
         if is_within || self.is_nearer_than_start(envelope, pose) { Ok(()) } else { Err(Limit::Envelope) }
     }
 
     /// Departure of the angles from their chords around a knot \[rad\].
     #[inline(always)]
-    fn angle_slack(&self, pose: &Pose, state: &PoseStopState) -> f64 {
+    fn angle_slack(&self, pose: &Pose, state: &PoseStopState, dt: f64) -> f64 {
         if !(self.stop.orientation.duration > 0.0) {
             return 0.0;
         }
+        let dt = dt.max(self.step_s);
         let (s, c) = (pose.rotation.m13.abs(), cosine_of_beta(&pose.rotation));
         let alpha = self.constants.parameters.limits.orientation.acceleration;
-        let w = state.orientation.velocity.norm() + alpha * self.dt;
+        let w = state.orientation.velocity.norm() + alpha * dt;
         let w = self.stop.orientation.peak_velocity.min(w);
         let curvature = alpha / c + w * w * (1.0 + c + 3.0 * s) / (c * c);
         let room = ROOM_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
-        (curvature * self.dt * self.dt / 8.0 - room).max(0.0)
+        (curvature * dt * dt / 8.0 - room).max(0.0)
     }
 
     /// Whether the start of the step is beyond the envelope, and a pose no farther beyond it.

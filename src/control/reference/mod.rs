@@ -13,6 +13,7 @@
 //! | `stop` | stop of a vector in closed form |
 //! | `verification` | whether a stop keeps the limits along its way |
 //! | `examination` | a stop near a bound, knot by knot |
+//! | `knots` | at which instants |
 //! | `cubic_departure` | what may happen between two knots |
 //! | `angle_ranges` | whether angles are within their ranges |
 //! | `pose_stop` | stop of position and orientation |
@@ -52,6 +53,7 @@ mod cubic_departure;
 mod examination;
 mod held_stop;
 mod history;
+mod knots;
 mod pose_bounds;
 pub mod pose_samples;
 mod pose_stop;
@@ -217,11 +219,11 @@ impl ReferenceGenerator {
         });
         // Without a target nothing is refused.
         let verified = desired.map(|(target, desired)| {
-            let Acceleration { angular, linear } = self.proposed(constants, target, &desired, step_s);
+            let (Acceleration { angular, linear }, work) = self.proposed(constants, target, &desired, step_s);
             move_on(&mut self.motion, &angular, &linear, step_s);
             let (now, next) = (&begin.acceleration, &self.motion.acceleration);
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
-            let step = Step { from: Some(&begin.pose), duration: step_s, change };
+            let step = Step { from: Some(&begin.pose), duration: step_s, change, work };
             let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step);
             self.components = self.components.after(verified.is_ok());
             verified
@@ -239,14 +241,14 @@ impl ReferenceGenerator {
         self.time_ns = end_ns;
     }
 
-    /// Acceleration of the next instant, towards its desired motion.
+    /// Acceleration of the next instant, towards its desired motion, and the work of the walls for it.
     fn proposed(
         &mut self,
         constants: &Constants,
         target: &Target<'_>,
         desired: &RelativeMotion,
         h: f64,
-    ) -> Acceleration {
+    ) -> (Acceleration, u32) {
         let limits = target.limits(&constants.parameters.limits);
         let closing_scale = target.closing_scale(self.closing_scale);
         let approach = |limits| Approach::new(limits, closing_scale, h);
@@ -272,9 +274,11 @@ impl ReferenceGenerator {
         if limit_leg_rates(constants, pose, &mut turn, &mut shift) {
             self.active_limits = self.active_limits.with(Limit::LegRate, true);
         }
+        let mut work = 0;
         if constants.parameters.on_violation == ViolationPolicy::Limit {
             let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
             let restricting = walls.restrict(constants.machine().level, &mut turn, &mut shift);
+            work = walls.work();
             if !restricting.is_empty() {
                 turning.limit_velocity(&mut turn);
                 shifting.limit_velocity(&mut shift);
@@ -297,6 +301,6 @@ impl ReferenceGenerator {
             .with(Limit::Velocity, turn.is_limited | shift.is_limited)
             .with(Limit::Acceleration, by_acceleration)
             .with(Limit::Jerk, by_jerk);
-        Acceleration { angular, linear }
+        (Acceleration { angular, linear }, work)
     }
 }

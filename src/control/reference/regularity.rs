@@ -19,7 +19,7 @@
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 
 use crate::control::parameters::Constants;
-use crate::model::kinematic_state::KinematicState;
+use crate::model::conditioning::Conditioning;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::{MAX_WRENCH_NORM, Sensitivity};
 
@@ -168,14 +168,12 @@ impl Ball {
     /// If so much work may be done; pivots are known only afterwards.
     fn new(constants: &Constants, center: &Pose, work: &mut u32) -> Option<Self> {
         *work = work.checked_sub(REGULARITY_WORK)?;
-        let machine = constants.machine();
-        let kinematic_state = KinematicState::new(machine, *center);
-        if kinematic_state.is_pivoted() {
+        let Conditioning { sensitivity, shortest, universal_sine, is_pivoted } =
+            Conditioning::new(constants.machine(), center);
+        if is_pivoted {
             *work = work.saturating_sub(PIVOTING_WORK);
         }
-        let Sensitivity { condition, norm, .. } = *kinematic_state.sensitivity();
-        let shortest = kinematic_state.lengths(machine).into_iter().fold(f64::INFINITY, f64::min);
-        let universal_sine = kinematic_state.universal_sine(machine);
+        let Sensitivity { condition, norm, .. } = sensitivity;
         let regularity = Regularity { condition, universal_sine };
         Some(Self { norm, inverse_norm: condition / norm, shortest, regularity })
     }

@@ -24,6 +24,8 @@ pub(super) struct Step<'a> {
     pub duration: f64,
     /// Change of the acceleration: angular \[rad/s^2\], linear \[m/s^2\].
     pub change: [f64; 2],
+    /// Work that it took to propose it, in knots of an examination.
+    pub work: u32,
 }
 
 impl Step<'_> {
@@ -63,7 +65,7 @@ impl Verifier {
             reach: [shift.length, turn.length],
             condition: constants.reference_condition,
         };
-        let mut work = MAX_WORK;
+        let mut work = MAX_WORK.saturating_sub(step.work);
         let is_free = shift.peak_velocity + linear_bulge <= position.velocity
             && turn.peak_velocity + angular_bulge <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity

@@ -39,6 +39,8 @@ const SWEEPS: usize = 8;
 const MAX_VISITS: usize = 24;
 /// One sweep of so many is over all walls, the others over the active ones.
 const FULL_SWEEP: usize = 3;
+/// Visits that take about as long as the examination of a knot.
+const VISITS_PER_WORK: usize = 24;
 /// Slowness of the return from a gap that is negative, over that of the approach.
 const RETURN_RATIO: f64 = 4.0;
 
@@ -90,6 +92,8 @@ pub(super) struct Walls {
     walls: [Wall; WALL_COUNT],
     count: usize,
     radius: f64,
+    /// Visits of walls so far.
+    visits: usize,
 }
 
 impl Walls {
@@ -103,7 +107,7 @@ impl Walls {
     ) -> Self {
         let (machine, limits) = (constants.machine(), &constants.parameters.limits);
         let radius = machine.joints.radius;
-        let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius };
+        let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius, visits: 0 };
         let kept = KEPT_RATIO * machine.actuator.stroke();
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
@@ -141,12 +145,13 @@ impl Walls {
     ) {
         let (machine, limits) = (constants.machine(), &constants.parameters.limits);
         let x = task_coordinates(&motion.pose, &machine.home);
-        let [alpha, beta, ..] = x;
         let radius = self.radius;
         // Rates of the Bryan angles: alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w / c^2.
-        let (e1, e2) = (Vector3::x(), Vector3::new(0.0, libm::cos(alpha), libm::sin(alpha)));
-        let (s, c) = (libm::sin(beta), libm::cos(beta));
-        let n = e1 * s + e1.cross(&e2) * c;
+        // Of the rotation, n is the last column, and c e2 is across it and e1.
+        let [_, beta, ..] = x;
+        let (e1, n) = (Vector3::x(), motion.pose.rotation.column(2).into_owned());
+        let (s, c) = (n.x, (n.y * n.y + n.z * n.z).sqrt().copysign(libm::cos(beta)));
+        let e2 = Vector3::new(0.0, n.z, -n.y) / c;
         let zero = Vector3::zeros();
         let gradients = [
             stacked(&((e1 - n * s) / (c * c * radius)), &zero),
@@ -180,6 +185,11 @@ impl Walls {
             };
             self.count += 1;
         }
+    }
+
+    /// The work so far, in knots of an examination.
+    pub fn work(&self) -> u32 {
+        (self.visits / VISITS_PER_WORK) as u32
     }
 
     /// Changes the wanted velocities of rotation and translation least, so that no wall is approached too fast. Returns the
@@ -227,6 +237,7 @@ impl Walls {
                     is_changed = true;
                 }
                 active += usize::from(multiplier != 0.0);
+                self.visits += 1;
             }
             if is_full && !is_changed {
                 break;
@@ -248,6 +259,7 @@ impl Walls {
                 let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
                 let excess = (dot(gradient, derivative) - wanted) * wall.inverse_square;
                 derivative -= gradient * f64x8::splat(simd, excess);
+                self.visits += 1;
             }
         }
         let store = |lanes: f64x8<S>, turn: &mut Vector3<f64>, shift: &mut Vector3<f64>| {
@@ -263,8 +275,9 @@ impl Walls {
 /// The sum of the products, in the same order on every processor.
 #[inline(always)]
 fn dot<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64 {
-    let [mx, my, mz, x, y, z, ..] = (a * b).to_array();
-    (mx + my) + (mz + x) + (y + z)
+    let (low, high) = (a * b).split();
+    let [a, b, c, d] = (low + high).to_array();
+    (a + b) + (c + d)
 }
 
 fn padded(v: &Vector6<f64>) -> [f64; LANES] {

@@ -225,7 +225,7 @@ fn a_component_that_waits_follows_the_stop() {
         let expected = stop.at(h + if is_followed { elapsed_s } else { 0.0 });
         let mut accelerations = |components| {
             reference.components = components;
-            reference.proposed(&constants, &target, &desired, h)
+            reference.proposed(&constants, &target, &desired, h).0
         };
         let both = accelerations(Components::Both);
         let shifting = accelerations(Components::Translation { steps: 0 });

@@ -1,5 +1,6 @@
 //! Regularity at the knots of a stop near a bound: of the pose itself, of the poses around it, and the work for it.
 
+use super::super::examination::MAX_WORK;
 use super::super::pose_bounds::PoseBounds;
 use super::super::pose_stop::{PoseStop, StopKind};
 use super::super::regularity::{KnotCover, RegularBalls};
@@ -79,6 +80,23 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
         }
     }
     assert!(later > 4, "{later}");
+}
+
+/// What the walls took of the work of a step is missing for its verification.
+#[test]
+fn a_step_whose_work_is_done_is_refused() {
+    let mut samples = Samples::new(95);
+    for _ in 0..20 {
+        let machine = machine(&mut samples);
+        let constants = Constants::new(&machine, parameters(&machine));
+        let pose = *constants.home.pose();
+        let verified = |work: u32| {
+            let step = Step { work, ..Step::default() };
+            Verifier::default().verify(&constants, &PoseBounds::nominal(&constants), &at_rest(&pose), &step)
+        };
+        assert_eq!(verified(MAX_WORK - 1), Ok(StopKind::ReleaseFirst));
+        assert_eq!(verified(MAX_WORK), Err(Limit::Condition));
+    }
 }
 
 /// No pose of a stop is farther from a state than the reach around it, and where the velocity is small some are almost as far.

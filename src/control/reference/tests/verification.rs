@@ -109,7 +109,7 @@ pub(super) struct PlayedStep {
 impl PlayedStep {
     fn step(&self) -> Step<'_> {
         let change = [self.jerk.angular.norm() * self.duration, self.jerk.linear.norm() * self.duration];
-        Step { from: self.from.as_ref(), duration: self.duration, change }
+        Step { from: self.from.as_ref(), duration: self.duration, change, work: 0 }
     }
 }
 

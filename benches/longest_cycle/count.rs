@@ -1,0 +1,52 @@
+//! Instructions of one cycle: a child process executes it step by step, under the eyes of its parent.
+
+#![allow(unsafe_code, reason = "a child is a fork")]
+
+use std::hint::black_box;
+
+use hexad::control::controller::{Controller, Input};
+use nix::sys::ptrace;
+use nix::sys::signal::{Signal, raise};
+use nix::sys::wait::{WaitStatus, waitpid};
+use nix::unistd::{ForkResult, Pid, fork};
+
+/// Instructions of the next cycle of a controller.
+pub fn instructions(controller: &Controller, input: &Input) -> u64 {
+    let mut controller = controller.clone();
+    let signals = traced(|| {});
+    let all = traced(|| {
+        black_box(controller.step(black_box(input)));
+    });
+    all - signals
+}
+
+/// Instructions of a child process between two signals, between which it does some work.
+fn traced(work: impl FnOnce()) -> u64 {
+    // SAFETY: the child has the one thread that forks. It calls the system, computes without allocation, and ends.
+    match unsafe { fork() }.expect("a process") {
+        ForkResult::Child => {
+            let stop = || raise(Signal::SIGSTOP);
+            let traced = ptrace::traceme().and_then(|()| stop());
+            work();
+            let end = traced.and_then(|()| stop());
+            // SAFETY: ends the process at once, without the destructors of its parent.
+            unsafe { libc::_exit(i32::from(end.is_err())) }
+        }
+        ForkResult::Parent { child } => count_to_next_stop(child).expect("a child that can be traced"),
+    }
+}
+
+fn count_to_next_stop(child: Pid) -> nix::Result<u64> {
+    waitpid(child, None)?;
+    let mut count = 0;
+    loop {
+        ptrace::step(child, None)?;
+        match waitpid(child, None)? {
+            WaitStatus::Stopped(_, Signal::SIGTRAP) => count += 1,
+            _ => break,
+        }
+    }
+    ptrace::kill(child)?;
+    waitpid(child, None)?;
+    Ok(count)
+}
