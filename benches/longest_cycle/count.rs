@@ -1,10 +1,11 @@
-//! Instructions of one cycle: a child process executes it step by step, under the eyes of its parent.
+//! Instructions of one cycle: a child process executes it, and its parent counts the steps.
 
 #![allow(unsafe_code, reason = "a child is a fork")]
 
 use std::hint::black_box;
 
 use hexad::control::controller::{Controller, Input};
+use nix::errno::Errno;
 use nix::sys::ptrace;
 use nix::sys::signal::{Signal, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
@@ -43,7 +44,8 @@ fn count_to_next_stop(child: Pid) -> nix::Result<u64> {
         ptrace::step(child, None)?;
         match waitpid(child, None)? {
             WaitStatus::Stopped(_, Signal::SIGTRAP) => count += 1,
-            _ => break,
+            WaitStatus::Stopped(_, Signal::SIGSTOP) => break,
+            _ => return Err(Errno::ECHILD),
         }
     }
     ptrace::kill(child)?;

@@ -2,9 +2,6 @@
 
 /// Part by which the true motion may exceed a limit: the loop's own error.
 pub const MOTION_ALLOWANCE: f64 = 0.02;
-/// The same for the acceleration: control that begins while the brakes still close meets a velocity that has changed since
-/// the measurement. 0.0216 is the worst found.
-pub const ACCELERATION_ALLOWANCE: f64 = 0.025;
 /// Part by which the reference may exceed a limit: rounding.
 pub const REFERENCE_ALLOWANCE: f64 = 1e-6;
 
@@ -68,9 +65,9 @@ impl Quantity {
             Self::Velocity
             | Self::AngularVelocity
             | Self::LegRate
+            | Self::Acceleration
             | Self::AngularAcceleration
             | Self::Condition => 1.0 + MOTION_ALLOWANCE,
-            Self::Acceleration => 1.0 + ACCELERATION_ALLOWANCE,
             Self::Stroke | Self::Envelope | Self::Engaging | Self::Following => 1.0,
             Self::ReferenceVelocity | Self::ReferenceAcceleration | Self::ReferenceJerk => {
                 1.0 + REFERENCE_ALLOWANCE
