@@ -1,9 +1,10 @@
 //! The longest cycle of the controller against the median, in instructions: `cargo bench --bench longest_cycle` (5 min).
 //!
 //! The runs of `tests/adversary`, at 1 kHz and faster: a search climbs for the longest cycle, with each policy on a processor of
-//! its own. Times decide which cycles of a run are counted, instructions which runs it climbs from. The median is that of the fast
-//! scene of the same machine, at 1 kHz. `-- --seconds N` searches for as long, `-- --machine NAME` with one machine only; `HEXAD_SEED`
-//! begins elsewhere; `-- --genome LINE` counts one run. With `RUSTFLAGS="-C target-cpu=x86-64-v3"` the counts are those of that instruction set.
+//! its own, from the longest that are known (`longest.txt`). Times decide which cycles of a run are counted, instructions which
+//! runs it climbs from. The median is that of the fast scene of the same machine, at 1 kHz. `-- --seconds N` searches for as long,
+//! `-- --machine NAME` with one machine only; `HEXAD_SEED` begins elsewhere; `-- --genome LINE` counts one run. With
+//! `RUSTFLAGS="-C target-cpu=x86-64-v3"` the counts are those of that instruction set.
 
 #![allow(
     dead_code,
@@ -39,6 +40,7 @@ use std::time::Duration;
 
 use hexad::control::parameters::ViolationPolicy;
 use hexad::realtime::setup::denormals;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use genome::Genome;
 use machines::MACHINES;
@@ -68,12 +70,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let time = Duration::from_secs_f64(seconds);
     let seed = env::var("HEXAD_SEED").map_or(Ok(1), |text| text.parse())?;
-    scope(|scope| {
-        for policy in [ViolationPolicy::Stop, ViolationPolicy::Limit] {
+    let progress = ProgressBar::new_spinner().with_message(format!("search of {seconds} s"));
+    progress.set_style(ProgressStyle::with_template("{spinner} {msg}, {elapsed}")?);
+    progress.enable_steady_tick(Duration::from_millis(200));
+    let searches = scope(|scope| {
+        let searches = [ViolationPolicy::Stop, ViolationPolicy::Limit].map(|policy| {
             let machines = machines.clone();
-            scope.spawn(move || report(&Search::climb(policy, machines, seed, time)));
-        }
+            scope.spawn(move || Search::climb(policy, machines, seed, time))
+        });
+        searches.map(|search| search.join().expect("a search that ends"))
     });
+    progress.finish_and_clear();
+    searches.iter().for_each(report);
     Ok(())
 }
 
