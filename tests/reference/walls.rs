@@ -6,7 +6,9 @@ use hexad::control::input_validation::SetpointMotion;
 use hexad::control::parameters::{Constants, Envelope, Parameters, ViolationPolicy};
 use hexad::control::reference::{ReferenceGenerator, Target};
 use hexad::model::task::TaskState;
-use nalgebra::Vector6;
+use hexad::plant::random::Random;
+use nalgebra::{Vector3, Vector6};
+use rayon::prelude::*;
 
 use super::common::data;
 use super::common::rig::parameters;
@@ -29,8 +31,9 @@ fn at(home: &[f64; 6], sines: &Sines, t: f64) -> TaskState {
     task
 }
 
-/// RMS jerk of translation and rotation over the limits once the wall is reached, and the largest values of the run.
-fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines) -> ([f64; 2], Largest) {
+/// Once the wall is reached: RMS jerk of translation and rotation over the limits, and how often per second one of them turns back from
+/// more than half of its limit to as much. And the largest values of the run.
+fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines) -> ([f64; 2], f64, Largest) {
     let config = Config::load(&data(machine, "toml")).unwrap();
     let mut parameters = parameters(&config);
     parameters.on_violation = ViolationPolicy::Limit;
@@ -43,7 +46,8 @@ fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines)
     let start = *reference.motion();
     reference.start(&constants, 0, &start);
     let period_s = parameters.period_ns as f64 * 1e-9;
-    let (mut squares, mut count, mut largest) = ([0.0; 2], 0.0, Largest::default());
+    let (mut squares, mut count, mut reversals, mut largest) = ([0.0; 2], 0.0, 0, Largest::default());
+    let mut last = [Vector3::zeros(); 2];
     for k in 0..6 * rate_hz {
         let now_ns = k * parameters.period_ns;
         let before = *reference.motion();
@@ -55,12 +59,19 @@ fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines)
         if k > 2 * rate_hz {
             let change = (reference.motion().acceleration.vector() - before.acceleration.vector()) / period_s;
             let limits = &parameters.limits;
-            squares[0] += (change.fixed_rows::<3>(3).norm() / limits.position.jerk).powi(2);
-            squares[1] += (change.fixed_rows::<3>(0).norm() / limits.orientation.jerk).powi(2);
+            let jerk = [
+                change.fixed_rows::<3>(3) / limits.position.jerk,
+                change.fixed_rows::<3>(0) / limits.orientation.jerk,
+            ];
+            for ((square, jerk), last) in squares.iter_mut().zip(jerk).zip(&mut last) {
+                *square += jerk.norm_squared();
+                reversals += u32::from(jerk.norm().min(last.norm()) > 0.5 && jerk.dot(last) < 0.0);
+                *last = jerk;
+            }
             count += 1.0;
         }
     }
-    (squares.map(|sum| f64::sqrt(sum / count)), largest)
+    (squares.map(|sum| f64::sqrt(sum / count)), f64::from(reversals) / 4.0, largest)
 }
 
 #[test]
@@ -93,15 +104,18 @@ fn the_platform_slides_along_walls_without_chatter() {
     for machine in ["motion_base", "fried2008", "tsai2000"] {
         for rate_hz in [250, 1000, 4000] {
             for (what, half, sines) in &cases {
-                let (jerk, largest) = press(machine, rate_hz, *half, sines);
+                let (jerk, reversals, largest) = press(machine, rate_hz, *half, sines);
                 let [shift, turn] = jerk;
                 let stroke = largest.0["stroke"];
-                println!("{machine} {rate_hz} Hz, {what}: jerk {shift:.4} {turn:.4}, stroke {stroke:.2e}");
-                // Leg ends are curved walls at an angle to each other: of a platform that is turned or far aside while it is
-                // pressed against several of them, the verified stop takes over again and again.
-                let most = if what.ends_with("turned") || what.ends_with("aside") { 0.3 } else { 0.05 };
-                if shift > most || turn > most {
-                    failures.push(format!("{machine} {rate_hz} Hz, {what}: {shift:.4} {turn:.4}"));
+                println!(
+                    "{machine} {rate_hz} Hz, {what}: jerk {shift:.4} {turn:.4}, {reversals:.1}/s, stroke {stroke:.2e}"
+                );
+                // Among the curved ends of several legs a platform that is turned or far aside passes a corner now and then: its
+                // acceleration changes there, at the limit of jerk. But it does not turn back and forth.
+                let most = if what.ends_with("turned") || what.ends_with("aside") { 0.15 } else { 0.05 };
+                if shift > most || turn > most || reversals > 3.0 {
+                    failures
+                        .push(format!("{machine} {rate_hz} Hz, {what}: {shift:.4} {turn:.4}, {reversals}/s"));
                 }
             }
         }
@@ -109,23 +123,27 @@ fn the_platform_slides_along_walls_without_chatter() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// A target far beyond the stroke, in every direction; then home: the platform comes back. Of the 72 ways one is found only
-/// slowly, along two legs at their ends at once.
+/// A target far beyond the stroke, along every coordinate and in many other directions; then home: the platform comes back.
 #[test]
 fn a_platform_pressed_into_any_corner_comes_back() {
-    let mut late = 0;
+    let mut random = Random::new(13);
+    let along = (0..12).map(|k| Vector6::ith(k / 2, if k % 2 == 0 { 1.0 } else { -1.0 }));
+    let directions: Vec<Vector6<f64>> =
+        along.chain((0..200).map(|_| Vector6::from_fn(|_, _| 2.0 * random.uniform() - 1.0))).collect();
+    let mut failures = Vec::new();
     for machine in ["motion_base", "fried2008", "tsai2000"] {
         let config = Config::load(&data(machine, "toml")).unwrap();
         for policy in [ViolationPolicy::Limit, ViolationPolicy::Stop] {
             let parameters = Parameters { on_violation: policy, ..parameters(&config) };
             let constants = Constants::new(&config.machine, parameters);
-            for (axis, sign) in (0..6).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
+            failures.par_extend(directions.par_iter().filter_map(|direction| {
                 let mut reference = ReferenceGenerator::new(&constants);
                 let home = *reference.motion();
                 reference.start(&constants, 0, &home);
-                let mut away = TaskState::at_rest(config.machine.home);
-                away.x[axis] += sign * if axis < 3 { 1.5 } else { 2.0 };
-                for (seconds, task) in [(4, away), (8, TaskState::at_rest(config.machine.home))] {
+                let far = direction.component_mul(&Vector6::new(1.5, 1.5, 1.5, 2.0, 2.0, 2.0));
+                let away = Vector6::from(config.machine.home) + far;
+                for (seconds, x) in [(4, away.into()), (8, config.machine.home)] {
+                    let task = TaskState::at_rest(x);
                     for _ in 0..1000 * seconds {
                         let now_ns = reference.time_ns();
                         let setpoint = SetpointMotion::new(Setpoint::motion(now_ns, task));
@@ -133,11 +151,13 @@ fn a_platform_pressed_into_any_corner_comes_back() {
                     }
                 }
                 let left = reference.motion().pose.displacement_to(&home.pose).vector().amax();
-                let is_back = left < 1e-6;
-                late += u32::from(!is_back);
-                assert!(is_back || left < away.x[axis].abs(), "{machine} {policy:?} {axis} {sign}: {left}");
-            }
+                let what = format!("{machine} {policy:?} {:.2?}: {left:.4}", direction.as_slice());
+                (left > 1e-6).then_some((policy, what))
+            }));
         }
     }
-    assert!(late <= 1, "{late} of 72 not at home after 8 s");
+    let limit = failures.iter().filter(|(policy, _)| *policy == ViolationPolicy::Limit);
+    assert_eq!(limit.count(), 0, "{failures:?}");
+    // The condition has no wall: behind poses of larger condition home is out of sight.
+    assert!(failures.len() <= 1, "{failures:?}");
 }

@@ -128,6 +128,11 @@ impl Approach {
         1.0 / self.outer_s
     }
 
+    /// What the velocity changes by while the acceleration builds up to its limit, `a^2/j` \[m/s\].
+    pub fn build_up_velocity(&self) -> f64 {
+        self.closing.acceleration * self.closing.acceleration / self.closing.jerk
+    }
+
     /// phi and phi' at a distance.
     pub fn closing_velocity(&self, distance: f64) -> (f64, f64) {
         self.closing_velocity_of(distance, || closing_roots([self], [distance])[0])
@@ -149,23 +154,32 @@ impl Approach {
         if v > limit { (limit, 0.0) } else { (v, slope) }
     }
 
-    /// The acceleration of the next instant for a wanted velocity, and whether the limits of acceleration and jerk
-    /// hold it back.
-    pub fn acceleration(
-        &self,
-        wanted: &WantedVelocity,
-        ahead: &Vector3<f64>,
-        present: &Vector3<f64>,
-    ) -> (Vector3<f64>, [bool; 2]) {
+    /// The accelerations of the next instant of two vectors for their wanted velocities, and whether the limits of acceleration
+    /// and jerk hold them back. `in_proportion`: both by the factor of the one that needs the smaller, which keeps the direction.
+    pub fn accelerations(
+        approaches: [&Self; 2],
+        wanted: [&WantedVelocity; 2],
+        ahead: [&Vector3<f64>; 2],
+        present: [&Vector3<f64>; 2],
+        in_proportion: bool,
+    ) -> ([Vector3<f64>; 2], [bool; 2]) {
+        let aim = [approaches[0].aim(wanted[0], ahead[0]), approaches[1].aim(wanted[1], ahead[1])];
+        let largest = approaches.map(|approach| approach.limits.acceleration);
+        let (aim, by_acceleration) = limited(&aim, largest, in_proportion);
+        let change = [aim[0] - present[0], aim[1] - present[1]];
+        let largest = approaches.map(|approach| approach.limits.jerk * approach.step_s);
+        let (change, by_jerk) = limited(&change, largest, in_proportion);
+        ([present[0] + change[0], present[1] + change[1]], [by_acceleration, by_jerk])
+    }
+
+    /// `a*` without limits.
+    fn aim(&self, wanted: &WantedVelocity, ahead: &Vector3<f64>) -> Vector3<f64> {
         let x = wanted.velocity - ahead;
         let time = INNER_TIME_RATIO * self.outer_s;
         let jerk = INNER_JERK_SHARE * self.limits.jerk;
         let per_velocity = 2.0 / (jerk * time * time);
         let gain = 2.0 / (time * (1.0 + (1.0 + x.norm() * per_velocity).sqrt()));
-        let (aim, is_acceleration_limited) =
-            limited(&(wanted.derivative + x * gain), self.limits.acceleration);
-        let (change, is_jerk_limited) = limited(&(aim - present), self.limits.jerk * self.step_s);
-        (present + change, [is_acceleration_limited, is_jerk_limited])
+        wanted.derivative + x * gain
     }
 }
 
@@ -218,8 +232,14 @@ pub(super) fn limit_leg_rates(
     true
 }
 
-/// A vector shortened to at most `limit`, and whether it was longer.
-fn limited(v: &Vector3<f64>, limit: f64) -> (Vector3<f64>, bool) {
-    let norm = v.norm();
-    if norm > limit { (v * (limit / norm), true) } else { (*v, false) }
+/// Two vectors shortened to at most `largest`, each by its own factor or both by the smaller, and whether one was longer.
+fn limited(vectors: &[Vector3<f64>; 2], largest: [f64; 2], in_proportion: bool) -> ([Vector3<f64>; 2], bool) {
+    let factor = |v: &Vector3<f64>, largest: f64| {
+        let norm = v.norm();
+        if norm > largest { largest / norm } else { 1.0 }
+    };
+    let [first, second] = [factor(&vectors[0], largest[0]), factor(&vectors[1], largest[1])];
+    let least = first.min(second);
+    let [first, second] = if in_proportion { [least; 2] } else { [first, second] };
+    ([vectors[0] * first, vectors[1] * second], least < 1.0)
 }

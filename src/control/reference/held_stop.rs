@@ -47,21 +47,6 @@ impl HeldStop {
         }
     }
 
-    /// The acceleration a step later along the stop.
-    // Out of line, as it is rare: the cycle stays short.
-    #[inline(never)]
-    pub fn acceleration(&self, motion: &Motion, limits: &Limits, h: f64) -> Acceleration {
-        let PoseStopState { orientation, position } = match self.phase {
-            Phase::AtRest => PoseStopState::default(),
-            Phase::Verified(StopKind::ReleaseFirst) => {
-                PoseStop::new(StopKind::ReleaseFirst, motion, limits).at(h)
-            }
-            Phase::Verified(StopKind::Planar) => self.stop.at(h),
-            Phase::Followed => self.stop.at(self.elapsed_s + h),
-        };
-        Acceleration { angular: orientation.acceleration, linear: position.acceleration }
-    }
-
     /// The motion a step later along the stop, which is followed from now on.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]

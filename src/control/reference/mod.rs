@@ -22,14 +22,12 @@
 //! | `pose_bounds` | lengths of the legs and envelope |
 //! | `approach` | acceleration towards a moving target |
 //! | `constant_jerk` | step of a motion |
-//! | `components` | whether translation and rotation move at once |
 //! | `walls` | soft approach of bounds |
 //! | `target` | setpoint, samples of poses, or a pose |
 //! | [`pose_samples`] | target through poses without derivatives |
 //! | `history` | the reference of the last cycles |
 
 use self::approach::{Approach, TargetOffset, limit_leg_rates};
-use self::components::Components;
 use self::constant_jerk::move_on;
 use self::held_stop::HeldStop;
 use self::history::History;
@@ -47,7 +45,6 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 
 mod angle_ranges;
 mod approach;
-mod components;
 mod constant_jerk;
 mod cubic_departure;
 mod examination;
@@ -71,6 +68,9 @@ mod walls;
 const MAX_STEP_S: f64 = 1e-3;
 /// Most steps in a cycle: after missed cycles they are longer, which is as safe and less smooth.
 const MAX_STEPS: f64 = 32.0;
+/// Steps after a refused one in which rotation and translation change in proportion, as they do at walls: limits of jerk that act on
+/// each of them alone turn the direction of the first steps, away from the target and perhaps against a bound.
+const IN_PROPORTION_STEPS: u32 = 50;
 
 /// Reference generator.
 #[derive(Clone, Debug)]
@@ -89,7 +89,8 @@ pub struct ReferenceGenerator {
     closing_scale: f64,
     /// What held the reference back in the last cycle.
     active_limits: LimitSet,
-    components: Components,
+    /// For so many steps rotation and translation still change in proportion, after one that was refused.
+    in_proportion_steps: u32,
 }
 
 impl ReferenceGenerator {
@@ -105,7 +106,7 @@ impl ReferenceGenerator {
             history: History::default(),
             closing_scale: 1.0,
             active_limits: LimitSet::default(),
-            components: Components::default(),
+            in_proportion_steps: 0,
         }
     }
 
@@ -123,7 +124,7 @@ impl ReferenceGenerator {
 
     /// Begins at an instant with the motion at which it was placed.
     pub fn begin(&mut self, time_ns: u64) {
-        (self.time_ns, self.components) = (time_ns, Components::default());
+        (self.time_ns, self.in_proportion_steps) = (time_ns, 0);
         self.history.clear();
     }
 
@@ -225,7 +226,10 @@ impl ReferenceGenerator {
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
             let step = Step { from: Some(&begin.pose), duration: step_s, change, work };
             let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step);
-            self.components = self.components.after(verified.is_ok());
+            self.in_proportion_steps = match verified {
+                Ok(_) => self.in_proportion_steps.saturating_sub(1),
+                Err(_) => IN_PROPORTION_STEPS,
+            };
             verified
         });
         match verified {
@@ -274,28 +278,25 @@ impl ReferenceGenerator {
         if limit_leg_rates(constants, pose, &mut turn, &mut shift) {
             self.active_limits = self.active_limits.with(Limit::LegRate, true);
         }
-        let mut work = 0;
+        let (mut work, mut in_proportion) = (0, self.in_proportion_steps > 0);
         if constants.parameters.on_violation == ViolationPolicy::Limit {
             let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
             let restricting = walls.restrict(constants.machine().level, &mut turn, &mut shift);
             work = walls.work();
             if !restricting.is_empty() {
+                in_proportion = true;
                 turning.limit_velocity(&mut turn);
                 shifting.limit_velocity(&mut shift);
                 self.active_limits = self.active_limits.union(restricting);
             }
         }
-        let (angular, turn_limits) = turning.acceleration(&turn, &led.angular, &acceleration.angular);
-        let (linear, shift_limits) = shifting.acceleration(&shift, &led.linear, &acceleration.linear);
-        let stopping = || self.stop.acceleration(&self.motion, &constants.parameters.limits, h);
-        let (angular, linear) = match self.components {
-            Components::Both => (angular, linear),
-            Components::Translation { .. } => (stopping().angular, linear),
-            Components::Rotation { .. } => (angular, stopping().linear),
-        };
-        let [by_acceleration, by_jerk] = [turn_limits, shift_limits]
-            .into_iter()
-            .fold([false; 2], |[a, j], [next_a, next_j]| [a | next_a, j | next_j]);
+        let ([angular, linear], [by_acceleration, by_jerk]) = Approach::accelerations(
+            [&turning, &shifting],
+            [&turn, &shift],
+            [&led.angular, &led.linear],
+            [&acceleration.angular, &acceleration.linear],
+            in_proportion,
+        );
         self.active_limits = self
             .active_limits
             .with(Limit::Velocity, turn.is_limited | shift.is_limited)

@@ -39,6 +39,7 @@ pub(super) struct PoseStopState {
 
 impl PoseStop {
     /// The stop of a kind from a motion.
+    #[cfg(test)]
     pub fn new(kind: StopKind, motion: &Motion, limits: &Limits) -> Self {
         let mut stop = Self::default();
         stop.plan(kind, motion, limits);

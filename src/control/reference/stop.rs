@@ -69,7 +69,10 @@ pub(super) fn release_first_extent(
 }
 
 /// Extent of the stop from a velocity without acceleration.
-fn straight_extent(v: f64, DerivativeLimits { acceleration, jerk, .. }: &DerivativeLimits) -> StopExtent {
+pub(super) fn straight_extent(
+    v: f64,
+    DerivativeLimits { acceleration, jerk, .. }: &DerivativeLimits,
+) -> StopExtent {
     let ramp = acceleration / jerk;
     let (duration, length) = if v >= acceleration * ramp {
         (v / acceleration + ramp, 0.5 * v * (v / acceleration + ramp))

@@ -4,13 +4,19 @@
 //! `g' = -G V`. The wanted twist V and its derivative are changed least (rotations weighted by the radius of the joints) so that
 //!
 //! ```text
-//! G V  <= phi(g)                        phi: braking curve of the approach, on a part of the limits
-//! G V' = -phi'(g) G V - G' V            where this bound is active
+//! G V  <= phi(g)                    phi: the lesser of the braking curve of the approach, on a part of the limits, and 2 g / T
+//! G V' = -phi'(g) G Q - G' Q        Q: the present twist; where this bound is active
 //! ```
 //!
-//! where both ends of a leg or of a coordinate are one wall with two sides,
-//! by Hildreth's method (C. Hildreth, "A quadratic programming procedure", 1957), a few sweeps over all walls. The walls prove
-//! nothing: the verified stop keeps the bounds. Without them it would do so at the limits of jerk.
+//! T is the duration of the stop. It brakes along V: a leg that is approached slowly by a platform that slides past fast
+//! moves on for half of T at its rate. Where rotation and translation cancel in a leg, the one that stops later remains.
+//!
+//! The more an active wall takes away from V, the more of its bound on V' holds: all of it from the velocity `a^2/j` on that the
+//! acceleration builds up in. Else V' would jump wherever another wall becomes active, and in a corner they would take turns.
+//!
+//! Both ends of a leg or of a coordinate are one wall with two sides. V is found by Hildreth's method (C. Hildreth, "A quadratic
+//! programming procedure", 1957), a few sweeps over all walls. The walls prove nothing: the verified stop keeps the bounds. Without
+//! them it would do so at the limits of jerk.
 //!
 //! Used under `on_violation = "limit"` only: a certified trajectory may go as near to a bound as it can be stopped.
 
@@ -21,7 +27,8 @@ use nalgebra::{Vector3, Vector6};
 
 use super::approach::{Approach, WantedVelocity};
 use super::pose_bounds::PoseBounds;
-use crate::control::limits::{DerivativeLimits, Limit, LimitSet, Limits};
+use super::stop::straight_extent;
+use crate::control::limits::{Limit, LimitSet, Limits};
 use crate::control::parameters::{Constants, Envelope};
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
 use crate::model::inverse_jacobian::leg_wrenches;
@@ -54,20 +61,22 @@ const WALL_COUNT: usize = 12;
 struct Side {
     /// Largest closing rate \[m/s\].
     rate: f64,
-    /// Its derivative if the end is approached at that rate, less the curvature \[m/s^2\].
+    /// Its derivative at the present rate, less the curvature \[m/s^2\].
     derivative: f64,
 }
 
 impl Side {
-    /// `curvature`: of the leg or coordinate towards this end.
-    fn new(approach: &Approach, gap: f64, curvature: f64) -> Self {
+    /// `closing` and `curvature`: rate of the leg or coordinate towards this end, and its curvature; `per_way`: rate over the way of the
+    /// stop \[1/s\].
+    fn new(approach: &Approach, gap: f64, closing: f64, curvature: f64, per_way: f64) -> Self {
         let (rate, slope) = if gap > 0.0 {
-            approach.closing_velocity(gap)
+            let (rate, slope) = approach.closing_velocity(gap);
+            if gap * per_way < rate { (gap * per_way, per_way) } else { (rate, slope) }
         } else {
             let slope = approach.slowest_slope() / RETURN_RATIO;
             (gap * slope, slope)
         };
-        Self { rate, derivative: -slope * rate - curvature }
+        Self { rate, derivative: -slope * closing - curvature }
     }
 }
 
@@ -84,6 +93,9 @@ struct Wall {
     sides: [Side; 2],
     /// Positive where the end along the gradient is active, negative at the other.
     multiplier: f64,
+    /// The same of the derivative, and its weight per multiplier.
+    derivative_multiplier: f64,
+    weight: f64,
 }
 
 /// Walls around one pose.
@@ -113,7 +125,9 @@ impl Walls {
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
         let approach = Approach::new(limits.position, CLOSING_SHARE, step_s);
-        let squared_time = stop_time_s(limits, led).powi(2) / 8.0;
+        let [turn_s, shift_s] = half_durations(limits, led);
+        let half_s = turn_s.max(shift_s);
+        let per_way = 1.0 / half_s;
         let ends = bounds.shortest.iter().zip(&bounds.longest);
         let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
         for (column, ((length, (rate, curvature)), (shortest, longest))) in wrenches.into_iter().zip(legs) {
@@ -121,12 +135,17 @@ impl Walls {
             let (moment, direction) = (Vector3::new(mx, my, mz), Vector3::new(nx, ny, nz));
             let gradient = stacked(&(moment / radius), &direction);
             let next = length + rate * step_s;
-            // A stop leads straight on: what the leg's length departs from its tangent on the way.
-            let departure = curvature * squared_time;
+            // What the way of the stop departs from `rate T / 2`: it leads straight on, and one of rotation and translation ends
+            // sooner.
+            let departure = 0.5 * curvature * half_s * half_s
+                + moment.dot(&led.angular) * (turn_s - half_s)
+                + direction.dot(&led.linear) * (shift_s - half_s);
             let gaps = [longest - next - departure.max(0.0), next - shortest + departure.min(0.0)];
             let [long, short] = gaps.map(|gap| gap - kept);
-            let sides = [Side::new(&approach, short, -curvature), Side::new(&approach, long, *curvature)];
-            walls.push(Limit::Stroke, gradient, sides);
+            let sides = [(short, -rate, -curvature), (long, *rate, *curvature)];
+            let sides =
+                sides.map(|(gap, closing, curvature)| Side::new(&approach, gap, closing, curvature, per_way));
+            walls.push(Limit::Stroke, &approach, gradient, sides);
         }
         if let Some(envelope) = &bounds.envelope {
             walls.push_envelope(constants, envelope, motion, led, step_s, kept);
@@ -164,24 +183,33 @@ impl Walls {
         let turning = Approach::new(limits.orientation, CLOSING_SHARE, step_s);
         let shifting = Approach::new(limits.position, CLOSING_SHARE, step_s);
         let velocity = stacked(&(led.angular * radius), &led.linear);
+        let [turn_per_way, shift_per_way] = half_durations(limits, led).map(f64::recip);
         let ranges = lowest.iter().zip(highest);
         for (axis, ((x, gradient), (low, high))) in x.iter().zip(gradients).zip(ranges).enumerate() {
-            let (approach, kept) = if axis < 3 { (&turning, kept / radius) } else { (&shifting, kept) };
+            let (approach, kept, per_way) = if axis < 3 {
+                (&turning, kept / radius, turn_per_way)
+            } else {
+                (&shifting, kept, shift_per_way)
+            };
             let kept = kept.min(0.05 * (high - low));
-            let next = x + gradient.dot(&velocity) * step_s;
-            let gaps = [next - low - kept, high - next - kept];
-            self.push(Limit::Envelope, gradient, gaps.map(|gap| Side::new(approach, gap, 0.0)));
+            let rate = gradient.dot(&velocity);
+            let next = x + rate * step_s;
+            let sides = [(next - low - kept, -rate), (high - next - kept, rate)];
+            let sides = sides.map(|(gap, closing)| Side::new(approach, gap, closing, 0.0, per_way));
+            self.push(Limit::Envelope, approach, gradient, sides);
         }
     }
 
-    fn push(&mut self, limit: Limit, gradient: Vector6<f64>, sides: [Side; 2]) {
+    fn push(&mut self, limit: Limit, approach: &Approach, gradient: Vector6<f64>, sides: [Side; 2]) {
         if let Some(wall) = self.walls.get_mut(self.count) {
+            let square = gradient.norm_squared();
             *wall = Wall {
                 limit: LimitSet::default().with(limit, true),
-                inverse_square: 1.0 / gradient.norm_squared().max(f64::MIN_POSITIVE),
+                inverse_square: 1.0 / square.max(f64::MIN_POSITIVE),
                 gradient: padded(&gradient),
                 sides,
-                multiplier: 0.0,
+                weight: square / approach.build_up_velocity(),
+                ..Wall::default()
             };
             self.count += 1;
         }
@@ -245,20 +273,25 @@ impl Walls {
             sweep += 1;
             sweeps = SWEEPS.min(MAX_VISITS / active.max(1));
         }
-        let is_active = |wall: &&Wall| wall.multiplier != 0.0;
-        let restricting =
-            walls.iter().filter(is_active).fold(LimitSet::default(), |all, wall| all.union(wall.limit));
+        let is_active = |wall: &Wall| wall.multiplier != 0.0;
+        let restricting = walls
+            .iter()
+            .filter(|wall| is_active(wall))
+            .fold(LimitSet::default(), |all, wall| all.union(wall.limit));
         if restricting.is_empty() {
             return restricting;
         }
         let mut derivative = load(&turn.derivative, &shift.derivative);
         for _ in 0..sweeps {
-            for wall in walls.iter().filter(is_active) {
+            for wall in walls.iter_mut().filter(|wall| is_active(wall)) {
                 let [against, along] = &wall.sides;
                 let gradient = f64x8::load_array(simd, wall.gradient);
                 let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
+                let weight = (wall.multiplier.abs() * wall.weight).min(1.0);
                 let excess = (dot(gradient, derivative) - wanted) * wall.inverse_square;
-                derivative -= gradient * f64x8::splat(simd, excess);
+                let change = weight * excess - (1.0 - weight) * wall.derivative_multiplier;
+                derivative -= gradient * f64x8::splat(simd, change);
+                wall.derivative_multiplier += change;
                 self.visits += 1;
             }
         }
@@ -285,12 +318,10 @@ fn padded(v: &Vector6<f64>) -> [f64; LANES] {
     [a, b, c, d, e, f, 0.0, 0.0]
 }
 
-/// Duration of the stop from a twist \[s\].
-fn stop_time_s(limits: &Limits, twist: &Twist) -> f64 {
-    let time_s = |limits: &DerivativeLimits, speed: f64| {
-        speed / limits.acceleration + limits.acceleration / limits.jerk
-    };
-    time_s(&limits.position, twist.linear.norm()).max(time_s(&limits.orientation, twist.angular.norm()))
+/// Half of the durations of the stops of rotation and translation from a twist without acceleration, their ways over the velocities \[s\].
+fn half_durations(limits: &Limits, twist: &Twist) -> [f64; 2] {
+    [(&twist.angular, &limits.orientation), (&twist.linear, &limits.position)]
+        .map(|(velocity, limits)| 0.5 * straight_extent(velocity.norm(), limits).duration)
 }
 
 fn stacked(first: &Vector3<f64>, second: &Vector3<f64>) -> Vector6<f64> {

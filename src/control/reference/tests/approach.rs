@@ -106,7 +106,16 @@ fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
         let aim = free * (P.acceleration / free.norm()).min(1.0);
         let near = aim + samples.vector(0.9 * P.jerk * step_s);
         let present = if samples.below(2) == 0 { near } else { samples.vector(P.acceleration) };
-        let (found, is_limited) = approach.acceleration(&wanted, &ahead, &present);
+        let still = Vector3::zeros();
+        let none = WantedVelocity { velocity: still, derivative: still, is_limited: false };
+        let ([found, other], is_limited) = Approach::accelerations(
+            [&approach; 2],
+            [&wanted, &none],
+            [&ahead, &still],
+            [&present, &still],
+            false,
+        );
+        assert_eq!(other, still);
         let change = aim - present;
         let expected = present + change * (P.jerk * step_s / change.norm()).min(1.0);
         assert!((found - expected).norm() < 1e-9, "{found}, not {expected}");
@@ -116,6 +125,32 @@ fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
         seen = core::array::from_fn(|kind| seen[kind] + u32::from(kinds[kind]));
     }
     assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
+}
+
+/// From rest without acceleration, where both are limited: the first change has the direction of both aims.
+#[test]
+fn accelerations_in_proportion_keep_their_direction() {
+    let mut samples = Samples::new(54);
+    let (step_s, still) = (1e-3, Vector3::zeros());
+    let approaches = [&Approach::new(P, 1.0, step_s), &Approach::new(P.scaled(0.5), 1.0, step_s)];
+    let mut turned = 0;
+    for _ in 0..500 {
+        let mut wanted =
+            || WantedVelocity { velocity: still, derivative: samples.vector(20.0), is_limited: false };
+        let [turn, shift] = [wanted(), wanted()];
+        let of = |in_proportion| {
+            let (found, _) =
+                Approach::accelerations(approaches, [&turn, &shift], [&still; 2], [&still; 2], in_proportion);
+            found
+        };
+        let [found, separate] = [of(true), of(false)];
+        let limits = [P.jerk * step_s, 0.5 * P.jerk * step_s];
+        let ratio = (limits[0] / turn.derivative.norm()).min(limits[1] / shift.derivative.norm()).min(1.0);
+        assert!((found[0] - turn.derivative * ratio).norm() < 1e-9);
+        assert!((found[1] - shift.derivative * ratio).norm() < 1e-9);
+        turned += u32::from((separate[0] - found[0]).norm() + (separate[1] - found[1]).norm() > 1e-3);
+    }
+    assert!(turned > 100, "{turned}");
 }
 
 #[test]

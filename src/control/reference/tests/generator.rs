@@ -1,9 +1,8 @@
 //! The generator as a whole: what it does in one step, and where it leads.
 
-use super::super::components::Components;
 use super::super::held_stop::Phase;
 use super::super::pose_samples::PoseSamples;
-use super::super::pose_stop::{PoseStop, StopKind};
+use super::super::pose_stop::PoseStop;
 use super::super::target::at_rest;
 use super::super::{ReferenceGenerator, Target};
 use super::*;
@@ -11,7 +10,7 @@ use crate::control::controller::{Setpoint, SetpointKind};
 use crate::control::input_validation::SetpointMotion;
 use crate::control::limits::Limit;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
-use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::rigid::Motion;
 use crate::model::task::{TaskState, task_coordinates};
 
 pub(super) const MS: u64 = 1_000_000;
@@ -201,44 +200,6 @@ fn old_setpoints_of_a_sine_are_followed_as_their_extrapolation() {
     }
 }
 
-/// While one component waits, its acceleration a step later is that of the stop.
-#[test]
-fn a_component_that_waits_follows_the_stop() {
-    let constants = constants(|_, _| ());
-    let mut motion = at_rest(constants.home.pose());
-    motion.twist = Twist { angular: Vector3::new(0.3, 0.1, 0.0), linear: Vector3::new(0.1, 0.3, 0.1) };
-    motion.acceleration =
-        Acceleration { angular: Vector3::new(1.0, 0.0, 2.0), linear: Vector3::new(0.0, 2.0, 1.0) };
-    let (h, elapsed_s) = (1e-3, 7e-3);
-    let setpoint = standing(&constants, [0.2, 0.2, 0.0, 0.2, 0.2, 0.2]);
-    let target = Target::Motion(&setpoint);
-    let desired = target.relative_to(&motion.pose, &constants.parameters, MS).unwrap();
-    let mut reference = started(&constants, &motion);
-    let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
-    for is_followed in [false, true] {
-        if is_followed {
-            (reference.stop.stop, reference.stop.elapsed_s) = (stop, elapsed_s);
-            reference.stop.phase = Phase::Followed;
-        } else {
-            reference.stop.hold(StopKind::Planar, &stop);
-        }
-        let expected = stop.at(h + if is_followed { elapsed_s } else { 0.0 });
-        let mut accelerations = |components| {
-            reference.components = components;
-            reference.proposed(&constants, &target, &desired, h).0
-        };
-        let both = accelerations(Components::Both);
-        let shifting = accelerations(Components::Translation { steps: 0 });
-        let turning = accelerations(Components::Rotation { steps: 0 });
-        assert_eq!((shifting.linear, turning.angular), (both.linear, both.angular));
-        assert_eq!(shifting.angular, expected.orientation.acceleration);
-        assert_eq!(turning.linear, expected.position.acceleration);
-        assert!(
-            (shifting.angular - both.angular).norm() > 0.1 && (turning.linear - both.linear).norm() > 0.1
-        );
-    }
-}
-
 /// At most a timeout and a period, before and after its instant.
 #[test]
 fn a_setpoint_is_extrapolated_no_further_than_its_timeout() {
@@ -252,27 +213,25 @@ fn a_setpoint_is_extrapolated_no_further_than_its_timeout() {
     }
 }
 
-/// After a refusal translation alone for 20 steps, or if that is refused rotation alone.
+/// For 50 steps, which another refusal begins anew. A cycle without a target, as before the drives are ready, is none.
 #[test]
-fn components_take_turns_after_refusals() {
-    let name = |components: Components| match components {
-        Components::Both => 'b',
-        Components::Translation { .. } => 't',
-        Components::Rotation { .. } => 'r',
-    };
-    let play = |accepted: &str| {
-        let mut components = Components::default();
-        let after = accepted.chars().map(|is_accepted| {
-            components = components.after(is_accepted == '1');
-            name(components)
-        });
-        after.collect::<String>()
-    };
-    let twenty = "1".repeat(20);
-    assert_eq!(play("110"), "bbt");
-    assert_eq!(play(&format!("0{twenty}11")), format!("{}bb", "t".repeat(21)));
-    assert_eq!(play(&format!("00{twenty}11")), format!("t{}bb", "r".repeat(21)));
-    assert_eq!(play("000"), "trb");
+fn rotation_and_translation_change_in_proportion_after_a_refusal() {
+    let constants = constants(|_, _| {});
+    let rest = at_rest(constants.home.pose());
+    let aside = standing(&constants, [0.01, 0.0, 0.0, 0.01, 0.0, 0.0]);
+    let mut fast = rest;
+    fast.twist.linear = Vector3::new(2.0 * LIMITS.position.velocity, 0.0, 0.0);
+    let mut reference = started(&constants, &rest);
+    reference.advance(&constants, MS, None);
+    let steps: Vec<u32> = (0..60)
+        .map(|k| {
+            reference.motion = if [2, 5].contains(&k) { fast } else { rest };
+            run(&constants, &mut reference, &Target::Motion(&aside), 1);
+            reference.in_proportion_steps
+        })
+        .collect();
+    assert_eq!(steps[..8], [0, 0, 50, 49, 48, 50, 49, 48]);
+    assert_eq!(steps[54..57], [1, 0, 0]);
 }
 
 /// What held the reference back in a cycle, of either component.
@@ -327,15 +286,4 @@ fn without_a_target_the_reference_ends_where_its_stop_does() {
     assert!(reference.is_at_rest());
     reference.advance(&constants, MS, None);
     assert!(reference.is_at_rest() && reference.motion() == &at_rest(constants.home.pose()));
-}
-
-/// A cycle without a target, as before the drives are ready, is no step that was refused: translation and rotation then move at once.
-#[test]
-fn both_components_move_after_a_cycle_without_a_target() {
-    let constants = constants(|_, _| {});
-    let mut reference = started(&constants, &at_rest(constants.home.pose()));
-    reference.advance(&constants, MS, None);
-    let aside = standing(&constants, [0.01, 0.0, 0.0, 0.01, 0.0, 0.0]);
-    let speeds = run(&constants, &mut reference, &Target::Motion(&aside), 1);
-    assert!(speeds.iter().all(|speed| *speed > 0.0), "{speeds:?}");
 }

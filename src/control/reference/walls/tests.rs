@@ -3,6 +3,8 @@
 use nalgebra::Matrix3;
 
 use super::*;
+use crate::control::limits::DerivativeLimits;
+use crate::control::reference::pose_stop::{PoseStop, StopKind, advanced};
 use crate::control::reference::samples::Samples;
 use crate::control::reference::target::at_rest;
 use crate::control::reference::tests::{machine, parameters, pose};
@@ -88,12 +90,13 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
         let now = scene.quantities(&motion.pose);
         let next = moved(&motion.twist, STEP_S);
         let (limits, twist) = (&constants.parameters.limits, &motion.twist);
-        let stop_s = (twist.linear.norm() / limits.position.acceleration
-            + limits.position.acceleration / limits.position.jerk)
-            .max(
-                twist.angular.norm() / limits.orientation.acceleration
-                    + limits.orientation.acceleration / limits.orientation.jerk,
-            );
+        let stop_of = |speed: f64, limits: &DerivativeLimits| {
+            let DerivativeLimits { acceleration, jerk, .. } = limits;
+            let is_long = speed >= acceleration * acceleration / jerk;
+            if is_long { speed / acceleration + acceleration / jerk } else { 2.0 * (speed / jerk).sqrt() }
+        };
+        let turn_s = stop_of(twist.angular.norm(), &limits.orientation);
+        let shift_s = stop_of(twist.linear.norm(), &limits.position);
         let envelope = bounds.envelope.unwrap();
         let stroke = constants.machine().actuator.stroke();
         for (k, wall) in ends(&walls).into_iter().enumerate() {
@@ -107,6 +110,15 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
                 let scaled = wall.gradient[axis] * if axis < 3 { radius } else { 1.0 };
                 assert!((scaled - sign * rate).abs() < 1e-6, "{k} {axis}: {scaled}, not {rate}");
             }
+            let stop_s = match quantity {
+                ..6 => turn_s.max(shift_s),
+                6..9 => turn_s,
+                _ => shift_s,
+            };
+            // The way of the stop, less that of half of its duration at the present rate.
+            let rest = |whole: Twist, s: f64| 0.5 * wall.gradient.dot(&whole.vector()) * (s - stop_s);
+            let asynchronous = rest(Twist { angular: twist.angular * radius, ..Twist::default() }, turn_s)
+                + rest(Twist { linear: twist.linear, ..Twist::default() }, shift_s);
             let t = 1e-4;
             let curvature = if quantity < LEGS {
                 let [after, before] = [t, -t].map(|t| moved(&motion.twist, t)[quantity]);
@@ -114,7 +126,8 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
             } else {
                 0.0
             };
-            let departure = (curvature * stop_s * stop_s / 8.0).max(0.0);
+            let departure = curvature * stop_s * stop_s / 8.0 + asynchronous;
+            let departure = if quantity < LEGS { departure.max(0.0) } else { 0.0 };
             let bound = match (quantity, k % 2) {
                 (leg @ 0..6, 0) => bounds.longest[leg],
                 (leg @ 0..6, _) => -bounds.shortest[leg],
@@ -125,14 +138,17 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
             let gap = bound - sign * next[quantity] - departure - kept;
             let approach = approach(constants, is_angle);
             let (rate, slope) = if gap > 0.0 {
-                approach.closing_velocity(gap)
+                let straight = 2.0 / stop_s;
+                let (rate, slope) = approach.closing_velocity(gap);
+                if straight * gap < rate { (straight * gap, straight) } else { (rate, slope) }
             } else {
                 outside += 1;
                 (gap * approach.slowest_slope() / 4.0, approach.slowest_slope() / 4.0)
             };
             // To second order in the step.
             assert!((wall.side.rate - rate).abs() < 2e-4, "{k}: {} not {rate}, gap {gap}", wall.side.rate);
-            let derivative = -slope * rate - curvature;
+            let velocity = stacked(&(twist.angular * radius), &twist.linear);
+            let derivative = -slope * wall.gradient.dot(&velocity) - curvature;
             assert!(
                 (wall.side.derivative - derivative).abs() < 2e-2,
                 "{k}: {} not {derivative}",
@@ -143,12 +159,63 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
     assert!(outside > 100, "{outside}");
 }
 
+/// A platform that approaches no wall too fast can stop before it: the planar stop, in fine steps.
+#[test]
+fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
+    let mut samples = Samples::new(74);
+    let (mut nearest, mut worst) = (0, f64::INFINITY);
+    for _ in 0..2000 {
+        let mut scene = Scene::new(&mut samples);
+        let lengths = leg_lengths(scene.constants.machine(), &scene.motion.pose);
+        scene.bounds.shortest = lengths.map(|length| length - (0.01 + 0.09 * samples.uniform()));
+        scene.bounds.longest = lengths.map(|length| length + (0.01 + 0.09 * samples.uniform()));
+        scene.bounds.envelope = None;
+        let whole = scene.motion.twist;
+        let scale = |scene: &mut Scene, factor: f64| {
+            scene.motion.twist = Twist { angular: whole.angular * factor, linear: whole.linear * factor };
+        };
+        let is_slow = |scene: &Scene| {
+            let velocity = stacked(
+                &(scene.motion.twist.angular * scene.constants.machine().joints.radius),
+                &scene.motion.twist.linear,
+            );
+            ends(&scene.walls()).iter().all(|end| end.gradient.dot(&velocity) <= end.side.rate)
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..20 {
+            let middle = 0.5 * (low + high);
+            scale(&mut scene, middle);
+            if is_slow(&scene) { low = middle } else { high = middle }
+        }
+        scale(&mut scene, low);
+        if low == 0.0 || high == 1.0 || !is_slow(&scene) {
+            continue;
+        }
+        nearest += 1;
+        let Scene { constants, bounds, motion } = &scene;
+        let stop = PoseStop::new(StopKind::Planar, motion, &constants.parameters.limits);
+        let (mut pose, mut state, dt) = (motion.pose, stop.at(0.0), stop.duration() / 100.0);
+        for k in 1..=100 {
+            let next = stop.at(f64::from(k) * dt);
+            pose = advanced(&pose, &state, &next, dt);
+            state = next;
+            let lengths = leg_lengths(constants.machine(), &pose);
+            let ends = bounds.shortest.iter().zip(&bounds.longest);
+            for (length, (shortest, longest)) in lengths.iter().zip(ends) {
+                let room = (length - shortest).min(longest - length);
+                worst = worst.min(room / constants.machine().actuator.stroke());
+            }
+        }
+    }
+    assert!(nearest > 1000 && worst > 0.95 * KEPT_RATIO, "{nearest}: {worst}");
+}
+
 /// The conditions of the nearest velocity: no wall is approached too fast, and the change is a sum of multiples of the
 /// gradients that are active, none of them negative.
 #[test]
 fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
     let mut samples = Samples::new(72);
-    let (mut several, mut free, mut most_work) = (0, 0, 0);
+    let (mut several, mut free, mut partly, mut most_work) = (0, 0, 0, 0);
     for _ in 0..500 {
         let scene = Scene::new(&mut samples);
         let mut walls = scene.walls();
@@ -188,12 +255,25 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
             [wall] => {
                 let rate = wall.gradient.dot(&after);
                 assert!(rate >= wall.side.rate - 1e-9 && (rate <= 0.0 || rate <= wall.side.rate + 1e-9));
-                assert!((wall.gradient.dot(&derivative) - wall.side.derivative).abs() < 1e-6);
+                // The bound on the derivative holds by a weight, from 0.6 a^2/j of the velocity that is taken away on wholly.
+                let is_angle = ends[12..18].iter().any(|end| core::ptr::eq(end, *wall));
+                let limits = &scene.constants.parameters.limits;
+                let limits = if is_angle { limits.orientation } else { limits.position };
+                let taken = wall.gradient.dot(&(before - after));
+                let weight = taken * limits.jerk / (0.6 * limits.acceleration * limits.acceleration);
+                partly += u32::from(weight < 1.0);
+                let weight = weight.min(1.0);
+                let before = wall.gradient.dot(&of(&turn.derivative, &shift.derivative));
+                let expected = weight * wall.side.derivative + (1.0 - weight) * before;
+                assert!((wall.gradient.dot(&derivative) - expected).abs() < 1e-6, "{weight}");
             }
             _ => several += 1,
         }
     }
-    assert!(several > 50 && free > 10 && most_work == 3, "{several} {free} {most_work}");
+    assert!(
+        several > 50 && free > 10 && partly > 3 && most_work == 3,
+        "{several} {free} {partly} {most_work}"
+    );
 }
 
 /// Two walls at 60 degrees, as the faces of a wedge: 8 sweeps leave 1e-4 of the excess.
@@ -208,7 +288,8 @@ fn two_walls_at_60_degrees_converge() {
     for direction in directions {
         let gradient = stacked(&Vector3::zeros(), &direction);
         let free = Side { rate: f64::INFINITY, derivative: 0.0 };
-        walls.push(Limit::Stroke, gradient, [free, Side::default()]);
+        let approach = approach(&scene.constants, false);
+        walls.push(Limit::Stroke, &approach, gradient, [free, Side::default()]);
     }
     let still =
         WantedVelocity { velocity: Vector3::zeros(), derivative: Vector3::zeros(), is_limited: false };
