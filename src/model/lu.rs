@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! step k: the row with the largest |a_kk| goes first; below, a_ij -= (a_ik / a_kk) a_kj
-//! LU:     the right-hand side carried along; then x_k = (b_k - sum_j>k a_kj x_j) / a_kk,   last to first
+//! LU:     the right-hand side carried along; then x_k = b_k / a_kk, and above b_i -= a_ik x_k,   last to first
 //! G.-J.:  also above, and column k becomes that of the inverse: a_kk <- 1, row k / a_kk; a_ik <- 0, minus a_ik row k
 //! ```
 //!
 //! In the end Gauss-Jordan leaves `A^-1` with its columns in the order of the pivots, which no norm sees.
 //!
-//! A row is changed as a whole in each step, in lanes, also the columns that are cleared already: without a branch that is
+//! A row is changed as a whole in each step of an elimination, in lanes, also the columns that are done: without a branch that is
 //! faster. Nothing is found by an index that could be out of range, and so nothing could panic. That is why it is not nalgebra's.
 //! The instruction set changes the time, not one bit of a result.
 
@@ -45,13 +45,14 @@ fn solved<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<
     eliminate::<_, 2>(simd, &mut rows)?;
     eliminate::<_, 3>(simd, &mut rows)?;
     eliminate::<_, 4>(simd, &mut rows)?;
-    substitute::<_, 5>(simd, &mut rows)?;
-    substitute::<_, 4>(simd, &mut rows)?;
-    substitute::<_, 3>(simd, &mut rows)?;
-    substitute::<_, 2>(simd, &mut rows)?;
-    substitute::<_, 1>(simd, &mut rows)?;
-    substitute::<_, 0>(simd, &mut rows)?;
-    Some(rows.map(|row| number::<LEGS>(&row)))
+    let mut x = rows.map(|row| number::<LEGS>(&row));
+    substitute::<5>(&rows, &mut x)?;
+    substitute::<4>(&rows, &mut x)?;
+    substitute::<3>(&rows, &mut x)?;
+    substitute::<2>(&rows, &mut x)?;
+    substitute::<1>(&rows, &mut x)?;
+    substitute::<0>(&rows, &mut x)?;
+    Some(x)
 }
 
 #[inline(always)]
@@ -77,8 +78,8 @@ fn weighted_inverse_norm<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], weights: &[f
 fn rows_of(a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> [Row; LEGS] {
     let mut rows = [Row::default(); LEGS];
     for ((row, left), right) in rows.iter_mut().zip(a).zip(b) {
-        let numbers = left.iter().chain([right]);
-        row.as_flattened_mut().iter_mut().zip(numbers).for_each(|(slot, x)| *slot = *x);
+        let [a, b, c, d, e, f] = *left;
+        *row = [[a, b, c, d], [e, f, *right, 0.0]];
     }
     rows
 }
@@ -98,15 +99,13 @@ fn pivoted<const COLUMN: usize>(rows: &mut [Row; LEGS]) -> Option<(&mut [Row], &
     (number::<COLUMN>(top) != 0.0).then_some((above, top, below))
 }
 
-/// Clears a column below its row.
+/// Clears a column below its row, up to rounding: it is not read again.
 #[inline(always)]
 fn eliminate<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> Option<()> {
     let (_, top, below) = pivoted::<COLUMN>(rows)?;
     let pivot = number::<COLUMN>(top);
     for row in below.iter_mut() {
         subtract(simd, row, number::<COLUMN>(row) / pivot, top);
-        // Without what rounding leaves: the substitution changes whole rows.
-        change_column::<_, COLUMN>(simd, row, 0.0);
     }
     Some(())
 }
@@ -130,19 +129,17 @@ fn exchange_row<S: Simd, const COLUMN: usize>(simd: S, row: &mut Row, top: &Row)
     subtract(simd, row, factor, top);
 }
 
-/// The unknown of a column, in place of the right-hand side of its row, and out of the rows above.
+/// The unknown of a column, in place of the right-hand side of its row, and out of those above.
 #[inline(always)]
-fn substitute<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> Option<()> {
-    let (above, rest) = rows.split_at_mut(COLUMN);
-    let (row, _) = rest.split_first_mut()?;
+fn substitute<const COLUMN: usize>(rows: &[Row; LEGS], x: &mut [f64; LEGS]) -> Option<()> {
+    let (rows_above, [row, ..]) = rows.split_at(COLUMN) else { return None };
+    let (above, [unknown, ..]) = x.split_at_mut(COLUMN) else { return None };
     let pivot = number::<COLUMN>(row);
     if pivot == 0.0 {
         return None;
     }
-    divide(simd, row, pivot);
-    for other in above.iter_mut() {
-        subtract(simd, other, number::<COLUMN>(other), row);
-    }
+    *unknown /= pivot;
+    above.iter_mut().zip(rows_above).for_each(|(x, row)| *x -= number::<COLUMN>(row) * *unknown);
     Some(())
 }
 

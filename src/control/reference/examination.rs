@@ -246,7 +246,7 @@ impl<'a> Examination<'a> {
         if cover.is_complete() {
             return Ok(());
         }
-        let around = Surroundings { pose, reach, condition: constants.parameters.condition };
+        let around = Surroundings { pose, reach, required: Regularity::of_surroundings(constants) };
         let regularity = balls.cover_by_new(constants, &around, &mut self.work).ok_or(Limit::Condition)?;
         let at_knot = Regularity::of_reference(constants);
         if cover.knot || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {

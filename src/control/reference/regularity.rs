@@ -36,6 +36,9 @@ const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
 pub(super) const REGULARITY_WORK: u32 = 1;
 const PIVOTING_WORK: u32 = 2;
 
+/// Least part of the sine of the reference that is allowed between knots, whatever the limits of the condition.
+const LEAST_SINE_SHARE: f64 = 0.5;
+
 /// How regular a pose is, or must be at least.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Regularity {
@@ -54,6 +57,13 @@ impl Regularity {
     /// What the reference must keep.
     pub fn of_reference(constants: &Constants) -> Self {
         Self { condition: constants.reference_condition, universal_sine: constants.universal_sine }
+    }
+
+    /// What the poses between knots must keep: the condition of the platform, and a sine that is less in the same ratio.
+    pub fn of_surroundings(constants: &Constants) -> Self {
+        let condition = constants.parameters.condition;
+        let share = (constants.reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0);
+        Self { condition, universal_sine: constants.universal_sine * share }
     }
 
     /// The looser bounds of both.
@@ -117,7 +127,7 @@ impl BallGroup {
         Displacements { shift, turn, chord }
     }
 
-    /// Whether every pose within a reach of a displaced one is regular and has at most a condition, by any ball.
+    /// Whether every pose within a reach of a displaced one is as regular as required, by any ball.
     #[inline(always)]
     fn covers<S: Simd>(
         &self,
@@ -125,7 +135,7 @@ impl BallGroup {
         constants: &Constants,
         displacements: &Displacements<S>,
         [shift, turn]: Reach,
-        limit: f64,
+        required: &Regularity,
     ) -> bool {
         let splat = |number: f64| f64x4::splat(simd, number);
         let load = |column: &[f64; LANES]| f64x4::load_array(simd, *column);
@@ -139,11 +149,11 @@ impl BallGroup {
         let turned_arm = turn + turned_leg;
         let change = (splat(6.0) * (turned_squared + turned_arm * turned_arm)).sqrt();
         let largest_norm = (norm + change).min(splat(MAX_WRENCH_NORM));
-        let least_sine = splat(least_universal_sine(constants, limit));
+        let Regularity { condition, universal_sine: least_sine } = *required;
         let is_covered = left.simd_gt(splat(0.0))
             & displacements.chord.simd_le(splat(MAX_CHORD))
-            & (universal_sine - turned_leg).simd_ge(least_sine)
-            & (largest_norm * inverse_norm).simd_le(splat(limit) * (splat(1.0) - inverse_norm * change));
+            & (universal_sine - turned_leg).simd_ge(splat(least_sine))
+            & (largest_norm * inverse_norm).simd_le(splat(condition) * (splat(1.0) - inverse_norm * change));
         is_covered.any_true()
     }
 }
@@ -182,20 +192,20 @@ impl Ball {
 /// Poses around one: within a shift \[m\] and a turn \[rad\].
 pub(super) type Reach = [f64; 2];
 
-/// Poses around one that shall be regular, each with at most a condition.
+/// Poses around one, and how regular they shall be.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surroundings<'a> {
     pub pose: &'a Pose,
     pub reach: Reach,
-    pub condition: f64,
+    pub required: Regularity,
 }
 
 /// What of a knot is proved to be regular.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct KnotCover {
-    /// The pose itself, and within the condition of the reference.
+    /// The pose itself, as the reference must be.
     pub knot: bool,
-    /// The poses around it, within the condition of the platform: else a reference at its own limit could not leave it.
+    /// The poses around it, as they must be: less so, else a reference at its own limit could not leave it.
     pub surroundings: bool,
 }
 
@@ -225,12 +235,12 @@ impl RegularBalls {
 
     /// The same by the balls that are kept.
     fn cover_by_known(&mut self, constants: &Constants, around: &Surroundings<'_>) -> bool {
-        let Surroundings { pose, reach, condition } = *around;
+        let Surroundings { pose, reach, required } = around;
         dispatch!(constants.machine().level, simd => {
             for index in self.recent_first() {
                 if let Some(group) = self.groups.get(index) {
                     let displacements = group.displacements(simd, pose);
-                    if group.covers(simd, constants, &displacements, reach, condition) {
+                    if group.covers(simd, constants, &displacements, *reach, required) {
                         self.recent = index;
                         return true;
                     }
@@ -257,12 +267,13 @@ impl RegularBalls {
         reach: Reach,
     ) -> KnotCover {
         let mut cover = KnotCover::default();
+        let [at_knot, around] = [Regularity::of_reference(constants), Regularity::of_surroundings(constants)];
         for index in self.recent_first() {
             let Some(group) = self.groups.get(index) else { continue };
             let displacements = group.displacements(simd, pose);
-            let covers = |reach, limit| group.covers(simd, constants, &displacements, reach, limit);
-            cover.knot = cover.knot || covers([0.0; 2], constants.reference_condition);
-            cover.surroundings = cover.surroundings || covers(reach, constants.parameters.condition);
+            let covers = |reach, required| group.covers(simd, constants, &displacements, reach, required);
+            cover.knot = cover.knot || covers([0.0; 2], &at_knot);
+            cover.surroundings = cover.surroundings || covers(reach, &around);
             if cover.is_complete() {
                 self.recent = index;
                 return cover;
@@ -280,7 +291,7 @@ impl RegularBalls {
         around: &Surroundings<'_>,
         work: &mut u32,
     ) -> Option<Regularity> {
-        let Surroundings { pose, reach, condition } = *around;
+        let Surroundings { pose, reach, required } = around;
         let ball = Ball::new(constants, pose, work)?;
         let index = self.kept / LANES;
         let group = self.groups.get_mut(index)?;
@@ -289,7 +300,7 @@ impl RegularBalls {
         // the next one.
         let is_covered = dispatch!(constants.machine().level, simd => {
             let displacements = group.displacements(simd, pose);
-            group.covers(simd, constants, &displacements, reach, condition)
+            group.covers(simd, constants, &displacements, *reach, required)
         });
         if !is_covered {
             return None;
@@ -298,12 +309,4 @@ impl RegularBalls {
         self.kept = (self.kept + 1) % (GROUPS * LANES);
         Some(ball.regularity)
     }
-}
-
-/// Least part of the sine of the reference that is allowed between knots, whatever the limits of the condition.
-const LEAST_SINE_SHARE: f64 = 0.5;
-
-/// The least sine that goes with a limit of the condition: that of the reference, or as much less as the limit is looser.
-fn least_universal_sine(constants: &Constants, condition: f64) -> f64 {
-    constants.universal_sine * (constants.reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0)
 }

@@ -7,7 +7,7 @@ use super::cubic_departure::curvature;
 use super::examination::{Examination, MAX_WORK};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, StopKind};
-use super::regularity::{RegularBalls, Surroundings};
+use super::regularity::{RegularBalls, Regularity, Surroundings};
 use super::stop::{StopExtent, release_first_extent};
 use crate::control::limits::{Limit, Limits};
 use crate::control::parameters::{Constants, Envelope};
@@ -63,7 +63,7 @@ impl Verifier {
         let around = Surroundings {
             pose,
             reach: [shift.length, turn.length],
-            condition: constants.reference_condition,
+            required: Regularity::of_reference(constants),
         };
         let mut work = MAX_WORK.saturating_sub(step.work);
         let is_free = shift.peak_velocity + linear_bulge <= position.velocity

@@ -93,8 +93,7 @@ struct Wall {
     sides: [Side; 2],
     /// Positive where the end along the gradient is active, negative at the other.
     multiplier: f64,
-    /// The same of the derivative, and its weight per multiplier.
-    derivative_multiplier: f64,
+    /// Part of the bound on the derivative that holds, per multiplier, up to all of it.
     weight: f64,
 }
 
@@ -273,28 +272,24 @@ impl Walls {
             sweep += 1;
             sweeps = SWEEPS.min(MAX_VISITS / active.max(1));
         }
-        let is_active = |wall: &Wall| wall.multiplier != 0.0;
-        let restricting = walls
-            .iter()
-            .filter(|wall| is_active(wall))
-            .fold(LimitSet::default(), |all, wall| all.union(wall.limit));
+        let mut restricting = LimitSet::default();
+        let mut active = heapless::Vec::<_, WALL_COUNT>::new();
+        for wall in walls.iter().filter(|wall| wall.multiplier != 0.0) {
+            restricting = restricting.union(wall.limit);
+            active.push(DerivativeBound::new(wall)).ok();
+        }
         if restricting.is_empty() {
             return restricting;
         }
         let mut derivative = load(&turn.derivative, &shift.derivative);
         for _ in 0..sweeps {
-            for wall in walls.iter_mut().filter(|wall| is_active(wall)) {
-                let [against, along] = &wall.sides;
-                let gradient = f64x8::load_array(simd, wall.gradient);
-                let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
-                let weight = (wall.multiplier.abs() * wall.weight).min(1.0);
-                let excess = (dot(gradient, derivative) - wanted) * wall.inverse_square;
-                let change = weight * excess - (1.0 - weight) * wall.derivative_multiplier;
+            for bound in &mut active {
+                let gradient = f64x8::load_array(simd, *bound.gradient);
+                let change = bound.change(dot(gradient, derivative));
                 derivative -= gradient * f64x8::splat(simd, change);
-                wall.derivative_multiplier += change;
-                self.visits += 1;
             }
         }
+        self.visits += sweeps * active.len();
         let store = |lanes: f64x8<S>, turn: &mut Vector3<f64>, shift: &mut Vector3<f64>| {
             let [mx, my, mz, x, y, z, ..] = lanes.to_array();
             (*turn, *shift) = (Vector3::new(mx, my, mz) / self.radius, Vector3::new(x, y, z));
@@ -302,6 +297,35 @@ impl Walls {
         store(velocity, &mut turn.velocity, &mut shift.velocity);
         store(derivative, &mut turn.derivative, &mut shift.derivative);
         restricting
+    }
+}
+
+/// Bound on V' at an active wall.
+struct DerivativeBound<'a> {
+    gradient: &'a [f64; LANES],
+    /// `G V'` at the bound.
+    wanted: f64,
+    /// The part of the bound that holds, over the square of the norm of the gradient; and the part that does not.
+    weight_per_square: f64,
+    rest: f64,
+    multiplier: f64,
+}
+
+impl<'a> DerivativeBound<'a> {
+    fn new(wall: &'a Wall) -> Self {
+        let [against, along] = &wall.sides;
+        let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
+        let weight = (wall.multiplier.abs() * wall.weight).min(1.0);
+        let weight_per_square = weight * wall.inverse_square;
+        Self { gradient: &wall.gradient, wanted, weight_per_square, rest: 1.0 - weight, multiplier: 0.0 }
+    }
+
+    /// Change of the multiplier for the present `G V'`.
+    #[inline(always)]
+    fn change(&mut self, present: f64) -> f64 {
+        let change = (present - self.wanted) * self.weight_per_square - self.rest * self.multiplier;
+        self.multiplier += change;
+        change
     }
 }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::regularity::{RegularBalls, Surroundings};
+use super::regularity::{RegularBalls, Regularity, Surroundings};
 use super::samples::Samples;
 use crate::control::estimator::Readings;
 use crate::control::estimator::covariance::NoiseModel;
@@ -149,6 +149,6 @@ fn bisected(mut holds: f64, mut fails: f64, mut test: impl FnMut(f64) -> bool) -
 
 /// Whether balls, and new ones as far as needed, cover the poses within a reach of one, within the condition of the reference.
 fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: [f64; 2]) -> bool {
-    let around = Surroundings { pose, reach, condition: constants.reference_condition };
+    let around = Surroundings { pose, reach, required: Regularity::of_reference(constants) };
     balls.cover(constants, &around, &mut u32::MAX.clone())
 }
