@@ -16,11 +16,12 @@
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::Vector3;
 
-use super::angle_ranges::{AngleRanges, MAX_SLACK_RATIO, cosine_of_beta};
+use super::angle_ranges::{AngleRanges, cosine_of_beta};
 use super::cubic_departure::{CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk};
 use super::knots::{Beside, Knots, MAX_INTERVALS};
 use super::pose_bounds::PoseBounds;
 use super::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
+use super::position_ranges::PositionRanges;
 use super::regularity::{REGULARITY_WORK, RegularBalls, Regularity, Surroundings};
 use super::verification::Step;
 use crate::control::limits::{Limit, Limits};
@@ -63,8 +64,9 @@ pub(super) struct Examination<'a> {
     step_s: f64,
     /// Directions in which C may depart, per coordinate.
     directions: Vector3<f64>,
-    /// Whether rates could exceed their limit, and the ranges of the angles if they could leave the envelope.
+    /// Whether rates could exceed their limit; the ranges of the envelope, those of the angles if they could leave it.
     needs_rates: bool,
+    positions: Option<PositionRanges>,
     angles: Option<AngleRanges>,
     /// The pose from which the step leads. Where rounding left it beyond a bound, a stop may be as far beyond: or the
     /// reference could not return.
@@ -128,6 +130,7 @@ impl<'a> Examination<'a> {
             step_s: step.duration,
             directions: u.abs() * 2.0 + e.abs(),
             needs_rates,
+            positions: bounds.envelope.as_ref().map(PositionRanges::new),
             angles: bounds
                 .envelope
                 .as_ref()
@@ -204,8 +207,8 @@ impl<'a> Examination<'a> {
         if !room.simd_ge(splat(slack - self.length_excess)).all_true() {
             return Err(Limit::Stroke);
         }
-        if let Some(envelope) = &self.bounds.envelope {
-            self.check_envelope(simd, envelope, pose, state, beside)?;
+        if !self.is_in_envelope(simd, pose, state, beside) && !self.is_nearer_than_start(pose) {
+            return Err(Limit::Envelope);
         }
         self.check_condition(simd, balls, pose, state, dt)?;
         Ok(legs)
@@ -267,27 +270,20 @@ impl<'a> Examination<'a> {
         self.start_regularity.is_some_and(|start| at_knot.or_less(&start).is_kept_by(regularity))
     }
 
+    /// Whether a knot, and the Bezier points beside it, are within the envelope.
     #[inline(always)]
-    fn check_envelope<S: Simd>(
-        &mut self,
-        simd: S,
-        envelope: &Envelope,
-        pose: &Pose,
-        state: &PoseStopState,
-        beside: Beside,
-    ) -> Result<(), Limit> {
+    fn is_in_envelope<S: Simd>(&self, simd: S, pose: &Pose, state: &PoseStopState, beside: Beside) -> bool {
+        let Some(positions) = &self.positions else { return true };
         let dt = beside.longest();
         let [.., in_step] = self.step_departure;
         let jerk = self.constants.parameters.limits.position.jerk;
         let slack = self.directions * (jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
         let at = |t: f64| pose.position + state.position.velocity * t;
-        let is_within = is_position_inside(envelope, &at(beside.after / 3.0), &slack)
-            && is_position_inside(envelope, &at(-beside.before / 3.0), &slack)
+        positions.contain(simd, [&at(beside.after / 3.0), &at(-beside.before / 3.0)], &slack)
             && self
                 .angles
                 .as_ref()
-                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_slack(pose, state, dt)));
-        if is_within || self.is_nearer_than_start(envelope, pose) { Ok(()) } else { Err(Limit::Envelope) }
+                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_slack(pose, state, dt)))
     }
 
     /// Departure of the angles from their chords around a knot \[rad\].
@@ -309,8 +305,8 @@ impl<'a> Examination<'a> {
     /// Whether the start of the step is beyond the envelope, and a pose no farther beyond it.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    fn is_nearer_than_start(&mut self, envelope: &Envelope, pose: &Pose) -> bool {
-        let Some(from) = self.from else { return false };
+    fn is_nearer_than_start(&mut self, pose: &Pose) -> bool {
+        let (Some(from), Some(envelope)) = (self.from, &self.bounds.envelope) else { return false };
         let Machine { home, level, .. } = *self.constants.machine();
         let (relaxed, angles) = self.relaxed.get_or_insert_with(|| {
             let x = task_coordinates(from, &home);
@@ -318,8 +314,10 @@ impl<'a> Examination<'a> {
             (relaxed, AngleRanges::new(&relaxed, &x))
         });
         relaxed != envelope
-            && is_position_inside(relaxed, &pose.position, &Vector3::zeros())
-            && dispatch!(level, simd => angles.contain(simd, &pose.rotation, -ANGLE_ROUNDING))
+            && dispatch!(level, simd => {
+                PositionRanges::new(relaxed).contain(simd, [&pose.position; 2], &Vector3::zeros())
+                    && angles.contain(simd, &pose.rotation, -ANGLE_ROUNDING)
+            })
     }
 }
 
@@ -329,15 +327,4 @@ fn relaxed(envelope: &Envelope, x: &[f64; 6]) -> Envelope {
     relaxed.lowest.iter_mut().zip(x).for_each(|(low, x)| *low = low.min(*x));
     relaxed.highest.iter_mut().zip(x).for_each(|(high, x)| *high = high.max(*x));
     relaxed
-}
-
-#[inline(always)]
-fn is_position_inside(envelope: &Envelope, p: &Vector3<f64>, slack: &Vector3<f64>) -> bool {
-    let Envelope { lowest: [_, _, _, x0, y0, z0], highest: [_, _, _, x1, y1, z1] } = envelope;
-    is_inside(p.x, slack.x, (x0, x1)) & is_inside(p.y, slack.y, (y0, y1)) & is_inside(p.z, slack.z, (z0, z1))
-}
-
-/// Whether a coordinate has a distance from both ends of its range, or a part of the range that is narrower.
-fn is_inside(x: f64, slack: f64, (low, high): (&f64, &f64)) -> bool {
-    (x - low).min(high - x) >= slack.min(MAX_SLACK_RATIO * (high - low))
 }

@@ -15,7 +15,7 @@
 //! | `examination` | a stop near a bound, knot by knot |
 //! | `knots` | at which instants |
 //! | `cubic_departure` | what may happen between two knots |
-//! | `angle_ranges` | whether angles are within their ranges |
+//! | `angle_ranges`, `position_ranges` | whether a pose is within the envelope |
 //! | `pose_stop` | stop of position and orientation |
 //! | `held_stop` | the stop that is held ready, and followed |
 //! | `regularity` | balls of poses proved regular, for the limit of the condition |
@@ -54,6 +54,7 @@ mod knots;
 mod pose_bounds;
 pub mod pose_samples;
 mod pose_stop;
+mod position_ranges;
 mod regularity;
 #[cfg(test)]
 mod samples;
@@ -117,8 +118,14 @@ impl ReferenceGenerator {
     pub fn place(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Limit> {
         self.motion = *motion;
         self.bounds = PoseBounds::around(constants, &motion.pose);
-        let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &Step::default());
-        self.stop.hold(verified.unwrap_or(StopKind::Planar), &self.verifier.planar);
+        let verified = self.verifier.verify(
+            constants,
+            &self.bounds,
+            &self.motion,
+            &Step::default(),
+            self.stop.candidate(),
+        );
+        self.stop.hold(verified.unwrap_or(StopKind::Planar));
         verified.map(drop)
     }
 
@@ -225,7 +232,8 @@ impl ReferenceGenerator {
             let (now, next) = (&begin.acceleration, &self.motion.acceleration);
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
             let step = Step { from: Some(&begin.pose), duration: step_s, change, work };
-            let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step);
+            let verified =
+                self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.candidate());
             self.in_proportion_steps = match verified {
                 Ok(_) => self.in_proportion_steps.saturating_sub(1),
                 Err(_) => IN_PROPORTION_STEPS,
@@ -233,7 +241,7 @@ impl ReferenceGenerator {
             verified
         });
         match verified {
-            Some(Ok(kind)) => self.stop.hold(kind, &self.verifier.planar),
+            Some(Ok(kind)) => self.stop.hold(kind),
             refused => {
                 if let Some(Err(limit)) = refused {
                     self.active_limits = self.active_limits.with(limit, true);

@@ -40,19 +40,18 @@ impl Step<'_> {
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Verifier {
     pub balls: RegularBalls,
-    /// The planar stop that was examined last.
-    pub planar: PoseStop,
 }
 
 impl Verifier {
     /// Verifies a step and the stop from the motion at its end. Returns which stop, or the limit that no stop was proved to
-    /// keep.
+    /// keep. A planar one is planned in a given place.
     pub fn verify(
         &mut self,
         constants: &Constants,
         bounds: &PoseBounds,
         motion: &Motion,
         step: &Step<'_>,
+        planar: &mut PoseStop,
     ) -> Result<StopKind, Limit> {
         let Limits { orientation, position, .. } = &constants.parameters.limits;
         let Motion { pose, twist, acceleration } = motion;
@@ -75,8 +74,8 @@ impl Verifier {
         if is_free {
             return Ok(StopKind::ReleaseFirst);
         }
-        self.planar.plan(StopKind::Planar, motion, &constants.parameters.limits);
-        Examination::new(constants, bounds, &self.planar, motion, x.as_ref(), step, work)?
+        planar.plan(StopKind::Planar, motion, &constants.parameters.limits);
+        Examination::new(constants, bounds, planar, motion, x.as_ref(), step, work)?
             .run(&mut self.balls, pose)?;
         Ok(StopKind::Planar)
     }

@@ -26,7 +26,7 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
         (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
         let verified = |constants: &Constants, from: Option<&Pose>| {
             let step = Step { from, ..Step::default() };
-            Verifier::default().verify(constants, &bounds, &at_rest(&pose), &step)
+            Verifier::default().verify(constants, &bounds, &at_rest(&pose), &step, &mut PoseStop::default())
         };
         let sine = universal_sine(&machine, &pose);
         constants.universal_sine = 0.99 * sine;
@@ -72,9 +72,9 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
         let mut scene = Scene::new(&mut samples);
         scene.constants.parameters.condition = 60.0;
         scene.constants.reference_condition = 50.0;
-        let mut verifier = Verifier::default();
+        let (mut verifier, mut planar) = (Verifier::default(), PoseStop::default());
         let mut verified =
-            || verifier.verify(&scene.constants, &scene.bounds, &scene.motion, &Step::default());
+            || verifier.verify(&scene.constants, &scene.bounds, &scene.motion, &Step::default(), &mut planar);
         if verified() == Err(Limit::Condition) {
             later += u32::from((0..3).any(|_| verified().is_ok()));
         }
@@ -92,7 +92,13 @@ fn a_step_whose_work_is_done_is_refused() {
         let pose = *constants.home.pose();
         let verified = |work: u32| {
             let step = Step { work, ..Step::default() };
-            Verifier::default().verify(&constants, &PoseBounds::nominal(&constants), &at_rest(&pose), &step)
+            Verifier::default().verify(
+                &constants,
+                &PoseBounds::nominal(&constants),
+                &at_rest(&pose),
+                &step,
+                &mut PoseStop::default(),
+            )
         };
         assert_eq!(verified(MAX_WORK - 1), Ok(StopKind::ReleaseFirst));
         assert_eq!(verified(MAX_WORK), Err(Limit::Condition));

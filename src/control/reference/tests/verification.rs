@@ -177,8 +177,9 @@ impl Scene {
 
     /// In one of the cycles that share the work of a long stop.
     pub fn verify(&self) -> Result<StopKind, Limit> {
-        let mut verifier = Verifier::default();
-        let mut verify = || verifier.verify(&self.constants, &self.bounds, &self.motion, &self.step.step());
+        let (mut verifier, mut planar) = (Verifier::default(), PoseStop::default());
+        let mut verify =
+            || verifier.verify(&self.constants, &self.bounds, &self.motion, &self.step.step(), &mut planar);
         match verify().or_else(|_| verify()).or_else(|_| verify())? {
             StopKind::Planar if self.is_free => Err(Limit::Stroke),
             kind => Ok(kind),
