@@ -149,7 +149,7 @@ impl<'a> Examination<'a> {
 
     /// Examines every knot, in one piece of code for each instruction set.
     #[inline(never)]
-    pub fn run(&mut self, balls: &mut RegularBalls, start: &Pose) -> Result<(), Limit> {
+    pub fn run(&mut self, balls: &mut RegularBalls, start: &Motion) -> Result<(), Limit> {
         dispatch!(self.constants.machine().level, simd => self.run_in_lanes(simd, balls, start))
     }
 
@@ -158,10 +158,10 @@ impl<'a> Examination<'a> {
         &mut self,
         simd: S,
         balls: &mut RegularBalls,
-        start: &Pose,
+        start: &Motion,
     ) -> Result<(), Limit> {
-        let mut pose = *start;
-        let mut state = self.stop.at(0.0);
+        let mut pose = start.pose;
+        let mut state = PoseStopState::begin(start);
         let (mut t, mut beside, mut before) = (0.0, Beside::default(), None);
         let mut k = 0;
         loop {
@@ -172,7 +172,7 @@ impl<'a> Examination<'a> {
             if is_last {
                 return Ok(());
             }
-            let next = self.stop.at(next_t);
+            let next = self.stop.at(simd, next_t);
             pose = advanced_to_knot(&pose, &state, &next, beside.after);
             (t, state) = (next_t, next);
             k += 1;

@@ -2,7 +2,7 @@
 
 use super::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
 use super::target::at_rest;
-use crate::control::limits::Limits;
+use crate::control::parameters::Constants;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
 /// Where the stop begins.
@@ -61,14 +61,14 @@ impl HeldStop {
     /// The motion a step later along the stop, which is followed from now on.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    pub fn follow(&mut self, motion: &Motion, limits: &Limits, h: f64) -> Motion {
+    pub fn follow(&mut self, constants: &Constants, motion: &Motion, h: f64) -> Motion {
         match self.phase {
-            Phase::AtRest => self.begin(StopKind::ReleaseFirst, &at_rest(&motion.pose), limits),
-            Phase::Verified(kind) => self.begin(kind, motion, limits),
+            Phase::AtRest => self.begin(constants, StopKind::ReleaseFirst, &at_rest(&motion.pose)),
+            Phase::Verified(kind) => self.begin(constants, kind, motion),
             Phase::Followed => {}
         }
         self.elapsed_s += h;
-        let next = self.held().at(self.elapsed_s);
+        let next = self.held().state_at(constants.machine().level, self.elapsed_s);
         let pose = advanced(&motion.pose, &self.state, &next, h);
         self.state = next;
         let PoseStopState { orientation, position } = next;
@@ -79,11 +79,11 @@ impl HeldStop {
         }
     }
 
-    fn begin(&mut self, kind: StopKind, motion: &Motion, limits: &Limits) {
+    fn begin(&mut self, constants: &Constants, kind: StopKind, motion: &Motion) {
         if let StopKind::ReleaseFirst = kind {
-            self.candidate().plan(kind, motion, limits);
+            self.candidate().plan(constants.machine().level, kind, motion, &constants.parameters.limits);
             self.is_second_held ^= true;
         }
-        (self.phase, self.state, self.elapsed_s) = (Phase::Followed, self.held().at(0.0), 0.0);
+        (self.phase, self.state, self.elapsed_s) = (Phase::Followed, PoseStopState::begin(motion), 0.0);
     }
 }

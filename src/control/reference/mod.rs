@@ -246,7 +246,7 @@ impl ReferenceGenerator {
                 if let Some(Err(limit)) = refused {
                     self.active_limits = self.active_limits.with(limit, true);
                 }
-                self.motion = self.stop.follow(&begin, &constants.parameters.limits, step_s);
+                self.motion = self.stop.follow(constants, &begin, step_s);
             }
         }
         self.history.record(begin_ns, &begin, &self.motion.acceleration, step_s);

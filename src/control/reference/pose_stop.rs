@@ -3,6 +3,7 @@
 //! In base axes `v' = a` and `w' = al`: one stop of a vector serves both. Only attitude is not linear,
 //! `R <- exp(W) R` with `W = theta - dt^2/12 w0 x w1`, theta the integral of w (Magnus; the remainder is of order dt^5).
 
+use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::Vector3;
 
 use super::regularity::Reach;
@@ -37,26 +38,53 @@ pub(super) struct PoseStopState {
     pub position: StopState,
 }
 
+impl PoseStopState {
+    /// Where a stop from a motion begins.
+    pub fn begin(Motion { twist, acceleration, .. }: &Motion) -> Self {
+        let state = |velocity: &Vector3<f64>, acceleration: &Vector3<f64>| StopState {
+            displacement: Vector3::zeros(),
+            velocity: *velocity,
+            acceleration: *acceleration,
+        };
+        Self {
+            orientation: state(&twist.angular, &acceleration.angular),
+            position: state(&twist.linear, &acceleration.linear),
+        }
+    }
+}
+
 impl PoseStop {
     /// The stop of a kind from a motion.
     #[cfg(test)]
     pub fn new(kind: StopKind, motion: &Motion, limits: &Limits) -> Self {
         let mut stop = Self::default();
-        stop.plan(kind, motion, limits);
+        stop.plan(Level::new(), kind, motion, limits);
         stop
     }
 
     /// Becomes the stop of a kind from a motion.
-    pub fn plan(&mut self, kind: StopKind, motion: &Motion, limits: &Limits) {
+    #[inline(never)]
+    pub fn plan(&mut self, level: Level, kind: StopKind, motion: &Motion, limits: &Limits) {
+        dispatch!(level, simd => self.plan_in_lanes(simd, kind, motion, limits));
+    }
+
+    #[inline(always)]
+    fn plan_in_lanes<S: Simd>(&mut self, simd: S, kind: StopKind, motion: &Motion, limits: &Limits) {
         let Motion { twist, acceleration, .. } = motion;
-        // No pointer to a function: the proof on the machine code does not follow calls through pointers.
-        let plan = |stop: &mut Stop, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits| match kind
-        {
-            StopKind::ReleaseFirst => stop.release_first(v, a, limits),
-            StopKind::Planar => stop.planar(v, a, limits),
-        };
-        plan(&mut self.orientation, &twist.angular, &acceleration.angular, &limits.orientation);
-        plan(&mut self.position, &twist.linear, &acceleration.linear, &limits.position);
+        let orientation = (&mut self.orientation, &twist.angular, &acceleration.angular, &limits.orientation);
+        let position = (&mut self.position, &twist.linear, &acceleration.linear, &limits.position);
+        // One piece of code for both: the cycle stays short.
+        for (stop, v, a, limits) in [orientation, position] {
+            match kind {
+                StopKind::ReleaseFirst => stop.release_first(simd, v, a, limits),
+                StopKind::Planar => stop.planar(simd, v, a, limits),
+            }
+        }
+    }
+
+    /// State `t` seconds after the start.
+    pub fn state_at(&self, level: Level, t: f64) -> PoseStopState {
+        dispatch!(level, simd => self.at(simd, t))
     }
 
     /// Time to rest \[s\].
@@ -64,10 +92,10 @@ impl PoseStop {
         self.orientation.duration.max(self.position.duration)
     }
 
-    /// State `t` seconds after the start.
+    /// The same in lanes.
     #[inline(always)]
-    pub fn at(&self, t: f64) -> PoseStopState {
-        PoseStopState { orientation: self.orientation.at(t), position: self.position.at(t) }
+    pub fn at<S: Simd>(&self, simd: S, t: f64) -> PoseStopState {
+        PoseStopState { orientation: self.orientation.at(simd, t), position: self.position.at(simd, t) }
     }
 
     /// Bounds on how far the stop moves within half of `dt` after a state, or before it: around one of the knots `dt` apart.

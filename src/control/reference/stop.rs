@@ -26,6 +26,7 @@
 
 use core::f64::consts::FRAC_1_SQRT_2;
 
+use fearless_simd::{Simd, f64x4, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
@@ -92,25 +93,46 @@ pub(super) struct StopState {
     pub acceleration: Vector3<f64>,
 }
 
-impl StopState {
-    /// After `dt` seconds of constant jerk.
-    #[inline(always)]
-    fn after(&self, jerk: &Vector3<f64>, dt: f64) -> Self {
-        let Self { displacement, velocity, acceleration } = self;
-        Self {
-            displacement: displacement + (velocity + (acceleration / 2.0 + jerk * (dt / 6.0)) * dt) * dt,
-            velocity: velocity + (acceleration + jerk * (0.5 * dt)) * dt,
-            acceleration: acceleration + jerk * dt,
-        }
-    }
-}
+/// A vector and a zero.
+type Lanes = [f64; 4];
 
-/// Piece of a stop with constant jerk.
+/// Piece of a stop with constant jerk, and the state in which it begins.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Piece {
-    state: StopState,
-    jerk: Vector3<f64>,
+    displacement: Lanes,
+    velocity: Lanes,
+    acceleration: Lanes,
+    jerk: Lanes,
+}
+
+impl Piece {
+    fn new(begin: &StopState, jerk: &Vector3<f64>) -> Self {
+        let padded = |v: &Vector3<f64>| [v.x, v.y, v.z, 0.0];
+        Self {
+            displacement: padded(&begin.displacement),
+            velocity: padded(&begin.velocity),
+            acceleration: padded(&begin.acceleration),
+            jerk: padded(jerk),
+        }
+    }
+
+    /// The state `dt` seconds after its begin.
+    #[inline(always)]
+    fn after<S: Simd>(&self, simd: S, dt: f64) -> StopState {
+        let (load, splat) = (|lanes| f64x4::load_array(simd, lanes), |number| f64x4::splat(simd, number));
+        let vector = |lanes: f64x4<S>| {
+            let [x, y, z, _] = lanes.to_array();
+            Vector3::new(x, y, z)
+        };
+        let (velocity, acceleration, jerk) = (load(self.velocity), load(self.acceleration), load(self.jerk));
+        let mean_velocity = velocity + (acceleration * splat(0.5) + jerk * splat(dt / 6.0)) * splat(dt);
+        StopState {
+            displacement: vector(load(self.displacement) + mean_velocity * splat(dt)),
+            velocity: vector(velocity + (acceleration + jerk * splat(0.5 * dt)) * splat(dt)),
+            acceleration: vector(acceleration + jerk * splat(dt)),
+        }
+    }
 }
 
 /// A stop as pieces of constant jerk.
@@ -129,9 +151,16 @@ pub(super) struct Stop {
 
 impl Stop {
     /// Becomes the stop that releases the acceleration first. In place, as a stop is large.
-    pub fn release_first(&mut self, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) {
+    #[inline(always)]
+    pub fn release_first<S: Simd>(
+        &mut self,
+        simd: S,
+        v: &Vector3<f64>,
+        a: &Vector3<f64>,
+        limits: &DerivativeLimits,
+    ) {
         let DerivativeLimits { acceleration: limit, jerk, .. } = *limits;
-        let mut pieces = Pieces::new(self, v, a);
+        let mut pieces = Pieces::new(simd, self, v, a);
         let magnitude = a.norm();
         if magnitude > 0.0 {
             pieces.push(magnitude / jerk, -a * (jerk / magnitude));
@@ -146,7 +175,14 @@ impl Stop {
     }
 
     /// Becomes the planar stop.
-    pub fn planar(&mut self, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) {
+    #[inline(always)]
+    pub fn planar<S: Simd>(
+        &mut self,
+        simd: S,
+        v: &Vector3<f64>,
+        a: &Vector3<f64>,
+        limits: &DerivativeLimits,
+    ) {
         let DerivativeLimits { acceleration: limit, jerk, .. } = *limits;
         let (speed, magnitude) = (v.norm(), a.norm());
         let u = if speed > NEGLIGIBLE_RATIO * limits.velocity {
@@ -158,7 +194,7 @@ impl Stop {
         };
         let rest = a - u * a.dot(&u);
         let c = rest.norm();
-        let mut pieces = Pieces::new(self, v, a);
+        let mut pieces = Pieces::new(simd, self, v, a);
         let (mut across_speed, mut peak) = (0.0, 0.0);
         if c > NEGLIGIBLE_RATIO * limit {
             let across_jerk = ACROSS_JERK_RATIO * jerk * c / limit;
@@ -188,45 +224,49 @@ impl Stop {
 
     /// State `t` seconds after the start; at rest from the end on.
     #[inline(always)]
-    pub fn at(&self, t: f64) -> StopState {
+    pub fn at<S: Simd>(&self, simd: S, t: f64) -> StopState {
         // All are compared, without a branch: most are called one after the other, at knots in different pieces.
         let begun = self.begins.iter().map(|begin| usize::from(*begin <= t)).sum::<usize>();
         let index = begun.saturating_sub(1);
         match (self.pieces.get(index), self.begins.get(index)) {
-            (Some(Piece { state, jerk }), Some(begin)) => state.after(jerk, t - begin),
+            (Some(piece), Some(begin)) => piece.after(simd, t - begin),
             _ => StopState::default(),
         }
     }
 }
 
 /// Pieces in the making, and the state at their end.
-struct Pieces<'a> {
+struct Pieces<'a, S: Simd> {
+    simd: S,
     stop: &'a mut Stop,
     end: StopState,
 }
 
-impl<'a> Pieces<'a> {
-    fn new(stop: &'a mut Stop, v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
+impl<'a, S: Simd> Pieces<'a, S> {
+    #[inline(always)]
+    fn new(simd: S, stop: &'a mut Stop, v: &Vector3<f64>, a: &Vector3<f64>) -> Self {
         let end = StopState { velocity: *v, acceleration: *a, ..StopState::default() };
         (stop.count, stop.begins, stop.duration) = (0, [f64::INFINITY; MAX_PIECES], 0.0);
-        Self { stop, end }
+        Self { simd, stop, end }
     }
 
     /// Appends a piece.
+    #[inline(always)]
     fn push(&mut self, dt: f64, jerk: Vector3<f64>) {
         if !(dt > 0.0) {
             return;
         }
-        let Self { stop: Stop { pieces, count, begins, duration, .. }, end } = self;
+        let Self { simd, stop: Stop { pieces, count, begins, duration, .. }, end } = self;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
-            (*piece, *begin) = (Piece { state: *end, jerk }, *duration);
+            (*piece, *begin) = (Piece::new(end, &jerk), *duration);
             *count += 1;
             *duration += dt;
-            *end = end.after(&jerk, dt);
+            *end = piece.after(*simd, dt);
         }
     }
 
     /// Appends the pieces of a plan along `u` and of one across along `e`, until the one across ends.
+    #[inline(always)]
     fn push_both(&mut self, u: &Vector3<f64>, along: &Plan, e: &Vector3<f64>, across: &[(f64, f64); 2]) {
         let [(first, _), (second, _)] = *across;
         let end = first + second;
@@ -241,11 +281,12 @@ impl<'a> Pieces<'a> {
     }
 
     /// Ends at rest.
+    #[inline(always)]
     fn finish(self, peak_velocity: f64) {
         let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
         let Stop { pieces, count, begins, duration, .. } = self.stop;
         if let (Some(piece), Some(begin)) = (pieces.get_mut(*count), begins.get_mut(*count)) {
-            (*piece, *begin) = (Piece { state: rest, jerk: Vector3::zeros() }, *duration);
+            (*piece, *begin) = (Piece::new(&rest, &Vector3::zeros()), *duration);
             *count += 1;
         }
         self.stop.peak_velocity = peak_velocity;

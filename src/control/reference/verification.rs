@@ -74,9 +74,9 @@ impl Verifier {
         if is_free {
             return Ok(StopKind::ReleaseFirst);
         }
-        planar.plan(StopKind::Planar, motion, &constants.parameters.limits);
+        planar.plan(constants.machine().level, StopKind::Planar, motion, &constants.parameters.limits);
         Examination::new(constants, bounds, planar, motion, x.as_ref(), step, work)?
-            .run(&mut self.balls, pose)?;
+            .run(&mut self.balls, motion)?;
         Ok(StopKind::Planar)
     }
 }

@@ -1,5 +1,7 @@
 //! The generator as a whole: what it does in one step, and where it leads.
 
+use fearless_simd::Level;
+
 use super::super::held_stop::Phase;
 use super::super::pose_samples::PoseSamples;
 use super::super::pose_stop::PoseStop;
@@ -272,7 +274,7 @@ fn without_a_target_the_reference_ends_where_its_stop_does() {
     for k in 1..=400_u64 {
         assert!(!reference.is_at_rest() || at_rest_after.is_some());
         reference.advance(&constants, k * MS, None);
-        let expected = stop.at(k as f64 * 1e-3).position;
+        let expected = stop.state_at(Level::new(), k as f64 * 1e-3).position;
         let found = reference.motion();
         assert!((found.twist.linear - expected.velocity).norm() < 1e-9);
         assert!((found.pose.position - motion.pose.position - expected.displacement).norm() < 1e-9, "{k}");

@@ -1,5 +1,7 @@
 //! Regularity at the knots of a stop near a bound: of the pose itself, of the poses around it, and the work for it.
 
+use fearless_simd::Level;
+
 use super::super::examination::MAX_WORK;
 use super::super::pose_bounds::PoseBounds;
 use super::super::pose_stop::{PoseStop, StopKind};
@@ -126,9 +128,9 @@ fn a_stop_moves_no_farther_than_its_reach() {
         };
         let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
         let (t, dt) = (samples.uniform() * stop.duration(), 0.06 * samples.uniform());
-        let state = stop.at(t);
+        let state = stop.state_at(Level::new(), t);
         let reach = stop.reach(&state, dt, &LIMITS);
-        for other in [(t - 0.5 * dt).max(0.0), t + 0.5 * dt].map(|t| stop.at(t)) {
+        for other in [(t - 0.5 * dt).max(0.0), t + 0.5 * dt].map(|t| stop.state_at(Level::new(), t)) {
             let moved = [
                 (other.position.displacement - state.position.displacement).norm(),
                 (other.orientation.displacement - state.orientation.displacement).norm(),

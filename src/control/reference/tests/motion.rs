@@ -2,6 +2,8 @@
 
 use nalgebra::Vector6;
 
+use fearless_simd::Level;
+
 use super::super::constant_jerk::move_on;
 use super::super::history::History;
 use super::super::pose_bounds::PoseBounds;
@@ -234,7 +236,8 @@ fn a_part_of_a_stop_turns_as_its_angular_velocity_says() {
         let stop = PoseStop::new(StopKind::ReleaseFirst, &motion, &LIMITS);
         // Less than the time in which the acceleration is released: the jerk is constant.
         let h = 0.9 * 0.01_f64.min(motion.acceleration.angular.norm() / LIMITS.orientation.jerk);
-        let found = advanced(&motion.pose, &stop.at(0.0), &stop.at(h), h);
+        let found =
+            advanced(&motion.pose, &stop.state_at(Level::new(), 0.0), &stop.state_at(Level::new(), h), h);
         let jerk = motion.acceleration.angular.normalize() * -LIMITS.orientation.jerk;
         let jerk = if h > 0.0 { jerk } else { Vector3::zeros() };
         let whole = Acceleration { angular: jerk, linear: Vector3::zeros() };

@@ -1,5 +1,7 @@
 //! Verified stops: each is played finely next to the bound with which it was just accepted.
 
+use fearless_simd::Level;
+
 use super::super::pose_bounds::PoseBounds;
 use super::super::pose_stop::{PoseStop, StopKind};
 use super::super::target::at_rest;
@@ -71,8 +73,8 @@ fn play(constants: &Constants, motion: &Motion, step: &PlayedStep, kind: StopKin
     let mut pose = motion.pose;
     extremes.add(constants, &pose, &motion.twist);
     for k in 0..count as u32 {
-        let middle = stop.at((f64::from(k) + 0.5) * dt);
-        let end = stop.at(f64::from(k + 1) * dt);
+        let middle = stop.state_at(Level::new(), (f64::from(k) + 0.5) * dt);
+        let end = stop.state_at(Level::new(), f64::from(k + 1) * dt);
         pose = Pose {
             rotation: exp(&(middle.orientation.velocity * dt)) * pose.rotation,
             position: motion.pose.position + end.position.displacement,

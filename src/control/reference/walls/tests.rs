@@ -2,6 +2,8 @@
 
 use nalgebra::Matrix3;
 
+use fearless_simd::Level;
+
 use super::*;
 use crate::control::limits::DerivativeLimits;
 use crate::control::reference::pose_stop::{PoseStop, StopKind, advanced};
@@ -194,9 +196,10 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
         nearest += 1;
         let Scene { constants, bounds, motion } = &scene;
         let stop = PoseStop::new(StopKind::Planar, motion, &constants.parameters.limits);
-        let (mut pose, mut state, dt) = (motion.pose, stop.at(0.0), stop.duration() / 100.0);
+        let (mut pose, mut state, dt) =
+            (motion.pose, stop.state_at(Level::new(), 0.0), stop.duration() / 100.0);
         for k in 1..=100 {
-            let next = stop.at(f64::from(k) * dt);
+            let next = stop.state_at(Level::new(), f64::from(k) * dt);
             pose = advanced(&pose, &state, &next, dt);
             state = next;
             let lengths = leg_lengths(constants.machine(), &pose);
