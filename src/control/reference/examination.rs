@@ -245,14 +245,13 @@ impl<'a> Examination<'a> {
     ) -> Result<(), Limit> {
         let constants = self.constants;
         let reach = self.stop.reach(state, dt, &constants.parameters.limits);
-        let cover = balls.knot_cover(simd, constants, pose, reach);
-        if cover.is_complete() {
+        if balls.cover_knot(simd, constants, pose, reach) {
             return Ok(());
         }
         let around = Surroundings { pose, reach, required: Regularity::of_surroundings(constants) };
         let regularity = balls.cover_by_new(constants, &around, &mut self.work).ok_or(Limit::Condition)?;
         let at_knot = Regularity::of_reference(constants);
-        if cover.knot || at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
+        if at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
         }
         Err(Limit::Condition)

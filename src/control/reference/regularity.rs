@@ -200,22 +200,6 @@ pub(super) struct Surroundings<'a> {
     pub required: Regularity,
 }
 
-/// What of a knot is proved to be regular.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct KnotCover {
-    /// The pose itself, as the reference must be.
-    pub knot: bool,
-    /// The poses around it, as they must be: less so, else a reference at its own limit could not leave it.
-    pub surroundings: bool,
-}
-
-impl KnotCover {
-    /// Whether nothing is missing.
-    pub fn is_complete(&self) -> bool {
-        self.knot && self.surroundings
-    }
-}
-
 /// The balls found last.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
@@ -257,29 +241,24 @@ impl RegularBalls {
         (0..GROUPS).map(move |k| (recent + k) % GROUPS)
     }
 
-    /// What of a knot the balls that are kept cover.
+    /// Whether the balls that are kept cover a knot, as regular as the reference must be, and the poses around it, as regular as they
+    /// must be: less so, else a reference at its own limit could not leave it.
     #[inline(always)]
-    pub fn knot_cover<S: Simd>(
-        &mut self,
-        simd: S,
-        constants: &Constants,
-        pose: &Pose,
-        reach: Reach,
-    ) -> KnotCover {
-        let mut cover = KnotCover::default();
+    pub fn cover_knot<S: Simd>(&mut self, simd: S, constants: &Constants, pose: &Pose, reach: Reach) -> bool {
         let [at_knot, around] = [Regularity::of_reference(constants), Regularity::of_surroundings(constants)];
+        let mut are_surroundings_covered = false;
         for index in self.recent_first() {
             let Some(group) = self.groups.get(index) else { continue };
             let displacements = group.displacements(simd, pose);
             let covers = |reach, required| group.covers(simd, constants, &displacements, reach, required);
-            cover.knot = cover.knot || covers([0.0; 2], &at_knot);
-            cover.surroundings = cover.surroundings || covers(reach, &around);
-            if cover.is_complete() {
+            are_surroundings_covered = are_surroundings_covered || covers(reach, &around);
+            // Where they are not, the knot becomes the centre of a new ball.
+            if are_surroundings_covered && covers([0.0; 2], &at_knot) {
                 self.recent = index;
-                return cover;
+                return true;
             }
         }
-        cover
+        false
     }
 
     /// Covers the surroundings by a new ball. Returns the regularity of the pose.
