@@ -39,3 +39,34 @@ impl PositionRanges {
 fn padded(v: &Vector3<f64>) -> Lanes {
     [v.x, v.y, v.z, 0.0]
 }
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+
+    /// Of each coordinate, at both ends, either position alone decides; and a narrow range keeps a quarter of its width.
+    #[test]
+    fn each_end_is_kept_by_both_positions() {
+        let envelope =
+            Envelope { lowest: [9.0, 9.0, 9.0, -1.0, 1.0, 0.0], highest: [9.0, 9.0, 9.0, 2.0, 3.0, 1e-3] };
+        let ranges = PositionRanges::new(&envelope);
+        let middle = Vector3::new(0.5, 2.0, 5e-4);
+        let slacks = [0.3, 0.1, 0.1];
+        let kept = [0.3, 0.1, 2.5e-4];
+        let contain = |positions: [&Vector3<f64>; 2]| dispatch!(Level::new(), simd => ranges.contain(simd, positions, &slacks.into()));
+        for axis in 0..3 {
+            let (low, high) = (envelope.lowest[3 + axis], envelope.highest[3 + axis]);
+            for (share, is_contained) in [(1.01, true), (0.99, false)] {
+                for coordinate in [low + share * kept[axis], high - share * kept[axis]] {
+                    let mut moved = middle;
+                    moved[axis] = coordinate;
+                    for positions in [[&moved, &middle], [&middle, &moved], [&moved; 2]] {
+                        assert_eq!(contain(positions), is_contained, "{axis} {coordinate}");
+                    }
+                }
+            }
+        }
+    }
+}
