@@ -1,7 +1,9 @@
 //! The generator at its bounds: where it may begin, what it refuses, and that it comes back.
 
+use fearless_simd::Level;
+
 use super::super::held_stop::Phase;
-use super::super::pose_stop::StopKind;
+use super::super::pose_stop::{PoseStop, StopKind};
 use super::super::target::at_rest;
 use super::super::{ReferenceGenerator, Target};
 use super::generator::{MS, constants, run, standing, started, x};
@@ -207,7 +209,7 @@ fn walls_keep_their_distance_under_limit_only() {
     }
 }
 
-/// The stop that is held from the start is the one that was verified.
+/// The stop that is held from the start, and followed, is the one that was verified.
 #[test]
 fn a_start_holds_the_stop_that_was_verified() {
     for (half, expected) in [(1.0, StopKind::ReleaseFirst), (0.05, StopKind::Planar)] {
@@ -219,9 +221,15 @@ fn a_start_holds_the_stop_that_was_verified() {
         let mut motion = at_rest(constants.home.pose());
         motion.twist.linear = Vector3::new(-0.2, 0.0, 0.0);
         motion.pose.position.x = if half < 1.0 { 0.047 } else { 0.0 };
-        let reference = started(&constants, &motion);
+        let mut reference = started(&constants, &motion);
         let Phase::Verified(kind) = reference.stop.phase else { panic!("no stop is held") };
-        assert_eq!(kind == StopKind::Planar, expected == StopKind::Planar, "{half}");
+        assert_eq!(kind, expected, "{half}");
+        let stop = PoseStop::new(kind, &motion, &constants.parameters.limits);
+        for k in 1..=20_u64 {
+            reference.advance(&constants, k * MS, None);
+            let expected = stop.state_at(Level::new(), k as f64 * 1e-3).position;
+            assert!((reference.motion().twist.linear - expected.velocity).norm() < 1e-9, "{half} {k}");
+        }
     }
 }
 
