@@ -22,6 +22,7 @@
 //! | `pose_bounds` | lengths of the legs and envelope |
 //! | `approach` | acceleration towards a moving target |
 //! | `constant_jerk` | step of a motion |
+//! | `padding` | vectors of three in four lanes |
 //! | `walls` | soft approach of bounds |
 //! | `target` | setpoint, samples of poses, or a pose |
 //! | [`pose_samples`] | target through poses without derivatives |
@@ -51,6 +52,7 @@ mod examination;
 mod held_stop;
 mod history;
 mod knots;
+mod padding;
 mod pose_bounds;
 pub mod pose_samples;
 mod pose_stop;

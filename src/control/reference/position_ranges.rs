@@ -4,18 +4,16 @@ use fearless_simd::{Simd, f64x4, prelude::*};
 use nalgebra::Vector3;
 
 use super::angle_ranges::MAX_SLACK_RATIO;
+use super::padding::{Padded, padded};
 use crate::control::parameters::Envelope;
 
-/// Three coordinates and a zero, which is within a range of zeros.
-type Lanes = [f64; 4];
-
-/// Ranges of the coordinates of C \[m\].
+/// Ranges of the coordinates of C \[m\], and one of zeros, which contains the zero of a padded vector.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PositionRanges {
-    lowest: Lanes,
-    highest: Lanes,
+    lowest: Padded,
+    highest: Padded,
     /// Most slack that is kept from each end.
-    slack: Lanes,
+    slack: Padded,
 }
 
 impl PositionRanges {
@@ -29,15 +27,11 @@ impl PositionRanges {
     /// Whether each coordinate of both positions has a distance from the ends of its range, or a part of it that is narrower.
     #[inline(always)]
     pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], slack: &Vector3<f64>) -> bool {
-        let load = |lanes: Lanes| f64x4::load_array(simd, lanes);
+        let load = |lanes: Padded| f64x4::load_array(simd, lanes);
         let [first, second] = positions.map(|position| load(padded(position)));
         let room = (first.min(second) - load(self.lowest)).min(load(self.highest) - first.max(second));
         room.simd_ge(load(padded(slack)).min(load(self.slack))).all_true()
     }
-}
-
-fn padded(v: &Vector3<f64>) -> Lanes {
-    [v.x, v.y, v.z, 0.0]
 }
 
 #[cfg(test)]

@@ -31,6 +31,7 @@ use fearless_simd::{Simd, f64x4, prelude::*};
 use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
+use super::padding::{Padded, padded};
 use crate::control::limits::DerivativeLimits;
 
 /// Jerk across as a ratio of `J c/A`. The larger, the sooner the part across ends, and the less is left along.
@@ -93,22 +94,18 @@ pub(super) struct StopState {
     pub acceleration: Vector3<f64>,
 }
 
-/// A vector and a zero.
-type Lanes = [f64; 4];
-
 /// Piece of a stop with constant jerk, and the state in which it begins.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Piece {
-    displacement: Lanes,
-    velocity: Lanes,
-    acceleration: Lanes,
-    jerk: Lanes,
+    displacement: Padded,
+    velocity: Padded,
+    acceleration: Padded,
+    jerk: Padded,
 }
 
 impl Piece {
     fn new(begin: &StopState, jerk: &Vector3<f64>) -> Self {
-        let padded = |v: &Vector3<f64>| [v.x, v.y, v.z, 0.0];
         Self {
             displacement: padded(&begin.displacement),
             velocity: padded(&begin.velocity),

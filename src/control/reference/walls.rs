@@ -25,6 +25,7 @@ use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use nalgebra::ComplexField as _;
 use nalgebra::{Vector3, Vector6};
 
+use self::derivative_bound::DerivativeBound;
 use super::approach::{Approach, WantedVelocity};
 use super::pose_bounds::PoseBounds;
 use super::stop::straight_extent;
@@ -300,35 +301,6 @@ impl Walls {
     }
 }
 
-/// Bound on V' at an active wall.
-struct DerivativeBound<'a> {
-    gradient: &'a [f64; LANES],
-    /// `G V'` at the bound.
-    wanted: f64,
-    /// The part of the bound that holds, over the square of the norm of the gradient; and the part that does not.
-    weight_per_square: f64,
-    rest: f64,
-    multiplier: f64,
-}
-
-impl<'a> DerivativeBound<'a> {
-    fn new(wall: &'a Wall) -> Self {
-        let [against, along] = &wall.sides;
-        let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
-        let weight = (wall.multiplier.abs() * wall.weight).min(1.0);
-        let weight_per_square = weight * wall.inverse_square;
-        Self { gradient: &wall.gradient, wanted, weight_per_square, rest: 1.0 - weight, multiplier: 0.0 }
-    }
-
-    /// Change of the multiplier for the present `G V'`.
-    #[inline(always)]
-    fn change(&mut self, present: f64) -> f64 {
-        let change = (present - self.wanted) * self.weight_per_square - self.rest * self.multiplier;
-        self.multiplier += change;
-        change
-    }
-}
-
 /// The sum of the products, in the same order on every processor.
 #[inline(always)]
 fn dot<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64 {
@@ -352,5 +324,6 @@ fn stacked(first: &Vector3<f64>, second: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(first.x, first.y, first.z, second.x, second.y, second.z)
 }
 
+mod derivative_bound;
 #[cfg(test)]
 mod tests;

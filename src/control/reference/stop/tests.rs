@@ -33,7 +33,7 @@ fn planned(kind: StopKind, v: &Vector3<f64>, a: &Vector3<f64>, limits: &Derivati
     stop
 }
 
-fn norm(lanes: Lanes) -> f64 {
+fn norm(lanes: Padded) -> f64 {
     nalgebra::Vector4::from(lanes).norm()
 }
 
