@@ -10,6 +10,7 @@
     reason = "helpers of tests and benches, each of which uses a part"
 )]
 
+pub mod certificate;
 pub mod edited;
 pub mod extremes;
 pub mod fast;
