@@ -4,9 +4,9 @@
 //! by the true motion of the platform. The search begins with the worst runs that were ever found, goes on with random ones
 //! and climbs from the best of each quantity.
 //!
-//! `HEXAD_ADVERSARY_SECONDS` is the time of the search (default 60); `HEXAD_ADVERSARY_CYCLES=1e7` searches for that many
-//! cycles under control of each machine instead; `HEXAD_SEED` begins elsewhere; `HEXAD_ADVERSARY_KEEP=FILE` writes the
-//! worst genomes, and `HEXAD_ADVERSARY_TRACE` with the test `trace` prints one run.
+//! `HEXAD_LONG=1` searches for 1e6 cycles under control of each machine with each policy, `HEXAD_LONG=5` for five times as many;
+//! `HEXAD_SEED` begins elsewhere; `HEXAD_ADVERSARY_KEEP=FILE` writes the worst genomes, and `HEXAD_ADVERSARY_TRACE` with the test
+//! `trace` prints one run.
 
 #![allow(
     clippy::unwrap_used,
@@ -16,20 +16,16 @@
     reason = "helpers of tests"
 )]
 
-mod common;
+use crate::common;
 
-mod adversary {
-    use super::*;
-
-    mod genome;
-    mod machines;
-    mod messages;
-    mod run;
-    mod scenario;
-    mod scorer;
-    mod search;
-    mod stream;
-    mod table;
-    mod tests;
-    mod trace;
-}
+mod genome;
+mod machines;
+mod messages;
+mod run;
+mod scenario;
+mod scorer;
+mod search;
+mod stream;
+mod table;
+mod tests;
+mod trace;

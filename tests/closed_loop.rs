@@ -2,36 +2,32 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod closed_loop {
-    use super::*;
-
-    mod ages;
-    mod allowed_disturbances;
-    mod assessment;
-    mod built_in;
-    mod disturbances;
-    mod drive_delay;
-    mod drive_status;
-    mod estimator;
-    mod evidence;
-    mod external_pose;
-    mod false_alarms;
-    mod feedback;
-    mod fidelities;
-    mod hardware_failures;
-    mod inputs;
-    mod limits;
-    mod modes;
-    mod policies;
-    mod poses;
-    mod replay;
-    mod ride;
-    mod setpoints;
-    mod stamp_clock;
-    mod stamps;
-    mod targets;
-    mod tracking;
-    mod trust;
-}
+mod ages;
+mod allowed_disturbances;
+mod assessment;
+mod built_in;
+mod disturbances;
+mod drive_delay;
+mod drive_status;
+mod estimator;
+mod evidence;
+mod external_pose;
+mod false_alarms;
+mod feedback;
+mod fidelities;
+mod hardware_failures;
+mod inputs;
+mod limits;
+mod modes;
+mod policies;
+mod poses;
+mod replay;
+mod ride;
+mod setpoints;
+mod stamp_clock;
+mod stamps;
+mod targets;
+mod tracking;
+mod trust;

@@ -6,15 +6,11 @@
 
 #![allow(clippy::expect_used, clippy::unreachable, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod cycles {
-    use super::*;
-
-    mod external;
-    mod oracle;
-    mod policies;
-    mod real_clock;
-    mod rig;
-    mod rights;
-}
+mod external;
+mod oracle;
+mod policies;
+mod real_clock;
+mod rig;
+mod rights;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "a test helper that fails is a failed test")]
 
-mod common;
+use crate::common;
 
 use std::process::Command;
 

@@ -3,20 +3,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod faults {
-    use super::*;
-
-    mod cells;
-    mod curves;
-    mod disturbances;
-    mod pictures;
-    mod recording;
-    mod rows;
-    mod scenarios;
-    mod sequences;
-    mod situations;
-    mod table;
-    mod world;
-}
+mod cells;
+mod curves;
+mod disturbances;
+mod pictures;
+mod recording;
+mod rows;
+mod scenarios;
+mod sequences;
+mod situations;
+mod table;
+mod world;

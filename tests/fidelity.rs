@@ -2,13 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod fidelity {
-    use super::*;
-
-    mod advise;
-    mod dense;
-    mod envelope;
-    mod scenes;
-}
+mod advise;
+mod dense;
+mod envelope;
+mod scenes;

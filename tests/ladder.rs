@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
 use common::{Errors, Legs, MACHINES, Table, data, machine, motions};
 use hexad::model::active_forces::InverseDynamics;

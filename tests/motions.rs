@@ -5,20 +5,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod motions {
-    use super::*;
-
-    mod beyond_the_envelope;
-    mod engage_in_motion;
-    mod frozen_sensors;
-    mod heave;
-    mod lost_source;
-    mod old_measurements;
-    mod old_setpoints;
-    mod released_in_motion;
-    mod replaced_source;
-    mod report;
-    mod wrong_derivatives;
-}
+mod beyond_the_envelope;
+mod engage_in_motion;
+mod frozen_sensors;
+mod heave;
+mod lost_source;
+mod old_measurements;
+mod old_setpoints;
+mod released_in_motion;
+mod replaced_source;
+mod report;
+mod wrong_derivatives;

@@ -3,14 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod near_singular {
-    use super::*;
-
-    pub mod reference;
-    pub mod scenes;
-}
+pub mod reference;
+pub mod scenes;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,8 +16,7 @@ use hexad::model::inverse_jacobian::{leg_wrenches, twist_from_rates};
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Pose;
 use nalgebra::{Matrix3, Vector6};
-use near_singular::reference;
-use near_singular::scenes::{Scene, scenes};
+use scenes::{Scene, scenes};
 
 /// What the errors may be, over those of partial pivoting.
 const WORST_RATIO: f64 = 2.0;

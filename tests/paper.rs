@@ -47,14 +47,10 @@
     reason = "a test helper that fails is a failed test; indices count legs, links and axes"
 )]
 
-mod common;
+use crate::common;
 
-mod paper {
-    use super::*;
-
-    mod agreement;
-    mod errata;
-    mod last_term;
-    mod power;
-    mod vectors;
-}
+mod agreement;
+mod errata;
+mod last_term;
+mod power;
+mod vectors;

@@ -3,22 +3,18 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod plant {
-    use super::*;
-
-    mod brakes;
-    mod dynamics;
-    mod elastic;
-    mod energy;
-    mod friction;
-    mod hardware;
-    mod held_forces;
-    mod imperfect;
-    mod integration;
-    mod power;
-}
+mod brakes;
+mod dynamics;
+mod elastic;
+mod energy;
+mod friction;
+mod hardware;
+mod held_forces;
+mod imperfect;
+mod integration;
+mod power;
 
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;

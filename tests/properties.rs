@@ -4,19 +4,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod properties {
-    use super::*;
-
-    mod dynamics;
-    mod invariance;
-    mod kinematics;
-    mod layouts;
-    mod regressor;
-    mod rotations;
-    mod stances;
-}
+mod dynamics;
+mod invariance;
+mod kinematics;
+mod layouts;
+mod regressor;
+mod rotations;
+mod stances;
 
 use std::sync::LazyLock;
 

@@ -2,16 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod reference {
-    use super::*;
-
-    mod arrival;
-    mod goto;
-    mod limits;
-    mod observer;
-    mod rates;
-    mod streams;
-    mod walls;
-}
+mod arrival;
+mod goto;
+mod limits;
+mod observer;
+mod rates;
+mod streams;
+mod walls;

@@ -2,19 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod stability {
-    use super::*;
-
-    mod beyond;
-    mod check;
-    mod dietmaier;
-    mod fichter;
-    mod gimbal;
-    mod legs;
-    mod passing;
-    mod random;
-    mod sampled;
-    mod sizes;
-}
+mod beyond;
+mod check;
+mod dietmaier;
+mod fichter;
+mod gimbal;
+mod legs;
+mod passing;
+mod random;
+mod sampled;
+mod sizes;

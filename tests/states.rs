@@ -2,12 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod states {
-    use super::*;
-
-    mod every_transition;
-    mod oracle;
-    mod sequences;
-}
+mod every_transition;
+mod oracle;
+mod sequences;

@@ -3,16 +3,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod vectors {
-    use super::*;
-
-    mod forward;
-    mod inverse;
-    mod refusals;
-    mod unsolved;
-}
+mod forward;
+mod inverse;
+mod refusals;
+mod unsolved;
 
 use std::fs;
 use std::path::{Path, PathBuf};

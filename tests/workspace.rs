@@ -2,16 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::indexing_slicing, reason = "helpers of tests")]
 
-mod common;
+use crate::common;
 
-mod workspace {
-    use super::*;
-
-    mod cells;
-    mod command;
-    mod forces;
-    mod regions;
-}
+mod cells;
+mod command;
+mod forces;
+mod regions;
 
 use hexad::analysis::envelope::MotionEnvelope;
 use hexad::model::machine::Machine;

@@ -21,7 +21,7 @@ use super::common::rig::parameters;
 use super::common::{deployed, machine};
 use super::machines::MACHINES;
 use super::run::Faults;
-use super::search::{Budget, Search};
+use super::search::Search;
 
 /// Axes of X.
 const ALPHA: usize = 0;
@@ -290,7 +290,7 @@ fn a_controller_that_is_wrong_is_found() {
     ];
     for (quantity, doctor) in cases {
         let mut search = Search::doctored(reference, doctor, quantity);
-        search.climb(3, Budget::Cycles(ENOUGH_CYCLES));
+        search.climb(3, ENOUGH_CYCLES, drop);
         let largest = search.row.extremes.of(quantity);
         let runs = search.row.runs;
         println!("{}: {largest:.4} of {:.4} after {runs} runs", quantity.name(), quantity.allowed());

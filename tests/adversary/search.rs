@@ -3,7 +3,6 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{available_parallelism, scope};
-use std::time::{Duration, Instant};
 
 use hexad::control::parameters::ViolationPolicy;
 use hexad::plant::random::Random;
@@ -12,7 +11,7 @@ use super::common::extremes::Quantity;
 use super::genome::Genome;
 use super::machines::MACHINES;
 use super::run::{Doctor, Outcome, run};
-use super::table::{self, Row};
+use super::table::Row;
 
 /// Genomes that are kept of each quantity and policy.
 const KEPT: usize = 4;
@@ -23,14 +22,6 @@ const CROSSED: f64 = 0.2;
 const FROZEN: f64 = 0.05;
 /// Runs of each machine that are all drawn anew.
 const FIRST_RUNS: u64 = 60;
-
-/// When the search of one machine ends.
-#[derive(Clone, Copy, Debug)]
-pub enum Budget {
-    Time(Duration),
-    /// Under control with each policy.
-    Cycles(u64),
-}
 
 /// A genome with what it reached.
 #[derive(Clone)]
@@ -142,15 +133,14 @@ impl Search {
         }
     }
 
-    pub fn climb(&mut self, seed: u64, budget: Budget) {
-        let begun = Instant::now();
-        let goes_on = |row: &Row| match budget {
-            Budget::Time(time) => begun.elapsed() < time,
-            Budget::Cycles(cycles) => row.cycles.iter().any(|done| *done < cycles),
-        };
-        while goes_on(&self.row) && !self.is_found() {
-            let genome = self.next(seed);
+    /// Searches until so many cycles were under control with each policy; `advance` counts them.
+    pub fn climb(&mut self, seed: u64, cycles: u64, advance: impl Fn(u64)) {
+        let counted = |row: &Row| row.cycles.iter().map(|done| *done.min(&cycles)).sum::<u64>();
+        advance(counted(&self.row));
+        while counted(&self.row) < 2 * cycles && !self.is_found() {
+            let (genome, before) = (self.next(seed), counted(&self.row));
             self.add(&genome);
+            advance(counted(&self.row) - before);
         }
     }
 
@@ -161,13 +151,10 @@ impl Search {
 }
 
 /// Searches with every machine, on every processor; each search begins with the genomes that are known.
-pub fn search(known: &[Genome], seed: u64, budget: Budget) -> Vec<Search> {
+pub fn search(known: &[Genome], seed: u64, cycles: u64, advance: impl Fn(u64) + Sync) -> Vec<Search> {
     let workers = available_parallelism().map_or(1, usize::from).min(MACHINES.len());
-    let budget = match budget {
-        Budget::Time(total) => Budget::Time(total / MACHINES.len().div_ceil(workers) as u32),
-        cycles @ Budget::Cycles(_) => cycles,
-    };
     let (next, searches) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let advance = &advance;
     let work = || {
         loop {
             let machine = next.fetch_add(1, Ordering::Relaxed);
@@ -176,9 +163,7 @@ pub fn search(known: &[Genome], seed: u64, budget: Budget) -> Vec<Search> {
             }
             let mut search = Search::new(machine);
             known.iter().filter(|genome| genome.machine == machine).for_each(|genome| search.add(genome));
-            search.climb(seed, budget);
-            // A long search shows how far it is.
-            println!("{}", table::text(std::slice::from_ref(&search.row)));
+            search.climb(seed, cycles, advance);
             searches.lock().unwrap().push(search);
         }
     };

@@ -2,33 +2,27 @@
 
 use std::collections::HashMap;
 use std::path::Path;
-use std::time::Duration;
 use std::{env, fs};
 
 use hexad::control::parameters::ViolationPolicy;
 use hexad::plant::random::Random;
 
+use super::common::certificate::Certificate;
 use super::common::extremes::Extremes;
 use super::genome::Genome;
 use super::machines::MACHINES;
 use super::run::{run, run_with};
 use super::scenario::Scenario;
-use super::search::{Budget, Found, Search, search};
+use super::search::{Found, Search, search};
 use super::{table, trace};
 
-/// Time of the search where none is given \[s\].
-const SECONDS: f64 = 60.0;
-/// Seed of the search where none is given.
-const SEED: u64 = 1;
+/// Cycles under control of each machine with each policy, beside those of the genomes that are known.
+const CYCLES: u64 = 30_000;
+const LONG_CYCLES: u64 = 1_000_000;
 /// Genomes that are written of each policy and quantity.
 const KEPT: u32 = 3;
 /// Violations that are printed with what their genomes mean.
 const EXPLAINED: usize = 3;
-
-fn number(name: &str) -> Option<f64> {
-    let text = env::var(name).ok()?;
-    Some(text.parse().unwrap_or_else(|_| panic!("{name} = {text}: must be a number")))
-}
 
 /// The genomes of `worst.txt`, which were the worst of their time.
 fn known() -> Vec<Genome> {
@@ -75,14 +69,11 @@ fn explain(violations: &[&Found]) -> String {
 }
 
 #[test]
-fn no_search_finds_a_motion_beyond_a_limit() {
-    let seconds = number("HEXAD_ADVERSARY_SECONDS").unwrap_or(SECONDS);
-    let budget = match number("HEXAD_ADVERSARY_CYCLES") {
-        Some(cycles) => Budget::Cycles(cycles as u64),
-        None => Budget::Time(Duration::from_secs_f64(seconds)),
-    };
-    let seed = number("HEXAD_SEED").map_or(SEED, |seed| seed as u64);
-    let searches = search(&known(), seed, budget);
+fn certificate_no_search_finds_a_motion_beyond_a_limit() {
+    let kinds = 2 * MACHINES.len() as u64;
+    let certificate = Certificate::new("adversary", kinds * CYCLES, kinds * LONG_CYCLES);
+    let cycles = certificate.total() / kinds;
+    let searches = search(&known(), certificate.seed(), cycles, |done| certificate.advance(done));
     let rows: Vec<_> = searches.iter().map(|search| search.row.clone()).collect();
     println!("{}", table::text(&rows));
     if let Ok(path) = env::var("HEXAD_ADVERSARY_KEEP") {
@@ -94,6 +85,8 @@ fn no_search_finds_a_motion_beyond_a_limit() {
         rows.iter().all(|row| row.cycles.iter().all(|cycles| *cycles > 0)),
         "a machine was never under control"
     );
+    certificate
+        .finish(format_args!("{cycles} cycles of each machine and policy, {} violations", violations.len()));
     assert!(violations.is_empty(), "{} beyond a limit:\n{}", violations.len(), explain(&violations));
 }
 

@@ -1,7 +1,7 @@
 //! A certificate: the long form of a test, with its progress and a line for the table in `docs/benchmarks.md`.
 //!
-//! `HEXAD_LONG=1 cargo test certificate -- --nocapture --test-threads=1` runs all of them. Without the variable each is a short run
-//! with a fixed seed. `HEXAD_SEED` repeats a run.
+//! `HEXAD_LONG=1 cargo test certificate -- --nocapture --test-threads=1` runs all of them, and `HEXAD_LONG=5` makes them five times as
+//! long. Without the variable each is a short run with a fixed seed. `HEXAD_SEED` repeats a run.
 
 use std::env;
 use std::fmt::Display;
@@ -28,9 +28,9 @@ pub struct Certificate {
 impl Certificate {
     /// Begins a run of so many trials, cycles or seconds.
     pub fn new(name: &'static str, short: u64, long: u64) -> Self {
-        let (total, bar) = match Self::is_long() {
-            true => (long, ProgressBar::new(long)),
-            false => (short, ProgressBar::hidden()),
+        let (total, bar) = match Self::factor() {
+            0 => (short, ProgressBar::hidden()),
+            factor => (factor * long, ProgressBar::new(factor * long)),
         };
         let style = ProgressStyle::with_template("{msg} {wide_bar} {human_pos} of {human_len}, {eta} left");
         bar.set_style(style.unwrap());
@@ -38,9 +38,14 @@ impl Certificate {
         Self { name, total, done: AtomicU64::new(0), seed: OnceLock::new(), bar, began: Instant::now() }
     }
 
-    /// Whether `HEXAD_LONG=1` selects the long forms.
+    /// How many times as long as the table's the long form is, by `HEXAD_LONG`; 0 is the short form.
+    fn factor() -> u64 {
+        env::var("HEXAD_LONG").map_or(0, |text| text.parse().expect("HEXAD_LONG must be a number"))
+    }
+
+    /// Whether `HEXAD_LONG` selects the long forms.
     pub fn is_long() -> bool {
-        env::var_os("HEXAD_LONG").is_some_and(|value| value == "1")
+        Self::factor() > 0
     }
 
     /// Length of this run.

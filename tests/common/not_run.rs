@@ -17,15 +17,25 @@ pub fn lacking(what: &str) {
 }
 
 /// The calling test does not run for what no right and no tool would change: the kernel, the processors, the host.
-#[allow(unsafe_code, reason = "the harness has no other end of a run that a test could use")]
 pub fn not_run(why: &str) {
     let test = thread::current().name().unwrap_or("a test").to_owned();
+    add(format!("    {test}: {}", why.trim()));
+}
+
+/// Adds those that another test process has named on its standard error.
+pub fn repeat(errors: &str) {
+    let named = errors.lines().skip_while(|line| !line.starts_with("NOT RUN: ")).skip(1);
+    named.take_while(|line| line.starts_with("    ")).for_each(|line| add(line.into()));
+}
+
+#[allow(unsafe_code, reason = "the harness has no other end of a run that a test could use")]
+fn add(line: String) {
     let mut not_run = NOT_RUN.lock().expect("the list of tests");
     if not_run.is_empty() {
         // SAFETY: the function is safe to call at any time.
         unsafe { libc::atexit(print) };
     }
-    not_run.push(format!("    {test}: {}", why.trim()));
+    not_run.push(line);
 }
 
 /// At the end of the process, below the result of the harness.

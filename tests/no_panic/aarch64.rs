@@ -1,7 +1,7 @@
 //! Where AArch64 code leaves a function. All instructions are words; the bits are those of the Arm
 //! Architecture Reference Manual, C4.1 (branches, exceptions, system), and no branch hides elsewhere.
 
-use crate::executable::{Constants, Leap, Leaps};
+use super::executable::{Constants, Leap, Leaps};
 
 pub fn leaps(code: &[u8], address: u64, _: &Constants) -> Leaps {
     let words: Vec<u32> =

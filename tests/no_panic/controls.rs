@@ -13,7 +13,7 @@ macro_rules! controls {
         pub fn all() -> Vec<Control> {
             vec![$({
                 black_box($name as *const ());
-                (concat!("no_panic::controls::", stringify!($name)), $finding)
+                (concat!("shipped::no_panic::controls::", stringify!($name)), $finding)
             }),*]
         }
     };
@@ -71,7 +71,7 @@ pub mod clean {
 
     pub fn all() -> [&'static str; 2] {
         black_box((computes as *const (), matches as *const ()));
-        ["no_panic::controls::clean::computes", "no_panic::controls::clean::matches"]
+        ["shipped::no_panic::controls::clean::computes", "no_panic::controls::clean::matches"]
     }
 }
 

@@ -10,7 +10,7 @@ use object::{
     SymbolKind,
 };
 
-use crate::{aarch64, x86_64};
+use super::{aarch64, x86_64};
 
 /// What one instruction does besides computing and going on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::executable::{Executable, Leap, Place};
+use super::executable::{Executable, Leap, Place};
 
 /// What the walk from one function found.
 #[derive(Debug, Default)]

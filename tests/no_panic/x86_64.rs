@@ -15,7 +15,7 @@ use iced_x86::{
     OpKind, Register,
 };
 
-use crate::executable::{Constants, Leap, Leaps};
+use super::executable::{Constants, Leap, Leaps};
 
 /// What a register holds.
 #[derive(Clone, Copy, PartialEq)]

@@ -14,6 +14,7 @@ use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::arrival::{ARRIVED, optimal_s};
+use super::common::certificate::Certificate;
 use super::common::rig::parameters;
 use super::common::{MACHINES, data};
 use super::observer::{Largest, examine};
@@ -21,6 +22,10 @@ use super::observer::{Largest, examine};
 /// Ways from which on the time is compared with the time-optimal profile \[m\], \[rad\], and the largest ratio.
 const COMPARED_FROM: [f64; 2] = [0.02, 0.02];
 const LONGEST_RATIO: f64 = 1.2;
+
+/// Pairs of poses of each machine.
+const PAIRS: u64 = 30;
+const LONG_PAIRS: u64 = 2000;
 
 /// Shares of the limits of autonomous motions, in turn.
 const SPEEDS: [f64; 3] = [1.0, 0.5, 0.1];
@@ -173,10 +178,11 @@ fn least_room(constants: &Constants, from: &Pose, to: &Pose) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// `HEXAD_RUNS` pairs of each machine.
 #[test]
-fn a_goto_keeps_every_limit_and_is_almost_as_fast_as_possible() {
-    let runs: u64 = std::env::var("HEXAD_RUNS").map_or(100, |runs| runs.parse().unwrap());
+fn certificate_a_goto_keeps_every_limit_and_is_almost_as_fast_as_possible() {
+    let machines = MACHINES.len() as u64;
+    let certificate = Certificate::new("goto", machines * PAIRS, machines * LONG_PAIRS);
+    let runs = certificate.total() / machines;
     for name in MACHINES {
         let config = Config::load(&data(name, "toml")).unwrap();
         let constants = Constants::new(&config.machine, parameters(&config));
@@ -194,6 +200,7 @@ fn a_goto_keeps_every_limit_and_is_almost_as_fast_as_possible() {
         assert!(slowest <= LONGEST_RATIO, "{name}: {slowest}");
         assert_eq!(for_nothing, 0, "{name}");
         assert!(u64::from(reached) > runs / 2, "{name}: {reached} of {runs}");
+        certificate.advance(runs);
     }
 }
 

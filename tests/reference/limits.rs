@@ -9,6 +9,7 @@ use hexad::plant::random::Random;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
+use super::common::certificate::Certificate;
 use super::common::rig::parameters;
 use super::common::{MACHINES, data};
 use super::observer::{Largest, examine};
@@ -16,6 +17,9 @@ use super::streams::Stream;
 
 const RATES_HZ: [u64; 6] = [100, 250, 1000, 1000, 4000, 20000];
 const SECONDS: f64 = 3.0;
+/// Runs of each machine.
+const RUNS: u64 = 12;
+const LONG_RUNS: u64 = 400;
 
 /// Bounds of what [`examine`] finds.
 pub const BOUNDS: [(&str, f64); 13] = [
@@ -92,9 +96,10 @@ fn run(name: &str, seed: u64) -> (Largest, u64) {
 }
 
 #[test]
-fn every_limit_is_kept() {
-    let runs: u64 = std::env::var("HEXAD_RUNS").map_or(20, |runs| runs.parse().unwrap());
-    let first: u64 = std::env::var("HEXAD_SEED").map_or(0, |seed| seed.parse().unwrap());
+fn certificate_every_limit_is_kept() {
+    let machines = MACHINES.len() as u64;
+    let certificate = Certificate::new("limits of the reference", machines * RUNS, machines * LONG_RUNS);
+    let (runs, first) = (certificate.total() / machines, certificate.seed());
     let (mut all, mut cycles, mut failures) = (Largest::default(), 0, Vec::new());
     for name in MACHINES {
         let results: Vec<_> =
@@ -116,8 +121,11 @@ fn every_limit_is_kept() {
         }
         println!("{name}: {:.4?}", of_machine.0);
         all.merge(&of_machine);
+        certificate.advance(runs);
     }
-    println!("{cycles} cycles: {:.6?}", all.0);
+    println!("{:.6?}", all.0);
+    certificate
+        .finish(format_args!("{runs} runs of each machine, {cycles} cycles, {} failures", failures.len()));
     failures.sort();
     assert!(
         failures.is_empty(),

@@ -10,6 +10,7 @@ use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 
+use super::common::certificate::Certificate;
 use super::common::data;
 use super::common::rig::parameters;
 use super::observer::{Largest, examine};
@@ -18,6 +19,9 @@ use super::observer::{Largest, examine};
 type Sines = [(f64, f64, f64); 6];
 
 const STILL: (f64, f64, f64) = (0.0, 0.0, 0.0);
+/// Corners that a platform of each machine is pressed into with each policy; the first twelve are along the coordinates.
+const CORNERS: u64 = 24;
+const LONG_CORNERS: u64 = 212;
 
 fn at(home: &[f64; 6], sines: &Sines, t: f64) -> TaskState {
     let mut task = TaskState::at_rest(*home);
@@ -125,11 +129,12 @@ fn the_platform_slides_along_walls_without_chatter() {
 
 /// A target far beyond the stroke, along every coordinate and in many other directions; then home: the platform comes back.
 #[test]
-fn a_platform_pressed_into_any_corner_comes_back() {
+fn certificate_a_platform_pressed_into_any_corner_comes_back() {
+    let certificate = Certificate::new("corners", 6 * CORNERS, 6 * LONG_CORNERS);
     let mut random = Random::new(13);
     let along = (0..12).map(|k| Vector6::ith(k / 2, if k % 2 == 0 { 1.0 } else { -1.0 }));
-    let directions: Vec<Vector6<f64>> =
-        along.chain((0..200).map(|_| Vector6::from_fn(|_, _| 2.0 * random.uniform() - 1.0))).collect();
+    let others = (12..certificate.total() / 6).map(|_| Vector6::from_fn(|_, _| 2.0 * random.uniform() - 1.0));
+    let directions: Vec<Vector6<f64>> = along.chain(others).collect();
     let mut failures = Vec::new();
     for machine in ["motion_base", "fried2008", "tsai2000"] {
         let config = Config::load(&data(machine, "toml")).unwrap();
@@ -150,12 +155,18 @@ fn a_platform_pressed_into_any_corner_comes_back() {
                         reference.advance(&constants, now_ns + 1_000_000, Some(&Target::Motion(&setpoint)));
                     }
                 }
+                certificate.advance(1);
                 let left = reference.motion().pose.displacement_to(&home.pose).vector().amax();
                 let what = format!("{machine} {policy:?} {:.2?}: {left:.4}", direction.as_slice());
                 (left > 1e-6).then_some((policy, what))
             }));
         }
     }
+    certificate.finish(format_args!(
+        "{} corners of three machines, {} do not come back",
+        directions.len(),
+        failures.len()
+    ));
     let limit = failures.iter().filter(|(policy, _)| *policy == ViolationPolicy::Limit);
     assert_eq!(limit.count(), 0, "{failures:?}");
     // The condition has no wall: behind poses of larger condition home is out of sight.

@@ -27,11 +27,13 @@
 
 mod properties;
 
+use std::fs;
 use std::path::{Path, PathBuf};
-use std::{env, fs};
 
 use hexad::control::law::ControlMode;
 use hexad::control::parameters::ViolationPolicy;
+
+use crate::common::certificate::Certificate;
 
 /// Memory of this process at its largest: the readers' bounds and the test itself \[kB\].
 const MAX_MEMORY_KB: u64 = 256 << 10;
@@ -72,11 +74,12 @@ fn cycles() {
     replay(properties::step::hold, &["tests/fuzz/seeds/step"], "");
 }
 
-/// A million cycles with any bits in their inputs, in every mode in turn; a hundred million with `HEXAD_LONG=1`.
+/// Cycles with any bits in their inputs, in every mode in turn.
 #[test]
-fn random_cycles() {
-    let wanted = if env::var_os("HEXAD_LONG").is_some() { 100_000_000 } else { 1_000_000 };
-    let mut state = 2008_u64;
+fn certificate_random_cycles() {
+    let certificate = Certificate::new("random cycles", 500_000, 100_000_000);
+    let wanted = certificate.total();
+    let mut state = 2008 + certificate.seed();
     let mut random = || {
         state ^= state << 13;
         state ^= state >> 7;
@@ -104,8 +107,9 @@ fn random_cycles() {
         let policy = if programs / 8 % 2 == 0 { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
         let (cycles, reached) = properties::step::run(&program, mode, has_rates, policy);
         (done, programs, controlled) = (done + cycles, programs + 1, controlled + u64::from(reached));
+        certificate.advance(cycles);
     }
-    println!("{done} cycles in {programs} programs, {controlled} of them reached control");
+    certificate.finish(format_args!("{done} cycles in {programs} programs, {controlled} of them reached control"));
     assert!(10 * controlled > programs, "{controlled} of {programs} reached control");
 }
 

@@ -13,8 +13,8 @@ mod values;
 
 use hexad::config::{Config, ConfigError, Violation};
 
-const FRIED: &str = include_str!("../../config/fried2008.toml");
-const REFERENCE: &str = include_str!("../../config/reference.toml");
+const FRIED: &str = include_str!("../config/fried2008.toml");
+const REFERENCE: &str = include_str!("../config/reference.toml");
 
 /// What is wrong with a text; empty if it loads.
 fn violations(text: &str) -> Vec<Violation> {

@@ -1,0 +1,12 @@
+//! The mathematics of the machine and its simulated platform, against independent references.
+
+mod common;
+
+mod fidelity;
+mod ladder;
+mod near_singular;
+mod paper;
+mod plant;
+mod properties;
+mod stability;
+mod workspace;
