@@ -109,7 +109,8 @@ fn certificate_random_cycles() {
         (done, programs, controlled) = (done + cycles, programs + 1, controlled + u64::from(reached));
         certificate.advance(cycles);
     }
-    certificate.finish(format_args!("{done} cycles in {programs} programs, {controlled} of them reached control"));
+    certificate
+        .finish(format_args!("{done} cycles in {programs} programs, {controlled} of them reached control"));
     assert!(10 * controlled > programs, "{controlled} of {programs} reached control");
 }
 

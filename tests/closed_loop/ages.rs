@@ -12,6 +12,9 @@ use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::plant::imperfections::Imperfections;
 
+use rayon::prelude::*;
+
+use super::common::certificate::cases;
 use super::common::hardware_loop::{HardwareLoop, configured};
 use super::common::rig::parameters;
 
@@ -71,13 +74,15 @@ fn wobble_with(
 const MASSES: [f64; 3] = [0.9, 1.0, 1.1];
 
 #[test]
-fn ages_are_stood_without_an_oscillation_or_refused() {
-    for (machine, lines) in [
+fn certificate_ages_are_stood_without_an_oscillation_or_refused() {
+    let loops = [
         ("motion_base", ""),
         ("motion_base", "[drive]\ndelay_us = 100.0\n"),
         ("motion_base", "[timeouts]\nmeasured_ms = 200.0\n"),
         ("fried2008", "[timeouts]\nmeasured_ms = 200.0\n[realtime]\nrate_hz = 500.0\n"),
-    ] {
+    ];
+    let all = loops.into_iter().flat_map(|of| MASSES.map(|mass| (of, mass)));
+    cases(all, 4).into_par_iter().for_each(|((machine, lines), mass)| {
         let config = configured(machine, lines);
         let bound_ms = 1e3 * longest_age_s(&config.deployment);
         let timeout_ms = 1e3 * config.deployment.timeouts.measured_s;
@@ -85,17 +90,16 @@ fn ages_are_stood_without_an_oscillation_or_refused() {
         assert!((10.0..100.0).contains(&bound_ms), "{bound_ms}");
         let least_ms = bound_ms.min(timeout_ms);
         for age_ms in [10.0, least_ms - 2.6, bound_ms + 2.6, 70.0, 150.0] {
-            for (mass, found) in MASSES.map(|mass| (mass, wobble(&config, age_ms, mass))) {
-                println!("{age_ms:.2} ms, mass {mass}: {found:?}");
-                match found {
-                    Ok(way) => assert!(age_ms < least_ms && way < 1e-4, "{age_ms} ms, mass {mass}: {way} m"),
-                    Err(_) if age_ms < least_ms => panic!("{age_ms} ms, mass {mass}: {found:?}"),
-                    Err(code) if age_ms < timeout_ms => assert_eq!(code, DiagnosticCode::MeasurementTooOld),
-                    Err(code) => assert_eq!(code, DiagnosticCode::MeasurementStampInvalid),
-                }
+            let found = wobble(&config, age_ms, mass);
+            println!("{age_ms:.2} ms, mass {mass}: {found:?}");
+            match found {
+                Ok(way) => assert!(age_ms < least_ms && way < 1e-4, "{age_ms} ms, mass {mass}: {way} m"),
+                Err(_) if age_ms < least_ms => panic!("{age_ms} ms, mass {mass}: {found:?}"),
+                Err(code) if age_ms < timeout_ms => assert_eq!(code, DiagnosticCode::MeasurementTooOld),
+                Err(code) => assert_eq!(code, DiagnosticCode::MeasurementStampInvalid),
             }
         }
-    }
+    });
 }
 
 /// The machine at the pose from which it moves away the fastest under held forces, a little within the limit of the condition.
@@ -114,12 +118,14 @@ const A_SECOND_NS: u64 = 1_000_000_000;
 const WITHIN_LIMIT: f64 = 0.9;
 
 #[test]
-fn near_singular_poses_ages_are_stood_without_an_oscillation_or_refused() {
-    for (machine, lines) in [
+fn certificate_near_singular_poses_ages_are_stood_without_an_oscillation_or_refused() {
+    let loops = [
         ("tsai2000", "[limits]\ncondition = 50.0\n"),
         ("tsai2000", "[realtime]\nrate_hz = 250.0\n[limits]\ncondition = 20.0\n"),
         ("reference", "[limits]\ncondition = 30.0\n"),
-    ] {
+    ];
+    let all = loops.into_iter().flat_map(|of| MASSES.map(|mass| (of, mass)));
+    cases(all, 2).into_par_iter().for_each(|((machine, lines), mass)| {
         let (config, pole) = at_fastest_pose(machine, &format!("{lines}[timeouts]\nmeasured_ms = 200.0\n"));
         let period_ms = 1e3 * config.deployment.realtime.period_s();
         let bound_ms = 1e3 * longest_age_s(&config.deployment);
@@ -127,15 +133,14 @@ fn near_singular_poses_ages_are_stood_without_an_oscillation_or_refused() {
         println!("{machine} {lines:?}: {pole:.1}/s, {bound_ms:.2} ms, {periods} periods");
         let ages = [1.0, periods, periods + 2.0].map(|periods| (periods, (periods + 0.5) * period_ms));
         for (count, age_ms) in ages {
-            for (mass, found) in MASSES.map(|mass| (mass, wobble(&config, age_ms, mass))) {
-                println!("{age_ms:.2} ms, mass {mass}: {found:?}");
-                match found {
-                    Ok(way) => assert!(count <= periods && way < 1e-4, "{age_ms} ms, mass {mass}: {way} m"),
-                    Err(code) => assert!(count > periods, "{age_ms} ms, mass {mass}: {code:?}"),
-                }
+            let found = wobble(&config, age_ms, mass);
+            println!("{age_ms:.2} ms, mass {mass}: {found:?}");
+            match found {
+                Ok(way) => assert!(count <= periods && way < 1e-4, "{age_ms} ms, mass {mass}: {way} m"),
+                Err(code) => assert!(count > periods, "{age_ms} ms, mass {mass}: {code:?}"),
             }
         }
-    }
+    });
 }
 
 /// The bound is not timid: it is the platform that leaves, not the check.

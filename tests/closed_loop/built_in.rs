@@ -9,7 +9,9 @@ use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
+use rayon::prelude::*;
 
+use super::common::certificate::cases;
 use super::common::deployed;
 use super::common::rig::Rig;
 
@@ -61,19 +63,17 @@ fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
 }
 
 #[test]
-fn of_every_length_are_accepted() {
-    for name in MACHINES {
+fn certificate_of_every_length_are_accepted() {
+    let motions = MOTIONS.into_iter().flat_map(|motion| [0.5, 1.0, 2.0, 8.0].map(|s| (motion, s)));
+    let all = MACHINES.into_iter().flat_map(|name| motions.clone().map(move |(motion, s)| (name, motion, s)));
+    cases(all, 5).into_par_iter().for_each(|(name, motion, seconds)| {
         let config = deployed(name);
-        for (motion, seconds) in
-            MOTIONS.into_iter().flat_map(|motion| [0.5, 1.0, 2.0, 8.0].map(|s| (motion, s)))
-        {
-            let scene = shaped(&config, motion, seconds);
-            println!("{name} {motion:?} {seconds} s: {:.4} of what the drives carry", share(&config, &scene));
-            let accepted = [0.0, 0.37, 0.5].map(|phase| is_accepted(&config, &scene, phase));
-            assert_eq!(accepted, [true; 3], "{name} {motion:?} {seconds} s");
-            assert!(share(&config, &scene) <= 1.0);
-        }
-    }
+        let scene = shaped(&config, motion, seconds);
+        println!("{name} {motion:?} {seconds} s: {:.4} of what the drives carry", share(&config, &scene));
+        let accepted = [0.0, 0.37, 0.5].map(|phase| is_accepted(&config, &scene, phase));
+        assert_eq!(accepted, [true; 3], "{name} {motion:?} {seconds} s");
+        assert!(share(&config, &scene) <= 1.0);
+    });
 }
 
 /// What the limits leave room for is as it was.
@@ -97,7 +97,7 @@ fn of_the_usual_length_lose_nothing() {
 
 /// Each limit makes a motion smaller, and no smaller than it must be.
 #[test]
-fn keep_each_limit_of_the_deployment() {
+fn certificate_keep_each_limit_of_the_deployment() {
     let tighten: [(&str, Tighten); 4] = [
         ("velocity", |c| c.deployment.limits.reference.position.velocity = 0.05),
         ("acceleration", |c| c.deployment.limits.reference.position.acceleration = 0.2),
@@ -113,15 +113,14 @@ fn keep_each_limit_of_the_deployment() {
             c.deployment.envelope = Some(limits);
         }),
     ];
-    for (name, (what, tighten)) in MACHINES.into_iter().flat_map(|name| repeat_n(name, 4).zip(tighten)) {
-        assert_fits(name, what, tighten, 1.1);
-    }
+    let all = MACHINES.into_iter().flat_map(|name| repeat_n(name, 4).zip(tighten));
+    cases(all, 3).into_par_iter().for_each(|(name, (what, tighten))| assert_fits(name, what, tighten, 1.1));
 }
 
 /// Limits that the reference keeps whatever is sent: refused is what it falls behind by more than the tolerance, so a
 /// motion that is a little larger may still be followed.
 #[test]
-fn keep_the_limits_of_the_reference() {
+fn certificate_keep_the_limits_of_the_reference() {
     let tighten: [(&str, Tighten); 3] = [
         ("jerk", |c| c.deployment.limits.reference.position.jerk = 5.0),
         ("turning jerk", |c| {
@@ -136,9 +135,8 @@ fn keep_the_limits_of_the_reference() {
             c.deployment.limits.condition = 1.02 * at_home;
         }),
     ];
-    for (name, (what, tighten)) in MACHINES.into_iter().flat_map(|name| repeat_n(name, 3).zip(tighten)) {
-        assert_fits(name, what, tighten, 1.5);
-    }
+    let all = MACHINES.into_iter().flat_map(|name| repeat_n(name, 3).zip(tighten));
+    cases(all, 4).into_par_iter().for_each(|(name, (what, tighten))| assert_fits(name, what, tighten, 1.5));
 }
 
 /// The motion is made smaller, is accepted, and is refused when it is `larger` times that size.

@@ -6,6 +6,9 @@ use hexad::control::state::State;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfections, SensorErrors};
 
+use rayon::prelude::*;
+
+use super::common::certificate::cases;
 use super::common::hardware_loop::{HardwareLoop, SENDING, configured};
 
 /// Duration of the motion \[s\].
@@ -53,15 +56,14 @@ fn recorded(config: &Config, imperfections: &Imperfections, motion: BuiltInMotio
 }
 
 #[test]
-fn the_delay_of_the_drives_is_measured() {
+fn certificate_the_delay_of_the_drives_is_measured() {
     // Friction as a share of the largest force, which on the light machine is many times its weight.
-    for (machine, rate_hz, friction) in
-        [("motion_base", 1000.0, 0.01), ("fried2008", 1000.0, 0.001), ("motion_base", 250.0, 0.003)]
-    {
+    let loops = [("motion_base", 1000.0, 0.01), ("fried2008", 1000.0, 0.001), ("motion_base", 250.0, 0.003)];
+    let drives = [0.0, 2.0, 5.0, 10.0].into_iter().flat_map(|dead_ms| [(dead_ms, false), (dead_ms, true)]);
+    let all = loops.into_iter().flat_map(|control| drives.clone().map(move |drive| (control, drive)));
+    cases(all, 3).into_par_iter().for_each(|((machine, rate_hz, friction), (dead_ms, is_imperfect))| {
         let config = config(machine, rate_hz);
         let most = config.machine.actuator.max_force;
-        for dead_ms in [0.0, 2.0, 5.0, 10.0] {
-            for is_imperfect in [false, true] {
                 let drive = DriveErrors { dead_time_ns: (1e6 * dead_ms) as u64, ..DriveErrors::default() };
                 let mut imperfections = Imperfections { seed: 1, drive, ..Imperfections::default() };
                 if is_imperfect {
@@ -92,9 +94,7 @@ fn the_delay_of_the_drives_is_measured() {
                 let bound_s = if is_imperfect { (0.1 * expected_s).max(1e-4) } else { 2e-5 };
                 assert!(error_s < bound_s, "{machine} {dead_ms} ms: {mean:?}");
                 assert!(error_s < 2e-5 + 3.0 * mean.deviation_s && mean.deviation_s < 2.5e-4, "{mean:?}");
-            }
-        }
-    }
+    });
 }
 
 /// A platform that stands shows no delay: no wrong number either.

@@ -6,10 +6,12 @@ use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
 use hexad::control::parameters::Parameters;
 use hexad::control::state::State;
+use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Twist};
 use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::random::Random;
+use hexad::plant::simulator::Simulator;
 use nalgebra::{Vector3, Vector6};
 
 use super::common::limit_check::TrueMotion;
@@ -42,6 +44,11 @@ fn at_home(config: &Config) -> (Rig, TaskState, Parameters) {
     (rig, home, parameters(config))
 }
 
+fn at_rest(config: &Config, platform: &Machine) -> Simulator {
+    let plant = &config.deployment.plant;
+    Simulator::new(platform, plant.brake_deceleration_m_s2, plant.step_s)
+}
+
 /// Position and orientation each: no more than `(1 + feedback_scale)` times the limit in the direction of the error, and
 /// all of it where it is less.
 #[test]
@@ -64,7 +71,7 @@ fn feedback_keeps_its_direction_and_ends_at_its_bound() {
             let x = home.x + Vector6::new(turn.x, turn.y, turn.z, shift.x, shift.y, shift.z);
             aside.home = x.into();
             let mut rig = rig.clone();
-            rig.simulator = Rig::new(&config, &aside).simulator;
+            rig.simulator = at_rest(&config, &aside);
             let output = rig.controller.step(&rig.input(&home));
             assert_eq!(output.state, State::Active, "{name}: {:?}", output.diagnostic);
             let pose = rig.simulator.state().pose;

@@ -1,5 +1,7 @@
 //! Which inputs count: what it takes to begin, and that one wrong message changes nothing.
 
+use std::sync::LazyLock;
+
 use hexad::control::controller::{Controller, Input, Output};
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::limits::Limit;
@@ -93,9 +95,12 @@ fn control_begins_only_near_the_setpoint() {
     assert!(!DiagnosticCode::SetpointTooFar.is_fault());
 }
 
+/// A rig in the middle of a motion, and the task at its next cycle.
+static IN_MOTION: LazyLock<(Rig, TaskState)> = LazyLock::new(|| in_motion(&deployed("fried2008")));
+
 /// Changes of one message, in motion.
 fn wrong(change: impl Fn(&mut Input)) {
-    let (mut rig, task) = in_motion(&deployed("fried2008"));
+    let (mut rig, task) = IN_MOTION.clone();
     let good = rig.input(&task);
     let mut twin = rig.controller.clone();
     let mut input = good;

@@ -14,6 +14,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Seed of every short run.
 const SHORT_SEED: u64 = 1;
 
+/// All cases of a table in a long run; every so manieth in a short one, from the first on.
+pub fn cases<T>(all: impl IntoIterator<Item = T>, every: usize) -> Vec<T> {
+    all.into_iter().step_by(if Certificate::is_long() { 1 } else { every }).collect()
+}
+
 /// A run of a test, short or long.
 pub struct Certificate {
     name: &'static str,

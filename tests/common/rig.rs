@@ -1,6 +1,9 @@
 //! The loop without threads: measurement and setpoint at k T, release at k T + T / 2, force on the platform
 //! from 100 us after the release on.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
 use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
 use hexad::control::parameters::Parameters;
 
@@ -31,13 +34,20 @@ const LONGEST_ENGAGING: u32 = 1000;
 /// The first cycle; the clock of a computer that has been up for a while.
 const START_NS: u64 = 86_400_000_000_000;
 
-/// What a deployment's sections mean to the controller.
+/// What a deployment's sections mean to the controller. Remembered, as the age at which a loop is stable takes a tenth of a second.
 pub fn parameters(config: &Config) -> Parameters {
+    static KNOWN: Mutex<BTreeMap<String, Parameters>> = Mutex::new(BTreeMap::new());
+    let key = format!("{config:?}");
+    if let Some(parameters) = KNOWN.lock().unwrap().get(&key) {
+        return *parameters;
+    }
     let fidelity = match config.deployment.control.fidelity {
         FidelityChoice::Fixed(fidelity) => fidelity,
         FidelityChoice::Auto => Fidelity::Exact,
     };
-    daemon::parameters(&config.machine, &config.deployment, fidelity)
+    let parameters = daemon::parameters(&config.machine, &config.deployment, fidelity);
+    KNOWN.lock().unwrap().insert(key, parameters);
+    parameters
 }
 
 /// Acceleration that the law answers a first measured error with, after rest without one: the gains of the estimator, its

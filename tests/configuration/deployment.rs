@@ -5,6 +5,7 @@ use hexad::config::{Config, Violation};
 use hexad::model::fidelity::Fidelity;
 
 use super::{FRIED, violations};
+use crate::common::certificate::cases;
 
 #[test]
 fn deployment_is_refused_beyond_what_the_rate_carries() {
@@ -224,14 +225,15 @@ acceleration = [0, 0, 0, 0, 0, 9.81]
 }
 
 #[test]
-fn the_largest_bandwidth_in_the_message_is_accepted() {
-    for (rate, damping, lead) in [
+fn certificate_the_largest_bandwidth_in_the_message_is_accepted() {
+    let loops = [
         (1000.0, 1.0, "10"),
         (1000.0, 0.1, "10"),
         (100.0, 0.7, "01"),
         (50.0, 10.0, "00"),
         (20_000.0, 3.0, "25"),
-    ] {
+    ];
+    for (rate, damping, lead) in cases(loops, 2) {
         for (axis, other) in [("position", "orientation"), ("orientation", "position")] {
             let text = |bandwidth: f64| {
                 format!(

@@ -13,7 +13,7 @@ use super::common::{MACHINES, machine};
 use super::scenes::{Scene, scenes};
 
 /// Motions per set.
-const DENSE: u32 = 200_000;
+const DENSE: u32 = 50_000;
 
 /// SplitMix64 (Steele, Lea and Flood, 2014): nothing in common with the chooser's spread.
 struct Random(u64);

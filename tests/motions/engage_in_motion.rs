@@ -5,6 +5,7 @@ use hexad::control::parameters::Parameters;
 use hexad::control::state::{Request, State};
 use hexad::model::task::TaskState;
 
+use super::common::certificate::cases;
 use super::common::deployed;
 use super::common::fast::Fast;
 use super::common::observed::Observed;
@@ -72,17 +73,16 @@ fn engage_on(
     range_s: [f64; 2],
     runs: &mut Runs,
 ) {
-    let mut t = range_s[0];
-    while t < range_s[1] {
+    let steps = ((range_s[1] - range_s[0]) / STEP_S) as u32;
+    for t in cases(0..=steps, 4).into_iter().map(|step| range_s[0] + f64::from(step) * STEP_S) {
         if can_engage(&parameters, &motion(t)) {
             engage_at(config, parameters, motion, t, runs);
         }
-        t += STEP_S;
     }
 }
 
 #[test]
-fn engaging_onto_a_moving_setpoint_stays_within_the_limits() {
+fn certificate_engaging_onto_a_moving_setpoint_stays_within_the_limits() {
     let mut report = Report::new("engage in motion");
     for name in MACHINES {
         let config = deployed(name);

@@ -3,6 +3,7 @@
 
 use hexad::control::state::{Request, State};
 
+use super::common::certificate::cases;
 use super::common::deployed;
 use super::common::observed::Observed;
 use super::common::rig::parameters;
@@ -30,7 +31,8 @@ fn release_and_park(name: &str, requests: &[Request], runs: &mut Runs) {
         let mut begun = Observed::standing(&config, parameters, &heave.moving([from, to], duration_s, 0.0));
         begun.engage(&heave.moving([from, to], duration_s, 0.0));
         let start_s = begun.time_s();
-        for (phase, pause_s) in PHASES.iter().flat_map(|phase| PAUSES_S.map(|pause| (phase, pause))) {
+        let all = PHASES.iter().flat_map(|phase| PAUSES_S.map(|pause| (phase, pause)));
+        for (phase, pause_s) in cases(all, 4) {
             let mut observed = begun.clone();
             let asked_at = |number: usize| start_s + phase * duration_s + pause_s * number as f64;
             let (mut asked, mut has_begun, mut has_parked) = (0, false, false);
@@ -53,7 +55,7 @@ fn release_and_park(name: &str, requests: &[Request], runs: &mut Runs) {
 }
 
 #[test]
-fn a_platform_that_is_released_in_motion_and_parked_stays_within_the_limits() {
+fn certificate_a_platform_that_is_released_in_motion_and_parked_stays_within_the_limits() {
     let mut report = Report::new("released in motion");
     for name in MACHINES {
         let mut runs = Runs::default();

@@ -1,5 +1,6 @@
 //! Setpoints whose derivatives are not those of their poses, at low and high rates.
 
+use super::common::certificate::cases;
 use super::common::edited::{config, deployed_table, set};
 use super::common::observed::Observed;
 use super::common::rig::parameters;
@@ -18,7 +19,7 @@ const DURATION_S: f64 = 3.0;
 const SENT: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0, -1.0]];
 
 #[test]
-fn wrong_derivatives_lead_to_no_motion_beyond_the_limits() {
+fn certificate_wrong_derivatives_lead_to_no_motion_beyond_the_limits() {
     let mut report = Report::new("wrong derivatives");
     for (name, rate_hz) in MACHINES.iter().flat_map(|name| RATES_HZ.map(|rate| (name, rate))) {
         let mut table = deployed_table(name);
@@ -30,9 +31,8 @@ fn wrong_derivatives_lead_to_no_motion_beyond_the_limits() {
         let parameters = parameters(&config);
         let heave = Heave::new(&config.machine, &parameters);
         let mut runs = Runs::default();
-        for ([v, a], [sent_rate, sent_accel]) in
-            PEAKS.iter().flat_map(|peaks| SENT.map(|sent| (*peaks, sent)))
-        {
+        let all = PEAKS.iter().flat_map(|peaks| SENT.map(|sent| (*peaks, sent)));
+        for ([v, a], [sent_rate, sent_accel]) in cases(all, 3) {
             let (omega, amplitude) = (a / v, (v * v / a).min(0.4 * (heave.range[1] - heave.range[0])));
             let sine = |t| {
                 let task = heave.sine(heave.middle(), amplitude, omega, t);

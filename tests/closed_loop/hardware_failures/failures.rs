@@ -82,8 +82,11 @@ const fn drive(name: &'static str, fail: fn(&mut [f64; LEGS], &mut Context<'_>))
     (name, Part::Drive(fail))
 }
 
+/// What fails, by its name in the table.
+pub type Failure = (&'static str, Part);
+
 /// Every failure with its name.
-pub const FAILURES: &[(&str, Part)] = &[
+pub const FAILURES: &[Failure] = &[
     sensor("all lengths frozen, stamps fresh", |m, c| m.length = c.first.length),
     sensor("one length frozen", |m, c| m.length[LEG] = c.first.length[LEG]),
     sensor("two lengths frozen", |m, c| {

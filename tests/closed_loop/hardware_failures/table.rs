@@ -1,9 +1,9 @@
 //! The table in the documents: written, read back and compared.
 
 use std::fmt::Write as _;
-use std::{env, fs};
+use std::fs;
 
-use super::failures::FAILURES;
+use super::failures::{FAILURES, Failure};
 use super::{Cell, Situation};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hardware_failures.md");
@@ -42,26 +42,32 @@ impl Cell {
     }
 }
 
-/// Compares the rows with the table of the documents, or writes it.
-pub fn check(rows: &[[Cell; Situation::ALL.len()]]) {
+/// A failure, and what became of it in each situation.
+pub type Row<'a> = (&'a Failure, [Cell; Situation::ALL.len()]);
+
+/// Writes the table into the documents.
+pub fn write(rows: &[Row]) {
     let document = fs::read_to_string(FILE).unwrap();
-    let (head, table) = document.split_at(document.find(HEAD).unwrap());
-    if env::var_os("HEXAD_WRITE_TABLE").is_some() {
-        let mut text =
-            format!("{head}{HEAD} at rest | slow | fast | engaging |\n| --- | --- | --- | --- | --- |\n");
-        for ((name, _), cells) in FAILURES.iter().zip(rows) {
-            let cells: Vec<String> = cells.iter().map(Cell::text).collect();
-            writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
-        }
-        fs::write(FILE, text).unwrap();
-        return;
+    let (head, _) = document.split_at(document.find(HEAD).unwrap());
+    let mut text =
+        format!("{head}{HEAD} at rest | slow | fast | engaging |\n| --- | --- | --- | --- | --- |\n");
+    for ((name, _), cells) in rows {
+        let cells: Vec<String> = cells.iter().map(Cell::text).collect();
+        writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
     }
-    let lines: Vec<&str> = table.lines().skip(2).collect();
-    assert_eq!(lines.len(), rows.len(), "{FILE}: rows");
+    fs::write(FILE, text).unwrap();
+}
+
+/// Compares these rows with the table of the documents, which has all.
+pub fn check(rows: &[Row]) {
+    let document = fs::read_to_string(FILE).unwrap();
+    let (_, table) = document.split_at(document.find(HEAD).unwrap());
+    let lines = table.lines().skip(2).map(|line| line.trim_matches('|').split('|').map(str::trim));
+    let lines: Vec<Vec<&str>> = lines.map(Iterator::collect).collect();
+    assert!(lines.iter().map(|texts| texts[0]).eq(FAILURES.iter().map(|(name, _)| *name)), "{FILE}: rows");
     let mut wrong = String::new();
-    for (line, ((name, _), cells)) in lines.iter().zip(FAILURES.iter().zip(rows)) {
-        let texts: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
-        assert_eq!(texts[0], *name, "{FILE}");
+    for ((name, _), cells) in rows {
+        let texts = lines.iter().find(|texts| texts[0] == *name).unwrap();
         for (text, (cell, situation)) in texts[1..].iter().zip(cells.iter().zip(Situation::ALL)) {
             if !cell.is_as(text) {
                 writeln!(wrong, "{name}, {situation:?}: {}; in the table: {text}", cell.text()).unwrap();
