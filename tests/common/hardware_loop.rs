@@ -1,6 +1,9 @@
 //! The loop without threads on imperfect hardware, over the fast scene: measurement at k T, release at k T + T / 2, force on its
 //! way 0.1 T after the release.
 
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
 use hexad::config::Config;
 use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
 use hexad::control::diagnostic::DiagnosticCode;
@@ -13,7 +16,7 @@ use toml::Table;
 
 use super::fast::Fast;
 use super::rig::{Tracking, parameters};
-use super::{angle_between, edited};
+use super::{Remembered, angle_between, edited, remembered};
 
 /// From the release to the force message, as a share of the period.
 pub const SENDING: f64 = 0.1;
@@ -24,13 +27,17 @@ const START_NS: u64 = 86_400_000_000_000;
 
 /// A deployable machine with other values of the keys in these lines.
 pub fn configured(machine: &str, lines: &str) -> Config {
-    let mut table = edited::deployed_table(machine);
-    for (section, keys) in lines.parse::<Table>().unwrap() {
-        for (key, value) in keys.as_table().unwrap() {
-            edited::set(&mut table, &section, key, value.clone());
+    static KNOWN: Remembered<Config> = Mutex::new(BTreeMap::new());
+    let make = || {
+        let mut table = edited::deployed_table(machine);
+        for (section, keys) in lines.parse::<Table>().unwrap() {
+            for (key, value) in keys.as_table().unwrap() {
+                edited::set(&mut table, &section, key, value.clone());
+            }
         }
-    }
-    edited::config(&table)
+        edited::config(&table)
+    };
+    remembered(&KNOWN, &format!("{machine} {lines}"), make)
 }
 
 /// A controller and imperfect hardware.

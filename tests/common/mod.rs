@@ -27,7 +27,9 @@ pub mod stability;
 pub mod stalls;
 pub mod true_motion;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use hexad::config::Config;
 use hexad::model::machine::{Joints, LEGS, Machine};
@@ -54,9 +56,24 @@ pub fn data(name: &str, extension: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name).with_extension(extension)
 }
 
+/// Values that take long to make, by what they are made from.
+pub type Remembered<T> = Mutex<BTreeMap<String, T>>;
+
+/// Makes a value once.
+pub fn remembered<T: Clone>(known: &Remembered<T>, key: &str, make: impl FnOnce() -> T) -> T {
+    if let Some(value) = known.lock().unwrap().get(key) {
+        return value.clone();
+    }
+    let value = make();
+    known.lock().unwrap().insert(key.into(), value.clone());
+    value
+}
+
 /// One of [`MACHINES`].
 pub fn machine(name: &str) -> Machine {
-    Config::load(&data(name, "toml")).unwrap_or_else(|error| panic!("{error}")).machine
+    static KNOWN: Remembered<Machine> = Mutex::new(BTreeMap::new());
+    let load = || Config::load(&data(name, "toml")).unwrap_or_else(|error| panic!("{error}")).machine;
+    remembered(&KNOWN, name, load)
 }
 
 /// The motions of a machine's vectors.

@@ -23,7 +23,7 @@ use hexad::motion::timeline::Timeline;
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector6;
 
-use super::{Errors, angle_between};
+use super::{Errors, Remembered, angle_between, remembered};
 
 /// What reading, computing and sending take, about as on a common computer.
 const FORCE_DELAY_NS: u64 = 100_000;
@@ -36,18 +36,13 @@ const START_NS: u64 = 86_400_000_000_000;
 
 /// What a deployment's sections mean to the controller. Remembered, as the age at which a loop is stable takes a tenth of a second.
 pub fn parameters(config: &Config) -> Parameters {
-    static KNOWN: Mutex<BTreeMap<String, Parameters>> = Mutex::new(BTreeMap::new());
-    let key = format!("{config:?}");
-    if let Some(parameters) = KNOWN.lock().unwrap().get(&key) {
-        return *parameters;
-    }
+    static KNOWN: Remembered<Parameters> = Mutex::new(BTreeMap::new());
     let fidelity = match config.deployment.control.fidelity {
         FidelityChoice::Fixed(fidelity) => fidelity,
         FidelityChoice::Auto => Fidelity::Exact,
     };
-    let parameters = daemon::parameters(&config.machine, &config.deployment, fidelity);
-    KNOWN.lock().unwrap().insert(key, parameters);
-    parameters
+    let make = || daemon::parameters(&config.machine, &config.deployment, fidelity);
+    remembered(&KNOWN, &format!("{config:?}"), make)
 }
 
 /// Acceleration that the law answers a first measured error with, after rest without one: the gains of the estimator, its

@@ -10,7 +10,7 @@ use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::common::certificate::Certificate;
+use super::common::certificate::{Certificate, cases};
 use super::common::data;
 use super::common::rig::parameters;
 use super::observer::{Largest, examine};
@@ -79,10 +79,10 @@ fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines)
 }
 
 #[test]
-fn the_platform_slides_along_walls_without_chatter() {
+fn certificate_the_platform_slides_along_walls_without_chatter() {
     let half = Vector6::new(0.15, 0.15, 0.15, 0.08, 0.08, 0.08);
     let slow = (0.0, 0.06, 0.5);
-    let cases: [(&str, Option<Vector6<f64>>, Sines); 8] = [
+    let walls: [(&str, Option<Vector6<f64>>, Sines); 8] = [
         ("one face, sliding", Some(half), [STILL, STILL, STILL, slow, (0.2, 0.0, 0.0), STILL]),
         ("two faces, sliding", Some(half), [STILL, STILL, STILL, slow, (0.2, 0.0, 0.0), (-0.3, 0.0, 0.0)]),
         (
@@ -104,26 +104,24 @@ fn the_platform_slides_along_walls_without_chatter() {
             [STILL, STILL, STILL, (1.0, 0.0, 0.0), (0.0, 0.3, 0.4), (0.2, 0.0, 0.0)],
         ),
     ];
-    let mut failures = Vec::new();
-    for machine in ["motion_base", "fried2008", "tsai2000"] {
-        for rate_hz in [250, 1000, 4000] {
-            for (what, half, sines) in &cases {
-                let (jerk, reversals, largest) = press(machine, rate_hz, *half, sines);
-                let [shift, turn] = jerk;
-                let stroke = largest.0["stroke"];
-                println!(
-                    "{machine} {rate_hz} Hz, {what}: jerk {shift:.4} {turn:.4}, {reversals:.1}/s, stroke {stroke:.2e}"
-                );
-                // Among the curved ends of several legs a platform that is turned or far aside passes a corner now and then: its
-                // acceleration changes there, at the limit of jerk. But it does not turn back and forth.
-                let most = if what.ends_with("turned") || what.ends_with("aside") { 0.15 } else { 0.05 };
-                if shift > most || turn > most || reversals > 3.0 {
-                    failures
-                        .push(format!("{machine} {rate_hz} Hz, {what}: {shift:.4} {turn:.4}, {reversals}/s"));
-                }
-            }
-        }
-    }
+    let loops = ["motion_base", "fried2008", "tsai2000"]
+        .into_iter()
+        .flat_map(|of| [250, 1000, 4000].map(|rate| (of, rate)));
+    let all = loops.flat_map(|of| walls.iter().map(move |wall| (of, wall)));
+    let failures = cases(all, 5).into_par_iter().filter_map(|((machine, rate_hz), (what, half, sines))| {
+        let (jerk, reversals, largest) = press(machine, rate_hz, *half, sines);
+        let [shift, turn] = jerk;
+        let stroke = largest.0["stroke"];
+        println!(
+            "{machine} {rate_hz} Hz, {what}: jerk {shift:.4} {turn:.4}, {reversals:.1}/s, stroke {stroke:.2e}"
+        );
+        // Among the curved ends of several legs a platform that is turned or far aside passes a corner now and then: its
+        // acceleration changes there, at the limit of jerk. But it does not turn back and forth.
+        let most = if what.ends_with("turned") || what.ends_with("aside") { 0.15 } else { 0.05 };
+        (shift > most || turn > most || reversals > 3.0)
+            .then(|| format!("{machine} {rate_hz} Hz, {what}: {shift:.4} {turn:.4}, {reversals}/s"))
+    });
+    let failures: Vec<_> = failures.collect();
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
