@@ -8,7 +8,9 @@ use hexad::control::leg_masses::LegMasses;
 use hexad::control::state::State;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
+use rayon::prelude::*;
 
+use super::common::certificate::cases;
 use super::common::deployed;
 use super::common::fast::Fast;
 use super::common::hardware_loop::configured;
@@ -137,49 +139,50 @@ fn legs_that_move_together_have_the_gain_of_the_law_on_average() {
 /// At its limit of bandwidth each mode still has its gain margin: what a push leaves fades also where forces
 /// answer to errors a quarter more than they should.
 #[test]
-fn the_largest_bandwidth_is_stable_in_every_mode() {
-    for name in ["fried2008", "motion_base", "tsai2000"] {
-        for mode in ControlMode::ALL {
-            let text = std::fs::read_to_string(format!("{}/config/{name}.toml", env!("CARGO_MANIFEST_DIR")));
-            let with = |hertz: f64| {
-                let mode = mode.name();
-                let control = format!("\n[control]\nmode = \"{mode}\"\nposition_bandwidth_hz = {hertz}\n");
-                Config::parse(&(text.as_ref().unwrap().clone() + &control), name)
-            };
-            let refusal = with(1e3).unwrap_err().to_string();
-            let largest = refusal.split("must be at most ").nth(1).unwrap().split(' ').next().unwrap();
-            let largest: f64 = largest.parse().unwrap();
-            assert!(with(1.01 * largest).is_err());
-            let mut config = with(largest).unwrap();
-            config.deployment.control.orientation_bandwidth_hz = largest;
-            let mut rig = Rig::new(&config, &config.machine);
-            let home = TaskState::at_rest(config.machine.home);
-            rig.engage(&home);
-            (0..2000).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
-            let (settled, holds) = (rig.simulator.state().pose.position, rig.force.unwrap());
-            let mut away = |cycles: u32, push: f64| {
-                for _ in 0..cycles {
-                    let output = rig.controller.step(&rig.input(&home));
-                    assert_eq!(
-                        output.state,
-                        State::Active,
-                        "{name} {}: {:?}",
-                        mode.name(),
-                        output.diagnostic.code
-                    );
-                    let answers = |leg: usize| holds[leg] + 1.25 * (output.force[leg] - holds[leg]);
-                    let mut force: [f64; 6] = core::array::from_fn(answers);
-                    force[0] += push;
-                    rig.pass(Some(force));
-                }
-                (rig.simulator.state().pose.position - settled).norm()
-            };
-            let pushed = away(20, 0.01 * config.machine.actuator.max_force);
-            let left = away(2000, 0.0);
-            println!("{name}, {}: to {largest} Hz, {pushed:e} m, {left:e} m are left", mode.name());
-            assert!(pushed > 1e-7 && left < 1e-3 * pushed, "{name} {}: {left} of {pushed}", mode.name());
-        }
-    }
+fn certificate_the_largest_bandwidth_is_stable_in_every_mode() {
+    let all = ["fried2008", "motion_base", "tsai2000"]
+        .into_iter()
+        .flat_map(|name| ControlMode::ALL.map(|mode| (name, mode)));
+    cases(all, 3).into_par_iter().for_each(|(name, mode)| {
+        let text = std::fs::read_to_string(format!("{}/config/{name}.toml", env!("CARGO_MANIFEST_DIR")));
+        let with = |hertz: f64| {
+            let mode = mode.name();
+            let control = format!("\n[control]\nmode = \"{mode}\"\nposition_bandwidth_hz = {hertz}\n");
+            Config::parse(&(text.as_ref().unwrap().clone() + &control), name)
+        };
+        let refusal = with(1e3).unwrap_err().to_string();
+        let largest = refusal.split("must be at most ").nth(1).unwrap().split(' ').next().unwrap();
+        let largest: f64 = largest.parse().unwrap();
+        assert!(with(1.01 * largest).is_err());
+        let mut config = with(largest).unwrap();
+        config.deployment.control.orientation_bandwidth_hz = largest;
+        let mut rig = Rig::new(&config, &config.machine);
+        let home = TaskState::at_rest(config.machine.home);
+        rig.engage(&home);
+        (0..2000).for_each(|_| assert_eq!(rig.cycle(&rig.input(&home)).state, State::Active));
+        let (settled, holds) = (rig.simulator.state().pose.position, rig.force.unwrap());
+        let mut away = |cycles: u32, push: f64| {
+            for _ in 0..cycles {
+                let output = rig.controller.step(&rig.input(&home));
+                assert_eq!(
+                    output.state,
+                    State::Active,
+                    "{name} {}: {:?}",
+                    mode.name(),
+                    output.diagnostic.code
+                );
+                let answers = |leg: usize| holds[leg] + 1.25 * (output.force[leg] - holds[leg]);
+                let mut force: [f64; 6] = core::array::from_fn(answers);
+                force[0] += push;
+                rig.pass(Some(force));
+            }
+            (rig.simulator.state().pose.position - settled).norm()
+        };
+        let pushed = away(20, 0.01 * config.machine.actuator.max_force);
+        let left = away(2000, 0.0);
+        println!("{name}, {}: to {largest} Hz, {pushed:e} m, {left:e} m are left", mode.name());
+        assert!(pushed > 1e-7 && left < 1e-3 * pushed, "{name} {}: {left} of {pushed}", mode.name());
+    });
 }
 
 /// Every second measurement is lost: the loop goes on with what becomes of the last error, and hardly worse.

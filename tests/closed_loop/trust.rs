@@ -9,7 +9,9 @@ use hexad::model::machine::LEGS;
 use hexad::model::task::TaskState;
 use hexad::plant::imperfections::{Imperfections, SensorErrors};
 use nalgebra::Vector6;
+use rayon::prelude::*;
 
+use super::common::certificate::cases;
 use super::common::fast::Fast;
 use super::common::hardware_loop::{HardwareLoop, configured};
 
@@ -73,43 +75,45 @@ fn freeze(config: &Config, share: f64, legs: &[usize], noise: f64, from_s: f64) 
     (output, control.time_s() - from_s, farthest)
 }
 
+/// Speed, noise, legs that freeze, and the phase of the motion with its number.
+fn freezes() -> impl Iterator<Item = (f64, f64, &'static [usize], f64)> {
+    const LEGS_FROZEN: [&[usize]; 3] = [&[0, 1, 2, 3, 4, 5], &[0], &[3]];
+    let speeds = [1.0, SLOW].into_iter().flat_map(|share| [0.0, 5e-6].map(|noise| (share, noise)));
+    let kinds = speeds.flat_map(|(share, noise)| LEGS_FROZEN.map(|legs| (share, noise, legs)));
+    kinds.flat_map(|(share, noise, legs)| {
+        // One quiet leg of a slow platform may be anywhere near its turnaround.
+        let is_slow_leg = legs.len() == 1 && share < 1.0 && noise == 0.0;
+        let (phases, step_s) = if is_slow_leg { (24, 0.0325) } else { (6, 0.13) };
+        (0..phases).map(move |phase| (share, noise, legs, 3.5 + step_s * f64::from(phase) / share.sqrt()))
+    })
+}
+
 #[test]
-fn sensors_that_freeze_in_motion_end_the_forces_before_the_platform_is_off_its_path() {
-    for machine in MACHINES {
+fn certificate_sensors_that_freeze_in_motion_end_the_forces_before_the_platform_is_off_its_path() {
+    let all = MACHINES.into_iter().flat_map(|machine| freezes().map(move |freeze| (machine, freeze)));
+    cases(all, 5).into_par_iter().for_each(|(machine, (share, noise, legs, from_s))| {
         let config = config(machine);
-        for (share, noise, legs) in [1.0, SLOW].into_iter().flat_map(|share| {
-            [0.0, 5e-6].into_iter().flat_map(move |noise| {
-                [vec![0, 1, 2, 3, 4, 5], vec![0], vec![3]].map(|legs| (share, noise, legs))
-            })
-        }) {
-            // One quiet leg of a slow platform may be anywhere near its turnaround.
-            let is_slow_leg = legs.len() == 1 && share < 1.0 && noise == 0.0;
-            let (phases, step_s) = if is_slow_leg { (24, 0.0325) } else { (6, 0.13) };
-            for phase in 0..phases {
-                let from_s = 3.5 + step_s * f64::from(phase) / share.sqrt();
-                let (output, time_s, farthest) = freeze(&config, share, &legs, noise, from_s);
-                println!(
-                    "{machine}, speed {share}, noise {noise:e}, legs {legs:?}: {:?} leg {} after {:.0} ms, {:.3} mm",
-                    output.diagnostic.code,
-                    output.diagnostic.index,
-                    1e3 * time_s,
-                    1e3 * farthest
-                );
-                let code = output.diagnostic.code;
-                assert!(
-                    matches!(code, DiagnosticCode::SensorFrozen | DiagnosticCode::MeasurementImplausible),
-                    "{machine} {share} {legs:?}: {:?}",
-                    output.diagnostic
-                );
-                assert!(legs.contains(&(output.diagnostic.index as usize - 1)) || legs.len() == 1);
-                // One leg near its own turnaround is crawling, however fast the platform is: the others do not show its fault.
-                let rates = leg_motion(&config.machine, &scene(&config, share)(from_s).motion()).rate;
-                let is_crawling = legs.len() == 1 && rates[legs[0]].abs() < CRAWLING_M_S;
-                let bound = if is_crawling { 2e-3 } else { 0.5e-3 };
-                assert!(farthest < bound, "{machine} {share} {legs:?}, {rates:?} m/s: {farthest} m");
-            }
-        }
-    }
+        let (output, time_s, farthest) = freeze(&config, share, legs, noise, from_s);
+        println!(
+            "{machine}, speed {share}, noise {noise:e}, legs {legs:?}: {:?} leg {} after {:.0} ms, {:.3} mm",
+            output.diagnostic.code,
+            output.diagnostic.index,
+            1e3 * time_s,
+            1e3 * farthest
+        );
+        let code = output.diagnostic.code;
+        assert!(
+            matches!(code, DiagnosticCode::SensorFrozen | DiagnosticCode::MeasurementImplausible),
+            "{machine} {share} {legs:?}: {:?}",
+            output.diagnostic
+        );
+        assert!(legs.contains(&(output.diagnostic.index as usize - 1)) || legs.len() == 1);
+        // One leg near its own turnaround is crawling, however fast the platform is: the others do not show its fault.
+        let rates = leg_motion(&config.machine, &scene(&config, share)(from_s).motion()).rate;
+        let is_crawling = legs.len() == 1 && rates[legs[0]].abs() < CRAWLING_M_S;
+        let bound = if is_crawling { 2e-3 } else { 0.5e-3 };
+        assert!(farthest < bound, "{machine} {share} {legs:?}, {rates:?} m/s: {farthest} m");
+    });
 }
 
 /// Largest distance from the pose at rest in the last second \[m\], after a motion; friction in the model and in the plant.
