@@ -17,7 +17,7 @@ use super::search::{Found, Search, search};
 use super::{table, trace};
 
 /// Cycles under control of each machine with each policy, beside those of the genomes that are known.
-const CYCLES: u64 = 30_000;
+const CYCLES: u64 = 10_000;
 const LONG_CYCLES: u64 = 1_000_000;
 /// Genomes that are written of each policy and quantity.
 const KEPT: u32 = 3;

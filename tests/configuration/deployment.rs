@@ -233,7 +233,7 @@ fn certificate_the_largest_bandwidth_in_the_message_is_accepted() {
         (50.0, 10.0, "00"),
         (20_000.0, 3.0, "25"),
     ];
-    for (rate, damping, lead) in cases(loops, 2) {
+    for (rate, damping, lead) in cases(loops, 3) {
         for (axis, other) in [("position", "orientation"), ("orientation", "position")] {
             let text = |bandwidth: f64| {
                 format!(

@@ -32,7 +32,7 @@ fn certificate_wrong_derivatives_lead_to_no_motion_beyond_the_limits() {
         let heave = Heave::new(&config.machine, &parameters);
         let mut runs = Runs::default();
         let all = PEAKS.iter().flat_map(|peaks| SENT.map(|sent| (*peaks, sent)));
-        for ([v, a], [sent_rate, sent_accel]) in cases(all, 3) {
+        for ([v, a], [sent_rate, sent_accel]) in cases(all, 6) {
             let (omega, amplitude) = (a / v, (v * v / a).min(0.4 * (heave.range[1] - heave.range[0])));
             let sine = |t| {
                 let task = heave.sine(heave.middle(), amplitude, omega, t);

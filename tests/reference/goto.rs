@@ -24,7 +24,7 @@ const COMPARED_FROM: [f64; 2] = [0.02, 0.02];
 const LONGEST_RATIO: f64 = 1.2;
 
 /// Pairs of poses of each machine.
-const PAIRS: u64 = 30;
+const PAIRS: u64 = 10;
 const LONG_PAIRS: u64 = 2000;
 
 /// Shares of the limits of autonomous motions, in turn.

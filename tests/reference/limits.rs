@@ -18,7 +18,7 @@ use super::streams::Stream;
 const RATES_HZ: [u64; 6] = [100, 250, 1000, 1000, 4000, 20000];
 const SECONDS: f64 = 3.0;
 /// Runs of each machine.
-const RUNS: u64 = 12;
+const RUNS: u64 = 5;
 const LONG_RUNS: u64 = 400;
 
 /// Bounds of what [`examine`] finds.

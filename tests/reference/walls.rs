@@ -20,7 +20,7 @@ type Sines = [(f64, f64, f64); 6];
 
 const STILL: (f64, f64, f64) = (0.0, 0.0, 0.0);
 /// Corners that a platform of each machine is pressed into with each policy; the first twelve are along the coordinates.
-const CORNERS: u64 = 24;
+const CORNERS: u64 = 14;
 const LONG_CORNERS: u64 = 212;
 
 fn at(home: &[f64; 6], sines: &Sines, t: f64) -> TaskState {
