@@ -1,4 +1,5 @@
-//! Commit and build profile for `hexad --version`. Works without git: from a tarball the commit is unknown.
+//! Commit and build profile for `hexad --version`. Works without git: from a tarball the commit is unknown. So it is in the profile of
+//! the tests, where each commit would build everything anew.
 
 use std::env::var;
 use std::process::Command;
@@ -11,9 +12,9 @@ fn git(arguments: &[&str]) -> Option<String> {
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    let (here, profile) = (var("CARGO_MANIFEST_DIR").ok(), var("PROFILE").unwrap_or_default());
     // A tarball unpacked inside of another repository has no commit of its own.
-    let here = var("CARGO_MANIFEST_DIR").ok();
-    let is_own = git(&["rev-parse", "--show-toplevel"]).is_some_and(|top| Some(top) == here);
+    let is_own = profile == "release" && git(&["rev-parse", "--show-toplevel"]).is_some_and(|top| Some(top) == here);
     let commit =
         is_own.then(|| git(&["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])).flatten();
     // It changes with every commit.
@@ -21,5 +22,5 @@ fn main() {
         println!("cargo::rerun-if-changed={log}");
     }
     println!("cargo::rustc-env=HEXAD_COMMIT={}", commit.as_deref().unwrap_or("unknown"));
-    println!("cargo::rustc-env=HEXAD_PROFILE={}", var("PROFILE").unwrap_or_default());
+    println!("cargo::rustc-env=HEXAD_PROFILE={profile}");
 }
