@@ -14,7 +14,8 @@ fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     let (here, profile) = (var("CARGO_MANIFEST_DIR").ok(), var("PROFILE").unwrap_or_default());
     // A tarball unpacked inside of another repository has no commit of its own.
-    let is_own = profile == "release" && git(&["rev-parse", "--show-toplevel"]).is_some_and(|top| Some(top) == here);
+    let is_own =
+        profile == "release" && git(&["rev-parse", "--show-toplevel"]).is_some_and(|top| Some(top) == here);
     let commit =
         is_own.then(|| git(&["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])).flatten();
     // It changes with every commit.
