@@ -74,7 +74,7 @@ fn shrunk(
         let envelope = MotionEnvelope::new(&machine.home, *limits);
         (0..CORNER_COUNT).all(|k| is_feasible(&envelope.at(&envelope.corner(k))))
     };
-    let mut sizes = (0..MAX_SHRINK_STEPS).map(|step| sized(0.8_f64.powi(step)));
+    let mut sizes = (0..MAX_SHRINK_STEPS).map(|step| sized(libm::pow(0.8, step.into())));
     sizes.find(is_feasible_at_all_corners).unwrap_or_else(|| sized(0.0))
 }
 

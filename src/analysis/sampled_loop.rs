@@ -282,8 +282,9 @@ impl SampledLoop {
     /// stable.
     pub fn gain_margin(&self) -> f64 {
         let none = 16.0 * self.mass_ratio * (1.0 + 1.0 / (self.wn_t * self.damping_ratio));
-        let stable =
-            (0..GAIN_STEPS).map(|step| 0.9_f64.powi(step)).find(|gain| self.is_stable_with_gain(*gain));
+        let stable = (0..GAIN_STEPS)
+            .map(|step| libm::pow(0.9, step.into()))
+            .find(|gain| self.is_stable_with_gain(*gain));
         stable.map_or(0.0, |inside| edge(inside, none, |gain| self.is_stable_with_gain(gain)))
     }
 

@@ -198,7 +198,7 @@ impl Plant<'_> {
         if !(largest_hz.is_finite() && largest_hz > 0.0) {
             return f64::NAN;
         }
-        let slower = (0..ESTIMATOR_STEPS).map(|step| largest_hz * 0.8_f64.powi(step));
+        let slower = (0..ESTIMATOR_STEPS).map(|step| largest_hz * libm::pow(0.8, step.into()));
         let candidates: Vec<_> = slower.chain(loops.iter().map(|(hertz, ..)| *hertz)).collect();
         let first = |is_stable: fn(&SampledLoop) -> bool| {
             candidates.iter().copied().find(|estimator_hz| {
