@@ -13,9 +13,10 @@ use crate::daemon::recorder::instruction_set;
 use crate::daemon::replay::{Replay, other_controller, recorded_config, recorded_controller, replay};
 use crate::model::machine::at_most_256_bits;
 use crate::output::files::print;
-use crate::recording::Item;
+use crate::output::version::VERSION;
 use crate::recording::copy::copy;
 use crate::recording::reader::{Recording, Summary};
+use crate::recording::{Item, RunInfo};
 
 /// Most ranges of cycles that are listed.
 const MAX_RANGES: usize = 10;
@@ -52,10 +53,13 @@ fn part(text: &str) -> Result<Part, String> {
 /// The replay is not the recording.
 #[derive(Debug, thiserror::Error)]
 enum ReplayError {
-    #[error("{0} of the cycles differ: the outputs are not those of the recording")]
-    Different(u64),
     #[error(
-        "no cycle could be compared: the memory of the controller in the recording is that of hexad {0}; use that version"
+        "{0} of the cycles differ: the outputs of hexad {VERSION} are not those of the recording, which is of hexad {1}"
+    )]
+    Different(u64, String),
+    #[error(
+        "no cycle could be compared: the memory of the controller in the recording is that of hexad {0}, and this is \
+         hexad {VERSION}; use that version"
     )]
     Unknown(String),
     #[error("no cycle is in {0:?} s; the recording is {1:.3} s long")]
@@ -86,15 +90,20 @@ impl ReplayArguments {
         let (summary, replay) = replay(&recording, controller)?;
         print(description(&recording, &summary, &replay, other.as_ref().unwrap_or(&recorded)))?;
         if replay.compared == 0 {
-            return Err(ReplayError::Unknown(info.version).into());
+            return Err(ReplayError::Unknown(recorded_version(&info)).into());
         }
         let is_tolerated = info.instruction_set != instruction_set(recorded.machine.level)
             && replay.is_rounding(recorded.deployment.realtime.period_s());
         if replay.different > 0 && other.is_none() && !is_tolerated {
-            return Err(ReplayError::Different(replay.different).into());
+            return Err(ReplayError::Different(replay.different, recorded_version(&info)).into());
         }
         Ok(())
     }
+}
+
+/// Version and commit of hexad that made a recording.
+fn recorded_version(info: &RunInfo) -> String {
+    format!("{} (commit {})", info.version, info.commit)
 }
 
 /// What the daemon would run on.
@@ -129,12 +138,11 @@ fn times_of(recording: &Recording, part: &RangeInclusive<f64>) -> Result<RangeIn
 fn description(recording: &Recording, summary: &Summary, replay: &Replay, config: &Config) -> String {
     let Summary { info, first, cycles, unfinished, .. } = summary;
     let mut text = format!(
-        "{}: {}, {cycles} cycles from number {}, hexad {} (commit {}), {}, {}\n",
+        "{}: {}, {cycles} cycles from number {}, hexad {}, {}, {}\n",
         recording.path().display(),
         info.name,
         first.cycle,
-        info.version,
-        info.commit,
+        recorded_version(info),
         info.instruction_set,
         info.fidelity,
     );
@@ -145,8 +153,8 @@ fn description(recording: &Recording, summary: &Summary, replay: &Replay, config
     if info.instruction_set != here {
         let _ = writeln!(text, "the instruction set is another one here: {here}; computed with {used}");
     }
-    if info.version != env!("CARGO_PKG_VERSION") {
-        let _ = writeln!(text, "the version is another one here: {}", env!("CARGO_PKG_VERSION"));
+    if [info.version.as_str(), &info.commit] != [env!("CARGO_PKG_VERSION"), env!("HEXAD_COMMIT")] {
+        let _ = writeln!(text, "the version is another one here: hexad {VERSION}");
     }
     if !replay.unknown.is_empty() {
         let ranges: Vec<_> = replay.unknown.iter().take(MAX_RANGES).map(|it| format!("{it:?}")).collect();

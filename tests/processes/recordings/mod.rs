@@ -11,6 +11,7 @@ use crate::support::children::{Ended, Hexad, run};
 use crate::support::machine::Machine;
 
 mod crashes;
+mod earlier;
 mod full_disk;
 #[cfg(target_arch = "x86_64")]
 mod instruction_sets;
