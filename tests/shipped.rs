@@ -4,5 +4,6 @@
 
 mod common;
 
+mod golden;
 mod no_panic;
 mod vectors;
