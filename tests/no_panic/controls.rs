@@ -71,7 +71,7 @@ pub mod clean {
 
     pub fn all() -> [&'static str; 2] {
         black_box((computes as *const (), matches as *const ()));
-        ["shipped::no_panic::controls::clean::computes", "no_panic::controls::clean::matches"]
+        ["shipped::no_panic::controls::clean::computes", "shipped::no_panic::controls::clean::matches"]
     }
 }
 
