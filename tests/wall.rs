@@ -144,6 +144,28 @@ impl<'ast> Visit<'ast> for Uses {
     }
 }
 
+/// No file of tests is left out: each is a target of Cargo or a module of one.
+#[test]
+fn every_file_of_tests_is_run() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = fs::read_to_string(root.join("Cargo.toml")).unwrap();
+    let is_target = |name: &str| manifest.contains(&format!("[[test]]\nname = \"{name}\"\n"));
+    let files: Vec<_> =
+        fs::read_dir(root.join("tests")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let files = files.iter().filter(|path| path.extension().is_some_and(|extension| extension == "rs"));
+    let names: Vec<_> = files.map(|path| path.file_stem().unwrap().to_str().unwrap()).collect();
+    let targets: String = names
+        .iter()
+        .filter(|name| is_target(name))
+        .map(|name| fs::read_to_string(root.join("tests").join(name).with_extension("rs")).unwrap())
+        .collect();
+    let left_out: Vec<_> = names
+        .iter()
+        .filter(|name| !is_target(name) && !targets.contains(&format!("\nmod {name};\n")))
+        .collect();
+    assert!(names.len() > 20 && left_out.is_empty(), "{left_out:?} of {}", names.len());
+}
+
 #[test]
 fn every_folder_uses_only_folders_above_it() {
     let mut wrong = vec![];

@@ -94,14 +94,6 @@ fn advise_and_workspace_print_json() {
 }
 
 #[test]
-fn version_names_commit_and_profile() {
-    let version = run(&Machine::patient("version"), &["--version"]).stdout;
-    let (number, build) = version.trim().split_once(" (").expect("a build");
-    assert_eq!(number, format!("hexad {}", env!("CARGO_PKG_VERSION")));
-    assert!(build.contains("commit") && build.ends_with("release)"), "{version}");
-}
-
-#[test]
 fn the_log_is_filtered_and_json_where_it_is_wanted() {
     let machine = Machine::with("logged", "[realtime]\nrate_hz = 100\n");
     assert!(Config::load(&machine.file).is_ok());
