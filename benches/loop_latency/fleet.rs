@@ -1,7 +1,8 @@
 //! Many platforms in one loop: the loop itself, with a step that steps the controller of each platform.
 //!
 //! Each has its own place on a moving path, exact fidelity, and is in control. What counts is the time from
-//! wake-up to output; the inputs are there already.
+//! wake-up to output; the inputs are there already. The loop ends with them: a platform whose inputs stood still
+//! would report a frozen sensor.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{scope, sleep};
@@ -10,6 +11,7 @@ use std::time::{Duration, Instant};
 use heapless::spsc::Queue;
 use hexad::config::Config;
 use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{OperatorRequest, Request, State};
 use hexad::daemon::cycle::CycleRecord;
 use hexad::daemon::parameters;
@@ -55,8 +57,12 @@ struct Fleet {
     path: Vec<(TaskState, [f64; 6], [f64; 6])>,
     /// Of the path and of the clock. The inputs have a time of their own: a cycle that is skipped is no jump.
     cycle: usize,
+    /// The last with inputs for every platform.
+    last_cycle: usize,
     period_ns: u64,
     inactive: u64,
+    /// Platform of the first of them, and the controller's reason.
+    first_inactive: Option<(usize, DiagnosticCode)>,
 }
 
 impl Fleet {
@@ -71,18 +77,21 @@ impl Fleet {
         };
         let controller = Controller::new(machine, parameters(machine, &config.deployment, Fidelity::Exact));
         let stride = (WARM_UP_STEP_S / period_s) as usize;
+        let last_cycle = WARM_UP_STEPS * stride + cycles;
         let mut fleet = Self {
             controllers: vec![controller; platforms],
-            path: (0..cycles + WARM_UP_STEPS * stride + SPREAD).map(row).collect(),
+            path: (0..last_cycle + SPREAD).map(row).collect(),
             cycle: 0,
+            last_cycle,
             period_ns: (period_s * 1e9) as u64,
             inactive: 0,
+            first_inactive: None,
         };
         for number in 1..=WARM_UP_STEPS as u64 {
             fleet.cycle += stride;
             fleet.step_all(Some(OperatorRequest { request: Request::Engage, message: (1, number) }));
         }
-        fleet.inactive = 0;
+        (fleet.inactive, fleet.first_inactive) = (0, None);
         fleet
     }
 
@@ -90,8 +99,9 @@ impl Fleet {
         let release_ns = self.cycle as u64 * self.period_ns;
         let mut last = Output::default();
         for (number, controller) in self.controllers.iter_mut().enumerate() {
-            let row = (self.cycle + number * APART % SPREAD).min(self.path.len() - 1);
-            let Some((task, length, rate)) = self.path.get(row) else { continue };
+            let Some((task, length, rate)) = self.path.get(self.cycle + number * APART % SPREAD) else {
+                continue;
+            };
             last = controller.step(&Input {
                 release_ns,
                 setpoint: Some(Setpoint::motion(release_ns, *task)),
@@ -104,7 +114,10 @@ impl Fleet {
                 request,
                 ..Input::default()
             });
-            self.inactive += u64::from(last.state != State::Active);
+            if last.state != State::Active {
+                self.inactive += 1;
+                self.first_inactive.get_or_insert((number, last.diagnostic.code));
+            }
         }
         last
     }
@@ -115,11 +128,17 @@ impl Fleet {
     }
 
     fn all_were_active(&self) -> Result<(), String> {
-        if self.inactive == 0 { Ok(()) } else { Err(format!("{} steps were not in control", self.inactive)) }
+        self.first_inactive.map_or(Ok(()), |(platform, code)| {
+            let steps = self.inactive;
+            Err(format!(
+                "{steps} steps were not in control, the first of platform {platform}: {}",
+                code.name()
+            ))
+        })
     }
 }
 
-/// Runs the loop with so many platforms for so long.
+/// Runs the loop with so many platforms for so long, or for as many cycles as that time has.
 pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<Trial, Failure> {
     let period_ns = 1_000_000_000 / u64::from(rate_hz);
     let timing = Timing {
@@ -141,7 +160,13 @@ pub fn trial(rig: &Rig, rate_hz: u32, platforms: usize, seconds: f64) -> Result<
     let report = scope(|threads| -> Result<_, Failure> {
         let thread = threads.spawn(|| {
             prepare(rig)?;
-            let step = |_: &mut Input, _: u64| fleet.next_cycle();
+            let step = |_: &mut Input, _: u64| {
+                let output = fleet.next_cycle();
+                if fleet.cycle == fleet.last_cycle {
+                    stop.store(true, Ordering::Relaxed);
+                }
+                output
+            };
             let report =
                 cyclic::run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stop);
             fleet.all_were_active().map(|()| report)
