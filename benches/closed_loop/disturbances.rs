@@ -7,9 +7,8 @@ use hexad::plant::imperfections::Imperfections;
 use serde::Deserialize;
 
 use super::run::Run;
-use super::support::Figures;
 use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
-use super::{Failure, MODES, cells, chart, common, play, write_csv};
+use super::{Charts, Failure, MODES, cells, common, play};
 
 const FILE: &str = "closed_loop_disturbances.csv";
 /// What a disturbance observer of 10 Hz, which the estimator has replaced, did for computed torque; measured rates, and setpoints
@@ -88,11 +87,11 @@ fn variants() -> Vec<(ControlMode, bool)> {
     [false, true].into_iter().flat_map(|is| ControlMode::ALL.map(|mode| (mode, is))).collect()
 }
 
-pub fn run(quick: bool) -> Result<(), Failure> {
-    let variants = variants();
+pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
+    let variants: Vec<_> = variants().into_iter().step_by(if quick { 3 } else { 1 }).collect();
     let mut rows = vec![];
     for sweep in &SWEEPS {
-        let levels: Vec<_> = sweep.levels.iter().copied().step_by(if quick { 4 } else { 1 }).collect();
+        let levels = if quick { &sweep.levels[..1] } else { sweep.levels };
         let run = |(mode, compensates): &(ControlMode, bool), level: f64| Run {
             machine: MACHINE,
             mode: *mode,
@@ -113,7 +112,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         }
     }
     let header = ["what", "level", "mode", "compensates", "position_rms_um", "position_max_um", "lost"];
-    write_csv(FILE, &header, &rows)
+    charts.write_csv(FILE, &header, &rows)
 }
 
 /// What the chart needs of a row.
@@ -133,18 +132,19 @@ impl Figure {
     }
 }
 
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Figure>::read(FILE)?;
-    let observer = Figures::<Figure>::read(OBSERVER_FILE)?.rows;
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Figure>(FILE)?;
+    let observer = Charts::published().read::<Figure>(OBSERVER_FILE)?.rows;
     let sweeps = figures.rows.chunk_by(|a, b| a.what == b.what);
-    let mut charts: Vec<_> = sweeps.map(|rows| draw_sweep(rows, &observer)).collect();
-    fit_ranges(&mut charts, false);
+    let mut drawn: Vec<_> = sweeps.map(|rows| draw_sweep(rows, &observer)).collect();
+    fit_ranges(&mut drawn, false);
     let mut legend: Vec<_> =
         MODES.iter().enumerate().map(|(k, name)| (Sample::Mark(Mark::Disc, k), *name)).collect();
     legend.push((Sample::Mark(Mark::Ring, 0), "disturbances compensated"));
     legend.push((Sample::Line(LineStyle::Dashed, Width::Curve, 0), "observer of 10 Hz, replaced"));
     let title = figures.titled("What control a scene needs: motion base, fast scene, 1 kHz");
-    Grid { title: &title, legend, columns: 2, charts }.write_svg(&chart("closed_loop_disturbances.svg"))?;
+    Grid { title: &title, legend, columns: 2, charts: drawn }
+        .write_svg(&charts.path("closed_loop_disturbances.svg"))?;
     Ok(())
 }
 

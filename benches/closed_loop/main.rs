@@ -3,7 +3,7 @@
 //! The controller against the simulated hardware, in one process and in simulated time, on the fast scene of a
 //! machine: tracking error against compute time for every control mode, model and rate; and against payload,
 //! friction, noise and dead time, with and without compensation of disturbances. Writes `benches/charts/closed_loop_*.csv` and
-//! `.svg`. `-- --quick` takes fewer of each; `-- --redraw` measures nothing and draws the charts from the CSV files.
+//! `.svg`. `-- --redraw` measures nothing and draws the charts from the CSV files; `-- --quick` takes few of each.
 
 #![allow(
     dead_code,
@@ -21,20 +21,28 @@ mod run;
 #[path = "../support/mod.rs"]
 mod support;
 
+use std::process::ExitCode;
+
+use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 
 use run::{Outcome, Run};
-use support::{Failure, cells, chart, write_csv};
+use support::charts::Charts;
+use support::{ChartArguments, Failure, cells, exit_code};
 
-fn main() -> Result<(), Failure> {
-    let has = |flag: &str| std::env::args().any(|argument| argument == flag);
-    if !has("--redraw") {
-        rates::run(has("--quick"))?;
-        disturbances::run(has("--quick"))?;
+fn main() -> ExitCode {
+    exit_code(run(&ChartArguments::parse()))
+}
+
+fn run(arguments: &ChartArguments) -> Result<(), Failure> {
+    let charts = arguments.charts();
+    if !arguments.redraw {
+        rates::run(&charts, arguments.extent.is_quick())?;
+        disturbances::run(&charts, arguments.extent.is_quick())?;
     }
-    rates::draw()?;
-    disturbances::draw()
+    rates::draw(&charts)?;
+    disturbances::draw(&charts)
 }
 
 /// All runs, on all processors, with their outcomes in the same order.

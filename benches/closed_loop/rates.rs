@@ -7,9 +7,8 @@ use hexad::plant::imperfections::Imperfections;
 use serde::Deserialize;
 
 use super::run::Run;
-use super::support::Figures;
 use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
-use super::{Failure, MODES, cells, chart, play, write_csv};
+use super::{Charts, Failure, MODES, cells, play};
 
 const FILE: &str = "closed_loop_rates.csv";
 
@@ -40,10 +39,11 @@ fn methods() -> Vec<Method> {
     methods
 }
 
-pub fn run(quick: bool) -> Result<(), Failure> {
-    let rates = if quick { &RATES_HZ[2..5] } else { &RATES_HZ[..] };
+pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
+    let (machines, rates, passes) =
+        if quick { (&MACHINES[..1], &RATES_HZ[2..3], 1) } else { (&MACHINES[..], &RATES_HZ[..], PASSES) };
     let mut rows = vec![];
-    for machine in MACHINES {
+    for machine in machines {
         let methods = methods();
         let at = |method: &Method, rate_hz: f64| Run {
             machine,
@@ -53,8 +53,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
             compensates: true,
             imperfections: Imperfections::default(),
         };
-        let steps: Vec<_> =
-            methods.iter().map(|method| at(method, 1e3).step_ns(if quick { 1 } else { PASSES })).collect();
+        let steps: Vec<_> = methods.iter().map(|method| at(method, 1e3).step_ns(passes)).collect();
         let runs: Vec<_> =
             methods.iter().flat_map(|method| rates.iter().map(move |rate| at(method, *rate))).collect();
         let outcomes = play(machine, &runs);
@@ -91,7 +90,7 @@ pub fn run(quick: bool) -> Result<(), Failure> {
         "orientation_rms_urad",
         "orientation_max_urad",
     ];
-    write_csv(FILE, &header, &rows)
+    charts.write_csv(FILE, &header, &rows)
 }
 
 /// What the chart needs of a row.
@@ -106,19 +105,19 @@ struct Figure {
 }
 
 /// A line per method, from the lowest rate to the highest.
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Figure>::read(FILE)?;
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Figure>(FILE)?;
     let machines: Vec<_> = figures.rows.chunk_by(|a, b| a.machine == b.machine).collect();
     let titles: Vec<_> = machines.iter().map(|rows| format!("{}, fast scene", rows[0].machine)).collect();
-    let mut charts: Vec<_> =
+    let mut drawn: Vec<_> =
         machines.iter().zip(&titles).map(|(rows, title)| draw_machine(title, rows)).collect();
-    fit_ranges(&mut charts, true);
+    fit_ranges(&mut drawn, true);
     let mut legend: Vec<_> =
         MODES.iter().enumerate().map(|(k, name)| (Sample::Mark(Mark::Disc, k), *name)).collect();
     legend.push((Sample::Mark(Mark::Ring, 0), "cheaper models"));
     let title = "Control without disturbance: RMS error against compute time, 250 Hz to 20 kHz";
-    Grid { title: &figures.titled(title), legend, columns: 2, charts }
-        .write_svg(&chart("closed_loop_rates.svg"))?;
+    Grid { title: &figures.titled(title), legend, columns: 2, charts: drawn }
+        .write_svg(&charts.path("closed_loop_rates.svg"))?;
     Ok(())
 }
 

@@ -11,20 +11,25 @@ use nix::sys::signal::{Signal, raise};
 use nix::sys::wait::{WaitStatus, waitpid};
 use nix::unistd::{ForkResult, Pid, fork};
 
+/// Whether this process may trace a child.
+pub fn require_tracing() -> nix::Result<()> {
+    traced(|| {}).map(drop)
+}
+
 /// Instructions of the next cycle of a controller.
 pub fn instructions(controller: &Controller, input: &Input) -> u64 {
     let mut controller = controller.clone();
-    let signals = traced(|| {});
+    let signals = traced(|| {}).expect("a child that can be traced");
     let all = traced(|| {
         black_box(controller.step(black_box(input)));
     });
-    all - signals
+    all.expect("a child that can be traced") - signals
 }
 
 /// Instructions of a child process between two signals, between which it does some work.
-fn traced(work: impl FnOnce()) -> u64 {
+fn traced(work: impl FnOnce()) -> nix::Result<u64> {
     // SAFETY: the child has the one thread that forks. It calls the system, computes without allocation, and ends.
-    match unsafe { fork() }.expect("a process") {
+    match unsafe { fork() }? {
         ForkResult::Child => {
             let stop = || raise(Signal::SIGSTOP);
             let traced = ptrace::traceme().and_then(|()| stop());
@@ -33,7 +38,7 @@ fn traced(work: impl FnOnce()) -> u64 {
             // SAFETY: ends the process at once, without the destructors of its parent.
             unsafe { libc::_exit(i32::from(end.is_err())) }
         }
-        ForkResult::Parent { child } => count_to_next_stop(child).expect("a child that can be traced"),
+        ForkResult::Parent { child } => count_to_next_stop(child),
     }
 }
 

@@ -62,13 +62,15 @@ impl Search {
         known
             .filter(|genome| genome.policy == policy && machines.contains(&genome.machine))
             .for_each(|genome| search.run(&genome));
-        while begun.elapsed() < time {
+        loop {
             let genome = search.next(policy, &machines, &mut random);
             if Scenario::of(&genome).parameters.period_ns <= LONGEST_PERIOD_NS {
                 search.run(&genome);
             }
+            if begun.elapsed() >= time {
+                return search;
+            }
         }
-        search
     }
 
     fn next(&self, policy: ViolationPolicy, machines: &Range<usize>, random: &mut Random) -> Genome {

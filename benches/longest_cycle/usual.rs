@@ -8,12 +8,10 @@ use super::common::rig;
 use super::count::instructions;
 use super::machines::{RATES_HZ, Variant, variant};
 
-/// Cycles that are counted, spread over the scene.
-const COUNTED: usize = 25;
 const RATE_HZ: f64 = 1000.0;
 
-/// Their median.
-pub fn median(machine: usize, policy: ViolationPolicy) -> u64 {
+/// The median of so many of them, spread over the scene.
+pub fn median(machine: usize, policy: ViolationPolicy, counted: usize) -> u64 {
     let rate = RATES_HZ.iter().position(|rate_hz| *rate_hz == RATE_HZ).unwrap();
     let config = variant(Variant { machine, rate, limits: 0, autonomous: 0 });
     let mut parameters = rig::parameters(&config);
@@ -26,7 +24,7 @@ pub fn median(machine: usize, policy: ViolationPolicy) -> u64 {
     let mut counts = vec![];
     for cycle in 0..cycles {
         let input = observed.input(&scene.at(observed.time_s() - begun_s));
-        if cycle % (cycles / COUNTED).max(1) == 0 {
+        if cycle % (cycles / counted).max(1) == 0 {
             counts.push(instructions(&observed.controller, &input));
         }
         observed.cycle(&input);

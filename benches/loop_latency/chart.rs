@@ -8,8 +8,9 @@ use super::contest::Contestant;
 use super::distribution::us;
 use super::results::{DISTRIBUTIONS, late_ns};
 use super::rig::Release;
+use super::support::Failure;
+use super::support::charts::Charts;
 use super::support::scatter::{Grid, Line, Sample, Scatter, Width, fit_ranges};
-use super::support::{Failure, Figures, chart};
 
 /// One look at the clock, which is what `hybrid` spins with: shorter times are drawn as this one \[us\].
 const SHORTEST_US: f64 = 0.01;
@@ -33,23 +34,31 @@ fn color(contestant: Contestant) -> usize {
 }
 
 /// Idle on the left, loaded on the right, a line for each rate.
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Figure>::read(DISTRIBUTIONS)?;
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Figure>(DISTRIBUTIONS)?;
     let groups = figures.rows.chunk_by(|a, b| (a.rate_hz, &a.load) == (b.rate_hz, &b.load));
     let groups: Vec<_> = groups.collect();
     let titles: Vec<_> = groups.iter().map(|group| title(group)).collect();
     let last = groups.len().saturating_sub(2);
-    let charts = groups.iter().zip(&titles).enumerate().map(|(index, (group, title))| Scatter {
+    let drawn = groups.iter().zip(&titles).enumerate().map(|(index, (group, title))| Scatter {
         title,
         x_label: if index >= last { "wake-up latency [µs]" } else { "" },
         y_label: if index % 2 == 0 { "share of wake-ups later" } else { "" },
         lines: curves(group),
         ..Scatter::default()
     });
-    let mut charts: Vec<_> = charts.collect();
-    fit_ranges(&mut charts, true);
-    let title = figures.titled("Wake-up latency of the loop and of cyclictest, same processor, same run");
-    Grid { title: &title, legend: legend(), columns: 2, charts }.write_svg(&chart("loop_latency.svg"))?;
+    let mut drawn: Vec<_> = drawn.collect();
+    fit_ranges(&mut drawn, true);
+    let is_measured =
+        |contestant: &Contestant| figures.rows.iter().any(|row| row.contestant == contestant.name());
+    let measured: Vec<_> = Contestant::ALL.into_iter().filter(is_measured).collect();
+    let title = figures.titled(if measured.contains(&Contestant::Cyclictest) {
+        "Wake-up latency of the loop and of cyclictest, same processor, same run"
+    } else {
+        "Wake-up latency of the loop; cyclictest was not measured"
+    });
+    Grid { title: &title, legend: legend(&measured), columns: 2, charts: drawn }
+        .write_svg(&charts.path("loop_latency.svg"))?;
     Ok(())
 }
 
@@ -75,9 +84,9 @@ fn curves(group: &[Figure]) -> Vec<Line> {
     lines
 }
 
-fn legend() -> Vec<(Sample, &'static str)> {
+fn legend(contestants: &[Contestant]) -> Vec<(Sample, &'static str)> {
     let curve = |contestant| Sample::Line(LineStyle::Solid, Width::Curve, color(contestant));
-    let contestants = Contestant::ALL.map(|contestant| (curve(contestant), contestant.name()));
+    let curves = contestants.iter().map(|contestant| (curve(*contestant), contestant.name()));
     let limit = (Sample::Line(LineStyle::Dashed, Width::Curve, 0), "late beyond this");
-    contestants.into_iter().chain([limit]).collect()
+    curves.chain([limit]).collect()
 }

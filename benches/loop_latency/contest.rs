@@ -13,6 +13,7 @@ use hexad::messages::Bus;
 
 use super::Failure;
 use super::distribution::Distribution;
+use super::results::Row;
 use super::rig::{PRIORITY, Process, Release, Rig};
 use super::subscriber::Subscriber;
 use super::tools::steal_ms;
@@ -67,14 +68,16 @@ impl Watch {
         (0..machines).map(operator).collect::<Result<_, Failure>>().map(Self)
     }
 
-    /// Engages every daemon and waits until it is in control.
-    pub fn until_active(&mut self, daemons: &mut [Process]) -> Result<(), Failure> {
+    /// Engages every daemon and waits until it is in control. Returns how many cycles each had run by then.
+    pub fn until_active(&mut self, daemons: &mut [Process]) -> Result<Vec<u64>, Failure> {
         let begin = Instant::now();
+        let mut cycles = vec![];
         for (number, operator) in self.0.iter_mut().enumerate() {
             let mut why = "says nothing";
             loop {
                 if let Some(status) = operator.status() {
                     if status.state == State::Active as u32 {
+                        cycles.push(status.counters.cycles);
                         break;
                     }
                     let cause = DiagnosticCode::from_number(status.diagnostic.code).unwrap_or_default();
@@ -92,38 +95,18 @@ impl Watch {
                 sleep(LOOK);
             }
         }
-        Ok(())
+        Ok(cycles)
     }
 }
 
-/// Runs one contestant for so long.
-pub fn round(
-    rig: &Rig,
-    watch: &mut Watch,
-    contestant: Contestant,
-    rate_hz: u32,
-    seconds: f64,
-) -> Result<Round, Failure> {
+/// Runs the contestant of a row for so long.
+pub fn round(rig: &Rig, watch: &mut Watch, row: &Row, seconds: f64) -> Result<Round, Failure> {
     let before_ms = steal_ms(rig.processors.contestant);
-    let mut round = match contestant {
-        Contestant::Cyclictest => cyclictest(rig, rate_hz, seconds)?,
-        Contestant::Hexad(release) => hexad(rig, watch, release, rate_hz, seconds)?,
+    let mut round = match row.contestant {
+        Contestant::Cyclictest => cyclictest(rig, row.rate_hz, seconds)?,
+        Contestant::Hexad(release) => hexad(rig, watch, release, row, seconds)?,
     };
     round.steal_ms = steal_ms(rig.processors.contestant) - before_ms;
-    Ok(round)
-}
-
-/// A round of the daemon with a polling subscriber.
-pub fn round_seen(
-    rig: &Rig,
-    watch: &mut Watch,
-    release: Release,
-    rate_hz: u32,
-    seconds: f64,
-) -> Result<Round, Failure> {
-    let subscriber = Subscriber::start(rig)?;
-    let mut round = round(rig, watch, Contestant::Hexad(release), rate_hz, seconds)?;
-    round.visible = subscriber.finish()?;
     Ok(round)
 }
 
@@ -162,19 +145,16 @@ fn read_json(text: &str) -> Option<Distribution> {
     Some(wakeup)
 }
 
-fn hexad(
-    rig: &Rig,
-    watch: &mut Watch,
-    release: Release,
-    rate_hz: u32,
-    seconds: f64,
-) -> Result<Round, Failure> {
-    let mut daemons = [start_daemon(rig, 0, rate_hz, release)?];
+fn hexad(rig: &Rig, watch: &mut Watch, release: Release, row: &Row, seconds: f64) -> Result<Round, Failure> {
+    let mut daemons = [start_daemon(rig, 0, row.rate_hz, release)?];
     watch.until_active(&mut daemons)?;
+    // It leaves the processor that it polls on no time for the start of a daemon.
+    let subscriber = row.seen.then(|| Subscriber::start(rig)).transpose()?;
     sleep(Duration::from_secs_f64(seconds));
+    let visible = subscriber.map_or_else(|| Ok(Distribution::default()), Subscriber::finish)?;
     let [mut daemon] = daemons;
     daemon.stop()?;
-    read_daemon(rig, 0)
+    Ok(Round { visible, ..read_daemon(rig, 0)? })
 }
 
 /// Starts the daemon of a machine.

@@ -13,7 +13,7 @@
 //!   ends at 1 ms; ours has three digits.
 //! - The driver, a light thread that publishes a moving setpoint and measured lengths at the loop's rate, runs in
 //!   the rounds of cyclictest too. The daemon does not: whatever its io thread, on the other processor, costs
-//!   the loop counts against us. The daemon is in control throughout, or the bench fails.
+//!   the loop counts against us. The daemon is in control throughout, or the round is left out.
 //! - Under load, `stress-ng` computes, moves memory and switches contexts on every processor. Where others use
 //!   the machine, "idle" means as idle as they leave it.
 //!
@@ -21,9 +21,10 @@
 //! visible is in rounds of its own (`subscriber.rs`), sizes are in `size.rs`. Files: `loop_latency.csv` and
 //! `.svg`, `loop_latency_distribution.csv`, `loop_size.csv` and `.svg` in `benches/charts`.
 //!
-//! Needs root or the right to FIFO priority, two processors, cyclictest, stress-ng and strace; names what is
-//! missing and ends with 2. `-- --quick` takes one short round of everything: within 60 s instead of 12 min.
-//! `-- --redraw` measures nothing and draws the charts from the CSV files.
+//! Needs root or the right to FIFO priority, two processors, cyclictest, stress-ng and strace. What is not measured
+//! for want of one of them, or because the host disturbed it, is named with its reason and left out of the files.
+//! `-- --quick` takes one short round of everything at one rate; `-- --redraw` measures nothing and draws the charts
+//! from the CSV files.
 
 mod chart;
 mod contest;
@@ -52,22 +53,20 @@ use distribution::Distribution;
 use driver::Driver;
 use load::Load;
 use results::Row;
-use rig::{Release, Rig};
+use rig::{PRIORITY, Release, Rig};
 use size::{Effort, Size, Unit};
-use support::Failure;
-
-/// Rates of the loop \[Hz\].
-const RATES: [u32; 5] = [250, 1000, 4000, 10_000, 20_000];
-
-/// Rates at which a subscriber polls \[Hz\].
-const SEEN_RATES: [u32; 2] = [1000, 4000];
-
-/// Exit code where something that the bench needs is missing.
-const CANNOT_BEGIN: u8 = 2;
+use support::charts::Charts;
+use support::omissions::Omissions;
+use support::{ChartArguments, Failure, exit_code};
+use tools::Tool;
 
 /// How much is measured.
 #[derive(Clone, Copy)]
 struct Plan {
+    /// Rates of the loop \[Hz\].
+    rates: &'static [u32],
+    /// Rates at which a subscriber polls \[Hz\].
+    seen_rates: &'static [u32],
     rounds: usize,
     /// Length of a round \[s\].
     seconds: f64,
@@ -75,90 +74,112 @@ struct Plan {
 }
 
 /// 500 wake-ups a round at the lowest rate, so that its p99 is not a single one.
-const FULL: Plan = Plan { rounds: 5, seconds: 2.0, sizes: Effort { repetitions: 3, seconds: 0.5 } };
-const QUICK: Plan = Plan { rounds: 1, seconds: 0.3, sizes: Effort { repetitions: 1, seconds: 0.1 } };
+const FULL: Plan = Plan {
+    rates: &[250, 1000, 4000, 10_000, 20_000],
+    seen_rates: &[1000, 4000],
+    rounds: 5,
+    seconds: 2.0,
+    sizes: Effort { repetitions: 3, seconds: 0.5, most_platforms: 8192, most_daemons: 32 },
+};
+const QUICK: Plan = Plan {
+    rates: &[1000],
+    seen_rates: &[1000],
+    rounds: 1,
+    seconds: 0.2,
+    sizes: Effort { repetitions: 1, seconds: 0.1, most_platforms: 128, most_daemons: 2 },
+};
 
 /// Everything that was measured.
+#[derive(Default)]
 struct Measured {
+    /// Those with at least one round.
     rows: Vec<Row>,
     sizes: Vec<Size>,
-    /// Single steps of the controller.
+    /// Single steps of the controller; empty if they were not measured.
     steps: Distribution,
-    /// System calls of the real-time thread.
+    /// System calls of the real-time thread; empty if they were not counted.
     calls: Vec<(String, u64)>,
 }
 
-/// Timing of the loop against cyclictest, and against its own size.
-#[derive(Parser)]
-struct Arguments {
-    /// One short round of everything: within 60 s.
-    #[arg(long)]
-    quick: bool,
-    /// Measures nothing and draws the charts from the CSV files.
-    #[arg(long)]
-    redraw: bool,
-    /// What `cargo bench` adds.
-    #[arg(long, hide = true)]
-    bench: bool,
-}
-
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let plan = if arguments.quick { QUICK } else { FULL };
-    let (outcome, code) = match Rig::new() {
-        _ if arguments.redraw => (draw(), ExitCode::FAILURE),
-        Ok(rig) => (run(&rig, plan), ExitCode::FAILURE),
-        Err(failure) => (Err(failure), ExitCode::from(CANNOT_BEGIN)),
-    };
-    outcome.map_or_else(
-        |failure| {
-            eprintln!("{failure}");
-            code
-        },
-        |()| ExitCode::SUCCESS,
-    )
+    exit_code(run(&ChartArguments::parse()))
 }
 
-fn run(rig: &Rig, plan: Plan) -> Result<(), Failure> {
+fn run(arguments: &ChartArguments) -> Result<(), Failure> {
+    let charts = arguments.charts();
+    if arguments.redraw {
+        chart::draw(&charts)?;
+        return size::draw(&charts);
+    }
     let begin = Instant::now();
-    let mut rows = rows();
+    let plan = if arguments.extent.is_quick() { QUICK } else { FULL };
+    let mut omissions = Omissions::default();
+    match tools::require_realtime(PRIORITY).and_then(|()| tools::processors()) {
+        Ok(processors) => {
+            let measured = measure(&Rig::new(processors)?, plan, &mut omissions)?;
+            summary::print(&measured);
+            println!(
+                "\n{} rounds of {} s each, {:.0} s",
+                plan.rounds,
+                plan.seconds,
+                begin.elapsed().as_secs_f64()
+            );
+            write(&charts, &measured)?;
+        }
+        Err(failure) => omissions.lacking("everything", failure),
+    }
+    omissions.finish()
+}
+
+fn measure(rig: &Rig, plan: Plan, omissions: &mut Omissions) -> Result<Measured, Failure> {
+    let missing: Vec<_> = Tool::ALL.into_iter().filter(|tool| !tool.is_there()).collect();
+    for tool in &missing {
+        let why = format!("no {}; install it with: apt-get install {}", tool.name(), tool.package());
+        omissions.lacking(tool.part(), why);
+    }
     let mut watch = Watch::new(1)?;
+    let mut rows = rows(plan, &missing);
     let style = ProgressStyle::with_template("{bar:40} {pos} of {len} rounds, {eta} left")?;
     let bar = ProgressBar::new((plan.rounds * rows.len()) as u64).with_style(style);
     for round in 0..plan.rounds {
-        take_all(rig, &mut watch, &mut rows, round, plan.seconds, &bar)?;
+        take_all(rig, &mut watch, &mut rows, round, plan.seconds, &bar, omissions);
     }
     bar.finish_and_clear();
+    rows.retain(|row| !row.rounds.is_empty());
     let spinner = ProgressBar::new_spinner();
     spinner.enable_steady_tick(Duration::from_millis(100));
-    let steps = fleet::steps(rig)?;
-    let calls = syscalls::of_the_loop(rig, &mut watch, Release::Hybrid)?;
-    let sizes = sizes(rig, plan.sizes, &spinner)?;
-    spinner.finish_and_clear();
-
-    let measured = Measured { rows, sizes, steps, calls };
-    summary::print(&measured);
-    println!("\n{} rounds of {} s each, {:.0} s", plan.rounds, plan.seconds, begin.elapsed().as_secs_f64());
-    if cfg!(debug_assertions) {
-        println!("a debug build: these times mean nothing and nothing was written; use cargo bench");
-        return Ok(());
+    let steps = omissions.attempt("steps", "Controller::step", fleet::steps(rig)).unwrap_or_default();
+    let mut calls = vec![];
+    if !missing.contains(&Tool::Strace) {
+        let counted = syscalls::of_the_loop(rig, &mut watch, Release::Hybrid);
+        calls = omissions.attempt("system calls", Tool::Strace.part(), counted).unwrap_or_default();
     }
-    write(&measured)
+    let sizes = sizes(rig, plan.sizes, &spinner, omissions);
+    spinner.finish_and_clear();
+    Ok(Measured { rows, sizes, steps, calls })
 }
 
-/// What is measured; those that are compared are side by side.
-fn rows() -> Vec<Row> {
+/// What is measured with the tools that there are; those that are compared are side by side.
+fn rows(plan: Plan, missing: &[Tool]) -> Vec<Row> {
     let row = |rate_hz, loaded, contestant, seen| Row { rate_hz, loaded, contestant, seen, rounds: vec![] };
     let mut rows = vec![];
-    for rate_hz in RATES {
+    for rate_hz in plan.rates {
         for loaded in [false, true] {
-            rows.extend(Contestant::ALL.map(|contestant| row(rate_hz, loaded, contestant, false)));
+            rows.extend(Contestant::ALL.map(|contestant| row(*rate_hz, loaded, contestant, false)));
         }
     }
-    for rate_hz in SEEN_RATES {
+    for rate_hz in plan.seen_rates {
         let releases = [Release::Sleep, Release::Hybrid];
-        rows.extend(releases.map(|release| row(rate_hz, false, Contestant::Hexad(release), true)));
+        rows.extend(releases.map(|release| row(*rate_hz, false, Contestant::Hexad(release), true)));
     }
+    rows.retain(|row| {
+        let needs = |tool| match tool {
+            Tool::Cyclictest => row.contestant == Contestant::Cyclictest,
+            Tool::StressNg => row.loaded,
+            Tool::Strace => false,
+        };
+        !missing.iter().any(|tool| needs(*tool))
+    });
     rows
 }
 
@@ -170,54 +191,52 @@ fn take_all(
     round: usize,
     seconds: f64,
     bar: &ProgressBar,
-) -> Result<(), Failure> {
+    omissions: &mut Omissions,
+) {
     for group in rows.chunk_by_mut(Row::compares_with) {
-        let Some(Row { loaded, rate_hz, .. }) = group.first() else { continue };
-        let _load = loaded.then(|| Load::start(rig)).transpose()?;
-        let _driver = Driver::start(rig, 1, *rate_hz)?;
+        let Some(row) = group.first() else { continue };
+        let surroundings = surroundings(rig, row);
+        let what = format!("{} Hz, {}, round {}", row.rate_hz, row.load(), round + 1);
+        let Some(_running) = omissions.attempt("load and driver", what, surroundings) else { continue };
         let turn = round % group.len();
         group.rotate_left(turn);
         for row in &mut *group {
-            take(rig, watch, row, seconds)?;
+            let taken = contest::round(rig, watch, row, seconds);
+            let what = format!("{}, round {}", row.name(), round + 1);
+            row.rounds.extend(omissions.attempt(row.contestant.name(), what, taken));
             bar.inc(1);
         }
         group.rotate_right(turn);
     }
-    Ok(())
 }
 
-fn take(rig: &Rig, watch: &mut Watch, row: &mut Row, seconds: f64) -> Result<(), Failure> {
-    let context =
-        |failure| format!("{} Hz, {}, {}: {failure}", row.rate_hz, row.load(), row.contestant.name());
-    let round = match row.contestant {
-        Contestant::Hexad(release) if row.seen => {
-            contest::round_seen(rig, watch, release, row.rate_hz, seconds)
-        }
-        contestant => contest::round(rig, watch, contestant, row.rate_hz, seconds),
-    };
-    row.rounds.push(round.map_err(context)?);
-    Ok(())
+/// The load, if any, and the driver of a group of rows.
+fn surroundings(rig: &Rig, row: &Row) -> Result<(Option<Load>, Driver), Failure> {
+    let load = row.loaded.then(|| Load::start(rig)).transpose()?;
+    Ok((load, Driver::start(rig, 1, row.rate_hz)?))
 }
 
-fn sizes(rig: &Rig, effort: Effort, spinner: &ProgressBar) -> Result<Vec<Size>, Failure> {
+fn sizes(rig: &Rig, effort: Effort, spinner: &ProgressBar, omissions: &mut Omissions) -> Vec<Size> {
     let mut sizes = vec![];
     for unit in [Unit::Platforms, Unit::Daemons] {
         for rate_hz in size::RATES {
             spinner.set_message(format!("{} at {rate_hz} Hz", unit.name()));
-            sizes.extend(size::search(rig, unit, rate_hz, effort)?);
+            sizes.extend(size::search(rig, unit, rate_hz, effort, omissions));
         }
     }
-    Ok(sizes)
+    sizes
 }
 
-fn write(measured: &Measured) -> Result<(), Failure> {
-    results::write_csv(&measured.rows)?;
-    results::write_distributions(&measured.rows)?;
-    size::write_csv(&measured.sizes, &measured.steps)?;
-    draw()
-}
-
-fn draw() -> Result<(), Failure> {
-    chart::draw()?;
-    size::draw()
+/// Files and charts of the parts that were measured.
+fn write(charts: &Charts, measured: &Measured) -> Result<(), Failure> {
+    if !measured.rows.is_empty() {
+        results::write_csv(charts, &measured.rows)?;
+        results::write_distributions(charts, &measured.rows)?;
+        chart::draw(charts)?;
+    }
+    if !measured.sizes.is_empty() {
+        size::write_csv(charts, &measured.sizes, &measured.steps)?;
+        size::draw(charts)?;
+    }
+    Ok(())
 }

@@ -2,7 +2,8 @@
 
 use super::contest::{Contestant, HISTOGRAM_NS, Round};
 use super::distribution::{Distribution, us};
-use super::support::{self, Failure};
+use super::support::Failure;
+use super::support::charts::Charts;
 
 /// Curves of the chart.
 pub const DISTRIBUTIONS: &str = "loop_latency_distribution.csv";
@@ -27,6 +28,12 @@ pub struct Row {
 impl Row {
     pub fn load(&self) -> &'static str {
         if self.loaded { "stress-ng" } else { "idle" }
+    }
+
+    /// As in a list.
+    pub fn name(&self) -> String {
+        let seen = if self.seen { " with a subscriber" } else { "" };
+        format!("{} Hz, {}, {}{seen}", self.rate_hz, self.load(), self.contestant.name())
     }
 
     /// Whether two rows are rounds of one comparison.
@@ -102,7 +109,7 @@ pub fn find(rows: &[Row], rate_hz: u32, loaded: bool, contestant: Contestant) ->
 }
 
 /// One line per row: quantiles are medians over the rounds, p9999 and max are of all rounds together.
-pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
+pub fn write_csv(charts: &Charts, rows: &[Row]) -> Result<(), Failure> {
     let names = |stem: &str| QUANTILES.map(|(quantile, _)| format!("{stem}_{quantile}_us"));
     let mut header: Vec<String> =
         ["rate_hz", "load", "contestant", "subscriber", "rounds", "cycles"].map(String::from).into();
@@ -125,7 +132,7 @@ pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
     }
     header.push("steal_ms".into());
     let header: Vec<_> = header.iter().map(String::as_str).collect();
-    support::write_csv("loop_latency.csv", &header, rows.iter().map(|row| record(row, rows)))
+    charts.write_csv("loop_latency.csv", &header, rows.iter().map(|row| record(row, rows)))
 }
 
 fn record(row: &Row, rows: &[Row]) -> Vec<String> {
@@ -173,7 +180,7 @@ pub fn ratio(row: &Row, rows: &[Row]) -> Option<f64> {
 }
 
 /// `rate_hz, load, contestant, latency_us, share_later`: the curves of the chart.
-pub fn write_distributions(rows: &[Row]) -> Result<(), Failure> {
+pub fn write_distributions(charts: &Charts, rows: &[Row]) -> Result<(), Failure> {
     let header = ["rate_hz", "load", "contestant", "latency_us", "share_later"];
     let records = rows.iter().filter(|row| !row.seen).flat_map(|row| {
         let curve = row.pooled(|round| &round.wakeup).curve();
@@ -182,5 +189,5 @@ pub fn write_distributions(rows: &[Row]) -> Result<(), Failure> {
             [row.rate_hz.to_string(), row.load().into(), row.contestant.name().into(), latency_us, share]
         })
     });
-    support::write_csv(DISTRIBUTIONS, &header, records)
+    charts.write_csv(DISTRIBUTIONS, &header, records)
 }

@@ -9,8 +9,8 @@ use hexad::config::Config;
 use hexad::realtime::process::terminate;
 use tempfile::TempDir;
 
+use super::Failure;
 use super::tools::Processors;
-use super::{Failure, tools};
 
 /// The machine that is controlled.
 const MACHINE: &str = include_str!("../../config/motion_base.toml");
@@ -47,11 +47,9 @@ pub struct Rig {
 }
 
 impl Rig {
-    pub fn new() -> Result<Self, Failure> {
-        tools::require_tools()?;
-        tools::require_realtime(PRIORITY)?;
+    pub fn new(processors: Processors) -> Result<Self, Failure> {
         let config = Config::parse(MACHINE, "config/motion_base.toml")?;
-        Ok(Self { folder: TempDir::new()?, config, processors: tools::processors()? })
+        Ok(Self { folder: TempDir::new()?, config, processors })
     }
 
     /// A file that goes away with the bench.

@@ -17,8 +17,10 @@ use super::distribution::{Distribution, us};
 use super::driver::Driver;
 use super::fleet;
 use super::rig::{Process, Release, Rig};
+use super::support::Failure;
+use super::support::charts::Charts;
+use super::support::omissions::Omissions;
 use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
-use super::support::{self, Failure, Figures, chart};
 
 const FILE: &str = "loop_size.csv";
 
@@ -27,9 +29,6 @@ pub const RATES: [u32; 2] = [1000, 4000];
 
 /// The largest size that carries is known to this factor.
 const RESOLUTION: f64 = 1.04;
-/// A search ends here, whatever carries.
-const MOST_PLATFORMS: usize = 8192;
-const MOST_DAEMONS: usize = 32;
 
 /// What a size is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,50 +78,62 @@ impl Size {
 pub struct Effort {
     pub repetitions: usize,
     pub seconds: f64,
+    /// A search ends here, whatever carries.
+    pub most_platforms: usize,
+    pub most_daemons: usize,
 }
 
-/// Doubles the size until it does not carry, then halves the gap.
-pub fn search(rig: &Rig, unit: Unit, rate_hz: u32, effort: Effort) -> Result<Vec<Size>, Failure> {
+/// Doubles the size until it does not carry, then halves the gap; ends at a size that cannot be measured.
+pub fn search(rig: &Rig, unit: Unit, rate_hz: u32, effort: Effort, omissions: &mut Omissions) -> Vec<Size> {
     let most = match unit {
-        Unit::Platforms => MOST_PLATFORMS,
-        Unit::Daemons => MOST_DAEMONS,
+        Unit::Platforms => effort.most_platforms,
+        Unit::Daemons => effort.most_daemons,
     };
     let mut sizes = vec![];
-    let (mut carried, mut count) = (0, 1);
+    let (mut carried, mut beyond) = (0, None);
     loop {
-        let size = measure(rig, unit, rate_hz, count, effort)?;
-        let carries = size.carries();
-        sizes.push(size);
-        if !carries || count == most {
-            break;
+        let count = match beyond {
+            None if carried == most => break,
+            None => (2 * carried).clamp(1, most),
+            Some(beyond) if beyond > carried + 1 && beyond as f64 > carried as f64 * RESOLUTION => {
+                usize::midpoint(carried, beyond)
+            }
+            Some(_) => break,
+        };
+        let Some(size) = measure(rig, unit, rate_hz, count, effort, omissions) else { break };
+        if size.carries() {
+            carried = count;
+        } else {
+            beyond = Some(count);
         }
-        (carried, count) = (count, (2 * count).min(most));
-    }
-    let mut beyond = count;
-    while beyond > carried + 1 && beyond as f64 > carried as f64 * RESOLUTION {
-        let middle = usize::midpoint(carried, beyond);
-        let size = measure(rig, unit, rate_hz, middle, effort)?;
-        *if size.carries() { &mut carried } else { &mut beyond } = middle;
         sizes.push(size);
     }
     sizes.sort_by_key(|size| size.count);
-    Ok(sizes)
+    sizes
 }
 
-fn measure(rig: &Rig, unit: Unit, rate_hz: u32, count: usize, effort: Effort) -> Result<Size, Failure> {
-    let context = |failure| format!("{count} {} at {rate_hz} Hz: {failure}", unit.name());
-    let busy = Distribution::default();
-    let mut size = Size { unit, rate_hz, count, busy, repetitions: effort.repetitions, carried: 0 };
+/// The repetitions that can be measured; `None` if none can.
+fn measure(
+    rig: &Rig,
+    unit: Unit,
+    rate_hz: u32,
+    count: usize,
+    effort: Effort,
+    omissions: &mut Omissions,
+) -> Option<Size> {
+    let mut size = Size { unit, rate_hz, count, busy: Distribution::default(), repetitions: 0, carried: 0 };
     for _ in 0..effort.repetitions {
         let trial = match unit {
             Unit::Platforms => fleet::trial(rig, rate_hz, count, effort.seconds),
             Unit::Daemons => daemons(rig, rate_hz, count, effort.seconds),
         };
-        let trial = trial.map_err(context)?;
+        let what = format!("{count} {} at {rate_hz} Hz", unit.name());
+        let Some(trial) = omissions.attempt(unit.name(), what, trial) else { continue };
         size.busy.merge(&trial.busy);
+        size.repetitions += 1;
         size.carried += usize::from(trial.carries);
     }
-    Ok(size)
+    Some(size).filter(|size| size.repetitions > 0)
 }
 
 /// So many daemons at once.
@@ -138,20 +149,23 @@ fn daemons(rig: &Rig, rate_hz: u32, count: usize, seconds: f64) -> Result<Trial,
         sleep(Duration::from_secs_f64(seconds));
     }
     daemons.iter_mut().for_each(Process::ask_to_stop);
-    match begun {
-        Ok(()) => {}
+    let cycles_before = match begun {
+        Ok(cycles) => cycles,
         Err(failure) if count == 1 => return Err(failure),
         // Those that run leave too little for the rest to begin.
         Err(_) => return Ok(Trial::default()),
-    }
+    };
     let period_ns = 1_000_000_000 / u64::from(rate_hz);
     let mut trial = Trial { carries: true, ..Trial::default() };
-    for (number, daemon) in daemons.iter_mut().enumerate() {
+    for (number, (daemon, before)) in daemons.iter_mut().zip(cycles_before).enumerate() {
         daemon.finish()?;
         let round = read_daemon(rig, number)?;
         let sent = round.end_to_end.count() - round.end_to_end.later_than(period_ns);
         let cycles = round.wakeup.count();
-        trial.carries &= is_rare(round.overruns, cycles) && is_rare(cycles.saturating_sub(sent), cycles);
+        // Only cycles in control have a force.
+        let in_control = cycles.saturating_sub(before);
+        trial.carries &=
+            is_rare(round.overruns, cycles) && is_rare(in_control.saturating_sub(sent), in_control);
         trial.busy.merge(&round.end_to_end);
     }
     Ok(trial)
@@ -162,27 +176,32 @@ pub fn is_rare(count: u64, cycles: u64) -> bool {
     100 * count < cycles
 }
 
-/// The largest size that carries; 0 if none does.
-pub fn largest(sizes: &[Size], unit: Unit, rate_hz: u32) -> usize {
-    let of_kind = sizes.iter().filter(|size| size.unit == unit && size.rate_hz == rate_hz);
-    let first_beyond = of_kind.clone().filter(|size| !size.carries()).map(|size| size.count).min();
-    let carried = of_kind.filter(|size| size.count < first_beyond.unwrap_or(usize::MAX));
-    carried.map(|size| size.count).max().unwrap_or(0)
+/// The largest size that carries, 0 if none does, and whether a larger one was measured; `None` if no size was.
+fn largest(sizes: &[Size], unit: Unit, rate_hz: u32) -> Option<(usize, bool)> {
+    let of_kind = || sizes.iter().filter(|size| size.unit == unit && size.rate_hz == rate_hz);
+    let most = of_kind().map(|size| size.count).max()?;
+    let first_beyond = of_kind().filter(|size| !size.carries()).map(|size| size.count).min();
+    let carried =
+        of_kind().map(|size| size.count).filter(|count| *count < first_beyond.unwrap_or(usize::MAX));
+    let largest = carried.max().unwrap_or(0);
+    Some((largest, largest < most))
 }
 
 pub fn print(sizes: &[Size]) {
     println!("\nlargest size that most repetitions carry");
     for unit in [Unit::Platforms, Unit::Daemons] {
         for rate_hz in RATES {
-            println!("{rate_hz:>6} Hz: {} {}", largest(sizes, unit, rate_hz), unit.name());
+            let Some((count, is_largest)) = largest(sizes, unit, rate_hz) else { continue };
+            let at_least = if is_largest { "" } else { "at least " };
+            println!("{rate_hz:>6} Hz: {at_least}{count} {}", unit.name());
         }
     }
 }
 
 /// `unit, rate_hz, count, cycles, busy_p50_us, busy_p99_us, busy_max_us, repetitions, repetitions_carried`
 ///
-/// The first row is a single step of one controller, outside of a loop.
-pub fn write_csv(sizes: &[Size], steps: &Distribution) -> Result<(), Failure> {
+/// The first row is a single step of one controller, outside of a loop, if it was measured.
+pub fn write_csv(charts: &Charts, sizes: &[Size], steps: &Distribution) -> Result<(), Failure> {
     let header = [
         "unit",
         "rate_hz",
@@ -202,11 +221,12 @@ pub fn write_csv(sizes: &[Size], steps: &Distribution) -> Result<(), Failure> {
             [unit.into(), rate_hz, count.to_string()].into_iter().chain(times).chain(repetitions)
         };
     let step = record("Controller::step", String::new(), 1, steps, ["1".into(), String::new()]);
+    let step = Some(step).filter(|_| steps.count() > 0);
     let sizes = sizes.iter().map(|size| {
         let Size { unit, rate_hz, count, busy, repetitions, carried } = size;
         record(unit.name(), rate_hz.to_string(), *count, busy, [repetitions, carried].map(usize::to_string))
     });
-    support::write_csv(FILE, &header, [step].into_iter().chain(sizes))
+    charts.write_csv(FILE, &header, step.into_iter().chain(sizes))
 }
 
 /// What the chart needs of a row. The step of one controller has no rate.
@@ -230,8 +250,8 @@ impl Figure {
 type Quantile = fn(&Figure) -> f64;
 
 /// Busy time of a cycle against the number of platforms, with the periods as bounds.
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Figure>::read(FILE)?;
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Figure>(FILE)?;
     let of_rate = |rate_hz: u32| {
         let of_unit = figures.rows.iter().filter(|row| row.unit == Unit::Platforms.name());
         of_unit.filter(move |row| row.rate_hz == Some(rate_hz))
@@ -255,18 +275,21 @@ pub fn draw() -> Result<(), Failure> {
             label: Label::None,
         }));
     }
-    let mut charts = vec![Scatter {
+    let mut drawn = vec![Scatter {
         x_label: "platforms",
         y_label: "wake-up to output [µs]",
         points,
         lines,
         ..Scatter::default()
     }];
-    fit_ranges(&mut charts, true);
-    let sizes = RATES.map(|rate_hz| {
+    fit_ranges(&mut drawn, true);
+    let sizes = RATES.into_iter().filter_map(|rate_hz| {
+        let most = of_rate(rate_hz).last()?.count;
         let carried = of_rate(rate_hz).take_while(|row| row.carries()).last().map_or(0, |row| row.count);
-        format!("{carried} at {} kHz", rate_hz / 1000)
+        let at_least = if carried == most { "at least " } else { "" };
+        Some(format!("{at_least}{carried} at {} kHz", rate_hz / 1000))
     });
+    let sizes: Vec<_> = sizes.collect();
     let title = format!("Platforms driven by one loop on one processor: {}", sizes.join(", "));
     let legend = vec![
         (Sample::Line(LineStyle::Solid, Width::Curve, 0), "1 kHz, median"),
@@ -276,6 +299,7 @@ pub fn draw() -> Result<(), Failure> {
         (Sample::Mark(Mark::Ring, 0), "overruns in most runs"),
         (Sample::Line(LineStyle::Dashed, Width::Curve, 0), "period"),
     ];
-    Grid { title: &figures.titled(&title), legend, columns: 1, charts }.write_svg(&chart("loop_size.svg"))?;
+    Grid { title: &figures.titled(&title), legend, columns: 1, charts: drawn }
+        .write_svg(&charts.path("loop_size.svg"))?;
     Ok(())
 }

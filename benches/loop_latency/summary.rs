@@ -22,11 +22,18 @@ pub fn print(measured: &Measured) {
     print_wakeups(rows);
     print_seen(rows);
     let (p50, p99) = (us(steps.quantile(0.5)), us(steps.quantile(0.99)));
-    println!("\nController::step, one after the other [us]: p50 {p50:.2}, p99 {p99:.2}");
-    let calls: Vec<_> = calls.iter().map(|(name, count)| format!("{count} {name}")).collect();
-    println!("system calls of the real-time thread in a second at 1 kHz: {}", calls.join(", "));
+    if steps.count() > 0 {
+        println!("\nController::step, one after the other [us]: p50 {p50:.2}, p99 {p99:.2}");
+    }
+    if !calls.is_empty() {
+        let calls: Vec<_> = calls.iter().map(|(name, count)| format!("{count} {name}")).collect();
+        println!("system calls of the real-time thread in a second at 1 kHz: {}", calls.join(", "));
+    }
     size::print(sizes);
-    print_goals(rows, p50);
+    print_goals(rows);
+    if steps.count() > 0 {
+        println!("  {} Controller::step: p50 {p50:.2} us", verdict(p50 <= STEP_US));
+    }
 }
 
 fn print_wakeups(rows: &[Row]) {
@@ -78,14 +85,14 @@ fn p50_us(row: &Row, pick: fn(&Round) -> &Distribution) -> f64 {
     row.quantile_us(pick, 0.5).unwrap_or(f64::NAN)
 }
 
-fn print_goals(rows: &[Row], step_p50_us: f64) {
+fn print_goals(rows: &[Row]) {
     println!("\ngoals");
     let of =
         |release| rows.iter().filter(move |row| row.contestant == Contestant::Hexad(release) && !row.seen);
     for row in of(Release::Sleep) {
-        let ratio = ratio(row, rows).unwrap_or(f64::NAN);
-        let best = find(rows, row.rate_hz, row.loaded, Contestant::Cyclictest).map(Row::best_p99_us);
-        let best_ratio = row.best_p99_us() / best.unwrap_or(f64::NAN);
+        let Some(theirs) = find(rows, row.rate_hz, row.loaded, Contestant::Cyclictest) else { continue };
+        let ratio = row.p99_us() / theirs.p99_us();
+        let best_ratio = row.best_p99_us() / theirs.best_p99_us();
         let what = format!("p99 {ratio:.2} x cyclictest's, in the best rounds {best_ratio:.2} x");
         say(ratio <= SLEEP_OVER_CYCLICTEST, row, &what);
     }
@@ -104,7 +111,6 @@ fn print_goals(rows: &[Row], step_p50_us: f64) {
         let after_us = p50_us(row, |round| &round.visible) - p50_us(row, |round| &round.wakeup);
         say(after_us <= VISIBLE_US, row, &format!("visible {after_us:.2} us after wake-up"));
     }
-    println!("  {} Controller::step: p50 {step_p50_us:.2} us", verdict(step_p50_us <= STEP_US));
 }
 
 fn say(holds: bool, row: &Row, what: &str) {

@@ -1,15 +1,53 @@
 //! What the bench needs of the system: tools, processors, the right to real time.
 
-use std::{env, fs, thread};
+use std::process::{Command, Stdio};
+use std::{fs, thread};
 
 use hexad::realtime::setup::cpus::Cpus;
 use hexad::realtime::setup::scheduling;
 
 use super::Failure;
 
-/// Command and the Debian package it is in.
-const TOOLS: [(&str, &str); 3] =
-    [("cyclictest", "rt-tests"), ("stress-ng", "stress-ng"), ("strace", "strace")];
+/// Program that measures or loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tool {
+    Cyclictest,
+    StressNg,
+    Strace,
+}
+
+impl Tool {
+    pub const ALL: [Self; 3] = [Self::Cyclictest, Self::StressNg, Self::Strace];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cyclictest => "cyclictest",
+            Self::StressNg => "stress-ng",
+            Self::Strace => "strace",
+        }
+    }
+
+    /// Its Debian package.
+    pub fn package(self) -> &'static str {
+        if self == Self::Cyclictest { "rt-tests" } else { self.name() }
+    }
+
+    /// What is not measured without it.
+    pub fn part(self) -> &'static str {
+        match self {
+            Self::Cyclictest => "rounds of cyclictest",
+            Self::StressNg => "rounds under load",
+            Self::Strace => "system calls of the real-time thread",
+        }
+    }
+
+    /// Whether it can be started.
+    pub fn is_there(self) -> bool {
+        let mut command = Command::new(self.name());
+        command.arg("--help").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+        command.status().is_ok()
+    }
+}
 
 /// The processors of the bench.
 #[derive(Clone, Debug)]
@@ -22,21 +60,6 @@ pub struct Processors {
     pub helpers: usize,
     /// Of the polling subscriber: one of its own, or where there are only two that of the helpers.
     pub subscriber: usize,
-}
-
-/// Every tool, or which are missing and how to get them.
-pub fn require_tools() -> Result<(), Failure> {
-    let path = env::var("PATH").unwrap_or_default();
-    let is_there = |tool: &str| env::split_paths(&path).any(|folder| folder.join(tool).is_file());
-    let missing: Vec<_> = TOOLS.into_iter().filter(|(tool, _)| !is_there(tool)).collect();
-    if missing.is_empty() {
-        return Ok(());
-    }
-    let list = |pick: fn(&(&'static str, &'static str)) -> &'static str, between: &str| {
-        missing.iter().map(pick).collect::<Vec<_>>().join(between)
-    };
-    let (tools, packages) = (list(|it| it.0, ", "), list(|it| it.1, " "));
-    Err(format!("missing: {tools}; install with: apt-get install {packages}").into())
 }
 
 /// The right to FIFO priority, tried in a thread that then ends.

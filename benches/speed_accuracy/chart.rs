@@ -11,9 +11,10 @@ use serde::Deserialize;
 
 use super::methods::BASELINE;
 use super::results::{FILE, PAPER};
+use super::support::Failure;
+use super::support::charts::Charts;
 use super::support::log_axis::log_range;
 use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, pareto_front};
-use super::support::{Failure, Figures, chart};
 
 const HEXAD: usize = 0;
 const DENSE: usize = 2;
@@ -53,8 +54,8 @@ enum Side {
     Flag,
 }
 
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Row>::read(FILE)?;
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Row>(FILE)?;
     let rows = &figures.rows;
     let items = items(rows);
     let (mut points, mut lines) = (vec![], vec![]);
@@ -87,7 +88,7 @@ pub fn draw() -> Result<(), Failure> {
     ];
     let times = log_range(points.iter().map(|point| point.at.0));
     let errors = log_range(points.iter().map(|point| point.at.1));
-    let charts = vec![Scatter {
+    let drawn = vec![Scatter {
         title: "",
         x_label: "time of one evaluation, one core [ns]",
         y_label: "largest error of a force / largest force",
@@ -97,7 +98,8 @@ pub fn draw() -> Result<(), Failure> {
         lines,
     }];
     let title = figures.titled("Inverse dynamics of a hexapod: time and error of one evaluation");
-    Grid { title: &title, legend, columns: 1, charts }.write_svg(&chart("speed_accuracy.svg"))?;
+    Grid { title: &title, legend, columns: 1, charts: drawn }
+        .write_svg(&charts.path("speed_accuracy.svg"))?;
     Ok(())
 }
 

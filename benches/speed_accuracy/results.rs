@@ -2,7 +2,8 @@
 
 use super::peers::PEERS;
 use super::scenes::{Errors, Pace};
-use super::support::{self, Failure};
+use super::support::Failure;
+use super::support::charts::Charts;
 use super::timing::Samples;
 
 pub const FILE: &str = "speed_accuracy.csv";
@@ -28,7 +29,7 @@ impl Row {
 }
 
 /// `method, isa, scene, ns_median, ns_latency, error_max_rel, error_rms_rel`
-pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
+pub fn write_csv(charts: &Charts, rows: &[Row]) -> Result<(), Failure> {
     let header = ["method", "isa", "scene", "ns_median", "ns_latency", "error_max_rel", "error_rms_rel"];
     let records = rows.iter().map(|row| {
         let Errors { max, rms } = row.errors;
@@ -37,7 +38,7 @@ pub fn write_csv(rows: &[Row]) -> Result<(), Failure> {
         let errors = [max, rms].map(|error| format!("{error:.2e}"));
         [method, isa, scene].into_iter().chain(times).chain(errors)
     });
-    support::write_csv(FILE, &header, records)
+    charts.write_csv(FILE, &header, records)
 }
 
 /// How many times longer the peers take than the exact model on the same inputs.

@@ -6,13 +6,13 @@ use hexad::output::charts::{LineStyle, Panel, Series, write_svg};
 
 use super::speed::newton;
 use super::support::provenance;
-use super::{Failure, MACHINES, cells, chart, common, write_csv};
+use super::{Charts, Failure, MACHINES, cells, common};
 
 const RATES_HZ: [f64; 2] = [1000.0, 250.0];
 /// Length of the motion \[s\].
 const SECONDS: f64 = 4.0;
 
-pub fn run() -> Result<(), Failure> {
+pub fn run(charts: &Charts) -> Result<(), Failure> {
     let (mut rows, mut lines) = (vec![], vec![]);
     for name in MACHINES {
         let machine = common::machine(name);
@@ -36,7 +36,8 @@ pub fn run() -> Result<(), Failure> {
             lines.push(points);
         }
     }
-    write_csv("stability_one_step.csv", &["machine", "rate_hz", "position_rms_m", "position_max_m"], &rows)?;
+    let header = ["machine", "rate_hz", "position_rms_m", "position_max_m"];
+    charts.write_csv("stability_one_step.csv", &header, &rows)?;
     let labels = RATES_HZ.map(|rate_hz| format!("{rate_hz} Hz"));
     let y_labels = MACHINES.map(|name| format!("{name} [µm]"));
     let panels = lines.chunks(RATES_HZ.len()).zip(&y_labels).map(|(of_machine, y_label)| Panel {
@@ -50,6 +51,6 @@ pub fn run() -> Result<(), Failure> {
     });
     let title = "Position error of one step of Newton's method per cycle, built-in sines";
     let title = format!("{title}\n{}", provenance());
-    write_svg(&chart("stability_one_step.svg"), &title, "time [s]", &panels.collect::<Vec<_>>())?;
+    write_svg(&charts.path("stability_one_step.svg"), &title, "time [s]", &panels.collect::<Vec<_>>())?;
     Ok(())
 }

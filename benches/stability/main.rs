@@ -24,23 +24,32 @@ mod support;
 #[path = "../speed_accuracy/timing.rs"]
 mod timing;
 
-use common::stability::{delayed, rivals, trials};
+use std::process::ExitCode;
 
-use support::{Failure, cells, chart, write_csv};
+use clap::Parser;
+
+use common::stability::{delayed, rivals, trials};
+use support::charts::Charts;
+use support::{ChartArguments, Failure, cells, exit_code};
 
 /// The machines that are looked at.
 const MACHINES: [&str; 3] = ["fried2008", "tsai2000", "motion_base"];
 
-fn main() -> Result<(), Failure> {
-    let has = |flag: &str| std::env::args().any(|argument| argument == flag);
-    if !has("--redraw") {
-        speed::run()?;
-        sampled::run()?;
-        maps::run(if has("--quick") { 20 } else { 1 })?;
+fn main() -> ExitCode {
+    exit_code(run(&ChartArguments::parse()))
+}
+
+fn run(arguments: &ChartArguments) -> Result<(), Failure> {
+    let charts = arguments.charts();
+    let quick = arguments.extent.is_quick();
+    if !arguments.redraw {
+        speed::run(&charts, quick)?;
+        sampled::run(&charts, quick)?;
+        maps::run(&charts, if quick { 100 } else { 1 })?;
     }
     // Takes no time, and its file has not all that is drawn.
-    cycles::run()?;
-    speed::draw()?;
-    sampled::draw()?;
-    maps::draw()
+    cycles::run(&charts)?;
+    speed::draw(&charts)?;
+    sampled::draw(&charts)?;
+    maps::draw(&charts)
 }

@@ -5,9 +5,8 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 use super::rivals::Update;
-use super::support::Figures;
 use super::trials::{End, Method, ambiguous, pose, step, trial, within_reach};
-use super::{Failure, MACHINES, cells, chart, common, write_csv};
+use super::{Charts, Failure, MACHINES, cells, common};
 
 /// Largest angle of the poses from home on every axis \[deg\].
 const ANGLES_DEG: [u32; 12] = [5, 10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60];
@@ -20,7 +19,7 @@ const METHODS: [(&str, Method); 3] = [
     ("Newton on Bryan angles", Method::Rival(Update::Angles)),
 ];
 
-pub fn run(fewer: u64) -> Result<(), Failure> {
+pub fn run(charts: &Charts, fewer: u64) -> Result<(), Failure> {
     let mut rows = vec![];
     for name in MACHINES {
         let machine = common::machine(name);
@@ -47,7 +46,7 @@ pub fn run(fewer: u64) -> Result<(), Failure> {
         }
     }
     let header = ["machine", "method", "angle_deg", "reachable_poses", "right", "failed", "wrong"];
-    write_csv(FILE, &header, &rows)?;
+    charts.write_csv(FILE, &header, &rows)?;
     million(fewer)
 }
 
@@ -64,8 +63,8 @@ struct Figure {
 type Share = fn(&Figure) -> f64;
 
 /// Share of failed and of wrong poses against the angle: two panels per machine, a line per method.
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Figure>::read(FILE)?;
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Figure>(FILE)?;
     let shares: [(&str, Share); 2] = [("failed", |row| row.failed), ("wrong", |row| row.wrong)];
     let mut drawn = vec![];
     for machine in figures.rows.chunk_by(|a, b| a.machine == b.machine) {
@@ -87,7 +86,7 @@ pub fn draw() -> Result<(), Failure> {
     });
     let title = figures.titled("Poses that are not found from home, within reach without a singular pose");
     let panels: Vec<_> = panels.collect();
-    write_svg(&chart("stability_maps.svg"), &title, "largest angle on every axis [deg]", &panels)?;
+    write_svg(&charts.path("stability_maps.svg"), &title, "largest angle on every axis [deg]", &panels)?;
     Ok(())
 }
 

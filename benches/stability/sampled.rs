@@ -6,15 +6,15 @@ use rayon::prelude::*;
 use serde::Deserialize;
 
 use super::delayed::boundary;
-use super::support::Figures;
-use super::{Failure, cells, chart, common, write_csv};
+use super::{Charts, Failure, cells, common};
 
 const FILE: &str = "stability_sampled.csv";
 
 /// In periods.
 const MAX_DELAY_PERIODS: u32 = 2;
-/// Points per period: of the simulation, and of the line.
+/// Points per period: of the simulation, of a quick one, and of the line.
 const FOUND: u32 = 4;
+const QUICK_FOUND: u32 = 1;
 const PREDICTED: u32 = 100;
 
 const DAMPING_RATIOS: [f64; 4] = [0.3, 0.7, 1.0, 2.0];
@@ -44,13 +44,13 @@ fn loops() -> Vec<SampledLoop> {
     dampings.into_iter().chain(masses).collect()
 }
 
-pub fn run() -> Result<(), Failure> {
+pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
     let mut config = common::deployed("fried2008");
     config.machine.gravity.fill(0.0);
     let mut rows = vec![];
     for sampled in loops() {
         let SampledLoop { damping_ratio, mass_ratio, .. } = sampled;
-        let found: Vec<At> = delays(FOUND)
+        let found: Vec<At> = delays(if quick { QUICK_FOUND } else { FOUND })
             .into_par_iter()
             .map(|delay| (delay, boundary(&config, &SampledLoop { delay, ..sampled })))
             .collect();
@@ -68,7 +68,7 @@ pub fn run() -> Result<(), Failure> {
         }
     }
     let header = ["damping_ratio", "mass_ratio", "delay_periods", "wn_t_predicted", "wn_t_simulated"];
-    write_csv(FILE, &header, &rows)
+    charts.write_csv(FILE, &header, &rows)
 }
 
 /// What the chart needs of a row.
@@ -79,10 +79,10 @@ struct Figure {
 }
 
 /// Predicted limits as lines, simulated ones as diamonds.
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Figure>::read(FILE)?;
-    let found: Vec<_> = figures.rows.chunks(delays(FOUND).len()).collect();
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Figure>(FILE)?;
     let loops = loops();
+    let found: Vec<_> = figures.rows.chunks((figures.rows.len() / loops.len()).max(1)).collect();
     let (dampings, masses) = loops.split_at(DAMPING_RATIOS.len());
     let (found_of_dampings, found_of_masses) = found.split_at(DAMPING_RATIOS.len());
     let panels = [
@@ -104,7 +104,7 @@ pub fn draw() -> Result<(), Failure> {
     });
     let title = figures.titled("Stability limit of the sampled loop: lines predicted, diamonds simulated");
     let x_label = "from measurement to force [periods]";
-    write_svg(&chart("stability_sampled.svg"), &title, x_label, &panels.collect::<Vec<_>>())?;
+    write_svg(&charts.path("stability_sampled.svg"), &title, x_label, &panels.collect::<Vec<_>>())?;
     Ok(())
 }
 

@@ -12,11 +12,10 @@ use nalgebra::{Vector3, Vector6};
 use serde::Deserialize;
 
 use super::rivals::Update;
-use super::support::Figures;
 use super::support::scatter::{Grid, Label, Line, Mark, Point, Sample, Scatter, Width, fit_ranges};
 use super::timing::{Samples, sample};
 use super::trials::{pose, rigid};
-use super::{Failure, MACHINES, cells, chart, common, rivals, write_csv};
+use super::{Charts, Failure, MACHINES, cells, common, rivals};
 
 const FILE: &str = "stability_speed.csv";
 
@@ -27,6 +26,7 @@ const TURN: f64 = 0.2 * core::f64::consts::PI / 180.0;
 
 const MOST_STEPS: u32 = 4;
 const ROUNDS: usize = 31;
+const QUICK_ROUNDS: usize = 3;
 const SAMPLE_S: f64 = 1e-3;
 const POSES: u64 = 100;
 /// Errors below this are rounding: where the chart ends.
@@ -78,7 +78,8 @@ struct Row {
     error: f64,
 }
 
-pub fn run() -> Result<(), Failure> {
+pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
+    let rounds = if quick { QUICK_ROUNDS } else { ROUNDS };
     let mut rows = vec![];
     for name in MACHINES {
         let machine = common::machine(name);
@@ -91,7 +92,7 @@ pub fn run() -> Result<(), Failure> {
                 });
                 let error = errors.fold(0.0, f64::max);
                 let mut samples = Samples::default();
-                for _ in 0..ROUNDS {
+                for _ in 0..rounds {
                     samples
                         .take(cases.len(), SAMPLE_S, |passes, fenced| sample(&cases, passes, fenced, find));
                 }
@@ -130,7 +131,7 @@ pub fn run() -> Result<(), Failure> {
             cells([&row.machine, &row.method, &row.start, &ns, &error])
         })
         .collect();
-    write_csv(FILE, &["machine", "method", "start", "ns_fenced", "error_max_m"], &table)
+    charts.write_csv(FILE, &["machine", "method", "start", "ns_fenced", "error_max_m"], &table)
 }
 
 /// What the chart needs of a row.
@@ -144,8 +145,8 @@ struct Figure {
 }
 
 /// The motion base: a line per start, a point per step.
-pub fn draw() -> Result<(), Failure> {
-    let figures = Figures::<Figure>::read(FILE)?;
+pub fn draw(charts: &Charts) -> Result<(), Failure> {
+    let figures = charts.read::<Figure>(FILE)?;
     let of = |start: &str, is_found: &dyn Fn(&str) -> bool| -> Vec<(f64, f64)> {
         let rows = figures.rows.iter().filter(|row| row.machine == "motion_base" && row.start == start);
         let rows = rows.filter(|row| is_found(&row.method));
@@ -169,15 +170,16 @@ pub fn draw() -> Result<(), Failure> {
         .collect();
     legend.push((Sample::Mark(Mark::Ring, 2), "hexad, factorization included"));
     legend.push((Sample::Mark(Mark::Disc, 2), "alone at the right: updates of Bryan angles"));
-    let mut charts = vec![Scatter {
+    let mut drawn = vec![Scatter {
         x_label: "time, one thread [ns]",
         y_label: "largest error [m]",
         points,
         lines,
         ..Scatter::default()
     }];
-    fit_ranges(&mut charts, true);
+    fit_ranges(&mut drawn, true);
     let title = figures.titled("Forward kinematics: error of the pose against time, motion base");
-    Grid { title: &title, legend, columns: 1, charts }.write_svg(&chart("stability_speed.svg"))?;
+    Grid { title: &title, legend, columns: 1, charts: drawn }
+        .write_svg(&charts.path("stability_speed.svg"))?;
     Ok(())
 }

@@ -1,29 +1,73 @@
-//! Figures of a run as a CSV file, and the charts that are drawn from it.
+//! What the benches share: arguments, files of figures and charts, and what could not be measured.
 //!
 //! A bench measures, writes `benches/charts/NAME.csv` and draws `NAME.svg` from that file. With `-- --redraw` it only
-//! draws.
+//! draws. With `-- --quick`, and where `cargo bench` does not start it, it exercises every part once within 20 s and leaves
+//! `benches/charts` as it is.
 
 #![allow(dead_code, reason = "each bench uses a part")]
 
+pub mod charts;
 pub mod log_axis;
+pub mod omissions;
 pub mod scatter;
 
 use std::error::Error;
 use std::fmt::Display;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitCode};
 use std::thread::available_parallelism;
 
-use hexad::output::files::write_whole;
-use serde::de::DeserializeOwned;
+use clap::{Args, Parser};
+
+use charts::Charts;
 
 /// Anything that ends a bench.
 pub type Failure = Box<dyn Error + Send + Sync>;
 
-/// Path of a file in `benches/charts`.
-pub fn chart(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/charts").join(name)
+/// Arguments of every bench.
+#[derive(Args)]
+pub struct Extent {
+    /// Exercises every part once, within 20 s; changes no file in benches/charts.
+    #[arg(long)]
+    quick: bool,
+    /// What `cargo bench` adds.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+impl Extent {
+    /// Whether the run is quick; without `cargo bench` every run is, as its build may be another.
+    pub fn is_quick(&self) -> bool {
+        self.quick || !self.bench
+    }
+}
+
+/// Measures, and draws charts of the figures.
+#[derive(Parser)]
+pub struct ChartArguments {
+    #[command(flatten)]
+    pub extent: Extent,
+    /// Measures nothing and draws the charts from the CSV files.
+    #[arg(long, conflicts_with = "quick")]
+    pub redraw: bool,
+}
+
+impl ChartArguments {
+    /// Where the run writes and draws.
+    pub fn charts(&self) -> Charts {
+        if self.redraw { Charts::published() } else { Charts::of_run(self.extent.is_quick()) }
+    }
+}
+
+/// Prints the failure that ended a bench, if one did.
+pub fn exit_code(outcome: Result<(), Failure>) -> ExitCode {
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("{failure}");
+            ExitCode::FAILURE
+        }
+    }
 }
 
 /// Date, commit, processor and compiler of a run, as one line.
@@ -45,45 +89,6 @@ pub fn provenance() -> String {
     let model = model.map_or_else(|| unknown("processor"), |(_, model)| model.trim().to_owned());
     let processors = available_parallelism().map_or(0, usize::from);
     format!("{date}, {commit}{changed}, {processors} x {model}, {compiler}")
-}
-
-/// Writes a CSV file; its first line is a comment, the provenance.
-pub fn write_csv<R>(name: &str, header: &[&str], rows: impl IntoIterator<Item = R>) -> Result<(), Failure>
-where
-    R: IntoIterator<Item: AsRef<[u8]>>,
-{
-    let mut csv = csv::Writer::from_writer(format!("# {}\n", provenance()).into_bytes());
-    csv.write_record(header)?;
-    for row in rows {
-        csv.write_record(row)?;
-    }
-    let path = chart(name);
-    fs::create_dir_all(chart(""))?;
-    write_whole(&path, &csv.into_inner()?)?;
-    println!("written: {}", path.display());
-    Ok(())
-}
-
-/// Figures of a run, read back from their file.
-pub struct Figures<T> {
-    provenance: Option<String>,
-    pub rows: Vec<T>,
-}
-
-impl<T: DeserializeOwned> Figures<T> {
-    /// Rows of `benches/charts/NAME`; fields are found by the names of their columns.
-    pub fn read(name: &str) -> Result<Self, Failure> {
-        let text = fs::read_to_string(chart(name)).map_err(|error| format!("{name}: {error}"))?;
-        let provenance = text.lines().next().and_then(|line| line.strip_prefix("# ")).map(String::from);
-        let mut csv = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(text.as_bytes());
-        Ok(Self { provenance, rows: csv.deserialize().collect::<Result<_, _>>()? })
-    }
-
-    /// A title with the provenance as its subtitle.
-    pub fn titled(&self, title: &str) -> String {
-        let lines: Vec<_> = [title].into_iter().chain(self.provenance.as_deref()).collect();
-        lines.join("\n")
-    }
 }
 
 /// Cells of a row.
