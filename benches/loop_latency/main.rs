@@ -79,14 +79,20 @@ const FULL: Plan = Plan {
     seen_rates: &[1000, 4000],
     rounds: 5,
     seconds: 2.0,
-    sizes: Effort { repetitions: 3, seconds: 0.5, most_platforms: 8192, most_daemons: 32 },
+    sizes: Effort {
+        rates: &size::RATES,
+        repetitions: 3,
+        seconds: 0.5,
+        most_platforms: 8192,
+        most_daemons: 32,
+    },
 };
 const QUICK: Plan = Plan {
     rates: &[1000],
     seen_rates: &[1000],
     rounds: 1,
     seconds: 0.2,
-    sizes: Effort { repetitions: 1, seconds: 0.1, most_platforms: 128, most_daemons: 2 },
+    sizes: Effort { rates: &[1000], repetitions: 1, seconds: 0.1, most_platforms: 128, most_daemons: 2 },
 };
 
 /// Everything that was measured.
@@ -219,9 +225,9 @@ fn surroundings(rig: &Rig, row: &Row) -> Result<(Option<Load>, Driver), Failure>
 fn sizes(rig: &Rig, effort: Effort, spinner: &ProgressBar, omissions: &mut Omissions) -> Vec<Size> {
     let mut sizes = vec![];
     for unit in [Unit::Platforms, Unit::Daemons] {
-        for rate_hz in size::RATES {
+        for rate_hz in effort.rates {
             spinner.set_message(format!("{} at {rate_hz} Hz", unit.name()));
-            sizes.extend(size::search(rig, unit, rate_hz, effort, omissions));
+            sizes.extend(size::search(rig, unit, *rate_hz, effort, omissions));
         }
     }
     sizes

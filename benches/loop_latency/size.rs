@@ -76,6 +76,8 @@ impl Size {
 /// How much to try.
 #[derive(Clone, Copy)]
 pub struct Effort {
+    /// Some of [`RATES`].
+    pub rates: &'static [u32],
     pub repetitions: usize,
     pub seconds: f64,
     /// A search ends here, whatever carries.

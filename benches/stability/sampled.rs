@@ -12,10 +12,11 @@ const FILE: &str = "stability_sampled.csv";
 
 /// In periods.
 const MAX_DELAY_PERIODS: u32 = 2;
-/// Points per period: of the simulation, of a quick one, and of the line.
+/// Points per period: of the simulation, and of the line.
 const FOUND: u32 = 4;
-const QUICK_FOUND: u32 = 1;
 const PREDICTED: u32 = 100;
+/// The one delay of a quick run.
+const QUICK_DELAY: f64 = 1.0;
 
 const DAMPING_RATIOS: [f64; 4] = [0.3, 0.7, 1.0, 2.0];
 /// Of the platform over that of the model. With the estimator as fast as the loop, no gain is stable below 0.4 and above 2.8.
@@ -47,12 +48,13 @@ fn loops() -> Vec<SampledLoop> {
 pub fn run(charts: &Charts, quick: bool) -> Result<(), Failure> {
     let mut config = common::deployed("fried2008");
     config.machine.gravity.fill(0.0);
+    let delays = if quick { vec![QUICK_DELAY] } else { delays(FOUND) };
     let mut rows = vec![];
     for sampled in loops() {
         let SampledLoop { damping_ratio, mass_ratio, .. } = sampled;
-        let found: Vec<At> = delays(if quick { QUICK_FOUND } else { FOUND })
-            .into_par_iter()
-            .map(|delay| (delay, boundary(&config, &SampledLoop { delay, ..sampled })))
+        let found: Vec<At> = delays
+            .par_iter()
+            .map(|delay| (*delay, boundary(&config, &SampledLoop { delay: *delay, ..sampled })))
             .collect();
         let mut worst = 0.0_f64;
         for (delay, found) in &found {
