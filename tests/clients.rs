@@ -16,7 +16,6 @@ mod clients {
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{self, Command};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
 
@@ -28,12 +27,6 @@ fn file(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("clients");
     fs::create_dir_all(&folder).unwrap();
     folder.join(name)
-}
-
-/// Held by a test that builds, or that runs drivers in real time.
-fn turn() -> MutexGuard<'static, ()> {
-    static TURN: Mutex<()> = Mutex::new(());
-    TURN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A daemon of the machine of the paper under another name, with more sections in its file. It runs.

@@ -5,16 +5,18 @@ use std::fs;
 use std::panic::{catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{self, Command};
+use std::sync::OnceLock;
+use std::thread::{scope, sleep};
 use std::time::Duration;
 
 use hexad::messages::{Bus, MeasuredMessage};
 
-use crate::common::libhexad::{prefix, repository, with_library};
+use crate::common::libhexad::{built, prefix, repository, with_library};
 use crate::common::not_run::lacking;
 use crate::common::process::Process;
 use crate::common::python::output;
 use crate::common::stalls::Watchdog;
-use crate::{file, start_daemon, turn};
+use crate::{file, start_daemon};
 
 /// What a run does not survive, half of the drivers' watchdog, and how often it is tried.
 const HELD: Duration = Duration::from_millis(10);
@@ -50,6 +52,12 @@ fn made(compiler: &str) -> PathBuf {
     folder
 }
 
+/// Both examples by the usual compiler.
+fn made_by_cc() -> &'static Path {
+    static MADE: OnceLock<PathBuf> = OnceLock::new();
+    MADE.get_or_init(|| made("cc"))
+}
+
 /// Both examples as C++.
 fn made_as_cpp() -> PathBuf {
     let folder = copied("cpp");
@@ -63,15 +71,6 @@ fn made_as_cpp() -> PathBuf {
     folder
 }
 
-/// The example in Rust.
-fn built_example() -> PathBuf {
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.current_dir(repository()).args(["build", "--release", "--quiet", "--example", "driver"]);
-    output(cargo.env("CARGO_TARGET_DIR", target)).unwrap();
-    target.join("release/examples/driver")
-}
-
 fn is_installed(tool: &str) -> bool {
     let found = Command::new(tool).arg("--version").output().is_ok();
     if !found {
@@ -82,7 +81,6 @@ fn is_installed(tool: &str) -> bool {
 
 #[test]
 fn the_examples_build_with_clang_and_cmake() {
-    let _turn = turn();
     if is_installed("clang") {
         made("clang");
     }
@@ -98,7 +96,6 @@ fn the_examples_build_with_clang_and_cmake() {
 
 #[test]
 fn a_driver_links_with_the_static_library() {
-    let _turn = turn();
     let (folder, prefix) = (copied("static"), prefix());
     let mut compiler = Command::new("cc");
     compiler
@@ -110,7 +107,7 @@ fn a_driver_links_with_the_static_library() {
     output(compiler.args(libraries.split(' '))).unwrap();
     let needed = output(Command::new("readelf").arg("-d").arg(folder.join("driver"))).unwrap();
     assert!(!needed.contains("libhexad"), "{needed}");
-    controls("static", || Command::new(folder.join("driver")), &made("cc").join("setpoint_source"));
+    controls("static", || Command::new(folder.join("driver")), &made_by_cc().join("setpoint_source"));
 }
 
 /// A run of the daemon with a driver and a setpoint source: largest length of a leg beyond home \[m\].
@@ -135,7 +132,7 @@ fn run(label: &str, driver: Command, source: &Path) -> f64 {
             let MeasuredMessage { drive_valid, drive_enabled, brake_open, .. } = message;
             reported = (drive_valid, drive_enabled.max(reported.1), brake_open.max(reported.2));
         }
-        std::thread::sleep(Duration::from_millis(1));
+        sleep(Duration::from_millis(1));
     }
     source.ends_well();
     // It stands; without a source control ends, and the driver closes the brakes.
@@ -174,18 +171,27 @@ fn controls(label: &str, driver: impl Fn() -> Command + std::panic::RefUnwindSaf
     }
 }
 
+/// A program below the priorities of the daemon, as the head of the example says; an ordinary one where that is not permitted.
+fn with_priority(program: &Path) -> Command {
+    let prefix = ["-f", "70"];
+    let is_permitted = Command::new("chrt").args(prefix).arg("true").status().is_ok_and(|it| it.success());
+    let mut command = Command::new(if is_permitted { "chrt" } else { "env" });
+    command.args(prefix.iter().filter(|_| is_permitted)).arg(program);
+    command
+}
+
 #[test]
 fn drivers_in_every_language_control_the_platform() {
-    let _turn = turn();
-    let (c, cpp) = (made("cc"), made_as_cpp());
-    controls("c", || Command::new(c.join("driver")), &cpp.join("setpoint_source"));
-    controls("cpp", || Command::new(cpp.join("driver")), &c.join("setpoint_source"));
-    let rust = built_example();
-    controls("rust", || Command::new(&rust), &c.join("setpoint_source"));
+    let (c, cpp, rust) = (made_by_cc(), &made_as_cpp(), &built().join("examples/driver"));
     let python = || {
         let mut command = Command::new("python3");
         command.arg(c.join("driver.py"));
         command
     };
-    controls("python", python, &c.join("setpoint_source"));
+    scope(|threads| {
+        threads.spawn(|| controls("c", || Command::new(c.join("driver")), &cpp.join("setpoint_source")));
+        threads.spawn(|| controls("cpp", || Command::new(cpp.join("driver")), &c.join("setpoint_source")));
+        threads.spawn(|| controls("rust", || with_priority(rust), &c.join("setpoint_source")));
+        threads.spawn(|| controls("python", python, &c.join("setpoint_source")));
+    });
 }

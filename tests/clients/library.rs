@@ -3,9 +3,9 @@
 use std::fs;
 use std::process::Command;
 
-use crate::common::libhexad::{prefix, with_library};
+use crate::common::libhexad::{cargo, prefix, with_library};
 use crate::common::python::output;
-use crate::{file, turn};
+use crate::file;
 
 /// Functions of the header.
 fn declared_functions() -> Vec<String> {
@@ -31,6 +31,12 @@ fn the_library_exports_the_functions_of_its_header_and_nothing_else() {
     assert!(exported.len() > 10, "{exported:?}");
     let dynamic = output(Command::new("readelf").arg("-d").arg(&library)).unwrap();
     assert!(dynamic.contains("Library soname: [libhexad.so.0]"), "{dynamic}");
+}
+
+#[test]
+fn its_own_tests_pass() {
+    let said = output(cargo("test").args(["--lib", "outcome::"])).unwrap();
+    assert!(said.contains("1 passed"), "{said}");
 }
 
 /// Outcomes of wrong calls: number, and the text of the failure.
@@ -91,7 +97,6 @@ NO_DAEMON no daemon runs for NAME
 
 #[test]
 fn a_wrong_call_fails_with_a_reason() {
-    let _turn = turn();
     let name = format!("wrong-calls-{}", std::process::id());
     let script = file("wrong_calls.py");
     fs::write(&script, WRONG_CALLS.replace("NAME", &name)).unwrap();

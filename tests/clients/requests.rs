@@ -6,7 +6,7 @@ use std::process::{self, Command};
 use crate::common::libhexad::with_library;
 use crate::common::process::Process;
 use crate::common::python::output;
-use crate::{start_daemon, turn};
+use crate::start_daemon;
 
 /// Sends a request, and prints what becomes of it.
 const PROGRAM: &str = "
@@ -33,7 +33,6 @@ const STOPPED: &str = "fault: emergency stop";
 
 #[test]
 fn an_emergency_stop_needs_no_socket() {
-    let _turn = turn();
     let name = format!("no-socket-{}", process::id());
     let daemon = start_daemon(&name, "");
     assert_eq!(ask(&name, "estop"), "OK");
@@ -53,7 +52,6 @@ fn an_emergency_stop_needs_no_socket() {
 
 #[test]
 fn a_held_daemon_is_not_called_stopped_and_stops_when_it_goes_on() {
-    let _turn = turn();
     let name = format!("held-{}", process::id());
     let daemon = start_daemon(&name, "");
     signal(&daemon, "STOP");

@@ -12,7 +12,7 @@ use hexad::plant::random::Random;
 
 use crate::common::libhexad::with_library;
 use crate::common::python::output;
-use crate::{file, turn};
+use crate::file;
 
 /// Force messages, and messages of each other topic.
 const FORCES: usize = 10_000;
@@ -140,7 +140,6 @@ fn compiled(compiler: &str, arguments: &[&str], source: &Path) -> Command {
 
 #[test]
 fn every_language_copies_the_same_bytes_and_applies_the_same_forces() {
-    let _turn = turn();
     let mut random = Random::new(14);
     let (mut verdicts, mut contents) = (String::new(), vec![]);
     for layout in MESSAGES {

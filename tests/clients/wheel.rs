@@ -4,10 +4,10 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use crate::common::libhexad::repository;
+use crate::common::libhexad::{prefix, repository};
 use crate::common::not_run::lacking;
 use crate::common::python::{environment, output};
-use crate::{file, turn};
+use crate::file;
 
 /// What builds it.
 const BUILD_TOOLS: [&str; 1] = ["hatchling==1.27.0"];
@@ -29,7 +29,6 @@ except hexad.HexadError as error:
 
 #[test]
 fn the_wheel_works_in_a_clean_environment() {
-    let _turn = turn();
     let tools = match environment(&BUILD_TOOLS.map(String::from)) {
         Ok(tools) => tools,
         Err(why) => return lacking(&why),
@@ -41,6 +40,7 @@ fn the_wheel_works_in_a_clean_environment() {
     let package = repository().join("clients/python");
     let mut wheel = Command::new(tools.join("bin/python"));
     wheel.args(["-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]);
+    wheel.env("HEXAD_LIBRARY", prefix().join("lib/libhexad.so.0"));
     output(wheel.args(["--no-build-isolation", "-w"]).arg(&built).arg(&package)).unwrap();
     let wheels: Vec<PathBuf> = fs::read_dir(&built).unwrap().map(|entry| entry.unwrap().path()).collect();
     let [wheel] = &wheels[..] else { panic!("{wheels:?}") };

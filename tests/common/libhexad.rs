@@ -18,10 +18,32 @@ pub fn prefix() -> &'static Path {
         let lock = File::create(folder.join("lock")).unwrap();
         lock.lock().unwrap();
         let mut install = Command::new(repository().join("clients/c/install"));
-        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
-        output(install.arg(folder.join("usr")).env("CARGO_TARGET_DIR", target)).unwrap();
+        output(install.arg(folder.join("usr")).env("HEXAD_BUILT", built())).unwrap();
         folder.join("usr")
     })
+}
+
+/// Folder of libhexad and of the example of a driver in Rust, built with the profile of this test.
+pub fn built() -> &'static Path {
+    static READY: OnceLock<()> = OnceLock::new();
+    READY.get_or_init(|| drop(output(cargo("build").args(["--lib", "--example", "driver"])).unwrap()));
+    profile_folder()
+}
+
+/// Where the executables of this test's profile are.
+fn profile_folder() -> &'static Path {
+    Path::new(env!("CARGO_BIN_EXE_hexad")).parent().unwrap()
+}
+
+/// A command of Cargo for libhexad, with the profile of this test. Together with the library `hexad`, which so has the features with
+/// which the tests were built, and is there already.
+pub fn cargo(command: &str) -> Command {
+    let profile = profile_folder().file_name().filter(|name| *name != "debug").unwrap_or("dev".as_ref());
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.current_dir(repository()).args([command, "--quiet", "-p", "hexad", "-p", "hexad-c"]);
+    cargo.arg("--profile").arg(profile);
+    cargo.arg("--target-dir").arg(Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap());
+    cargo
 }
 
 /// Where the sources are.
