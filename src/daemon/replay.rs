@@ -124,13 +124,11 @@ pub fn other_controller(config: &Config) -> Controller {
 /// Computes the cycles of a recording again with a controller before its first cycle.
 pub fn replay(recording: &Recording, controller: Controller) -> Result<(Summary, Replay), RecordingError> {
     denormals::flush();
-    let mut replayer = Replayer {
-        controller,
-        next_cycle: Some(1),
-        begin_ns: None,
-        columns: CycleMessage::LAYOUT.columns(""),
-        replay: Replay::default(),
-    };
+    let columns = CycleMessage::LAYOUT.columns("");
+    let first_of_array = |column: &String| columns.iter().position(|other| array(other) == array(column));
+    let arrays = columns.iter().map(first_of_array).collect();
+    let (begin_ns, replay) = (None, Replay::default());
+    let mut replayer = Replayer { controller, next_cycle: Some(1), begin_ns, columns, arrays, replay };
     let summary = recording.each(|item| replayer.add(&item))?;
     Ok((summary, replayer.replay))
 }
@@ -141,6 +139,8 @@ struct Replayer {
     next_cycle: Option<u64>,
     begin_ns: Option<u64>,
     columns: Vec<String>,
+    /// First column of the array to which each column belongs.
+    arrays: Vec<Option<usize>>,
     replay: Replay,
 }
 
@@ -176,11 +176,11 @@ impl Replayer {
         self.replay.different += 1;
         let time_s = cycle.due_ns.saturating_sub(begin_ns) as f64 * 1e-9;
         let (numbers, cycle) = (cycle.numbers(), cycle.cycle);
-        for ((field, recorded), replayed) in self.columns.iter().zip(&numbers).zip(replayed.numbers()) {
+        let columns = self.columns.iter().zip(&self.arrays);
+        for (((field, array), recorded), replayed) in columns.zip(&numbers).zip(replayed.numbers()) {
             if recorded.to_bits() != replayed.to_bits() {
-                let is_of_field = |(other, _): &(&String, &f64)| array(other) == array(field);
-                let of_field = self.columns.iter().zip(&numbers).filter(is_of_field);
-                let scale = of_field.fold(0.0, |scale: f64, (_, number)| scale.max(number.abs()));
+                let of_array = self.arrays.iter().zip(&numbers).filter(|(other, _)| *other == array);
+                let scale = of_array.fold(0.0, |scale: f64, (_, number)| scale.max(number.abs()));
                 let (field, recorded) = (field.clone(), *recorded);
                 self.replay.add(Difference { cycle, time_s, field, recorded, replayed, scale });
             }
