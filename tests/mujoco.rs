@@ -154,12 +154,15 @@ fn mujoco_sees_what_is_wrong_in_a_model() {
     }
 }
 
-/// Twenty poses within the stroke, up to a tenth of a radian and of the platform's radius from home.
+/// Poses of a machine that is held.
+const POSES: usize = 8;
+
+/// Poses within the stroke, up to a tenth of a radian and of the platform's radius from home.
 fn poses(machine: &Machine) -> Vec<[f64; 6]> {
     let mut random = Random::new(7);
     let stroke = machine.actuator.min_length..machine.actuator.max_length;
     let mut poses = Vec::new();
-    while poses.len() < 20 {
+    while poses.len() < POSES {
         let mut x = machine.home;
         for (k, value) in x.iter_mut().enumerate() {
             let reach = if k < 3 { 0.1 } else { 0.1 * machine.joints.radius };
@@ -189,7 +192,7 @@ fn mujoco_holds_the_machine_with_the_same_forces() {
         python::run("mujoco_statics.py", &[&model, &input, &output]).unwrap();
 
         let table = Table::read(&output);
-        assert_eq!(table.rows.len(), 20);
+        assert_eq!(table.rows.len(), POSES);
         let mut gaps = Errors::default();
         let mut settled = Vec::new();
         let mut found = Vec::new();

@@ -23,6 +23,7 @@ pub mod paper;
 pub mod process;
 pub mod python;
 pub mod rig;
+pub mod shipped;
 pub mod stability;
 pub mod stalls;
 pub mod true_motion;

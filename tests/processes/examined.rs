@@ -3,8 +3,9 @@
 use hexad::config::Config;
 use serde_json::Value;
 
-use crate::support::children::{Ended, run};
+use crate::support::children::{Ended, HANG, Hexad, run};
 use crate::support::machine::Machine;
+use crate::support::recorder::Recorder;
 
 /// The machine of the paper with drives that are too weak to hold it.
 fn weak(test: &str) -> Machine {
@@ -101,9 +102,10 @@ fn the_log_is_filtered_and_json_where_it_is_wanted() {
         let mut command = crate::support::children::hexad();
         command.arg("plant").arg("--config").arg(&machine.file).args(more);
         command.envs(variables.iter().copied());
-        let plant = crate::support::children::Hexad::spawn(&machine, "plant", command);
-        std::thread::sleep(std::time::Duration::from_millis(700));
-        plant.stops_on("TERM", crate::support::children::HANG).stderr
+        let plant = Hexad::spawn(&machine, "plant", command);
+        let recorder = Recorder::start(&machine.name);
+        recorder.until("it measures", |recording| recording.measured.last().map(drop));
+        plant.stops_on("TERM", HANG).stderr
     };
     let json = with(&[], &["--log-format", "json"]);
     let lines: Vec<Value> = json.lines().map(|line| serde_json::from_str(line).expect(line)).collect();

@@ -24,8 +24,8 @@ struct Thread {
 
 #[test]
 fn priorities_and_the_processor_of_the_loop_alone() {
-    // Daemons that are bound to the same processor are refused.
-    let _turn = turns::alone();
+    // Daemons that are bound to the same processor are refused: all others with this one run alone.
+    let _turn = turns::beside_others();
     let Some((daemon, _machine)) = granted("priorities_and_the_processor_of_the_loop_alone", "cpu = 0")
     else {
         return;

@@ -1,19 +1,22 @@
 //! A longer run with all memory locked: the real-time thread meets no page for the first time, allocates
-//! nothing, and what is locked is not much.
-//!
-//! 20 seconds, or a minute with `HEXAD_LONG=1`. Needs root (CAP_IPC_LOCK).
+//! nothing, and what is locked is not much. Needs root (CAP_IPC_LOCK).
 
+use std::fs;
 use std::time::{Duration, Instant};
-use std::{env, fs};
 
 use hexad::daemon::report::Report;
 
+use crate::common::certificate::Certificate;
 use crate::common::not_run::lacking;
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::Machine;
 use crate::support::recorder::Recorder;
 use crate::support::trio::{start_daemon, start_plant};
 use crate::support::{operator, rules, turns};
+
+/// Length of the motion \[s\].
+const MOTION_S: u64 = 5;
+const LONG_MOTION_S: u64 = 59;
 
 /// What the daemon may keep in memory: 64 MB, and 32 MB of the last 30 s \[kB\].
 const MOST_KB: u64 = 96 * 1024;
@@ -22,9 +25,10 @@ const MOST_KB: u64 = 96 * 1024;
 const TICKS_PER_S: f64 = 100.0;
 
 #[test]
-fn the_real_time_thread_uses_nothing_it_did_not_have() {
+fn certificate_the_real_time_thread_uses_nothing_it_did_not_have() {
     let _turn = turns::beside_others();
-    let seconds = if env::var_os("HEXAD_LONG").is_some_and(|value| value == "1") { 59.0 } else { 17.0 };
+    let certificate = Certificate::new("locked memory", MOTION_S, LONG_MOTION_S);
+    let seconds = certificate.total();
     let machine = Machine::patient("locked-memory");
     let recorder = Recorder::start(&machine.name);
     let plant = start_plant(&machine);
@@ -37,7 +41,8 @@ fn the_real_time_thread_uses_nothing_it_did_not_have() {
     let start = Instant::now();
     let setpoints = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", &seconds.to_string()]);
     operator::engage(&machine);
-    let moved = setpoints.ends_within(Duration::from_secs_f64(seconds) + HANG);
+    let moved = setpoints.ends_within(Duration::from_secs(seconds) + HANG);
+    certificate.advance(seconds);
     assert_eq!(moved.status.code(), Some(0), "{}", moved.stderr);
     let simulated_s = start.elapsed().as_secs_f64();
 
@@ -57,6 +62,9 @@ fn the_real_time_thread_uses_nothing_it_did_not_have() {
     assert!(resident_kb < MOST_KB, "{resident_kb} kB");
     assert!(report.faults.is_empty(), "{:#?}", report.faults);
     rules::hold(&recorder.finish());
+    certificate.finish(format_args!(
+        "{seconds} s in motion, no allocation and no page fault of the real-time thread, {resident_kb} kB resident"
+    ));
 }
 
 fn resident_kb(process: u32) -> u64 {

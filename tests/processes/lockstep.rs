@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
-use std::{env, fs, thread};
+use std::{env, thread};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
 use hexad::commands::plant::hardware;
@@ -14,6 +14,7 @@ use hexad::messages::layout::FieldType;
 use hexad::messages::{ForceMessage, MeasuredMessage};
 use hexad::realtime::setup::scheduling;
 
+use crate::common::shipped;
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::{Machine, PERIOD_NS};
 use crate::support::recorder::Recorder;
@@ -22,24 +23,22 @@ use crate::support::{operator, turns};
 
 const LOCKSTEP: &str = "[realtime]\nrelease = \"lockstep\"";
 
-/// Of the motion \[s\], and where a debug build takes part, which is a hundred times slower.
-const SECONDS: &str = "20";
-const DEBUG_SECONDS: &str = "3";
+/// Length of the motion \[s\].
+const SECONDS: &str = "3";
 
 /// Cycles that it takes at least, with the way there and back.
-const LEAST: usize = 20_000;
+const LEAST: usize = 3_000;
 
 /// A build of `hexad` and the processor that it may use; any, if none is said.
-struct Build {
+pub struct Build {
     program: PathBuf,
     cpu: Option<usize>,
-    seconds: &'static str,
 }
 
 impl Build {
     /// The one under test.
-    fn this(cpu: Option<usize>) -> Self {
-        Self { program: hexad().get_program().into(), cpu, seconds: SECONDS }
+    pub fn this(cpu: Option<usize>) -> Self {
+        Self { program: hexad().get_program().into(), cpu }
     }
 
     fn start(&self, machine: &Machine, arguments: &[&str]) -> Hexad {
@@ -60,13 +59,12 @@ impl Build {
     /// Daemon and setpoint source.
     fn start_both(&self, machine: &Machine) -> (Hexad, Hexad) {
         let daemon = self.start(machine, &["run"]);
-        let motion = ["move", "--motion", "sines", "--seconds", self.seconds, "--engage"];
+        let motion = ["move", "--motion", "sines", "--seconds", SECONDS, "--engage"];
         (daemon, self.start(machine, &motion))
     }
 
-    /// All forces of a run whose plant is this process, until control has ended; and the time of processors that it took.
-    fn forces_for_us(self) -> (Vec<ForceMessage>, Duration) {
-        let before = processor_time();
+    /// All forces of a run whose plant is this process, until control has ended.
+    pub fn forces_for_us(self) -> Vec<ForceMessage> {
         // In a thread of its own, whose processor ends with it.
         let run = move || {
             self.cpu.map_or(Ok(()), scheduling::bind_to_cpu).expect("the processor");
@@ -118,8 +116,7 @@ impl Build {
             assert!(ended.stderr.contains("TIME IS SIMULATED"), "{}", ended.stderr);
             said
         };
-        let said = thread::spawn(run).join().expect("the plant");
-        (said, processor_time() - before)
+        thread::spawn(run).join().expect("the plant")
     }
 
     /// Forces of a run of which all parts are processes of this build, as far as somebody who listens hears
@@ -135,16 +132,6 @@ impl Build {
         daemon.stops_on("TERM", HANG);
         recorder.finish().forces
     }
-}
-
-/// Time of processors that this process and its children that have ended have used. How long they wait for a processor
-/// depends on who else wants it.
-fn processor_time() -> Duration {
-    const TICK: Duration = Duration::from_millis(10);
-    let line = fs::read_to_string("/proc/self/stat").expect("the usage of this process");
-    // Behind the name: from the state on, the 12th to the 15th.
-    let (_, fields) = line.rsplit_once(')').expect("the name of this process");
-    fields.split_whitespace().skip(11).take(4).map(|ticks| ticks.parse::<u32>().expect("ticks") * TICK).sum()
 }
 
 /// As it is in memory.
@@ -178,17 +165,12 @@ fn assert_heard(all: &[ForceMessage], heard: &[ForceMessage], what: &str) {
 
 #[test]
 fn in_lock_step_the_forces_are_the_same_bytes_on_one_processor_and_on_two() {
-    let _turn = turns::alone();
-    let (first, took) = Build::this(None).forces_for_us();
-    let simulated = Duration::from_nanos(PERIOD_NS * first.len() as u64);
-    println!("{simulated:?} of simulated time in {took:?} of processors");
+    let _turn = turns::beside_others();
+    let first = Build::this(None).forces_for_us();
     let valid = first.iter().filter(|force| force.valid == 1).count();
     assert!(valid > LEAST, "{valid} cycles under control");
-    assert!(took < simulated, "slower than real time: {took:?} for {simulated:?}");
-    assert_same(&first, &Build::this(None).forces_for_us().0, "again");
-    let (alone, took) = Build::this(Some(0)).forces_for_us();
-    println!("{simulated:?} of simulated time on one processor in {took:?}");
-    assert_same(&first, &alone, "on one processor");
+    assert_same(&first, &Build::this(None).forces_for_us(), "again");
+    assert_same(&first, &Build::this(Some(0)).forces_for_us(), "on one processor");
     assert_heard(&first, &Build::this(None).forces_overheard(), "with hexad plant");
 }
 
@@ -199,13 +181,13 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     let machine = Machine::with("lock-step-operated", LOCKSTEP);
     let daemon = Hexad::start::<&str>(&machine, "run", &[]);
     let plant = Hexad::start::<&str>(&machine, "plant", &[]);
-    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "1000"]);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "200"]);
     // Before that it checks the whole motion, and the daemon would engage onto home, where it has no setpoint yet.
     source.says("the setpoints stand where the platform stands");
     operator::engage(&machine);
     operator::does(&machine, "stop", &[], &["standby"]);
     player_ended(source);
-    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "1000"]);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "200"]);
     source.says("the setpoints stand where the platform stands");
     operator::engage(&machine);
     let ended = daemon.stops_on("TERM", HANG);
@@ -214,22 +196,25 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     plant.stops_on("TERM", HANG);
 }
 
-/// Debug, if this is release, and the other way round.
+/// The forces of this build and of another are the same bytes.
+fn assert_same_as(other: PathBuf, what: &str) {
+    let _turn = turns::beside_others();
+    let other = Build { program: other, cpu: None };
+    assert_heard(&Build::this(None).forces_for_us(), &other.forces_overheard(), what);
+}
+
 #[test]
-#[ignore = "builds the other profile, which takes minutes"]
-fn in_lock_step_the_forces_are_the_same_bytes_in_debug_and_release() {
-    let _turn = turns::alone();
-    let this: PathBuf = hexad().get_program().into();
-    let target = this.parent().and_then(Path::parent).expect("the target folder");
-    let (profile, arguments): (_, &[&str]) =
-        if cfg!(debug_assertions) { ("release", &["--release"]) } else { ("debug", &[]) };
+fn in_lock_step_the_forces_are_the_same_bytes_as_those_of_the_shipped_program() {
+    assert_same_as(shipped::program(), "shipped");
+}
+
+#[test]
+#[ignore = "builds without optimization, which takes minutes"]
+fn in_lock_step_the_forces_are_the_same_bytes_without_optimization() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("unoptimized");
     let mut cargo = Command::new(env!("CARGO"));
-    cargo
-        .args(["build", "--bin", "hexad", "--manifest-path"])
-        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
-    let built = cargo.args(arguments).arg("--target-dir").arg(target).status().expect("cargo");
-    assert!(built.success());
-    let this = Build { seconds: DEBUG_SECONDS, ..Build::this(None) };
-    let other = Build { program: target.join(profile).join("hexad"), seconds: DEBUG_SECONDS, cpu: None };
-    assert_heard(&this.forces_for_us().0, &other.forces_overheard(), profile);
+    cargo.current_dir(env!("CARGO_MANIFEST_DIR")).env("CARGO_PROFILE_DEV_OPT_LEVEL", "0");
+    cargo.args(["build", "--bin", "hexad", "--target-dir"]).arg(&folder);
+    assert!(cargo.status().expect("cargo").success());
+    assert_same_as(folder.join("debug/hexad"), "without optimization");
 }

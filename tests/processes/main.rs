@@ -3,9 +3,6 @@
 //! The host may take the processor away for many milliseconds. No test asserts an absolute time but for
 //! generous limits against hanging; timeouts are long where they are not what is tested; what is counted is
 //! compared with what the messages themselves say.
-//!
-//! `HEXAD_LONG=1` runs the tests of locked memory and of peers that die for a minute each, and 500 rounds of
-//! kills; `HEXAD_SEED` repeats the rounds of a run.
 
 #![allow(
     clippy::unwrap_used,
@@ -19,21 +16,17 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod support;
+mod test_threads;
 
+mod alone;
 mod always_stops;
-mod churn;
 mod command_line;
 mod control_socket;
-mod demo;
 mod doctor;
 mod doubted;
-mod drive_delay;
-mod estop_trials;
 mod examined;
-mod external;
 mod fidelity;
 mod hosted;
-mod hybrid;
 mod in_force;
 mod killed;
 mod locked_memory;
@@ -54,10 +47,8 @@ mod remains;
 mod requests;
 mod rounds;
 mod stale;
-mod system_calls;
 mod tables;
 mod targets;
 mod trajectory;
 mod two_sources;
-mod unprivileged;
 mod wrong_senders;

@@ -5,6 +5,7 @@ use std::time::Duration;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::State;
 use hexad::messages::ForceMessage;
+use hexad::messages::clock::monotonic_ns;
 
 use crate::support::machine::{PERIOD_NS, TIMEOUT_NS};
 use crate::support::recorder::Recording;
@@ -16,6 +17,12 @@ const PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS + TIMEOUT_NS / 2);
 
 /// Longer than the loop stands old measurements, shorter than every timeout.
 const SHORT_PAUSE: Duration = Duration::from_nanos(TIMEOUT_NS / 4);
+
+/// Longest silence in that pause: closer to the timeouts than this the host decides.
+const LONGEST_SILENCE_NS: u64 = TIMEOUT_NS / 4 * 3;
+
+/// A busy machine can keep the test itself from ending a pause in time; not each time.
+const ATTEMPTS: usize = 5;
 
 /// Grid points within the pause, less those that a signal needs to arrive.
 const LEAST_SKIPPED: u64 = (TIMEOUT_NS + TIMEOUT_NS / 2) / PERIOD_NS - 10;
@@ -51,6 +58,25 @@ fn a_paused_daemon_counts_what_it_missed_and_recovers() {
 fn a_pause_shorter_than_the_timeouts_keeps_control() {
     let _turn = turns::beside_others();
     let trio = Trio::in_motion("paused-shortly");
+    for _ in 0..ATTEMPTS {
+        let (lost, silent_ns) = pause_shortly(&trio);
+        if silent_ns < LONGEST_SILENCE_NS {
+            assert_eq!(lost, None);
+            trio.moves_after(monotonic_ns());
+            trio.finish();
+            return;
+        }
+        println!("silent for {silent_ns} ns, again; lost: {lost:?}");
+        if lost.is_some() {
+            operator::clear_and_engage(&trio.machine);
+        }
+        trio.moves_after(monotonic_ns());
+    }
+    panic!("the pause was too long in each of {ATTEMPTS} attempts");
+}
+
+/// The first force behind the pause that is not valid, and the longest silence in it \[ns\].
+fn pause_shortly(trio: &Trio) -> (Option<ForceMessage>, u64) {
     trio.daemon.hold();
     trio.plant.hold();
     let (from_ns, _) = let_pass(SHORT_PAUSE);
@@ -59,12 +85,10 @@ fn a_pause_shorter_than_the_timeouts_keeps_control() {
         recording.forces.last().filter(|force| force.release_ns > from_ns + PERIOD_NS).map(drop)
     });
     trio.plant.signal("CONT");
-    let (_, after_ns) = let_pass(Duration::from_nanos(2 * TIMEOUT_NS));
-    trio.moves_after(after_ns);
+    let_pass(Duration::from_nanos(2 * TIMEOUT_NS));
     let is_lost = |force: &&ForceMessage| force.release_ns > from_ns && force.valid == 0;
-    let lost = trio.recorder.so_far().forces.iter().find(is_lost).copied();
-    assert_eq!(lost, None);
-    trio.finish();
+    let recording = trio.recorder.so_far();
+    (recording.forces.iter().find(is_lost).copied(), recording.longest_silence_ns(from_ns))
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn plays(machine: &Machine) -> Ended {
     let file = machine.file.display().to_string();
     run(
         machine,
-        &["move", "--engage", "--motion", "sines", "--seconds", "2", "--within", "10", "--config", &file],
+        &["move", "--engage", "--motion", "sines", "--seconds", "1", "--within", "10", "--config", &file],
     )
 }
 

@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 use std::fs;
+use std::panic::resume_unwind;
 use std::process::{Command, Stdio};
+use std::thread::scope;
 
 use hexad::control::state::State;
 use hexad::messages::{ForceMessage, MeasuredMessage};
@@ -38,7 +40,7 @@ allow_unstable_age = true
 [plant]
 force_timeout_ms = 400.0
 ";
-/// A longer gap between two messages of one process is a pause of the host: what the platform does in it is not judged.
+/// A longer gap between two messages of one process is a pause of the host: what the platform does beyond its limits then is not judged.
 const LONGEST_GAP_NS: u64 = 5 * PERIOD_NS;
 /// Trials until one has no pause.
 const TRIALS: u32 = 5;
@@ -46,11 +48,13 @@ const TRIALS: u32 = 5;
 #[test]
 fn a_platform_released_in_motion_is_parked_within_its_limits() {
     let _turn = turns::beside_others();
-    for requests in [&["off", "park"] as &[_], &["estop", "clear", "park"]] {
-        let judged = (0..TRIALS).any(|_| trial(requests));
-        if !judged {
-            not_run("the host paused in every trial");
-        }
+    let judged = scope(|threads| {
+        let judge = |requests| threads.spawn(move || (0..TRIALS).any(|_| trial(requests)));
+        let both = [&["off", "park"] as &[_], &["estop", "clear", "park"]].map(judge);
+        both.map(|thread| thread.join().unwrap_or_else(|failure| resume_unwind(failure)))
+    });
+    if judged.contains(&false) {
+        not_run("the host paused in every trial");
     }
 }
 
@@ -93,16 +97,23 @@ fn trial(requests: &[&str]) -> bool {
         recording.forces.iter().filter(|force| since(force.header.time_ns)).copied().collect();
     let measured: Vec<_> =
         recording.measured.iter().filter(|measured| since(measured.header.time_ns)).copied().collect();
-    let pause_ns = longest_gap_ns(forces.iter().map(|force| force.header.time_ns))
-        .max(longest_gap_ns(measured.iter().map(|measured| measured.header.time_ns)));
-    if pause_ns > LONGEST_GAP_NS {
-        println!("{requests:?}: a pause of {:.1} ms; not judged", pause_ns as f64 * 1e-6);
-        return false;
-    }
     let seen = Seen::of(&recording, &forces, &measured);
     println!("{requests:?}: {seen:?}; {}", stderr.trim());
-    assert!(!words.contains("end stop"), "{requests:?}: {seen:?}\n{words}");
-    assert!(seen.margin_m > 0.0 && seen.speed_m_s <= LARGEST_SPEED_M_S, "{requests:?}: {seen:?}");
+    let is_within = !words.contains("end stop") && seen.margin_m > 0.0 && seen.speed_m_s <= LARGEST_SPEED_M_S;
+    let pause_ns = |until_ns: u64| {
+        let times_ns = forces.iter().map(|force| force.header.time_ns);
+        let measured_ns = measured.iter().map(|measured| measured.header.time_ns);
+        let until = |time_ns: &u64| *time_ns <= until_ns;
+        longest_gap_ns(times_ns.filter(until)).max(longest_gap_ns(measured_ns.filter(until)))
+    };
+    // A pause before the request has released the platform may have done so itself; one after it excuses.
+    let released = forces.iter().find(|force| force.valid == 0).expect("it was released");
+    let judged_ns = if is_within { released.header.time_ns } else { u64::MAX };
+    if pause_ns(judged_ns) > LONGEST_GAP_NS {
+        println!("{requests:?}: a pause of {:.1} ms; not judged", pause_ns(judged_ns) as f64 * 1e-6);
+        return false;
+    }
+    assert!(is_within, "{requests:?}: {seen:?}\n{words}");
     true
 }
 

@@ -1,6 +1,4 @@
 //! Participants that are killed while they join, while they run and between: the daemon removes what they leave.
-//!
-//! 60 of them, or 1,000 with `HEXAD_LONG=1`.
 
 use std::collections::BTreeSet;
 use std::fs::{self, read_dir, read_to_string};
@@ -9,6 +7,7 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use crate::common::certificate::Certificate;
 use crate::support::children::{HANG, Hexad, hexad};
 use crate::support::machine::Machine;
 use crate::support::turns;
@@ -17,6 +16,10 @@ use crate::support::turns;
 const FIRST_MS: u64 = 10;
 const STEP_MS: u64 = 7;
 const DELAYS: u64 = 23;
+
+/// Each delay with each of two participants.
+const KILLS: u64 = 2 * DELAYS;
+const LONG_KILLS: u64 = 1000;
 
 /// Segments in `/dev/shm` and book-keeping of a folder.
 fn entries(folder: &Path) -> BTreeSet<PathBuf> {
@@ -35,9 +38,9 @@ fn entries(folder: &Path) -> BTreeSet<PathBuf> {
 }
 
 #[test]
-fn killed_participants_leave_nothing() {
+fn certificate_killed_participants_leave_nothing() {
     let _turn = turns::beside_others();
-    let kills = if std::env::var_os("HEXAD_LONG").is_some_and(|value| value == "1") { 1000 } else { 60 };
+    let certificate = Certificate::new("killed participants", KILLS, LONG_KILLS);
     let machine = Machine::patient("remains");
     // Shared memory of their own: the other tests have participants, too.
     let places = machine.path("places");
@@ -51,9 +54,10 @@ fn killed_participants_leave_nothing() {
     daemon.says("running");
     let folder = places.join("hexad");
     let before = entries(&folder);
-    for k in 0..kills {
+    for k in 0..certificate.total() {
         let arguments: &[&str] = if k % 2 == 0 { &["plant"] } else { &["move", "--motion", "settle"] };
         kill_after(command(arguments), Duration::from_millis(FIRST_MS + STEP_MS * (k % DELAYS)));
+        certificate.advance(1);
     }
     let began = Instant::now();
     let left = loop {
@@ -65,6 +69,8 @@ fn killed_participants_leave_nothing() {
     };
     daemon.stops_on("TERM", HANG);
     assert!(left.is_empty(), "{left:#?}");
+    let kills = certificate.total();
+    certificate.finish(format_args!("{kills} kills, nothing left in shared memory"));
 }
 
 fn kill_after(mut command: Command, delay: Duration) {

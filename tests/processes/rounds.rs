@@ -1,24 +1,24 @@
 //! Rounds of SIGKILL, or SIGSTOP and SIGCONT, at random moments on random participants, and each time the same
 //! end: what was killed is started again, a fault is cleared, one `engage` engages.
-//!
-//! 12 rounds, or 500 with `HEXAD_LONG=1`. `HEXAD_SEED` repeats a run, as far as the host lets it.
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
-use std::{env, fs};
 
 use hexad::control::state::{Request, State};
 use hexad::messages::clock::monotonic_ns;
 
+use crate::common::certificate::Certificate;
 use crate::support::children::{HANG, Hexad};
 use crate::support::machine::TIMEOUT_NS;
 use crate::support::random::Random;
 use crate::support::trio::{Trio, start_daemon, start_plant, start_setpoints};
 use crate::support::{operator, rules, turns};
 
-const ROUNDS: usize = 12;
-const LONG_ROUNDS: usize = 500;
+/// Each kind of blow once.
+const ROUNDS: u64 = BLOWS.len() as u64;
+const LONG_ROUNDS: u64 = 500;
 
 /// Longest wait for the blow \[ms\]: from engaging through settling and the approach into the motion.
 const BEFORE_MS: u64 = 2000;
@@ -73,17 +73,14 @@ struct Tally {
 }
 
 #[test]
-fn after_any_blow_one_engage_engages() {
+fn certificate_after_any_blow_one_engage_engages() {
     let _turn = turns::beside_others();
-    let number = |name: &str| env::var(name).ok().and_then(|value| value.parse().ok());
-    let rounds = if number("HEXAD_LONG") == Some(1) { LONG_ROUNDS } else { ROUNDS };
-    let seed = number("HEXAD_SEED").unwrap_or_else(monotonic_ns);
-    println!("HEXAD_SEED={seed}");
-    let mut random = Random::new(seed);
+    let certificate = Certificate::new("rounds of kills and holds", ROUNDS, LONG_ROUNDS);
+    let mut random = Random::new(certificate.seed());
     let mut trio = Trio::in_motion("rounds");
     let (mut tallies, mut stalls) = (BTreeMap::<_, Tally>::new(), 0);
     let files_before = shared_files();
-    for round in 0..rounds {
+    for round in 0..certificate.total() as usize {
         // Each kind once, then any.
         let blow = BLOWS.get(round).copied().unwrap_or_else(|| random.one_of(&BLOWS));
         sleep(Duration::from_millis(random.below(BEFORE_MS)));
@@ -107,6 +104,7 @@ fn after_any_blow_one_engage_engages() {
             process.must_run();
         }
         rules::hold(&trio.recorder.cut());
+        certificate.advance(1);
     }
     for (blow, Tally { rounds, faults, longest }) in tallies {
         println!("{blow:?}: {rounds} rounds, {faults} with a fault, engaged again within {longest:.2?}");
@@ -114,6 +112,9 @@ fn after_any_blow_one_engage_engages() {
     println!("control lost once more while the host was away: {stalls}");
     println!("files in shared memory: {files_before}, at the end {}", shared_files());
     trio.finish();
+    let rounds = certificate.total();
+    certificate
+        .finish(format_args!("{rounds} rounds, {stalls} of them engaged again after a pause of the host"));
 }
 
 /// Strikes, and starts again what was killed.
@@ -172,23 +173,11 @@ fn recover(trio: &Trio, what: &str) -> (bool, usize) {
         if ended.status.success() {
             return (faults, again);
         }
-        let silent_ns = longest_silence_ns(trio, from_ns);
+        let silent_ns = trio.recorder.so_far().longest_silence_ns(from_ns);
         println!("{what}: not engaged: {}; somebody was silent for {silent_ns} ns", ended.stderr.trim_end());
         assert!(silent_ns > STALL_NS, "{what}: from {}: {}", state.name(), ended.stderr);
         again += 1;
     }
-}
-
-/// Of daemon, plant and setpoint source since an instant.
-fn longest_silence_ns(trio: &Trio, from_ns: u64) -> u64 {
-    let recording = trio.recorder.so_far();
-    let times: [Vec<u64>; 3] = [
-        recording.forces.iter().map(|message| message.header.time_ns).collect(),
-        recording.measured.iter().map(|message| message.header.time_ns).collect(),
-        recording.setpoints.iter().map(|message| message.header.time_ns).collect(),
-    ];
-    let gaps = times.iter().flat_map(|times| times.windows(2)).filter(|pair| pair[0] >= from_ns);
-    gaps.map(|pair| pair[1].saturating_sub(pair[0])).max().unwrap_or(0)
 }
 
 /// The state in which a blow ends.

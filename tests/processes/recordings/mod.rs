@@ -26,9 +26,11 @@ fn arguments(machine: &Machine) -> Vec<PathBuf> {
     ["--record".into(), record, "--faults".into(), faults, "--report".into(), report].into()
 }
 
-/// A daemon that records every cycle and every fault.
+/// A daemon that records every cycle and every fault. Returns when it runs.
 fn start_recording(machine: &Machine) -> Hexad {
-    Hexad::start(machine, "run", &arguments(machine))
+    let mut daemon = Hexad::start(machine, "run", &arguments(machine));
+    daemon.says_or_has_ended("running");
+    daemon
 }
 
 /// The recordings in a folder of a machine, the oldest first.

@@ -53,9 +53,9 @@ fn both_sides_of_a_reload_are_repeated_with_their_own_gains() {
         assert_eq!(is_before, numbers[1] < first, "{numbers:?}");
         assert!(cycles.iter().any(|cycle| cycle.state == State::Active as u32));
     }
-    // The gains are in force: with the old ones the forces would be others.
+    // The gains are in force: with the old ones the cycles would be others.
     fs::write(&machine.file, &old).unwrap();
     let config = machine.file.display().to_string();
     let Ended { stdout, .. } = about(&machine, "replay", after, &["--config", &config]);
-    assert!(stdout.contains(" cycles differ\n") && stdout.contains(" s), force_n_"), "{stdout}");
+    assert!(stdout.contains(" cycles differ\n"), "{stdout}");
 }

@@ -19,7 +19,9 @@ use crate::support::trio::start_plant;
 use crate::support::turns;
 
 /// Time in which something happens in each part of a run; the motion begins a second after control.
-const WHILE: Duration = Duration::from_millis(2500);
+const WHILE: Duration = Duration::from_millis(1800);
+/// Time after a source has died: longer than its timeout, and than the stop.
+const AFTERWARDS: Duration = Duration::from_millis(1200);
 
 /// Short: the search for its amplitude takes a share of its length.
 const MOTION: [&str; 4] = ["--motion", "sines", "--seconds", "6"];
@@ -40,7 +42,7 @@ fn eventful_run(keys: &str, policy: &str) -> Machine {
             if source.runs() {
                 source.kill();
             }
-            sleep(WHILE);
+            sleep(AFTERWARDS);
         } else {
             let _ = ask(&machine, end, &[]);
         }
@@ -73,31 +75,55 @@ fn holds(machine: &Machine) {
     }
 }
 
-#[test]
-fn each_fidelity_is_repeated() {
+/// A run with keys of `[control]` and a policy.
+fn is_repeated(keys: &str, policy: &str) {
     let _turn = turns::beside_others();
-    for (fidelity, policy) in [
-        ("rigid-legs", "stop"),
-        ("no-velocity", "limit"),
-        ("lumped-legs", "stop"),
-        ("massless-legs", "limit"),
-        ("auto", "stop"),
-    ] {
-        holds(&eventful_run(&format!("fidelity = \"{fidelity}\""), policy));
-    }
+    holds(&eventful_run(keys, policy));
 }
 
 #[test]
-fn each_mode_is_repeated() {
-    let _turn = turns::beside_others();
-    for (mode, policy) in [
-        ("feedforward_joint_pd", "limit"),
-        ("gravity_joint_pd", "stop"),
-        ("joint_pd", "limit"),
-        ("computed_torque", "limit"),
-    ] {
-        holds(&eventful_run(&format!("mode = \"{mode}\""), policy));
-    }
+fn rigid_legs_are_repeated() {
+    is_repeated("fidelity = \"rigid-legs\"", "stop");
+}
+
+#[test]
+fn no_velocity_is_repeated() {
+    is_repeated("fidelity = \"no-velocity\"", "limit");
+}
+
+#[test]
+fn lumped_legs_are_repeated() {
+    is_repeated("fidelity = \"lumped-legs\"", "stop");
+}
+
+#[test]
+fn massless_legs_are_repeated() {
+    is_repeated("fidelity = \"massless-legs\"", "limit");
+}
+
+#[test]
+fn the_fidelity_chosen_by_itself_is_repeated() {
+    is_repeated("fidelity = \"auto\"", "stop");
+}
+
+#[test]
+fn feedforward_joint_pd_is_repeated() {
+    is_repeated("mode = \"feedforward_joint_pd\"", "limit");
+}
+
+#[test]
+fn gravity_joint_pd_is_repeated() {
+    is_repeated("mode = \"gravity_joint_pd\"", "stop");
+}
+
+#[test]
+fn joint_pd_is_repeated() {
+    is_repeated("mode = \"joint_pd\"", "limit");
+}
+
+#[test]
+fn computed_torque_is_repeated() {
+    is_repeated("mode = \"computed_torque\"", "limit");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::path::PathBuf;
-use std::process::{self, Child, Command, ExitStatus, Stdio};
+use std::process::{self, Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::thread::{panicking, sleep};
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ use super::machine::Machine;
 use super::threads::all_stopped;
 
 /// Longer than this nothing may take that has no length of its own.
-pub const HANG: Duration = Duration::from_secs(20);
+pub const HANG: Duration = Duration::from_secs(60);
 
 /// How often to look whether something has happened.
 const LOOK: Duration = Duration::from_millis(2);
@@ -55,6 +55,11 @@ impl Hexad {
         let [out, err] = [&stdout, &stderr].map(|path| File::create(path).expect("a file for the output"));
         let child = command.stdout(out).stderr(err).spawn().expect("a process");
         Self { child, command: name.into(), stdout, stderr }
+    }
+
+    /// The pipe to its standard input.
+    pub fn input(&mut self) -> ChildStdin {
+        self.child.stdin.take().expect("a pipe")
     }
 
     pub fn id(&self) -> u32 {
@@ -100,6 +105,16 @@ impl Hexad {
     pub fn says(&self, words: &str) {
         let start = Instant::now();
         while !self.words().contains(words) {
+            let command = &self.command;
+            assert!(start.elapsed() < HANG, "{command} must say {words:?}, and said:\n{}", self.words());
+            sleep(LOOK);
+        }
+    }
+
+    /// Waits until it has said this, or has ended.
+    pub fn says_or_has_ended(&mut self, words: &str) {
+        let start = Instant::now();
+        while !self.words().contains(words) && self.runs() {
             let command = &self.command;
             assert!(start.elapsed() < HANG, "{command} must say {words:?}, and said:\n{}", self.words());
             sleep(LOOK);

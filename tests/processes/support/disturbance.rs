@@ -129,7 +129,7 @@ fn filled(folder: &Path) -> PathBuf {
 /// Requests without pause on the topic.
 pub struct Flood {
     stop: Arc<AtomicBool>,
-    thread: JoinHandle<u64>,
+    thread: Option<JoinHandle<u64>>,
 }
 
 impl Flood {
@@ -148,12 +148,19 @@ impl Flood {
                 sent
             })
         };
-        Self { stop, thread }
+        Self { stop, thread: Some(thread) }
     }
 
-    fn finish(self) {
+    fn finish(mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        let sent = self.thread.join().expect("a publisher");
+        let sent = self.thread.take().expect("taken only here").join().expect("a publisher");
         assert!(sent > 1000, "{sent} requests");
+    }
+}
+
+/// Also when a test has failed: the others need the processors.
+impl Drop for Flood {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
     }
 }

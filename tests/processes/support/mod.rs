@@ -1,5 +1,6 @@
 //! What the tests share.
 
+pub mod button;
 pub mod children;
 pub mod disturbance;
 pub mod forged;

@@ -4,7 +4,7 @@ use super::children::{Ended, run};
 use super::machine::Machine;
 
 /// Less than the tests wait for any process.
-const WITHIN_S: &str = "15";
+const WITHIN_S: &str = "45";
 
 /// `hexad REQUEST` with more arguments, to its end.
 pub fn ask(machine: &Machine, request: &str, more: &[&str]) -> Ended {

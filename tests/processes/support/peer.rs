@@ -2,7 +2,8 @@
 //! once more. What it asks for depends on nothing but the time, so a successor takes over without a jump.
 
 use std::env;
-use std::process::{self, Command, Stdio};
+use std::io::{self, Write};
+use std::process::{self, ChildStdin, Command, Stdio};
 
 use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
@@ -49,27 +50,49 @@ impl Controlled {
     }
 
     /// All that engaging takes.
-    pub fn ready(machine: Machine, daemon: Hexad) -> Self {
+    pub fn ready(machine: Machine, mut daemon: Hexad) -> Self {
+        daemon.says_or_has_ended("running");
         let plant = start_plant(&machine);
         let peer = start(&machine);
         Self { peer, daemon, plant, machine }
     }
 
-    /// The present peer is killed; another one follows it within the timeout.
+    /// The present peer is killed; another one follows it within the timeout, however long a process takes to start.
     pub fn replace_peer(&mut self) {
+        let next = Waiting::start(&self.machine);
         self.peer.kill();
-        self.peer = start(&self.machine);
+        self.peer = next.joins();
+    }
+}
+
+/// A peer that has started and has not joined.
+struct Waiting {
+    peer: Hexad,
+    input: ChildStdin,
+}
+
+impl Waiting {
+    fn start(machine: &Machine) -> Self {
+        let mut command = Command::new(env::current_exe().expect("this program"));
+        command.args(["support::peer::takes_part", "--exact", "--ignored", "--nocapture"]);
+        command.env(PART, format!("{} {}", machine.name, process::id())).stdin(Stdio::piped());
+        let mut peer = Hexad::spawn(machine, "peer", command);
+        let input = peer.input();
+        peer.says("ready");
+        Self { peer, input }
+    }
+
+    /// Returns when it has sent its first setpoint.
+    fn joins(mut self) -> Hexad {
+        self.input.write_all(b"\n").expect("to write");
+        self.peer.says("here");
+        self.peer
     }
 }
 
 /// Starts one more; returns when it has sent its first setpoint.
 pub fn start(machine: &Machine) -> Hexad {
-    let mut command = Command::new(env::current_exe().expect("this program"));
-    command.args(["support::peer::takes_part", "--exact", "--ignored", "--nocapture"]);
-    command.env(PART, format!("{} {}", machine.name, process::id())).stdin(Stdio::null());
-    let peer = Hexad::spawn(machine, "peer", command);
-    peer.says("here");
-    peer
+    Waiting::start(machine).joins()
 }
 
 /// The setpoint at an instant.
@@ -90,6 +113,8 @@ fn takes_part() {
     assert!(child::stop_with_parent(parent.parse().expect("a process")), "its test is gone");
     // So that a busy machine does not make it late.
     let _ = scheduling::fifo_priority(1);
+    eprintln!("ready");
+    io::stdin().read_line(&mut String::new()).expect("a line");
     let bus = Bus::join(machine).expect("to join");
     let mut setpoints = bus.publisher::<SetpointMessage>().expect("to publish");
     // Present without a word: the plant measures.

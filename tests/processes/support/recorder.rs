@@ -36,6 +36,19 @@ pub struct Recording {
     pub passed_over: RejectionCounts,
 }
 
+impl Recording {
+    /// Longest silence that ended after an instant, of daemon, plant or setpoint source \[ns\].
+    pub fn longest_silence_ns(&self, from_ns: u64) -> u64 {
+        let times: [Vec<u64>; 3] = [
+            self.forces.iter().map(|message| message.header.time_ns).collect(),
+            self.measured.iter().map(|message| message.header.time_ns).collect(),
+            self.setpoints.iter().map(|message| message.header.time_ns).collect(),
+        ];
+        let gaps = times.iter().flat_map(|times| times.windows(2)).filter(|pair| pair[1] > from_ns);
+        gaps.map(|pair| pair[1].saturating_sub(pair[0])).max().unwrap_or(0)
+    }
+}
+
 /// Listens in a thread of its own, which owns the ports.
 pub struct Recorder {
     recording: Arc<Mutex<Recording>>,

@@ -100,13 +100,20 @@ pub fn player_ended(player: Hexad) {
     assert!(status.code() == Some(1) && stderr.contains(words), "{status}: {stderr}");
 }
 
+/// Returns when it has joined, or has ended: a participant that begins meanwhile waits for its topics, but not for long.
 pub fn start_plant(machine: &Machine) -> Hexad {
-    Hexad::start::<&str>(machine, "plant", &[])
+    let mut plant = Hexad::start::<&str>(machine, "plant", &[]);
+    plant.says_or_has_ended("plant at rest");
+    plant
 }
 
+/// Returns when it runs, or has ended: the commands of operators wait for a daemon, but not for long.
 pub fn start_daemon(machine: &Machine) -> Hexad {
     let [report, histogram] = ["report.json", "histogram.csv"].map(|name| machine.path(name));
-    Hexad::start(machine, "run", &["--report".into(), report, "--histogram".into(), histogram])
+    let mut daemon =
+        Hexad::start(machine, "run", &["--report".into(), report, "--histogram".into(), histogram]);
+    daemon.says_or_has_ended("running");
+    daemon
 }
 
 pub fn start_setpoints(machine: &Machine) -> Hexad {

@@ -22,7 +22,7 @@ fn the_dead_time_of_the_drives_is_measured() {
     let folder = machine.path("record");
     let daemon = Hexad::start(&machine, "run", &["--record".as_ref(), folder.as_os_str()]);
     daemon.says("running");
-    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "15"]);
+    let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "8"]);
     let engaged = ask(&machine, "engage", &["--wait", "--within", "10"]);
     assert!(engaged.status.success(), "{}", engaged.stderr);
     assert!(source.ends_within(HANG).status.success());

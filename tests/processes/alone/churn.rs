@@ -2,8 +2,7 @@
 //!
 //! Two daemons at 4 kHz under the same load in the same seconds: one among constant peers, one among peers
 //! that die. What is zero is zero in both; the time of a cycle is compared between them, second by second.
-//!
-//! Ten seconds, or a minute with `HEXAD_LONG=1`. Needs root (CAP_IPC_LOCK).
+//! Needs root (CAP_IPC_LOCK).
 
 use std::thread::sleep;
 use std::time::{Duration, Instant};
@@ -14,6 +13,7 @@ use hexad::messages::LoopTimes;
 use hexad::messages::StatusMessage;
 use hexad::messages::{Bus, Subscriber};
 
+use crate::common::certificate::Certificate;
 use crate::common::not_run::lacking;
 use crate::support::children::HANG;
 use crate::support::machine::{Machine, PATIENT};
@@ -23,6 +23,10 @@ use crate::support::turns;
 
 const RATE: &str = "[realtime]\nrate_hz = 4000.0\n";
 const KILLS_PER_S: u32 = 10;
+
+/// Length of a round \[s\].
+const ROUND_S: u64 = 4;
+const LONG_ROUND_S: u64 = 60;
 
 /// Largest p99.9 of the time of a cycle among dying peers, over that among constant ones.
 const LARGEST_RATIO: f64 = 1.5;
@@ -35,9 +39,9 @@ const ROUNDS: usize = 4;
 const PER_LINE: u64 = 20;
 
 #[test]
-fn the_real_time_thread_does_not_notice_peers_that_die() {
+fn certificate_the_real_time_thread_does_not_notice_peers_that_die() {
     let _turn = turns::alone();
-    let seconds = if std::env::var_os("HEXAD_LONG").is_some_and(|value| value == "1") { 60 } else { 10 };
+    let certificate = Certificate::new("peers that die", ROUND_S, LONG_ROUND_S);
     let [calm, disturbed] =
         ["calm", "disturbed"].map(|name| Machine::with(name, &format!("{RATE}{PATIENT}")));
     let (mut calm, mut disturbed) = (Observed::start(calm), Observed::start(disturbed));
@@ -45,11 +49,11 @@ fn the_real_time_thread_does_not_notice_peers_that_die() {
         lacking("locked memory");
         return;
     }
-    let mut kills = 0;
+    let (mut kills, mut ratio) = (0, f64::INFINITY);
     let began = Instant::now();
     for round in 1..=ROUNDS {
         let before = [&calm, &disturbed].map(|it| it.p999_ns.len());
-        for _ in 0..KILLS_PER_S * seconds {
+        for kill in 0..KILLS_PER_S * certificate.total() as u32 {
             disturbed.controlled.replace_peer();
             kills += 1;
             // Once at least: a slow host kills more slowly.
@@ -61,11 +65,12 @@ fn the_real_time_thread_does_not_notice_peers_that_die() {
                 }
                 sleep(Duration::from_millis(5));
             }
+            certificate.advance(u64::from(round == 1 && kill % KILLS_PER_S == 0));
         }
         let [among_constant, among_dying] = [&calm, &disturbed].map(|it| it);
         let [reference, found] =
             [median(&among_constant.p999_ns[before[0]..]), median(&among_dying.p999_ns[before[1]..])];
-        let ratio = found as f64 / reference as f64;
+        ratio = found as f64 / reference as f64;
         let rate = f64::from(kills) / began.elapsed().as_secs_f64();
         println!(
             "{rate:.1} kills/s; p99.9 of a cycle {found} ns, undisturbed {reference} ns: {ratio:.2} times"
@@ -81,6 +86,8 @@ fn the_real_time_thread_does_not_notice_peers_that_die() {
     for observed in [calm, disturbed] {
         observed.ends();
     }
+    certificate
+        .finish(format_args!("{kills} kills, p99.9 of a cycle {ratio:.2} times that among constant peers"));
 }
 
 fn median(values: &[u64]) -> u64 {

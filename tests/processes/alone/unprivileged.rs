@@ -52,7 +52,7 @@ fn machine(test: &str) -> Machine {
 
 fn demo(machine: &Machine, wrappers: &[&[&str]]) -> Ended {
     let mut command = wrapped(machine, wrappers);
-    command.args(["demo", "--seconds", "3", "--config"]).arg(&machine.file);
+    command.args(["demo", "--seconds", "1", "--config"]).arg(&machine.file);
     command.arg("--charts").arg(machine.path("charts"));
     Hexad::spawn(machine, "demo", command).ends_within(HANG * 2)
 }

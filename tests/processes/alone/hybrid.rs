@@ -24,7 +24,7 @@ use crate::support::turns;
 const RATE_HZ: u64 = 997;
 const PERIOD_NS: u64 = 1_003_009;
 
-const FORCES: usize = 2000;
+const FORCES: usize = 1000;
 
 /// The poller begins to look so long before the release \[ns\]: a wake-up of its own must fit in.
 const LOOK_NS: u64 = 150_000;

@@ -32,10 +32,15 @@ fn the_loop_calls_the_system_for_its_sleep_only() {
         lacking(&format!("strace: {error}; apt-get install strace"));
         return;
     }
-    let _turn = turns::beside_others();
-    let daemons =
-        [("sleep", ALL_BUT_SLEEPS), ("hybrid", ALL_BUT_SLEEPS), ("external", ALL_BUT_SLEEPS), ("sleep", ALL)];
-    let mut watched = daemons.map(|(release, calls)| (release, calls, watch(release, calls)));
+    // What is traced waits for the tracer, which has no priority.
+    let _turn = turns::alone();
+    watch([("sleep", ALL_BUT_SLEEPS), ("hybrid", ALL_BUT_SLEEPS), ("external", ALL_BUT_SLEEPS)]);
+    watch([("sleep", ALL)]);
+}
+
+/// Daemons at once, while peers die.
+fn watch<const N: usize>(daemons: [(&str, &str); N]) {
+    let mut watched = daemons.map(|(release, calls)| (release, calls, traced(release, calls)));
     for _ in 0..3 {
         sleep(Duration::from_millis(500));
         watched.iter_mut().for_each(|(.., controlled)| controlled.replace_peer());
@@ -48,7 +53,7 @@ fn the_loop_calls_the_system_for_its_sleep_only() {
     }
 }
 
-fn watch(release: &str, calls: &str) -> Controlled {
+fn traced(release: &str, calls: &str) -> Controlled {
     let machine = Machine::with("system-calls", &format!("[realtime]\nrelease = \"{release}\"\n{PATIENT}"));
     let daemon = hexad();
     let mut command = Command::new("strace");
