@@ -286,7 +286,7 @@ pub fn draw(charts: &Charts) -> Result<(), Failure> {
     }];
     fit_ranges(&mut drawn, true);
     let sizes = RATES.into_iter().filter_map(|rate_hz| {
-        let most = of_rate(rate_hz).last()?.count;
+        let most = of_rate(rate_hz).next_back()?.count;
         let carried = of_rate(rate_hz).take_while(|row| row.carries()).last().map_or(0, |row| row.count);
         let at_least = if carried == most { "at least " } else { "" };
         Some(format!("{at_least}{carried} at {} kHz", rate_hz / 1000))
