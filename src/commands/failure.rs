@@ -61,7 +61,7 @@ impl CommandError for DaemonError {
         let is_configured =
             |error: &SocketError| matches!(error, SocketError::NoGroup(_) | SocketError::NotMember(_));
         match self {
-            Self::NotRealtime(_) | Self::Config(_) => false,
+            Self::NotRealtime(_) | Self::Files(_) | Self::Config(_) => false,
             Self::Socket(error) => !is_configured(error),
             Self::Port(_) | Self::Signals(_) | Self::Thread(_) | Self::Died(_) | Self::Report(_) => true,
         }

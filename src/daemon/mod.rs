@@ -21,7 +21,7 @@ use crate::messages::{Claim, PortError};
 use crate::output::files::{FileError, write_whole};
 use crate::realtime::request_signal::{RequestSignal, post_on_signals};
 use crate::realtime::request_word::RequestWord;
-use crate::realtime::setup::Shortfall;
+use crate::realtime::setup::{Shortfall, open_files};
 use crate::realtime::stop_request::Stop;
 
 pub mod control_socket;
@@ -71,6 +71,9 @@ pub enum DaemonError {
     /// The kernel refused steps of the real-time set-up, and the deployment requires them all.
     #[error("realtime.require_realtime is set, and there is {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     NotRealtime(Vec<Shortfall>),
+    /// Its limit of open files is too low.
+    #[error(transparent)]
+    Files(Shortfall),
     /// The named thread panicked or ended before it was stopped.
     #[error("the {0} thread ended unexpectedly")]
     Died(&'static str),
@@ -100,6 +103,9 @@ pub fn request_of(signal: RequestSignal) -> Request {
     }
 }
 
+/// Files that the daemon may need open at once: all connections and what comes with them, shared memory, recordings.
+const OPEN_FILES: u64 = 512;
+
 /// Target of the log of warnings about the configuration.
 pub const CONFIGURATION_LOG: &str = "hexad::config";
 
@@ -108,6 +114,7 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
     for warning in config.examine().into_result(config)? {
         warn!(target: CONFIGURATION_LOG, "{warning}");
     }
+    open_files::permit(OPEN_FILES).map_err(DaemonError::Files)?;
     let mut claim = Claim::take(&config.name)?;
     // It lives as long as the process: signals may come until its end.
     let word: &'static RequestWord = Box::leak(Box::default());

@@ -1,12 +1,14 @@
 //! The control socket: its protocol, its users, and the status.
 
 use std::fs;
+use std::io::BufReader;
 use std::process::Command;
 
 use serde_json::{Value, json};
 
 use crate::common::not_run::lacking;
 use crate::support::children::{Ended, HANG, Hexad, run};
+use crate::support::disturbance::{line_of, python};
 use crate::support::machine::{Machine, PATIENT};
 use crate::support::nobody::{AS_NOBODY, NO_LIMITS_RAISED, cannot, wrapped};
 use crate::support::operator::{ask, clear, does};
@@ -218,4 +220,54 @@ fn status_shows_what_the_daemon_knows() {
     );
     assert!(stdout.contains("   ACTIVE") && stdout.contains("no diagnostic"), "{stdout}");
     trio.finish();
+}
+
+/// Lines with more files than the daemon receives; path of the socket.
+const FILES_WITH_LINES: &str = r#"
+import array, socket, sys
+line = b'{"version": 1, "request": "status"}\n'
+files = [0] * 60
+for _ in range(300):
+    link = socket.socket(socket.AF_UNIX)
+    link.connect(sys.argv[1])
+    link.sendmsg([line], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))])
+    assert b'"done"' in link.makefile("rb").readline()
+print("sent")
+"#;
+
+#[test]
+fn files_that_come_with_lines_do_not_stay_open() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("files");
+    let daemon = start_daemon(&machine);
+    let open = || fs::read_dir(format!("/proc/{}/fd", daemon.id())).expect("its files").count();
+    let before = open();
+    let mut sender = python(&["/usr/bin/env"], FILES_WITH_LINES, &path_of(&daemon));
+    assert_eq!(line_of(&mut BufReader::new(sender.stdout.take().expect("a pipe"))), "sent");
+    sender.wait().expect("its end");
+    does(&machine, "estop", &[], &["fault"]);
+    let after = open();
+    assert!(after < before + 10, "{before} files before, {after} after");
+    daemon.stops_on("TERM", HANG);
+}
+
+#[test]
+fn a_daemon_that_may_not_open_enough_files_says_so() {
+    let _turn = turns::beside_others();
+    let machine = Machine::patient("few-files");
+    let start = |limits: &str| {
+        let program = env!("CARGO_BIN_EXE_hexad");
+        let mut shell = Command::new("sh");
+        shell.args([
+            "-c",
+            &format!("ulimit {limits}; exec {program} run --config {}", machine.file.display()),
+        ]);
+        Hexad::spawn(&machine, "run", shell)
+    };
+    let Ended { status, stderr, .. } = start("-n 32").ends_within(HANG);
+    assert_ne!(status.code(), Some(0));
+    assert!(stderr.contains("RLIMIT_NOFILE is 32; LimitNOFILE=512"), "{stderr}");
+    let daemon = start("-Sn 32");
+    daemon.says("running");
+    daemon.stops_on("TERM", HANG);
 }

@@ -97,7 +97,7 @@ pub(super) fn run(loaded: Arc<Loaded>, links: ControlLinks<'_>, stop: &AtomicBoo
         woke_ns: monotonic_ns(),
         stale_until_ns: 0,
         warned_ns: 0,
-        closed: 0,
+        unserved: 0,
         logged: [None; 2],
     };
     while !stop.load(Ordering::Relaxed) {
@@ -129,9 +129,9 @@ struct Server<'a> {
     woke_ns: u64,
     /// Until then a request may have been sent before the process was held \[ns\].
     stale_until_ns: u64,
-    /// The last warning \[ns\], and the connections closed without one since then.
+    /// The last warning \[ns\], and the clients without one since then.
     warned_ns: u64,
-    closed: u64,
+    unserved: u64,
     /// Mistakes of the senders of setpoints and measurements that were logged last.
     logged: [Option<Rejection>; 2],
 }
@@ -178,11 +178,29 @@ impl Server<'_> {
         self.woke_ns = now_ns;
     }
 
-    /// Accepts who waits, and reads at once: a stop does not wait until what all others have sent is read.
+    /// Accepts who waits, and reads at once: a stop does not wait until what all others have sent is read. Where no more files may be
+    /// open, another connection makes room.
     fn accept(&mut self) {
         let snapshot = *self.snapshots.read();
         for _ in 0..MAX_CONNECTIONS {
-            let Ok((stream, _)) = self.socket.listener.accept() else { return };
+            let stream = match self.socket.listener.accept() {
+                Ok((stream, _)) => stream,
+                Err(error) if matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE)) => {
+                    if let Some(count) = self.warning() {
+                        warn!(
+                            count,
+                            "control socket: a client waits, and no file is free ({error}): raise LimitNOFILE"
+                        );
+                    }
+                    if !self.close_least() {
+                        // Whatever holds the files: not in a busy loop.
+                        sleep(Duration::from_millis(PENDING_WAIT_MS.into()));
+                        return;
+                    }
+                    continue;
+                }
+                Err(_) => return,
+            };
             let Ok(mut connection) = Connection::new(stream, self.woke_ns) else { continue };
             if self.receive(&mut connection, &snapshot) {
                 self.connections.push(connection);
@@ -192,12 +210,16 @@ impl Server<'_> {
 
     /// Closes connections beyond the most, after each was read once: however many connect, none is closed before its first line.
     fn make_room(&mut self) {
-        while self.connections.len() > MAX_CONNECTIONS {
-            let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
-            let Some((_, least)) = ranks.min() else { return };
-            let closed = self.connections.swap_remove(least);
-            closed.pending.iter().for_each(|pending| pending.cancel(self.word));
-        }
+        while self.connections.len() > MAX_CONNECTIONS && self.close_least() {}
+    }
+
+    /// Closes the first connection in the order of [`Connection::rank`]; false if there is none.
+    fn close_least(&mut self) -> bool {
+        let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
+        let Some((_, least)) = ranks.min() else { return false };
+        let closed = self.connections.swap_remove(least);
+        closed.pending.iter().for_each(|pending| pending.cancel(self.word));
+        true
     }
 
     /// Reads at most one line of each connection. Stops are carried out at once, of all else some in each round.
@@ -243,12 +265,20 @@ impl Server<'_> {
     }
 
     fn warn_of(&mut self, connection: &Connection, reason: &str) {
-        self.closed += 1;
-        if self.woke_ns.saturating_sub(self.warned_ns) > WARNING_INTERVAL_NS {
-            let (peer, count) = (&connection.peer, self.closed);
+        if let Some(count) = self.warning() {
+            let peer = &connection.peer;
             warn!(user = %peer.user(), process = peer.process_id, count, "control socket: closed: {reason}");
-            (self.warned_ns, self.closed) = (self.woke_ns, 0);
         }
+    }
+
+    /// Counts a client that misbehaves or is not served; their number since the last warning, if it is time for one.
+    fn warning(&mut self) -> Option<u64> {
+        self.unserved += 1;
+        let is_time = self.woke_ns.saturating_sub(self.warned_ns) > WARNING_INTERVAL_NS;
+        is_time.then(|| {
+            self.warned_ns = self.woke_ns;
+            core::mem::take(&mut self.unserved)
+        })
     }
 
     /// Logs each mistake of a sender when it is first seen.

@@ -9,6 +9,7 @@ pub mod deadline;
 pub mod denormals;
 pub mod idle;
 pub mod memory;
+pub mod open_files;
 pub mod permissions;
 pub mod refusals;
 pub mod scheduling;
