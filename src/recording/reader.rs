@@ -16,6 +16,8 @@ use crate::output::files::FileError;
 
 /// Most bytes that are read at once: a chunk. A damaged length cannot demand more.
 const READ_BYTES: usize = 128 * 1024;
+/// Longest record \[bytes\]: many times a chunk and a configuration.
+const MAX_RECORD_BYTES: usize = 64 << 20;
 
 /// A recording, which is read anew from its file each time.
 pub struct Recording {
@@ -65,8 +67,8 @@ impl Recording {
         mut visit: impl FnMut(Record<'_>) -> Result<(), RecordingError>,
     ) -> Result<Option<String>, RecordingError> {
         let mut file = File::open(&self.path).map_err(FileError::on(&self.path))?;
-        let mut reader =
-            LinearReader::new_with_options(LinearReaderOptions::default().with_skip_end_magic(true));
+        let options = LinearReaderOptions::default().with_skip_end_magic(true);
+        let mut reader = LinearReader::new_with_options(options.with_record_length_limit(MAX_RECORD_BYTES));
         while let Some(event) = reader.next_event() {
             match event {
                 Ok(LinearReadEvent::ReadRequest(wanted)) => {
@@ -155,4 +157,31 @@ fn memory(bytes: &[u8]) -> Option<Item> {
     let (length, content) = rest.split_first_chunk()?;
     let is_whole = u32::from_ne_bytes(*length) as usize == content.len();
     is_whole.then(|| Item::Memory { cycle: u64::from_ne_bytes(*cycle), bytes: content.into() })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn no_length_in_a_damaged_file_is_trusted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("damaged.mcap");
+        let first_record = [mcap::MAGIC, &[1], &u64::MAX.to_le_bytes(), b"rest"].concat();
+        let whole = fs::read("tests/data/hexad-2026-11-25.mcap").unwrap();
+        let damaged = (mcap::MAGIC.len()..whole.len()).step_by(whole.len() / 500).map(|at| {
+            let mut content = whole.clone();
+            content.iter_mut().skip(at).take(8).for_each(|byte| *byte = 0xff);
+            content
+        });
+        for content in [first_record].into_iter().chain(damaged) {
+            fs::write(&path, content).unwrap();
+            // Refused, or read as far as it is whole.
+            let _ = Recording::open(&path).unwrap().summary();
+        }
+        fs::write(&path, &whole).unwrap();
+        assert!(Recording::open(&path).unwrap().summary().is_ok());
+    }
 }
