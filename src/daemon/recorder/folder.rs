@@ -3,7 +3,6 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use tracing::info;
 
@@ -22,6 +21,9 @@ impl Default for Bounds {
         Self { file: 256 << 20, total: 4 << 30 }
     }
 }
+
+/// Order of recordings, the oldest first.
+type Age = (bool, u64, u64);
 
 /// Folder for the recordings of one run.
 #[derive(Clone, Debug)]
@@ -50,16 +52,13 @@ impl Folder {
         self.path.join(format!("{}.{}.{part}.mcap", self.name, self.started_s))
     }
 
-    /// Deletes the oldest recordings of this machine. A name has no dot: no other machine's begins alike.
+    /// Deletes the oldest recordings of this machine, those of the present run last: its clock may be behind that of runs before.
     fn make_room(&self) -> io::Result<()> {
-        let prefix = format!("{}.", self.name);
-        let mut files: Vec<(SystemTime, PathBuf, u64)> = vec![];
+        let mut files: Vec<(Age, PathBuf, u64)> = vec![];
         for entry in fs::read_dir(&self.path)? {
             let entry = entry?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if name.starts_with(&prefix) && name.ends_with(".mcap") {
-                let metadata = entry.metadata()?;
-                files.push((metadata.modified()?, entry.path(), metadata.len()));
+            if let Some(age) = self.age(&entry.file_name().to_string_lossy()) {
+                files.push((age, entry.path(), entry.metadata()?.len()));
             }
         }
         files.sort();
@@ -74,10 +73,22 @@ impl Folder {
         }
         Ok(())
     }
+
+    /// Order of a recording of this machine by its name: whether it is of the present run, start of its run, and number of its part.
+    /// `None` if it is another file. A name has no dot: no other machine's begins alike.
+    fn age(&self, file: &str) -> Option<Age> {
+        let (started_s, part) =
+            file.strip_prefix(&self.name)?.strip_prefix('.')?.strip_suffix(".mcap")?.split_once('.')?;
+        let started_s = started_s.parse().ok()?;
+        let number = part.rsplit('-').next()?.parse().ok()?;
+        Some((started_s == self.started_s, started_s, number))
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::SystemTime;
+
     use super::*;
 
     #[test]
@@ -102,5 +113,32 @@ mod tests {
             .collect();
         left.sort();
         assert_eq!(left, ["a-b.1.1.mcap", "a.1.2.mcap", "a.1.csv", "a.2.1.mcap"]);
+    }
+
+    #[test]
+    fn the_present_run_is_the_newest_whatever_the_clock_says() {
+        let folder = tempfile::tempdir().unwrap();
+        let future = SystemTime::now() + core::time::Duration::from_secs(1_000_000);
+        for name in
+            ["a.5.998.mcap", "a.5.1000.mcap", "a.9.001.mcap", "a.4.001.mcap", "a.4.002.mcap", "a.x.mcap"]
+        {
+            let path = folder.path().join(name);
+            fs::write(&path, [0; 100]).unwrap();
+            if !name.starts_with("a.4.") {
+                fs::File::options().write(true).open(&path).unwrap().set_modified(future).unwrap();
+            }
+        }
+        let mut left = vec![];
+        for total in [600, 500, 400, 300, 200] {
+            Folder::new(folder.path(), "a", 4, Bounds { file: 100, total }).next_path("003");
+            let names = fs::read_dir(folder.path()).unwrap();
+            left.push(names.map(|it| it.unwrap().file_name().into_string().unwrap()).collect::<Vec<_>>());
+        }
+        let gone: Vec<_> = left
+            .windows(2)
+            .map(|pair| pair[0].iter().find(|name| !pair[1].contains(name)).map(String::as_str))
+            .collect();
+        let expected = ["a.5.998.mcap", "a.5.1000.mcap", "a.9.001.mcap", "a.4.001.mcap"].map(Some);
+        assert_eq!(gone, expected);
     }
 }
