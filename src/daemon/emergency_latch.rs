@@ -5,8 +5,8 @@
 //! recorder can hold it up.
 
 use core::sync::atomic::{AtomicBool, Ordering};
-use std::fs::{File, read};
-use std::io::ErrorKind;
+use std::fs::{File, metadata, read};
+use std::io::{self, ErrorKind};
 use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -87,6 +87,10 @@ impl EmergencyLatch {
     /// Latch in a folder, as the daemon before has left it. An error if that cannot be known or changed.
     pub fn open(folder: &Path) -> Result<Self, FileError> {
         let path = folder.join(FILE);
+        if !folder.is_dir() {
+            let cause = format!("there must be a folder: mkdir -p {}", folder.display());
+            return Err(FileError::on(folder)(io::Error::new(ErrorKind::NotFound, cause)));
+        }
         let is_set = match read(&path) {
             Ok(content) => content != CLEARED,
             Err(error) if error.kind() == ErrorKind::NotFound => false,
@@ -140,11 +144,12 @@ impl EmergencyLatch {
         }
     }
 
-    /// Replaces the content durably; the file too if somebody has removed it.
+    /// Replaces the content durably; makes the file anew if somebody has removed it, or put another folder in place of its own.
     fn store(&mut self, content: &[u8]) -> Result<(), FileError> {
         let written = self.file.write_all_at(content, 0).and_then(|()| self.file.sync_data());
-        let links = written.and_then(|()| self.file.metadata()).map(|found| found.nlink());
-        if links.map_err(FileError::on(&self.path))? == 0 {
+        let own = written.and_then(|()| self.file.metadata()).map_err(FileError::on(&self.path))?;
+        let is_found = metadata(&self.path).is_ok_and(|it| (it.dev(), it.ino()) == (own.dev(), own.ino()));
+        if !is_found {
             self.file = create(&self.path, content)?;
         }
         Ok(())
@@ -207,7 +212,7 @@ mod tests {
         let folder = TempDir::new().unwrap();
         let mut latch = EmergencyLatch::open(folder.path()).unwrap();
         let file =
-            || fs::metadata(folder.path().join(FILE)).map(|found| (found.ino(), found.blocks(), found.len()));
+            || metadata(folder.path().join(FILE)).map(|found| (found.ino(), found.blocks(), found.len()));
         let before = file().unwrap();
         for state in [EMERGENCY, OFF, EMERGENCY] {
             latch.follow(change(state));
@@ -223,6 +228,26 @@ mod tests {
         fs::remove_file(&latch.path).unwrap();
         latch.follow(change(EMERGENCY));
         assert!(is_kept(&folder));
+    }
+
+    #[test]
+    fn a_folder_that_was_replaced_has_the_file_again() {
+        let parent = TempDir::new().unwrap();
+        let [folder, moved] = ["state", "moved"].map(|name| parent.path().join(name));
+        fs::create_dir(&folder).unwrap();
+        let mut latch = EmergencyLatch::open(&folder).unwrap();
+        fs::rename(&folder, moved).unwrap();
+        fs::create_dir(&folder).unwrap();
+        latch.follow(change(EMERGENCY));
+        assert!(EmergencyLatch::open(&folder).unwrap().is_set());
+    }
+
+    #[test]
+    fn a_folder_that_is_missing_is_named_with_the_remedy() {
+        let parent = TempDir::new().unwrap();
+        let folder = parent.path().join("missing");
+        let error = EmergencyLatch::open(&folder).unwrap_err().to_string();
+        assert!(error.contains(&format!("mkdir -p {}", folder.display())), "{error}");
     }
 
     #[test]
