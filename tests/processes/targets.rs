@@ -239,7 +239,7 @@ fn a_jog_moves_while_keys_arrive_and_no_longer() {
     let began = Instant::now();
     while pose(&machine)[5] < 0.01 {
         assert!(began.elapsed() < HANG, "the platform does not move up: {:?}", pose(&machine));
-        keys.write_all(b"e").expect("a key");
+        keys.write_all(b"r").expect("a key");
         keys.flush().expect("a key");
         sleep(Duration::from_millis(20));
     }
@@ -247,7 +247,7 @@ fn a_jog_moves_while_keys_arrive_and_no_longer() {
     let (from_ns, to_ns) = let_pass(Duration::from_secs(1));
     let x = pose(&machine);
     assert!(x[5] >= 0.01 && x[5] < 0.06, "{x:?}");
-    keys.write_all(b"\x03").expect("Ctrl-C");
+    keys.write_all(b"q").expect("a key");
     keys.flush().expect("a key");
     let ended = child.wait().expect("its end");
     assert_eq!(ended.code(), Some(0), "of jog");

@@ -79,7 +79,7 @@ impl<'a> JogTarget<'a> {
             (Key::Faster, false) => self.step = (self.step + 1).min(STEPS.len() - 1),
             (Key::Slower, false) => self.step = self.step.saturating_sub(1),
             (Key::Mode, _) => self.is_continuous = !self.is_continuous,
-            (Key::Stop, _) => {}
+            (Key::Stop | Key::Leave, _) => {}
         }
         None
     }

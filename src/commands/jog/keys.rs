@@ -14,17 +14,21 @@ pub enum Key {
     Mode,
     /// Ends motion, as any other key that has no meaning does.
     Stop,
+    /// Ends the command.
+    Leave,
 }
 
-/// Keys of each coordinate of X, up and down. `z` is where a German keyboard has `y`.
+/// Keys of each coordinate of X, up and down: two rows of the keyboard right of `q`. `z` is where a German keyboard has `y`.
 const KEYS: [(&[u8], &[u8]); 6] =
-    [(b"r", b"f"), (b"t", b"g"), (b"yz", b"h"), (b"q", b"a"), (b"w", b"s"), (b"e", b"d")];
+    [(b"t", b"g"), (b"yz", b"h"), (b"u", b"j"), (b"w", b"s"), (b"e", b"d"), (b"r", b"f")];
+
+const ESCAPE: u8 = 0x1b;
 
 /// Key of what a terminal has sent. Of many at once only the last counts: they may have waited in a
 /// slow connection.
 pub fn last_key(bytes: &[u8]) -> Option<Key> {
     // A sequence of an arrow or function key moves nothing.
-    if bytes.contains(&0x1b) {
+    if bytes.len() > 1 && bytes.contains(&ESCAPE) {
         return Some(Key::Stop);
     }
     bytes.last().map(|byte| key(*byte))
@@ -39,6 +43,7 @@ fn key(byte: u8) -> Key {
         b'+' => Key::Faster,
         b'-' => Key::Slower,
         b'm' => Key::Mode,
+        b'q' | b'Q' | ESCAPE => Key::Leave,
         _ => Key::Stop,
     })
 }
@@ -59,8 +64,11 @@ mod tests {
         moves.dedup();
         assert_eq!(moves.len(), 12);
         assert_eq!(last_key(b""), None);
-        assert_eq!(last_key(b"qqqa"), Some(Key::Move { axis: 3, sign: -1.0 }));
+        assert_eq!(last_key(b"wwws"), Some(Key::Move { axis: 3, sign: -1.0 }));
         // An arrow key whose last byte is a letter of its own.
-        assert_eq!(last_key(b"\x1b[a"), Some(Key::Stop));
+        assert_eq!(last_key(b"\x1b[s"), Some(Key::Stop));
+        for leaving in [b"q", b"Q", b"\x1b"] {
+            assert_eq!(last_key(leaving), Some(Key::Leave), "{leaving:?}");
+        }
     }
 }

@@ -60,7 +60,7 @@ impl JogArguments {
     }
 }
 
-/// Publishes a target that keys move, until a signal.
+/// Publishes a target that keys move, until `q`, Esc or a signal.
 fn jog(source: &mut TargetSource, mut target: JogTarget, stop: &Stop) -> Result<(), Failure> {
     let terminal = Terminal::open().map_err(|error| Failure { exit_code: 2, message: error.to_string() })?;
     let mut held: Option<(Key, Instant)> = None;
@@ -68,7 +68,11 @@ fn jog(source: &mut TargetSource, mut target: JogTarget, stop: &Stop) -> Result<
     while !stop.is_requested() {
         source.publish(target.x())?;
         let (reference, now) = (source.present_x()?, Instant::now());
-        if let Some(key) = last_key(&terminal.bytes()) {
+        let key = last_key(&terminal.bytes());
+        if key == Some(Key::Leave) {
+            break;
+        }
+        if let Some(key) = key {
             held = target.press(key, &pose_of(&reference)).map(|key| (key, now));
         }
         held = held.filter(|(_, at)| at.elapsed() < KEY_TIMEOUT && source.active_since().is_some());

@@ -23,7 +23,7 @@ impl fmt::Display for JogScreen<'_> {
         writeln!(
             f,
             "{:.80}",
-            format!("jog {}   {state}   Ctrl-C ends; the platform then stands under control", report.machine)
+            format!("jog {}   {state}   q ends; the platform then stands under control", report.machine)
         )?;
         let code = answer.diagnostic.code;
         writeln!(f, "{:.80}", if code == 0 { "" } else { &answer.diagnostic.text })?;
@@ -34,7 +34,7 @@ impl fmt::Display for JogScreen<'_> {
         writeln!(f, "{:.80}", format!("bound     {bound}"))?;
         poses(f, report)?;
         legs(f, report)?;
-        writeln!(f, "\nup/down   x q/a   y w/s   z e/d   alpha r/f   beta t/g   gamma y/h")?;
+        writeln!(f, "\nup/down   x w/s   y e/d   z r/f   alpha t/g   beta y/h   gamma u/j   leave q")?;
         let pace = match target.pace() {
             Pace::Continuous([position, angle]) => format!(
                 "{} mm/s, {} deg/s while a key is held",
