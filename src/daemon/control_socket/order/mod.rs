@@ -49,6 +49,8 @@ enum Stage {
     Retrying,
     /// The controller has accepted it.
     Accepted,
+    /// A later request has taken the place of a stop: whether the platform is stopped says its state.
+    Replaced,
 }
 
 /// Result of a look at a pending order.
@@ -86,6 +88,10 @@ impl PendingOrder {
             Stage::Posting => self.try_post(snapshot, word, now_ns),
             Stage::Retrying if age_ns > RETRY_INTERVAL_NS => self.try_post(snapshot, word, now_ns),
             Stage::Posted(posted) if posted == snapshot.answered => return self.answered(snapshot, now_ns),
+            Stage::Posted(posted) if word.load() != posted && is_stop(self.order.request) => {
+                (self.stage, self.since_ns) = (Stage::Replaced, now_ns);
+                return self.replaced(snapshot, now_ns);
+            }
             Stage::Posted(posted) if word.load() != posted => {
                 return self.answer(
                     RequestResult::Superseded,
@@ -98,6 +104,7 @@ impl PendingOrder {
                 return self.unanswered(snapshot);
             }
             Stage::Accepted => return self.completion(snapshot, now_ns),
+            Stage::Replaced => return self.replaced(snapshot, now_ns),
             Stage::Posted(_) | Stage::Retrying => {}
         }
         self.check_deadline(snapshot, now_ns)
@@ -170,6 +177,15 @@ impl PendingOrder {
             Some(false) => self.answer(RequestResult::Failed, snapshot, state_text(snapshot)),
             None => self.check_deadline(snapshot, now_ns),
         }
+    }
+
+    /// The request that has replaced this stop may not have been seen yet.
+    fn replaced(&self, snapshot: &Snapshot, now_ns: u64) -> Step {
+        let is_new = now_ns.saturating_sub(self.since_ns) <= ANSWER_LIMIT_NS;
+        if is_new && state(snapshot).has_control() {
+            return self.check_deadline(snapshot, now_ns);
+        }
+        self.completion(snapshot, now_ns)
     }
 
     fn check_deadline(&self, snapshot: &Snapshot, now_ns: u64) -> Step {

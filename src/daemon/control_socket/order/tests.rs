@@ -60,6 +60,33 @@ fn a_stop_of_another_supersedes_an_engage_and_does_not_wait_for_it() {
 }
 
 #[test]
+fn a_stop_that_another_replaces_ends_with_whether_the_platform_is_stopped() {
+    let none = Diagnostic::default();
+    for (later, state, expected) in [
+        (Request::Estop, State::Fault, RequestResult::Done),
+        (Request::Clear, State::Off, RequestResult::Failed),
+    ] {
+        let word = RequestWord::default();
+        let mut first = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 1000);
+        // The loop has seen it, and before its order looks, a later request is posted and answered.
+        word.set_seen(word.load());
+        let _later = PendingOrder::post(order(later, false), &first_cycle(), &word, 2000);
+        let step = first.step(&snapshot(state, word.load(), none), &word, 3000);
+        assert_eq!(result(&step), Some(expected), "{later:?}");
+    }
+    // An emergency stop in place of a stop that the loop has not seen.
+    let word = RequestWord::default();
+    let mut stop = PendingOrder::post(order(Request::Stop, false), &first_cycle(), &word, 1000);
+    let _estop = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 2000);
+    assert_eq!(result(&stop.step(&snapshot(State::Active, 0, none), &word, 3000)), None, "on its way");
+    let step = stop.step(&snapshot(State::Fault, word.load(), none), &word, 4000);
+    assert!(
+        matches!(&step, Step::Answer(line) if line.result == RequestResult::Failed && line.state == "fault"),
+        "{step:?}"
+    );
+}
+
+#[test]
 fn what_the_loop_does_not_answer_is_withdrawn_unless_it_stops() {
     for request in Request::ALL {
         let word = RequestWord::default();
