@@ -98,6 +98,12 @@ impl Config {
         Ok(Self { path: absolute(path).ok(), ..Self::parse(&text, &place)? })
     }
 
+    /// The same once more, by a daemon that runs: of a regular file, which cannot hold it up.
+    pub fn load_again(path: &Path) -> Result<Self, ConfigError> {
+        let (text, place) = text::read_regular_file(path)?;
+        Ok(Self { path: Some(path.into()), ..Self::parse(&text, &place)? })
+    }
+
     /// Validates a text; error texts name it `place`.
     pub fn parse(original: &str, place: &str) -> Result<Self, ConfigError> {
         Self::parse_on(at_most_256_bits(Level::new()), original, place)

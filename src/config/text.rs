@@ -1,7 +1,9 @@
 //! Text of a configuration file: all errors that come before the parsing as TOML.
 
+use std::fs::File;
 use std::io::{self, Read};
-use std::{fs::File, path::Path};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
 
 use super::{ConfigError, Violation};
 
@@ -12,6 +14,18 @@ pub const MAX_FILE_BYTES: usize = 64 << 10;
 pub fn read_file(path: &Path) -> Result<(String, String), ConfigError> {
     let place = path.display().to_string();
     let file = File::open(path).map_err(unreadable(&place))?;
+    Ok((read_text(file, &place)?, place))
+}
+
+/// Text of a file that has to be a regular one: no pipe can hold up the reader.
+pub fn read_regular_file(path: &Path) -> Result<(String, String), ConfigError> {
+    let place = path.display().to_string();
+    let opened = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
+    let is_regular = |file: File| match file.metadata()?.is_file() {
+        true => Ok(file),
+        false => Err(io::Error::other("it is not a regular file")),
+    };
+    let file = opened.and_then(is_regular).map_err(unreadable(&place))?;
     Ok((read_text(file, &place)?, place))
 }
 
@@ -47,6 +61,18 @@ mod tests {
     /// Error text for a source.
     fn refusal(source: impl Read) -> String {
         read_text(source, "x.toml").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_pipe_without_a_writer_holds_nobody_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let [pipe, file] = ["pipe", "file"].map(|name| folder.path().join(name));
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let refused = read_regular_file(&pipe).unwrap_err().to_string();
+        assert!(refused.ends_with("it is not a regular file"), "{refused}");
+        assert!(read_regular_file(folder.path()).is_err());
+        std::fs::write(&file, "x").unwrap();
+        assert_eq!(read_regular_file(&file).unwrap().0, "x");
     }
 
     #[test]

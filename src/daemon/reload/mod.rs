@@ -139,7 +139,7 @@ impl Reloading<'_, '_> {
         self.receive(Duration::ZERO);
         let current = &self.current.config;
         let path = current.path.as_deref().ok_or(ReloadError::NoFile)?;
-        let new = Config::load(path)?;
+        let new = Config::load_again(path)?;
         let (place, changes) = (new.place.clone(), changes(&current.text, &new.text));
         refuse_restarts(current, &new, &changes)?;
         for warning in new.examine().into_result(&new)? {
