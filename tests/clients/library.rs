@@ -104,3 +104,31 @@ fn a_wrong_call_fails_with_a_reason() {
     let found = output(command.arg(script)).unwrap();
     assert_eq!(found, OUTCOMES.replace("NAME", &name));
 }
+
+/// A child of fork has a copy of its parent's client, ends, and lets the parent go on.
+const FORK: &str = "
+import hexad, os
+with hexad.Client('NAME', hexad.Role.DRIVER | hexad.Role.MONITOR) as client:
+    measured = hexad.Measured()
+    child = os.fork()
+    if child == 0:
+        try:
+            client.publish_measured(1, measured)
+        except hexad.HexadError as error:
+            print(error)
+        client.close()
+        raise SystemExit
+    os.waitpid(child, 0)
+    client.publish_measured(2, measured)
+    print(client.latest_measured().header.time_ns)
+";
+
+#[test]
+fn a_child_of_fork_leaves_its_parents_ports_alone() {
+    let name = format!("fork-{}", std::process::id());
+    let script = file("fork.py");
+    fs::write(&script, FORK.replace("NAME", &name)).unwrap();
+    let said = output(with_library(Command::new("python3")).arg(script)).unwrap();
+    let [refusal, received] = said.lines().collect::<Vec<_>>()[..] else { panic!("{said}") };
+    assert!(refusal.starts_with("the client is that of process ") && received == "2", "{said}");
+}

@@ -77,7 +77,7 @@ uint64_t hexad_monotonic_ns(void);
 const char *hexad_last_error(void);
 
 // Joins the topics of a machine (`name` of its file) in one or several roles (their sum), as the user of the daemon.
-// Returns NULL on failure. The client belongs to the caller until hexad_close.
+// Returns NULL on failure. The client belongs to the caller until hexad_close, and to this process: a child of fork opens its own.
 //
 // # Safety
 //
@@ -86,7 +86,7 @@ struct hexad_client *hexad_open(const char *machine,
                                 uint32_t roles);
 
 // Leaves the topics and frees the client; NULL is allowed. Returns HEXAD_BUSY, and frees nothing, while another thread uses
-// it.
+// it. In a child of fork it does nothing: the client is that of the parent.
 //
 // # Safety
 //

@@ -1,5 +1,6 @@
 //! The handle: ports of the roles in which a program has joined.
 
+use std::process;
 use std::sync::{Mutex, TryLockError};
 
 use hexad::messages::clock::monotonic_ns;
@@ -17,7 +18,11 @@ const DEPTH: usize = 8;
 
 /// A program that has joined the topics of a machine.
 #[allow(non_camel_case_types, reason = "a name of C")]
-pub struct hexad_client(Mutex<Ports>);
+pub struct hexad_client {
+    ports: Mutex<Ports>,
+    /// The process that has joined. A child of `fork` has a copy of the ports, and must not touch what the parent uses.
+    process_id: u32,
+}
 
 /// Ports of all roles that were requested.
 pub struct Ports {
@@ -53,7 +58,12 @@ pub struct Monitor {
 impl hexad_client {
     /// A handle of ports.
     pub fn new(ports: Ports) -> Self {
-        Self(Mutex::new(ports))
+        Self { ports: Mutex::new(ports), process_id: process::id() }
+    }
+
+    /// Whether this process has joined, and not the one that has forked it.
+    pub fn is_own(&self) -> bool {
+        self.process_id == process::id()
     }
 }
 
@@ -69,7 +79,12 @@ pub unsafe fn with<T>(
     // SAFETY: the caller's promise. Ports may change threads: all that they share is in this handle, and the lock orders the calls.
     let client = unsafe { client.as_ref() };
     let client = client.ok_or_else(|| Failure::new(HEXAD_INVALID, "the client is NULL"))?;
-    match client.0.try_lock() {
+    if !client.is_own() {
+        let text =
+            format!("the client is that of process {}: a child of fork opens its own", client.process_id);
+        return Err(Failure::new(HEXAD_INVALID, text));
+    }
+    match client.ports.try_lock() {
         Ok(mut ports) => act(&mut ports),
         Err(TryLockError::WouldBlock) => Err(Failure::new(HEXAD_BUSY, "another thread uses the client")),
         Err(TryLockError::Poisoned(_)) => {

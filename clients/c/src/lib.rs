@@ -52,7 +52,7 @@ pub extern "C" fn hexad_last_error() -> *const c_char {
 }
 
 /// Joins the topics of a machine (`name` of its file) in one or several roles (their sum), as the user of the daemon.
-/// Returns NULL on failure. The client belongs to the caller until hexad_close.
+/// Returns NULL on failure. The client belongs to the caller until hexad_close, and to this process: a child of fork opens its own.
 ///
 /// # Safety
 ///
@@ -70,7 +70,7 @@ pub unsafe extern "C" fn hexad_open(machine: *const c_char, roles: u32) -> *mut 
 }
 
 /// Leaves the topics and frees the client; NULL is allowed. Returns HEXAD_BUSY, and frees nothing, while another thread uses
-/// it.
+/// it. In a child of fork it does nothing: the client is that of the parent.
 ///
 /// # Safety
 ///
@@ -78,7 +78,8 @@ pub unsafe extern "C" fn hexad_open(machine: *const c_char, roles: u32) -> *mut 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hexad_close(client: *mut hexad_client) -> hexad_result {
     guard(|| {
-        if client.is_null() {
+        // SAFETY: the caller's promise.
+        if !unsafe { client.as_ref() }.is_some_and(hexad_client::is_own) {
             return Ok(HEXAD_OK);
         }
         // SAFETY: the caller's promise.

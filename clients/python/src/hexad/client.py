@@ -83,7 +83,7 @@ def view(field: Any) -> numpy.ndarray:
 class Client:
     """A program that has joined the topics of a machine, as the user of the daemon.
 
-    Two threads may not use it at the same time. Use it in a `with` statement, or call `close`.
+    Two threads may not use it at the same time, and a child of `os.fork` opens its own. Use it in a `with` statement, or call `close`.
     """
 
     def __init__(self, machine: str, roles: Role) -> None:
