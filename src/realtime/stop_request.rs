@@ -25,6 +25,12 @@ impl Stop {
         Ok(stop)
     }
 
+    /// As a signal does.
+    #[cfg(test)]
+    pub fn request(&self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// Whether a signal has arrived.
     pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed) > 0

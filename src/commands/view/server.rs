@@ -1,11 +1,12 @@
 //! An HTTP server for a page and its data: on the loopback alone, for those who know its token, without any request that
 //! changes something.
 
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::realtime::stop_request::Stop;
 
@@ -15,11 +16,14 @@ pub const THREADS: usize = 4;
 /// Longest head of a request \[bytes\].
 const MAX_HEAD: usize = 8192;
 
-/// Longest silence of a browser within a request.
+/// Longest time for a request, and for a reply.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How often a thread without a connection looks for one.
-const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
+/// Most requests of a thread that are on their way; the oldest makes room for one more.
+const MAX_UNREAD: usize = 64;
+
+/// How often a thread looks for connections and what they have sent.
+const INTERVAL: Duration = Duration::from_millis(10);
 
 /// Bytes of the token: 128 bits cannot be guessed.
 const TOKEN_BYTES: usize = 16;
@@ -54,27 +58,40 @@ impl Server {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
     }
 
-    /// Replies to requests until the stop; `reply` is called with the path and the query of those with the token.
+    /// Replies to requests until the stop; `reply` is called with the path and the query of those with the token. A slow
+    /// sender delays no other.
     pub fn serve(&self, stop: &Stop, reply: impl Fn(&str, &[(&str, &str)]) -> Option<Reply>) {
+        let mut unread = VecDeque::new();
         while !stop.is_requested() {
-            match self.listener.accept() {
-                // A browser that has gone needs no reply.
-                Ok((stream, _)) => drop(self.converse(stream, &reply)),
-                Err(_) => sleep(ACCEPT_INTERVAL),
+            for _ in 0..MAX_UNREAD {
+                let Ok((stream, _)) = self.listener.accept() else { break };
+                unread.extend(Request::new(stream));
+                if unread.len() > MAX_UNREAD {
+                    unread.pop_front();
+                }
             }
+            unread.retain_mut(|request: &mut Request| match request.read() {
+                Ok(true) => {
+                    // A browser that has gone needs no reply.
+                    let _ = self.answer(request, &reply);
+                    false
+                }
+                Ok(false) => request.began.elapsed() < TIMEOUT,
+                Err(_) => false,
+            });
+            sleep(INTERVAL);
         }
     }
 
-    fn converse(
+    fn answer(
         &self,
-        mut stream: TcpStream,
+        request: &mut Request,
         reply: &impl Fn(&str, &[(&str, &str)]) -> Option<Reply>,
     ) -> io::Result<()> {
+        let stream = &mut request.stream;
         stream.set_nonblocking(false)?;
-        stream.set_read_timeout(Some(TIMEOUT))?;
         stream.set_write_timeout(Some(TIMEOUT))?;
-        let head = read_head(&mut stream)?;
-        let (status, reply) = self.response(&head, reply);
+        let (status, reply) = self.response(&String::from_utf8_lossy(&request.head), reply);
         let Reply { kind, content } = reply;
         let length = content.len();
         write!(
@@ -119,18 +136,33 @@ impl Server {
     }
 }
 
-/// Reads until the empty line behind the head of a request.
-fn read_head(stream: &mut TcpStream) -> io::Result<String> {
-    let mut head = vec![];
-    let mut buffer = [0; 1024];
-    while !head.windows(4).any(|end| end == b"\r\n\r\n") {
-        let count = stream.read(&mut buffer)?;
-        if count == 0 || head.len() + count > MAX_HEAD {
-            return Err(io::ErrorKind::InvalidData.into());
-        }
-        head.extend_from_slice(buffer.get(..count).unwrap_or_default());
+/// A connection whose request is on its way.
+struct Request {
+    stream: TcpStream,
+    head: Vec<u8>,
+    began: Instant,
+}
+
+impl Request {
+    /// Of a connection that was just accepted; `None` if it is of no use.
+    fn new(stream: TcpStream) -> Option<Self> {
+        stream.set_nonblocking(true).ok()?;
+        Some(Self { stream, head: vec![], began: Instant::now() })
     }
-    Ok(String::from_utf8_lossy(&head).into())
+
+    /// Reads what there is; whether the head with its empty line is complete.
+    fn read(&mut self) -> io::Result<bool> {
+        let mut buffer = [0; MAX_HEAD];
+        match self.stream.read(&mut buffer) {
+            Ok(count) if count > 0 && self.head.len() + count <= MAX_HEAD => {
+                self.head.extend(buffer.iter().take(count));
+            }
+            Ok(_) => return Err(io::ErrorKind::InvalidData.into()),
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) => return Err(error),
+        }
+        Ok(self.head.windows(4).any(|end| end == b"\r\n\r\n"))
+    }
 }
 
 /// Compares in a time that does not depend on where two texts differ.
@@ -172,5 +204,28 @@ mod tests {
         assert_eq!(status(&server, &format!("{line}\r\n")), "403 Forbidden");
         assert_eq!(status(&server, &format!("{line}Host: evil.example:{port}\r\n\r\n")), "403 Forbidden");
         assert_ne!(Server::start(0).unwrap().token, *token);
+    }
+
+    #[test]
+    fn who_sends_slowly_holds_up_nobody() {
+        let server = Server::start(0).unwrap();
+        let (port, stop) = (server.port, Stop::default());
+        let connect = || {
+            let mut stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port)).unwrap();
+            stream.write_all(b"G").unwrap();
+            stream
+        };
+        std::thread::scope(|threads| {
+            let serving = threads.spawn(|| server.serve(&stop, |_, _| None));
+            // They stay while the page is asked for, and after it.
+            let _slow: Vec<_> = (0..3 * MAX_UNREAD).map(|_| connect()).collect();
+            let mut stream = connect();
+            stream.write_all(b"ET / HTTP/1.1\r\n\r\n").unwrap();
+            let mut text = String::new();
+            let _ = stream.read_to_string(&mut text);
+            stop.request();
+            serving.join().unwrap();
+            assert!(text.starts_with("HTTP/1.1 403 Forbidden"), "{text}");
+        });
     }
 }
