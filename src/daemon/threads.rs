@@ -47,9 +47,8 @@ use crate::realtime::setup::memory;
 use crate::realtime::stop_request::Stop;
 use crate::realtime::triple_buffer::triple_buffer;
 
-/// Stack of each thread: twice what they use, and small because locked memory holds all of it. The recorder uses most: by the
-/// frames of its functions 495 KB where the crate is one unit of code, 555 KB where it is several (2026-11-25). Unoptimized code
-/// keeps every intermediate value there.
+/// Stack of each thread: twice what they use, and small because locked memory holds all of it. The recorder uses most: 495 KB where
+/// the crate is one unit of code, 555 KB where it is several (2026-11-25). Unoptimized code keeps every intermediate value there.
 pub(super) const STACK_BYTES: usize = if cfg!(debug_assertions) { 8 << 20 } else { 1 << 20 };
 
 /// Longest wait for the platform to come to rest before the daemon ends: below the stop timeout of a service manager.

@@ -52,7 +52,7 @@ impl Folder {
         self.path.join(format!("{}.{}.{part}.mcap", self.name, self.started_s))
     }
 
-    /// Deletes the oldest recordings of this machine, those of the present run last: its clock may be behind that of runs before.
+    /// Deletes the oldest recordings of this machine, those of the present run last: the clock may have been set back since the others.
     fn make_room(&self) -> io::Result<()> {
         let mut files: Vec<(Age, PathBuf, u64)> = vec![];
         for entry in fs::read_dir(&self.path)? {
