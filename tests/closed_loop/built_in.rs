@@ -7,6 +7,7 @@ use hexad::commands::r#move::trajectory::Trajectory;
 use hexad::config::Config;
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
+use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use rayon::prelude::*;
@@ -60,6 +61,20 @@ fn is_accepted(config: &Config, scene: &FittedMotion, phase: f64) -> bool {
         let followed = (output.state, output.diagnostic.code) == (State::Active, DiagnosticCode::None);
         followed && output.missed_setpoints == 0
     })
+}
+
+/// Slow drives make a motion smaller, to four fifths of their rate and not much less.
+#[test]
+fn leave_a_reserve_of_the_rates_of_the_legs() {
+    for name in MACHINES {
+        let mut machine = deployed(name).machine;
+        machine.actuator.max_rate *= 0.1;
+        let scene = fit(&machine, BuiltInMotion::Sines, 8.0);
+        let rates =
+            (0..=1000).flat_map(|k| leg_motion(&machine, &scene.at(8e-3 * f64::from(k)).motion()).rate);
+        let used = rates.fold(0.0, |most: f64, rate| most.max(rate.abs())) / machine.actuator.max_rate;
+        assert!((0.6..=0.8).contains(&used), "{name}: {used}");
+    }
 }
 
 #[test]

@@ -54,6 +54,20 @@ fn an_error_that_swings_is_named() {
     assert_eq!(swinging(2e-4, 8.0, 4.0), None);
 }
 
+/// The end of a disturbance at 1.5 s: each swing is less than the one before by a ratio.
+#[test]
+fn an_error_that_rings_until_it_is_at_rest_is_none() {
+    let ringing = |ratio: f64| {
+        found(|t| {
+            let swings = 20.0 * (t - 1.5);
+            let size = if swings < 0.0 { 0.0 } else { 4e-4 * ratio.powf(swings) };
+            (with(size * (0.5 * TAU * swings).sin(), 0.0), 0.0, 0.0)
+        })
+    };
+    assert_eq!(ringing(0.8), None);
+    assert_eq!(ringing(0.95).map(|(code, _)| code), Some(DiagnosticCode::Oscillation));
+}
+
 #[test]
 fn a_payload_that_changes_is_named_and_one_that_stays_is_not() {
     let carried = |ratio: f64, from_s: f64, lift: f64| {

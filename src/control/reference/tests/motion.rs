@@ -209,6 +209,29 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
     }
 }
 
+/// A leg that stands half a room from its end stop may come back and has no room towards it.
+#[test]
+fn relaxed_bounds_keep_their_distance_from_the_end_stops() {
+    let free = generator::constants(|_, parameters| parameters.stroke_margin = 0.01);
+    let pose = free.home.pose();
+    let lengths = leg_lengths(free.machine(), pose);
+    for is_long in [false, true] {
+        let mut machine = free.machine().clone();
+        let stroke = machine.actuator.stroke();
+        let half_room = 0.5 * 2.5e-5 * stroke;
+        let (shortest, longest) =
+            lengths.iter().fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), &l| (a.min(l), b.max(l)));
+        let at_stop = if is_long { longest } else { shortest };
+        machine.actuator.min_length =
+            if is_long { longest + half_room - stroke } else { shortest - half_room };
+        machine.actuator.max_length = machine.actuator.min_length + stroke;
+        let bounds = PoseBounds::around(&Constants::new(&machine, free.parameters), pose);
+        let bounds = if is_long { bounds.longest } else { bounds.shortest };
+        let leg = lengths.iter().position(|&length| length == at_stop).unwrap();
+        assert_eq!(bounds[leg], at_stop, "{is_long}");
+    }
+}
+
 /// With the axis of rotation turning meanwhile: to fourth order in the step.
 #[test]
 fn a_long_step_turns_as_its_angular_velocity_says() {
