@@ -119,6 +119,8 @@ pub mod daemon;
 pub mod messages;
 pub mod model;
 pub mod motion;
+#[cfg(feature = "client")]
+pub mod operator;
 #[cfg(feature = "daemon")]
 pub mod output;
 pub mod plant;

@@ -13,13 +13,14 @@ use syn::visit::{self, Visit};
 use syn::{ExprUnsafe, ItemUse, Macro, UseTree};
 
 /// The folders, from the one that uses nothing. A folder uses folders above it and no other.
-const FOLDERS: [&str; 12] = [
+const FOLDERS: [&str; 13] = [
     "model",
     "control",
     "motion",
     "plant",
     "analysis",
     "messages",
+    "operator",
     "realtime",
     "output",
     "config",
@@ -37,6 +38,7 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ("motion", &["control"], "a motion is the same under any control"),
     ("plant", &["control", "motion"], "it stands in for hardware, which knows neither"),
     ("messages", &["motion", "plant", "analysis"], "a driver needs none of them"),
+    ("operator", &["model", "motion", "plant", "analysis"], "a request needs none of them"),
     ("realtime", &["model", "control", "motion", "plant", "analysis"], "the loop is generic"),
     (
         "output",
@@ -46,7 +48,7 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
 ];
 
 /// Folders in which `unsafe` may stand, each block with its argument.
-const UNSAFE: [&str; 2] = ["messages", "realtime"];
+const UNSAFE: [&str; 3] = ["messages", "operator", "realtime"];
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")

@@ -2,11 +2,9 @@
 
 use core::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use clap::Args;
 
-use crate::config::identity::Identity;
 use crate::config::{Config, ConfigError};
 
 /// Configuration of demonstrations and diagnoses without `--config`.
@@ -32,12 +30,7 @@ impl MachineFile {
         Config::load(self.path())
     }
 
-    /// Identity of the machine, also if the rest of the file is not valid.
-    pub fn identity(&self) -> Result<Identity, ConfigError> {
-        Identity::load(self.path())
-    }
-
-    fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         // One of them is there: the group is required.
         self.argument.as_deref().or(self.option.as_deref()).unwrap_or(Path::new(""))
     }
@@ -47,7 +40,7 @@ impl MachineFile {
 #[derive(Debug, Args)]
 #[group(multiple = false)]
 pub struct OptionalMachineFile {
-    /// Machine file (TOML); without it, the built-in fried2008 or, for `status`, every machine of this host
+    /// Machine file (TOML); without it, the built-in fried2008, or what runs on this host; requests also take the name of a machine that runs
     #[arg(value_name = "MACHINE")]
     argument: Option<PathBuf>,
     /// The same as an option
@@ -72,30 +65,6 @@ pub struct TableFiles {
     /// CSV to write; `-` is standard output
     #[arg(long, value_name = "FILE")]
     pub output: PathBuf,
-}
-
-#[derive(Debug, Args)]
-pub struct RequestArguments {
-    #[command(flatten)]
-    pub machine: MachineFile,
-    /// Longest to wait for the outcome [s]
-    #[arg(long, default_value_t = 30.0, value_parser = duration, allow_negative_numbers = true)]
-    within: f64,
-}
-
-impl RequestArguments {
-    pub fn timeout(&self) -> Duration {
-        Duration::from_secs_f64(self.within)
-    }
-}
-
-#[derive(Debug, Args)]
-pub struct EngageArguments {
-    #[command(flatten)]
-    pub request: RequestArguments,
-    /// Wait for measurements and for a setpoint where the platform stands, instead of being refused
-    #[arg(long)]
-    pub wait: bool,
 }
 
 /// Duration \[s\] of a motion, a wait or a measurement.

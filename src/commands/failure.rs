@@ -2,11 +2,11 @@
 
 use core::error::Error;
 
-use super::operate::OperatorError;
 use crate::config::ConfigError;
 use crate::daemon::DaemonError;
 use crate::daemon::control_socket::location::SocketError;
 use crate::messages::PortError;
+use crate::operator::OperatorError;
 use crate::output::files::FileError;
 use crate::output::svg::ChartError;
 use crate::recording::RecordingError;
@@ -59,7 +59,7 @@ impl CommandError for DaemonError {
     /// What the system refuses now, and another daemon, may be different at the next attempt: a service manager repeats it.
     fn has_begun(&self) -> bool {
         let is_configured =
-            |error: &SocketError| matches!(error, SocketError::NoGroup(_) | SocketError::NotMember(_));
+            |error: &SocketError| matches!(error, SocketError::NoGroup(..) | SocketError::NotMember(..));
         match self {
             Self::NotRealtime(_) | Self::Files(_) | Self::Config(_) => false,
             Self::Socket(error) => !is_configured(error),
@@ -86,6 +86,6 @@ impl CommandError for FileError {
 
 impl CommandError for OperatorError {
     fn has_begun(&self) -> bool {
-        !matches!(self, Self::Port(_) | Self::NoDaemon(_) | Self::Forbidden { .. })
+        !matches!(self, Self::NoDaemon(_) | Self::NoMachine | Self::Several(_) | Self::Forbidden { .. })
     }
 }

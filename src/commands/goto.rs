@@ -10,7 +10,6 @@ use clap::Args;
 
 use super::arguments::{MachineFile, duration, number_within};
 use super::failure::Failure;
-use super::operate::status;
 use super::target::pose_options::PoseOptions;
 use super::target::{TargetError, TargetSource, constants, pose_of, reference_x};
 use crate::analysis::target_motion::{REACHED_M, REACHED_RAD, TargetMotion, target_motion};
@@ -18,6 +17,7 @@ use crate::config::Config;
 use crate::control::limits::Limit;
 use crate::control::parameters::Constants;
 use crate::model::machine::LEGS;
+use crate::operator::requests::status;
 use crate::output::files::print;
 use crate::output::numbers::{AXES, axis_unit, fixed, percent, significant};
 use crate::realtime::stop_request::Stop;

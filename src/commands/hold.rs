@@ -6,11 +6,12 @@ use clap::Args;
 
 use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
-use super::operate::{Order, carry_out};
 use super::target::{TargetError, TargetSource, constants};
 use crate::analysis::target_motion::check_target;
 use crate::commands::target::pose_of;
 use crate::control::state::Request;
+use crate::operator::Order;
+use crate::operator::stops::stop_machine;
 use crate::output::files::print;
 use crate::realtime::stop_request::Stop;
 
@@ -47,11 +48,11 @@ impl HoldArguments {
         }
         // Its own wait must not end with the signal that has brought it here.
         let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT };
-        let outcome = carry_out(&config.identity(), &order, &Stop::default(), |_| ());
+        let outcome = stop_machine(&config.name, &order, &|| false);
         if !has_control {
             // Without control there is nothing to stop, unless it was taken just now.
             return Err(TargetError::InterruptedEarly.into());
         }
-        Ok(print(format_args!("{}\n", outcome?.state))?)
+        Ok(print(format_args!("{}\n", outcome?))?)
     }
 }

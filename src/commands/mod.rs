@@ -7,7 +7,7 @@
 use clap::{Parser, Subcommand};
 
 use self::advise::AdviseArguments;
-use self::arguments::{EngageArguments, MachineFile, RequestArguments};
+use self::arguments::MachineFile;
 use self::check::CheckArguments;
 use self::convert::ConvertArguments;
 use self::demo::DemoArguments;
@@ -23,11 +23,11 @@ use self::jog::JogArguments;
 use self::log::{FORMAT_VARIABLE, LogFormat};
 use self::messages::MessagesArguments;
 use self::r#move::MoveArguments;
-use self::operate::Order;
 use self::record::RecordArguments;
 use self::recover::RecoverArguments;
 use self::replay::ReplayArguments;
 use self::report::ReportArguments;
+use self::request::{EngageArguments, RequestArguments, StopArguments};
 use self::run::RunArguments;
 use self::status::StatusArguments;
 use self::view::ViewArguments;
@@ -56,13 +56,13 @@ pub mod log;
 pub mod messages;
 pub mod r#move;
 mod offline_tables;
-pub mod operate;
 pub mod plant;
 mod progress;
 mod record;
 mod recover;
 mod replay;
 mod report;
+mod request;
 mod run;
 pub mod status;
 mod target;
@@ -99,15 +99,15 @@ enum CommandArguments {
     /// Take control: the platform follows the setpoint from now on
     Engage(EngageArguments),
     /// Come to rest under control, then disable the forces; the brakes close
-    Stop(RequestArguments),
+    Stop(StopArguments),
     /// Come to rest, go to the home pose, then disable the forces; the brakes close
     Park(RequestArguments),
     /// Leave a fault; the platform stays without force until engaged
     Clear(RequestArguments),
     /// Disable the forces at once; the brakes close
-    Off(RequestArguments),
+    Off(StopArguments),
     /// Disable the forces at once, until cleared; the brakes close
-    Estop(RequestArguments),
+    Estop(StopArguments),
     /// Take over gains, limits and timeouts of the daemon's machine file, while no force is valid
     Reload(RequestArguments),
     /// Show state, diagnostic, pose, legs, timing and sources of a running daemon
@@ -156,13 +156,13 @@ impl CommandLine {
             Is::Hold(arguments) => arguments.execute(),
             Is::Jog(arguments) => arguments.execute(),
             Is::Demo(arguments) => arguments.execute(),
-            Is::Engage(EngageArguments { request, wait }) => send(&request, Request::Engage, wait),
-            Is::Stop(arguments) => send(&arguments, Request::Stop, false),
-            Is::Park(arguments) => send(&arguments, Request::Park, false),
-            Is::Clear(arguments) => send(&arguments, Request::Clear, false),
-            Is::Off(arguments) => send(&arguments, Request::Off, false),
-            Is::Estop(arguments) => send(&arguments, Request::Estop, false),
-            Is::Reload(arguments) => reload(&arguments),
+            Is::Engage(arguments) => arguments.execute(),
+            Is::Stop(arguments) => arguments.execute(Request::Stop),
+            Is::Park(arguments) => arguments.execute(Request::Park),
+            Is::Clear(arguments) => arguments.execute(Request::Clear),
+            Is::Off(arguments) => arguments.execute(Request::Off),
+            Is::Estop(arguments) => arguments.execute(Request::Estop),
+            Is::Reload(arguments) => arguments.reload(),
             Is::Status(arguments) => arguments.execute(),
             Is::View(arguments) => arguments.execute(),
             Is::Faults => Ok(print(FaultTables)?),
@@ -181,22 +181,4 @@ impl CommandLine {
             Is::ForwardKinematics(arguments) => arguments.execute(),
         }
     }
-}
-
-/// Requests that the daemon reads its machine file again, and prints what has changed.
-fn reload(arguments: &RequestArguments) -> Result<(), Failure> {
-    let changed = operate::reload::reload(&arguments.machine.identity()?.name, arguments.timeout())?;
-    Ok(print(format_args!("{changed}\n"))?)
-}
-
-/// Sends an operator's request and prints the state that it led to, and on standard error what it waits for.
-fn send(arguments: &RequestArguments, request: Request, waits: bool) -> Result<(), Failure> {
-    let (machine, stop) = (arguments.machine.identity()?, Stop::on_signals()?);
-    let order = Order { request, is_patient: waits, timeout: arguments.timeout() };
-    let outcome =
-        operate::carry_out(&machine, &order, &stop, |reason| eprintln!("hexad: waiting: {reason}"))?;
-    if let Some(way) = outcome.confirmed {
-        eprintln!("hexad: {way}");
-    }
-    Ok(print(format_args!("{}\n", outcome.state))?)
 }

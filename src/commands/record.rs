@@ -1,13 +1,23 @@
 //! `hexad record`: the last seconds of a running daemon, as a recording.
 
+use std::fs::File;
+use std::io::Write as _;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 
 use super::arguments::{MachineFile, duration};
 use super::failure::Failure;
-use super::operate;
+use crate::operator::OperatorError;
+use crate::operator::connection::Connection;
+use crate::operator::protocol::{RequestLine, RequestResult};
+use crate::operator::requests::ask_first;
 use crate::output::files::{print, write_whole_with};
+use crate::realtime::file_passing;
+
+/// Longest wait for a recording of the last seconds: 160 MB on a slow disk.
+const RECORD_LIMIT: Duration = Duration::from_secs(60);
 
 #[derive(Debug, Args)]
 pub struct RecordArguments {
@@ -26,9 +36,24 @@ impl RecordArguments {
         let config = self.machine.load()?;
         let mut written = String::new();
         write_whole_with(&self.output, |file| -> Result<(), Failure> {
-            written = operate::record(&config.name, self.last, file)?;
+            written = record(&config.name, self.last, file)?;
             Ok(())
         })?;
         Ok(print(format_args!("{}: {written}\n", self.output.display()))?)
+    }
+}
+
+/// Lets the daemon of a machine write its last seconds to a file; returns what it has written, in words.
+fn record(machine: &str, last_s: f64, file: &File) -> Result<String, OperatorError> {
+    let line = RequestLine { last_s: Some(last_s), ..RequestLine::new("record") };
+    let answer = ask_first(machine, |connection: &mut Connection| {
+        let text = serde_json::to_string(&line)? + "\n";
+        let count = file_passing::send(connection.stream(), text.as_bytes(), file)?;
+        connection.stream().write_all(text.as_bytes().get(count..).unwrap_or_default())?;
+        connection.receive(Instant::now() + RECORD_LIMIT, || false)
+    })?;
+    match answer.result {
+        RequestResult::Done => Ok(answer.text),
+        _ => Err(OperatorError::NotRecorded(answer.text)),
     }
 }

@@ -13,12 +13,12 @@ use fearless_simd::Level;
 use serde::Serialize;
 use thiserror::Error;
 use toml::de::DeTable;
+use tracing::warn;
 
 use crate::messages::{Bus, PortError};
 use crate::model::machine::{Machine, at_most_256_bits};
 
 use self::deployment::Deployment;
-use self::identity::Identity;
 use self::reader::{SectionReader, ViolationLog};
 
 mod bound;
@@ -28,8 +28,8 @@ pub mod deployment;
 pub mod examination;
 pub mod fidelity;
 mod geometry;
-pub mod identity;
 mod machine;
+pub mod machine_name;
 mod reader;
 mod syntax;
 pub mod text;
@@ -128,14 +128,17 @@ impl Config {
         }
     }
 
-    /// What a request needs of it.
-    pub fn identity(&self) -> Identity {
-        Identity { name: self.name.clone(), is_simulated: self.deployment.realtime.is_simulated() }
-    }
-
     /// Joins the topics of the machine, in real or simulated time. Logs a warning where time is simulated.
     pub fn join(&self) -> Result<Bus, PortError> {
-        self.identity().join()
+        if !self.deployment.realtime.is_simulated() {
+            return Bus::join(&self.name);
+        }
+        warn!(
+            "TIME IS SIMULATED (realtime.release = \"lockstep\"): no hardware receives messages, topics are \
+             hexad-simulated/{}/...",
+            self.name
+        );
+        Bus::join_simulated(&self.name)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::control::controller::{Input, Output};
 use crate::control::state::{OperatorRequest, Request, State};
-use crate::messages::CycleMessage;
+use crate::messages::{CycleMessage, MAX_REQUEST_AGE_NS};
 use crate::realtime::cyclic::{self, CyclicInput};
 use crate::realtime::exchange;
 use crate::realtime::request_word;
@@ -31,9 +31,6 @@ impl CyclicInput for Input {
 
 /// Epoch of a request over the control socket or by a signal; no publisher begins then. Its sequence is the request word.
 pub const WORD_EPOCH: u64 = u64::MAX;
-
-/// A request that may begin control and is older than this is not carried out: its sender has long stopped waiting \[ns\].
-pub const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
 
 /// Request of each cycle: from the request word or from the command topic, each once.
 #[derive(Clone, Copy, Debug, Default)]

@@ -18,8 +18,9 @@ use crate::config::{Config, ConfigError};
 use crate::control::state::Request;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Claim, PortError};
+use crate::operator::signal::RequestSignal;
 use crate::output::files::{FileError, write_whole};
-use crate::realtime::request_signal::{RequestSignal, post_on_signals};
+use crate::realtime::request_signal::post_on_signals;
 use crate::realtime::request_word::RequestWord;
 use crate::realtime::setup::{Shortfall, open_files};
 use crate::realtime::stop_request::Stop;
@@ -95,14 +96,6 @@ pub struct Files {
     pub state: Option<PathBuf>,
 }
 
-/// Request that a signal to the daemon posts.
-pub fn request_of(signal: RequestSignal) -> Request {
-    match signal {
-        RequestSignal::User1 => Request::Estop,
-        RequestSignal::User2 => Request::Stop,
-    }
-}
-
 /// Files that the daemon may need open at once: all connections and what comes with them, shared memory, recordings.
 const OPEN_FILES: u64 = 512;
 
@@ -118,7 +111,7 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
     let mut claim = Claim::take(&config.name)?;
     // It lives as long as the process: signals may come until its end.
     let word: &'static RequestWord = Box::leak(Box::default());
-    let requests = [RequestSignal::User1, RequestSignal::User2].map(|signal| request_of(signal) as u32);
+    let requests = [RequestSignal::User1, RequestSignal::User2].map(|signal| signal.request() as u32);
     post_on_signals(word, requests).map_err(DaemonError::Signals)?;
     // Not before the signals: who finds it may send them.
     let socket = location::open(&config.name, &config.deployment.operator)?;

@@ -1,6 +1,6 @@
 //! Claim of a machine: the lock that makes one daemon the only one, and the record by which commands find it.
 //!
-//! The lock is in the owner's private folder, so that no other user can hold it. The record beside the control socket may be
+//! The lock is in the owner's private folder, so that no other user can hold it and every process of the user finds it. The record beside the control socket may be
 //! read by everybody who may use the socket; it counts while its process lives.
 
 use std::fs::{self, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 use super::bus::{PortError, port_error};
 use super::location::{
-    PRIVATE_FILE, ROOT_FOLDER, SYSTEM_FOLDER, TEMPORARY_FOLDER, USER_RUNTIME_FOLDERS, open_private,
-    open_user_folder, renew_prefix, user_folder, user_id,
+    PRIVATE_FILE, SYSTEM_FOLDER, daemon_folders, open_private, open_user_folder, renew_prefix, system_user,
+    user_folders, user_id,
 };
 
 /// End of the name of a record.
@@ -42,6 +42,8 @@ pub struct RunningDaemon {
     pub machine: String,
     /// Number of the process.
     pub process_id: u32,
+    /// Its start in clock ticks since boot.
+    pub start_time: u64,
     /// User of the process.
     pub user_id: u32,
     /// Its control socket.
@@ -54,13 +56,13 @@ impl Claim {
     /// Claims a machine; an error if another daemon of this user, of the service or of root controls it. Those of other
     /// users do not count: they reach no participant of this one, and could block it for good.
     pub fn take(machine: &str) -> Result<Self, PortError> {
-        let own = open_user_folder()?;
-        let mut locks = vec![lock(&own, machine)?];
-        let system = Path::new(SYSTEM_FOLDER);
-        let system_user = system_user();
-        if user_id() == 0 && own != system && system_user.is_some() {
-            locks.push(lock(system, machine)?);
+        open_user_folder()?;
+        let (mut folders, system_user) = (user_folders(), system_user());
+        let system = PathBuf::from(SYSTEM_FOLDER);
+        if user_id() == 0 && !folders.contains(&system) && system_user.is_some() {
+            folders.push(system);
         }
+        let locks = folders.iter().map(|folder| lock(folder, machine)).collect::<Result<_, _>>()?;
         let counts = |daemon: &RunningDaemon| [Some(0), system_user].contains(&Some(daemon.user_id));
         if let Some(other) = running_daemons(machine).into_iter().find(counts) {
             let (process_id, user_id) = (other.process_id, other.user_id);
@@ -100,11 +102,6 @@ impl Claim {
 fn record_text(process_id: u32, start_time: u64, processors: &[usize]) -> String {
     let processors: Vec<_> = processors.iter().map(usize::to_string).collect();
     format!("{process_id}\n{start_time}\n{}\n", processors.join(","))
-}
-
-/// User of the service, if there is one.
-fn system_user() -> Option<u32> {
-    metadata(SYSTEM_FOLDER).ok().filter(fs::Metadata::is_dir).map(|found| found.uid())
 }
 
 impl Drop for Claim {
@@ -168,15 +165,10 @@ fn write_record(path: &Path, text: &str) -> io::Result<()> {
     written
 }
 
-/// Daemons that run for a machine, of every user whose record can be read.
-pub fn running_daemons(machine: &str) -> Vec<RunningDaemon> {
-    folders().iter().filter_map(|folder| running_daemon(folder, machine)).collect()
-}
-
 /// Daemons that run on this host, of every user whose record can be read, by name of their machine.
-pub fn all_running_daemons() -> Vec<RunningDaemon> {
+fn all_running_daemons() -> Vec<RunningDaemon> {
     let mut found = vec![];
-    for folder in folders() {
+    for folder in daemon_folders() {
         let records =
             entries(&folder).filter(|path| path.extension().is_some_and(|it| it == RECORD_EXTENSION));
         let machines =
@@ -187,19 +179,9 @@ pub fn all_running_daemons() -> Vec<RunningDaemon> {
     found
 }
 
-/// Folders in which a daemon may have recorded itself.
-fn folders() -> Vec<PathBuf> {
-    let mut folders = vec![PathBuf::from(SYSTEM_FOLDER), ROOT_FOLDER.into(), user_folder()];
-    folders.extend(entries(USER_RUNTIME_FOLDERS).map(|folder| folder.join("hexad")));
-    let temporary = Path::new(TEMPORARY_FOLDER);
-    let name = temporary.file_name().unwrap_or_default().to_string_lossy();
-    let is_temporary =
-        |folder: &PathBuf| folder.file_name().is_some_and(|it| it.to_string_lossy().starts_with(&*name));
-    let parent = temporary.parent().unwrap_or(temporary).to_string_lossy().into_owned();
-    folders.extend(entries(&parent).filter(is_temporary));
-    folders.sort();
-    folders.dedup();
-    folders
+/// Daemons that run for a machine, of every user whose record can be read.
+pub fn running_daemons(machine: &str) -> Vec<RunningDaemon> {
+    daemon_folders().iter().filter_map(|folder| running_daemon(folder, machine)).collect()
 }
 
 fn entries(folder: impl AsRef<Path>) -> impl Iterator<Item = PathBuf> {
@@ -208,7 +190,7 @@ fn entries(folder: impl AsRef<Path>) -> impl Iterator<Item = PathBuf> {
 
 /// The daemon of a record, if its process lives, and if folder, file and process are of one user, or file and process of
 /// root.
-fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
+pub fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let folder_owner = symlink_metadata(folder).ok().filter(fs::Metadata::is_dir)?.uid();
     let path = folder.join(format!("{machine}.{RECORD_EXTENSION}"));
     let mut options = OpenOptions::new();
@@ -226,12 +208,13 @@ fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let is_alive = start_time(process_id).is_ok_and(|started| started == recorded_start);
     let is_of_one_user = process_user(process_id)? == owner && [folder_owner, 0].contains(&owner);
     let machine = machine.to_owned();
-    let found = RunningDaemon { machine, process_id, user_id: owner, socket, processors };
+    let found =
+        RunningDaemon { machine, process_id, start_time: recorded_start, user_id: owner, socket, processors };
     (is_alive && is_of_one_user).then_some(found)
 }
 
 /// Start of a process in clock ticks since boot: with its number it names the process for good.
-fn start_time(process_id: u32) -> io::Result<u64> {
+pub fn start_time(process_id: u32) -> io::Result<u64> {
     let text = fs::read_to_string(format!("/proc/{process_id}/stat"))?;
     // The name may contain anything, also spaces and brackets.
     let fields = text.rsplit_once(')').map_or("", |(_, fields)| fields);
@@ -256,13 +239,14 @@ mod tests {
         assert_eq!(running_daemons(&machine), []);
         let mut claim = Claim::take(&machine).unwrap();
         assert_eq!(running_daemons(&machine), [], "nothing is recorded yet");
-        let socket = user_folder().join(format!("{machine}.sock"));
+        let socket = open_user_folder().unwrap().join(format!("{machine}.sock"));
         let processors = vec![1022, 1023];
         claim.record(&socket, &processors).unwrap();
         let (process_id, user_id) = (std::process::id(), user_id());
         let expected = RunningDaemon {
             machine: machine.clone(),
             process_id,
+            start_time: start_time(process_id).unwrap(),
             user_id,
             socket: socket.clone(),
             processors,

@@ -17,6 +17,9 @@ message! {
     }
 }
 
+/// A request that may begin control and is older than this is not carried out: its sender has long stopped waiting \[ns\].
+pub const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
+
 impl From<Request> for CommandMessage {
     fn from(request: Request) -> Self {
         Self { request: request as u32, ..Self::default() }

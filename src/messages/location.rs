@@ -1,9 +1,9 @@
 //! Location of the shared memory: one private folder per user, and a prefix that no other user can foresee.
 //!
 //! The folder holds iceoryx2's book-keeping, the locks of the machines and the prefix of the segments in `/dev/shm`. Other
-//! users can neither make it nor write in it, and nothing falls back on a folder that they could have made.
+//! users can neither make it nor write in it. It follows from the user alone and from no environment variable: all processes of
+//! a user must find the same locks and the same shared memory, however they were started.
 
-use std::env;
 use std::fs::{self, DirBuilder, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
@@ -20,10 +20,10 @@ use super::bus::{PortError, port_error};
 pub const SYSTEM_FOLDER: &str = "/run/hexad";
 /// Root's own folder where it has no runtime folder; only root may make it.
 pub const ROOT_FOLDER: &str = "/run/hexad-root";
-/// Runtime folders of users who are logged in, by user ID.
-pub const USER_RUNTIME_FOLDERS: &str = "/run/user";
-/// Beginning of the folder of a user without a runtime folder, and of one that a group may enter.
-pub const TEMPORARY_FOLDER: &str = "/tmp/hexad-";
+/// Where other users' folders are, and the beginning of their names. Not the runtime folder of a login, which comes and goes with
+/// its sessions.
+const TEMPORARY: &str = "/tmp";
+const TEMPORARY_NAME: &str = "hexad-";
 
 /// Folder of iceoryx2's book-keeping.
 const BOOKS: &str = "iceoryx2";
@@ -40,11 +40,11 @@ const CREATION_TIMEOUT: Duration = Duration::from_millis(5);
 
 /// Only the owner may open it: also who may only read could lock it for good.
 pub(super) const PRIVATE_FILE: u32 = 0o600;
-/// Others may enter it for the control socket and the record beside it, whose own permissions say who may use them.
-const USER_FOLDER: u32 = 0o711;
+/// Others may enter it and see which machines run; permissions of the control sockets say who may use them.
+const USER_FOLDER: u32 = 0o755;
 const PRIVATE_FOLDER: u32 = 0o700;
 /// Permissions with which others could write in a folder.
-const OTHERS_WRITE: u32 = 0o022;
+pub const OTHERS_WRITE: u32 = 0o022;
 
 /// User of this process.
 pub fn user_id() -> u32 {
@@ -52,34 +52,69 @@ pub fn user_id() -> u32 {
     metadata("/proc/self").map_or(0, |found| found.uid())
 }
 
-/// Folder of this user. The service's own if that belongs to this user, else in the user's runtime folder.
+/// Folder of this user: the service's own if that belongs to this user, root's, else the first of [`user_folders`].
 pub fn user_folder() -> PathBuf {
-    let user_id = user_id();
-    let is_own = |folder: &Path| {
-        folder.is_absolute() && metadata(folder).is_ok_and(|found| found.is_dir() && found.uid() == user_id)
-    };
-    if is_own(Path::new(SYSTEM_FOLDER)) {
-        return SYSTEM_FOLDER.into();
-    }
-    let named = env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
-    let usual = Path::new(USER_RUNTIME_FOLDERS).join(user_id.to_string());
-    match named.into_iter().chain([usual]).find(|folder| is_own(folder)) {
-        Some(folder) => folder.join("hexad"),
-        None if user_id == 0 => ROOT_FOLDER.into(),
-        None => format!("{TEMPORARY_FOLDER}{user_id}").into(),
+    match (metadata(SYSTEM_FOLDER), user_id()) {
+        (Ok(found), user_id) if found.is_dir() && found.uid() == user_id => SYSTEM_FOLDER.into(),
+        (_, 0) => ROOT_FOLDER.into(),
+        (_, user_id) => own_folders(user_id).into_iter().next().unwrap_or_else(|| temporary(user_id, 0)),
     }
 }
 
-/// Makes the folder of this user if it is missing; an error if it could be another user's.
+/// All folders of this user: several where another user has made, and later removed, one that was to be this user's.
+pub fn user_folders() -> Vec<PathBuf> {
+    let first = user_folder();
+    let others = own_folders(user_id()).into_iter().filter(|folder| *folder != first);
+    core::iter::once(first.clone()).chain(others).collect()
+}
+
+/// Folders in which daemons of any user may listen.
+pub fn daemon_folders() -> Vec<PathBuf> {
+    let system = [SYSTEM_FOLDER, ROOT_FOLDER].map(PathBuf::from);
+    system.into_iter().chain(temporary_folders(TEMPORARY_NAME)).collect()
+}
+
+/// User of the service, if there is one.
+pub fn system_user() -> Option<u32> {
+    metadata(SYSTEM_FOLDER).ok().filter(fs::Metadata::is_dir).map(|found| found.uid())
+}
+
+/// The folder of a user, or the one to take where so many are not the user's.
+fn temporary(user_id: u32, others: u32) -> PathBuf {
+    let end = if others == 0 { String::new() } else { format!("-{others}") };
+    Path::new(TEMPORARY).join(format!("{TEMPORARY_NAME}{user_id}{end}"))
+}
+
+/// Folders of this user among the temporary files, by name.
+fn own_folders(user_id: u32) -> Vec<PathBuf> {
+    let first = temporary(user_id, 0);
+    let others = temporary_folders(&format!("{TEMPORARY_NAME}{user_id}-"));
+    core::iter::once(first).chain(others).filter(|folder| is_own(folder)).collect()
+}
+
+fn temporary_folders(beginning: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(TEMPORARY).into_iter().flatten().flatten();
+    let named = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(beginning));
+    let mut found: Vec<_> = named.map(|entry| entry.path()).collect();
+    found.sort();
+    found
+}
+
+/// Makes the folder of this user if it is missing, whatever other users have made.
 pub fn open_user_folder() -> Result<PathBuf, PortError> {
-    let folder = user_folder();
-    make_user_folder(&folder).map_err(port_error(format!("cannot make {}", folder.display())))?;
+    let mut folder = user_folder();
+    for others in 1.. {
+        let is_temporary = folder.parent() == Some(Path::new(TEMPORARY));
+        match make_own(&folder, USER_FOLDER) {
+            Ok(()) => break,
+            // Another user's: nobody can take all names.
+            Err(_) if is_temporary && symlink_metadata(&folder).is_ok() => {
+                folder = temporary(user_id(), others)
+            }
+            Err(cause) => return Err(port_error(format!("cannot make {}", folder.display()))(cause)),
+        }
+    }
     Ok(folder)
-}
-
-/// Makes a folder in which only this user may write, if it is missing; an error if it could be another user's.
-pub fn make_user_folder(folder: &Path) -> io::Result<()> {
-    make_own(folder, USER_FOLDER)
 }
 
 fn make_own(folder: &Path, mode: u32) -> io::Result<()> {
@@ -89,14 +124,15 @@ fn make_own(folder: &Path, mode: u32) -> io::Result<()> {
         Ok(()) => fs::set_permissions(folder, Permissions::from_mode(mode))?,
         Err(_) => {}
     }
-    let found = symlink_metadata(folder)?;
-    if found.is_dir() && found.uid() == user_id() && found.mode() & OTHERS_WRITE == 0 {
+    if is_own(folder) {
         return Ok(());
     }
-    Err(io::Error::other(
-        "it must be a folder of this user in which nobody else may write; remove it, or set XDG_RUNTIME_DIR to a \
-         private folder",
-    ))
+    Err(io::Error::other("it must be a folder of this user in which nobody else may write; remove it"))
+}
+
+fn is_own(folder: &Path) -> bool {
+    symlink_metadata(folder)
+        .is_ok_and(|found| found.is_dir() && found.uid() == user_id() && found.mode() & OTHERS_WRITE == 0)
 }
 
 /// Opens a file of this user alone, following no link.
@@ -253,7 +289,7 @@ mod tests {
         fs::set_permissions(&open, Permissions::from_mode(0o777)).unwrap();
         symlink(&private, &link).unwrap();
         for path in [open, link] {
-            assert!(make_user_folder(&path).is_err(), "{}", path.display());
+            assert!(make_own(&path, USER_FOLDER).is_err(), "{}", path.display());
         }
     }
 }

@@ -16,7 +16,7 @@
 //! | type name | `hexad_<last part>` |
 //! | settings | open or create with `max_publishers` 4, of `command` 16, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: the first participant sets them for all |
 //! | location | in the folder of the user: root path `iceoryx2` in it, prefix the content of the file `prefix` in it; create the node while holding `flock` on that file |
-//! | folder of the user | `/run/hexad` if it belongs to the user; else `hexad` in `$XDG_RUNTIME_DIR`, or in `/run/user/<user ID>`, if that belongs to the user; else `/run/hexad-root` for root and `/tmp/hexad-<user ID>` for others; mode 0711, `iceoryx2` in it 0700 |
+//! | folder of the user | `/run/hexad` if it belongs to the user; else `/run/hexad-root` for root and `/tmp/hexad-<user ID>` for others, or, where that is not the user's, the first of `/tmp/hexad-<user ID>-*` that is; mode 0755, `iceoryx2` in it 0700 |
 //! | user | all participants of a machine run as one user |
 //! | signals | the daemon's node installs no handlers (`SignalHandlingMode::Disabled`) |
 //!
@@ -61,7 +61,7 @@ mod subscriber;
 
 pub use self::bus::{Bus, PortError, TopicObserver};
 pub use self::claim::Claim;
-pub use self::command::CommandMessage;
+pub use self::command::{CommandMessage, MAX_REQUEST_AGE_NS};
 pub use self::cycle::{CycleMessage, GapMessage};
 pub use self::force::ForceMessage;
 pub use self::header::Header;

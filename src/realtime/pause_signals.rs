@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use std::fs::read_to_string;
 use std::io;
 
-use super::request_signal::RequestSignal;
+use nix::sys::signal::Signal;
 
 /// Whether the last of both was SIGUSR1.
 static IS_PAUSED: AtomicBool = AtomicBool::new(false);
@@ -46,8 +46,8 @@ extern "C" fn handle(signal: c_int) {
 }
 
 /// The signal that pauses a process, or lets it go on.
-pub fn pause_signal(pauses: bool) -> RequestSignal {
-    if pauses { RequestSignal::User1 } else { RequestSignal::User2 }
+pub fn pause_signal(pauses: bool) -> Signal {
+    if pauses { Signal::SIGUSR1 } else { Signal::SIGUSR2 }
 }
 
 /// Whether a process handles both signals: without a handler they would end it.

@@ -13,44 +13,11 @@ static WORD: AtomicPtr<RequestWord> = AtomicPtr::new(ptr::null_mut());
 /// Numbers of the requests of SIGUSR1 and SIGUSR2.
 static REQUESTS: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];
 
-/// Signal that posts a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RequestSignal {
-    /// SIGUSR1.
-    User1,
-    /// SIGUSR2.
-    User2,
-}
-
-impl RequestSignal {
-    /// Name for people and for `kill -s`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::User1 => "USR1",
-            Self::User2 => "USR2",
-        }
-    }
-
-    fn number(self) -> c_int {
-        match self {
-            Self::User1 => libc::SIGUSR1,
-            Self::User2 => libc::SIGUSR2,
-        }
-    }
-
-    /// Sends it to a process; the error of the system where this user may not.
-    pub fn send(self, process_id: u32) -> io::Result<()> {
-        // SAFETY: plain numbers. A process that has ended makes the call fail.
-        let result = unsafe { libc::kill(process_id as libc::pid_t, self.number()) };
-        if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
-    }
-}
-
 /// Makes SIGUSR1 and SIGUSR2 of this process post the requests with these numbers to `word`.
 pub fn post_on_signals(word: &'static RequestWord, requests: [u32; 2]) -> io::Result<()> {
     REQUESTS.iter().zip(requests).for_each(|(stored, request)| stored.store(request, Ordering::Relaxed));
     WORD.store(ptr::from_ref(word).cast_mut(), Ordering::Release);
-    for signal in [RequestSignal::User1, RequestSignal::User2] {
+    for signal in [libc::SIGUSR1, libc::SIGUSR2] {
         // SAFETY: an all-zero `sigaction` is valid and is filled before use. The handler calls only what may be called in
         // one: atomic operations and clock_gettime. A null pointer for the old action is allowed.
         let result = unsafe {
@@ -58,7 +25,7 @@ pub fn post_on_signals(word: &'static RequestWord, requests: [u32; 2]) -> io::Re
             action.sa_sigaction = handle as extern "C" fn(c_int) as libc::sighandler_t;
             action.sa_flags = libc::SA_RESTART;
             libc::sigemptyset(&mut action.sa_mask);
-            libc::sigaction(signal.number(), &action, ptr::null_mut())
+            libc::sigaction(signal, &action, ptr::null_mut())
         };
         if result != 0 {
             return Err(io::Error::last_os_error());

@@ -10,8 +10,8 @@ use crate::common::not_run::lacking;
 use crate::support::children::{Ended, HANG, Hexad, run};
 use crate::support::disturbance::{line_of, python};
 use crate::support::machine::{Machine, PATIENT};
-use crate::support::nobody::{AS_NOBODY, NO_LIMITS_RAISED, cannot, wrapped};
-use crate::support::operator::{ask, clear, does};
+use crate::support::nobody::{AS_NOBODY, cannot, wrapped};
+use crate::support::operator::does;
 use crate::support::peer::Controlled;
 use crate::support::socket::{Client, path_of, status};
 use crate::support::trio::{Trio, start_daemon};
@@ -151,30 +151,6 @@ fn another_user_is_told_who_may_and_a_group_opens_it() {
         }
         daemon.stops_on("TERM", HANG);
     }
-}
-
-#[test]
-fn root_stops_the_daemon_of_another_user() {
-    if cannot(&[NO_LIMITS_RAISED, AS_NOBODY]) {
-        return;
-    }
-    let _turn = turns::beside_others();
-    let machine = Machine::patient("root");
-    let mut command = wrapped(&machine, &[NO_LIMITS_RAISED, AS_NOBODY]);
-    command.args(["run", "--config"]).arg(&machine.file);
-    let daemon = Hexad::spawn(&machine, "run", command);
-    daemon.says("running");
-    does(&machine, "estop", &[], &["fault"]);
-    daemon.says("request: estop user=root process=");
-    assert_eq!(status(&machine)["state"], "fault");
-    clear(&machine);
-    fs::remove_file(path_of(&daemon)).expect("a socket");
-    let Ended { status, stdout, stderr } = ask(&machine, "estop", &[]);
-    // Root's shared memory is elsewhere: nothing can confirm it, and that is said.
-    assert_eq!((status.code(), stdout.as_str()), (Some(1), ""), "{stderr}");
-    assert!(stderr.contains("by SIGUSR1 to process"), "{stderr}");
-    daemon.says("fault: emergency stop");
-    daemon.stops_on("TERM", HANG);
 }
 
 #[test]

@@ -33,6 +33,7 @@ mod locked_memory;
 mod lockstep;
 mod modes;
 mod orderly_stop;
+mod other_users;
 mod other_version;
 mod overruns;
 mod pages;

@@ -1,14 +1,14 @@
 //! A participant with another version of iceoryx2, which a program gets that takes the newest from PyPI.
 
-use std::fs;
 use std::io::BufReader;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
 use crate::common::not_run::lacking;
 use crate::common::python::environment;
-use crate::support::children::{HANG, Hexad, hexad};
+use crate::support::children::HANG;
 use crate::support::disturbance::line_of;
+use crate::support::host::Host;
 use crate::support::machine::Machine;
 use crate::support::turns;
 
@@ -31,9 +31,10 @@ except Exception as error:
     print(f"refused: {error!r}", flush=True)
 "#;
 
-fn participant(python: &Path, folder: &Path, machine: &Machine) -> (Child, String) {
-    let mut command = Command::new(python.join("bin/python"));
-    command.args(["-c", PARTICIPANT]).arg(folder).arg(format!("hexad/{}/measured", machine.name));
+fn participant(python: &Path, host: &Host) -> (Child, String) {
+    let mut command = host.program(0, &[], python.join("bin/python"));
+    let topic = format!("hexad/{}/measured", host.machine().name);
+    command.args(["-c", PARTICIPANT, "/run/hexad-root", &topic]);
     let mut child =
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("a Python");
     let said = line_of(&mut BufReader::new(child.stdout.take().expect("a pipe")));
@@ -47,27 +48,17 @@ fn a_participant_with_another_version_of_iceoryx2_is_named() {
         Ok(python) => python,
         Err(why) => return lacking(&why),
     };
-    let machine = Machine::patient("other-version");
     // Shared memory of their own: what the other version leaves must not meet the other tests.
-    let places = machine.path("places");
-    fs::create_dir(&places).expect("a folder");
-    let daemon = || {
-        let mut command = hexad();
-        command.arg("run").arg("--config").arg(&machine.file).env("XDG_RUNTIME_DIR", &places);
-        Hexad::spawn(&machine, "run", command)
-    };
-    let folder = places.join("hexad");
-
-    let first = daemon();
-    first.says("running");
-    let (mut refused, said) = participant(&python, &folder, &machine);
+    let Some(host) = Host::start(Machine::patient("other-version")) else { return };
+    let first = host.daemon(0, &[], None);
+    let (mut refused, said) = participant(&python, &host);
     assert!(said.starts_with("refused: ") && said.contains("ServiceInCorruptedState"), "{said}");
     refused.wait().expect("its end");
     first.stops_on("TERM", HANG);
 
-    let (mut other, said) = participant(&python, &folder, &machine);
+    let (mut other, said) = participant(&python, &host);
     assert_eq!(said, "takes part");
-    let ended = daemon().ends_within(HANG);
+    let ended = host.run(0, &[], &["run", "/run/test/machine.toml"]);
     drop(other.stdin.take());
     other.wait().expect("its end");
     assert_eq!(ended.status.code(), Some(1), "{}", ended.stderr);

@@ -1,14 +1,15 @@
 //! Participants that are killed while they join, while they run and between: the daemon removes what they leave.
 
 use std::collections::BTreeSet;
-use std::fs::{self, read_dir, read_to_string};
+use std::fs::read_dir;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::common::certificate::Certificate;
-use crate::support::children::{HANG, Hexad, hexad};
+use crate::support::children::HANG;
+use crate::support::host::{Host, OPERATOR};
 use crate::support::machine::Machine;
 use crate::support::turns;
 
@@ -21,9 +22,8 @@ const DELAYS: u64 = 23;
 const KILLS: u64 = 2 * DELAYS;
 const LONG_KILLS: u64 = 1000;
 
-/// Segments in `/dev/shm` and book-keeping of a folder.
-fn entries(folder: &Path) -> BTreeSet<PathBuf> {
-    let prefix = read_to_string(folder.join("prefix")).expect("the prefix");
+/// Segments of shared memory, and book-keeping of a folder.
+fn entries(folder: &Path, segments: &Path) -> BTreeSet<PathBuf> {
     let mut found = BTreeSet::new();
     let mut folders = vec![folder.to_path_buf()];
     while let Some(next) = folders.pop() {
@@ -32,8 +32,7 @@ fn entries(folder: &Path) -> BTreeSet<PathBuf> {
             found.insert(entry.path());
         }
     }
-    let segments = read_dir("/dev/shm").expect("shared memory").flatten().map(|entry| entry.path());
-    found.extend(segments.filter(|it| it.to_string_lossy().contains(&prefix)));
+    found.extend(read_dir(segments).expect("shared memory").flatten().map(|entry| entry.path()));
     found
 }
 
@@ -43,17 +42,17 @@ fn certificate_killed_participants_leave_nothing() {
     let certificate = Certificate::new("killed participants", KILLS, LONG_KILLS);
     let machine = Machine::patient("remains");
     // Shared memory of their own: the other tests have participants, too.
-    let places = machine.path("places");
-    fs::create_dir(&places).expect("a folder");
+    let Some(host) = Host::start(machine) else { return };
     let command = |arguments: &[&str]| {
-        let mut command = hexad();
-        command.args(arguments).arg("--config").arg(&machine.file).env("XDG_RUNTIME_DIR", &places);
+        let mut command = host.hexad(OPERATOR, &[], arguments);
+        command.args(["--config", "/run/test/machine.toml"]);
         command
     };
-    let daemon = Hexad::spawn(&machine, "run", command(&["run"]));
-    daemon.says("running");
-    let folder = places.join("hexad");
-    let before = entries(&folder);
+    let daemon = host.daemon(OPERATOR, &[], None);
+    let folder = host.path(&format!("/tmp/hexad-{OPERATOR}"));
+    let segments = host.path("/dev/shm");
+    let entries = || entries(&folder, &segments);
+    let before = entries();
     for k in 0..certificate.total() {
         let arguments: &[&str] = if k % 2 == 0 { &["plant"] } else { &["move", "--motion", "settle"] };
         kill_after(command(arguments), Duration::from_millis(FIRST_MS + STEP_MS * (k % DELAYS)));
@@ -61,7 +60,7 @@ fn certificate_killed_participants_leave_nothing() {
     }
     let began = Instant::now();
     let left = loop {
-        let left: Vec<_> = entries(&folder).difference(&before).cloned().collect();
+        let left: Vec<_> = entries().difference(&before).cloned().collect();
         if left.is_empty() || began.elapsed() > HANG {
             break left;
         }

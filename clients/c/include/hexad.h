@@ -161,9 +161,10 @@ enum hexad_result hexad_latest_measured(struct hexad_client *client,
 
 // Sends a request (HEXAD_REQUEST_...) over the control socket and waits until its state is reached, at most `within_s`
 // seconds and two more. `until_ready` also waits for measurement and setpoint where they are missing. It needs no client,
-// and any user whom the machine file admits may call it. hexad_last_error has the daemon's reason. Where the socket does not
-// answer an emergency stop within half a second, it goes by SIGUSR1, as that of the command `hexad estop` does; so does off,
-// which then lasts until a clear. HEXAD_TIMED_OUT then means that the daemon has not reported the stop within two seconds.
+// and any user whom the machine file admits may call it. hexad_last_error has the daemon's reason. It does what the command of the
+// same name does: a stop, off or estop goes to every daemon of the machine at once, and counts if that of the service, else of this
+// user or of root has confirmed it. Where the socket does not answer within half a second, an emergency stop and off go by SIGUSR1,
+// and then last until a clear; a stop goes by SIGUSR2. HEXAD_TIMED_OUT means that it is not known whether the platform is stopped.
 //
 // # Safety
 //

@@ -4,8 +4,8 @@ use core::fmt;
 
 use super::jog_target::{JogTarget, Pace};
 use super::keys::Key;
-use crate::commands::operate::Answer;
 use crate::commands::status::screen::{legs, poses};
+use crate::operator::protocol::AnswerLine as Answer;
 use crate::output::numbers::{AXES, significant};
 
 /// What it shows.

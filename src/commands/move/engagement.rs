@@ -4,11 +4,12 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 use super::MoveError;
-use crate::commands::operate::{OperatorError, Order, carry_out_in_background};
+use crate::commands::request::carry_out_in_background;
 use crate::config::Config;
 use crate::control::diagnostic::DiagnosticCode;
 use crate::control::state::Request;
 use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage};
+use crate::operator::{OperatorError, Order};
 use crate::realtime::stop_request::Stop;
 
 /// Request for control on its way.
@@ -53,7 +54,7 @@ impl Engagement {
                 let result = result.get_or_insert_with(|| {
                     let rest = within.saturating_sub(began.elapsed());
                     let order = Order { request: Request::Engage, is_patient: true, timeout: rest };
-                    carry_out_in_background(&config.identity(), order, stop)
+                    carry_out_in_background(&config.name, order, stop)
                 });
                 match result.try_recv() {
                     Ok(outcome) => Ok(outcome?),

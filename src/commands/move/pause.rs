@@ -7,12 +7,15 @@ use std::fs::read;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use nix::sys::signal::kill;
+use nix::unistd::Pid;
 use tracing::info;
 
 use super::MoveError;
-use crate::commands::operate::{Answer, status};
 use crate::config::Config;
 use crate::daemon::process_names::named;
+use crate::operator::protocol::AnswerLine as Answer;
+use crate::operator::requests::status;
 use crate::realtime::pause_signals::{handles_pause, pause_signal};
 
 /// Time for which the setpoint must not change to count as at rest.
@@ -24,8 +27,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Requests it, and waits until the setpoints of a paused player rest.
 pub fn request(config: &Config, pauses: bool) -> Result<(), MoveError> {
     let player = player(&status(&config.name)?)?;
-    pause_signal(pauses)
-        .send(player)
+    kill(Pid::from_raw(player as i32), pause_signal(pauses))
         .map_err(|error| MoveError::NoPlayer(format!("{} cannot be signalled: {error}", named(player))))?;
     if !pauses {
         info!("{} goes on", named(player));

@@ -10,8 +10,9 @@ use clap::Args;
 use self::screen::Screen;
 use super::arguments::OptionalMachineFile;
 use super::failure::Failure;
-use super::operate;
-use crate::config::identity::Identity;
+use super::request::machine_name;
+use crate::operator::protocol::AnswerLine;
+use crate::operator::requests;
 use crate::output::files::print;
 use crate::realtime::stop_request::Stop;
 
@@ -48,14 +49,14 @@ impl StatusArguments {
     }
 
     fn show_machine(&self, path: &Path) -> Result<(), Failure> {
-        let machine = Identity::load(path)?.name;
+        let machine = machine_name(path)?;
         if !self.watch {
-            return self.show(&operate::status(&machine)?, false);
+            return self.show(&requests::status(&machine)?, false);
         }
         let stop = Stop::on_signals()?;
         let is_terminal = io::stdout().is_terminal();
         while !stop.is_requested() {
-            match operate::status(&machine) {
+            match requests::status(&machine) {
                 Ok(answer) => self.show(&answer, is_terminal)?,
                 // The daemon may be about to start again.
                 Err(error) if is_terminal && !self.json => {
@@ -68,7 +69,7 @@ impl StatusArguments {
         Ok(())
     }
 
-    fn show(&self, answer: &operate::Answer, in_place: bool) -> Result<(), Failure> {
+    fn show(&self, answer: &AnswerLine, in_place: bool) -> Result<(), Failure> {
         if self.json {
             return Ok(print(answer.to_line())?);
         }

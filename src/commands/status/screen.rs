@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use crate::daemon::control_socket::protocol::AnswerLine;
-use crate::daemon::control_socket::status::{ConfigurationReport, LegReport, SourceReport, StatusReport};
+use crate::operator::protocol::AnswerLine;
+use crate::operator::status_report::{ConfigurationReport, LegReport, SourceReport, StatusReport};
 use crate::output::numbers::{AXES, axis_unit, fixed, significant};
 use crate::output::text_table::paragraph;
 
@@ -181,8 +181,8 @@ fn age_text(age_s: f64) -> String {
 pub(in crate::commands) mod tests {
     use super::*;
     use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-    use crate::daemon::control_socket::protocol::{RequestResult, VERSION};
-    use crate::daemon::control_socket::status::{ProcessReport, TimingReport};
+    use crate::operator::protocol::{RequestResult, VERSION};
+    use crate::operator::status_report::{ProcessReport, TimingReport};
 
     /// Every field as long as it gets.
     pub fn answer() -> AnswerLine {

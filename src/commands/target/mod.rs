@@ -11,15 +11,14 @@ use nalgebra::Vector3;
 
 use self::watch::{StatusWatch, Watched};
 use super::failure::{CommandError, INTERRUPTED, default_exit_code};
-use super::operate::{Answer, OperatorError, Order, carry_out_in_background, status};
 use super::plant::prepare_thread;
+use super::request::carry_out_in_background;
 use crate::analysis::target_motion::{TargetRefusal, check_target};
 use crate::config::Config;
 use crate::control::controller::{Setpoint, SetpointKind};
 use crate::control::limits::DerivativeLimits;
 use crate::control::parameters::Constants;
 use crate::control::state::{Request, State};
-use crate::daemon::control_socket::status::StatusReport;
 use crate::daemon::process_names::named;
 use crate::daemon::{self, nanoseconds};
 use crate::messages::clock::monotonic_ns;
@@ -27,6 +26,10 @@ use crate::messages::{Bus, PortError, Publisher, SetpointMessage};
 use crate::model::fidelity::Fidelity;
 use crate::model::rigid::{Pose, Twist};
 use crate::model::task::{TaskState, task_coordinates};
+use crate::operator::protocol::AnswerLine as Answer;
+use crate::operator::requests::status;
+use crate::operator::status_report::StatusReport;
+use crate::operator::{OperatorError, Order};
 use crate::realtime::clock::{Grid, sleep_until};
 use crate::realtime::stop_request::Stop;
 
@@ -236,7 +239,7 @@ impl<'a> TargetSource<'a> {
         let Some(timeout) = self.within else { return Ok(()) };
         let engagement = self.engagement.get_or_insert_with(|| {
             let order = Order { request: Request::Engage, is_patient: true, timeout };
-            carry_out_in_background(&self.config.identity(), order, &self.stop)
+            carry_out_in_background(&self.config.name, order, &self.stop)
         });
         match engagement.try_recv() {
             // The command itself has noticed the signal, too.

@@ -4,8 +4,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant};
 
-use crate::commands::operate::{Answer, OperatorError, status};
 use crate::config::Config;
+use crate::operator::OperatorError;
+use crate::operator::protocol::AnswerLine as Answer;
+use crate::operator::requests::status;
 
 /// Time between two requests: a person sees no faster changes.
 const INTERVAL: Duration = Duration::from_millis(50);

@@ -16,6 +16,8 @@ use super::arguments::MachineFile;
 use super::failure::{CommandError, Failure};
 use super::report::head;
 use crate::config::Config;
+use crate::operator::endpoint::{Endpoint, endpoints};
+use crate::operator::users::user_name;
 use crate::output::files::print;
 use crate::output::page::page;
 use crate::realtime::stop_request::Stop;
@@ -46,10 +48,23 @@ struct ViewError {
 
 impl CommandError for ViewError {}
 
+/// Nothing would ever be shown.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "the daemon of {machine} runs as user {user}, whose topics only {user} can join: run hexad view as that user; hexad status needs no topics"
+)]
+struct ForeignDaemon {
+    machine: String,
+    user: String,
+}
+
+impl CommandError for ForeignDaemon {}
+
 impl ViewArguments {
     pub fn execute(self) -> Result<(), Failure> {
         let (config, stop) = (self.machine.load()?, Stop::on_signals()?);
         let mut topics = Topics::join(&config)?;
+        check_user(&config.name)?;
         let live = Mutex::new(Live::new(&config));
         let server = Server::start(self.port).map_err(|cause| ViewError { port: self.port, cause })?;
         print(format_args!("{}\n", server.address()))?;
@@ -68,6 +83,18 @@ impl ViewArguments {
             }
         });
         Ok(())
+    }
+}
+
+/// An error if only daemons of other users run: their topics are not seen.
+fn check_user(machine: &str) -> Result<(), ForeignDaemon> {
+    let found = endpoints(Some(machine));
+    let foreign = found.iter().find(|it| it.daemon.is_some() && !it.is_own());
+    match foreign {
+        Some(foreign) if !found.iter().any(Endpoint::is_own) => {
+            Err(ForeignDaemon { machine: machine.into(), user: user_name(foreign.owner) })
+        }
+        _ => Ok(()),
     }
 }
 

@@ -12,13 +12,8 @@ pub struct OperatorAccess {
     pub group: Option<String>,
     /// Permissions of the control socket: to connect is to write.
     pub mode: u32,
-}
-
-impl OperatorAccess {
-    /// Whether every user may connect.
-    pub fn is_for_everybody(&self) -> bool {
-        self.mode & 0o002 != 0
-    }
+    /// Group that may read the status and nothing else, besides those who may send requests.
+    pub read_group: Option<String>,
 }
 
 pub(super) fn read(mut section: SectionReader) -> OperatorAccess {
@@ -26,6 +21,7 @@ pub(super) fn read(mut section: SectionReader) -> OperatorAccess {
     let access = OperatorAccess {
         group: section.optional_name("group", MAX_GROUP_LENGTH),
         mode: section.choice_or("mode", 0o660, &modes),
+        read_group: section.optional_name("read_group", MAX_GROUP_LENGTH),
     };
     section.finish();
     access

@@ -6,12 +6,12 @@ use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
-use nix::unistd::{Uid, User};
 use tracing::warn;
 
 use super::last_seconds::LastSeconds;
-use super::order::{PendingOrder, is_stop};
-use super::protocol::{AnswerLine, RequestLine, RequestResult};
+use super::order::PendingOrder;
+use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult, is_stop};
+use crate::operator::users::user_name;
 use crate::realtime::file_passing;
 
 /// Longest line \[bytes\]: many times the longest request.
@@ -61,17 +61,13 @@ impl Peer {
     }
 }
 
-/// Name of a user, or its number.
-pub fn user_name(user_id: u32) -> String {
-    let found = User::from_uid(Uid::from_raw(user_id)).ok().flatten();
-    found.map_or_else(|| user_id.to_string(), |user| user.name)
-}
-
 /// Connection of a client.
 #[derive(Debug)]
 pub struct Connection {
     pub stream: UnixStream,
     pub peer: Peer,
+    /// Whether it may send requests, and not only read.
+    pub may_request: bool,
     /// The request that is not answered yet.
     pub pending: Option<PendingOrder>,
     /// The line that waits for its turn.
@@ -105,12 +101,13 @@ pub enum Received {
 
 impl Connection {
     /// A connection that was just accepted.
-    pub fn new(stream: UnixStream, now_ns: u64) -> io::Result<Self> {
+    pub fn new(stream: UnixStream, may_request: bool, now_ns: u64) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
         let peer = Peer::of(&stream);
         Ok(Self {
             stream,
             peer,
+            may_request,
             pending: None,
             line: None,
             reload: None,
@@ -200,7 +197,7 @@ mod tests {
 
     fn pair() -> (UnixStream, Connection) {
         let (client, server) = UnixStream::pair().unwrap();
-        (client, Connection::new(server, 0).unwrap())
+        (client, Connection::new(server, true, 0).unwrap())
     }
 
     #[test]

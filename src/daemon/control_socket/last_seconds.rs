@@ -3,10 +3,10 @@
 use std::fs::File;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel};
 
-use super::protocol::{AnswerLine, RequestResult, VERSION};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
 use crate::daemon::recorder::WindowOrder;
+use crate::operator::protocol::{AnswerLine, RequestResult, VERSION};
 
 /// Name of the request.
 pub const RECORD: &str = "record";

@@ -3,106 +3,141 @@
 use std::fs::{self, Permissions};
 use std::io;
 use std::os::unix::fs::{PermissionsExt, chown};
-use std::os::unix::net::UnixListener;
+use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::process;
 
-use nix::unistd::{Group, geteuid};
+use nix::unistd;
 
 use crate::config::deployment::OperatorAccess;
-use crate::messages::location::{SYSTEM_FOLDER, TEMPORARY_FOLDER, make_user_folder, user_folder};
+use crate::messages::PortError;
+use crate::messages::location::{SYSTEM_FOLDER, open_user_folder};
+use crate::operator::endpoint::{reading_path, socket_path};
 
 /// Error of opening the control socket.
 #[derive(Debug, thiserror::Error)]
 pub enum SocketError {
     /// The configured group does not exist.
-    #[error("operator.group = \"{0}\": no such group; create it, or correct the machine file")]
-    NoGroup(String),
+    #[error("operator.{0} = \"{1}\": no such group; create it, or correct the machine file")]
+    NoGroup(&'static str, String),
     /// The daemon may not give its socket to the configured group.
-    #[error("operator.group = \"{0}\": the user of the daemon must be a member of that group")]
-    NotMember(String),
-    /// A folder or socket could not be made.
+    #[error("operator.{0} = \"{1}\": the user of the daemon must be a member of that group")]
+    NotMember(&'static str, String),
+    /// The folder of this user could not be made.
+    #[error(transparent)]
+    Folder(#[from] PortError),
+    /// The socket could not be made.
     #[error("cannot open the control socket {path}: {cause}")]
     Open {
-        /// Socket or folder.
+        /// Its path.
         path: PathBuf,
         /// Error of the operating system.
         cause: io::Error,
     },
 }
 
-/// Path of the socket of a machine in a folder.
-pub fn socket_path(folder: &Path, machine: &str) -> PathBuf {
-    folder.join(format!("{machine}.sock"))
-}
-
-/// Open control socket; its file is removed when it is dropped.
+/// Open control socket; its files are removed when it is dropped.
 #[derive(Debug)]
 pub struct ControlSocket {
     /// Listener, which does not block.
     pub listener: UnixListener,
+    /// The same of those who may read the status and nothing else.
+    pub reading: Option<UnixListener>,
     /// Path of its file.
     pub path: PathBuf,
 }
 
-impl Drop for ControlSocket {
-    fn drop(&mut self) {
-        // Fails only if somebody has removed it.
-        let _ = fs::remove_file(&self.path);
+impl ControlSocket {
+    /// The next client, and whether it may send requests: those who may come first.
+    pub fn accept(&self) -> io::Result<(UnixStream, bool)> {
+        match (self.listener.accept(), &self.reading) {
+            (Err(error), Some(reading)) if error.kind() == io::ErrorKind::WouldBlock => {
+                reading.accept().map(|(stream, _)| (stream, false))
+            }
+            (accepted, _) => accepted.map(|(stream, _)| (stream, true)),
+        }
     }
 }
 
-/// Opens the control socket of a machine: in [`SYSTEM_FOLDER`] if this process may write there, else in a folder of this
+impl Drop for ControlSocket {
+    fn drop(&mut self) {
+        // Fails only if somebody has removed them.
+        for path in
+            [Some(self.path.clone()), self.reading.as_ref().map(|_| beside(&self.path))].into_iter().flatten()
+        {
+            let _ = fs::remove_file(path);
+        }
+    }
+}
+
+/// Path of the socket for reading beside that for requests.
+fn beside(socket: &Path) -> PathBuf {
+    let folder = socket.parent().unwrap_or(socket);
+    reading_path(folder, &socket.file_stem().unwrap_or_default().to_string_lossy())
+}
+
+/// Opens the control socket of a machine: in [`SYSTEM_FOLDER`] if this process may write there, else in the folder of this
 /// user.
 pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, SocketError> {
-    let group_id = match &access.group {
-        None => None,
-        Some(name) => {
-            let group = Group::from_name(name).ok().flatten();
-            Some(group.ok_or_else(|| SocketError::NoGroup(name.clone()))?.gid.as_raw())
+    let (group, read_group) =
+        (Group::find("group", &access.group)?, Group::find("read_group", &access.read_group)?);
+    let in_folder = |folder: &Path| -> Result<ControlSocket, SocketError> {
+        let path = socket_path(folder, machine);
+        let listener = bind(&path, access.mode, group.as_ref())?;
+        let mut socket = ControlSocket { listener, reading: None, path };
+        if read_group.is_some() {
+            socket.reading = Some(bind(&beside(&socket.path), 0o660, read_group.as_ref())?);
         }
+        Ok(socket)
     };
-    let bind = |folder: &Path| bind(&socket_path(folder, machine), access.mode, group_id);
     let system = Path::new(SYSTEM_FOLDER);
-    let failed = |path: PathBuf, cause: io::Error| match &access.group {
-        // Not EACCES: to change the group is not permitted.
-        Some(name) if cause.raw_os_error() == Some(libc::EPERM) => SocketError::NotMember(name.clone()),
-        _ => SocketError::Open { path, cause },
-    };
     if system.is_dir() {
-        match bind(system).map_err(|cause| failed(system.into(), cause)) {
+        match in_folder(system) {
             Err(SocketError::Open { .. }) => {}
             result => return result,
         }
     }
-    let folder = folder(access);
-    make_user_folder(&folder).map_err(|cause| failed(folder.clone(), cause))?;
-    bind(&folder).map_err(|cause| failed(socket_path(&folder, machine), cause))
+    in_folder(&open_user_folder()?)
 }
 
-/// The user's folder, if nobody else has to enter it, else one among the temporary files.
-fn folder(access: &OperatorAccess) -> PathBuf {
-    let is_private = access.group.is_none() && !access.is_for_everybody();
-    if is_private { user_folder() } else { format!("{TEMPORARY_FOLDER}{}", geteuid()).into() }
+/// A group that a key names.
+struct Group {
+    key: &'static str,
+    name: String,
+    id: u32,
+}
+
+impl Group {
+    fn find(key: &'static str, name: &Option<String>) -> Result<Option<Self>, SocketError> {
+        let Some(name) = name.clone() else { return Ok(None) };
+        match unistd::Group::from_name(&name).ok().flatten() {
+            Some(found) => Ok(Some(Self { key, name, id: found.gid.as_raw() })),
+            None => Err(SocketError::NoGroup(key, name)),
+        }
+    }
 }
 
 /// Binds under a temporary name: the socket appears with its permissions, and replaces that of a daemon that died.
-fn bind(path: &Path, mode: u32, group_id: Option<u32>) -> io::Result<ControlSocket> {
-    let temporary = path.with_extension(format!("{}", process::id()));
+fn bind(path: &Path, mode: u32, group: Option<&Group>) -> Result<UnixListener, SocketError> {
+    let temporary = path.with_extension(process::id().to_string());
     let _ = fs::remove_file(&temporary);
-    let listener = UnixListener::bind(&temporary)?;
-    let prepared = listener
-        .set_nonblocking(true)
-        .and_then(|()| group_id.map_or(Ok(()), |group_id| chown(&temporary, None, Some(group_id))))
-        .and_then(|()| fs::set_permissions(&temporary, Permissions::from_mode(mode)))
-        .and_then(|()| fs::rename(&temporary, path));
-    match prepared {
-        Ok(()) => Ok(ControlSocket { listener, path: path.into() }),
-        Err(error) => {
-            let _ = fs::remove_file(&temporary);
-            Err(error)
+    let bound = UnixListener::bind(&temporary).and_then(|listener| {
+        listener.set_nonblocking(true)?;
+        chown(&temporary, None, group.map(|group| group.id))?;
+        fs::set_permissions(&temporary, Permissions::from_mode(mode))?;
+        fs::rename(&temporary, path)?;
+        Ok(listener)
+    });
+    bound.map_err(|cause| {
+        let _ = fs::remove_file(&temporary);
+        match group {
+            // Not EACCES: to change the group is not permitted.
+            Some(Group { key, name, .. }) if cause.raw_os_error() == Some(libc::EPERM) => {
+                SocketError::NotMember(key, name.clone())
+            }
+            _ => SocketError::Open { path: path.into(), cause },
         }
-    }
+    })
 }
 
 #[cfg(test)]
@@ -118,7 +153,8 @@ mod tests {
         for mode in [0o600, 0o660] {
             // The file of a daemon that was killed.
             core::mem::forget(bind(&path, 0o666, None).unwrap());
-            let socket = bind(&path, mode, None).unwrap();
+            let listener = bind(&path, mode, None).unwrap();
+            let socket = ControlSocket { listener, reading: None, path: path.clone() };
             assert_eq!(fs::metadata(&path).unwrap().mode() & 0o777, mode);
             assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
             drop(socket);
@@ -128,8 +164,12 @@ mod tests {
 
     #[test]
     fn a_group_that_does_not_exist_is_named() {
-        let access = OperatorAccess { group: Some("no-such-group-here".into()), mode: 0o660 };
-        let error = open("m", &access).unwrap_err().to_string();
-        assert!(error.starts_with("operator.group = \"no-such-group-here\": no such group"), "{error}");
+        let none = Some("no-such-group-here".to_owned());
+        for (group, read_group, key) in [(none.clone(), None, "group"), (None, none, "read_group")] {
+            let error =
+                open("m", &OperatorAccess { group, read_group, mode: 0o660 }).unwrap_err().to_string();
+            let words = format!("operator.{key} = \"no-such-group-here\": no such group");
+            assert!(error.starts_with(&words), "{error}");
+        }
     }
 }

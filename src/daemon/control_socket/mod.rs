@@ -17,18 +17,16 @@ use std::time::Duration;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use tracing::warn;
 
-pub use self::connection::user_name;
 use self::connection::{Connection, Received};
 use self::location::ControlSocket;
 use self::order::Step;
-use self::protocol::{AnswerLine, RequestLine};
 use self::status::StatusSource;
-use super::cycle::MAX_REQUEST_AGE_NS;
 use super::recorder::WindowOrder;
 use super::reload::{Loaded, Reloaded, Requester};
 use super::snapshot::Snapshot;
-use crate::messages::Rejection;
 use crate::messages::clock::monotonic_ns;
+use crate::messages::{MAX_REQUEST_AGE_NS, Rejection};
+use crate::operator::protocol::{AnswerLine, RequestLine};
 use crate::realtime::request_word::RequestWord;
 use crate::realtime::triple_buffer::Reader;
 
@@ -36,7 +34,6 @@ mod connection;
 mod last_seconds;
 pub mod location;
 mod order;
-pub mod protocol;
 mod reload;
 mod respond;
 pub mod status;
@@ -60,6 +57,10 @@ const STALE_TIME_NS: u64 = 200_000_000;
 
 /// Least time between two warnings of clients that misbehave \[ns\]: they must not fill the log.
 const WARNING_INTERVAL_NS: u64 = 1_000_000_000;
+
+/// Answer to a request of a client that may only read.
+const READING_ONLY: &str =
+    "this socket is for reading: only status; operator.group names who may send requests";
 
 /// Longest that a request may wait \[s\].
 const MAX_WITHIN_S: f64 = 86_400.0;
@@ -148,7 +149,9 @@ impl Server<'_> {
         let is_busy = |connection: &Connection| connection.is_waiting() || connection.has_line();
         let is_pending = self.connections.iter().any(is_busy);
         let timeout = PollTimeout::from(if is_pending { PENDING_WAIT_MS } else { IDLE_WAIT_MS });
-        let mut events = vec![PollFd::new(self.socket.listener.as_fd(), PollFlags::POLLIN)];
+        let listeners = core::iter::once(&self.socket.listener).chain(&self.socket.reading);
+        let mut events: Vec<_> = listeners.map(|it| PollFd::new(it.as_fd(), PollFlags::POLLIN)).collect();
+        let listeners = events.len();
         events.extend(self.connections.iter().map(|connection| {
             let events = if connection.has_ended { PollFlags::empty() } else { PollFlags::POLLIN };
             PollFd::new(connection.stream.as_fd(), events)
@@ -159,7 +162,7 @@ impl Server<'_> {
         let has_left = |event: &PollFd<'_>| {
             event.revents().is_some_and(|seen| seen.intersects(left) && !seen.contains(PollFlags::POLLIN))
         };
-        let mut gone: Vec<bool> = events.iter().skip(1).map(has_left).collect();
+        let mut gone: Vec<bool> = events.iter().skip(listeners).map(has_left).collect();
         drop(events);
         let word = self.word;
         let mut gone = gone.drain(..);
@@ -183,8 +186,8 @@ impl Server<'_> {
     fn accept(&mut self) {
         let snapshot = *self.snapshots.read();
         for _ in 0..MAX_CONNECTIONS {
-            let stream = match self.socket.listener.accept() {
-                Ok((stream, _)) => stream,
+            let (stream, may_request) = match self.socket.accept() {
+                Ok(accepted) => accepted,
                 Err(error) if matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE)) => {
                     if let Some(count) = self.warning() {
                         warn!(
@@ -201,7 +204,7 @@ impl Server<'_> {
                 }
                 Err(_) => return,
             };
-            let Ok(mut connection) = Connection::new(stream, self.woke_ns) else { continue };
+            let Ok(mut connection) = Connection::new(stream, may_request, self.woke_ns) else { continue };
             if self.receive(&mut connection, &snapshot) {
                 self.connections.push(connection);
             }
@@ -249,6 +252,9 @@ impl Server<'_> {
         match connection.receive(self.woke_ns) {
             Received::Nothing => !connection.is_done(self.woke_ns),
             Received::Line(line) => match RequestLine::parse(&line) {
+                Ok(line) if !connection.may_request && line.request != "status" => {
+                    connection.send(&AnswerLine::invalid(READING_ONLY.into()))
+                }
                 Ok(line) if line.is_stop() => self.respond(connection, &line, snapshot, &mut None),
                 Ok(line) => {
                     connection.line = Some(line);

@@ -2,10 +2,10 @@
 
 use super::Server;
 use super::connection::Connection;
-use super::protocol::{AnswerLine, RequestLine, RequestResult};
-use crate::control::diagnostic::DiagnosticCode;
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::daemon::reload::{ReloadError, Reloaded};
 use crate::daemon::snapshot::Snapshot;
+use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
 
 /// Name of the request that is not the controller's.
 pub const RELOAD: &str = "reload";
@@ -51,5 +51,5 @@ impl Server<'_> {
 
 fn answer_to_reload(result: RequestResult, snapshot: &Snapshot, text: String) -> AnswerLine {
     let state = snapshot.status.state().unwrap_or_default();
-    AnswerLine::named(result, RELOAD, state, DiagnosticCode::None.into(), text)
+    AnswerLine::named(result, RELOAD, state, Diagnostic::from(DiagnosticCode::None), text)
 }

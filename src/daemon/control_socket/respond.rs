@@ -7,13 +7,13 @@ use tracing::{debug, info};
 use super::connection::Connection;
 use super::last_seconds::{LastSeconds, RECORD};
 use super::order::{Order, PendingOrder};
-use super::protocol::{AnswerLine, RequestLine, RequestResult};
 use super::reload::RELOAD;
 use super::{MAX_WITHIN_S, Server};
-use crate::control::diagnostic::DiagnosticCode;
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::Request;
 use crate::daemon::snapshot::Snapshot;
 use crate::messages::clock::monotonic_ns;
+use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
 
 impl Server<'_> {
     /// Responds to a line; false if the connection is of no more use. `status` is the answer to `status` in this round.
@@ -69,7 +69,7 @@ impl Server<'_> {
         if request.can_begin_control() {
             let state = snapshot.status.state().unwrap_or_default();
             let answer = |result, code: DiagnosticCode, text: String| {
-                Some(AnswerLine::new(result, request, state, code.into(), text))
+                Some(AnswerLine::new(result, request, state, Diagnostic::from(code), text))
             };
             if self.is_ending.load(Ordering::Relaxed) {
                 let code = DiagnosticCode::DaemonEnding;

@@ -2,12 +2,12 @@
 
 use crate::control::controller::{Input, Measurement, Setpoint};
 use crate::control::state::{OperatorRequest, Request};
-use crate::daemon::cycle::{CycleInput, MAX_REQUEST_AGE_NS};
+use crate::daemon::cycle::CycleInput;
 use crate::daemon::reload::timeouts::TimeoutsNs;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{
-    Bus, CommandMessage, LeasedSubscriber, MeasuredMessage, PortError, Rejection, RejectionCounts,
-    SetpointMessage, Subscriber,
+    Bus, CommandMessage, LeasedSubscriber, MAX_REQUEST_AGE_NS, MeasuredMessage, PortError, Rejection,
+    RejectionCounts, SetpointMessage, Subscriber,
 };
 
 /// The daemon's own request before it ends; no message has this epoch.

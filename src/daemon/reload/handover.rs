@@ -16,7 +16,7 @@ use super::Loaded;
 use super::timeouts::{MessageTimeouts, TimeoutsNs};
 use crate::control::controller::Controller;
 use crate::control::state::State;
-use crate::daemon::cycle::MAX_REQUEST_AGE_NS;
+use crate::messages::MAX_REQUEST_AGE_NS;
 
 /// Room for the one offer: a queue holds one less than its length.
 pub const LENGTH: usize = 2;

@@ -4,6 +4,7 @@ pub mod button;
 pub mod children;
 pub mod disturbance;
 pub mod forged;
+pub mod host;
 pub mod machine;
 pub mod nobody;
 pub mod operator;

@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::protocol::{AnswerLine, RequestResult};
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::{Request, State};
-use crate::daemon::cycle::MAX_REQUEST_AGE_NS;
 use crate::daemon::process_names::sentence;
 use crate::daemon::snapshot::Snapshot;
+use crate::messages::MAX_REQUEST_AGE_NS;
+use crate::operator::protocol::{AnswerLine, RequestResult, is_stop};
 use crate::realtime::request_word::RequestWord;
 
 /// Interval between two attempts of a request that waits until it is possible \[ns\].
@@ -217,11 +217,6 @@ impl PendingOrder {
     ) -> AnswerLine {
         AnswerLine::new(result, self.order.request, state(snapshot), diagnostic, text)
     }
-}
-
-/// Whether a request ends control or force; it is never withdrawn.
-pub fn is_stop(request: Request) -> bool {
-    matches!(request, Request::Stop | Request::Off | Request::Estop)
 }
 
 /// Whether a state is the one that an accepted request leads to; `None` on the way there.

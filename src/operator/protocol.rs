@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::order::is_stop;
-use super::status::StatusReport;
-use crate::control::diagnostic::Diagnostic;
+use super::status_report::StatusReport;
 use crate::control::state::{Request, State};
-use crate::daemon::process_names::sentence;
+
+/// Whether a request ends control or force; it is never withdrawn.
+pub fn is_stop(request: Request) -> bool {
+    matches!(request, Request::Stop | Request::Off | Request::Estop)
+}
 
 /// Version of the protocol. It changes only if a client of an older one would misunderstand.
 pub const VERSION: u32 = 1;
@@ -142,21 +144,6 @@ pub struct DiagnosticReport {
     pub text: String,
 }
 
-impl From<Diagnostic> for DiagnosticReport {
-    fn from(diagnostic: Diagnostic) -> Self {
-        let finite = |number: f64| Some(number).filter(|number| number.is_finite());
-        let Diagnostic { code, value, bound, index } = diagnostic;
-        Self {
-            code: code as u32,
-            name: code.name().into(),
-            value: finite(value),
-            bound: finite(bound),
-            index,
-            text: sentence(&diagnostic),
-        }
-    }
-}
-
 /// Line of the daemon.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnswerLine {
@@ -183,7 +170,7 @@ impl AnswerLine {
         result: RequestResult,
         request: Request,
         state: State,
-        diagnostic: Diagnostic,
+        diagnostic: impl Into<DiagnosticReport>,
         text: String,
     ) -> Self {
         Self::named(result, request.name(), state, diagnostic, text)
@@ -194,7 +181,7 @@ impl AnswerLine {
         result: RequestResult,
         request: &str,
         state: State,
-        diagnostic: Diagnostic,
+        diagnostic: impl Into<DiagnosticReport>,
         text: String,
     ) -> Self {
         let (request, state) = (request.into(), state.name().into());

@@ -1,0 +1,64 @@
+//! One request over one connection.
+
+use std::io;
+use std::time::{Duration, Instant};
+
+use super::connection::Connection;
+use super::protocol::{AnswerLine, RequestLine, RequestResult};
+use super::{OperatorError, Order};
+
+/// Time beyond that of the request in which the daemon must have answered.
+const ANSWER_GRACE: Duration = Duration::from_secs(2);
+
+impl Order {
+    /// The line that asks for it.
+    pub(super) fn line(&self) -> RequestLine {
+        RequestLine {
+            wait: true,
+            until_ready: self.is_patient,
+            progress: true,
+            within_s: self.timeout.as_secs_f64(),
+            ..RequestLine::new(self.request.name())
+        }
+    }
+
+    /// What an answer to it means: the name of the state that it led to, or why it did not.
+    pub(super) fn conclude(&self, answer: AnswerLine) -> Result<String, OperatorError> {
+        let (request, text) = (self.request, answer.text);
+        match answer.result {
+            RequestResult::Done => Ok(answer.state),
+            RequestResult::Refused | RequestResult::Invalid => Err(OperatorError::Refused(request, text)),
+            RequestResult::TimedOut => {
+                Err(OperatorError::TimedOut(request, self.timeout.as_secs_f64(), text))
+            }
+            RequestResult::Stale => Err(OperatorError::Stale(request, text)),
+            RequestResult::Unanswered => Err(OperatorError::NotConfirmed(request, text)),
+            RequestResult::Failed
+            | RequestResult::Superseded
+            | RequestResult::Accepted
+            | RequestResult::Waiting => Err(OperatorError::NotCompleted(request, text)),
+        }
+    }
+}
+
+/// Sends a line and reads until its answer; `None` if none came: the first line until an instant, the answer in `timeout` and a little
+/// more. `waits` receives why the daemon waits.
+pub(super) fn converse(
+    connection: &mut Connection,
+    line: &RequestLine,
+    first_until: Instant,
+    timeout: Duration,
+    interrupted: impl Fn() -> bool,
+    mut waits: impl FnMut(&str),
+) -> io::Result<Option<AnswerLine>> {
+    connection.send(line)?;
+    let mut until = first_until;
+    loop {
+        match connection.receive(until, &interrupted)? {
+            Some(answer) if answer.result == RequestResult::Waiting => waits(&answer.text),
+            Some(answer) if answer.result == RequestResult::Accepted => {}
+            answer => return Ok(answer),
+        }
+        until = Instant::now() + timeout + ANSWER_GRACE;
+    }
+}

@@ -1,0 +1,153 @@
+//! Requests to one daemon: the first that counts, of the service, of this user, of root.
+
+use std::io;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use super::connection::{Attempt, Connection};
+use super::endpoint::{Endpoint, endpoints};
+use super::exchange::converse;
+use super::protocol::{AnswerLine, RequestLine, RequestResult};
+use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
+use crate::messages::MAX_REQUEST_AGE_NS;
+
+/// Longest wait for the first line of the daemon: longer than the daemon waits for its loop.
+const FIRST_LINE_LIMIT: Duration = Duration::from_secs(3);
+
+/// Longest wait of a patient request for a daemon that is about to start.
+const DAEMON_START_LIMIT: Duration = Duration::from_secs(2);
+
+/// Sends a request that does not stop, and waits for its outcome: the name of the state that it led to. `waits` receives why it waits,
+/// each reason once. A patient request also waits for a daemon that is about to start.
+pub fn carry_out(
+    machine: &str,
+    order: &Order,
+    interrupted: &(dyn Fn() -> bool + Sync),
+    mut waits: impl FnMut(&str),
+) -> Result<String, OperatorError> {
+    let began = Instant::now();
+    loop {
+        let outcome = attempt(machine, order, interrupted, &mut waits);
+        let limit = match &outcome {
+            Err(OperatorError::NoDaemon(_)) if order.is_patient => DAEMON_START_LIMIT.min(order.timeout),
+            // Only what this command has just sent itself is not old.
+            Err(OperatorError::Stale(..)) => Duration::from_nanos(MAX_REQUEST_AGE_NS),
+            _ => return outcome,
+        };
+        if began.elapsed() > limit || interrupted() {
+            return outcome;
+        }
+        sleep(RETRY_INTERVAL);
+    }
+}
+
+fn attempt(
+    machine: &str,
+    order: &Order,
+    interrupted: &dyn Fn() -> bool,
+    waits: &mut impl FnMut(&str),
+) -> Result<String, OperatorError> {
+    let ask = |connection: &mut Connection| {
+        let until = Instant::now() + FIRST_LINE_LIMIT;
+        converse(connection, &order.line(), until, order.timeout, interrupted, &mut *waits)
+    };
+    match ask_first(machine, ask) {
+        Ok(answer) => order.conclude(answer),
+        Err(_) if interrupted() => Err(OperatorError::Interrupted),
+        Err(OperatorError::NoAnswer(reason)) => Err(OperatorError::NotConfirmed(order.request, reason)),
+        Err(error) => Err(error),
+    }
+}
+
+/// The status of the daemon of a machine.
+pub fn status(machine: &str) -> Result<AnswerLine, OperatorError> {
+    first_answer(machine, status_of)
+}
+
+/// The status of the daemon that listens at an endpoint.
+pub fn status_of(endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
+    ask_at(endpoint, Endpoint::connect_to_read, |connection| {
+        let until = Instant::now() + FIRST_LINE_LIMIT;
+        converse(connection, &RequestLine::new("status"), until, FIRST_LINE_LIMIT, || false, |_| ())
+    })
+}
+
+/// Lets the daemon of a machine read its machine file again; returns what has changed, in words.
+pub fn reload(machine: &str, timeout: Duration) -> Result<String, OperatorError> {
+    let line = RequestLine { progress: true, ..RequestLine::new("reload") };
+    let answer = ask_first(machine, |connection| {
+        converse(connection, &line, Instant::now() + FIRST_LINE_LIMIT, timeout, || false, |_| ())
+    });
+    match answer {
+        Ok(AnswerLine { result: RequestResult::Done, text, .. }) => Ok(text),
+        Ok(AnswerLine { result: RequestResult::Unanswered, text, .. })
+        | Err(OperatorError::NoAnswer(text)) => Err(OperatorError::ReloadNotConfirmed(text)),
+        Ok(AnswerLine { text, .. }) => Err(OperatorError::ReloadRefused(text)),
+        Err(error) => Err(error),
+    }
+}
+
+/// The answer of the first daemon that counts, by `ask`, which sends a request over a connection.
+pub fn ask_first(
+    machine: &str,
+    mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
+) -> Result<AnswerLine, OperatorError> {
+    first_answer(machine, |endpoint| ask_at(endpoint, Endpoint::connect, &mut ask))
+}
+
+fn first_answer(
+    machine: &str,
+    mut ask: impl FnMut(&Endpoint) -> Result<AnswerLine, OperatorError>,
+) -> Result<AnswerLine, OperatorError> {
+    let mut failure = OperatorError::NoDaemon(machine.into());
+    for endpoint in endpoints(Some(machine)) {
+        match ask(&endpoint) {
+            Err(OperatorError::NoDaemon(_)) => {}
+            // Another one may admit this user, or count.
+            Err(error @ (OperatorError::Forbidden { .. } | OperatorError::NotTrusted { .. })) => {
+                if matches!(failure, OperatorError::NoDaemon(_)) {
+                    failure = error;
+                }
+            }
+            answer => return answer,
+        }
+    }
+    Err(failure)
+}
+
+fn ask_at(
+    endpoint: &Endpoint,
+    connect: impl Fn(&Endpoint) -> io::Result<Attempt>,
+    mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
+) -> Result<AnswerLine, OperatorError> {
+    let mut reason = "it accepts nobody".to_owned();
+    for _ in 0..ATTEMPTS {
+        match connect(endpoint) {
+            Ok(Attempt::Connected(connection)) if !endpoint.counts(&connection) => {
+                return Err(Stranger::at(endpoint, &connection, "nothing was sent").error("the request"));
+            }
+            Ok(Attempt::Connected(mut connection)) => match ask(&mut connection) {
+                Ok(Some(answer)) => return Ok(answer),
+                Ok(None) => {
+                    reason = "is it stopped, or its log blocked?".into();
+                    break;
+                }
+                // Closed, as it does where too many connect.
+                Err(error) => reason = error.to_string(),
+            },
+            Ok(Attempt::Full) => sleep(RETRY_INTERVAL),
+            Ok(Attempt::Forbidden) => return Err(OperatorError::forbidden_at(endpoint)),
+            Ok(Attempt::Absent) | Err(_) if endpoint.daemon.is_some() => break,
+            Ok(Attempt::Absent) | Err(_) => return Err(OperatorError::NoDaemon(endpoint.machine.clone())),
+        }
+    }
+    if !endpoint.is_trusted {
+        return Err(OperatorError::NoDaemon(endpoint.machine.clone()));
+    }
+    let process =
+        endpoint.daemon.as_ref().map_or("the daemon".into(), |it| format!("process {}", it.process_id));
+    Err(OperatorError::NoAnswer(format!(
+        "{process} does not answer at {}: {reason}",
+        endpoint.socket.display()
+    )))
+}
