@@ -10,7 +10,7 @@ use hexad::control::state::State;
 use hexad::plant::random::Random;
 
 use super::count::instructions;
-use super::genome::Genome;
+use super::genome::{Genome, Sensors};
 use super::run::run_with;
 use super::scenario::Scenario;
 
@@ -77,7 +77,12 @@ impl Search {
         let index = |random: &mut Random, count: usize| (random.uniform() * count as f64) as usize;
         let pick = |random: &mut Random| &self.found[index(random, self.found.len())].genome;
         if self.found.len() < KEPT.min(KEPT_OF_MACHINE * machines.len()) || random.uniform() < DRAWN {
-            return Genome::random(machines.start + index(random, machines.len()), policy, false, random);
+            return Genome::random(
+                machines.start + index(random, machines.len()),
+                policy,
+                Sensors::Exact,
+                random,
+            );
         }
         let parent = pick(random).clone();
         if random.uniform() < CROSSED {

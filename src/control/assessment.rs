@@ -33,8 +33,10 @@ pub(super) struct Evidence<'a> {
     pub reports: &'a [Result<(), Diagnostic>; 2],
     /// Whether the drives are ready, or nothing else is reported.
     pub is_ready: bool,
-    /// The motion with which control would begin, if it is known.
-    pub free_motion: Option<&'a Motion>,
+    /// The motion with which control would begin, or why it is not known.
+    pub free_motion: Result<&'a Motion, Diagnostic>,
+    /// Whether a length repeats itself.
+    pub is_doubtful: bool,
 }
 
 // Out of line, as is `target` in the controller: jump tables inside `step` are beyond the proof on the machine code.
@@ -65,7 +67,7 @@ pub(super) fn assess(
     let is_waiting = cycle.state == State::Engaging && !is_ready;
     let has_ended = !is_waiting && has_ended(cycle, setpoint, reference);
     let localization = located.map(drop);
-    Findings { localization, start, engagement, tracking, has_ended }
+    Findings { localization, start, engagement, tracking, is_doubtful: evidence.is_doubtful, has_ended }
 }
 
 // In the checks each result is looked at where it is, as copies of many that are in order take time.
@@ -163,8 +165,7 @@ fn check_start(
     check_publishers(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
     check_reports(evidence)?;
     let moving = Diagnostic::from(DiagnosticCode::PlatformMoving);
-    let motion = evidence.free_motion.ok_or(moving)?;
-    reference.place(cycle.constants, motion).map_err(|limit| moving.at(limit as usize))
+    reference.place(cycle.constants, evidence.free_motion?).map_err(|limit| moving.at(limit as usize))
 }
 
 fn check_following_error(

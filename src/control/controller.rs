@@ -158,7 +158,7 @@ impl Controller {
             let rate = leg_rates.rates(&constants.leg_rates, measurement);
             localization.locate(&cycle, measurement, rate)
         });
-        let free_motion = free_motion.update(&cycle, located.as_ref().ok());
+        let free_motion = free_motion.update(&cycle, localization, located.as_ref().ok());
         let mut error = match &mut located {
             Ok(located) if cycle.state.has_control() => {
                 Some(errors.update(&cycle, reference, localization, located))
@@ -179,7 +179,8 @@ impl Controller {
             change: errors.change(),
             reports: &reports,
             is_ready: drives.is_ready,
-            free_motion: free_motion.as_ref(),
+            free_motion: free_motion.as_ref().map_err(|diagnostic| *diagnostic),
+            is_doubtful: errors.is_doubtful(),
         };
         let mut assessed_limits = LimitSet::default();
         let findings = assess(&cycle, &evidence, localization, reference, &mut assessed_limits);

@@ -155,6 +155,8 @@ codes! {
     TwoMeasuredSources = 12, None, BoundDescription::Processes, "two sources of measurements", "end one of them";
     /// Two processes publish setpoints; control does not begin before one of them ends.
     TwoSetpointSources = 13, None, BoundDescription::Processes, "two sources of setpoints", "end one of them";
+    /// The lengths do not show that the platform stands, and the driver sends no rates.
+    RestNotShown = 14, None, absolute("speed of a joint by the lengths", "m/s", "exceeds", "that of a platform that stands,"), "the lengths do not show that the platform stands", "wait until it stands; a start in motion needs measured rates; [measured] length_noise_m says how long the lengths are watched";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
     /// Measurements stopped arriving.

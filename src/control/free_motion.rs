@@ -9,20 +9,19 @@
 //! speed(t) = |v| + d t, at least 0       d = (|v| - |v0|) / (t - t0), along the twist, as all legs come to rest at once
 //! ```
 //!
-//! Until there are two, the motion of a platform that moves is unknown, and control does not begin. Nor does it where brakes take a
+//! Until there are two, the motion of a platform that moves is unknown, and control does not begin. Where the driver sends no rates,
+//! it begins at rest only, which the lengths have to show ([`super::standstill`]). Nor does it begin where brakes take a
 //! large part of the velocity limit within a period: until the force acts, which may be some part of a period late, the platform would
 //! have another velocity than its reference. Such brakes soon have it at rest.
 
 use super::controller::Cycle;
+use super::diagnostic::{Diagnostic, DiagnosticCode};
 use super::input_validation::seconds_between;
 use super::limits::largest_ratio;
-use super::localization::{Located, PlatformState};
+use super::localization::{Localization, Located, PlatformState};
 use super::parameters::{Constants, Parameters};
+use super::standstill::{Standstill, standing_speed};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
-
-/// Speed of a joint at which a platform without force counts as standing, as a ratio of the velocity limit: above the noise
-/// of rates, and below what feedback could not take up at once.
-const STANDING_RATIO: f64 = 1e-3;
 
 /// Largest change of the twist within a period with which control begins, over the limits of velocity: a force that acts a fifth of a
 /// period late makes 2 % of them.
@@ -42,9 +41,13 @@ struct Sample {
 impl Sample {
     fn new(constants: &Constants, Located { measurement, platform, .. }: &Located<'_>) -> Self {
         let PlatformState { pose, twist, .. } = *platform;
-        let speed = twist.linear.norm() + constants.arm * twist.angular.norm();
-        Self { time_ns: measurement.time_ns, pose, twist, speed }
+        Self { time_ns: measurement.time_ns, pose, twist, speed: speed(constants, &twist) }
     }
+}
+
+/// Bound on the speed of a joint \[m/s\].
+fn speed(constants: &Constants, twist: &Twist) -> f64 {
+    twist.linear.norm() + constants.arm * twist.angular.norm()
 }
 
 /// The last measurements without force.
@@ -53,37 +56,72 @@ impl Sample {
 pub(super) struct FreeMotion {
     /// The instant until which the last force was held \[ns\].
     held_until_ns: u64,
+    /// Of the newest measurement \[ns\].
+    newest_ns: Option<u64>,
+    /// The last two, if both have rates.
     before: Option<Sample>,
     last: Option<Sample>,
+    /// All lengths.
+    standstill: Standstill,
 }
 
 impl FreeMotion {
-    /// The motion at the instant at which the force of a cycle that begins without one would begin; `None` if it is unknown.
-    pub fn update(&mut self, cycle: &Cycle<'_>, located: Option<&Located<'_>>) -> Option<Motion> {
+    /// The motion at the instant at which the force of a cycle that begins without one would begin; why control does not begin if it
+    /// is unknown.
+    pub fn update(
+        &mut self,
+        cycle: &Cycle<'_>,
+        localization: &Localization,
+        located: Option<&Located<'_>>,
+    ) -> Result<Motion, Diagnostic> {
         let Cycle { constants, release_ns, state } = *cycle;
         let begin_ns = release_ns.saturating_add(constants.parameters.force_delay_ns);
-        if state.has_control() {
+        // Where the pose is unknown, what came before is another motion.
+        let Some(located) = located.filter(|_| !state.has_control()) else {
             // The force of the cycle before is held until that of this one would begin, at most a period late.
             let held_until_ns = begin_ns.saturating_add(constants.parameters.period_ns);
+            let held_until_ns = if state.has_control() { held_until_ns } else { self.held_until_ns };
             *self = Self { held_until_ns, ..Self::default() };
-            return None;
-        }
-        let new = located.map(|located| Sample::new(constants, located));
-        // Where the pose is unknown, what came before is another motion.
-        let Some(new) = new else {
-            (self.before, self.last) = (None, None);
-            return None;
+            return Err(DiagnosticCode::PlatformMoving.into());
         };
-        let is_new = self.last.is_none_or(|last| last.time_ns < new.time_ns);
-        if is_new && new.time_ns >= self.held_until_ns {
-            (self.before, self.last) = (self.last, Some(new));
+        let measurement = located.measurement;
+        let is_new = self.newest_ns.is_none_or(|newest_ns| measurement.time_ns > newest_ns);
+        if measurement.time_ns >= self.held_until_ns && is_new {
+            self.newest_ns = Some(measurement.time_ns);
+            self.standstill.add(&constants.parameters, measurement);
+            let new = measurement.rate.is_some().then(|| Sample::new(constants, located));
+            (self.before, self.last) = (new.and(self.last), new);
         }
-        self.at(constants, begin_ns)
+        match self.at(constants, begin_ns) {
+            Some(motion) => Ok(motion),
+            None if self.last.is_some() => Err(DiagnosticCode::PlatformMoving.into()),
+            None => self.at_rest(constants, localization, &located.platform.pose),
+        }
+    }
+
+    /// Rest, if the lengths show it.
+    fn at_rest(
+        &self,
+        constants: &Constants,
+        localization: &Localization,
+        pose: &Pose,
+    ) -> Result<Motion, Diagnostic> {
+        let largest = standing_speed(&constants.parameters);
+        let found = self.standstill.latest();
+        let speed = found.map_or(f64::INFINITY, |rates| {
+            let twist = localization.twist_of(constants, &rates.rate.into());
+            twist.map_or(f64::INFINITY, |twist| speed(constants, &twist) + rates.uncertainty)
+        });
+        if self.standstill.rates().is_some() && speed <= largest {
+            let (twist, acceleration) = (Twist::default(), Acceleration::default());
+            return Ok(Motion { pose: *pose, twist, acceleration });
+        }
+        Err(Diagnostic::new(DiagnosticCode::RestNotShown, speed, largest))
     }
 
     fn at(&self, constants: &Constants, instant_ns: u64) -> Option<Motion> {
         let last = self.last?;
-        let standing = STANDING_RATIO * constants.parameters.limits.position.velocity;
+        let standing = standing_speed(&constants.parameters);
         let change = match self.before {
             Some(before) => (last.speed - before.speed) / seconds_between(before.time_ns, last.time_ns),
             None if last.speed <= standing => 0.0,

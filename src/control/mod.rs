@@ -37,6 +37,7 @@ pub mod localization;
 pub mod parameters;
 pub mod reference;
 mod stamp_clock;
+mod standstill;
 pub mod state;
 pub mod supervisor;
 pub mod tracking_error;

@@ -46,6 +46,8 @@ pub struct Findings {
     pub engagement: Result<(), Diagnostic>,
     /// Whether the reference can be followed further. A diagnostic that is no fault ends it by a stop.
     pub tracking: Result<(), Diagnostic>,
+    /// Whether a length repeats itself: a stop under control may then follow a frozen sensor.
+    pub is_doubtful: bool,
     /// The reference of engaging, stopping or parking has come to its end.
     pub has_ended: bool,
 }
@@ -109,6 +111,12 @@ pub fn next(
         {
             return (fault(diagnostic), None);
         }
+        // A payload or an impact that a frozen sensor has made looks like any other.
+        let under_way = (mode.state == State::Stopping).then_some(mode.diagnostic);
+        let change = findings.tracking.err().into_iter().chain(under_way).find(|cause| is_change(cause.code));
+        if let Some(cause) = change.filter(|_| findings.is_doubtful) {
+            return (fault(cause), None);
+        }
     }
     if request == Some(Request::Off) && mode.state != State::Fault {
         return (OFF_BY_REQUEST, None);
@@ -120,6 +128,11 @@ pub fn next(
         State::Stopping => stopping(mode, request, findings),
         State::Parking => parking(mode, request, findings),
     }
+}
+
+/// Whether readings alone have shown it, and its reaction is a stop under control.
+fn is_change(code: DiagnosticCode) -> bool {
+    matches!(code, DiagnosticCode::PayloadChanged | DiagnosticCode::Impact)
 }
 
 /// Off by request of an operator: it does not become standby by itself.
@@ -270,6 +283,7 @@ mod tests {
         start: Ok(()),
         engagement: Ok(()),
         tracking: Ok(()),
+        is_doubtful: false,
         has_ended: false,
     };
 
@@ -325,5 +339,24 @@ mod tests {
             let mode = after(stopping, &Findings { engagement, ..ended });
             assert_eq!((mode.state, mode.diagnostic), (State::Standby, shown));
         }
+    }
+
+    /// A stop under control for a change follows readings; with one that repeats itself the brakes close, at once or during the stop.
+    #[test]
+    fn a_change_that_a_frozen_sensor_may_have_made_closes_the_brakes() {
+        let active = SupervisorState { state: State::Active, ..SupervisorState::default() };
+        for code in [DiagnosticCode::PayloadChanged, DiagnosticCode::Impact, DiagnosticCode::DeadlineMissed] {
+            let brakes = code != DiagnosticCode::DeadlineMissed;
+            let found = Findings { tracking: Err(code.into()), ..IN_ORDER };
+            let expected = |mode: SupervisorState| {
+                let state = if brakes { State::Fault } else { State::Stopping };
+                assert_eq!((mode.state, mode.diagnostic.code), (state, code));
+            };
+            expected(after(active, &Findings { is_doubtful: true, ..found }));
+            let stopping = after(active, &found);
+            assert_eq!(stopping.state, State::Stopping);
+            expected(after(stopping, &Findings { is_doubtful: true, ..IN_ORDER }));
+        }
+        assert_eq!(after(active, &Findings { is_doubtful: true, ..IN_ORDER }).state, State::Active);
     }
 }

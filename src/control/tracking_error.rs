@@ -204,6 +204,11 @@ impl ErrorTracker {
         self.distrust.as_ref()
     }
 
+    /// Whether a length repeats itself: it may be that of a frozen sensor.
+    pub fn is_doubtful(&self) -> bool {
+        self.sensors.repeat()
+    }
+
     /// What has changed on the platform, or that it oscillates.
     pub fn change(&self) -> Option<&Diagnostic> {
         self.change.as_ref()

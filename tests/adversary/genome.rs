@@ -5,6 +5,7 @@ use core::fmt;
 use hexad::control::parameters::ViolationPolicy;
 use hexad::plant::random::Random;
 
+use super::common::observed::Rates;
 use super::machines::MACHINES;
 
 /// More than any run reads; the rest has no effect.
@@ -16,20 +17,54 @@ const DEVIATIONS: [f64; 3] = [0.3, 0.03, 0.003];
 /// Part of the changes that draw a gene anew.
 const REDRAWN: f64 = 0.25;
 
+/// What the sensors send.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensors {
+    /// Lengths and rates.
+    Exact,
+    /// Lengths alone.
+    Lengths,
+    /// Rates in some measurements.
+    Mixed,
+    /// Lengths and rates that freeze: judged by fewer bounds, as the controller cannot know.
+    Frozen,
+}
+
+impl Sensors {
+    pub const ALL: [Self; 4] = [Self::Exact, Self::Lengths, Self::Mixed, Self::Frozen];
+    const NAMES: [(Self, &str); 4] = [
+        (Self::Exact, "exact"),
+        (Self::Lengths, "lengths"),
+        (Self::Mixed, "mixed"),
+        (Self::Frozen, "frozen"),
+    ];
+
+    pub fn rates(self) -> Rates {
+        match self {
+            Self::Exact | Self::Frozen => Rates::Always,
+            Self::Lengths => Rates::Never,
+            Self::Mixed => Rates::Sometimes,
+        }
+    }
+}
+
 /// What a run is made of.
 #[derive(Clone, PartialEq)]
 pub struct Genome {
     /// Index in [`MACHINES`].
     pub machine: usize,
     pub policy: ViolationPolicy,
-    /// Whether the sensors freeze: judged by fewer bounds, as the controller cannot know.
-    pub is_frozen: bool,
+    pub sensors: Sensors,
     pub genes: [u16; GENES],
 }
 
 impl Genome {
-    pub fn random(machine: usize, policy: ViolationPolicy, is_frozen: bool, random: &mut Random) -> Self {
-        Self { machine, policy, is_frozen, genes: core::array::from_fn(|_| draw(random)) }
+    pub fn random(machine: usize, policy: ViolationPolicy, sensors: Sensors, random: &mut Random) -> Self {
+        Self { machine, policy, sensors, genes: core::array::from_fn(|_| draw(random)) }
+    }
+
+    pub fn is_frozen(&self) -> bool {
+        self.sensors == Sensors::Frozen
     }
 
     /// A few genes are other ones.
@@ -65,17 +100,14 @@ impl Genome {
             "limit" => ViolationPolicy::Limit,
             _ => return None,
         };
-        let is_frozen = match words.next()? {
-            "frozen" => true,
-            "exact" => false,
-            _ => return None,
-        };
+        let word = words.next()?;
+        let (sensors, _) = *Sensors::NAMES.iter().find(|(_, name)| *name == word)?;
         let text = words.next().filter(|text| text.len() == 4 * GENES && text.is_ascii())?;
         let mut genes = [0; GENES];
         for (gene, digits) in genes.iter_mut().zip(text.as_bytes().chunks(4)) {
             *gene = u16::from_str_radix(core::str::from_utf8(digits).ok()?, 16).ok()?;
         }
-        Some(Self { machine, policy, is_frozen, genes })
+        Some(Self { machine, policy, sensors, genes })
     }
 }
 
@@ -85,7 +117,8 @@ impl fmt::Display for Genome {
             ViolationPolicy::Stop => "stop",
             ViolationPolicy::Limit => "limit",
         };
-        let sensors = if self.is_frozen { "frozen" } else { "exact" };
+        let sensors =
+            Sensors::NAMES.iter().find(|(sensors, _)| *sensors == self.sensors).map_or("", |(_, name)| name);
         write!(f, "{} {policy} {sensors} ", MACHINES[self.machine])?;
         self.genes.iter().try_for_each(|gene| write!(f, "{gene:04x}"))
     }

@@ -51,13 +51,17 @@ pub fn run_with(
     mut watch: impl FnMut(&Observed, &Input, &Output),
 ) -> Outcome {
     let scenario = Scenario::of(genome);
-    let mut observed = Observed::with(&scenario.config, &scenario.config.machine, scenario.parameters);
+    let mut config = scenario.config.as_ref().clone();
+    let brakes = &mut config.deployment.plant.brake_deceleration_m_s2;
+    *brakes = scenario.brakes_m_s2.unwrap_or(*brakes);
+    let mut observed = Observed::with(&config, &config.machine, scenario.parameters);
     if let Some(doctor) = doctor {
         let (mut machine, mut parameters) = (scenario.config.machine.clone(), scenario.parameters);
         doctor(&mut machine, &mut parameters);
         observed.controller = Controller::new(&machine, parameters);
     }
     observed.phase_ns = scenario.phase_ns;
+    observed.rates = genome.sensors.rates();
     observed.force_delay_ns = scenario.force_delay_ns;
     let mut source = Source { engaged: None, shift: [Vector6::zeros(); 2], is_replaced: false };
     let mut channel = scenario.messages.channel();
@@ -82,7 +86,7 @@ pub fn run_with(
         before = output;
     }
     let mut extremes = observed.meter.extremes;
-    if genome.policy == ViolationPolicy::Limit && !genome.is_frozen {
+    if genome.policy == ViolationPolicy::Limit && !genome.is_frozen() {
         extremes.add(Quantity::Fault, f64::from(faults.count), observed.now_ns);
     }
     Outcome {

@@ -6,6 +6,7 @@ use hexad::config::Config;
 use hexad::control::parameters::{Envelope, Parameters, ViolationPolicy};
 use hexad::control::state::Request;
 
+use super::common::observed::Rates;
 use super::common::rig;
 use super::genome::{Genome, Reader};
 use super::machines::{AUTONOMOUS, LIMIT_FACTORS, RATES_HZ, Variant};
@@ -47,6 +48,8 @@ pub struct Scenario {
     pub retry_s: f64,
     /// Whether control is taken back with `park`.
     pub parks: bool,
+    /// Deceleration by the brakes, if not the default \[m/s^2\].
+    pub brakes_m_s2: Option<f64>,
     /// When the sensors freeze \[s\].
     pub frozen_s: Option<f64>,
 }
@@ -96,7 +99,7 @@ impl Scenario {
         Self {
             retry_s: genes.logarithmic(0.001, 0.1),
             parks: genes.choice(&[false, false, false, true]),
-            frozen_s: genome.is_frozen.then(|| duration_s * genes.within(0.2, 0.9)),
+            frozen_s: genome.is_frozen().then(|| duration_s * genes.within(0.2, 0.9)),
             config,
             parameters,
             duration_s,
@@ -108,6 +111,8 @@ impl Scenario {
             start,
             messages,
             requests,
+            // What brakes have left of a motion is what lengths alone do not tell.
+            brakes_m_s2: (genome.sensors.rates() != Rates::Always).then(|| genes.logarithmic(1.0, 50.0)),
         }
     }
 }

@@ -8,7 +8,7 @@ use hexad::control::parameters::ViolationPolicy;
 use hexad::plant::random::Random;
 
 use super::common::extremes::Quantity;
-use super::genome::Genome;
+use super::genome::{Genome, Sensors};
 use super::machines::MACHINES;
 use super::run::{Doctor, Outcome, run};
 use super::table::Row;
@@ -18,8 +18,9 @@ const KEPT: usize = 4;
 /// Part of the genomes that are drawn anew, and of the others that are crossed.
 const DRAWN: f64 = 0.25;
 const CROSSED: f64 = 0.2;
-/// Part of the runs in which the sensors freeze.
-const FROZEN: f64 = 0.05;
+/// Parts of the runs by what the sensors send; the rest sends lengths and rates.
+const SENSORS: [(Sensors, f64); 3] =
+    [(Sensors::Frozen, 0.05), (Sensors::Lengths, 0.35), (Sensors::Mixed, 0.15)];
 /// Runs of each machine that are all drawn anew.
 const FIRST_RUNS: u64 = 60;
 
@@ -56,9 +57,20 @@ pub fn allowed(genome: &Genome, quantity: Quantity) -> f64 {
         | Quantity::ReferenceAcceleration
         | Quantity::ReferenceJerk
         | Quantity::ReferenceStroke => quantity.allowed(),
-        _ if genome.is_frozen => f64::INFINITY,
+        _ if genome.is_frozen() => f64::INFINITY,
         _ => quantity.allowed(),
     }
+}
+
+/// Sensors by a share of all runs.
+fn drawn(parts: [(Sensors, f64); 3], mut share: f64) -> Sensors {
+    for (sensors, part) in parts {
+        if share < part {
+            return sensors;
+        }
+        share -= part;
+    }
+    Sensors::Exact
 }
 
 impl Search {
@@ -104,7 +116,7 @@ impl Search {
                 pool.truncate(KEPT);
             }
         }
-        if !genome.is_frozen {
+        if !genome.is_frozen() {
             self.row.end_stops += u64::from(outcome.end_stops);
         }
     }
@@ -115,7 +127,7 @@ impl Search {
         let mut random = Random::new(seed ^ self.row.runs << 8 ^ (machine as u64) << 56);
         let [stop, limit] = self.row.cycles;
         let policy = if stop <= limit { ViolationPolicy::Stop } else { ViolationPolicy::Limit };
-        let is_frozen = random.uniform() < FROZEN;
+        let sensors = drawn(SENSORS, random.uniform());
         let pools = &self.pools[policy as usize];
         let quantity = (random.uniform() * Quantity::ALL.len() as f64) as usize;
         let quantity = self.aim.map_or(quantity, |aim| aim as usize);
@@ -124,7 +136,7 @@ impl Search {
             pool.get((random.uniform() * pool.len() as f64) as usize).map(|found| found.genome.clone())
         };
         let Some(parent) = pick(&mut random, &pools[quantity]).filter(|_| !is_drawn) else {
-            return Genome::random(machine, policy, is_frozen, &mut random);
+            return Genome::random(machine, policy, sensors, &mut random);
         };
         let other = (random.uniform() * Quantity::ALL.len() as f64) as usize;
         match pick(&mut random, &pools[other]).filter(|_| random.uniform() < CROSSED) {

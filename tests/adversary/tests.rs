@@ -9,7 +9,7 @@ use hexad::plant::random::Random;
 
 use super::common::certificate::Certificate;
 use super::common::extremes::Extremes;
-use super::genome::Genome;
+use super::genome::{Genome, Sensors};
 use super::machines::MACHINES;
 use super::run::{run, run_with};
 use super::scenario::Scenario;
@@ -109,7 +109,7 @@ fn a_genome_is_written_and_read_back() {
     let mut random = Random::new(7);
     for machine in 0..MACHINES.len() {
         for policy in [ViolationPolicy::Stop, ViolationPolicy::Limit] {
-            let genome = Genome::random(machine, policy, machine % 2 == 0, &mut random);
+            let genome = Genome::random(machine, policy, Sensors::ALL[machine % 4], &mut random);
             let line = format!("{genome} # velocity 1.0");
             assert!(Genome::parse(&line).is_some_and(|read| read == genome), "{line}");
         }
@@ -121,7 +121,7 @@ fn a_genome_is_written_and_read_back() {
 fn a_genome_is_one_run() {
     let mut random = Random::new(11);
     for machine in 0..MACHINES.len() {
-        let genome = Genome::random(machine, ViolationPolicy::Stop, false, &mut random);
+        let genome = Genome::random(machine, ViolationPolicy::Stop, Sensors::ALL[machine % 4], &mut random);
         let (first, second) = (run(&genome, None), run(&genome, None));
         assert_eq!((first.extremes, first.cycles), (second.extremes, second.cycles));
     }

@@ -47,6 +47,9 @@ pub struct HardwareLoop {
     pub has_rates: bool,
     pub now_ns: u64,
     pub period_ns: u64,
+    /// Number of the request for control.
+    asked: u64,
+    had_control: bool,
     force: Option<[f64; LEGS]>,
 }
 
@@ -64,6 +67,8 @@ impl HardwareLoop {
                 imperfections,
             ),
             has_rates: false,
+            asked: 0,
+            had_control: false,
             now_ns: START_NS,
             period_ns: parameters.period_ns,
             force: None,
@@ -76,14 +81,16 @@ impl HardwareLoop {
 
     /// What the controller sees, everything in order.
     pub fn input(&mut self, task: &TaskState) -> Input {
+        // Asks as an operator who waits: until control begins, and not after it has ended.
+        self.had_control |= self.controller.state().has_control();
+        self.asked += u64::from(!self.had_control);
         let (length, rate) = self.hardware.measure();
         let rate = self.has_rates.then_some(rate);
         Input {
             release_ns: self.now_ns + self.period_ns / 2,
             setpoint: Some(Setpoint::motion(self.now_ns, *task)),
             measurement: Some(Measurement { time_ns: self.now_ns, length, rate, ..Measurement::default() }),
-            request: (self.now_ns > START_NS)
-                .then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
+            request: Some(OperatorRequest { request: Request::Engage, message: (1, self.asked) }),
             ..Input::default()
         }
     }

@@ -22,6 +22,28 @@ pub const STEP_S: f64 = 2.5e-3;
 /// More than the gentlest of motions onto a setpoint as near as it must be.
 const LONGEST_ENGAGING_S: f64 = 5.0;
 
+/// Whether the driver sends rates of the legs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rates {
+    Always,
+    Never,
+    /// In some measurements, in others not.
+    Sometimes,
+}
+
+impl Rates {
+    pub const ALL: [Self; 3] = [Self::Always, Self::Never, Self::Sometimes];
+
+    /// Whether a measurement has them.
+    fn are_sent(self, number: u64) -> bool {
+        match self {
+            Self::Always => true,
+            Self::Never => false,
+            Self::Sometimes => [0, 1, 2, 5, 7].contains(&(number % 11)),
+        }
+    }
+}
+
 /// A controller, a platform, and what is measured of it.
 #[derive(Clone)]
 pub struct Observed {
@@ -36,6 +58,7 @@ pub struct Observed {
     /// From the release to the instant at which the force acts.
     pub force_delay_ns: u64,
     pub asked: Option<OperatorRequest>,
+    pub rates: Rates,
     /// On the platform now.
     pub force: Option<[f64; LEGS]>,
 }
@@ -60,6 +83,7 @@ impl Observed {
             phase_ns: parameters.period_ns / 2,
             force_delay_ns: 0,
             asked: None,
+            rates: Rates::Always,
             force: None,
         }
     }
@@ -112,10 +136,11 @@ impl Observed {
 
     pub fn measurement(&self) -> Measurement {
         let legs = self.simulator.leg_motion();
+        let has_rates = self.rates.are_sent((self.now_ns - START_NS) / self.parameters.period_ns);
         Measurement {
             time_ns: self.now_ns,
             length: legs.length,
-            rate: Some(legs.rate),
+            rate: has_rates.then_some(legs.rate),
             ..Measurement::default()
         }
     }

@@ -41,6 +41,7 @@ fn a_setpoint_that_leaves_the_envelope_does_not_take_the_platform_with_it() {
             let duration_s = slower * quickest_s;
             let start = heave.moving(way, duration_s, 0.0);
             let mut observed = Observed::standing(&config, parameters, &start);
+            observed.rates = runs.rates();
             observed.engage(&start);
             let start_s = observed.time_s();
             while observed.time_s() < start_s + duration_s + AFTER_S {

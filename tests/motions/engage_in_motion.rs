@@ -45,6 +45,7 @@ fn can_engage(parameters: &Parameters, task: &TaskState) -> bool {
 
 fn engage_at(config: &Config, parameters: Parameters, motion: Motion<'_>, t: f64, runs: &mut Runs) {
     let mut observed = Observed::standing(config, parameters, &motion(t));
+    observed.rates = runs.rates();
     let (mut was_asked, mut was_accepted) = (false, false);
     while observed.time_s() < BEFORE_S + AFTER_S {
         if !was_asked && observed.time_s() >= BEFORE_S {

@@ -52,6 +52,7 @@ fn frozen_sensors_lead_to_no_acceleration_beyond_the_limits_and_to_a_fault() {
             let turns = (FADE_S / (4.0 * quarter_s)).ceil();
             let frozen_s = (4.0 * turns + phase) * quarter_s;
             let mut observed = Observed::standing(&config, parameters, &sine(0.0));
+            observed.rates = runs.rates();
             observed.engage(&sine(0.0));
             let start_s = observed.time_s();
             let mut frozen: Option<Measurement> = None;

@@ -41,6 +41,7 @@ fn a_source_that_dies_while_accelerating_leads_to_no_motion_beyond_the_limits() 
         let mut runs = Runs::default();
         for share in DIES_AT {
             let mut observed = Observed::standing(&config, parameters, &accelerating(0.0));
+            observed.rates = runs.rates();
             observed.engage(&accelerating(0.0));
             let (start_s, mut dead_s) = (observed.time_s(), 0.0);
             let mut input = observed.input(&accelerating(0.0));

@@ -18,6 +18,7 @@ const DURATION_S: f64 = 5.0;
 
 fn follow_late(config: &Config, motion: &dyn Fn(f64) -> TaskState, age_ns: u64, runs: &mut Runs) {
     let mut observed = Observed::standing(config, parameters(config), &motion(0.0));
+    observed.rates = runs.rates();
     observed.engage(&motion(0.0));
     let start_s = observed.time_s();
     while observed.time_s() < start_s + DURATION_S {

@@ -5,7 +5,7 @@ use hexad::control::state::{Request, State};
 
 use super::common::certificate::cases;
 use super::common::deployed;
-use super::common::observed::Observed;
+use super::common::observed::{Observed, Rates};
 use super::common::rig::parameters;
 use super::heave::{Heave, duration_s};
 use super::report::{Report, Runs};
@@ -27,12 +27,14 @@ fn release_and_park(name: &str, requests: &[Request], runs: &mut Runs) {
     let distance = LONGEST_HEAVE_M.min(heave.range[1] - heave.range[0]);
     let (low, high) = (heave.middle() - 0.5 * distance, heave.middle() + 0.5 * distance);
     let duration_s = duration_s(&parameters, &config.machine, distance);
-    for [from, to] in [[low, high], [high, low]] {
+    let ways = [[low, high], [high, low]].into_iter().flat_map(|way| Rates::ALL.map(|rates| (way, rates)));
+    for ([from, to], rates) in ways {
         let mut begun = Observed::standing(&config, parameters, &heave.moving([from, to], duration_s, 0.0));
+        begun.rates = rates;
         begun.engage(&heave.moving([from, to], duration_s, 0.0));
         let start_s = begun.time_s();
         let all = PHASES.iter().flat_map(|phase| PAUSES_S.map(|pause| (phase, pause)));
-        for (phase, pause_s) in cases(all, 4) {
+        for (phase, pause_s) in cases(all, 7) {
             let mut observed = begun.clone();
             let asked_at = |number: usize| start_s + phase * duration_s + pause_s * number as f64;
             let (mut asked, mut has_begun, mut has_parked) = (0, false, false);

@@ -46,6 +46,7 @@ fn certificate_a_source_replaced_in_motion_leads_to_no_motion_beyond_the_limits(
                 }
                 for (gap, next) in GAPS.iter().flat_map(|gap| PHASES.map(|next| (gap, next))) {
                     let mut observed = followed.clone();
+                    observed.rates = runs.rates();
                     for _ in 0..*gap {
                         observed.cycle(&observed.input_with(Some(last)));
                     }

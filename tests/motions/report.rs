@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::common::extremes::{Extremes, Quantity};
-use super::common::observed::Observed;
+use super::common::observed::{Observed, Rates};
 
 /// What one test has measured.
 pub struct Report {
@@ -29,6 +29,11 @@ pub struct Runs {
 }
 
 impl Runs {
+    /// For the next run: each in turn.
+    pub fn rates(&self) -> Rates {
+        Rates::ALL[self.count as usize % Rates::ALL.len()]
+    }
+
     pub fn add(&mut self, observed: &Observed) {
         let meter = &observed.meter;
         self.count += 1;

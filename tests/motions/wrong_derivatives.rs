@@ -39,6 +39,7 @@ fn certificate_wrong_derivatives_lead_to_no_motion_beyond_the_limits() {
                 TaskState { x: task.x, xd: task.xd * sent_rate, xdd: task.xdd * sent_accel }
             };
             let mut observed = Observed::standing(&config, parameters, &sine(0.0));
+            observed.rates = runs.rates();
             observed.engage(&sine(0.0));
             let start_s = observed.time_s();
             while observed.time_s() < start_s + DURATION_S {

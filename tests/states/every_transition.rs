@@ -90,12 +90,13 @@ fn every(
         let mut count = 0;
         for [localization, tracking] in &courses {
             for [start, engagement] in starts {
-                for has_ended in [false, true] {
+                for (has_ended, is_doubtful) in [(false, false), (true, false), (false, true)] {
                     let found = Findings {
                         localization: *localization,
                         start: *start,
                         engagement: *engagement,
                         tracking: *tracking,
+                        is_doubtful,
                         has_ended,
                     };
                     for request in &requests {
@@ -123,7 +124,7 @@ fn certificate_every_transition_is_the_documented_one() {
     });
     let causes = DiagnosticCode::ALL.len() as u64;
     let courses = if Certificate::is_long() { (causes + 1).pow(2) } else { 2 * causes + 1 + 25 };
-    let rest = 7 * courses * 2 * 3;
+    let rest = 7 * courses * 3 * 3;
     let (all, idle_starts) = (3 * causes * 7, 2 * (causes + 1));
     let every = if Certificate::is_long() { 1 } else { SHORT_MODES as u64 };
     let idle = (2 * 3 * causes).div_ceil(every);

@@ -112,6 +112,11 @@ impl FrozenSensors {
         if is_any_equal { self.check_motion(&legs(), readings, one_leg) } else { Ok(()) }
     }
 
+    /// Whether any length has been the same for so many readings that its sensor may be frozen.
+    pub fn repeat(&self) -> bool {
+        self.equal_readings.iter().any(|equal| *equal + 1 >= MIN_EQUAL_READINGS)
+    }
+
     /// Whether the reference has not moved while readings stayed the same.
     // Out of line, as most sensors have noise: the cycle stays short.
     #[inline(never)]

@@ -85,6 +85,20 @@ const fn drive(name: &'static str, fail: fn(&mut [f64; LEGS], &mut Context<'_>))
 /// What fails, by its name in the table.
 pub type Failure = (&'static str, Part);
 
+/// Lengths that freeze.
+pub const FROZEN: &[Failure] = &[
+    sensor("one", |m, c| freezes::<1>(m, c)),
+    sensor("two", |m, c| freezes::<2>(m, c)),
+    sensor("three", |m, c| freezes::<3>(m, c)),
+    sensor("four", |m, c| freezes::<4>(m, c)),
+    sensor("five", |m, c| freezes::<5>(m, c)),
+    sensor("all six", |m, c| freezes::<6>(m, c)),
+];
+
+fn freezes<const COUNT: usize>(measurement: &mut Measurement, context: &Context<'_>) {
+    measurement.length[..COUNT].copy_from_slice(&context.first.length[..COUNT]);
+}
+
 /// Every failure with its name.
 pub const FAILURES: &[Failure] = &[
     sensor("all lengths frozen, stamps fresh", |m, c| m.length = c.first.length),

@@ -3,12 +3,10 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use super::failures::{FAILURES, Failure};
+use super::failures::Failure;
 use super::{Cell, Situation};
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/hardware_failures.md");
-/// The table begins after the line that contains this.
-const HEAD: &str = "| failure |";
 /// Other processors round otherwise: allowed differences of times and distances, relative and absolute.
 const RELATIVE: f64 = 0.25;
 const TIME_S: f64 = 0.01;
@@ -45,26 +43,33 @@ impl Cell {
 /// A failure, and what became of it in each situation.
 pub type Row<'a> = (&'a Failure, [Cell; Situation::ALL.len()]);
 
-/// Writes the table into the documents.
-pub fn write(rows: &[Row]) {
+/// The document before a table, the table, and what follows. Its first line begins with the head of its first column.
+fn parts<'a>(document: &'a str, head: &str) -> [&'a str; 3] {
+    let (before, rest) = document.split_at(document.find(&format!("| {head} |")).unwrap());
+    let (table, after) = rest.split_at(rest.find("\n\n").map_or(rest.len(), |end| end + 1));
+    [before, table, after]
+}
+
+/// Writes a table into the documents.
+pub fn write(head: &str, rows: &[Row]) {
     let document = fs::read_to_string(FILE).unwrap();
-    let (head, _) = document.split_at(document.find(HEAD).unwrap());
+    let [before, _, after] = parts(&document, head);
     let mut text =
-        format!("{head}{HEAD} at rest | slow | fast | engaging |\n| --- | --- | --- | --- | --- |\n");
+        format!("{before}| {head} | at rest | slow | fast | engaging |\n| --- | --- | --- | --- | --- |\n");
     for ((name, _), cells) in rows {
         let cells: Vec<String> = cells.iter().map(Cell::text).collect();
         writeln!(text, "| {name} | {} |", cells.join(" | ")).unwrap();
     }
-    fs::write(FILE, text).unwrap();
+    fs::write(FILE, text + after).unwrap();
 }
 
 /// Compares these rows with the table of the documents, which has all.
-pub fn check(rows: &[Row]) {
+pub fn check(head: &str, all: &[Failure], rows: &[Row]) {
     let document = fs::read_to_string(FILE).unwrap();
-    let (_, table) = document.split_at(document.find(HEAD).unwrap());
+    let [_, table, _] = parts(&document, head);
     let lines = table.lines().skip(2).map(|line| line.trim_matches('|').split('|').map(str::trim));
     let lines: Vec<Vec<&str>> = lines.map(Iterator::collect).collect();
-    assert!(lines.iter().map(|texts| texts[0]).eq(FAILURES.iter().map(|(name, _)| *name)), "{FILE}: rows");
+    assert!(lines.iter().map(|texts| texts[0]).eq(all.iter().map(|(name, _)| *name)), "{FILE}: rows");
     let mut wrong = String::new();
     for ((name, _), cells) in rows {
         let texts = lines.iter().find(|texts| texts[0] == *name).unwrap();

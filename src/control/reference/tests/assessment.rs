@@ -87,7 +87,8 @@ impl Scene {
             change: self.change.as_ref(),
             reports: &self.reports,
             is_ready: self.is_ready,
-            free_motion: free_motion.as_ref(),
+            free_motion: free_motion.as_ref().ok_or(DiagnosticCode::PlatformMoving.into()),
+            is_doubtful: false,
         };
         let mut reference = ReferenceGenerator::new(&constants);
         let localization = Localization::new(&constants);

@@ -3,8 +3,9 @@
 use super::super::target::at_rest;
 use super::*;
 use crate::control::controller::{Cycle, Measurement};
+use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::free_motion::FreeMotion;
-use crate::control::localization::{Located, PlatformState};
+use crate::control::localization::{Localization, Located, PlatformState};
 use crate::control::state::State;
 use crate::model::rigid::{Motion, Twist};
 
@@ -23,13 +24,14 @@ fn update(
     measured: Option<(u64, f64)>,
 ) -> Option<Motion> {
     let (time_ns, speed) = measured.unwrap_or_default();
-    let measurement = Measurement { time_ns, ..Measurement::default() };
+    let measurement = Measurement { time_ns, rate: Some([0.0; LEGS]), ..Measurement::default() };
     let twist = Twist { linear: Vector3::x() * speed, ..Twist::default() };
     let pose = *constants.home.pose();
     let platform = PlatformState { pose, twist, condition: 2.0, time_to_singularity: f64::INFINITY };
     let located = Located { measurement: &measurement, rate: [0.0; LEGS], platform };
     let cycle = Cycle { constants, release_ns, state };
-    free.update(&cycle, measured.map(|_| &located))
+    let localization = Localization::new(constants);
+    free.update(&cycle, &localization, measured.map(|_| &located)).ok()
 }
 
 #[test]
@@ -99,4 +101,60 @@ fn a_measurement_counts_once_and_only_if_no_force_acted_when_it_was_taken() {
     assert!(update(&mut free, &constants, standby(1), Some((MS, 0.99 * standing))).is_some());
     let mut free = FreeMotion::default();
     assert!(update(&mut free, &constants, standby(1), Some((MS, 1.01 * standing))).is_none());
+}
+
+/// Lengths without rates: what is found after each millisecond of lengths that have moved from home by so much.
+fn by_lengths(away: impl Fn(u64) -> f64, milliseconds: u64) -> Vec<Result<Motion, Diagnostic>> {
+    let constants = constants();
+    let localization = Localization::new(&constants);
+    let home = constants.home.lengths(constants.machine());
+    let mut free = FreeMotion::default();
+    let of = |ms: u64| {
+        let length = home.map(|length| length + away(ms));
+        let measurement = Measurement { time_ns: ms * MS, length, ..Measurement::default() };
+        // The filter of rates says what is of no use.
+        let twist = Twist { linear: Vector3::x(), ..Twist::default() };
+        let pose = *constants.home.pose();
+        let platform = PlatformState { pose, twist, condition: 2.0, time_to_singularity: f64::INFINITY };
+        let located = Located { measurement: &measurement, rate: [0.0; LEGS], platform };
+        let cycle = Cycle { constants: &constants, release_ns: ms * MS, state: State::Standby };
+        free.update(&cycle, &localization, Some(&located))
+    };
+    (1..=milliseconds).map(of).collect()
+}
+
+#[test]
+fn without_rates_control_begins_at_rest_only() {
+    let first = |found: &[Result<Motion, Diagnostic>]| found.iter().position(Result::is_ok);
+    // In whole windows of 45 ms.
+    assert_eq!(first(&by_lengths(|_| 0.0, 200)), Some(45));
+    // Brakes of 10 m/s^2 from 0.3 m/s, at rest after 30 ms.
+    let braking = |ms: u64| {
+        let t = ms.min(30) as f64 * 1e-3;
+        (0.3 - 5.0 * t) * t
+    };
+    assert_eq!(first(&by_lengths(braking, 200)), Some(90));
+    // A motion that is slow, and one that begins once more: seen by the next measurement that is beyond the scatter.
+    let slow = by_lengths(|ms| 5e-6 * ms as f64, 200);
+    assert_eq!(first(&slow), None);
+    let Err(found) = slow[150] else { panic!("it moves") };
+    let standing = 1e-3 * LIMITS.position.velocity;
+    assert_eq!((found.code, found.bound), (DiagnosticCode::RestNotShown, standing));
+    assert!((0.003..0.05).contains(&found.value), "{}", found.value);
+    let again = by_lengths(|ms| if ms < 100 { 0.0 } else { 1e-4 * (ms - 99) as f64 }, 130);
+    assert!(again[98].is_ok() && again[99..].iter().all(Result::is_err));
+}
+
+/// Noise of 2 um, which the machine file does not state.
+#[test]
+fn a_platform_at_rest_with_noise_is_accepted_in_time() {
+    let mut samples = Samples::new(37);
+    let mut normal = || (0..12).map(|_| samples.uniform()).sum::<f64>() - 6.0;
+    let (mut in_time, trials) = (0, 1000);
+    for _ in 0..trials {
+        let noise: Vec<f64> = (0..101).map(|_| 2e-6 * normal()).collect();
+        in_time += u32::from(by_lengths(|ms| noise[ms as usize], 100)[99].is_ok());
+    }
+    println!("{in_time} of {trials} within 100 ms");
+    assert!(f64::from(in_time) >= 0.99 * f64::from(trials), "{in_time}");
 }
