@@ -1,6 +1,6 @@
 //! Requests in step with setpoints, over the topic `command`: in simulated time a request then belongs to an instant.
 //!
-//! Operators use the control socket ([`super::operate`]).
+//! Operators use the control socket ([`crate::operator`]).
 
 use crate::control::state::Request;
 use crate::messages::clock::monotonic_ns;

@@ -15,6 +15,7 @@ use crate::control::controller::Output;
 use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::state::State;
 use crate::messages::Remains;
+use crate::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
 use crate::realtime::stop_request::Hangups;
 
 /// Time between two looks at the progress of the threads: many within the time-out of any watchdog.
@@ -110,6 +111,8 @@ pub struct Supervision<'a> {
     /// What killed participants leave; `None` where it cannot be found.
     remains: Option<Remains>,
     cleaned: Instant,
+    /// Whether it was reported that the shared memory is gone.
+    are_deleted: bool,
 }
 
 impl<'a> Supervision<'a> {
@@ -138,6 +141,7 @@ impl<'a> Supervision<'a> {
                 .inspect_err(|error| warn!("killed participants leave files: {error}"))
                 .ok(),
             cleaned: Instant::now(),
+            are_deleted: false,
         }
     }
 
@@ -161,6 +165,11 @@ impl<'a> Supervision<'a> {
         }
         if let Some(remains) = self.remains.as_mut().filter(|_| self.cleaned.elapsed() >= CLEANING_INTERVAL) {
             remains.remove();
+            let are_deleted = are_segments_deleted();
+            if are_deleted && !self.are_deleted {
+                error!("{SEGMENTS_DELETED}");
+            }
+            self.are_deleted = are_deleted;
             self.cleaned = Instant::now();
         }
     }

@@ -12,7 +12,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::clock::monotonic_ns;
-use super::location::Location;
+use super::location::{Location, SEGMENTS_DELETED};
 use super::reservation::refusal;
 use super::{LeasedSubscriber, Message, Publisher, Subscriber};
 
@@ -41,7 +41,8 @@ pub(super) fn port_error<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) ->
 }
 
 /// Words of iceoryx2 that do not say what to do, and what to do.
-const CURES: [(&str, &str); 6] = [
+const CURES: [(&str, &str); 7] = [
+    ("SystemInFlux", SEGMENTS_DELETED),
     ("ServiceInCorruptedState", OTHER_VERSION),
     ("VersionMismatch", OTHER_VERSION),
     ("ServiceInUnknownState", OTHER_VERSION),

@@ -165,11 +165,26 @@ impl Location {
     /// Why nothing can be created here, in the words of the system; `None` if something can.
     pub(super) fn obstacle(&self) -> Option<String> {
         let root = self.config.global.root_path().to_string();
-        let probe = Path::new(&root).join(format!("probe-{}", std::process::id()));
-        let written = fs::write(&probe, [0; 1]);
-        let _ = fs::remove_file(&probe);
-        written.err().map(|error| format!("{root}: {error}"))
+        let name = format!("{}probe-{}", self.config.global.prefix, std::process::id());
+        [root.as_str(), SEGMENTS].into_iter().find_map(|folder| {
+            let probe = Path::new(folder).join(&name);
+            let written = fs::write(&probe, [0; 1]);
+            let _ = fs::remove_file(&probe);
+            written.err().map(|error| format!("cannot write in {folder}: {error}"))
+        })
     }
+}
+
+/// What has happened to shared memory that was deleted under running participants, and what to do.
+pub const SEGMENTS_DELETED: &str = "the files of the shared memory in /dev/shm were deleted while it was in use: who runs goes on, and nobody can \
+    join. systemd-logind does that when the last session of a user who is no system user ends (RemoveIPC=yes). Stop all participants of this \
+    user, set RemoveIPC=no in /etc/systemd/logind.conf, or run them as a system user, then start them again";
+
+/// Whether this user's shared memory is gone from `/dev/shm`. Meant for participants: while one runs it has some.
+pub fn are_segments_deleted() -> bool {
+    let prefix = fs::read_to_string(user_folder().join(PREFIX_FILE)).unwrap_or_default();
+    let mut entries = fs::read_dir(SEGMENTS).into_iter().flatten().flatten();
+    !prefix.is_empty() && !entries.any(|entry| entry.file_name().to_string_lossy().starts_with(&prefix))
 }
 
 /// Opens the file of the prefix, locked shared, and reads it. The first participant chooses the prefix.

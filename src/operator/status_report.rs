@@ -12,6 +12,9 @@ pub struct StatusReport {
     pub machine: String,
     /// Process of the daemon.
     pub process_id: u32,
+    /// What is wrong with the daemon's surroundings, with the remedy.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// The configuration in force.
     #[serde(default)]
     pub configuration: ConfigurationReport,

@@ -244,6 +244,35 @@ link.sendall(b'{"version": 1, "request": "estop"}\n')
 print(link.makefile().readline())
 "#;
 
+/// As systemd-logind does it when the last session of a user ends.
+#[test]
+fn shared_memory_that_is_deleted_under_a_daemon_is_named_with_the_remedy() {
+    let _turn = turns::beside_others();
+    let Some(host) = host("deleted", "") else { return };
+    let name = host.machine().name.clone();
+    let daemon = host.daemon(OPERATOR, &[], None);
+    let warnings =
+        |status: &Ended| status.stdout.contains("warning: ") && status.stdout.contains("RemoveIPC=no");
+    assert!(!warnings(&host.run(OPERATOR, &[], &["status", &name])));
+    host.does("rm /dev/shm/*");
+    daemon.says("were deleted while it was in use");
+    assert!(warnings(&host.run(OPERATOR, &[], &["status", &name])));
+    let plant = host.run(OPERATOR, &[], &["plant", "/run/test/machine.toml"]);
+    assert!(plant.status.code() == Some(2) && plant.stderr.contains("RemoveIPC=no"), "{}", plant.stderr);
+    // It still stops.
+    says(&host.run(OPERATOR, &[], &["estop", &name]), 0, "fault", "");
+    daemon.stops_on("TERM", HANG);
+}
+
+#[test]
+fn shared_memory_that_may_not_be_written_is_named() {
+    let _turn = turns::beside_others();
+    let Some(host) = host("unwritable", "") else { return };
+    host.does("chmod 755 /dev/shm");
+    let ended = host.run(OPERATOR, &[], &["run", "/run/test/machine.toml"]);
+    says(&ended, 1, "", "cannot write in /dev/shm: Permission denied");
+}
+
 /// Nobody types a name in an emergency.
 #[test]
 fn without_a_name_what_runs_is_stopped() {

@@ -38,6 +38,10 @@ impl fmt::Display for Screen<'_> {
         for k in 0..DIAGNOSTIC_LINES {
             writeln!(f, "{}", lines.lines().nth(k).unwrap_or_default())?;
         }
+        report
+            .warnings
+            .iter()
+            .try_for_each(|warning| write!(f, "{}", paragraph("warning: ", warning, WIDTH)))?;
         timing(f, report)?;
         poses(f, report)?;
         legs(f, report)?;
@@ -199,6 +203,7 @@ pub(in crate::commands) mod tests {
             rejected: None,
         };
         let report = StatusReport {
+            warnings: vec![],
             version: String::new(),
             machine: "m".repeat(20),
             process_id: 4_194_304,

@@ -12,6 +12,7 @@ use crate::control::limits::{Limit, LimitSet};
 use crate::daemon::process_names::{command, sentence};
 use crate::daemon::reload::Loaded;
 use crate::daemon::snapshot::Snapshot;
+use crate::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
 use crate::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
 use crate::model::machine::LEGS;
 use crate::operator::protocol::{AnswerLine, DiagnosticReport, RequestResult, VERSION};
@@ -96,6 +97,7 @@ impl StatusSource {
             version: BUILD.into(),
             machine: name.clone(),
             process_id: process::id(),
+            warnings: are_segments_deleted().then(|| SEGMENTS_DELETED.into()).into_iter().collect(),
             configuration: ConfigurationReport {
                 file: place.clone(),
                 sha1: loaded.sha1.clone(),

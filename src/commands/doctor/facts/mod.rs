@@ -8,7 +8,7 @@ use self::permissions::RefusedRights;
 use self::processors::LoopCpus;
 use super::files::HostFiles;
 use crate::config::deployment::Realtime;
-use crate::messages::location::user_folder;
+use crate::messages::location::{user_folder, user_id};
 use crate::realtime::clock_cost::ClockCost;
 use crate::realtime::setup::permissions::Permissions;
 
@@ -99,6 +99,7 @@ pub fn all(
         ("swap", surroundings::swap(host)),
         ("huge pages", surroundings::huge_pages(host)),
         ("shared memory", surroundings::shared_memory(host, &user_folder())),
+        ("after logout", surroundings::removed_memory(host, user_id())),
     ]);
     facts.into_iter().map(|(name, examined)| named(name, examined)).collect()
 }

@@ -72,6 +72,28 @@ pub fn shared_memory(host: &HostFiles, folder: &Path) -> Examined {
     }
 }
 
+/// Largest user ID of a system user, whose shared memory logind leaves alone.
+const MAX_SYSTEM_USER: u32 = 999;
+
+/// Whether systemd-logind deletes the shared memory of this user when the user's last session ends.
+pub fn removed_memory(host: &HostFiles, user_id: u32) -> Examined {
+    if user_id <= MAX_SYSTEM_USER {
+        return Ok(Fact::good("stays: this is a system user"));
+    }
+    if !host.exists("run/systemd/system") {
+        return Ok(Fact::good("stays: systemd does not run"));
+    }
+    let file = host.text("etc/systemd/logind.conf").unwrap_or_default();
+    let setting = file.lines().rev().find_map(|line| line.trim().strip_prefix("RemoveIPC="));
+    if setting.is_some_and(|value| ["no", "false", "off", "0"].contains(&value.trim())) {
+        return Ok(Fact::good("stays: RemoveIPC=no"));
+    }
+    Ok(Fact::bad(
+        "systemd-logind deletes it when this user's last session ends, also under a running daemon",
+        "RemoveIPC=no in /etc/systemd/logind.conf, then systemctl restart systemd-logind; or run hexad as a system user",
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -122,6 +144,22 @@ mod tests {
             );
         }
         assert_eq!(examined(huge_pages(&host(&[]).files)).assessment, Assessment::Unknown);
+    }
+
+    #[test]
+    fn logind_deletes_the_shared_memory_of_users_who_log_out() {
+        let systemd = ("run/systemd/system", "");
+        let conf = |text: &'static str| ("etc/systemd/logind.conf", text);
+        for (files, user_id, assessment) in [
+            (vec![systemd], 999, Assessment::Good),
+            (vec![], 1000, Assessment::Good),
+            (vec![systemd], 1000, Assessment::Bad),
+            (vec![systemd, conf("[Login]\n#RemoveIPC=no")], 1000, Assessment::Bad),
+            (vec![systemd, conf("[Login]\nRemoveIPC=no")], 1000, Assessment::Good),
+        ] {
+            let fact = examined(removed_memory(&host(&files).files, user_id));
+            assert_eq!(fact.assessment, assessment, "{files:?}, {user_id}");
+        }
     }
 
     #[test]
