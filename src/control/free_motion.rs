@@ -88,13 +88,13 @@ impl FreeMotion {
         let is_new = self.newest_ns.is_none_or(|newest_ns| measurement.time_ns > newest_ns);
         if measurement.time_ns >= self.held_until_ns && is_new {
             self.newest_ns = Some(measurement.time_ns);
-            self.standstill.add(&constants.parameters, measurement);
+            self.standstill.add(constants, measurement);
             let new = measurement.rate.is_some().then(|| Sample::new(constants, located));
             (self.before, self.last) = (new.and(self.last), new);
         }
         match self.at(constants, begin_ns) {
             Some(motion) => Ok(motion),
-            None if self.last.is_some() => Err(DiagnosticCode::PlatformMoving.into()),
+            None if measurement.rate.is_some() => Err(DiagnosticCode::PlatformMoving.into()),
             None => self.at_rest(constants, localization, &located.platform.pose),
         }
     }

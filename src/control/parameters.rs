@@ -7,6 +7,7 @@ use super::estimator::input_matrix::InputMatrix;
 use super::estimator::{EstimatorConstants, FrozenLegBounds, Readings};
 use super::law::Law;
 use super::limits::Limits;
+use super::standstill::window_s;
 use super::supervisor::AfterStop;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
@@ -139,6 +140,8 @@ pub struct Constants {
     pub disturbance_bounds: DisturbanceBounds,
     /// What equal readings of one leg allow.
     pub(super) frozen_leg: FrozenLegBounds,
+    /// Window in which lengths alone show rest \[s\].
+    pub(super) rest_window_s: f64,
     /// Of the estimator of the rates of the legs.
     pub leg_rates: EstimatorConstants,
     /// Largest condition of the reference: below that of the platform, for the following error.
@@ -194,6 +197,7 @@ impl Constants {
                 parameters.limits.position.acceleration
                     + parameters.law.acceleration_left_to_feedback(&parameters.limits, arm, &disturbance),
             ),
+            rest_window_s: window_s(&parameters),
             leg_rates: EstimatorConstants::new(lengths_only, parameters.readings, unbounded, f64::INFINITY),
             parameters,
             home,

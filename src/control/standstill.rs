@@ -17,7 +17,7 @@ use nalgebra::ComplexField as _;
 
 use super::controller::Measurement;
 use super::input_validation::seconds_between;
-use super::parameters::Parameters;
+use super::parameters::{Constants, Parameters};
 use crate::model::machine::LEGS;
 
 /// Shortest window \[s\]. With it 2 um of noise at 1 kHz are 0.02 mm/s, and 10 um 0.12 mm/s.
@@ -123,7 +123,8 @@ pub(super) struct Standstill {
 
 impl Standstill {
     /// Adds a measurement, which is later than those before.
-    pub fn add(&mut self, parameters: &Parameters, measurement: &Measurement) {
+    pub fn add(&mut self, constants: &Constants, measurement: &Measurement) {
+        let parameters = &constants.parameters;
         let Some(window) = &mut self.window else {
             self.window = Some(Window::new(measurement));
             return;
@@ -140,7 +141,7 @@ impl Standstill {
                     + parameters.readings.step
         }) {
             (self.window, self.rates) = (Some(Window::new(measurement)), None);
-        } else if t >= window_s(parameters) {
+        } else if t >= constants.rest_window_s {
             (self.rates, self.window) = (window.rates(), Some(Window::new(measurement)));
         }
     }
