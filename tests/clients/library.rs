@@ -92,7 +92,7 @@ OK
 INVALID no request is 99
 INVALID within_s = -1 s is not between 0 and 86400 s
 INVALID within_s = NaN s is not between 0 and 86400 s
-NO_DAEMON no daemon runs for NAME
+NO_DAEMON no daemon runs for NAME: none listens in /run/hexad or in a folder of a user
 ";
 
 #[test]

@@ -54,5 +54,10 @@ fn the_wheel_works_in_a_clean_environment() {
     let mut program = Command::new(&python);
     program.arg("-I").env_remove("PYTHONPATH").env_remove("LD_LIBRARY_PATH").current_dir(file(""));
     let printed = output(program.args(["-c", &PROGRAM.replace("MACHINE", &name)])).unwrap();
-    assert_eq!(printed, format!("True True\nFalse 0\nNO_DAEMON no daemon runs for {name}: none listens in /run/hexad or in a folder of a user\n"));
+    assert_eq!(
+        printed,
+        format!(
+            "True True\nFalse 0\nNO_DAEMON no daemon runs for {name}: none listens in /run/hexad or in a folder of a user\n"
+        )
+    );
 }
