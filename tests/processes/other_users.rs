@@ -9,6 +9,8 @@ use crate::support::host::{Host, MALLORY, NOGROUP, OPERATOR, SERVICE};
 use crate::support::machine::Machine;
 use crate::support::turns;
 
+/// The machine file there.
+const FILE: &str = "/run/test/machine.toml";
 const STOPPED: &str = "fault: emergency stop";
 
 /// Listens like a daemon of the machines whose names are given, with a record of itself, and answers every line, or none.
@@ -73,7 +75,7 @@ fn another_users_answer_does_not_count() {
             (OPERATOR, "only daemons of the service, of root and of this user count"),
             (0, "Run it as that user"),
         ] {
-            let alone = host.run(user, &[], &[request, &name]);
+            let alone = host.run(user, &[], &[request, FILE]);
             says(&alone, 1, "", words);
             assert!(
                 alone.stderr.contains(&format!("of user {MALLORY} at /tmp/hexad-{MALLORY}/{name}.sock")),
@@ -81,7 +83,7 @@ fn another_users_answer_does_not_count() {
                 alone.stderr
             );
             let daemon = host.daemon(user, &[], None);
-            let beside = host.run(user, &[], &[request, &name]);
+            let beside = host.run(user, &[], &[request, FILE]);
             says(&beside, 0, reached, &format!("the daemon of user {MALLORY} at"));
             if request == "estop" {
                 daemon.says(STOPPED);
@@ -106,7 +108,7 @@ fn the_service_is_stopped_beside_a_practice_daemon() {
     // In the other order the second one refuses to start.
     let practice = host.daemon(OPERATOR, &[], None);
     let service = host.daemon(SERVICE, &[], None);
-    let ended = host.run(OPERATOR, &[], &["estop", &name]);
+    let ended = host.run(OPERATOR, &[], &["estop", FILE]);
     says(
         &ended,
         0,
@@ -117,7 +119,7 @@ fn the_service_is_stopped_beside_a_practice_daemon() {
     practice.says(STOPPED);
     // A service that does not answer is not stopped, whatever the practice daemon says.
     service.hold();
-    let ended = host.run(OPERATOR, &[], &["estop", &name]);
+    let ended = host.run(OPERATOR, &[], &["estop", FILE]);
     says(&ended, 1, "", "cannot be signalled");
     service.signal("CONT");
     service.stops_on("TERM", HANG);
@@ -132,7 +134,7 @@ fn nobody_else_is_signalled() {
     let name = host.machine().name.clone();
     let mut impostor = impostor(&host, "none", &[&name]);
     for request in ["estop", "stop", "off"] {
-        says(&host.run(0, &[], &[request, &name]), 1, "", "it does not answer");
+        says(&host.run(0, &[], &[request, FILE]), 1, "", "it does not answer");
     }
     impostor.must_run();
 }
@@ -141,7 +143,6 @@ fn nobody_else_is_signalled() {
 fn one_lock_whatever_the_environment_and_other_users_have_made() {
     let _turn = turns::beside_others();
     let Some(host) = host("lock", "") else { return };
-    let name = host.machine().name.clone();
     // Another user has taken the names, and gives one back later.
     host.does(&format!(
         "for end in '' -1 -2; do mkdir /tmp/hexad-{OPERATOR}$end; done; chown -R {MALLORY} /tmp/hexad-*"
@@ -161,7 +162,7 @@ fn one_lock_whatever_the_environment_and_other_users_have_made() {
     refused("/run/b");
     host.does(&format!("rmdir /tmp/hexad-{OPERATOR}"));
     refused("/run/a");
-    says(&host.run(OPERATOR, &[], &["estop", &name]), 0, "fault", "");
+    says(&host.run(OPERATOR, &[], &["estop", FILE]), 0, "fault", "");
     daemon.says(STOPPED);
     daemon.stops_on("TERM", HANG);
 }
@@ -171,7 +172,6 @@ fn one_lock_whatever_the_environment_and_other_users_have_made() {
 fn an_operator_in_another_container_reaches_the_daemon() {
     let _turn = turns::beside_others();
     let Some(host) = host("container", "") else { return };
-    let name = host.machine().name.clone();
     let daemon = host.daemon(OPERATOR, &[], None);
     let isolated = |request: &str| {
         let mut command = host.program(0, &[], "unshare");
@@ -187,7 +187,7 @@ fn an_operator_in_another_container_reaches_the_daemon() {
             &user,
             "--clear-groups",
         ]);
-        command.args(["/run/test/hexad", request, &name]);
+        command.args(["/run/test/hexad", request, FILE]);
         host.spawn(request, command).ends_within(HANG)
     };
     let status = isolated("status");
@@ -221,7 +221,7 @@ fn a_reader_sees_the_status_and_sends_nothing() {
     let forbidden = format!("this user may not send requests for {name}");
     says(&host.run(MALLORY, &[], &["status", &name]), 2, "", &forbidden);
     for request in ["estop", "clear"] {
-        says(&host.run(MALLORY, &[NOGROUP], &[request, &name]), 2, "", &forbidden);
+        says(&host.run(MALLORY, &[NOGROUP], &[request, FILE]), 2, "", &forbidden);
     }
     let status = host.run(MALLORY, &[NOGROUP], &["status", &name]);
     assert!(status.stdout.contains("OFF"), "{}", status.stderr);
@@ -260,7 +260,7 @@ fn shared_memory_that_is_deleted_under_a_daemon_is_named_with_the_remedy() {
     let plant = host.run(OPERATOR, &[], &["plant", "/run/test/machine.toml"]);
     assert!(plant.status.code() == Some(2) && plant.stderr.contains("RemoveIPC=no"), "{}", plant.stderr);
     // It still stops.
-    says(&host.run(OPERATOR, &[], &["estop", &name]), 0, "fault", "");
+    says(&host.run(OPERATOR, &[], &["estop", FILE]), 0, "fault", "");
     daemon.stops_on("TERM", HANG);
 }
 
