@@ -204,7 +204,7 @@ impl ErrorTracker {
         self.distrust.as_ref()
     }
 
-    /// Whether a length repeats itself: it may be that of a frozen sensor.
+    /// Whether a length repeats itself: its sensor may be frozen.
     pub fn is_doubtful(&self) -> bool {
         self.sensors.repeat()
     }

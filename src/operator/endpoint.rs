@@ -1,7 +1,7 @@
 //! Where daemons of this host listen, of whatever user, and whether they count.
 //!
-//! Any user can make a folder, a socket and a record that look like a daemon's. What counts is told by descriptors alone: folder and
-//! socket belong to trusted users and nobody else may write there, and the process that listens is a trusted user's.
+//! Any user can make a folder, a socket and a record that look like a daemon's. A daemon is trusted by descriptors alone: trusted users
+//! own folder, socket and listening process, and no other user may write in the folder.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -57,7 +57,7 @@ impl Endpoint {
         })
     }
 
-    /// Whether it is that of the service.
+    /// Whether the service listens here.
     pub fn is_service(&self) -> bool {
         self.socket.starts_with(SYSTEM_FOLDER)
     }

@@ -7,7 +7,7 @@ use super::connection::Connection;
 use super::protocol::{AnswerLine, RequestLine, RequestResult};
 use super::{OperatorError, Order};
 
-/// Time beyond that of the request in which the daemon must have answered.
+/// Time after the timeout of the request within which the daemon must answer.
 const ANSWER_GRACE: Duration = Duration::from_secs(2);
 
 impl Order {
