@@ -35,7 +35,7 @@ impl Rates {
     pub const ALL: [Self; 3] = [Self::Always, Self::Never, Self::Sometimes];
 
     /// Whether a measurement has them.
-    fn are_sent(self, number: u64) -> bool {
+    pub fn are_sent(self, number: u64) -> bool {
         match self {
             Self::Always => true,
             Self::Never => false,

@@ -2,12 +2,14 @@
 
 use hexad::control::diagnostic::DiagnosticCode::{
     self, EmergencyStop, FeedbackSaturated, FollowingError, MeasurementImplausible, OperatorRequest,
-    ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointTooFar, VelocityError,
+    RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointTooFar,
+    VelocityError,
 };
 use hexad::control::law::ControlMode;
 use hexad::control::parameters::ViolationPolicy;
 use hexad::control::state::State;
 
+use super::common::observed::Rates;
 use super::disturbances::Disturbance;
 use super::situations::Situation;
 
@@ -52,6 +54,9 @@ impl Cell {
         }
     }
 }
+
+/// Nothing after a request to switch off.
+pub const OFF_TO_THE_END: Cell = Full(&[(State::Off, OperatorRequest)]);
 
 /// What the platform may feel: shares of the limits of acceleration and jerk, and seconds until it stands.
 #[derive(Clone, Copy, Debug)]
@@ -159,9 +164,7 @@ pub fn in_mode(
             (wider(1.5, 1.8), cell)
         }
         ("daemon held for 5 ms", Stopping) if mode.acts_on_legs() && !is_pd => (wider(1.02, 1.46), cell),
-        ("off, and engage 3 ms later", Engaging | InMotion | Stopping) if is_pd => {
-            (bounds, Full(&[(State::Off, OperatorRequest)]))
-        }
+        ("off, and engage 3 ms later", Engaging | InMotion | Stopping) if is_pd => (bounds, OFF_TO_THE_END),
         ("off, and park 10 ms later" | "estop, then clear, and park 10 ms later", InMotion | Stopping)
             if is_gravity =>
         {
@@ -234,4 +237,44 @@ fn cause_in_mode(mode: ControlMode, name: &str, situation: Situation) -> Option<
         _ => return None,
     };
     Some(cell)
+}
+
+/// The cell of a driver that does not send rates, or not always: what is wrong with rates passes unseen, or is seen later; lengths
+/// show the rest; and control does not begin anew in motion.
+pub fn with_rates(
+    rates: Rates,
+    name: &str,
+    situation: Situation,
+    bounds: Bounds,
+    cell: Cell,
+) -> (Bounds, Cell) {
+    use Situation::{AtRest, Engaging, Fault, InMotion, Parking, Standby, Stopping};
+    let (is_always, is_never) = (rates == Rates::Always, rates == Rates::Never);
+    match (name, situation, cell) {
+        _ if is_always => (bounds, cell),
+        ("rates infinite", ..) | ("rates zero", Parking, _) => (LONG, On),
+        ("rates of the wrong sign" | "rates in mm/s" | "rates zero", _, Brake(RateJumped)) => {
+            if is_never {
+                (LONG, On)
+            } else {
+                (bounds, Brake(VelocityError))
+            }
+        }
+        (_, _, Brake(RateJumped | RateInconsistent)) => (bounds, Brake(MeasurementImplausible)),
+        (_, Standby | Fault, _) => (bounds, cell),
+        // With rates in some measurements, one of those may come just in time.
+        ("off, and engage 3 ms later", InMotion, _) => (bounds, OFF_TO_THE_END),
+        ("off, and engage 3 ms later", ..) if is_never => (bounds, OFF_TO_THE_END),
+        ("off, and park 10 ms later" | "estop, then clear, and park 10 ms later", AtRest, _) if !is_never => {
+            (bounds, cell)
+        }
+        ("off, and park 10 ms later", ..) => (bounds, OFF_TO_THE_END),
+        ("estop, then clear, and park 10 ms later", Engaging | AtRest, _) => {
+            (bounds, Full(&[(State::Fault, EmergencyStop), (State::Standby, ReadyToEngage)]))
+        }
+        ("estop, then clear, and park 10 ms later", InMotion | Stopping | Parking, _) => {
+            (bounds, Full(&[(State::Fault, EmergencyStop), (State::Standby, SetpointTooFar)]))
+        }
+        _ => (bounds, cell),
+    }
 }

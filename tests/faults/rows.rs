@@ -14,8 +14,8 @@ use hexad::control::state::State;
 use super::cells::Cell::{self, Brake, End, Full, Idle, On, Path, Stop};
 use super::cells::{
     ACCELERATED, AT_FORCE_LIMIT, Bounds, ENDLESS, EVERYWHERE, FULL_STOP, GENTLE, LATE, LATE_STOP, LOAD,
-    LOADED, LONG, MISSED, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED, Row, SHAKEN, STRUCK,
-    SWITCHED_OFF, TOO_FAR, UNSEEN, unusable_measurement, unusable_setpoint, wrong_in_motion,
+    LOADED, LONG, MISSED, OFF_TO_THE_END, OUT_OF_THE_BRAKES, PARKED_OUT_OF_THE_BRAKES, PARKS, PULLED, Row,
+    SHAKEN, STRUCK, SWITCHED_OFF, TOO_FAR, UNSEEN, unusable_measurement, unusable_setpoint, wrong_in_motion,
 };
 use super::disturbances::{host, machine, measurements, operator, reports, setpoints, together};
 use super::sequences;
@@ -23,7 +23,6 @@ use super::sequences;
 /// Engaged, without a fault, and never on the setpoint.
 const NEVER_ACTIVE: Cell = Path(&[]);
 const ENGAGES: Cell = Full(&[(State::Engaging, DiagnosticCode::None), (State::Active, DiagnosticCode::None)]);
-const OFF_TO_THE_END: Cell = Full(&[(State::Off, OperatorRequest)]);
 const PARKS_AGAIN: Cell = Full(&[
     (State::Stopping, OperatorRequest),
     (State::Parking, OperatorRequest),

@@ -12,6 +12,7 @@ use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;
+use super::common::observed::Rates;
 use super::common::rig::{Rig, parameters};
 use super::world::{Source, World};
 
@@ -61,7 +62,7 @@ impl Situation {
     }
 
     /// A machine for a person, in this situation.
-    pub fn world(self, mode: ControlMode, policy: ViolationPolicy) -> World {
+    pub fn world(self, mode: ControlMode, policy: ViolationPolicy, rates: Rates) -> World {
         let (mut config, _) = machine(mode);
         config.deployment.setpoint.on_violation = policy;
         if self == Self::Engaging {
@@ -71,11 +72,12 @@ impl Situation {
         let mut rig = Rig::new(&config, &config.machine);
         rig.controller = Controller::new(&config.machine, parameters);
         let mut world = World::new(rig, &config.machine, parameters);
+        world.rates = rates;
+        // Without rates, rest is shown by lengths over a while.
+        world.run(50);
         let mut home = TaskState::at_rest(config.machine.home);
         match self {
-            Self::Standby => {
-                world.run(50);
-            }
+            Self::Standby => {}
             Self::Engaging => {
                 home.x[5] += 0.75 * parameters.engage_position;
                 world.source = Source::Still(home);

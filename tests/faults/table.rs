@@ -13,8 +13,9 @@ use hexad::control::state::State;
 use hexad::plant::simulator::Brakes;
 use rayon::prelude::*;
 
-use super::cells::{Bounds, Cell, LONG, Row, in_mode};
+use super::cells::{Bounds, Cell, LONG, Row, in_mode, with_rates};
 use super::common::certificate;
+use super::common::observed::Rates;
 use super::disturbances::{Disturbance, Moment};
 use super::recording::Peaks;
 use super::rows::{ROWS, ROWS_UNDER_LIMIT};
@@ -36,22 +37,26 @@ struct Outcome {
     world: World,
 }
 
-fn run(
-    policy: ViolationPolicy,
-    mode: ControlMode,
-    situation: Situation,
-    disturbance: Disturbance,
-) -> Outcome {
-    static WORLDS: LazyLock<Vec<Vec<World>>> = LazyLock::new(|| {
-        let of = |(policy, mode)| {
+/// A machine of the table: its policy, mode, and driver.
+type Variant = (ViolationPolicy, ControlMode, Rates);
+
+/// Every mode with rates, and one without them or with some.
+fn variants() -> impl Iterator<Item = Variant> {
+    let without = [Rates::Never, Rates::Sometimes].map(|rates| (ControlMode::default(), rates));
+    let each = ControlMode::ALL.map(|mode| (mode, Rates::Always)).into_iter().chain(without);
+    POLICIES.into_iter().flat_map(move |policy| each.clone().map(move |(mode, rates)| (policy, mode, rates)))
+}
+
+fn run(variant: Variant, situation: Situation, disturbance: Disturbance) -> Outcome {
+    static WORLDS: LazyLock<Vec<(Variant, Vec<World>)>> = LazyLock::new(|| {
+        let of = |variant @ (policy, mode, rates)| {
             // One by one: all together are too many for the stack of a thread.
-            Situation::ALL.iter().map(|situation| situation.world(mode, policy)).collect()
+            (variant, Situation::ALL.iter().map(|situation| situation.world(mode, policy, rates)).collect())
         };
-        let modes = |policy| ControlMode::ALL.into_iter().map(move |mode| (policy, mode));
-        POLICIES.into_iter().flat_map(modes).map(of).collect()
+        variants().map(of).collect()
     });
-    let machine = policy as usize * ControlMode::ALL.len() + mode as usize;
-    let mut world = WORLDS[machine][situation as usize].clone();
+    let (_, worlds) = WORLDS.iter().find(|(found, _)| *found == variant).unwrap();
+    let mut world = worlds[situation as usize].clone();
     let before = world.last;
     for cycle in 0..CYCLES {
         world.cycle(|world, input| disturbance(&mut Moment { world, input, before, cycle }));
@@ -136,18 +141,14 @@ fn complaints(cell: Cell, bounds: &Bounds, situation: Situation, outcome: &Outco
     wrong
 }
 
-/// A row of the table of a policy, in a mode.
-type Case = (ViolationPolicy, ControlMode, &'static Row, Situation);
+/// A row of the table on a machine.
+type Case = (Variant, &'static Row, Situation);
 
 fn cases() -> Vec<Case> {
-    let tables = [(ViolationPolicy::Stop, ROWS), (ViolationPolicy::Limit, ROWS_UNDER_LIMIT)];
     let mut cases = vec![];
-    for (policy, rows) in tables {
-        for (mode, row) in
-            ControlMode::ALL.into_iter().flat_map(|mode| rows.iter().map(move |row| (mode, row)))
-        {
-            cases.extend(Situation::ALL.map(|situation| (policy, mode, row, situation)));
-        }
+    for variant @ (policy, ..) in variants() {
+        let rows = if policy == ViolationPolicy::Stop { ROWS } else { ROWS_UNDER_LIMIT };
+        cases.extend(rows.iter().flat_map(|row| Situation::ALL.map(|situation| (variant, row, situation))));
     }
     cases
 }
@@ -159,17 +160,20 @@ fn certificate_every_fault_in_every_state_does_what_the_table_says() {
     let cells = certificate::cases(cells, 4);
     let lines: Vec<_> = cells
         .par_iter()
-        .map(|(policy, mode, (name, disturbance, bounds, expected), situation)| {
-            let outcome = run(*policy, *mode, *situation, *disturbance);
-            let (bounds, cell) =
-                in_mode(*policy, *mode, name, *situation, *bounds, expected[*situation as usize]);
+        .map(|(variant @ (policy, mode, rates), (name, disturbance, bounds, expected), situation)| {
+            let outcome = run(*variant, *situation, *disturbance);
+            let expected = expected[*situation as usize];
+            let (bounds, cell) = in_mode(*policy, *mode, name, *situation, *bounds, expected);
+            let (bounds, cell) = with_rates(*rates, name, *situation, bounds, cell);
             let wrong = complaints(cell, &bounds, *situation, &outcome);
             let wrong: String = wrong
                 .iter()
                 .take(5)
-                .map(|what| format!("\n  {policy:?}, {}, {name}, {situation:?}: {what}", mode.name()))
+                .map(|what| {
+                    format!("\n  {policy:?}, {}, rates {rates:?}, {name}, {situation:?}: {what}", mode.name())
+                })
                 .collect();
-            (csv_line(*policy, *mode, name, *situation, &outcome), wrong)
+            (csv_line(variant, name, *situation, &outcome), wrong)
         })
         .collect();
     if let Some(path) = std::env::var_os("HEXAD_FAULT_TABLE") {
@@ -180,22 +184,16 @@ fn certificate_every_fault_in_every_state_does_what_the_table_says() {
     assert!(wrong.is_empty(), "{wrong}");
 }
 
-const CSV_HEADER: &str = "on_violation,mode,fault,state,then,force_share,force_rate_share,acceleration_share,\
+const CSV_HEADER: &str = "on_violation,mode,rates,fault,state,then,force_share,force_rate_share,acceleration_share,\
     jerk_share,at_rest_s\n";
 
-fn csv_line(
-    policy: ViolationPolicy,
-    mode: ControlMode,
-    name: &str,
-    situation: Situation,
-    outcome: &Outcome,
-) -> String {
+fn csv_line((policy, mode, rates): &Variant, name: &str, situation: Situation, outcome: &Outcome) -> String {
     let then: Vec<_> =
         outcome.changes.iter().map(|(state, cause)| format!("{} ({})", state.name(), cause.name())).collect();
     let then = if then.is_empty() { "goes on".into() } else { then.join(" > ") };
     let Peaks { force, force_rate, acceleration, jerk, .. } = outcome.peaks;
-    let policy = if policy == ViolationPolicy::Stop { "stop" } else { "limit" };
-    let mut line = format!("{policy},{},\"{name}\",{situation:?},\"{then}\"", mode.name());
+    let policy = if *policy == ViolationPolicy::Stop { "stop" } else { "limit" };
+    let mut line = format!("{policy},{},{rates:?},\"{name}\",{situation:?},\"{then}\"", mode.name());
     for share in [force, force_rate, acceleration, jerk] {
         write!(line, ",{share:.3}").unwrap();
     }

@@ -14,6 +14,7 @@ use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::simulator::Simulator;
 use nalgebra::Vector6;
 
+use super::common::observed::Rates;
 use super::common::rig::Rig;
 use super::recording::{Recording, Sample};
 
@@ -53,9 +54,10 @@ pub struct World {
     pub rig: Rig,
     pub source: Source,
     pub grip: Grip,
+    pub rates: Rates,
     pub machine: Machine,
     pub parameters: Parameters,
-    /// What the controller got last.
+    /// What the controller got last, with rates in any case.
     pub last: Input,
     pub recording: Recording,
     dynamics: ForwardDynamics,
@@ -68,6 +70,7 @@ impl World {
             rig,
             source: Source::Still(TaskState::at_rest(machine.home)),
             grip: Grip::Free,
+            rates: Rates::Always,
             machine: machine.clone(),
             parameters,
             last: Input::default(),
@@ -108,8 +111,12 @@ impl World {
             self.rig.pass(self.rig.force.filter(|_| is_driven));
             return Output::default();
         }
-        let output = self.rig.controller.step(&input);
         self.last = input;
+        let has_none = |measurement: &&mut Measurement| {
+            !self.rates.are_sent(measurement.time_ns / self.parameters.period_ns)
+        };
+        input.measurement.iter_mut().filter(has_none).for_each(|measurement| measurement.rate = None);
+        let output = self.rig.controller.step(&input);
         let force = output.state.has_control().then_some(output.force);
         let applied = self.applied(force);
         self.rig.pass(applied);

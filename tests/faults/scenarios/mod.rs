@@ -4,6 +4,7 @@
 //! With `HEXAD_CHARTS=FOLDER` each is drawn into a picture.
 
 use super::cells::{Bounds, GENTLE};
+use super::common::observed::Rates;
 use super::common::rig::{Rig, parameters};
 use super::pictures::{Picture, draw};
 use super::recording::Peaks;
@@ -136,7 +137,7 @@ fn twice(between: &Path) -> Vec<(State, DiagnosticCode)> {
 fn situations_are_what_they_say() {
     for mode in ControlMode::ALL {
         for situation in Situation::ALL {
-            let mut world = situation.world(mode, ViolationPolicy::default());
+            let mut world = situation.world(mode, ViolationPolicy::default(), Rates::Always);
             let output = world.cycle(|_, _| {});
             assert_eq!(output.state, situation.state());
             assert_eq!(output.force != [0.0; 6], situation.state().has_control());
