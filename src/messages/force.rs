@@ -112,6 +112,11 @@ mod tests {
         }
         message.force_n[3] = 1.0;
         assert!(!message.may_be_applied(1_000, 20), "the checksum is that of other forces");
+        for (force_n, may_be_applied) in [(1.0, true), (f64::NAN, false), (f64::INFINITY, false)] {
+            message.force_n[3] = force_n;
+            message.checksum = message.computed_checksum();
+            assert_eq!(message.may_be_applied(1_000, 20), may_be_applied, "{force_n} N");
+        }
     }
 
     #[test]

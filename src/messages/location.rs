@@ -307,4 +307,20 @@ mod tests {
             assert!(make_own(&path, USER_FOLDER).is_err(), "{}", path.display());
         }
     }
+
+    #[test]
+    fn a_folder_of_another_user_is_refused() {
+        let parent = TempDir::new().unwrap();
+        let foreign = if user_id() == 0 {
+            let folder = parent.path().join("foreign");
+            make_own(&folder, USER_FOLDER).unwrap();
+            std::os::unix::fs::chown(&folder, Some(1), None).unwrap();
+            folder
+        } else {
+            // Root's, and only root may write in it.
+            "/usr".into()
+        };
+        assert_eq!(metadata(&foreign).unwrap().mode() & OTHERS_WRITE, 0);
+        assert!(make_own(&foreign, USER_FOLDER).is_err());
+    }
 }

@@ -100,4 +100,13 @@ mod tests {
             assert_eq!(Measurement::from(&message), measurement);
         }
     }
+
+    #[test]
+    fn a_pose_and_rates_count_only_where_their_mark_is_one() {
+        for mark in [0, 2, u32::MAX] {
+            let message = MeasuredMessage { rates_valid: mark, pose_valid: mark, ..Default::default() };
+            let found = Measurement::from(&message);
+            assert_eq!((found.rate, found.pose), (None, None), "{mark}");
+        }
+    }
 }

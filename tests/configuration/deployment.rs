@@ -1,7 +1,9 @@
 //! Deployment: bounds, and what follows from the rate.
 
+use hexad::config::control_loops::longest_age_s;
 use hexad::config::deployment::{Deployment, FidelityChoice};
 use hexad::config::{Config, Violation};
+use hexad::control::estimator::SENT_ACCELERATIONS;
 use hexad::model::fidelity::Fidelity;
 
 use super::{FRIED, violations};
@@ -277,4 +279,15 @@ fn defaults_fit_the_rate() {
         assert_eq!(timeouts.measured_s, measured_s);
         assert_eq!(control.position_bandwidth_hz == 10.0, rate_hz > 300);
     }
+}
+
+/// A slow loop at a high rate stands an age of many periods; the estimator knows only so many of the accelerations sent since.
+#[test]
+fn measurements_are_no_older_than_what_the_estimator_remembers() {
+    let bandwidths = "[control]\nposition_bandwidth_hz = 5.0\norientation_bandwidth_hz = 5.0\n";
+    let text = format!("{FRIED}[realtime]\nrate_hz = 20_000\n{bandwidths}[timeouts]\nmeasured_ms = 10.0\n");
+    let Config { deployment, .. } = Config::parse(&text, "a test").expect("a valid file");
+    let oldest_s = longest_age_s(&deployment) + deployment.drive.total_delay_s();
+    let remembered_s = (SENT_ACCELERATIONS - 1) as f64 * deployment.realtime.period_s();
+    assert!((oldest_s - remembered_s).abs() < 1e-12, "{oldest_s} s of {remembered_s} s");
 }

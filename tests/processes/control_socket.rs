@@ -6,6 +6,7 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 
+use crate::common::certificate::Certificate;
 use crate::common::not_run::lacking;
 use crate::support::children::{Ended, HANG, Hexad, run};
 use crate::support::disturbance::{line_of, python};
@@ -198,33 +199,57 @@ fn status_shows_what_the_daemon_knows() {
     trio.finish();
 }
 
-/// Lines with more files than the daemon receives; path of the socket.
-const FILES_WITH_LINES: &str = r#"
+/// Path of the socket, and number of connections, which nobody honest would make: lines with more files than the daemon receives,
+/// lines that do not end, are too long, no text, or unknown, answers that nobody reads, and none of all that.
+const HOSTILE: &str = r#"
 import array, socket, sys
-line = b'{"version": 1, "request": "status"}\n'
-files = [0] * 60
-for _ in range(300):
+status = b'{"version": 1, "request": "status"}\n'
+files = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [0] * 60))]
+lines = [status, b'{"version": 1, "requ', b"x" * 5000, b"\xff\n", b'{"version": 1, "request": "x"}\n', status * 40, b""]
+for k in range(int(sys.argv[2])):
     link = socket.socket(socket.AF_UNIX)
     link.connect(sys.argv[1])
-    link.sendmsg([line], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", files))])
-    assert b'"done"' in link.makefile("rb").readline()
+    try:
+        link.sendmsg([lines[k % 7]], files if k // 7 % 2 else [])
+        if k // 14 % 3 == 0:
+            link.settimeout(0.01)
+            link.recv(100)
+    except OSError:
+        pass
 print("sent")
 "#;
 
 #[test]
-fn files_that_come_with_lines_do_not_stay_open() {
+fn certificate_hostile_connections_leave_nothing() {
     let _turn = turns::beside_others();
+    let certificate = Certificate::new("hostile connections", 1_000, 100_000);
     let machine = Machine::patient("files");
     let daemon = start_daemon(&machine);
-    let open = || fs::read_dir(format!("/proc/{}/fd", daemon.id())).expect("its files").count();
-    let before = open();
-    let mut sender = python(&["/usr/bin/env"], FILES_WITH_LINES, &path_of(&daemon));
-    assert_eq!(line_of(&mut BufReader::new(sender.stdout.take().expect("a pipe"))), "sent");
-    sender.wait().expect("its end");
-    does(&machine, "estop", &[], &["fault"]);
-    let after = open();
-    assert!(after < before + 10, "{before} files before, {after} after");
+    let hostile = |count: u64| {
+        let mut sender =
+            python(&["/usr/bin/env"], HOSTILE, &[path_of(&daemon).as_ref(), count.to_string().as_ref()]);
+        assert_eq!(line_of(&mut BufReader::new(sender.stdout.take().expect("a pipe"))), "sent");
+        assert!(sender.wait().expect("its end").success());
+        does(&machine, "estop", &[], &["fault"]);
+        certificate.advance(count);
+    };
+    // The most that are open at once, and their buffers.
+    hostile(certificate.total() / 10);
+    let before @ [files, threads, kilobytes] = resources(daemon.id());
+    hostile(certificate.total() * 9 / 10);
+    let after = resources(daemon.id());
+    assert!(after[0] <= files && after[1] == threads && after[2] <= kilobytes + 256, "{before:?}, {after:?}");
     daemon.stops_on("TERM", HANG);
+    certificate.finish(format!("files, threads, kB: {before:?} before, {after:?} after"));
+}
+
+/// Open files, threads, and memory of a process \[kB\].
+fn resources(process_id: u32) -> [usize; 3] {
+    let of = |folder: &str| fs::read_dir(format!("/proc/{process_id}/{folder}")).expect("its files").count();
+    let status = fs::read_to_string(format!("/proc/{process_id}/status")).expect("its status");
+    let memory = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("its memory");
+    let kilobytes = memory.split_whitespace().next().and_then(|number| number.parse().ok());
+    [of("fd"), of("task"), kilobytes.expect("a number")]
 }
 
 #[test]

@@ -177,4 +177,26 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_request_of_the_topic_from_before_the_word_does_not_begin_control() {
+        let bus = Bus::join(&format!("overtaken-requests-{}", std::process::id())).unwrap();
+        let mut inputs = Inputs::open(&bus, TimeoutsNs { setpoint_ns: 1, measured_ns: 1 }).unwrap();
+        let mut commands = bus.publisher::<CommandMessage>().unwrap();
+        for (word, request) in (1..).zip(Request::ALL) {
+            for (later_ns, is_overtaken) in [(0, false), (1, true)] {
+                let sent_ns = monotonic_ns();
+                let message = commands.next_message();
+                commands.publish(sent_ns, request.into()).unwrap();
+                let word = 2 * word + later_ns;
+                let word_ns = sent_ns + later_ns;
+                let filter =
+                    InputFilter { has_control: false, answered: (0, 0), is_ending: false, word, word_ns };
+                inputs.receive_requests(|| sent_ns, filter);
+                let is_accepted = !(is_overtaken && request.can_begin_control());
+                let expected = is_accepted.then_some(OperatorRequest { request, message });
+                assert_eq!(inputs.input().request, expected, "{request:?}, the word {later_ns} ns later");
+            }
+        }
+    }
 }

@@ -108,3 +108,28 @@ impl<'q, 'o> Handover<'q, 'o> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    #[test]
+    fn an_offer_is_taken_while_it_is_fresh() {
+        let config = Config::parse(include_str!("../../../config/fried2008.toml"), "a test").unwrap();
+        let loaded = Arc::new(Loaded::new(config));
+        let mut controller = loaded.controller.clone();
+        let timeouts = MessageTimeouts::new(loaded.timeouts());
+        let expected = [(MAX_REQUEST_AGE_NS, Answer::Taken(1)), (MAX_REQUEST_AGE_NS + 1, Answer::TooOld)];
+        for (age_ns, answer) in expected {
+            let mut offer = Offer::new(loaded.clone());
+            offer.offered_ns = 1_000;
+            let (mut offers, mut answers) = (OfferQueue::new(), OfferQueue::new());
+            let ((mut offered, offers), (answers, mut answered)) = (offers.split(), answers.split());
+            assert!(offered.enqueue(&mut offer).is_ok());
+            Handover::new(offers, answers, &timeouts).begin_cycle(&mut controller, 1_000 + age_ns);
+            let found = answered.dequeue().map(|offer| offer.answer);
+            assert_eq!(found, Some(answer), "{age_ns} ns after the offer");
+        }
+    }
+}

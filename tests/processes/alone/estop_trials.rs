@@ -38,12 +38,19 @@ use crate::support::witness::Witness;
 
 /// Trials in each situation, and the number of situations.
 const TRIALS: u64 = STATES.len() as u64;
-const LONG_TRIALS: u64 = 143;
-const SITUATIONS: u64 = 7;
+const LONG_TRIALS: u64 = 1001;
+const SITUATIONS: u64 = 9;
 
 /// Situations with one daemon, one after the other.
-const BESIDE_ROOT: [Situation; 5] =
-    [Situation::Quiet, Situation::Slots, Situation::Messages, Situation::Connections, Situation::Outsiders];
+const BESIDE_ROOT: [Situation; 7] = [
+    Situation::Quiet,
+    Situation::Slots,
+    Situation::Messages,
+    Situation::Connections,
+    Situation::Outsiders,
+    Situation::Files,
+    Situation::Together,
+];
 
 /// Valid forces after sending: of two periods.
 const MAX_CYCLES: u64 = 2;
@@ -171,23 +178,24 @@ type Tally = BTreeMap<String, BTreeMap<u64, usize>>;
 struct Stand {
     controlled: Controlled,
     recorder: Recorder,
-    button: Button,
+    user: &'static [&'static str],
     random: Random,
 }
 
 impl Stand {
-    fn new(user: &[&str], group: &str, seed: u64) -> Self {
+    fn new(user: &'static [&'static str], group: &str, seed: u64) -> Self {
         let machine = Machine::with("trials", &format!("{LIMITS}{PATIENT}{group}"));
         let recorder = Recorder::start(&machine.name);
         let daemon = start_daemon(&machine);
-        let button = Button::connect(user, &path_of(&daemon));
         let controlled = Controlled::with(machine, daemon);
-        Self { controlled, recorder, button, random: Random::new(seed) }
+        Self { controlled, recorder, user, random: Random::new(seed) }
     }
 
     fn run(&mut self, witness: &Witness, situation: Situation, trials: u64, advance: impl Fn()) -> Outcome {
-        let Self { controlled, recorder, button, random } = self;
+        let Self { controlled, recorder, user, random } = self;
         let socket = path_of(&controlled.daemon);
+        let at_once = if situation == Situation::Together { 32 } else { 1 };
+        let mut button = Button::connect(user, &socket, at_once);
         let disturbance = Disturbance::begin(situation, &controlled.machine.name, &socket);
         let (mut tally, mut outcome) = (Tally::new(), Outcome { trials, ..Outcome::default() });
         for trial in 0..trials {
@@ -215,6 +223,7 @@ impl Stand {
             advance();
         }
         disturbance.end();
+        button.finish();
         println!("{situation:?}: {outcome}");
         for (state, counts) in tally {
             println!("  {state}: valid forces after sending: trials {counts:?}");
@@ -224,7 +233,6 @@ impl Stand {
 
     fn finish(self) {
         let Controlled { peer: _peer, daemon, plant, machine: _machine } = self.controlled;
-        self.button.finish();
         daemon.stops_on("TERM", HANG);
         plant.stops_on("TERM", HANG);
     }

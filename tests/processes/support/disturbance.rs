@@ -1,5 +1,6 @@
 //! What else goes on while an emergency stop is sent: taken slots, floods, users outside of the group, full file systems.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -36,6 +37,26 @@ print("here", flush=True)
 time.sleep(3600)
 "#;
 
+/// 16 that send lines with more files than the daemon receives.
+const PYTHON_FILES: &str = r#"
+import array, socket, sys, threading, time
+line = b'{"version": 1, "request": "status"}\n'
+files = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [0] * 60))]
+def send():
+    while True:
+        try:
+            link = socket.socket(socket.AF_UNIX)
+            link.connect(sys.argv[1])
+            link.sendmsg([line], files)
+            link.recv(65536)
+        except OSError:
+            time.sleep(0.0001)
+for _ in range(16):
+    threading.Thread(target=send, daemon=True).start()
+print("here", flush=True)
+time.sleep(3600)
+"#;
+
 /// What else goes on during an emergency stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Situation {
@@ -49,6 +70,10 @@ pub enum Situation {
     Connections,
     /// 64 users outside of the group.
     Outsiders,
+    /// 16 connections of the group that pass files.
+    Files,
+    /// 32 emergency stops at once.
+    Together,
     /// Sent by a member of the group.
     Member,
     /// `/dev/shm` and `/tmp` are full.
@@ -58,30 +83,36 @@ pub enum Situation {
 /// What disturbs, until it is dropped.
 pub enum Disturbance {
     None,
-    Slots { _slots: Box<Slots> },
+    Slots {
+        _slots: Box<Slots>,
+    },
     Messages(Vec<Flood>),
     Connections(Hostile),
-    Outsiders(Child, BufReader<std::process::ChildStdout>),
+    /// A process that says no word unless it gets what it must not.
+    Process(Child, BufReader<std::process::ChildStdout>),
     Full(Vec<PathBuf>),
 }
 
 impl Disturbance {
     pub fn begin(situation: Situation, machine: &str, socket: &Path) -> Self {
         match situation {
-            Situation::Quiet | Situation::Member => Self::None,
+            Situation::Quiet | Situation::Member | Situation::Together => Self::None,
             Situation::Slots => Self::Slots { _slots: Box::new(Slots::fill(machine)) },
             Situation::Messages => Self::Messages((0..4).map(|_| Flood::start(machine)).collect()),
             Situation::Connections => Self::Connections(Hostile::start(socket, 64)),
-            Situation::Outsiders => {
-                let mut child = python(OUTSIDER, PYTHON_OUTSIDERS, socket);
-                let mut words = BufReader::new(child.stdout.take().expect("a pipe"));
-                assert_eq!(line_of(&mut words), "here");
-                Self::Outsiders(child, words)
-            }
+            Situation::Outsiders => Self::process(OUTSIDER, PYTHON_OUTSIDERS, socket),
+            Situation::Files => Self::process(&["/usr/bin/env"], PYTHON_FILES, socket),
             Situation::Full => {
                 Self::Full(["/dev/shm", "/tmp"].map(|folder| filled(Path::new(folder))).into())
             }
         }
+    }
+
+    fn process(user: &[&str], program: &str, socket: &Path) -> Self {
+        let mut child = python(user, program, &[socket.as_os_str()]);
+        let mut words = BufReader::new(child.stdout.take().expect("a pipe"));
+        assert_eq!(line_of(&mut words), "here");
+        Self::Process(child, words)
     }
 
     pub fn end(self) {
@@ -89,7 +120,7 @@ impl Disturbance {
             Self::None | Self::Slots { .. } => {}
             Self::Messages(floods) => floods.into_iter().for_each(Flood::finish),
             Self::Connections(hostile) => println!("the connections sent {} bytes", hostile.finish()),
-            Self::Outsiders(mut child, mut words) => {
+            Self::Process(mut child, mut words) => {
                 child.kill().expect("a signal");
                 child.wait().expect("its end");
                 assert_eq!(line_of(&mut words), "", "nobody outside of the group may enter");
@@ -99,9 +130,9 @@ impl Disturbance {
     }
 }
 
-pub fn python(user: &[&str], program: &str, socket: &Path) -> Child {
+pub fn python(user: &[&str], program: &str, arguments: &[&OsStr]) -> Child {
     let mut command = Command::new(user[0]);
-    command.args(&user[1..]).args(["/usr/bin/env", "python3", "-c", program]).arg(socket);
+    command.args(&user[1..]).args(["/usr/bin/env", "python3", "-c", program]).args(arguments);
     command
         .env("PATH", "/usr/bin:/bin")
         .stdin(Stdio::piped())
