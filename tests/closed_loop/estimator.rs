@@ -5,6 +5,7 @@ use hexad::control::diagnostic::DiagnosticCode;
 use hexad::plant::imperfections::{DriveErrors, Imperfections, SensorErrors};
 
 use super::common::hardware_loop::{HardwareLoop, SENDING, configured};
+use super::common::observed::Rates;
 
 /// Delay of the drives beside sending, told and true \[ms\].
 #[derive(Clone, Copy)]
@@ -27,12 +28,12 @@ fn rms_um(
     config: &Config,
     mass: f64,
     imperfections: &Imperfections,
-    has_rates: bool,
+    rates: Rates,
 ) -> Result<f64, DiagnosticCode> {
     let mut platform = config.machine.clone();
     platform.platform.mass *= mass;
     let mut control = HardwareLoop::new(config, &platform, imperfections);
-    control.has_rates = has_rates;
+    control.rates = rates;
     control.play(config).map(|tracking| 1e6 * tracking.position.rms())
 }
 
@@ -55,10 +56,10 @@ fn with_the_models_parameters_sampling_leaves_next_to_nothing() {
         ("fried2008", 250.0, 0.5),
     ] {
         let config = config(machine, rate_hz, TOLD);
-        for has_rates in [false, true] {
+        for rates in Rates::ALL {
             println!("{:.2} Hz", config.deployment.control.position_bandwidth_hz);
-            let found = rms_um(&config, 1.0, &Imperfections::default(), has_rates).unwrap();
-            println!("{machine} {rate_hz} Hz, rates {has_rates}: {found:.4} um");
+            let found = rms_um(&config, 1.0, &Imperfections::default(), rates).unwrap();
+            println!("{machine} {rate_hz} Hz, rates {rates:?}: {found:.4} um");
             assert!(found < bound_um, "{machine} at {rate_hz} Hz: {found} um");
         }
     }
@@ -68,7 +69,7 @@ fn with_the_models_parameters_sampling_leaves_next_to_nothing() {
 fn noise_of_the_sensors_is_filtered() {
     let mut config = config("motion_base", 1000.0, TOLD);
     config.deployment.noise.length_m = 1e-5;
-    let quiet = rms_um(&config, 1.0, &with_noise(1e-5), false).unwrap();
+    let quiet = rms_um(&config, 1.0, &with_noise(1e-5), Rates::Never).unwrap();
     println!("10 um of noise: {quiet:.2} um");
     assert!((4.0..7.0).contains(&quiet), "{quiet}");
 }
@@ -76,7 +77,7 @@ fn noise_of_the_sensors_is_filtered() {
 #[test]
 fn a_payload_is_compensated() {
     let config = config("motion_base", 1000.0, TOLD);
-    let moving = rms_um(&config, 1.2, &Imperfections::default(), false).unwrap();
+    let moving = rms_um(&config, 1.2, &Imperfections::default(), Rates::Never).unwrap();
     println!("a fifth more mass: {moving:.2} um");
     assert!((4.0..6.0).contains(&moving), "{moving}");
 }
@@ -86,7 +87,7 @@ fn dead_time_that_is_told_costs_next_to_nothing() {
     for (milliseconds, bound_um) in [(5.0, 1.0), (7.0, 1.5), (10.0, 2.5)] {
         let delay = Delay { told: Some(milliseconds), truth: milliseconds };
         let config = config("motion_base", 1000.0, delay);
-        let found = rms_um(&config, 1.0, &with_dead_time(delay.truth), false).unwrap();
+        let found = rms_um(&config, 1.0, &with_dead_time(delay.truth), Rates::Never).unwrap();
         println!("{milliseconds} ms told: {found:.3} um");
         assert!(found < bound_um, "{milliseconds} ms: {found}");
     }
@@ -96,7 +97,7 @@ fn dead_time_that_is_told_costs_next_to_nothing() {
 fn dead_time_that_is_not_told_is_stable() {
     let delay = Delay { told: None, truth: 5.0 };
     let config = config("motion_base", 1000.0, delay);
-    let found = rms_um(&config, 1.0, &with_dead_time(delay.truth), false).unwrap();
+    let found = rms_um(&config, 1.0, &with_dead_time(delay.truth), Rates::Never).unwrap();
     println!("5 ms not told: {found:.2} um");
     assert!(found < 12.0, "{found}");
 }

@@ -15,6 +15,7 @@ use hexad::plant::imperfections::Imperfections;
 use toml::Table;
 
 use super::fast::Fast;
+use super::observed::Rates;
 use super::rig::{Tracking, parameters};
 use super::{Remembered, angle_between, edited, remembered};
 
@@ -44,7 +45,7 @@ pub fn configured(machine: &str, lines: &str) -> Config {
 pub struct HardwareLoop {
     pub controller: Controller,
     pub hardware: Hardware,
-    pub has_rates: bool,
+    pub rates: Rates,
     pub now_ns: u64,
     pub period_ns: u64,
     /// Number of the request for control.
@@ -66,7 +67,7 @@ impl HardwareLoop {
                 plant.tolerance_m,
                 imperfections,
             ),
-            has_rates: false,
+            rates: Rates::Never,
             asked: 0,
             had_control: false,
             now_ns: START_NS,
@@ -85,7 +86,7 @@ impl HardwareLoop {
         self.had_control |= self.controller.state().has_control();
         self.asked += u64::from(!self.had_control);
         let (length, rate) = self.hardware.measure();
-        let rate = self.has_rates.then_some(rate);
+        let rate = self.rates.are_sent(self.now_ns / self.period_ns).then_some(rate);
         Input {
             release_ns: self.now_ns + self.period_ns / 2,
             setpoint: Some(Setpoint::motion(self.now_ns, *task)),

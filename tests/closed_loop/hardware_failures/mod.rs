@@ -21,8 +21,10 @@ use hexad::plant::random::Random;
 use rayon::prelude::*;
 
 use self::failures::{Context, FAILURES, FROZEN, Failure, Part};
+use self::table::Row;
 use super::common::certificate::cases;
 use super::common::hardware_loop::{HardwareLoop, SENDING, configured};
+use super::common::observed::Rates;
 use super::trust::scene;
 
 /// The machine of the table, with sensors and drives as they are: noise, resolution, dead time.
@@ -76,11 +78,12 @@ fn config() -> Config {
 
 /// A failure of a machine whose sensors have the noise of its file, or less than their resolution: those are watched until the forces
 /// end, as a stop under control would follow what a frozen sensor says.
-fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool) -> Cell {
+fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool, rates: Rates) -> Cell {
     let length_noise = if is_quiet { QUIET_NOISE_M } else { NOISE_M };
     let sensor = SensorErrors { length_noise, length_step: STEP_M, ..SensorErrors::default() };
     let imperfections = Imperfections { seed: 3, sensor, ..Imperfections::default() };
     let mut control = HardwareLoop::new(config, &config.machine, &imperfections);
+    control.rates = rates;
     let moving = scene(config, situation.speed());
     let mut random = Random::new(5);
     let (mut measured, mut sent) = (Vec::<Measurement>::new(), Vec::<[f64; LEGS]>::new());
@@ -167,15 +170,37 @@ fn certificate_every_failure_is_noticed_as_the_table_says() {
 /// With little noise a frozen length looks like one that stands.
 #[test]
 fn certificate_lengths_that_freeze_quietly_are_noticed_as_the_table_says() {
-    check("frozen lengths", &configured(MACHINE, "[drive]\ndelay_us = 100"), FROZEN, true);
+    check("frozen lengths", &quiet(), FROZEN, true);
+}
+
+fn quiet() -> Config {
+    configured(MACHINE, "[drive]\ndelay_us = 100")
 }
 
 fn check(head: &str, config: &Config, failures: &[Failure], is_quiet: bool) {
-    let rows = |(_, part): &Failure| Situation::ALL.map(|situation| cell(config, part, situation, is_quiet));
-    let rows = |failure| (failure, rows(failure));
+    let rows = |failure| row(config, failure, is_quiet, Rates::Never);
     if env::var_os("HEXAD_WRITE_TABLE").is_some() {
         table::write(head, &failures.par_iter().map(rows).collect::<Vec<_>>());
     } else {
-        table::check(head, failures, &cases(failures, 4).into_par_iter().map(rows).collect::<Vec<_>>());
+        let rows: Vec<_> = cases(failures, 4).into_par_iter().map(rows).collect();
+        table::check(head, failures, &rows, Cell::is_as);
+    }
+}
+
+fn row<'a>(config: &Config, failure: &'a Failure, is_quiet: bool, rates: Rates) -> Row<'a> {
+    (failure, Situation::ALL.map(|situation| cell(config, &failure.1, situation, is_quiet, rates)))
+}
+
+/// The table is that of lengths alone.
+#[test]
+fn certificate_with_rates_every_failure_is_noticed_and_moves_no_farther() {
+    for (head, config, failures, is_quiet) in
+        [("failure", config(), FAILURES, false), ("frozen lengths", quiet(), FROZEN, true)]
+    {
+        let rates = [Rates::Always, Rates::Sometimes];
+        let all = failures.iter().flat_map(|failure| rates.map(|rates| (failure, rates)));
+        let rows =
+            cases(all, 13).into_par_iter().map(|(failure, rates)| row(&config, failure, is_quiet, rates));
+        table::check(head, failures, &rows.collect::<Vec<_>>(), Cell::is_no_worse);
     }
 }
