@@ -1,5 +1,5 @@
-//! Emergency stops from every state, whatever else goes on: no force is valid two periods after the request was sent, or five while
-//! 64 hostile connections are accepted and read before it (of 1001 stops 3 to 5 took more than two).
+//! Emergency stops from every state, whatever else goes on: no force is valid two periods after the request was sent, or five where
+//! other connections are accepted and read before it: 64 hostile ones, or those of 31 other stops (of 1001 stops 5 took more than two).
 //!
 //! What counts are forces: those that were published as valid after the client took the time, before it connected. Where the host
 //! took a processor away meanwhile, which threads of real-time priority witness, as many more are allowed as fit into that time.
@@ -53,7 +53,7 @@ const BESIDE_ROOT: [Situation; 7] = [
     Situation::Together,
 ];
 
-/// Valid forces after sending: of two periods, and of those that hostile connections take.
+/// Valid forces after sending: of two periods, and of those that other connections take.
 const MAX_CYCLES: u64 = 2;
 const MAX_CYCLES_AMONG_CONNECTIONS: u64 = 5;
 
@@ -202,7 +202,7 @@ impl Stand {
         let at_once = if situation == Situation::Together { 32 } else { 1 };
         let mut button = Button::connect(user, &socket, at_once);
         let most = match situation {
-            Situation::Connections => MAX_CYCLES_AMONG_CONNECTIONS,
+            Situation::Connections | Situation::Together => MAX_CYCLES_AMONG_CONNECTIONS,
             _ => MAX_CYCLES,
         };
         let disturbance = Disturbance::begin(situation, &controlled.machine.name, &socket);
