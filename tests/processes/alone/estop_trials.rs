@@ -1,5 +1,5 @@
 //! Emergency stops from every state, whatever else goes on: no force is valid two periods after the request was sent, or five where
-//! other connections are accepted and read before it: 64 hostile ones, or those of 31 other stops (of 1001 stops 5 took more than two).
+//! other connections are accepted and read before it: 64 hostile ones, or those of 31 other stops (4 and 19 of 1001 took more than two).
 //!
 //! What counts are forces: those that were published as valid after the client took the time, before it connected. Where the host
 //! took a processor away meanwhile, which threads of real-time priority witness, as many more are allowed as fit into that time.
