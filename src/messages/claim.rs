@@ -276,4 +276,19 @@ mod tests {
         }
         fs::remove_file(path).unwrap();
     }
+
+    #[test]
+    fn a_record_of_another_users_process_does_not_count() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let path = folder.path().join("foreign.daemon");
+        // Another user's process, or for root another user's record.
+        let process_id = if user_id() == 0 { std::process::id() } else { 1 };
+        let record = record_text(process_id, start_time(process_id).unwrap(), &[]);
+        write_record(&path, &record).unwrap();
+        if user_id() == 0 {
+            assert!(running_daemon(folder.path(), "foreign").is_some(), "before it is another user's");
+            std::os::unix::fs::chown(&path, Some(1), None).unwrap();
+        }
+        assert_eq!(running_daemon(folder.path(), "foreign"), None);
+    }
 }

@@ -18,10 +18,14 @@ use hexad::realtime::overrun::OverrunPolicy;
 const DRIVE_BEGAN_NS: u64 = 5_000;
 const DRIVE_PERIOD_NS: u64 = 1_000_000;
 
+/// The time of a message, by the drive.
+fn drive(number: u64) -> u64 {
+    DRIVE_BEGAN_NS + number * DRIVE_PERIOD_NS
+}
+
 fn message(number: u64) -> CycleInput {
     let mut handed = CycleInput { measurements: number, handed_ns: monotonic_ns(), ..CycleInput::default() };
-    let time_ns = DRIVE_BEGAN_NS + number * DRIVE_PERIOD_NS;
-    handed.input.measurement = Some(Measurement { time_ns, ..Measurement::default() });
+    handed.input.measurement = Some(Measurement { time_ns: drive(number), ..Measurement::default() });
     handed
 }
 
@@ -45,7 +49,8 @@ struct Ended {
 }
 
 impl Loop {
-    fn start() -> Self {
+    /// The cycle of this message takes two periods.
+    fn start(slow: Option<u64>) -> Self {
         let (side, io) = exchange();
         let stop = Arc::new(AtomicBool::new(false));
         let timing = Timing {
@@ -64,6 +69,9 @@ impl Loop {
             let mut seen = vec![];
             let step = |input: &mut Input, _: u64| {
                 seen.push((input.release_ns, input.deadline_missed));
+                if slow.is_some_and(|number| input.release_ns == drive(number)) {
+                    sleep(Duration::from_nanos(2 * DRIVE_PERIOD_NS));
+                }
                 Output::default()
             };
             let report = run(&mut Monotonic, &timing, step, Output::default(), side, records_in, &stopped);
@@ -99,7 +107,7 @@ impl Loop {
 
 #[test]
 fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
-    let mut cycles = Loop::start();
+    let mut cycles = Loop::start(None);
     // Three before the first cycle are one release; then one by one; then three at once.
     (3..=20).for_each(|number| cycles.cycle_after(number));
     cycles.cycle_after(24);
@@ -107,7 +115,6 @@ fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
     sleep(Duration::from_millis(500));
     cycles.cycle_after(25);
     let Ended { report, seen, records } = cycles.stop();
-    let drive = |number: u64| DRIVE_BEGAN_NS + number * DRIVE_PERIOD_NS;
     let by_message: Vec<_> = (3..=20).chain([24]).map(drive).collect();
     let found: Vec<_> = seen.iter().map(|(release_ns, _)| *release_ns).collect();
     let (signalled, after) = found.split_at(by_message.len());
@@ -122,4 +129,13 @@ fn each_message_releases_one_cycle_and_silence_one_per_timeout() {
     assert!(seen[by_message.len() - 1].1, "the cycle after them is told");
     let io_late = records.iter().filter(|record| record.io_late).count();
     assert_eq!(io_late, watchdog.len(), "only the cycles of the watchdog had nothing new");
+}
+
+#[test]
+fn the_cycle_after_one_longer_than_a_period_is_told() {
+    let mut cycles = Loop::start(Some(4));
+    (3..=5).for_each(|number| cycles.cycle_after(number));
+    let Ended { report, seen, .. } = cycles.stop();
+    let missed = seen.iter().find(|(release_ns, _)| *release_ns == drive(5)).map(|(_, missed)| *missed);
+    assert_eq!((missed, report.counters.skipped), (Some(true), 0), "{seen:?}");
 }

@@ -287,3 +287,23 @@ pub(super) fn prepare_thread(config: &Config) {
         debug!("{shortfall}");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_force_acts_beyond_its_expiry_however_late_the_plant_looks() {
+        let config = Config::parse(include_str!("../../../config/fried2008.toml"), "a test").unwrap();
+        let expires_ns = 10_000_000;
+        let lengths = |until_ns, looks: &[u64]| {
+            let mut plant = DrivenPlant::new(&config, 0);
+            plant.force = Some(([200.0; LEGS], until_ns));
+            looks.iter().for_each(|time_ns| plant.advance_to(*time_ns));
+            plant.hardware.measure()
+        };
+        let late = lengths(expires_ns, &[5 * expires_ns]);
+        assert_eq!(late, lengths(expires_ns, &[expires_ns, 5 * expires_ns]));
+        assert_ne!(late, lengths(5 * expires_ns, &[5 * expires_ns]), "a force that lasts");
+    }
+}
