@@ -7,9 +7,8 @@ use std::time::Duration;
 
 use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::state::{Request, State};
-use hexad::messages::Bus;
-use hexad::messages::SetpointMessage;
 use hexad::messages::clock::monotonic_ns;
+use hexad::messages::{Bus, CommandMessage, SetpointMessage};
 
 use crate::support::children::{Ended, HANG, Hexad};
 use crate::support::machine::{Machine, PATIENT, PERIOD_NS};
@@ -183,10 +182,15 @@ fn estop_in(
     });
     let asked_ns = monotonic_ns();
     does(machine, "estop", &[], &["fault"]);
+    // The answer may be here before the request is recorded, and the one before it is not meant.
+    let stopped_ns = recorder.until("the emergency stop is recorded, and a fault after it", |recording| {
+        let is_it = |command: &&CommandMessage| command.request == Request::Estop as u32;
+        let stopped_ns = recording.commands.iter().rfind(is_it)?.header.time_ns;
+        let last = recording.forces.last().filter(|force| force.header.time_ns > stopped_ns)?;
+        (stopped_ns >= asked_ns && last.state == State::Fault as u32).then_some(stopped_ns)
+    });
     let recording = recorder.so_far();
     let first = recording.forces.partition_point(|force| force.header.time_ns < asked_ns);
-    let stopped = recording.commands.iter().rfind(|command| command.request == Request::Estop as u32);
-    let stopped_ns = stopped.expect("a request").header.time_ns;
     let after = recording.forces[first..].iter().filter(|force| force.header.time_ns > stopped_ns);
     let valid = after.filter(|force| force.valid == 1).count();
     let last = recording.forces.last().expect("forces");
