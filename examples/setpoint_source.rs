@@ -9,8 +9,8 @@ use std::env;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::{Request, State};
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, CommandMessage, PortError, SetpointMessage, StatusMessage};
 use hexad::model::task::TaskState;

@@ -18,10 +18,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use hexad::model::LEGS;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::machine::{LEGS, Link, Machine};
+use hexad::model::machine::{Link, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;

@@ -16,10 +16,11 @@ mod imperfect;
 mod integration;
 mod power;
 
+use hexad::model::LEGS;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;

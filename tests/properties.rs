@@ -17,8 +17,9 @@ mod stances;
 use std::sync::LazyLock;
 
 use common::{Legs, MACHINES, machine};
+use hexad::model::LEGS;
 use hexad::model::inverse_jacobian::condition;
-use hexad::model::machine::{LEGS, Link, Machine};
+use hexad::model::machine::{Link, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use nalgebra::{Matrix3, Vector3, Vector6};

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use proc_macro2::{TokenStream, TokenTree};
 use syn::visit::{self, Visit};
-use syn::{ExprUnsafe, ItemUse, Macro, UseTree};
+use syn::{ExprUnsafe, ItemUse, Macro, UseTree, VisRestricted};
 
 /// The folders, from the one that uses nothing. A folder uses folders above it and no other.
 const FOLDERS: [&str; 13] = [
@@ -49,6 +49,8 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
 
 /// Folders in which `unsafe` may stand, each block with its argument.
 const UNSAFE: [&str; 3] = ["messages", "operator", "realtime"];
+
+mod import_cycles;
 
 fn source() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
@@ -129,6 +131,10 @@ impl Uses {
 impl<'ast> Visit<'ast> for Uses {
     fn visit_item_use(&mut self, item: &'ast ItemUse) {
         self.add_tree(vec![], &item.tree);
+    }
+
+    fn visit_vis_restricted(&mut self, _: &'ast VisRestricted) {
+        // Who may see an item is no use of anything.
     }
 
     fn visit_path(&mut self, path: &'ast syn::Path) {

@@ -5,10 +5,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use hexad::config::Config;
-use hexad::control::controller::{Controller, Input, Measurement, Setpoint};
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::controller::Controller;
 use hexad::control::law::ControlMode;
-use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad::control::signals::state::{OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::task::TaskState;

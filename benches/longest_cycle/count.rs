@@ -4,7 +4,8 @@
 
 use std::hint::black_box;
 
-use hexad::control::controller::{Controller, Input};
+use hexad::control::controller::Controller;
+use hexad::control::signals::inputs::Input;
 use nix::errno::Errno;
 use nix::sys::ptrace;
 use nix::sys::signal::{Signal, raise};

@@ -4,9 +4,10 @@ use std::hint::black_box;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-use hexad::control::controller::{Controller, Input};
+use hexad::control::controller::Controller;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::State;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::state::State;
 use hexad::plant::random::Random;
 
 use super::count::instructions;

@@ -10,9 +10,10 @@ use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
 use hexad::config::Config;
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::control::controller::{Controller, Output};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad::control::signals::state::{OperatorRequest, Request, State};
 use hexad::daemon::cycle::CycleRecord;
 use hexad::daemon::parameters;
 use hexad::messages::clock::monotonic_ns;

@@ -1,11 +1,11 @@
 //! The methods of hexad: the fidelities, and the instruction sets of this CPU.
 
 use fearless_simd::Level;
+use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{
     Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
 };
-use hexad::model::machine::LEGS;
 use hexad::model::rigid::Motion;
 
 use super::timing::sample;

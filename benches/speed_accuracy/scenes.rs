@@ -11,7 +11,8 @@ use std::path::Path;
 
 use fearless_simd::Level;
 use hexad::config::Config;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::LEGS;
+use hexad::model::machine::Machine;
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use hexad::output::csv_table::{NumberTable, legs, six, trajectory_columns};

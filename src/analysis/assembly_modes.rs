@@ -10,10 +10,11 @@ use core::fmt;
 use nalgebra::{Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
+use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::rigid::{Pose, Twist};
 use crate::plant::random::Random;
 

@@ -6,9 +6,9 @@
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
-use crate::model::machine::LEGS;
 use crate::model::rigid::Motion;
 
 /// Motions per task: half a millisecond of work, long against the cost of handing it to a thread.

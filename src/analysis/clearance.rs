@@ -31,10 +31,11 @@
 use nalgebra::{Matrix6, Vector3};
 
 use super::region_shape::{PoseCell, RegionShape, turned};
+use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::{leg_wrenches, scaled_wrenches};
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::MAX_WRENCH_NORM;
 

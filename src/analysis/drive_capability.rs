@@ -10,8 +10,9 @@
 //! not included: leave room for them in F.
 
 use super::pose_quality::{AccelerationDemand, LegLoad, PoseEvaluator};
+use crate::model::LEGS;
 use crate::model::inverse_jacobian::leg_wrenches;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
 
 /// Drives of a machine at one pose.

@@ -19,11 +19,12 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector6};
 
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::regressor::regressor;
 use crate::model::rigid::{Acceleration, Motion, Pose};
 

@@ -14,9 +14,9 @@
 use super::envelope::{CORNER_COUNT, DIMENSIONS, EnvelopePoint, MotionEnvelope};
 use super::fidelity_error::{ErrorStatistics, FIDELITY_COUNT, FidelitySample, largest};
 use super::reachable_envelope::within_stroke;
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::{Exact, Fidelity};
-use crate::model::machine::LEGS;
 
 /// Points of the even spread that are evaluated. Eight times as many change the figures by a few per cent; this many
 /// take a fraction of a second when the daemon starts.

@@ -4,9 +4,9 @@
 //! counted and not evaluated.
 
 use super::reachable_envelope::within_stroke;
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
-use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
 
 /// Number of fidelities.

@@ -17,12 +17,13 @@
 use nalgebra::{Matrix6, Schur, Vector6};
 
 use super::envelope::MotionEnvelope;
-use crate::control::limits::Limits;
+use crate::control::signals::limits::Limits;
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::sensitivity::Sensitivity;

@@ -23,11 +23,12 @@
 
 use nalgebra::{Matrix3, Matrix6, RowVector3, Vector3, Vector6};
 
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 

@@ -2,7 +2,7 @@
 //!
 //! Computed torque leaves of every axis, linear or angular, a double integrator of the error,
 //! `e'' = -u / m`, with m the mass of the platform over that of the model. At instant k T a measurement gives e. The
-//! [`estimator`](crate::control::estimator) corrects its estimate by it, predicts it over the delay that it knows, and the law
+//! [`estimator`](crate::control::law::estimator) corrects its estimate by it, predicts it over the delay that it knows, and the law
 //! commands
 //!
 //! ```text
@@ -22,7 +22,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::control::estimator::covariance::{Gains, NoiseModel};
+use crate::control::law::estimator::covariance::{Gains, NoiseModel};
 
 /// Longest delay that is computed, in periods; a loop that is stable with more counts as stable with this one.
 pub const MAX_DELAY_PERIODS: usize = 64;

@@ -5,12 +5,14 @@
 
 use core::fmt;
 
-use crate::control::limits::{Limit, LimitSet};
-use crate::control::parameters::{Constants, Envelope};
-use crate::control::reference::{ReferenceGenerator, Target};
+use crate::control::constants::Constants;
+use crate::control::parameters::Envelope;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::setpoint::target::Target;
+use crate::control::signals::limits::{Limit, LimitSet};
+use crate::model::LEGS;
 use crate::model::inverse_geometry::{leg_lengths, leg_motion, universal_sine};
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::LEGS;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
 

@@ -2,9 +2,9 @@
 
 use core::fmt;
 
-use crate::control::diagnostic::{DiagnosticCode, Reaction};
-use crate::control::limits::Limit;
-use crate::control::state::State;
+use crate::control::signals::diagnostic::{DiagnosticCode, Reaction};
+use crate::control::signals::limits::Limit;
+use crate::control::signals::state::State;
 use crate::output::text_table::{Left, Right, paragraph, stdout_width, text_table};
 
 /// Tables of states, faults and limits, by number.

@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::target::{TargetError, TargetSource, constants};
 use crate::analysis::target_motion::check_target;
 use crate::commands::target::pose_of;
-use crate::control::state::Request;
+use crate::control::signals::state::Request;
 use crate::operator::Order;
 use crate::operator::stops::stop_machine;
 use crate::output::files::print;

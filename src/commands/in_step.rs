@@ -2,7 +2,7 @@
 //!
 //! Operators use the control socket ([`crate::operator`]).
 
-use crate::control::state::Request;
+use crate::control::signals::state::Request;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage, Subscriber};
 

@@ -8,10 +8,11 @@ use super::failure::Failure;
 use super::offline_tables::{UnsolvedRows, read_trajectory, task_state, time};
 use super::progress::item_bar;
 use crate::analysis::batch;
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Fidelity;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::output::csv_table::{NumberTable, legs};
 use crate::output::csv_writer::CsvWriter;
 

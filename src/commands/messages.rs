@@ -6,10 +6,10 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use super::failure::Failure;
-use crate::control::controller::SetpointKind;
-use crate::control::diagnostic::DiagnosticCode;
-use crate::control::limits::Limit;
-use crate::control::state::{Request, State};
+use crate::control::signals::diagnostic::DiagnosticCode;
+use crate::control::signals::inputs::SetpointKind;
+use crate::control::signals::limits::Limit;
+use crate::control::signals::state::{Request, State};
 use crate::messages::MESSAGES;
 use crate::messages::layout::{Field, Kind, Layout, Topic};
 use crate::output::files::print;

@@ -32,7 +32,7 @@ use self::run::RunArguments;
 use self::status::StatusArguments;
 use self::view::ViewArguments;
 use self::workspace::WorkspaceArguments;
-use crate::control::state::Request;
+use crate::control::signals::state::Request;
 use crate::output::files::print;
 use crate::output::version::VERSION;
 use crate::realtime::stop_request::Stop;

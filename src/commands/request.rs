@@ -14,7 +14,7 @@ use super::arguments::{MachineFile, OptionalMachineFile, duration};
 use super::failure::Failure;
 use crate::config::ConfigError;
 use crate::config::machine_name::name_in;
-use crate::control::state::Request;
+use crate::control::signals::state::Request;
 use crate::operator::requests::{self, carry_out};
 use crate::operator::stops::{Stopped, Target, stop};
 use crate::operator::{OperatorError, Order};

@@ -5,7 +5,7 @@ use core::fmt;
 
 use super::deployment::{Control, Deployment, DeploymentLimits, Drive, Realtime, STABLE_MASSES};
 use crate::analysis::sampled_loop::{MAX_DELAY_PERIODS, SampledLoop, edge};
-use crate::control::estimator::SENT_ACCELERATIONS;
+use crate::control::law::estimator::SENT_ACCELERATIONS;
 
 /// Control loop with the longest delay that the daemon may have.
 #[derive(Clone, Copy, Debug)]

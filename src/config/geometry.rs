@@ -7,10 +7,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::machine::{LegSection, rounded};
 use super::reader::SectionReader;
+use crate::model::LEGS;
 use crate::model::forward_kinematics::MAX_CONDITION;
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::rigid::{Pose, Twist};
 
 /// Distance below which two points coincide, as a share of the joints' radius: a micrometre on a machine of a metre,

@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 use super::bound::Bound;
 use super::geometry;
 use super::reader::SectionReader;
-use crate::model::machine::{Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia};
+use crate::model::LEGS;
+use crate::model::machine::{Actuator, Joints, Link, Machine, Platform, TransverseInertia};
 use crate::model::task::TaskState;
 
 /// Largest gravity \[m/s^2\]: ten times the Earth's is a wrong unit, not a site.

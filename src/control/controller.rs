@@ -3,26 +3,31 @@
 //! [`Controller::step`] shows the stages in order. Each is a function of its arguments and of the memory of its own
 //! struct; none changes the memory of another. A cycle does a bounded amount of work.
 
-use super::assessment::{Evidence, assess};
-use super::diagnostic::Diagnostic;
-use super::drive_monitor::DriveMonitor;
-use super::estimator::LegRateEstimator;
-use super::external_pose::ExternalPose;
-use super::feedback_bound::FeedbackBound;
-use super::force_limits::{ForceLimiter, LimitedForces};
-use super::forces::forces;
-use super::free_motion::FreeMotion;
-use super::input_validation::{MeasurementValidator, SetpointValidator};
-pub use super::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
-use super::limits::LimitSet;
-use super::localization::{Localization, PlatformState};
-use super::parameters::{Constants, Parameters};
-use super::reference::{ReferenceGenerator, Target};
-use super::stamp_clock::StampClock;
-use super::state::{Request, State};
-use super::supervisor::Supervisor;
-use super::tracking_error::{ErrorTracker, TrackingError, setpoint_error};
-use crate::model::machine::{LEGS, Machine};
+use crate::control::constants::Constants;
+use crate::control::cycle::Cycle;
+use crate::control::law::error_tracker::{ErrorTracker, setpoint_error};
+use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::law::force_limits::{ForceLimiter, LimitedForces};
+use crate::control::law::forces::forces;
+use crate::control::parameters::Parameters;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::sensing::drive_monitor::DriveMonitor;
+use crate::control::sensing::external_pose::ExternalPose;
+use crate::control::sensing::free_motion::FreeMotion;
+use crate::control::sensing::leg_rates::LegRateEstimator;
+use crate::control::sensing::localization::{Localization, PlatformState};
+use crate::control::sensing::measurement::MeasurementValidator;
+use crate::control::sensing::stamp_clock::StampClock;
+use crate::control::setpoint::validation::SetpointValidator;
+use crate::control::signals::diagnostic::Diagnostic;
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::Input;
+use crate::control::signals::limits::LimitSet;
+use crate::control::signals::state::{Request, State};
+use crate::control::supervision::assessment::{Evidence, assess};
+use crate::control::supervision::supervisor::Supervisor;
+use crate::model::LEGS;
+use crate::model::machine::Machine;
 use crate::model::rigid::{Motion, Wrench};
 
 /// Result of one cycle: forces, state, and the numbers that explain them.
@@ -52,15 +57,6 @@ pub struct Output {
     pub error: Option<TrackingError>,
     /// The reference at the end of the hold of this cycle's force, under control.
     pub reference: Option<Motion>,
-}
-
-/// Context of one cycle, which every stage may depend on.
-#[derive(Clone, Copy)]
-pub(super) struct Cycle<'a> {
-    pub constants: &'a Constants,
-    pub release_ns: u64,
-    /// At the beginning of the cycle.
-    pub state: State,
 }
 
 /// Controller of one machine: its constants, and the memory of each stage.
@@ -201,7 +197,7 @@ impl Controller {
             // Until the drives are ready it stays where it is, or comes to rest. So it does in the first cycle, in which its stop
             // was verified: there is one examination in a cycle.
             let is_waiting = begins || next == State::Engaging && !drives.is_ready;
-            let target = Target::of_state(constants, next, &setpoint).filter(|_| !is_waiting);
+            let target = setpoint.target_in(constants, next).filter(|_| !is_waiting);
             reference.set_closing_scale(closing_scale(parameters, next));
             reference.advance(constants, begin_ns.saturating_add(parameters.period_ns), target.as_ref());
         }

@@ -3,41 +3,27 @@
 //! [`controller::Controller::step`] is a pure function of its state and its input: every run can be
 //! replayed bit for bit. Its stages in the order of a cycle:
 //!
-//! | stage | file |
+//! | stage | folder |
 //! | --- | --- |
-//! | validate inputs | [`input_validation`] |
-//! | locate platform, tracking error | [`localization`], [`tracking_error`] with its [`estimator`] |
-//! | decide state | `assessment`, [`supervisor`] with the states of [`state`] |
+//! | validate the measurement, locate the platform | [`sensing`] |
+//! | validate the setpoint | [`setpoint`] |
+//! | tracking error with its estimator | [`law`] |
+//! | checks of sensors, drives, load | [`monitoring`] |
+//! | decide the state | [`supervision`] |
 //! | reference | [`mod@reference`] |
-//! | control law | [`law`] with its [`gains`] and [`leg_masses`] |
-//! | forces | `forces` |
-//! | checks | `drive_response`, `disturbance_monitor`, `feedback_bound`, `force_limits` |
+//! | control law, forces | [`law`] |
 //!
-//! The checks of all stages return a [`diagnostic`]; the bounds are in [`parameters`] and [`limits`].
+//! What the stages pass to each other is in [`signals`], what a deployment chooses in [`parameters`], what follows from it in
+//! [`constants`]. The checks of all stages return a [`signals::diagnostic`].
 
-mod assessment;
+pub mod constants;
 pub mod controller;
-pub mod diagnostic;
-pub mod disturbance_monitor;
-pub mod drive_monitor;
-mod drive_response;
-pub mod estimator;
-mod external_pose;
-mod feedback_bound;
-mod force_limits;
-mod forces;
-mod free_motion;
-pub mod gains;
-pub mod input_validation;
-mod inputs;
+mod cycle;
 pub mod law;
-pub mod leg_masses;
-pub mod limits;
-pub mod localization;
+pub mod monitoring;
 pub mod parameters;
 pub mod reference;
-mod stamp_clock;
-mod standstill;
-pub mod state;
-pub mod supervisor;
-pub mod tracking_error;
+pub mod sensing;
+pub mod setpoint;
+pub mod signals;
+pub mod supervision;

@@ -1,20 +1,16 @@
-//! Parameters of a controller, and all that stays constant while it runs.
+//! Parameters of a controller: what a deployment chooses.
 
-use super::disturbance_monitor::DisturbanceBounds;
-use super::drive_response::least_disturbance;
-use super::estimator::covariance::NoiseModel;
-use super::estimator::input_matrix::InputMatrix;
-use super::estimator::{EstimatorConstants, FrozenLegBounds, Readings};
-use super::law::Law;
-use super::limits::Limits;
-use super::standstill::window_s;
-use super::supervisor::AfterStop;
-use crate::model::active_forces::InverseDynamics;
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+
+use crate::control::law::Law;
+use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::covariance::NoiseModel;
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::limits::Limits;
+use crate::control::signals::limits::largest_ratio;
+use crate::control::signals::state::AfterStop;
 use crate::model::fidelity::Fidelity;
-use crate::model::inverse_geometry::universal_sine;
-use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::Machine;
-use nalgebra::Vector6;
 
 /// Parameters that a deployment chooses for a controller. Times are in nanoseconds, like the clock.
 #[derive(Clone, Copy, Debug)]
@@ -84,6 +80,19 @@ impl Parameters {
         self.period_ns as f64 * 1e-9
     }
 
+    /// An error over the engage tolerance, the largest of its four parts. A velocity error is
+    /// divided by `wn = sqrt(Kp)`, so that it compares with a pose error.
+    pub(super) fn tolerance_ratio(&self, error: &TrackingError) -> f64 {
+        let Self { law, engage_position, engage_orientation, .. } = self;
+        let TrackingError { pose, twist } = error;
+        largest_ratio([
+            pose.linear.norm() / engage_position,
+            pose.angular.norm() / engage_orientation,
+            twist.linear.norm() / (law.position.stiffness.sqrt() * engage_position),
+            twist.angular.norm() / (law.orientation.stiffness.sqrt() * engage_orientation),
+        ])
+    }
+
     /// Longest extrapolation of a setpoint \[s\]: until the first cycle that finds it too old.
     pub(super) fn max_extrapolation_s(&self) -> f64 {
         self.setpoint_timeout_ns.saturating_add(self.period_ns) as f64 * 1e-9
@@ -108,112 +117,4 @@ pub struct Envelope {
     pub lowest: [f64; 6],
     /// Highest value of each coordinate of X \[rad\], \[m\].
     pub highest: [f64; 6],
-}
-
-/// Part of the way from the condition at home to its limit that the reference uses.
-const CONDITION_SHARE: f64 = 0.85;
-/// Least sine of the angle between a leg and the first axis of its universal joint, 6 degrees: fewer than any joint leaves.
-/// The moment of the leg's spin grows with the inverse of the third power; there it still changes by less than itself in a
-/// cycle of 10 ms.
-const MIN_UNIVERSAL_SINE: f64 = 0.1;
-/// The same as a ratio of that at home, for machines whose legs are as near to the axes there.
-const MIN_UNIVERSAL_SINE_PER_HOME: f64 = 0.5;
-
-/// Machine model, parameters and home pose: constant while the controller runs.
-#[derive(Clone, Debug)]
-pub struct Constants {
-    /// Inverse dynamics of the machine.
-    pub dynamics: InverseDynamics,
-    /// Choices of the deployment.
-    pub parameters: Parameters,
-    /// At home.
-    pub home: KinematicState,
-    /// Largest distance of a joint on the platform from C \[m\].
-    pub arm: f64,
-    /// Acceleration of the platform by what the law commands.
-    pub input_matrix: InputMatrix,
-    /// Of the estimator under control.
-    pub estimator: EstimatorConstants,
-    /// Square of the least disturbance that may be a force that a drive does not deliver; infinite where the law leaves forces to feedback.
-    pub least_missing_squared: f64,
-    /// Changes of the disturbance that are no fault.
-    pub disturbance_bounds: DisturbanceBounds,
-    /// What equal readings of one leg allow.
-    pub(super) frozen_leg: FrozenLegBounds,
-    /// Window in which lengths alone show rest \[s\].
-    pub(super) rest_window_s: f64,
-    /// Of the estimator of the rates of the legs.
-    pub leg_rates: EstimatorConstants,
-    /// Largest condition of the reference: below that of the platform, for the following error.
-    pub reference_condition: f64,
-    /// Least sine of the angle between a leg and the first axis of its universal joint, of the reference.
-    pub universal_sine: f64,
-}
-
-impl Constants {
-    /// Evaluates them.
-    pub fn new(machine: &Machine, parameters: Parameters) -> Self {
-        let home = KinematicState::new(machine, machine.home_pose());
-        let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
-        let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
-        let at_home = home.sensitivity().condition;
-        let reference_condition = at_home + CONDITION_SHARE * (parameters.condition - at_home);
-        let sine_at_home = universal_sine(machine, home.pose());
-        let universal_sine = MIN_UNIVERSAL_SINE.min(MIN_UNIVERSAL_SINE_PER_HOME * sine_at_home);
-        let NoiseModel { bandwidth, period_s, .. } = parameters.noise;
-        let lengths_only = NoiseModel { bandwidth, period_s, rate_noise_ratio: None };
-        let input_matrix = InputMatrix::at_home(machine, &parameters.law, parameters.fidelity);
-        let Law { saturation, compensates_disturbance, .. } = &parameters.law;
-        let disturbance = input_matrix.largest_disturbance(saturation);
-        let acts_on_legs = parameters.law.mode.acts_on_legs();
-        let least_missing = least_disturbance(
-            &input_matrix.acceleration_by_force(machine, home.pose()),
-            if acts_on_legs { 1.0 } else { arm },
-            machine.actuator.max_force,
-        );
-        let expects_forces = parameters.law.mode.includes_inertia();
-        let unbounded = Vector6::repeat(f64::INFINITY);
-        let disturbance_bounds = DisturbanceBounds::new(
-            machine,
-            &parameters,
-            &input_matrix,
-            least_missing,
-            if acts_on_legs { 1.0 } else { arm },
-        );
-        Self {
-            disturbance_bounds,
-            dynamics: InverseDynamics::new(machine),
-            input_matrix,
-            least_missing_squared: if expects_forces { least_missing * least_missing } else { f64::INFINITY },
-            frozen_leg: FrozenLegBounds::new(
-                parameters.law.position.stiffness,
-                machine.actuator.max_force,
-                period_s,
-            ),
-            estimator: EstimatorConstants::new(
-                parameters.noise,
-                parameters.readings,
-                if *compensates_disturbance { disturbance } else { unbounded },
-                parameters.limits.position.acceleration
-                    + parameters.law.acceleration_left_to_feedback(&parameters.limits, arm, &disturbance),
-            ),
-            rest_window_s: window_s(&parameters),
-            leg_rates: EstimatorConstants::new(lengths_only, parameters.readings, unbounded, f64::INFINITY),
-            parameters,
-            home,
-            arm,
-            reference_condition,
-            universal_sine,
-        }
-    }
-
-    /// Length by which angles of the error become distances \[m\]; errors of legs have no angles.
-    pub(super) fn error_arm(&self) -> f64 {
-        if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm }
-    }
-
-    /// The machine.
-    pub fn machine(&self) -> &Machine {
-        self.dynamics.machine()
-    }
 }

@@ -1,7 +1,8 @@
 //! The generic cyclic loop with the controller's input and output.
 
-use crate::control::controller::{Input, Output};
-use crate::control::state::{OperatorRequest, Request, State};
+use crate::control::controller::Output;
+use crate::control::signals::inputs::Input;
+use crate::control::signals::state::{OperatorRequest, Request, State};
 use crate::messages::{CycleMessage, MAX_REQUEST_AGE_NS};
 use crate::realtime::cyclic::{self, CyclicInput};
 use crate::realtime::exchange;

@@ -14,8 +14,8 @@ use std::sync::Arc;
 use tracing::{error, info};
 
 use crate::control::controller::Output;
-use crate::control::diagnostic::DiagnosticCode;
-use crate::control::state::State;
+use crate::control::signals::diagnostic::DiagnosticCode;
+use crate::control::signals::state::State;
 use crate::messages::clock::monotonic_ns;
 use crate::output::files::{FileError, write_whole};
 use crate::realtime::clock::Monotonic;

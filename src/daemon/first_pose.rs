@@ -12,7 +12,7 @@ use rayon::ThreadPoolBuilder;
 use tracing::warn;
 
 use crate::analysis::assembly_modes::other_modes;
-use crate::control::localization::PlatformState;
+use crate::control::sensing::localization::PlatformState;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::rigid::Pose;

@@ -15,7 +15,7 @@ use self::recorder::Folders;
 use self::reload::Loaded;
 use self::report::Report;
 use crate::config::{Config, ConfigError};
-use crate::control::state::Request;
+use crate::control::signals::state::Request;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Claim, PortError};
 use crate::operator::signal::RequestSignal;

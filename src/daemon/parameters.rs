@@ -6,10 +6,10 @@ use nalgebra::Vector6;
 
 use crate::config::control_loops::longest_age_s;
 use crate::config::deployment::Deployment;
-use crate::control::estimator::Readings;
-use crate::control::estimator::covariance::NoiseModel;
-use crate::control::gains::Gains;
 use crate::control::law::Law;
+use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::covariance::NoiseModel;
+use crate::control::law::gains::Gains;
 use crate::control::parameters::{Envelope, Parameters};
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;

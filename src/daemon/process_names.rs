@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::control::diagnostic::{BoundDescription, Diagnostic};
+use crate::control::signals::diagnostic::{BoundDescription, Diagnostic};
 
 /// Command of a process; empty if it has ended.
 pub fn command(process_id: u32) -> String {
@@ -30,7 +30,7 @@ pub fn named(process_id: u32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::diagnostic::DiagnosticCode;
+    use crate::control::signals::diagnostic::DiagnosticCode;
 
     #[test]
     fn a_sentence_about_two_processes_names_both() {

@@ -84,7 +84,7 @@ pub struct Tracking {
 pub struct Fault {
     /// Number of the cycle that entered the fault, from 1.
     pub cycle: u64,
-    /// Number of the [`DiagnosticCode`](crate::control::diagnostic::DiagnosticCode).
+    /// Number of the [`DiagnosticCode`](crate::control::signals::diagnostic::DiagnosticCode).
     pub number: u32,
     /// Name of that code, in words.
     pub name: String,

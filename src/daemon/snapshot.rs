@@ -1,9 +1,9 @@
 //! Snapshot of the daemon for the control thread: what the I/O thread has after each cycle.
 
-use crate::control::controller::{Measurement, Publishers, Setpoint};
-use crate::control::diagnostic::Diagnostic;
+use crate::control::signals::diagnostic::Diagnostic;
+use crate::control::signals::inputs::{Measurement, Publishers, Setpoint};
 use crate::messages::{Rejection, StatusMessage};
-use crate::model::machine::LEGS;
+use crate::model::LEGS;
 
 /// Newest cycle as the I/O thread published it, with its inputs.
 #[derive(Clone, Copy, Debug, Default)]

@@ -9,7 +9,8 @@ use tracing::warn;
 
 use super::{DaemonError, nanoseconds};
 use crate::config::deployment::{Realtime, Scheduler};
-use crate::control::controller::{Controller, Input, Measurement, Setpoint};
+use crate::control::controller::Controller;
+use crate::control::signals::inputs::{Input, Measurement, Setpoint};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;

@@ -121,7 +121,7 @@ impl Collector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::controller::{Input, Measurement};
+    use crate::control::signals::inputs::{Input, Measurement};
 
     fn record(cycle: u64, wakeup_ns: u64) -> CycleRecord {
         let measurement = Some(Measurement { time_ns: 11, ..Measurement::default() });

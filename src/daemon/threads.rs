@@ -34,8 +34,9 @@ use super::start::{
 use super::supervision::{Progress, SUPERVISION_INTERVAL, Supervision};
 use super::{DaemonError, REALTIME_THREAD};
 use crate::config::Config;
-use crate::control::controller::{Controller, Input, Output};
-use crate::control::diagnostic::DiagnosticCode;
+use crate::control::controller::{Controller, Output};
+use crate::control::signals::diagnostic::DiagnosticCode;
+use crate::control::signals::inputs::Input;
 use crate::messages::Statistics;
 use crate::realtime::clock::Monotonic;
 use crate::realtime::cyclic::{self, LoopReport, RECORDS};

@@ -3,7 +3,7 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
-use crate::control::state::{OperatorRequest, Request};
+use crate::control::signals::state::{OperatorRequest, Request};
 
 message! {
     /// Request of a program that sends it in step with its setpoints, one per message. Operators use the control socket.

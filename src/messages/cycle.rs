@@ -4,11 +4,12 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
 use super::{DiagnosticRecord, MeasuredMessage};
-use crate::control::controller::{Input, Measurement, Output, Publishers, Setpoint, SetpointKind};
-use crate::control::limits::LimitSet;
-use crate::control::localization::PlatformState;
-use crate::control::state::{OperatorRequest, Request, State};
-use crate::control::tracking_error::TrackingError;
+use crate::control::controller::Output;
+use crate::control::sensing::localization::PlatformState;
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
+use crate::control::signals::limits::LimitSet;
+use crate::control::signals::state::{OperatorRequest, Request, State};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 use crate::model::task::TaskState;
 

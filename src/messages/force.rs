@@ -73,9 +73,9 @@ impl ForceMessage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::diagnostic::DiagnosticCode;
-    use crate::control::limits::LimitSet;
-    use crate::control::state::State;
+    use crate::control::signals::diagnostic::DiagnosticCode;
+    use crate::control::signals::limits::LimitSet;
+    use crate::control::signals::state::State;
 
     #[test]
     fn a_force_is_valid_only_under_control() {

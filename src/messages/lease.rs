@@ -5,7 +5,7 @@
 //! whichever lives counts, the one that began last first.
 
 use super::Message;
-use crate::control::controller::Publishers;
+use crate::control::signals::inputs::Publishers;
 
 /// Publishers that are remembered: as many as a topic has at once.
 pub(super) const PUBLISHERS: usize = 4;

@@ -3,8 +3,8 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
-use crate::control::controller::Measurement;
-use crate::control::drive_monitor::DriveStatus;
+use crate::control::signals::inputs::DriveStatus;
+use crate::control::signals::inputs::Measurement;
 
 message! {
     /// Measured leg lengths and rates, and optionally a measured pose.

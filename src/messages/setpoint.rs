@@ -3,7 +3,7 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
-use crate::control::controller::{Setpoint, SetpointKind};
+use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::model::task::TaskState;
 
 message! {

@@ -5,8 +5,8 @@ use iceoryx2::prelude::ZeroCopySend;
 use super::layout::message;
 use super::{IoCounters, LoopCounters, Statistics};
 use crate::control::controller::Output;
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::state::State;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::state::State;
 use crate::model::task::task_coordinates;
 
 message! {
@@ -126,9 +126,9 @@ impl StatusMessage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::limits::LimitSet;
-    use crate::control::localization::PlatformState;
-    use crate::control::tracking_error::TrackingError;
+    use crate::control::sensing::localization::PlatformState;
+    use crate::control::signals::errors::TrackingError;
+    use crate::control::signals::limits::LimitSet;
     use crate::model::rigid::{Twist, Wrench};
     use crate::model::task::TaskState;
     use nalgebra::Vector6;

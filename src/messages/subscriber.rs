@@ -10,7 +10,7 @@ use super::bus::BUFFER;
 use super::clock::monotonic_ns;
 use super::lease::{Arrival, Lease, PUBLISHERS};
 use super::{Message, Rejection, RejectionCounts};
-use crate::control::controller::Publishers;
+use crate::control::signals::inputs::Publishers;
 
 /// Subscriber of one topic, which gives precedence to the latest life of the publisher.
 pub struct Subscriber<T: Message> {

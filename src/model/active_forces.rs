@@ -14,6 +14,7 @@
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
+use super::LEGS;
 use super::factorization::{Factorization, LaneWrench, wrench_columns};
 use super::fidelity::{
     Exact, Fidelity, Gravity, LumpedLegs, MasslessLegs, ModelTerms, NoVelocity, RigidLegs,
@@ -21,7 +22,7 @@ use super::fidelity::{
 use super::inverse_geometry::LegGeometry;
 use super::lanes::LaneArithmetic as _;
 use super::leg::{LegConstants, LegReaction};
-use super::machine::{Actuator, Joints, LEGS, Machine};
+use super::machine::{Actuator, Joints, Machine};
 use super::platform::{PrincipalAxes, acceleration_map};
 use super::rigid::{Acceleration, Motion, Twist};
 use super::triples::LegLanes;

@@ -21,11 +21,12 @@
 use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
+use super::LEGS;
 use super::inverse_geometry::LegGeometry;
 use super::lanes::{LaneArithmetic as _, Triple};
 use super::lanes3::{Lanes3, broadcasts};
 use super::lu;
-use super::machine::{Joints, LEGS};
+use super::machine::Joints;
 use super::rigid::{Twist, Wrench};
 use super::triples::{LegLanes, Triples};
 

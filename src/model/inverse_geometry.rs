@@ -15,9 +15,10 @@ use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3};
 
+use super::LEGS;
 use super::lanes::{LaneArithmetic as _, least_of_legs};
 use super::lanes3::Lanes3;
-use super::machine::{Joints, LEGS, Machine};
+use super::machine::{Joints, Machine};
 use super::platform::acceleration_map;
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 use super::triples::LegLanes;

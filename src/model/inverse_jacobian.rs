@@ -7,9 +7,10 @@
 use fearless_simd::dispatch;
 use nalgebra::Matrix6;
 
+use super::LEGS;
 use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
-use super::machine::{LEGS, Machine};
+use super::machine::Machine;
 use super::rigid::{Pose, Twist};
 
 /// Matrix N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],

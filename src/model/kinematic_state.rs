@@ -5,10 +5,11 @@
 
 use fearless_simd::{Simd, dispatch};
 
+use super::LEGS;
 use super::factorization::{Factorization, StoredFactorization};
 use super::inverse_geometry::LegGeometry;
 use super::lanes3::Lanes3;
-use super::machine::{LEGS, Machine};
+use super::machine::Machine;
 use super::rigid::{Pose, Twist};
 use super::sensitivity::Sensitivity;
 use super::triples::LegLanes;

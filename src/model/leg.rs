@@ -33,11 +33,12 @@
 
 use fearless_simd::{Simd, f64x8, prelude::*};
 
+use super::LEGS;
 use super::fidelity::{LegInertia, ModelTerms};
 use super::inverse_geometry::{LegGeometry, LegVelocity, leg_lengths};
 use super::lanes::LaneArithmetic as _;
 use super::lanes3::Lanes3;
-use super::machine::{LEGS, Machine};
+use super::machine::Machine;
 use super::triples::{LegLanes, Triples};
 
 /// Smallest `|u x n|^2` that divides: a leg within 1e-6 rad of its universal joint's first axis.

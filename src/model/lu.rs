@@ -14,7 +14,7 @@
 
 use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
 
-use super::machine::LEGS;
+use super::LEGS;
 
 /// Numbers in a vector of lanes.
 const LANES: usize = 4;

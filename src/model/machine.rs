@@ -10,12 +10,10 @@ use fearless_simd::Level;
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3};
 
+use super::LEGS;
 use super::rigid::{Pose, Twist};
 use super::task::TaskState;
 use super::triples::{LegLanes, Triples};
-
-/// Number of legs.
-pub const LEGS: usize = 6;
 
 /// Constants of one Gough-Stewart platform: geometry, masses, actuators, home. SI units throughout.
 ///

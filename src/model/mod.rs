@@ -55,3 +55,6 @@ pub mod rigid;
 pub mod sensitivity;
 pub mod task;
 pub mod triples;
+
+/// Number of legs.
+pub const LEGS: usize = 6;

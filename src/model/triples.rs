@@ -11,7 +11,7 @@
 use fearless_simd::{Simd, SimdBase, f64x8};
 use nalgebra::{Matrix3, Vector3};
 
-use super::machine::LEGS;
+use super::LEGS;
 
 /// One number per leg in memory, in the order of the lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -9,7 +9,7 @@ use std::time::Duration;
 use self::connection::Connection;
 use self::endpoint::Endpoint;
 use self::users::user_name;
-use crate::control::state::Request;
+use crate::control::signals::state::Request;
 
 pub mod connection;
 pub mod endpoint;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::status_report::StatusReport;
-use crate::control::state::{Request, State};
+use crate::control::signals::state::{Request, State};
 
 /// Whether a request ends control or force; it is never withdrawn.
 pub fn is_stop(request: Request) -> bool {

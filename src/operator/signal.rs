@@ -18,7 +18,7 @@ use super::connection::{Attempt, Connection};
 use super::endpoint::Endpoint;
 use super::protocol::RequestLine;
 use super::users::user_name;
-use crate::control::state::{Request, State};
+use crate::control::signals::state::{Request, State};
 use crate::messages::claim::start_time;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Bus, StatusMessage, Subscriber};

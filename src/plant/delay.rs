@@ -2,7 +2,7 @@
 
 use heapless::Deque;
 
-use crate::model::machine::LEGS;
+use crate::model::LEGS;
 
 /// Command to the drives: six forces \[N\], or none.
 pub type DriveCommand = Option<[f64; LEGS]>;

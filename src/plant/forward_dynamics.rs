@@ -12,9 +12,10 @@
 
 use nalgebra::{Cholesky, Matrix6, U6, Vector6};
 
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::mass_matrix::MassMatrix;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 

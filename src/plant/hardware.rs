@@ -4,7 +4,8 @@ use super::delay::{DeadTime, DriveCommand};
 use super::imperfections::{DriveErrors, Imperfections, SensorErrors};
 use super::random::Random;
 use super::simulator::Simulator;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::LEGS;
+use crate::model::machine::Machine;
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 

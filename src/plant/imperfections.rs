@@ -15,7 +15,8 @@
 use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
-use crate::model::machine::{Joints, LEGS, Machine};
+use crate::model::LEGS;
+use crate::model::machine::{Joints, Machine};
 use crate::model::rigid::Wrench;
 
 use super::random::Random;

@@ -16,11 +16,12 @@ use super::forward_dynamics::ForwardDynamics;
 use super::imperfections::Imperfections;
 use super::integrator::{BodyState, DriveStates, PlantState, integrate};
 use super::terms::{PlantTerms, legs};
+use crate::model::LEGS;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::{LegMotion, leg_lengths};
 use crate::model::inverse_jacobian::twist_from_rates;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::rigid::Twist;
 use crate::model::task::TaskState;
 

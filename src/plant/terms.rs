@@ -23,8 +23,9 @@ use nalgebra::Vector6;
 use super::forward_dynamics::ForwardDynamics;
 use super::imperfections::{ElasticLeg, ExternalWrench, Friction, Imperfections};
 use super::integrator::{Accelerations, PlantState};
+use crate::model::LEGS;
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
-use crate::model::machine::{Actuator, LEGS, Machine};
+use crate::model::machine::{Actuator, Machine};
 use crate::model::rigid::{Acceleration, Motion};
 
 /// Longest step times rate, whatever the tolerance: Runge-Kutta is stable to 2.78, and 1 is also accurate.

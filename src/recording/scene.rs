@@ -6,9 +6,10 @@
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::cdr::CdrWriter;
-use crate::control::localization::PlatformState;
+use crate::control::sensing::localization::PlatformState;
 use crate::messages::CycleMessage;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::LEGS;
+use crate::model::machine::Machine;
 
 /// Writes the scene of cycles.
 #[derive(Clone, Debug)]

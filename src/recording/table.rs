@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::reader::{Recording, Summary};
 use super::{Item, RecordingError};
-use crate::control::input_validation::seconds_between;
+use crate::control::signals::time::seconds_between;
 use crate::messages::layout::{Declared, Layout};
 use crate::messages::{CycleMessage, ForceMessage, MeasuredMessage, SetpointMessage, StatusMessage};
 use crate::output::csv_writer::CsvWriter;

@@ -1,6 +1,6 @@
 //! How setpoints and measurements travel: kinds, rates, delays, jitter and losses.
 
-use hexad::control::controller::{Measurement, Setpoint, SetpointKind};
+use hexad::control::signals::inputs::{Measurement, Setpoint, SetpointKind};
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;
 use nalgebra::Vector6;

@@ -1,10 +1,11 @@
 //! One run of a genome: the controller against the plant, scored by the true motion.
 
-use hexad::control::controller::{Controller, Input, Measurement, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::Limit;
+use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::{Parameters, ViolationPolicy};
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::{Input, Measurement};
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{Profile, rise};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use hexad::config::Config;
 use hexad::control::parameters::{Envelope, Parameters, ViolationPolicy};
-use hexad::control::state::Request;
+use hexad::control::signals::state::Request;
 
 use super::common::observed::Rates;
 use super::common::rig;

@@ -2,13 +2,14 @@
 //! references that leave theirs, and whole searches against controllers that are wrong on purpose.
 
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
 use hexad::control::parameters::{Envelope, Parameters};
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad::control::signals::state::State;
+use hexad::model::LEGS;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{rise, straight_move};

@@ -2,8 +2,8 @@
 
 use core::f64::consts::TAU;
 
-use hexad::control::limits::DerivativeLimits;
 use hexad::control::parameters::Parameters;
+use hexad::control::signals::limits::DerivativeLimits;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;

@@ -1,8 +1,9 @@
 //! A run in words and numbers, for a person who looks into a violation.
 
-use hexad::control::controller::{Input, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::tracking_error::TrackingError;
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::errors::TrackingError;
+use hexad::control::signals::inputs::Input;
 use hexad::model::inverse_geometry::universal_sine;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::plant::simulator::Brakes;

@@ -16,9 +16,11 @@
 use core::hint::black_box;
 use core::panic::PanicInfo;
 
-use hexad::control::controller::{Controller, Input, Output};
+use hexad::control::controller::{Controller, Output};
+use hexad::control::signals::inputs::Input;
 use hexad::control::parameters::Parameters;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::LEGS;
+use hexad::model::machine::Machine;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::plant::simulator::Simulator;
 

@@ -6,9 +6,9 @@ use hexad::analysis::held_forces::HeldForces;
 use hexad::config::Config;
 use hexad::config::control_loops::longest_age_s;
 use hexad::control::controller::Controller;
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::parameters::Parameters;
-use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::{OperatorRequest, Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::plant::imperfections::Imperfections;
 

@@ -3,11 +3,11 @@
 use core::f64::consts::TAU;
 
 use hexad::config::Config;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
+use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
-use hexad::model::machine::LEGS;
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::TaskState;
 

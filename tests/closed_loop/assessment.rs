@@ -1,10 +1,11 @@
 //! What ends or prevents control although inputs are valid: each check alone, the others wide.
 
-use hexad::control::controller::{Controller, SetpointKind};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::Limit;
+use hexad::control::controller::Controller;
 use hexad::control::parameters::{Parameters, ViolationPolicy};
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::SetpointKind;
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::rigid::{Acceleration, Motion, Twist};

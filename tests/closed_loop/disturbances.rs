@@ -1,8 +1,8 @@
 //! Compensation of disturbances: it removes what a wrong payload leaves, and does not wind up.
 
 use hexad::config::Config;
-use hexad::control::limits::Limit;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Gravity;
 use hexad::model::task::TaskState;

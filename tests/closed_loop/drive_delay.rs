@@ -2,7 +2,7 @@
 
 use hexad::analysis::drive_delay::{DriveDelay, MeasuredMotion, RecordedStretch, SentForce, drive_delay};
 use hexad::config::Config;
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfections, SensorErrors};
 

@@ -1,10 +1,11 @@
 //! What a driver reports of its drives: control waits for them, and ends if they fault or if a force does not arrive.
 
-use hexad::control::controller::{Input, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::drive_monitor::DriveStatus;
-use hexad::control::state::{Request, State};
-use hexad::model::machine::LEGS;
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::DriveStatus;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::state::{Request, State};
+use hexad::model::LEGS;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 

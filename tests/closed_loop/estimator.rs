@@ -1,7 +1,7 @@
 //! The estimator: what it leaves of noise, payloads and dead times, with lengths alone and with rates.
 
 use hexad::config::Config;
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::plant::imperfections::{DriveErrors, Imperfections, SensorErrors};
 
 use super::common::hardware_loop::{HardwareLoop, SENDING, configured};

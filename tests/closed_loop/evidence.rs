@@ -1,10 +1,11 @@
 //! Every cause comes with the number that caused it, its bound, and the leg or axis; and a cycle near a limit
 //! says so before the limit bites.
 
-use hexad::control::controller::{Input, Output, SetpointKind};
-use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad::control::limits::Limit;
-use hexad::control::state::State;
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad::control::signals::inputs::{Input, SetpointKind};
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::State;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 

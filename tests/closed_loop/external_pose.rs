@@ -1,8 +1,9 @@
 //! The pose of another sensor: it shows homing, scale and slip, which lengths alone cannot.
 
-use hexad::control::controller::{Input, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{Request, State};
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, fit};
 

@@ -3,8 +3,8 @@
 //! `HEXAD_LONG=1` makes it ten hours of simulated motion.
 
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfections, SensorErrors};
 use hexad::plant::random::Random;
 use rayon::prelude::*;

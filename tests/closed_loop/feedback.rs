@@ -2,10 +2,10 @@
 
 use hexad::config::Config;
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
 use hexad::control::parameters::Parameters;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Twist};
 use hexad::model::task::TaskState;

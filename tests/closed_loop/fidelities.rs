@@ -3,9 +3,9 @@
 
 use hexad::config::deployment::FidelityChoice;
 use hexad::control::controller::Controller;
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::parameters::Parameters;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::model::fidelity::Fidelity;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 

@@ -2,10 +2,11 @@
 
 use std::sync::LazyLock;
 
-use hexad::control::controller::{Controller, Input, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::Limit;
-use hexad::control::state::{Request, State};
+use hexad::control::controller::{Controller, Output};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};

@@ -1,11 +1,12 @@
 //! Forces stay within what the actuators can do, whatever comes in, and lose what they must lose evenly.
 
 use hexad::config::Config;
-use hexad::control::controller::{Input, Output};
-use hexad::control::limits::{DerivativeLimits, Limit, Limits};
+use hexad::control::controller::Output;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::limits::{DerivativeLimits, Limit, Limits};
+use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Gravity;
-use hexad::model::machine::LEGS;
 use hexad::model::rigid::Motion as Moving;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};

@@ -2,10 +2,10 @@
 //! and what compensation makes of it.
 
 use hexad::config::Config;
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
-use hexad::control::leg_masses::LegMasses;
-use hexad::control::state::State;
+use hexad::control::law::leg_masses::LegMasses;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 use rayon::prelude::*;

@@ -1,11 +1,11 @@
 //! Setpoints of people, joysticks and simulators under `on_violation = "limit"`: the platform follows as near as the limits
 //! allow, and nothing that is sent is a fault.
 
-use hexad::control::controller::SetpointKind;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::Limit;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::SetpointKind;
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::State;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::plant::random::Random;

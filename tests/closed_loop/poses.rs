@@ -3,8 +3,8 @@
 use core::array;
 
 use hexad::control::controller::Controller;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::rigid::Pose;
 use hexad::model::task::TaskState;

@@ -1,6 +1,7 @@
 //! The controller is a pure function of its inputs.
 
-use hexad::control::controller::{Controller, Input, Output};
+use hexad::control::controller::{Controller, Output};
+use hexad::control::signals::inputs::Input;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 
 use super::common::deployed;

@@ -1,10 +1,11 @@
 //! A controlled platform and what it feels, for the policies of setpoints.
 
 use hexad::config::Config;
-use hexad::control::controller::{Output, Setpoint, SetpointKind};
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::controller::Output;
 use hexad::control::parameters::{Parameters, ViolationPolicy};
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::{Setpoint, SetpointKind};
+use hexad::control::signals::state::State;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;

@@ -1,11 +1,12 @@
 //! Checks of setpoints, each alone: what it accepts just within its bound and refuses just beyond it.
 
-use hexad::control::controller::Setpoint;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::input_validation::{SetpointMotion, check_setpoint};
-use hexad::control::limits::LimitSet;
 use hexad::control::parameters::{Envelope, Parameters};
-use hexad::control::state::{Request, State};
+use hexad::control::setpoint::motion::SetpointMotion;
+use hexad::control::setpoint::validation::check_setpoint;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::Setpoint;
+use hexad::control::signals::limits::LimitSet;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::task::TaskState;
 

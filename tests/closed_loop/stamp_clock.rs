@@ -1,8 +1,8 @@
 //! With external release: stamps that do not advance as the daemon's clock does end control within a bounded time.
 
-use hexad::control::controller::Input;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::Request;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::state::Request;
 use hexad::model::task::TaskState;
 
 use super::common::deployed;

@@ -1,8 +1,9 @@
 //! Time stamps of measurements: of the future, and too old for the loop.
 
-use hexad::control::controller::{Input, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{Request, State};
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 

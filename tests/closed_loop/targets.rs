@@ -1,9 +1,9 @@
 //! Targets: a pose to move to and stand at, under both policies.
 
-use hexad::control::controller::SetpointKind;
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::SetpointKind;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 

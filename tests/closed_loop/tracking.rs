@@ -4,7 +4,7 @@
 use core::f64::consts::TAU;
 
 use hexad::analysis::sampled_loop::SampledLoop;
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::model::rigid::{Motion, Twist};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::BuiltInMotion;

@@ -2,10 +2,10 @@
 
 use hexad::config::Config;
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
+use hexad::model::LEGS;
 use hexad::model::inverse_geometry::leg_motion;
-use hexad::model::machine::LEGS;
 use hexad::model::task::TaskState;
 use hexad::plant::imperfections::{Imperfections, SensorErrors};
 use nalgebra::Vector6;

@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use hexad::config::Config;
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{OperatorRequest, Request, State};
-use hexad::model::machine::{LEGS, Machine};
+use hexad::control::controller::{Controller, Output};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::model::LEGS;
+use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;
 use hexad::plant::hardware::Hardware;
 use hexad::plant::imperfections::Imperfections;

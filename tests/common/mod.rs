@@ -33,7 +33,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use hexad::config::Config;
-use hexad::model::machine::{Joints, LEGS, Machine};
+use hexad::model::LEGS;
+use hexad::model::machine::{Joints, Machine};
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
 use nalgebra::{Matrix3, Vector3, Vector6};

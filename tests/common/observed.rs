@@ -2,10 +2,12 @@
 //! force a while after the release. It stops at each release, where the reference of the cycle before is due.
 
 use hexad::config::Config;
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
-use hexad::control::state::{OperatorRequest, Request, State};
-use hexad::model::machine::{LEGS, Machine};
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::model::LEGS;
+use hexad::model::machine::Machine;
 use hexad::model::rigid::Motion;
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::plant::simulator::{Brakes, Simulator};

@@ -4,19 +4,21 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
 
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::estimator::ErrorState;
-use hexad::control::estimator::input_matrix::InputMatrix;
-use hexad::control::limits::Limit;
-use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::control::law::input_matrix::InputMatrix;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::errors::ErrorState;
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{OperatorRequest, Request, State};
 use hexad::daemon;
+use hexad::model::LEGS;
 use hexad::model::fidelity::Fidelity;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use hexad::motion::timeline::Timeline;
@@ -51,7 +53,12 @@ pub fn answer(config: &Config, error: &Vector6<f64>) -> Vector6<f64> {
     let parameters = parameters(config);
     let (_, [[by_e, by_w, by_d], _]) = parameters.noise.steady();
     let period_s = parameters.noise.period_s;
-    let input_matrix = InputMatrix::at_home(&config.machine, &parameters.law, parameters.fidelity);
+    let input_matrix = InputMatrix::at_home(
+        &config.machine,
+        parameters.law.mode,
+        &parameters.law.leg_masses,
+        parameters.fidelity,
+    );
     let largest = input_matrix.largest_disturbance(&parameters.law.saturation);
     let estimate = ErrorState {
         value: error * by_e,

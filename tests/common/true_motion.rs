@@ -4,13 +4,14 @@
 //! release and at each change of the forces. Only the reference is the controller's, as it is judged too.
 
 use hexad::control::controller::Output;
-use hexad::control::gains::Gains;
-use hexad::control::limits::DerivativeLimits;
+use hexad::control::law::gains::Gains;
 use hexad::control::parameters::Parameters;
-use hexad::control::state::State;
+use hexad::control::signals::limits::DerivativeLimits;
+use hexad::control::signals::state::State;
+use hexad::model::LEGS;
 use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Pose};
 use hexad::model::task::task_coordinates;
 use hexad::plant::forward_dynamics::ForwardDynamics;

@@ -3,7 +3,7 @@
 use hexad::config::control_loops::longest_age_s;
 use hexad::config::deployment::{Deployment, FidelityChoice};
 use hexad::config::{Config, Violation};
-use hexad::control::estimator::SENT_ACCELERATIONS;
+use hexad::control::law::estimator::SENT_ACCELERATIONS;
 use hexad::model::fidelity::Fidelity;
 
 use super::{FRIED, violations};

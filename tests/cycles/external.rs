@@ -6,7 +6,8 @@ use std::thread::{JoinHandle, sleep, spawn};
 use std::time::{Duration, Instant};
 
 use heapless::spsc::Queue;
-use hexad::control::controller::{Input, Measurement, Output};
+use hexad::control::controller::Output;
+use hexad::control::signals::inputs::{Input, Measurement};
 use hexad::daemon::cycle::{CycleInput, CycleRecord, IoSide};
 use hexad::messages::clock::monotonic_ns;
 use hexad::realtime::clock::Monotonic;

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use heapless::spsc::Queue;
-use hexad::control::controller::{Input, Output};
+use hexad::control::controller::Output;
+use hexad::control::signals::inputs::Input;
 use hexad::daemon::cycle::CycleRecord;
 use hexad::messages::LoopCounters;
 use hexad::messages::clock::monotonic_ns;

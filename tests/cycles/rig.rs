@@ -4,7 +4,8 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Queue;
-use hexad::control::controller::{Input, Output};
+use hexad::control::controller::Output;
+use hexad::control::signals::inputs::Input;
 use hexad::daemon::cycle::CycleRecord;
 use hexad::messages::LoopCounters;
 use hexad::realtime::clock::Clock;

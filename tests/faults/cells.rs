@@ -1,13 +1,13 @@
 //! What becomes of a fault in a state, and what the platform may feel meanwhile.
 
-use hexad::control::diagnostic::DiagnosticCode::{
+use hexad::control::law::ControlMode;
+use hexad::control::parameters::ViolationPolicy;
+use hexad::control::signals::diagnostic::DiagnosticCode::{
     self, EmergencyStop, FeedbackSaturated, FollowingError, MeasurementImplausible, OperatorRequest,
     RateInconsistent, RateJumped, ReadyToEngage, SensorFrozen, SetpointBeyondLimits, SetpointTooFar,
     VelocityError,
 };
-use hexad::control::law::ControlMode;
-use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 
 use super::common::observed::Rates;
 use super::disturbances::Disturbance;

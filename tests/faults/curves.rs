@@ -1,7 +1,7 @@
 //! The lines of a picture, from the samples of a recording.
 
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::model::rigid::{Motion, Pose, Twist};
 
 use super::recording::Sample;

@@ -1,10 +1,10 @@
 //! What happened, and how near to its bounds.
 
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::Limits;
 use hexad::control::parameters::Parameters;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::limits::Limits;
+use hexad::control::signals::state::State;
 use hexad::model::rigid::{Acceleration, Pose, Twist};
 use hexad::model::task::TaskState;
 

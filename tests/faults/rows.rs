@@ -1,6 +1,6 @@
 //! The rows of the table: every fault, and what becomes of it in every state.
 
-use hexad::control::diagnostic::DiagnosticCode::{
+use hexad::control::signals::diagnostic::DiagnosticCode::{
     self, DaemonHeld, DeadlineMissed, DisturbanceLasting, DriveFault, DriveForceMissing, DriveNotReady,
     EmergencyStop, ExternalPoseMismatch, HoldingPose, Impact, LengthOutOfStroke, MeasurementImplausible,
     MeasurementJumped, MeasurementLost, MeasurementNotFinite, MeasurementStampInvalid, MeasurementTooOld,
@@ -9,7 +9,7 @@ use hexad::control::diagnostic::DiagnosticCode::{
     SetpointOutOfEnvelope, SetpointOutOfReach, SetpointStampInvalid, SetpointTooFast, StampClockInvalid,
     VelocityError,
 };
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 
 use super::cells::Cell::{self, Brake, End, Full, Idle, On, Path, Stop};
 use super::cells::{

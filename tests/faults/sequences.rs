@@ -1,6 +1,6 @@
 //! Faults and requests that follow each other while the platform moves.
 
-use hexad::control::state::Request;
+use hexad::control::signals::state::Request;
 
 use super::disturbances::{Moment, setpoints};
 use super::world::wanted;

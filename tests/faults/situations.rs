@@ -3,11 +3,11 @@
 use hexad::analysis::envelope;
 use hexad::config::Config;
 use hexad::control::controller::Controller;
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
-use hexad::control::limits::DerivativeLimits;
 use hexad::control::parameters::{Parameters, ViolationPolicy};
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::limits::DerivativeLimits;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
 

@@ -6,10 +6,10 @@
 use std::fmt::Write;
 use std::sync::LazyLock;
 
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::plant::simulator::Brakes;
 use rayon::prelude::*;
 

@@ -1,11 +1,13 @@
 //! A controller, a platform, a setpoint source, and what may go wrong between them.
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
-use hexad::control::state::Request;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad::control::signals::state::Request;
+use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{Exact, Gravity};
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::FittedMotion;

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 use std::fmt::Debug;
 
 use hexad::config::Config;
-use hexad::control::controller::{Input, Measurement, Output, SetpointKind};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::drive_monitor::DriveStatus;
+use hexad::control::controller::Output;
 use hexad::control::law::ControlMode;
-use hexad::control::limits::Limit;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::DriveStatus;
+use hexad::control::signals::inputs::{Input, Measurement, SetpointKind};
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::fidelity::Fidelity;
 
 use super::stream::Run;

@@ -15,9 +15,9 @@
 //!
 //! Numbers are the bits of an `f64`. Words of a part that is missing repeat those of the row before.
 
-use hexad::control::controller::{Input, Measurement, Publishers, Setpoint, SetpointKind};
-use hexad::control::drive_monitor::DriveStatus;
-use hexad::control::state::{OperatorRequest, Request};
+use hexad::control::signals::inputs::DriveStatus;
+use hexad::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
+use hexad::control::signals::state::{OperatorRequest, Request};
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 

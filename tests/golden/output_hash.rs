@@ -5,10 +5,10 @@
 //! payload), integers, numbers of an enumeration; for an optional part 1 and its words, or 0. Matrices go column by column.
 
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::Diagnostic;
-use hexad::control::limits::LimitSet;
-use hexad::control::localization::PlatformState;
-use hexad::control::tracking_error::TrackingError;
+use hexad::control::sensing::localization::PlatformState;
+use hexad::control::signals::diagnostic::Diagnostic;
+use hexad::control::signals::errors::TrackingError;
+use hexad::control::signals::limits::LimitSet;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 
 /// Hash of the outputs so far.

@@ -7,7 +7,8 @@ use std::{fs, thread};
 
 use fearless_simd::Level;
 use hexad::config::Config;
-use hexad::control::controller::{Controller, Input, Output};
+use hexad::control::controller::{Controller, Output};
+use hexad::control::signals::inputs::Input;
 use hexad::realtime::setup::denormals;
 use rayon::prelude::*;
 

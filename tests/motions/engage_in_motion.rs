@@ -2,7 +2,7 @@
 
 use hexad::config::Config;
 use hexad::control::parameters::Parameters;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
 
 use super::common::certificate::cases;

@@ -7,8 +7,8 @@ use super::common::observed::Observed;
 use super::common::rig::parameters;
 use super::heave::{FADE_S, Heave, amplitude};
 use super::report::{Report, Runs};
-use hexad::control::controller::Measurement;
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::Measurement;
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 /// Angular frequencies of the vertical sines \[rad/s\].

@@ -2,8 +2,8 @@
 //! arrive: control begins with the motion that the platform has then, not with the one that was measured.
 
 use hexad::config::Config;
-use hexad::control::controller::Input;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::state::{Request, State};
 
 use super::common::edited::{config, deployed_table, set};
 use super::common::extremes::Quantity;

@@ -7,7 +7,7 @@ use super::common::rig::parameters;
 use super::heave::{Heave, amplitude};
 use super::report::{Report, Runs};
 use hexad::config::Config;
-use hexad::control::controller::Setpoint;
+use hexad::control::signals::inputs::Setpoint;
 use hexad::model::task::TaskState;
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];

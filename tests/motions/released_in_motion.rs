@@ -1,7 +1,7 @@
 //! `off` and `park`, or `estop`, `clear` and `park`, while the platform moves: its brakes have just begun to close when
 //! control begins again.
 
-use hexad::control::state::{Request, State};
+use hexad::control::signals::state::{Request, State};
 
 use super::common::certificate::cases;
 use super::common::deployed;

@@ -7,7 +7,7 @@ use super::common::observed::Observed;
 use super::common::rig::parameters;
 use super::heave::{FADE_S, Heave, amplitude};
 use super::report::{Report, Runs};
-use hexad::control::controller::Setpoint;
+use hexad::control::signals::inputs::Setpoint;
 
 const MACHINES: [&str; 3] = ["reference", "motion_base", "fried2008"];
 /// Angular frequencies of the vertical sines \[rad/s\], of the source before and the one after.

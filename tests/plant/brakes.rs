@@ -1,6 +1,7 @@
 //! Brakes and end stops.
 
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::LEGS;
+use hexad::model::machine::Machine;
 use hexad::model::rigid::Twist;
 use hexad::plant::simulator::{Brakes, Simulator};
 

@@ -1,7 +1,8 @@
 //! Elastic legs: energy, play, the rigid limit, and the step that the tolerance asks for.
 
+use hexad::model::LEGS;
 use hexad::model::inverse_geometry::leg_lengths;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::plant::imperfections::{ElasticLeg, Friction, Imperfections};
 use hexad::plant::simulator::{Brakes, Simulator};
 use nalgebra::Vector6;

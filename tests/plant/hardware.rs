@@ -1,6 +1,7 @@
 //! Commands and sensors: nothing by default, the same with the same seed, and each imperfection alone.
 
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::LEGS;
+use hexad::model::machine::Machine;
 use hexad::plant::hardware::Hardware;
 use hexad::plant::imperfections::{BuildErrors, Imperfections};
 use hexad::plant::simulator::{Brakes, Simulator};

@@ -1,7 +1,7 @@
 //! Forces that are held while the legs turn: the bounds of the jerk against the accelerations of the plant.
 
 use hexad::analysis::held_forces::HeldForces;
-use hexad::control::limits::{DerivativeLimits, Limits};
+use hexad::control::signals::limits::{DerivativeLimits, Limits};
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_jacobian::leg_wrenches;

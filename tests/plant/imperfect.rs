@@ -1,9 +1,10 @@
 //! Forces that the model does not have, each against what it must do by the laws of mechanics.
 
+use hexad::model::LEGS;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion, Twist, Wrench};
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::imperfections::{BuildErrors, Friction, Imperfections};

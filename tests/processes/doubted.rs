@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use hexad::config::Config;
 use hexad::messages::{Bus, MeasuredMessage, Message};
+use hexad::model::LEGS;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
-use hexad::model::machine::LEGS;
 use hexad::model::task::TaskState;
 
 use crate::support::children::{HANG, Hexad};

@@ -1,7 +1,7 @@
 //! SIGKILL in full motion, then a restart and one `engage`, without anybody cleaning up.
 
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::Request;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::Request;
 use hexad::messages::MeasuredMessage;
 use hexad::messages::clock::monotonic_ns;
 

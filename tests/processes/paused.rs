@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::messages::ForceMessage;
 use hexad::messages::clock::monotonic_ns;
 

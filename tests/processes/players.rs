@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::messages::clock::monotonic_ns;
 
 use crate::support::children::{Ended, HANG, Hexad, run};

@@ -5,9 +5,9 @@ use std::time::Duration;
 use std::{fs, thread};
 
 use hexad::config::Config;
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::messages::StatusMessage;
-use hexad::model::machine::LEGS;
+use hexad::model::LEGS;
 use hexad::plant::simulator::Simulator;
 use hexad::realtime::clock::{Grid, sleep_until};
 use hexad::realtime::setup::scheduling;

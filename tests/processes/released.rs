@@ -6,7 +6,7 @@ use std::panic::resume_unwind;
 use std::process::{Command, Stdio};
 use std::thread::scope;
 
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::messages::{ForceMessage, MeasuredMessage};
 
 use crate::common::not_run::not_run;

@@ -6,7 +6,7 @@ use std::fs;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::control::state::{Request, State};
+use hexad::control::signals::state::{Request, State};
 use hexad::messages::clock::monotonic_ns;
 
 use crate::common::certificate::Certificate;

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use hexad::commands::in_step::Operator;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::{Request, State};
 use hexad::messages::Bus;
 use hexad::messages::clock::monotonic_ns;
 use serde_json::json;

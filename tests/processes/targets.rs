@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use hexad::commands::demo::children::PARENT_VARIABLE;
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::messages::clock::monotonic_ns;
 
 use crate::support::children::{Ended, HANG, Hexad, run};

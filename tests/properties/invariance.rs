@@ -1,13 +1,14 @@
 //! What the forces must not depend on: the choice of axes, of units, of leg numbers, of instructions.
 
 use fearless_simd::Level;
+use hexad::model::LEGS;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::{Exact, LumpedLegs, MasslessLegs, NoVelocity, RigidLegs};
 use hexad::model::forward_kinematics::refine;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::inverse_jacobian::condition;
 use hexad::model::kinematic_state::KinematicState;
-use hexad::model::machine::{LEGS, Link, Machine};
+use hexad::model::machine::{Link, Machine};
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;

@@ -1,12 +1,13 @@
 //! Sound machines whose legs are arranged so that methods which work on some of the legs first may fail:
 //! parallel legs, legs in a plane.
 
+use hexad::model::LEGS;
 use hexad::model::active_forces::{InverseDynamics, inverse_dynamics};
 use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::{Tracker, TrackingResult};
 use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::inverse_jacobian::{condition, leg_wrenches, twist_from_rates};
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;

@@ -1,11 +1,12 @@
 //! Arrival at a target that jumps: against the time-optimal profile, without overshoot, at every rate.
 
 use hexad::config::Config;
-use hexad::control::controller::Setpoint;
-use hexad::control::input_validation::SetpointMotion;
-use hexad::control::limits::DerivativeLimits;
-use hexad::control::parameters::Constants;
-use hexad::control::reference::{ReferenceGenerator, Target};
+use hexad::control::constants::Constants;
+use hexad::control::reference::ReferenceGenerator;
+use hexad::control::setpoint::motion::SetpointMotion;
+use hexad::control::setpoint::target::Target;
+use hexad::control::signals::inputs::Setpoint;
+use hexad::control::signals::limits::DerivativeLimits;
 use hexad::model::task::TaskState;
 use nalgebra::{Vector3, Vector6};
 use rsruckig::prelude::*;

@@ -5,8 +5,8 @@ use hexad::analysis::target_motion::{
     REACHED_M, REACHED_RAD, TargetRefusal, check_target, target_motion, workspace_bounds,
 };
 use hexad::config::Config;
-use hexad::control::limits::Limit;
-use hexad::control::parameters::Constants;
+use hexad::control::constants::Constants;
+use hexad::control::signals::limits::Limit;
 use hexad::model::rigid::{Pose, Twist};
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;

@@ -1,10 +1,12 @@
 //! No limit is exceeded, whatever the targets, and each is approached.
 
 use hexad::config::Config;
-use hexad::control::input_validation::SetpointMotion;
-use hexad::control::limits::DerivativeLimits;
-use hexad::control::parameters::{Constants, Envelope, Parameters};
-use hexad::control::reference::{ReferenceGenerator, Target};
+use hexad::control::constants::Constants;
+use hexad::control::parameters::{Envelope, Parameters};
+use hexad::control::reference::ReferenceGenerator;
+use hexad::control::setpoint::motion::SetpointMotion;
+use hexad::control::setpoint::target::Target;
+use hexad::control::signals::limits::DerivativeLimits;
 use hexad::plant::random::Random;
 use nalgebra::Vector6;
 use rayon::prelude::*;

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use hexad::control::parameters::{Constants, Envelope};
+use hexad::control::constants::Constants;
+use hexad::control::parameters::Envelope;
 use hexad::control::reference::ReferenceGenerator;
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::kinematic_state::KinematicState;

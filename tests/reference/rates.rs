@@ -3,10 +3,11 @@
 use core::f64::consts::TAU;
 
 use hexad::config::Config;
-use hexad::control::controller::Setpoint;
-use hexad::control::input_validation::SetpointMotion;
-use hexad::control::parameters::Constants;
-use hexad::control::reference::{ReferenceGenerator, Target};
+use hexad::control::constants::Constants;
+use hexad::control::reference::ReferenceGenerator;
+use hexad::control::setpoint::motion::SetpointMotion;
+use hexad::control::setpoint::target::Target;
+use hexad::control::signals::inputs::Setpoint;
 use hexad::model::rigid::Pose;
 use hexad::model::task::TaskState;
 

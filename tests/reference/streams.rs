@@ -1,6 +1,6 @@
 //! Streams of targets, each by a seed.
 
-use hexad::control::controller::{Setpoint, SetpointKind};
+use hexad::control::signals::inputs::{Setpoint, SetpointKind};
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;
 use nalgebra::Vector6;

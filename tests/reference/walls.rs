@@ -1,10 +1,12 @@
 //! Pressing into walls, under `on_violation = "limit"`: the platform slides along them without chatter.
 
 use hexad::config::Config;
-use hexad::control::controller::Setpoint;
-use hexad::control::input_validation::SetpointMotion;
-use hexad::control::parameters::{Constants, Envelope, Parameters, ViolationPolicy};
-use hexad::control::reference::{ReferenceGenerator, Target};
+use hexad::control::constants::Constants;
+use hexad::control::parameters::{Envelope, Parameters, ViolationPolicy};
+use hexad::control::reference::ReferenceGenerator;
+use hexad::control::setpoint::motion::SetpointMotion;
+use hexad::control::setpoint::target::Target;
+use hexad::control::signals::inputs::Setpoint;
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};

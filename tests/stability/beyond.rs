@@ -2,9 +2,9 @@
 //! is not taken for one that is still on the side of home: not until somebody has looked and said so.
 
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad::control::limits::Limit;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::inverse_geometry::leg_motion;
 use hexad::model::rigid::{Pose, Wrench};
 use hexad::model::task::TaskState;

@@ -5,7 +5,7 @@
 use core::f64::consts::FRAC_PI_2;
 
 use hexad::config::Config;
-use hexad::control::limits::{DerivativeLimits, Limits};
+use hexad::control::signals::limits::{DerivativeLimits, Limits};
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Pose;

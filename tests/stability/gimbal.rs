@@ -5,9 +5,9 @@ use core::f64::consts::FRAC_PI_2;
 
 use hexad::config::Config;
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::DerivativeLimits;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::limits::DerivativeLimits;
+use hexad::control::signals::state::State;
 use hexad::model::rigid::{Motion, Pose};
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::rise;

@@ -4,9 +4,9 @@ use core::f64::consts::TAU;
 
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::Limit;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::State;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::{Exact, Fidelity, MasslessLegs, RigidLegs};
 use hexad::model::forward_kinematics::{MAX_CONDITION, Outcome, refine};

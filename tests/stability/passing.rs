@@ -4,10 +4,10 @@
 
 use hexad::config::Config;
 use hexad::control::controller::Output;
-use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad::control::limits::Limit;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::State;
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::forward_kinematics::MAX_CONDITION;

@@ -2,9 +2,9 @@
 
 use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::config::Config;
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::model::LEGS;
 use hexad::model::inverse_jacobian::leg_wrenches;
-use hexad::model::machine::LEGS;
 use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::imperfections::SensorErrors;

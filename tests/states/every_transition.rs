@@ -1,8 +1,9 @@
 //! Every state with every cause and goal, every request, every combination of findings.
 
-use hexad::control::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
-use hexad::control::state::{Request, State};
-use hexad::control::supervisor::{AfterStop, Findings, SupervisorState, next};
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
+use hexad::control::signals::state::AfterStop;
+use hexad::control::signals::state::{Request, State};
+use hexad::control::supervision::supervisor::{Findings, SupervisorState, next};
 use rayon::prelude::*;
 
 use super::common::certificate::{Certificate, cases};

@@ -1,8 +1,9 @@
 //! What the documents say must follow, written as a list: the first line that applies counts.
 
-use hexad::control::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
-use hexad::control::state::{Request, State};
-use hexad::control::supervisor::{AfterStop, Findings, SupervisorState};
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
+use hexad::control::signals::state::AfterStop;
+use hexad::control::signals::state::{Request, State};
+use hexad::control::supervision::supervisor::{Findings, SupervisorState};
 
 type Next = (SupervisorState, Option<Diagnostic>);
 

@@ -4,11 +4,12 @@
 use std::sync::LazyLock;
 
 use hexad::config::Config;
-use hexad::control::controller::{Input, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::limits::Limit;
-use hexad::control::localization::PlatformState;
-use hexad::control::state::{Request, State};
+use hexad::control::controller::Output;
+use hexad::control::sensing::localization::PlatformState;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::Input;
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
 use proptest::prelude::*;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hexad::control::state::Request;
+use hexad::control::signals::state::Request;
 use hexad::operator::protocol::is_stop;
 use hexad::operator::requests::carry_out;
 use hexad::operator::stops::stop_machine;

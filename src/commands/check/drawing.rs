@@ -7,8 +7,9 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 use std::path::Path;
 
+use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::output::axis::Axis;
 use crate::output::svg::{

@@ -7,13 +7,13 @@ use crate::config::control_loops::{ControlLoop, longest_age_s, loops};
 use crate::config::deployment::default_limits::{DerivedLimit, derived_limits};
 use crate::config::examination::Examination;
 use crate::config::{Config, Violation};
-use crate::control::parameters::Constants;
+use crate::control::constants::Constants;
 use crate::daemon;
+use crate::model::LEGS;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::{Exact, Fidelity};
 use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::LEGS;
 use crate::model::task::TaskState;
 
 /// Schema of the JSON, raised when a field changes its meaning or goes.

@@ -6,11 +6,11 @@ use nalgebra::Vector6;
 
 use super::recording::{Recording, desired_motion, measured_pose};
 use crate::config::Config;
-use crate::control::input_validation::seconds_between;
+use crate::control::signals::time::seconds_between;
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::LEGS;
 use crate::output::charts::{LineStyle, Panel, Series, write_svg};
 use crate::output::svg::ChartError;
 

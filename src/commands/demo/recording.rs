@@ -1,7 +1,7 @@
 //! Recording of the topics during a demonstration, and its tracking error.
 
-use crate::control::controller::Setpoint;
-use crate::control::input_validation::seconds_between;
+use crate::control::signals::inputs::Setpoint;
+use crate::control::signals::time::seconds_between;
 use crate::daemon::report::TrackingSum;
 use crate::messages::{Bus, PortError, Subscriber};
 use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage};

@@ -3,8 +3,8 @@
 use crate::analysis::target_motion::{TargetRefusal, WorkspaceBound, check_target};
 use crate::commands::jog::keys::Key;
 use crate::commands::target::pose_of;
-use crate::control::limits::DerivativeLimits;
-use crate::control::parameters::Constants;
+use crate::control::constants::Constants;
+use crate::control::signals::limits::DerivativeLimits;
 use crate::model::rigid::Pose;
 
 /// Velocities, as shares of those of autonomous motions.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector6;
 
-use crate::control::limits::{DerivativeLimits, Limits};
+use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::motion::minimum_jerk::shortest_duration;
 
 /// Share of each limit that the approach uses; the rest is for angles that turn at once and add up.

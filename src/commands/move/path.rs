@@ -2,7 +2,7 @@
 
 use super::rate_change::RateChange;
 use super::trajectory::Trajectory;
-use crate::control::limits::Limits;
+use crate::control::signals::limits::Limits;
 use crate::model::task::TaskState;
 use crate::motion::timeline::Timeline;
 

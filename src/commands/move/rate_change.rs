@@ -1,7 +1,7 @@
 //! Change of the rate of a motion's own time, from one to zero or back: so the platform comes to rest, and goes on, on the
 //! way that was checked, and not beside it.
 
-use crate::control::limits::{DerivativeLimits, Limits};
+use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::model::task::TaskState;
 use crate::motion::minimum_jerk::{Profile, rise};
 

@@ -11,8 +11,9 @@ use super::signals::{COLUMNS, SIGNALS};
 use super::summary::{Fact, facts};
 use super::track::Track;
 use crate::config::Config;
-use crate::control::state::State;
-use crate::model::machine::{LEGS, Machine};
+use crate::control::signals::state::State;
+use crate::model::LEGS;
+use crate::model::machine::Machine;
 
 /// Head of a page.
 #[derive(Serialize)]

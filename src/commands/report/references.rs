@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use crate::control::input_validation::seconds_between;
+use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
 /// References kept: more periods than a measurement is old.

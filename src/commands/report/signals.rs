@@ -2,13 +2,14 @@
 
 use super::references::References;
 use crate::config::Config;
-use crate::control::input_validation::seconds_between;
+use crate::control::signals::time::seconds_between;
 use crate::daemon::nanoseconds;
 use crate::messages::CycleMessage;
+use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::rigid::{Pose, Twist};
 use crate::model::task::task_coordinates;
 
@@ -207,8 +208,9 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::controller::{Input, Measurement, Output};
-    use crate::control::localization::PlatformState;
+    use crate::control::controller::Output;
+    use crate::control::sensing::localization::PlatformState;
+    use crate::control::signals::inputs::{Input, Measurement};
     use crate::model::rigid::Motion;
     use crate::model::task::TaskState;
 

@@ -184,7 +184,7 @@ fn age_text(age_s: f64) -> String {
 #[cfg(test)]
 pub(in crate::commands) mod tests {
     use super::*;
-    use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+    use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
     use crate::operator::protocol::{RequestResult, VERSION};
     use crate::operator::status_report::{ProcessReport, TimingReport};
 

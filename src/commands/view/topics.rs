@@ -3,12 +3,13 @@
 use std::collections::VecDeque;
 
 use crate::config::Config;
-use crate::control::controller::{Input, Measurement, Output, Setpoint};
-use crate::control::input_validation::seconds_between;
-use crate::control::limits::LimitSet;
-use crate::control::localization::PlatformState;
-use crate::control::state::State;
-use crate::control::tracking_error::TrackingError;
+use crate::control::controller::Output;
+use crate::control::sensing::localization::PlatformState;
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::{Input, Measurement, Setpoint};
+use crate::control::signals::limits::LimitSet;
+use crate::control::signals::state::State;
+use crate::control::signals::time::seconds_between;
 use crate::messages::{
     CycleMessage, ForceMessage, MeasuredMessage, PortError, SetpointMessage, StatusMessage, Subscriber,
 };

@@ -10,8 +10,8 @@ use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
 use crate::control::law::ControlMode;
-use crate::control::leg_masses::LegMasses;
-use crate::control::supervisor::AfterStop;
+use crate::control::law::leg_masses::LegMasses;
+use crate::control::signals::state::AfterStop;
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
 

@@ -5,7 +5,7 @@ use core::fmt;
 use serde::Serialize;
 
 use crate::analysis::drive_capability::DriveCapability;
-use crate::control::limits::{DerivativeLimits, Limits};
+use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::model::machine::Machine;
 
 /// Motions that a standing person tolerates: half of gravity, a hundredth of a second to build it up.

@@ -6,7 +6,7 @@ use crate::analysis::held_forces::{HeldForces, SurveyedPose};
 use crate::config::bound::Bound;
 use crate::config::machine::rounded;
 use crate::config::reader::SectionReader;
-use crate::control::limits::{DerivativeLimits, Limits as ReferenceLimits};
+use crate::control::signals::limits::{DerivativeLimits, Limits as ReferenceLimits};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;

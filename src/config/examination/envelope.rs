@@ -6,10 +6,11 @@ use crate::analysis::clearance::{Clearance, WorkspaceLimit};
 use crate::analysis::envelope::{CORNER_COUNT, EnvelopeBounds, MotionEnvelope};
 use crate::analysis::region_proof::{RegionProof, poses, prove};
 use crate::config::machine::rounded;
+use crate::model::LEGS;
 use crate::model::active_forces::inverse_dynamics;
 use crate::model::fidelity::Exact;
 use crate::model::inverse_geometry::leg_motion;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::output::numbers::{AXES, axis_unit, significant};
 
 pub(super) fn examine(examiner: &mut Examiner) {

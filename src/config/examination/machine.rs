@@ -4,7 +4,8 @@ use super::Examiner;
 use crate::analysis::drive_capability::DriveCapability;
 use crate::analysis::leg_crossing::{CrossingKind, LegCrossing, leg_crossings};
 use crate::config::machine::rounded;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::LEGS;
+use crate::model::machine::Machine;
 use nalgebra::Vector3;
 
 /// Largest share of the actuators' force that holding the platform may take: a tenth remains for feedback and

@@ -1,6 +1,6 @@
 //! The reference of the last cycles: its motion at the instant of a measurement.
 
-use crate::control::input_validation::seconds_between;
+use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
 /// Segments kept, a power of two: at 1 kHz those of 128 ms, at 20 kHz of 6 ms. An older instant, as that of a measurement behind a

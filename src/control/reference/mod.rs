@@ -8,64 +8,39 @@
 //! verified before, which needs no check. By induction every limit holds at all times, also if every setpoint is lost.
 //! The assumptions and the proof: `docs/safety.md`.
 //!
-//! | file | content |
+//! | folder | content |
 //! | --- | --- |
-//! | `stop` | stop of a vector in closed form |
-//! | `verification` | whether a stop keeps the limits along its way |
-//! | `examination` | a stop near a bound, knot by knot |
-//! | `knots` | at which instants |
-//! | `cubic_departure` | what may happen between two knots |
-//! | `angle_ranges`, `position_ranges` | whether a pose is within the envelope |
-//! | `pose_stop` | stop of position and orientation |
-//! | `held_stop` | the stop that is held ready, and followed |
-//! | `regularity` | balls of poses proved regular, for the limit of the condition |
-//! | `pose_bounds` | lengths of the legs and envelope |
-//! | `approach` | acceleration towards a moving target |
-//! | `constant_jerk` | step of a motion |
-//! | `padding` | vectors of three in four lanes |
-//! | `walls` | soft approach of bounds |
-//! | `target` | setpoint, samples of poses, or a pose |
-//! | [`pose_samples`] | target through poses without derivatives |
+//! | `proposal` | acceleration towards a moving target, and away from bounds |
+//! | `stop` | stop in closed form, and the one that is held ready |
+//! | `proof` | whether a step, and the stop from its end, keep every limit |
 //! | `history` | the reference of the last cycles |
 
-use self::approach::{Approach, TargetOffset, limit_leg_rates};
-use self::constant_jerk::move_on;
-use self::held_stop::HeldStop;
-use self::history::History;
-use self::pose_bounds::PoseBounds;
-use self::pose_stop::StopKind;
-pub use self::target::Target;
-use self::target::{RelativeMotion, at_rest};
-use self::verification::{Step, Verifier};
-use self::walls::Walls;
-use super::input_validation::{SetpointMotion, seconds_between};
-use super::limits::{Limit, LimitSet};
-use super::parameters::{Constants, Parameters, ViolationPolicy};
-use super::tracking_error::TrackingError;
+use crate::control::constants::Constants;
+use crate::control::parameters::{Parameters, ViolationPolicy};
+use crate::control::reference::history::History;
+use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::proof::{step::Step, verification::Verifier};
+use crate::control::reference::proposal::approach::{Approach, TargetOffset, limit_leg_rates};
+use crate::control::reference::proposal::walls::Walls;
+use crate::control::reference::stop::constant_jerk::move_on;
+use crate::control::reference::stop::held_stop::HeldStop;
+use crate::control::reference::stop::pose_stop::StopKind;
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::target::{RelativeMotion, at_rest};
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::limits::{Limit, LimitSet};
+use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-mod angle_ranges;
-mod approach;
-mod constant_jerk;
-mod cubic_departure;
-mod examination;
-mod held_stop;
 mod history;
-mod knots;
-mod padding;
-mod pose_bounds;
-pub mod pose_samples;
-mod pose_stop;
-mod position_ranges;
-mod regularity;
+mod proof;
+mod proposal;
 #[cfg(test)]
 mod samples;
 mod stop;
-mod target;
 #[cfg(test)]
 mod tests;
-mod verification;
-mod walls;
 
 /// Longest step of the generator \[s\], so that slow loops give the same motion as fast ones.
 const MAX_STEP_S: f64 = 1e-3;

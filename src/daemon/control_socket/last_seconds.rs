@@ -3,8 +3,8 @@
 use std::fs::File;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel};
 
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::state::State;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::state::State;
 use crate::daemon::recorder::WindowOrder;
 use crate::operator::protocol::{AnswerLine, RequestResult, VERSION};
 

@@ -2,7 +2,7 @@
 
 use super::Server;
 use super::connection::Connection;
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::daemon::reload::{ReloadError, Reloaded};
 use crate::daemon::snapshot::Snapshot;
 use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};

@@ -6,15 +6,15 @@ use std::process;
 use std::sync::Arc;
 
 use crate::config::Config;
-use crate::control::controller::Publishers;
-use crate::control::diagnostic::Diagnostic;
-use crate::control::limits::{Limit, LimitSet};
+use crate::control::signals::diagnostic::Diagnostic;
+use crate::control::signals::inputs::Publishers;
+use crate::control::signals::limits::{Limit, LimitSet};
 use crate::daemon::process_names::{command, sentence};
 use crate::daemon::reload::Loaded;
 use crate::daemon::snapshot::Snapshot;
 use crate::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
 use crate::messages::{Bus, MeasuredMessage, Rejection, SetpointMessage, TopicObserver};
-use crate::model::machine::LEGS;
+use crate::model::LEGS;
 use crate::operator::protocol::{AnswerLine, DiagnosticReport, RequestResult, VERSION};
 use crate::operator::status_report::{
     ConfigurationReport, LegReport, ProcessReport, SourceReport, StatusReport, TimingReport,
@@ -201,7 +201,7 @@ fn process_report(process_id: u32, publishers: Publishers) -> ProcessReport {
 mod tests {
     use super::*;
     use crate::config::Config;
-    use crate::control::controller::{Measurement, Setpoint};
+    use crate::control::signals::inputs::{Measurement, Setpoint};
     use crate::model::task::TaskState;
 
     #[test]

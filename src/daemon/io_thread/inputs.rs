@@ -1,7 +1,7 @@
 //! Inputs of the controller: the newest message of each topic, and the request that is pending.
 
-use crate::control::controller::{Input, Measurement, Setpoint};
-use crate::control::state::{OperatorRequest, Request};
+use crate::control::signals::inputs::{Input, Measurement, Setpoint};
+use crate::control::signals::state::{OperatorRequest, Request};
 use crate::daemon::cycle::CycleInput;
 use crate::daemon::reload::timeouts::TimeoutsNs;
 use crate::messages::clock::monotonic_ns;

@@ -3,8 +3,8 @@
 use heapless::spsc::Producer;
 
 use crate::control::controller::Output;
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::state::State;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::state::State;
 use crate::daemon::cycle::CycleOutput;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Bus, ForceMessage, IoCounters, PortError, Publisher, Statistics, StatusMessage};

@@ -1,7 +1,7 @@
 //! Which faults end control, and when the cycles around them are complete.
 
-use crate::control::diagnostic::DiagnosticCode;
-use crate::control::state::State;
+use crate::control::signals::diagnostic::DiagnosticCode;
+use crate::control::signals::state::State;
 use crate::messages::CycleMessage;
 
 /// Finds the cycles of faults.

@@ -4,7 +4,8 @@ use std::sync::mpsc::channel;
 
 use super::*;
 use crate::config::Config;
-use crate::control::controller::{Controller, Input, Measurement};
+use crate::control::controller::Controller;
+use crate::control::signals::inputs::{Input, Measurement};
 use crate::daemon::memory_queue::{CycleMemory, MemoryProducer, MemoryQueue};
 use crate::daemon::replay::{Replay, recorded_controller, replay};
 use crate::messages::GapMessage;

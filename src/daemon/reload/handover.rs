@@ -15,7 +15,7 @@ use heapless::spsc::{Consumer, Producer, Queue};
 use super::Loaded;
 use super::timeouts::{MessageTimeouts, TimeoutsNs};
 use crate::control::controller::Controller;
-use crate::control::state::State;
+use crate::control::signals::state::State;
 use crate::messages::MAX_REQUEST_AGE_NS;
 
 /// Room for the one offer: a queue holds one less than its length.

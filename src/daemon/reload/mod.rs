@@ -19,7 +19,7 @@ use super::parameters::{parameters, timing};
 use crate::config::changes::{Change, changes};
 use crate::config::{Config, ConfigError, fidelity};
 use crate::control::controller::Controller;
-use crate::control::state::State;
+use crate::control::signals::state::State;
 use crate::messages::clock::monotonic_ns;
 use crate::model::fidelity::Fidelity;
 use crate::realtime::cyclic::ReleaseMode;

@@ -33,9 +33,10 @@ use fearless_simd::dispatch;
 
 pub use tracker::{Tracker, TrackingResult};
 
+use super::LEGS;
 use super::factorization::Factorization;
 use super::kinematic_state::KinematicState;
-use super::machine::{LEGS, Machine};
+use super::machine::Machine;
 use newton::Newton;
 
 /// Most steps of one call of [`refine`]. From the edge of the trusted region six suffice to rounding, by Kantorovich.

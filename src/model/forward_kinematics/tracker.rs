@@ -3,8 +3,9 @@
 use nalgebra::Vector6;
 
 use super::{NewtonReport, Outcome, refine};
+use crate::model::LEGS;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{LEGS, Machine};
+use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
 
 /// Share of a trusted step taken toward lengths further away: below 1, so that rounding does not exceed it.

@@ -1,10 +1,11 @@
 //! Failures of sensors, drives and messages: what each does to what the controller reads, or to the forces that act.
 
-use hexad::control::controller::Measurement;
-use hexad::control::drive_monitor::DriveStatus;
+use hexad::control::signals::inputs::DriveStatus;
+use hexad::control::signals::inputs::Measurement;
+use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::TaskState;
 use hexad::plant::random::Random;

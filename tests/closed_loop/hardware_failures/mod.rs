@@ -9,11 +9,12 @@ mod table;
 use std::env;
 
 use hexad::config::Config;
-use hexad::control::controller::{Measurement, Output};
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::drive_monitor::DriveStatus;
-use hexad::control::state::State;
-use hexad::model::machine::LEGS;
+use hexad::control::controller::Output;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::DriveStatus;
+use hexad::control::signals::inputs::Measurement;
+use hexad::control::signals::state::State;
+use hexad::model::LEGS;
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::plant::imperfections::{Imperfections, SensorErrors};
 use hexad::plant::random::Random;

@@ -2,22 +2,24 @@
 
 #![allow(dead_code, reason = "the bench uses a part of it")]
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint};
+use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
 
 use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::estimator::Readings;
-use hexad::control::estimator::covariance::NoiseModel;
-use hexad::control::gains::Gains;
+use hexad::control::law::estimator::Readings;
+use hexad::control::law::estimator::covariance::NoiseModel;
+use hexad::control::law::gains::Gains;
 use hexad::control::law::{ControlMode, Law};
-use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::{OperatorRequest, Request, State};
 use hexad::daemon;
+use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
-use hexad::model::machine::{LEGS, Machine};
+use hexad::model::machine::Machine;
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::TaskState;
 use hexad::plant::hardware::Hardware;

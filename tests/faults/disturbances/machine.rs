@@ -1,6 +1,6 @@
 //! Obstacles, brakes, drives and loads.
 
-use hexad::model::machine::LEGS;
+use hexad::model::LEGS;
 
 use super::super::world::{Grip, World};
 use super::Moment;

@@ -1,7 +1,7 @@
 //! Wrong, missing and noisy measurements.
 
-use hexad::control::controller::Measurement;
-use hexad::model::machine::LEGS;
+use hexad::control::signals::inputs::Measurement;
+use hexad::model::LEGS;
 
 use super::{Moment, noise};
 

@@ -1,7 +1,7 @@
 //! What goes wrong, each as a change of one cycle's input or of the world.
 
-use hexad::control::controller::{Input, Measurement};
-use hexad::control::state::Request;
+use hexad::control::signals::inputs::{Input, Measurement};
+use hexad::control::signals::state::Request;
 
 use super::world::{World, measured, wanted};
 

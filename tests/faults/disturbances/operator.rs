@@ -1,6 +1,6 @@
 //! Requests of the operator.
 
-use hexad::control::state::Request;
+use hexad::control::signals::state::Request;
 
 use super::super::world::Source;
 use super::Moment;

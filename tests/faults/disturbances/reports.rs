@@ -1,7 +1,7 @@
 //! What a driver reports of its drives, and the pose of another sensor.
 
-use hexad::control::drive_monitor::DriveStatus;
-use hexad::model::machine::LEGS;
+use hexad::control::signals::inputs::DriveStatus;
+use hexad::model::LEGS;
 
 use super::Moment;
 

@@ -1,6 +1,6 @@
 //! Wrong, missing and noisy setpoints.
 
-use hexad::control::controller::Setpoint;
+use hexad::control::signals::inputs::Setpoint;
 
 use super::super::situations::GAMMA_RANGE;
 use super::super::world::{Source, wanted};

@@ -1,6 +1,6 @@
 //! Several faults at once.
 
-use hexad::control::state::Request;
+use hexad::control::signals::state::Request;
 
 use super::{Moment, host, machine, measurements, operator, setpoints};
 

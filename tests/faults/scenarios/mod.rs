@@ -10,10 +10,10 @@ use super::pictures::{Picture, draw};
 use super::recording::Peaks;
 use super::situations::{Situation, machine};
 use super::world::{Source, World};
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
 use hexad::control::parameters::ViolationPolicy;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 

@@ -3,15 +3,16 @@
 
 use std::sync::LazyLock;
 
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint, SetpointKind};
+use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::{Parameters, ViolationPolicy};
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint, SetpointKind};
 
 use hexad::config::Config;
-use hexad::control::diagnostic::DiagnosticCode;
 use hexad::control::law::ControlMode;
-use hexad::control::limits::Limit;
-use hexad::control::localization::PlatformState;
-use hexad::control::state::{OperatorRequest, Request, State};
+use hexad::control::sensing::localization::PlatformState;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::limits::Limit;
+use hexad::control::signals::state::{OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::leg_motion;

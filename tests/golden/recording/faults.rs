@@ -2,9 +2,9 @@
 
 use core::f64::consts::TAU;
 
-use hexad::control::drive_monitor::DriveStatus;
-use hexad::control::state::{Request, State};
-use hexad::model::machine::LEGS;
+use hexad::control::signals::inputs::DriveStatus;
+use hexad::control::signals::state::{Request, State};
+use hexad::model::LEGS;
 use hexad::motion::built_in::BuiltInMotion;
 
 use super::Script;

@@ -1,6 +1,6 @@
 //! Slow and fast loops, and the control modes.
 
-use hexad::control::state::{Request, State};
+use hexad::control::signals::state::{Request, State};
 use hexad::motion::built_in::BuiltInMotion;
 
 use super::Script;

@@ -2,11 +2,12 @@
 
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
-use hexad::control::controller::{Controller, Input, Measurement, Output, Setpoint, SetpointKind};
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
-use hexad::control::state::{OperatorRequest, Request, State};
-use hexad::model::machine::LEGS;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint, SetpointKind};
+use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::model::LEGS;
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::motion::minimum_jerk::{rise, straight_move};

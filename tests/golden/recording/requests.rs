@@ -1,6 +1,6 @@
 //! Every request in every state.
 
-use hexad::control::state::{Request, State};
+use hexad::control::signals::state::{Request, State};
 
 use super::Script;
 use super::recorder::Recorder;

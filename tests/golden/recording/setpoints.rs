@@ -1,7 +1,7 @@
 //! Setpoints of every kind, wrong ones and lost ones, under both policies.
 
-use hexad::control::controller::SetpointKind;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::inputs::SetpointKind;
+use hexad::control::signals::state::{Request, State};
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::BuiltInMotion;

@@ -7,7 +7,7 @@
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::daemon::report::Report;
 use hexad::messages::LoopTimes;
 use hexad::messages::StatusMessage;

@@ -14,8 +14,8 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::State;
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::State;
 use hexad::daemon::cycle::WORD_EPOCH;
 use hexad::messages::ForceMessage;
 use hexad::realtime::request_word;

@@ -4,11 +4,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use hexad::config::Config;
-use hexad::control::controller::{Input, Measurement, Output, Setpoint};
-use hexad::control::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad::control::localization::PlatformState;
-use hexad::control::state::State;
-use hexad::control::tracking_error::TrackingError;
+use hexad::control::controller::Output;
+use hexad::control::sensing::localization::PlatformState;
+use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use hexad::control::signals::errors::TrackingError;
+use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
+use hexad::control::signals::state::State;
 use hexad::messages::CycleMessage;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::rigid::Twist;

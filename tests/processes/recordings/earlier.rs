@@ -6,7 +6,7 @@ use std::{env, fs, thread};
 
 use hexad::commands::plant::hardware;
 use hexad::config::Config;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::state::{Request, State};
 use hexad::daemon::replay::recorded_controller;
 use hexad::messages::lockstep::{REPEAT_INTERVAL, poll_until};
 use hexad::messages::{Bus, CommandMessage, CycleMessage, ForceMessage, MeasuredMessage, SetpointMessage};

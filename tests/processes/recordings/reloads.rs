@@ -3,7 +3,7 @@
 use std::fs;
 
 use hexad::config::Config;
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 
 use super::{about, files, read, replays_exactly, start_recording};
 use crate::support::children::{Ended, HANG};

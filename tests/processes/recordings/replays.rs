@@ -6,8 +6,8 @@ use std::path::Path;
 use std::thread::sleep;
 use std::time::Duration;
 
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::state::{Request, State};
 
 #[cfg(target_arch = "x86_64")]
 use super::instruction_sets;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{JoinHandle, spawn};
 
-use hexad::control::state::Request;
+use hexad::control::signals::state::Request;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, CommandMessage};
 

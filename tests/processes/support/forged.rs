@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use hexad::control::state::State;
+use hexad::control::signals::state::State;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{Bus, Publisher};
 use hexad::messages::{ForceMessage, Header, Message};

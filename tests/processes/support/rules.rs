@@ -2,9 +2,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use hexad::control::controller::SetpointKind;
-use hexad::control::diagnostic::DiagnosticCode;
-use hexad::control::state::{Request, State};
+use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::inputs::SetpointKind;
+use hexad::control::signals::state::{Request, State};
 use hexad::messages::{ForceMessage, MeasuredMessage, Message, SetpointMessage};
 
 use super::machine::{PERIOD_NS, TIMEOUT_NS};

@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::messages::ForceMessage;
 
 use super::recorder::Recording;

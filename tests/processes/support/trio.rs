@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use hexad::control::diagnostic::DiagnosticCode;
+use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::messages::clock::monotonic_ns;
 use hexad::messages::{ForceMessage, MeasuredMessage};
 

@@ -1,7 +1,9 @@
 //! The braking curves against their equations, derivatives against differences.
 
-use super::super::approach::{Approach, TargetOffset, WantedVelocity, limit_leg_rates};
-use super::*;
+use crate::control::reference::proposal::approach::{
+    Approach, TargetOffset, WantedVelocity, limit_leg_rates,
+};
+use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::rigid::Twist;
 

@@ -1,17 +1,20 @@
 //! Assessment of a cycle: each finding alone decides.
 
-use super::super::{ReferenceGenerator, Target};
-use super::*;
-use crate::control::assessment::{Evidence, assess};
-use crate::control::controller::{Cycle, Input, Measurement, Publishers, Setpoint, SetpointKind};
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::feedback_bound::FeedbackBound;
-use crate::control::input_validation::{SetpointMotion, ValidatedSetpoint};
-use crate::control::limits::LimitSet;
-use crate::control::localization::{Localization, Located, PlatformState};
-use crate::control::state::State;
-use crate::control::supervisor::Findings;
-use crate::control::tracking_error::TrackingError;
+use crate::control::cycle::Cycle;
+use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::reference::tests::*;
+use crate::control::sensing::localization::{Localization, Located, PlatformState};
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::validated::ValidatedSetpoint;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
+use crate::control::signals::limits::LimitSet;
+use crate::control::signals::state::State;
+use crate::control::supervision::assessment::{Evidence, assess};
+use crate::control::supervision::supervisor::Findings;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::TaskState;
 use nalgebra::Vector6;

@@ -1,7 +1,7 @@
 //! Quantities whose extremes lie between the knots of an examined stop, or within the step before it.
 
-use super::verification::{PlayedStep, Scene};
-use super::*;
+use crate::control::reference::tests::verification::{PlayedStep, Scene};
+use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::task::task_coordinates;

@@ -1,8 +1,10 @@
 //! The bounds on derivatives of lengths, term by term, and on what happens between two knots.
 
-use super::super::cubic_departure::{CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk};
-use super::between_knots::scene;
-use super::*;
+use crate::control::reference::proof::cubic_departure::{
+    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk,
+};
+use crate::control::reference::tests::between_knots::scene;
+use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 

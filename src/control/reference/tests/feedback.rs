@@ -3,12 +3,12 @@
 
 use nalgebra::Vector6;
 
-use super::*;
-use crate::control::controller::Cycle;
-use crate::control::diagnostic::DiagnosticCode;
-use crate::control::feedback_bound::FeedbackBound;
-use crate::control::forces::forces;
-use crate::control::state::State;
+use crate::control::cycle::Cycle;
+use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::law::forces::forces;
+use crate::control::reference::tests::*;
+use crate::control::signals::diagnostic::DiagnosticCode;
+use crate::control::signals::state::State;
 use crate::model::rigid::{Acceleration, Motion};
 use crate::model::task::TaskState;
 

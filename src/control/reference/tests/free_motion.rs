@@ -1,12 +1,13 @@
 //! Motion of a platform without force: what of its measurements counts, and how its deceleration leads on.
 
-use super::super::target::at_rest;
-use super::*;
-use crate::control::controller::{Cycle, Measurement};
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::free_motion::FreeMotion;
-use crate::control::localization::{Localization, Located, PlatformState};
-use crate::control::state::State;
+use crate::control::cycle::Cycle;
+use crate::control::reference::tests::*;
+use crate::control::sensing::free_motion::FreeMotion;
+use crate::control::sensing::localization::{Localization, Located, PlatformState};
+use crate::control::setpoint::target::at_rest;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::state::State;
 use crate::model::rigid::{Motion, Twist};
 
 const MS: u64 = 1_000_000;

@@ -2,15 +2,16 @@
 
 use fearless_simd::Level;
 
-use super::super::held_stop::Phase;
-use super::super::pose_samples::PoseSamples;
-use super::super::pose_stop::PoseStop;
-use super::super::target::at_rest;
-use super::super::{ReferenceGenerator, Target};
-use super::*;
-use crate::control::controller::{Setpoint, SetpointKind};
-use crate::control::input_validation::SetpointMotion;
-use crate::control::limits::Limit;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::reference::stop::held_stop::Phase;
+use crate::control::reference::stop::pose_stop::PoseStop;
+use crate::control::reference::tests::*;
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::pose_samples::PoseSamples;
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::target::at_rest;
+use crate::control::signals::inputs::{Setpoint, SetpointKind};
+use crate::control::signals::limits::Limit;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::rigid::Motion;
 use crate::model::task::{TaskState, task_coordinates};

@@ -2,14 +2,15 @@
 
 use fearless_simd::Level;
 
-use super::super::held_stop::Phase;
-use super::super::pose_stop::{PoseStop, StopKind};
-use super::super::target::at_rest;
-use super::super::{ReferenceGenerator, Target};
-use super::generator::{MS, constants, run, standing, started, x};
-use super::*;
-use crate::control::limits::Limit;
 use crate::control::parameters::Envelope;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::reference::stop::held_stop::Phase;
+use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
+use crate::control::reference::tests::generator::{MS, constants, run, standing, started, x};
+use crate::control::reference::tests::*;
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::target::at_rest;
+use crate::control::signals::limits::Limit;
 use crate::model::rigid::{Motion, Twist};
 use crate::model::task::task_coordinates;
 

@@ -2,15 +2,15 @@
 
 use fearless_simd::{Level, dispatch};
 
-use super::super::examination::MAX_WORK;
-use super::super::pose_bounds::PoseBounds;
-use super::super::pose_stop::{PoseStop, StopKind};
-use super::super::regularity::RegularBalls;
-use super::super::target::at_rest;
-use super::super::verification::{Step, Verifier};
-use super::verification::Scene;
-use super::*;
-use crate::control::limits::Limit;
+use crate::control::reference::proof::examination::MAX_WORK;
+use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::proof::regularity::RegularBalls;
+use crate::control::reference::proof::{step::Step, verification::Verifier};
+use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
+use crate::control::reference::tests::verification::Scene;
+use crate::control::reference::tests::*;
+use crate::control::setpoint::target::at_rest;
+use crate::control::signals::limits::Limit;
 use crate::model::inverse_geometry::universal_sine;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 

@@ -1,10 +1,11 @@
 //! Validation of measurements: each check alone, next to its bound.
 
-use super::*;
-use crate::control::controller::{Cycle, Measurement};
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::input_validation::MeasurementValidator;
-use crate::control::state::State;
+use crate::control::cycle::Cycle;
+use crate::control::reference::tests::*;
+use crate::control::sensing::measurement::MeasurementValidator;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::state::State;
 
 const MS: u64 = 1_000_000;
 /// Release of the first cycle.

@@ -2,22 +2,22 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::regularity::{RegularBalls, Regularity, Surroundings};
-use super::samples::Samples;
-use crate::control::estimator::Readings;
-use crate::control::estimator::covariance::NoiseModel;
-use crate::control::gains::Gains;
+use crate::control::constants::Constants;
+use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::covariance::NoiseModel;
+use crate::control::law::gains::Gains;
+use crate::control::law::leg_masses::LegMasses;
 use crate::control::law::{ControlMode, Law};
-use crate::control::leg_masses::LegMasses;
-use crate::control::limits::{DerivativeLimits, Limits};
-use crate::control::parameters::{Constants, Parameters, ViolationPolicy};
-use crate::control::supervisor::AfterStop;
+use crate::control::parameters::{Parameters, ViolationPolicy};
+use crate::control::reference::proof::regularity::{RegularBalls, Regularity, Surroundings};
+use crate::control::reference::samples::Samples;
+use crate::control::signals::limits::{DerivativeLimits, Limits};
+use crate::control::signals::state::AfterStop;
+use crate::model::LEGS;
 use crate::model::fidelity::Fidelity;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::kinematic_state::KinematicState;
-use crate::model::machine::{
-    Actuator, Joints, LEGS, Link, Machine, Platform, TransverseInertia, at_most_256_bits,
-};
+use crate::model::machine::{Actuator, Joints, Link, Machine, Platform, TransverseInertia, at_most_256_bits};
 use crate::model::rigid::{Pose, exp};
 
 mod approach;

@@ -4,15 +4,16 @@ use nalgebra::Vector6;
 
 use fearless_simd::Level;
 
-use super::super::constant_jerk::move_on;
-use super::super::history::History;
-use super::super::pose_bounds::PoseBounds;
-use super::super::pose_stop::{PoseStop, StopKind, advanced};
-use super::super::target::at_rest;
-use super::super::{ReferenceGenerator, Target};
-use super::*;
-use crate::control::controller::Setpoint;
-use crate::control::input_validation::SetpointMotion;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::reference::history::History;
+use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::stop::constant_jerk::move_on;
+use crate::control::reference::stop::pose_stop::{PoseStop, StopKind, advanced};
+use crate::control::reference::tests::*;
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::target::at_rest;
+use crate::control::signals::inputs::Setpoint;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::TaskState;
 

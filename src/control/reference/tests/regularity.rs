@@ -2,8 +2,8 @@
 
 use nalgebra::Vector6;
 
-use super::super::regularity::RegularBalls;
-use super::*;
+use crate::control::reference::proof::regularity::RegularBalls;
+use crate::control::reference::tests::*;
 use crate::model::rigid::Twist;
 
 /// The pose of a ball at six numbers: rotation and shift as parts of the largest.

@@ -1,15 +1,18 @@
 //! Setpoints between their validation and the reference: one that is not valid is no target, and a gap gives no jerk.
 
-use super::super::Target;
-use super::super::pose_samples::PoseSamples;
-use super::*;
-use crate::control::controller::{Cycle, Measurement, Setpoint};
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::input_validation::{SetpointMotion, ValidatedSetpoint};
-use crate::control::limits::LimitSet;
-use crate::control::localization::{Located, PlatformState};
-use crate::control::state::State;
-use crate::control::tracking_error::{TrackingError, setpoint_error};
+use crate::control::cycle::Cycle;
+use crate::control::law::error_tracker::setpoint_error;
+use crate::control::reference::tests::*;
+use crate::control::sensing::localization::{Located, PlatformState};
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::pose_samples::PoseSamples;
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::validated::ValidatedSetpoint;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::{Measurement, Setpoint};
+use crate::control::signals::limits::LimitSet;
+use crate::control::signals::state::State;
 use crate::model::rigid::Twist;
 use crate::model::task::TaskState;
 
@@ -38,10 +41,10 @@ fn a_setpoint_that_is_not_valid_is_neither_approached_nor_compared_with() {
             active_limits: LimitSet::default(),
         };
         for state in [State::Engaging, State::Active] {
-            assert_eq!(Target::of_state(&constants, state, &setpoint).is_some(), is_valid, "{state:?}");
+            assert_eq!(setpoint.target_in(&constants, state).is_some(), is_valid, "{state:?}");
         }
-        assert!(Target::of_state(&constants, State::Stopping, &setpoint).is_none());
-        assert!(Target::of_state(&constants, State::Parking, &setpoint).is_some());
+        assert!(setpoint.target_in(&constants, State::Stopping).is_none());
+        assert!(setpoint.target_in(&constants, State::Parking).is_some());
         let cycle = Cycle { constants: &constants, release_ns: 0, state: State::Standby };
         let error = setpoint_error(&cycle, &setpoint, &located);
         assert_eq!(error, is_valid.then(TrackingError::default));

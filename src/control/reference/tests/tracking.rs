@@ -2,14 +2,16 @@
 
 use nalgebra::Vector6;
 
-use super::super::ReferenceGenerator;
-use super::super::target::at_rest;
-use super::*;
-use crate::control::controller::{Cycle, Measurement};
-use crate::control::diagnostic::DiagnosticCode;
-use crate::control::localization::{Localization, Located, PlatformState};
-use crate::control::state::State;
-use crate::control::tracking_error::{ErrorTracker, TrackingError};
+use crate::control::cycle::Cycle;
+use crate::control::law::error_tracker::ErrorTracker;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::reference::tests::*;
+use crate::control::sensing::localization::{Localization, Located, PlatformState};
+use crate::control::setpoint::target::at_rest;
+use crate::control::signals::diagnostic::DiagnosticCode;
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::state::State;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::rigid::Twist;
 

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector6;
 
-use super::super::regularity::RegularBalls;
-use super::regularity::within;
-use super::*;
+use crate::control::reference::proof::regularity::RegularBalls;
+use crate::control::reference::tests::regularity::within;
+use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::universal_sine;
 
 /// The least sine that a climb finds in a ball.

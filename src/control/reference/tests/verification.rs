@@ -2,13 +2,13 @@
 
 use fearless_simd::Level;
 
-use super::super::pose_bounds::PoseBounds;
-use super::super::pose_stop::{PoseStop, StopKind};
-use super::super::target::at_rest;
-use super::super::verification::{Step, Verifier};
-use super::*;
-use crate::control::limits::Limit;
 use crate::control::parameters::Envelope;
+use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::proof::{step::Step, verification::Verifier};
+use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
+use crate::control::reference::tests::*;
+use crate::control::setpoint::target::at_rest;
+use crate::control::signals::limits::Limit;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::task_coordinates;

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::control::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::state::{Request, State};
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::state::{Request, State};
 use crate::daemon::process_names::sentence;
 use crate::daemon::snapshot::Snapshot;
 use crate::messages::MAX_REQUEST_AGE_NS;

@@ -1,0 +1,130 @@
+//! All that stays constant while a controller runs: the machine, the parameters, and what follows from both.
+
+use nalgebra::Vector6;
+
+use crate::control::law::Law;
+use crate::control::law::estimator::EstimatorConstants;
+use crate::control::law::estimator::covariance::NoiseModel;
+use crate::control::law::input_matrix::InputMatrix;
+use crate::control::monitoring::disturbance_monitor::DisturbanceBounds;
+use crate::control::monitoring::frozen_sensors::FrozenLegBounds;
+use crate::control::monitoring::weighting::least_disturbance;
+use crate::control::parameters::Parameters;
+use crate::control::sensing::standstill::window_s;
+use crate::model::active_forces::InverseDynamics;
+use crate::model::inverse_geometry::universal_sine;
+use crate::model::kinematic_state::KinematicState;
+use crate::model::machine::Machine;
+
+/// Part of the way from the condition at home to its limit that the reference uses.
+const CONDITION_SHARE: f64 = 0.85;
+/// Least sine of the angle between a leg and the first axis of its universal joint, 6 degrees: fewer than any joint leaves.
+/// The moment of the leg's spin grows with the inverse of the third power; there it still changes by less than itself in a
+/// cycle of 10 ms.
+const MIN_UNIVERSAL_SINE: f64 = 0.1;
+/// The same as a ratio of that at home, for machines whose legs are as near to the axes there.
+const MIN_UNIVERSAL_SINE_PER_HOME: f64 = 0.5;
+
+/// Machine model, parameters and home pose: constant while the controller runs.
+#[derive(Clone, Debug)]
+pub struct Constants {
+    /// Inverse dynamics of the machine.
+    pub dynamics: InverseDynamics,
+    /// Choices of the deployment.
+    pub parameters: Parameters,
+    /// At home.
+    pub home: KinematicState,
+    /// Largest distance of a joint on the platform from C \[m\].
+    pub arm: f64,
+    /// Acceleration of the platform by what the law commands.
+    pub input_matrix: InputMatrix,
+    /// Of the estimator under control.
+    pub estimator: EstimatorConstants,
+    /// Square of the least disturbance that may be a force that a drive does not deliver; infinite where the law leaves forces to feedback.
+    pub least_missing_squared: f64,
+    /// Changes of the disturbance that are no fault.
+    pub disturbance_bounds: DisturbanceBounds,
+    /// What equal readings of one leg allow.
+    pub(super) frozen_leg: FrozenLegBounds,
+    /// Window in which lengths alone show rest \[s\].
+    pub(super) rest_window_s: f64,
+    /// Of the estimator of the rates of the legs.
+    pub leg_rates: EstimatorConstants,
+    /// Largest condition of the reference: below that of the platform, for the following error.
+    pub reference_condition: f64,
+    /// Least sine of the angle between a leg and the first axis of its universal joint, of the reference.
+    pub universal_sine: f64,
+}
+
+impl Constants {
+    /// Evaluates them.
+    pub fn new(machine: &Machine, parameters: Parameters) -> Self {
+        let home = KinematicState::new(machine, machine.home_pose());
+        let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
+        let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
+        let at_home = home.sensitivity().condition;
+        let reference_condition = at_home + CONDITION_SHARE * (parameters.condition - at_home);
+        let sine_at_home = universal_sine(machine, home.pose());
+        let universal_sine = MIN_UNIVERSAL_SINE.min(MIN_UNIVERSAL_SINE_PER_HOME * sine_at_home);
+        let NoiseModel { bandwidth, period_s, .. } = parameters.noise;
+        let lengths_only = NoiseModel { bandwidth, period_s, rate_noise_ratio: None };
+        let input_matrix = InputMatrix::at_home(
+            machine,
+            parameters.law.mode,
+            &parameters.law.leg_masses,
+            parameters.fidelity,
+        );
+        let Law { saturation, compensates_disturbance, .. } = &parameters.law;
+        let disturbance = input_matrix.largest_disturbance(saturation);
+        let acts_on_legs = parameters.law.mode.acts_on_legs();
+        let least_missing = least_disturbance(
+            &input_matrix.acceleration_by_force(machine, home.pose()),
+            if acts_on_legs { 1.0 } else { arm },
+            machine.actuator.max_force,
+        );
+        let expects_forces = parameters.law.mode.includes_inertia();
+        let unbounded = Vector6::repeat(f64::INFINITY);
+        let disturbance_bounds = DisturbanceBounds::new(
+            machine,
+            &parameters,
+            &input_matrix,
+            least_missing,
+            if acts_on_legs { 1.0 } else { arm },
+        );
+        Self {
+            disturbance_bounds,
+            dynamics: InverseDynamics::new(machine),
+            input_matrix,
+            least_missing_squared: if expects_forces { least_missing * least_missing } else { f64::INFINITY },
+            frozen_leg: FrozenLegBounds::new(
+                parameters.law.position.stiffness,
+                machine.actuator.max_force,
+                period_s,
+            ),
+            estimator: EstimatorConstants::new(
+                parameters.noise,
+                parameters.readings,
+                if *compensates_disturbance { disturbance } else { unbounded },
+                parameters.limits.position.acceleration
+                    + parameters.law.acceleration_left_to_feedback(&parameters.limits, arm, &disturbance),
+            ),
+            rest_window_s: window_s(&parameters),
+            leg_rates: EstimatorConstants::new(lengths_only, parameters.readings, unbounded, f64::INFINITY),
+            parameters,
+            home,
+            arm,
+            reference_condition,
+            universal_sine,
+        }
+    }
+
+    /// Length by which angles of the error become distances \[m\]; errors of legs have no angles.
+    pub(super) fn error_arm(&self) -> f64 {
+        if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm }
+    }
+
+    /// The machine.
+    pub fn machine(&self) -> &Machine {
+        self.dynamics.machine()
+    }
+}

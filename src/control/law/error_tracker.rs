@@ -1,0 +1,227 @@
+//! Tracking error of the platform: as measured for the checks, as estimated for feedback.
+//!
+//! The error is taken at the instant of the measurement, where both sides are known; the [`estimator`](super::estimator) predicts
+//! it to the instant at which the force acts. Without a new measurement the checks use the prediction.
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+use nalgebra::Vector6;
+
+use crate::control::constants::Constants;
+use crate::control::cycle::Cycle;
+use crate::control::law::estimator::{Estimator, EstimatorConstants};
+use crate::control::monitoring::disturbance_monitor::DisturbanceMonitor;
+use crate::control::monitoring::drive_response::DriveResponse;
+use crate::control::monitoring::frozen_sensors::FrozenSensors;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::sensing::localization::{Localization, Located};
+use crate::control::setpoint::validated::ValidatedSetpoint;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::ErrorState;
+use crate::control::signals::errors::{FeedbackError, TrackingError};
+use crate::model::LEGS;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::rigid::{Motion, Pose, Twist};
+
+/// Error of the platform against the setpoint, without control; `None` unless the setpoint is valid and recent.
+pub(in crate::control) fn setpoint_error(
+    cycle: &Cycle<'_>,
+    setpoint: &ValidatedSetpoint<'_>,
+    Located { measurement, platform, .. }: &Located<'_>,
+) -> Option<TrackingError> {
+    let target = setpoint.target.as_ref().filter(|_| setpoint.status.is_ok())?;
+    let desired = target.motion_at(&cycle.constants.parameters, measurement.time_ns)?;
+    Some(TrackingError::new(&desired, &platform.pose, &platform.twist))
+}
+
+/// Error of the platform against the reference, under control.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct ErrorTracker {
+    estimator: Estimator,
+    sensors: FrozenSensors,
+    drives: DriveResponse,
+    disturbance: DisturbanceMonitor,
+    /// Force that was sent last \[N\], and the acceleration by feedback.
+    sent: [f64; LEGS],
+    sent_acceleration: Vector6<f64>,
+    /// Measured; while there is no new measurement, predicted.
+    error: TrackingError,
+    /// Measured minus estimated, after the last measurement has corrected the estimate.
+    residual: Vector6<f64>,
+    /// What the last measurement and the prediction disagree in.
+    distrust: Option<Diagnostic>,
+    /// What has changed on the platform.
+    change: Option<Diagnostic>,
+}
+
+impl ErrorTracker {
+    /// Begins without an error at an instant after a measurement: the reference begins there with the motion that the platform
+    /// has then. Returns the error.
+    pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> TrackingError {
+        self.estimator.start(&constants.estimator, measured_ns, begin_ns, &FeedbackError::default());
+        (self.sensors, self.drives, self.distrust) =
+            (FrozenSensors::default(), DriveResponse::default(), None);
+        (self.disturbance, self.change) = (DisturbanceMonitor::default(), None);
+        (self.error, self.residual) = (TrackingError::default(), Vector6::zeros());
+        self.error
+    }
+
+    /// Corrects the estimate by a measurement, if it is new. Returns the error. Where the driver sends no rates, the twist of
+    /// the platform becomes the estimated one.
+    pub fn update(
+        &mut self,
+        cycle: &Cycle<'_>,
+        reference: &ReferenceGenerator,
+        localization: &Localization,
+        located: &mut Located<'_>,
+    ) -> TrackingError {
+        let Self { estimator, sensors, drives, disturbance, sent, sent_acceleration, .. } = self;
+        let constants = cycle.constants;
+        let time_ns = located.measurement.time_ns;
+        let desired = reference.motion_at(time_ns);
+        let (mut error, deviation) = measured(cycle, &desired, located);
+        let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
+        let interval_s = estimator.interval_s(time_ns);
+        let innovation = estimator.correct(&constants.estimator, time_ns, &deviation);
+        let is_new = innovation.is_some();
+        if let Some(innovation) = innovation {
+            self.residual = deviation.value - estimator.state().value;
+            let legs = || {
+                let feedback = feedback_forces(constants, sent_acceleration, &desired.pose);
+                [leg_lengths(constants.machine(), &desired.pose), feedback]
+            };
+            let EstimatorConstants { readings, .. } = &constants.estimator;
+            let disturbance_now = &estimator.state().disturbance;
+            let mut check = || {
+                sensors.check(&located.measurement.length, readings, &constants.frozen_leg, legs)?;
+                check_innovation(constants, &innovation, interval_s, located)?;
+                drives.check(constants, disturbance_now, sent, &located.platform.pose, interval_s)
+            };
+            self.distrust = check().err();
+            self.change = disturbance
+                .check(
+                    &constants.disturbance_bounds,
+                    estimator.state(),
+                    &desired,
+                    drives.unexplained_squared,
+                    interval_s,
+                )
+                .err();
+        }
+        // A measurement from before control began shows another motion.
+        if located.measurement.rate.is_none() && interval_s >= 0.0 {
+            let rate = &estimator.state().rate;
+            error.twist = if acts_on_legs {
+                localization.twist_of(constants, rate).unwrap_or(error.twist)
+            } else {
+                Twist::from_vector(rate)
+            };
+            let twist = &mut located.platform.twist;
+            twist.angular = desired.twist.angular - error.twist.angular;
+            twist.linear = desired.twist.linear - error.twist.linear;
+        }
+        if is_new {
+            self.error = error;
+        } else if !acts_on_legs {
+            let mut predicted = *estimator.state();
+            estimator.predict(&mut predicted, cycle.release_ns);
+            self.error = TrackingError::from(&predicted.error());
+        }
+        self.error
+    }
+
+    /// What the last measurement and the prediction disagree in, or which sensor is frozen.
+    pub fn distrust(&self) -> Option<&Diagnostic> {
+        self.distrust.as_ref()
+    }
+
+    /// Whether a length repeats itself: its sensor may be frozen.
+    pub fn is_doubtful(&self) -> bool {
+        self.sensors.repeat()
+    }
+
+    /// What has changed on the platform, or that it oscillates.
+    pub fn change(&self) -> Option<&Diagnostic> {
+        self.change.as_ref()
+    }
+
+    /// The estimator, after the last measurement.
+    pub fn estimator(&self) -> &Estimator {
+        &self.estimator
+    }
+
+    /// A predicted error with the value that was measured: where the legs are, by which forces act. The estimate follows it
+    /// with a lag, and forces for a pose that lags are a negative stiffness, which grows with the condition.
+    pub fn without_lag(&self, predicted: &ErrorState) -> FeedbackError {
+        FeedbackError { value: predicted.value + self.residual, rate: predicted.rate }
+    }
+
+    /// Records the acceleration by forces that limits take away.
+    pub fn record_limited(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
+        self.disturbance.record_limited(&constants.disturbance_bounds, acceleration);
+    }
+
+    /// Records the acceleration that feedback sends, after all limits, with the force, and the instant from which on it acts.
+    pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>, force: &[f64; LEGS]) {
+        (self.sent, self.sent_acceleration) = (*force, *acceleration);
+        self.estimator.record_sent(begin_ns, acceleration);
+    }
+}
+
+/// Forces on the legs by an acceleration of feedback, each as if the others stayed as they are.
+fn feedback_forces(constants: &Constants, acceleration: &Vector6<f64>, pose: &Pose) -> [f64; LEGS] {
+    let law = &constants.parameters.law;
+    let of_legs = match law.mode.acts_on_legs() {
+        true => *acceleration,
+        false => leg_wrenches(constants.machine(), pose).tr_mul(acceleration),
+    };
+    law.feedback_leg_forces(&of_legs)
+}
+
+/// Whether each leg is where the prediction has it. Its innovation is `N^T nu`, at most `|nu_p| + r |nu_R|`.
+fn check_innovation(
+    constants: &Constants,
+    innovation: &Vector6<f64>,
+    interval_s: f64,
+    located: &Located<'_>,
+) -> Result<(), Diagnostic> {
+    let bound = constants.estimator.innovation_bound(interval_s);
+    let acts_on_legs = constants.parameters.law.mode.acts_on_legs();
+    let Twist { angular, linear } = Twist::from_vector(innovation);
+    let largest =
+        if acts_on_legs { innovation.amax() } else { linear.norm() + constants.arm * angular.norm() };
+    if largest <= bound {
+        return Ok(());
+    }
+    let of_legs = if acts_on_legs {
+        *innovation
+    } else {
+        leg_wrenches(constants.machine(), &located.platform.pose).tr_mul(innovation)
+    };
+    let (leg, largest) = of_legs
+        .iter()
+        .map(|value| value.abs())
+        .enumerate()
+        .fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most });
+    if largest <= bound {
+        return Ok(());
+    }
+    Err(Diagnostic::new(DiagnosticCode::MeasurementImplausible, largest, bound).at(leg))
+}
+
+/// The measured error against a desired motion: of the pose, and what feedback acts on.
+fn measured(
+    cycle: &Cycle<'_>,
+    desired: &Motion,
+    Located { measurement, rate, platform }: &Located<'_>,
+) -> (TrackingError, FeedbackError) {
+    let constants = cycle.constants;
+    let error = TrackingError::new(desired, &platform.pose, &platform.twist);
+    let deviation = match constants.parameters.law.mode.acts_on_legs() {
+        true => FeedbackError::of_legs(constants.machine(), desired, &measurement.length, rate),
+        false => FeedbackError::from(&error),
+    };
+    (error, deviation)
+}

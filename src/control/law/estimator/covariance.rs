@@ -1,0 +1,190 @@
+//! Covariance of the estimate, the same for all axes, and the gains that follow from it.
+//!
+//! State of an axis in units of the noise of a reading and of the period: `[e, T w, T^2 d] / sigma`. Its disturbance changes
+//! as a random walk, d' is white noise of intensity q:
+//!
+//! ```text
+//! P(t + eta T) = F P F^T + Q       F = [1 eta eta^2/2; 0 1 eta; 0 0 1]
+//! Q = (we T)^6 [eta^5/20 eta^4/8 eta^3/6; eta^4/8 eta^3/3 eta^2/2; eta^3/6 eta^2/2 eta]
+//! we = (q / (sigma^2 T))^(1/6)     bandwidth of the filter
+//! reading of e:  K = P h / (h^T P h + 1), P -= K h^T P       h = [1 0 0]; of T w with its own noise
+//! ```
+//!
+//! Source: Kalman (1960); Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 6.2.3. One
+//! number decides the gains, `we T`. In these units the numbers are within a few powers of ten of 1, also at 20 kHz. The
+//! covariance follows the true intervals, so a sample that is lost, or came late, changes the gains as it should: with
+//! constant gains a source of which half of the samples are missing is unstable.
+
+/// What the gains follow from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseModel {
+    /// Bandwidth `we` \[rad/s\].
+    pub bandwidth: f64,
+    /// Standard deviation of a reading of a rate over that of a length \[1/s\]; `None` if rates are not used.
+    pub rate_noise_ratio: Option<f64>,
+    /// The period of the loop \[s\].
+    pub period_s: f64,
+}
+
+/// Covariance matrix of one axis, its upper triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct Covariance {
+    ee: f64,
+    ew: f64,
+    ed: f64,
+    ww: f64,
+    wd: f64,
+    dd: f64,
+}
+
+/// Gains of a reading for e \[1\], w \[1/T\] and d \[1/T^2\], the latter two without their unit.
+pub type Gains = [f64; 3];
+
+/// Relative change of a gain in an update below which the covariance counts as steady.
+const STEADY_CHANGE: f64 = 1e-13;
+/// Bound of the updates until then.
+const MAX_STEADY_UPDATES: u32 = 1_000_000;
+
+impl NoiseModel {
+    /// The covariance after a reading, when readings have come once a period for long, and the gains of the last.
+    pub fn steady(&self) -> (Covariance, [Gains; 2]) {
+        let mut covariance = Covariance::default();
+        let mut gains = [Gains::default(); 2];
+        for _ in 0..MAX_STEADY_UPDATES {
+            let before = gains[0];
+            covariance.advance(self, 1.0);
+            gains[0] = covariance.correct_length();
+            gains[1] = self.rate_noise().map_or(Gains::default(), |noise| covariance.correct_rate(noise));
+            let [e, _, d] = gains[0];
+            if (e - before[0]).abs() <= STEADY_CHANGE * e && (d - before[2]).abs() <= STEADY_CHANGE * d.abs()
+            {
+                break;
+            }
+        }
+        (covariance, gains)
+    }
+
+    /// Variance of a reading of a rate, in the units of the state.
+    pub(in crate::control::law::estimator) fn rate_noise(&self) -> Option<f64> {
+        self.rate_noise_ratio.map(|ratio| (ratio * self.period_s) * (ratio * self.period_s))
+    }
+}
+
+impl Covariance {
+    /// Over so many periods without a reading.
+    pub fn advance(&mut self, model: &NoiseModel, periods: f64) {
+        let Self { ee, ew, ed, ww, wd, dd } = *self;
+        let (n, half) = (periods, 0.5 * periods * periods);
+        let (by_e, by_w, by_d) = (ee + n * ew + half * ed, ew + n * ww + half * wd, ed + n * wd + half * dd);
+        let (rate_by_w, rate_by_d) = (ww + n * wd, wd + n * dd);
+        let third = (model.bandwidth * model.period_s) * (model.bandwidth * model.period_s);
+        let intensity = third * third * third * n;
+        let square = n * n;
+        *self = Self {
+            ee: by_e + n * by_w + half * by_d + intensity * square * square / 20.0,
+            ew: by_w + n * by_d + intensity * square * n / 8.0,
+            ed: by_d + intensity * square / 6.0,
+            ww: rate_by_w + n * rate_by_d + intensity * square / 3.0,
+            wd: rate_by_d + intensity * n / 2.0,
+            dd: dd + intensity,
+        };
+    }
+
+    /// After a reading of e. Returns its gains.
+    pub fn correct_length(&mut self) -> Gains {
+        let Self { ee, ew, ed, .. } = *self;
+        let share = 1.0 / (ee + 1.0);
+        self.correct([ee, ew, ed], share)
+    }
+
+    /// After a reading of T w with this variance. Returns its gains.
+    pub fn correct_rate(&mut self, noise: f64) -> Gains {
+        let Self { ew, ww, wd, .. } = *self;
+        let share = 1.0 / (ww + noise);
+        self.correct([ew, ww, wd], share)
+    }
+
+    fn correct(&mut self, [e, w, d]: [f64; 3], share: f64) -> Gains {
+        let gains = [e * share, w * share, d * share];
+        let [by_e, by_w, by_d] = gains;
+        self.ee -= by_e * e;
+        self.ew -= by_e * w;
+        self.ed -= by_e * d;
+        self.ww -= by_w * w;
+        self.wd -= by_w * d;
+        self.dd -= by_d * d;
+        gains
+    }
+
+    /// Standard deviation of the difference between a reading of e and its prediction, over that of a reading.
+    pub fn innovation_variance(&self) -> f64 {
+        self.ee + 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn model(bandwidth_hz: f64, rate_noise_ratio: Option<f64>) -> NoiseModel {
+        NoiseModel { bandwidth: core::f64::consts::TAU * bandwidth_hz, rate_noise_ratio, period_s: 1e-3 }
+    }
+
+    /// `K ~ [2 we T, 2 (we T)^2, (we T)^3]` for a slow filter: the poles of `s^3 + 2 we s^2 + 2 we^2 s + we^3`, Butterworth's.
+    #[test]
+    fn a_slow_filter_has_the_poles_of_butterworth() {
+        for hertz in [0.1, 0.3, 1.0] {
+            let x = core::f64::consts::TAU * hertz * 1e-3;
+            let (_, [gains, _]) = model(hertz, None).steady();
+            for (gain, expected) in gains.iter().zip([2.0 * x, 2.0 * x * x, x * x * x]) {
+                assert!((gain / expected - 1.0).abs() < 2.5 * x, "{hertz}: {gains:?}");
+            }
+        }
+    }
+
+    /// The figures of an independent solution of the Riccati equation.
+    #[test]
+    fn the_gains_are_those_of_the_riccati_equation() {
+        for (hertz, expected) in [(30.0, [0.314, 0.0590, 0.00555]), (10.0, [0.118, 0.00742, 0.000233])] {
+            let (covariance, [gains, _]) = model(hertz, None).steady();
+            for (gain, expected) in gains.iter().zip(expected) {
+                assert!((gain / expected - 1.0).abs() < 0.01, "{hertz}: {gains:?}");
+            }
+            let mut before = covariance;
+            before.advance(&model(hertz, None), 1.0);
+            if hertz == 30.0 {
+                assert!((before.innovation_variance().sqrt() - 1.21).abs() < 0.005);
+            }
+        }
+    }
+
+    #[test]
+    fn it_is_steady() {
+        for rate_noise_ratio in [None, Some(10.0), Some(300.0)] {
+            for hertz in [0.05, 1.0, 30.0, 200.0] {
+                let model = model(hertz, rate_noise_ratio);
+                let (covariance, [gains, _]) = model.steady();
+                let mut next = covariance;
+                next.advance(&model, 1.0);
+                let again = next.correct_length();
+                for (gain, again) in gains.iter().zip(again) {
+                    assert!((gain / again - 1.0).abs() < 1e-9, "{hertz} Hz: {gains:?} {again:?}");
+                }
+            }
+        }
+    }
+
+    /// Two half periods without a reading are one.
+    #[test]
+    fn pieces_of_a_period_are_the_period() {
+        let model = model(30.0, None);
+        let (start, _) = model.steady();
+        let (mut whole, mut pieces) = (start, start);
+        whole.advance(&model, 1.0);
+        pieces.advance(&model, 0.3);
+        pieces.advance(&model, 0.7);
+        assert!((whole.ee - pieces.ee).abs() < 1e-15 && (whole.wd - pieces.wd).abs() < 1e-15);
+        assert!((whole.dd / pieces.dd - 1.0).abs() < 1e-12);
+    }
+}

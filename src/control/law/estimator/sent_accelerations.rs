@@ -1,0 +1,81 @@
+//! The accelerations that feedback has sent lately, each until the next begins.
+
+use nalgebra::Vector6;
+
+use crate::control::signals::errors::ErrorState;
+use crate::control::signals::time::seconds_between;
+
+/// Accelerations kept, a power of two: at 10 kHz those of 25 ms, the longest delay of the drives with the age of a measurement.
+pub const CAPACITY: usize = 256;
+
+const ZERO: Vector6<f64> = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+
+/// An acceleration and the instant from which on it acts.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+struct SentAcceleration {
+    begin_ns: u64,
+    acceleration: Vector6<f64>,
+}
+
+/// Ring of the last accelerations.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control::law::estimator) struct SentAccelerations {
+    #[cfg_attr(feature = "daemon", serde(with = "serde_big_array::BigArray"))]
+    ring: [SentAcceleration; CAPACITY],
+    /// Number ever recorded; the last has the index of this less one.
+    count: usize,
+}
+
+impl Default for SentAccelerations {
+    fn default() -> Self {
+        Self { ring: [SentAcceleration::default(); CAPACITY], count: 0 }
+    }
+}
+
+impl SentAccelerations {
+    /// Forgets all: until the next one acts there is none.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Records an acceleration that acts from an instant on.
+    pub fn record(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
+        if let Some(slot) = self.ring.get_mut(self.count % CAPACITY) {
+            *slot = SentAcceleration { begin_ns, acceleration: *acceleration };
+        }
+        self.count += 1;
+    }
+
+    /// The one recorded so many before the last.
+    fn recorded(&self, age: usize) -> Option<&SentAcceleration> {
+        if age >= self.count.min(CAPACITY) {
+            return None;
+        }
+        self.ring.get((self.count - 1 - age) % CAPACITY)
+    }
+
+    /// Moves an error from an instant to a later one, under the accelerations that act between them.
+    pub fn advance(&self, state: &mut ErrorState, from_ns: u64, to_ns: u64) {
+        let mut age = 0;
+        while self.recorded(age).is_some_and(|sent| sent.begin_ns > from_ns) {
+            age += 1;
+        }
+        let (mut acting, mut now_ns) = (self.recorded(age), from_ns);
+        loop {
+            let next = age.checked_sub(1).and_then(|age| Some((age, self.recorded(age)?)));
+            let end_ns = next.map_or(to_ns, |(_, next)| next.begin_ns.min(to_ns));
+            if end_ns > now_ns {
+                // Before the first none acts.
+                let acceleration = acting.map_or(&ZERO, |sent| &sent.acceleration);
+                state.advance(seconds_between(now_ns, end_ns), acceleration);
+                now_ns = end_ns;
+            }
+            match next {
+                Some((next_age, next)) if end_ns < to_ns => (acting, age) = (Some(next), next_age),
+                _ => return,
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! Bound of the total command: the acceleration of the reference and that of feedback.
+//!
+//! ```text
+//! computed torque:  |a_d + s a| <= (1 + feedback_scale) A      position and orientation each, largest s in [0, 1]
+//! modes on legs:    |s a_i| <= (1 + feedback_scale) (A + r Ar) + the largest disturbance
+//! ```
+//!
+//! The acceleration of feedback keeps its direction. A sensor that fails, a collision or a wrong payload then accelerates
+//! the platform no more than this; saturation that lasts is a fault.
+
+use nalgebra::{Vector3, Vector6};
+
+use crate::control::cycle::Cycle;
+use crate::control::parameters::Parameters;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::model::rigid::Acceleration;
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+
+/// Longest saturation of feedback \[s\]: a brief impact, or a step at the start of control.
+const MAX_SATURATION_S: f64 = 0.1;
+
+/// Speed at which the time of saturation is forgotten, over that at which it counts: feedback that oscillates between its
+/// bounds, as about a sensor that is frozen, is saturated a twentieth of the time at least.
+const FORGETTING_RATIO: f64 = 0.03;
+
+/// Bound of the feedback, and for how long it was reached lately.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct FeedbackBound {
+    saturated_s: f64,
+}
+
+impl FeedbackBound {
+    /// Whether saturation has not lasted too long.
+    pub fn check(&self) -> Result<(), Diagnostic> {
+        if self.saturated_s <= MAX_SATURATION_S {
+            return Ok(());
+        }
+        Err(Diagnostic::new(DiagnosticCode::FeedbackSaturated, self.saturated_s, MAX_SATURATION_S))
+    }
+
+    /// Limits the acceleration that feedback adds to that of the reference.
+    pub fn limit(
+        &mut self,
+        cycle: &Cycle<'_>,
+        desired: &Acceleration,
+        wanted: &Vector6<f64>,
+    ) -> Vector6<f64> {
+        let parameters = &cycle.constants.parameters;
+        let limited = match parameters.law.mode.acts_on_legs() {
+            true => limit_legs(cycle, wanted),
+            false => limit_pose(parameters, desired, wanted),
+        };
+        let rate = if limited != *wanted { 1.0 } else { -FORGETTING_RATIO };
+        self.saturated_s = (self.saturated_s + rate * parameters.period_s()).max(0.0);
+        limited
+    }
+}
+
+fn limit_pose(parameters: &Parameters, desired: &Acceleration, wanted: &Vector6<f64>) -> Vector6<f64> {
+    let Parameters { limits, feedback_scale, .. } = parameters;
+    let added = Acceleration::from_vector(wanted);
+    let bounded = |desired: &Vector3<f64>, added: &Vector3<f64>, limit: f64| {
+        added * share_within(desired, added, (1.0 + feedback_scale) * limit)
+    };
+    Acceleration {
+        angular: bounded(&desired.angular, &added.angular, limits.orientation.acceleration),
+        linear: bounded(&desired.linear, &added.linear, limits.position.acceleration),
+    }
+    .vector()
+}
+
+/// Largest share s in \[0, 1\] with `|desired + s added| <= bound`, if `|desired|` is within the bound.
+fn share_within(desired: &Vector3<f64>, added: &Vector3<f64>, bound: f64) -> f64 {
+    if (desired + added).norm_squared() <= bound * bound {
+        return 1.0;
+    }
+    let (square, mixed) = (added.norm_squared(), added.dot(desired));
+    let room = (bound * bound - desired.norm_squared()).max(0.0);
+    (room / (mixed + (mixed * mixed + square * room).sqrt())).clamp(0.0, 1.0)
+}
+
+fn limit_legs(cycle: &Cycle<'_>, wanted: &Vector6<f64>) -> Vector6<f64> {
+    let Parameters { limits, feedback_scale, law, .. } = &cycle.constants.parameters;
+    let limit = limits.position.acceleration + cycle.constants.arm * limits.orientation.acceleration;
+    let bounds = law.saturation.map(|saturation| (1.0 + feedback_scale) * limit + saturation);
+    let excess = wanted.component_div(&bounds).amax();
+    if excess > 1.0 { wanted / excess } else { *wanted }
+}

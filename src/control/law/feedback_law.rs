@@ -1,0 +1,147 @@
+//! The control law: six accelerations from six errors, and the motion they command in each mode.
+//!
+//! ```text
+//! a = Kp e + Kd e' + B^-1 d      e, e', d: error, its rate and the disturbance, estimated; B: input matrix, mostly 1
+//! ```
+//!
+//! | mode | errors | force |
+//! | --- | --- | --- |
+//! | [`ComputedTorque`](ControlMode::ComputedTorque) | of the pose | inverse dynamics at the present pose and twist, with the acceleration `desired + a` |
+//! | [`FeedforwardJointPd`](ControlMode::FeedforwardJointPd) | of the legs | inverse dynamics of the desired motion + `m_i a_i` |
+//! | [`GravityJointPd`](ControlMode::GravityJointPd) | of the legs | weight at the desired pose + `m_i a_i` |
+//! | [`JointPd`](ControlMode::JointPd) | of the legs | `m_i a_i` |
+//!
+//! Errors of the pose: `e_p = C_d - C` and `e_R = log(R_d R^T)`, a rotation vector in base axes, never angles.
+//! Errors of the legs: desired lengths and rates, by inverse geometry, minus measured ones. No law on legs
+//! needs forward kinematics, weight included: it is taken at the desired pose, which has no noise. Supervision
+//! (following error, condition, stopping, parking) uses the measured pose in every mode. Legs have no angles:
+//! their gains are those of the position. `m_i`: see [`super::leg_masses`]; d: [`super::estimator`].
+//!
+//! The law combines two instants. Feedback acts on the error at the instant at which the force begins; the dynamics are evaluated
+//! in the middle of the hold, at the reference minus the error there. Both errors are predictions of the estimator, from the
+//! instant of the measurement, where both sides are known: quantities of different instants are never subtracted.
+
+use nalgebra::Vector6;
+
+use crate::control::law::gains::Gains;
+use crate::control::law::input_matrix::InputMatrix;
+use crate::control::law::leg_masses::LegMasses;
+use crate::control::law::mode::ControlMode;
+use crate::control::signals::errors::ErrorState;
+use crate::control::signals::errors::FeedbackError;
+use crate::control::signals::limits::Limits;
+use crate::model::LEGS;
+use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Gravity;
+use crate::model::machine::Machine;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::task::TaskState;
+
+/// Control law of one deployment: mode and gains.
+#[derive(Clone, Copy, Debug)]
+pub struct Law {
+    /// Errors that feedback acts on and terms of the dynamics that are added.
+    pub mode: ControlMode,
+    /// Of the position, and of the legs.
+    pub position: Gains,
+    /// Gains of the orientation; not used in modes that act on the legs.
+    pub orientation: Gains,
+    /// Whether the estimated disturbance is compensated. If not, a payload unknown to the model needs an error, and the
+    /// platform yields to people as the gains let it.
+    pub compensates_disturbance: bool,
+    /// Effective mass of each drive, and the loop gains that follow.
+    pub leg_masses: LegMasses,
+    /// Largest disturbance of the estimator: \[rad/s^2\] and \[m/s^2\], or of each leg.
+    pub saturation: Vector6<f64>,
+}
+
+/// Largest disturbance over the acceleration limit: a payload or friction unknown to the model; more than that is a
+/// collision.
+const SATURATION_RATIO: f64 = 0.5;
+
+impl Law {
+    /// The law of a machine.
+    pub fn new(
+        machine: &Machine,
+        mode: ControlMode,
+        [position, orientation]: [Gains; 2],
+        leg_masses: LegMasses,
+        compensates_disturbance: bool,
+        limits: &Limits,
+    ) -> Self {
+        let [angular, linear] =
+            [&limits.orientation, &limits.position].map(|limits| SATURATION_RATIO * limits.acceleration);
+        let mut saturation = Vector6::repeat(linear);
+        match mode {
+            ControlMode::ComputedTorque => saturation.fixed_rows_mut::<3>(0).fill(angular),
+            // Here also the weight is unknown.
+            ControlMode::JointPd => {
+                let home = TaskState::at_rest(machine.home).motion();
+                let weight = InverseDynamics::new(machine).forces::<Gravity>(&home).unwrap_or_default();
+                saturation += Vector6::from(weight).abs().component_div(&leg_masses.mass);
+            }
+            ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
+        }
+        Self { mode, position, orientation, compensates_disturbance, leg_masses, saturation }
+    }
+
+    /// Largest acceleration of a leg that a mode without inertia leaves to feedback: all of the reference's, and the largest
+    /// disturbance.
+    pub(in crate::control) fn acceleration_left_to_feedback(
+        &self,
+        limits: &Limits,
+        arm: f64,
+        disturbance: &Vector6<f64>,
+    ) -> f64 {
+        if self.mode.includes_inertia() {
+            return 0.0;
+        }
+        limits.position.acceleration + arm * limits.orientation.acceleration + disturbance.amax()
+    }
+
+    /// Kp and Kd of every deviation.
+    pub(in crate::control) fn gains(&self) -> (Vector6<f64>, Vector6<f64>) {
+        let Self { position, orientation, .. } = self;
+        let first = if self.mode.acts_on_legs() { position } else { orientation };
+        let all = |first: f64, second: f64| Vector6::new(first, first, first, second, second, second);
+        (all(first.stiffness, position.stiffness), all(first.damping, position.damping))
+    }
+
+    /// `Kp e + Kd e' + B^-1 d` of an estimate at the instant at which the force begins.
+    pub fn acceleration(&self, estimate: &ErrorState, input_matrix: &InputMatrix) -> Vector6<f64> {
+        let (stiffness, damping) = self.gains();
+        let feedback = estimate.value.component_mul(&stiffness) + estimate.rate.component_mul(&damping);
+        if !self.compensates_disturbance {
+            return feedback;
+        }
+        feedback + input_matrix.command(&estimate.disturbance)
+    }
+
+    /// The motion whose forces the mode commands. Computed torque: the pose where the platform will be at the instant of `desired`
+    /// with an error, the acceleration with that of feedback, and the twist of the reference, as friction of estimated rates
+    /// would shake a platform at rest. A mode on legs: the desired motion.
+    pub(in crate::control) fn dynamics_motion(
+        &self,
+        desired: Motion,
+        error: &FeedbackError,
+        acceleration: &Vector6<f64>,
+    ) -> Motion {
+        if self.mode.acts_on_legs() {
+            return desired;
+        }
+        let Acceleration { angular, linear } = Acceleration::from_vector(acceleration);
+        Motion {
+            pose: desired.pose.extrapolated(&Twist::from_vector(&-error.value)),
+            twist: desired.twist,
+            acceleration: Acceleration {
+                angular: desired.acceleration.angular + angular,
+                linear: desired.acceleration.linear + linear,
+            },
+        }
+    }
+
+    /// Forces `m_i a_i` of the drives for accelerations of the legs.
+    pub fn feedback_leg_forces(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
+        acceleration.component_mul(&self.leg_masses.mass).into()
+    }
+}

@@ -1,0 +1,114 @@
+//! Limits of the forces: their magnitude by the actuators, and their rate of change.
+
+use nalgebra::Vector6;
+
+use crate::control::constants::Constants;
+use crate::control::cycle::Cycle;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::limits::{Limit, LimitSet};
+use crate::model::LEGS;
+use crate::model::fidelity::Gravity;
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::rigid::{Motion, Pose, Wrench};
+
+/// Forces of a cycle within their limits.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::control) struct LimitedForces {
+    /// \[N\]
+    pub force: [f64; LEGS],
+    /// Wrench of these forces minus that of the commanded ones, about C; zero if they are not limited.
+    pub wrench_error: Wrench,
+    pub active_limits: LimitSet,
+}
+
+/// Last stage of the cycle: limits magnitude and rate of the forces.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct ForceLimiter {
+    /// Of the last cycle under control.
+    last: [f64; LEGS],
+    /// Whether that one was limited.
+    is_limited: bool,
+}
+
+impl ForceLimiter {
+    /// Limits the forces for a motion, unless they cannot be computed. The rate is limited from the second cycle under control on.
+    pub fn limit(
+        &mut self,
+        cycle: &Cycle<'_>,
+        commanded: &[f64; LEGS],
+        motion: &Motion,
+        limited: &mut LimitedForces,
+    ) -> Result<(), Diagnostic> {
+        let Cycle { constants, state, .. } = *cycle;
+        let possible = limit_magnitude(constants, commanded, motion)?;
+        let force = if state.has_control() { self.limit_rate(constants, &possible) } else { possible };
+        limited.force = force;
+        limited.active_limits = LimitSet::default()
+            .with(Limit::Force, possible != *commanded)
+            .with(Limit::ForceRate, force != possible);
+        (self.last, self.is_limited) = (force, force != *commanded);
+        if self.is_limited {
+            limited.wrench_error = wrench_error(constants, &motion.pose, &force, commanded);
+        }
+        Ok(())
+    }
+
+    /// Limits the change since the last cycle, by the same factor for every leg.
+    fn limit_rate(&self, constants: &Constants, force: &[f64; LEGS]) -> [f64; LEGS] {
+        let parameters = &constants.parameters;
+        let change = parameters.force_rate * parameters.period_ns as f64 * 1e-9;
+        scale_into_bounds(&self.last, force, |last| (last - change, last + change))
+    }
+}
+
+// Out of line, as it is rare: the cycle stays short.
+#[inline(never)]
+fn wrench_error(constants: &Constants, pose: &Pose, force: &[f64; LEGS], commanded: &[f64; LEGS]) -> Wrench {
+    let difference = Vector6::from(*force) - Vector6::from(*commanded);
+    Wrench::from_vector(&(leg_wrenches(constants.machine(), pose) * difference))
+}
+
+/// Forces beyond the limit keep the part that carries the weight and reduce all else by the same factor, so that the
+/// rest keeps its direction.
+fn limit_magnitude(
+    constants: &Constants,
+    force: &[f64; LEGS],
+    motion: &Motion,
+) -> Result<[f64; LEGS], Diagnostic> {
+    let limit = constants.machine().actuator.max_force;
+    if force.iter().all(|value| value.abs() <= limit) {
+        return Ok(*force);
+    }
+    let weight = constants.dynamics.forces::<Gravity>(motion).ok_or(DiagnosticCode::SingularPose)?;
+    Ok(scale_into_bounds(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
+}
+
+/// From `start`, which is within its bounds, as far toward `end` as all bounds allow.
+fn scale_into_bounds(
+    start: &[f64; LEGS],
+    end: &[f64; LEGS],
+    bounds: impl Fn(f64) -> (f64, f64),
+) -> [f64; LEGS] {
+    let is_within = |(start, end): (&f64, &f64)| {
+        let (low, high) = bounds(*start);
+        (low..=high).contains(end)
+    };
+    if start.iter().zip(end).all(is_within) {
+        return *end;
+    }
+    let fraction = |(start, end): (&f64, &f64)| {
+        let ((low, high), way) = (bounds(*start), end - start);
+        let room = if way > 0.0 { high - start } else { low - start };
+        if way == 0.0 { 1.0 } else { room / way }
+    };
+    let fraction = start.iter().zip(end).map(fraction).fold(1.0, f64::min).max(0.0);
+    let mut reached = *end;
+    if fraction < 1.0 {
+        for (reached, start) in reached.iter_mut().zip(start) {
+            let (low, high) = bounds(*start);
+            *reached = (start + fraction * (*reached - start)).max(low).min(high);
+        }
+    }
+    reached
+}

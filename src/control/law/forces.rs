@@ -1,0 +1,34 @@
+//! Forces of the drives for a commanded motion, by the terms of the dynamics that the control mode has.
+
+use crate::control::constants::Constants;
+use crate::control::law::ControlMode;
+use crate::control::parameters::Parameters;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::model::LEGS;
+use crate::model::fidelity::Fidelity;
+use crate::model::rigid::Motion;
+
+use nalgebra::Vector6;
+
+/// Forces \[N\] for the motion that the law commands, and in a mode on legs for the acceleration of the legs.
+pub(in crate::control) fn forces(
+    constants: &Constants,
+    motion: &Motion,
+    acceleration: &Vector6<f64>,
+) -> Result<[f64; LEGS], Diagnostic> {
+    let Parameters { law, fidelity, .. } = &constants.parameters;
+    let fidelity = match law.mode {
+        ControlMode::ComputedTorque | ControlMode::FeedforwardJointPd => Some(*fidelity),
+        ControlMode::GravityJointPd => Some(Fidelity::Gravity),
+        ControlMode::JointPd => None,
+    };
+    let mut force = if law.mode.acts_on_legs() { law.feedback_leg_forces(acceleration) } else { [0.0; LEGS] };
+    if let Some(fidelity) = fidelity {
+        let modelled = constants.dynamics.forces_of(fidelity, motion).ok_or(DiagnosticCode::SingularPose)?;
+        force.iter_mut().zip(modelled).for_each(|(force, modelled)| *force += modelled);
+    }
+    if force.iter().any(|value| !value.is_finite()) {
+        return Err(DiagnosticCode::ForceNotFinite.into());
+    }
+    Ok(force)
+}

@@ -1,0 +1,110 @@
+//! Input matrix of the error dynamics at home: how the platform really accelerates where the law commands an acceleration.
+//!
+//! ```text
+//! e'' = d - B a        a: acceleration of the law, in the coordinates of the error
+//! exact computed torque        B = 1
+//! reduced fidelity             B = M^-1 N G      G: leg forces of the fidelity for unit accelerations
+//! modes on legs                B = N^T M^-1 N diag(m)
+//! ```
+//!
+//! With it the estimator knows that a fidelity without the mass of the legs accelerates the platform too little, and that the
+//! forces of one leg move the others: else both were disturbances as fast as the loop. M and N are those at home; what changes
+//! with the pose the disturbance takes.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use crate::control::law::leg_masses::LegMasses;
+use crate::control::law::mode::ControlMode;
+use crate::model::LEGS;
+use crate::model::active_forces::InverseDynamics;
+use crate::model::fidelity::Fidelity;
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::machine::Machine;
+use crate::model::mass_matrix::MassMatrix;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
+
+/// Input matrix of one machine and law.
+#[derive(Clone, Copy, Debug)]
+pub struct InputMatrix {
+    /// `M^-1`.
+    mobility: Matrix6<f64>,
+    acts_on_legs: bool,
+    /// B and its inverse; `None` if B is the identity.
+    by_command: Option<[Matrix6<f64>; 2]>,
+}
+
+impl InputMatrix {
+    /// At home. The identity where the machine has no mass matrix.
+    pub fn at_home(machine: &Machine, mode: ControlMode, leg_masses: &LegMasses, fidelity: Fidelity) -> Self {
+        let home = machine.home_pose();
+        let wrenches = leg_wrenches(machine, &home);
+        let mobility = MassMatrix::new(machine).at(&home).try_inverse().unwrap_or_default();
+        let by_force = mobility * wrenches;
+        let acts_on_legs = mode.acts_on_legs();
+        let by_command = if acts_on_legs {
+            with_inverse(wrenches.transpose() * by_force * Matrix6::from_diagonal(&leg_masses.mass))
+        } else if fidelity == Fidelity::Exact {
+            None
+        } else {
+            with_inverse(by_force * unit_forces(machine, fidelity))
+        };
+        Self { mobility, acts_on_legs, by_command }
+    }
+
+    /// The acceleration of the platform for one of the law.
+    pub fn acceleration(&self, commanded: &Vector6<f64>) -> Vector6<f64> {
+        self.by_command.map_or(*commanded, |[matrix, _]| matrix * commanded)
+    }
+
+    /// Largest disturbance that a law with this bound of its acceleration can compensate, axis by axis.
+    pub fn largest_disturbance(&self, bound: &Vector6<f64>) -> Vector6<f64> {
+        self.by_command.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
+    }
+
+    /// The acceleration by a wrench beside that of the law, at a pose: the forces that limits took away. Near flat legs a force
+    /// moves the platform far less than at home, so N is that of the pose.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn acceleration_of(&self, machine: &Machine, pose: &Pose, wrench: &Wrench) -> Vector6<f64> {
+        let acceleration = self.mobility * wrench.vector();
+        if self.acts_on_legs { leg_wrenches(machine, pose).tr_mul(&acceleration) } else { acceleration }
+    }
+
+    /// Acceleration by a unit force of each leg at a pose, a column for each, in the coordinates of the error.
+    pub fn acceleration_by_force(&self, machine: &Machine, pose: &Pose) -> Matrix6<f64> {
+        let wrenches = leg_wrenches(machine, pose);
+        let by_force = self.mobility * wrenches;
+        if self.acts_on_legs { wrenches.tr_mul(&by_force) } else { by_force }
+    }
+
+    /// The wrench about C that a disturbance, in the coordinates of the error, would need at home.
+    pub fn wrench_of_disturbance(&self, machine: &Machine) -> Matrix6<f64> {
+        let inertia = self.mobility.try_inverse().unwrap_or_default();
+        if !self.acts_on_legs {
+            return inertia;
+        }
+        let of_legs = leg_wrenches(machine, &machine.home_pose()).transpose();
+        inertia * of_legs.try_inverse().unwrap_or_default()
+    }
+
+    /// The acceleration that the law must command for one of the platform.
+    pub fn command(&self, acceleration: &Vector6<f64>) -> Vector6<f64> {
+        self.by_command.map_or(*acceleration, |[_, inverse]| inverse * acceleration)
+    }
+}
+
+fn with_inverse(matrix: Matrix6<f64>) -> Option<[Matrix6<f64>; 2]> {
+    matrix.try_inverse().map(|inverse| [matrix, inverse])
+}
+
+/// Leg forces of a fidelity at home, a column for each unit acceleration; without gravity.
+fn unit_forces(machine: &Machine, fidelity: Fidelity) -> Matrix6<f64> {
+    let weightless = InverseDynamics::new(&Machine { gravity: Vector3::zeros(), ..machine.clone() });
+    let pose = machine.home_pose();
+    let column = |k: usize| {
+        let acceleration = Acceleration::from_vector(&Vector6::ith(k, 1.0));
+        let motion = Motion { pose, twist: Twist::default(), acceleration };
+        Vector6::from(weightless.forces_of(fidelity, &motion).unwrap_or_default())
+    };
+    Matrix6::from_columns(&core::array::from_fn::<_, LEGS, _>(column))
+}

@@ -1,0 +1,310 @@
+//! Changes of what acts on the platform: a payload, an impact, an oscillation.
+//!
+//! The estimator compensates a disturbance whatever its cause. Three causes are faults all the same: a payload that comes or goes under
+//! control, a collision, and a loop that is near its limit of stability. With e the estimated error, d the estimated disturbance, M the
+//! inertia and a the acceleration of the reference:
+//!
+//! ```text
+//! payload       m = -(M d).g / (g.g - a.g)                            mass that the model lacks
+//!               | mean of m over 30 ms - mean of m over 1 s | <= bound
+//! impact        | d - mean of d over 150 ms | <= bound                unless the force of one leg explains it
+//!               beyond that for 20 ms it is no impact: a collision that goes on, or several drives without force
+//! oscillation   e turns back by more than a bound, four times in a row, each within a period of the loop
+//! ```
+//!
+//! The payload that is there when control begins is no fault. After an impact and with another payload the platform is still under
+//! control, and stops. Angles count by the radius of the platform.
+//!
+//! Where the reference shakes, the error shakes as well, as masses are not known exactly; where `[limits]` allows a sudden
+//! disturbance, that shakes the platform, too. Both parts are allowed. Forces that limits took away are known only as well as the
+//! inertia at home is that of the pose: a payload and an impact are beyond the bound by more than those would accelerate.
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+use nalgebra::{Vector3, Vector6};
+
+use crate::control::law::estimator::Readings;
+use crate::control::law::input_matrix::InputMatrix;
+use crate::control::parameters::Parameters;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::ErrorState;
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::machine::Machine;
+use crate::model::rigid::{Acceleration, Motion};
+
+/// Time constants of the payload now and of the usual one \[s\].
+const PAYLOAD_TIME_CONSTANT_S: f64 = 0.03;
+const USUAL_PAYLOAD_TIME_CONSTANT_S: f64 = 1.0;
+/// Time from the start of control in which every payload is usual, and swings decay \[s\].
+const START_S: f64 = 1.0;
+/// Default of `limits.payload_change_kg` over the mass of the platform, and over the mass that all drives can lift: friction that
+/// the model lacks looks like a payload.
+const PAYLOAD_RATIO: f64 = 0.1;
+const HIDDEN_LIFT_RATIO: f64 = 0.02;
+/// Time constant in which forces that limits took away are forgotten \[s\]: that of the usual payload.
+const LIMITED_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
+/// Least weight in a motion over that at rest: a platform that falls has no weight to compare with.
+const LEAST_WEIGHT_RATIO: f64 = 0.3;
+
+/// Default of `limits.disturbance_step_m_s2` over the limit of acceleration, of which 0.5 is compensated, and over the acceleration by
+/// the least force that a drive is watched for.
+const IMPACT_RATIO: f64 = 0.4;
+const IMPACT_BY_FRICTION: f64 = 1.5;
+/// Longest impact \[s\].
+const MAX_IMPACT_S: f64 = 0.02;
+
+/// Change of the error from one turn to the next in a loop of 10 Hz \[m\].
+const SWING_M: f64 = 8e-5;
+/// Natural frequency of that loop squared \[1/s^2\], and the largest change for a slower loop \[m\].
+const SWING_STIFFNESS: f64 = 3948.0;
+const MAX_SWING_M: f64 = 5e-3;
+/// The same in deviations of a reading.
+const SWING_DEVIATIONS: f64 = 10.0;
+/// Swings in a row that are an oscillation.
+const SWINGS: u32 = 4;
+/// Least ratio of a swing to the one before: less is the end of a disturbance.
+const LEAST_GROWTH: f64 = 0.9;
+/// Swing of the error, times Kp, over the disturbance by friction.
+const SWING_BY_FRICTION: f64 = 0.3;
+/// Swing of the error over the acceleration of a reference that shakes, times Kp: a payload of a fifth and the delay of the drives
+/// make half of it at 7 to 10 Hz. Without inertia in the law the error is that of the reference.
+const SHAKING_RATIO: f64 = 1.0;
+const SHAKING_RATIO_WITHOUT_INERTIA: f64 = 4.0;
+/// The same over a sudden disturbance that `[limits]` allows: a force that switches at 5 to 10 Hz makes 0.9.
+const SWING_BY_STEP: f64 = 1.5;
+/// Speed at which a shake of the reference is forgotten, over that at which its slow part follows.
+const FORGETTING_RATIO: f64 = 0.3;
+
+/// Bounds of the disturbance and of the error.
+#[derive(Clone, Copy, Debug)]
+pub struct DisturbanceBounds {
+    /// Payload for a unit disturbance \[kg / (m/s^2)\].
+    payload_by_disturbance: Vector6<f64>,
+    /// The largest for a disturbance in any direction.
+    payload_by_norm: f64,
+    /// Gravity over its square \[s^2/m\].
+    gravity: Vector3<f64>,
+    /// Of a change of the payload \[kg\].
+    pub payload: f64,
+    /// Of a sudden disturbance \[m/s^2\].
+    pub impact: f64,
+    /// Of a swing of the error \[m\].
+    swing: f64,
+    /// Swing that an acceleration of the reference explains \[m / (m/s^2)\].
+    swing_by_acceleration: f64,
+    /// Longest time from a turn to the next \[s\].
+    longest_swing_s: f64,
+    /// Radius by which angles count \[m\], squared.
+    arm_squared: f64,
+}
+
+impl DisturbanceBounds {
+    /// Of a machine. `friction` is the least disturbance that is no friction of one drive \[m/s^2\]; `arm` is the radius by which
+    /// angles count \[m\].
+    pub fn new(
+        machine: &Machine,
+        parameters: &Parameters,
+        input_matrix: &InputMatrix,
+        friction: f64,
+        arm: f64,
+    ) -> Self {
+        let Parameters { law, limits, payload_change_kg, disturbance_step, .. } = parameters;
+        let Readings { noise, .. } = parameters.readings;
+        let expects_forces = law.mode.includes_inertia();
+        let has_weight = expects_forces && machine.gravity.norm_squared() > 0.0;
+        let gravity = machine.gravity / machine.gravity.norm_squared().max(f64::MIN_POSITIVE);
+        let along_gravity = Vector6::new(0.0, 0.0, 0.0, gravity.x, gravity.y, gravity.z);
+        let by_legs = leg_wrenches(machine, &machine.home_pose()).tr_mul(&along_gravity).abs().sum();
+        let largest_lift_kg = machine.actuator.max_force * by_legs;
+        let default_kg = (PAYLOAD_RATIO * machine.platform.mass).max(HIDDEN_LIFT_RATIO * largest_lift_kg);
+        let default_step = (IMPACT_RATIO * limits.position.acceleration).max(IMPACT_BY_FRICTION * friction);
+        let softest = law.position.stiffness.min(law.orientation.stiffness);
+        let softness = (SWING_STIFFNESS / softest).max(1.0);
+        let swing = (SWING_M * softness * softness).min(MAX_SWING_M);
+        let by_step = SWING_BY_STEP * disturbance_step.unwrap_or(0.0) / softest;
+        let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
+        let payload_by_disturbance = -input_matrix.wrench_of_disturbance(machine).tr_mul(&along_gravity);
+        let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm;
+        Self {
+            payload_by_disturbance,
+            payload_by_norm: by_angles.hypot(payload_by_disturbance.fixed_rows::<3>(3).norm()),
+            gravity,
+            payload: if has_weight { payload_change_kg.unwrap_or(default_kg) } else { f64::INFINITY },
+            impact: if expects_forces { disturbance_step.unwrap_or(default_step) } else { f64::INFINITY },
+            swing: by_step + swing.max(SWING_DEVIATIONS * noise).max(SWING_BY_FRICTION * friction / softest),
+            swing_by_acceleration: shaking / softest,
+            longest_swing_s: core::f64::consts::TAU / softest.sqrt(),
+            arm_squared: arm * arm,
+        }
+    }
+
+    fn norm_squared(&self, vector: &Vector6<f64>) -> f64 {
+        let [a, b, c, x, y, z]: [f64; 6] = (*vector).into();
+        (a * a + b * b + c * c) * self.arm_squared + (x * x + y * y + z * z)
+    }
+}
+
+/// Memory of the checks.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct DisturbanceMonitor {
+    since_start_s: f64,
+    payload: f64,
+    usual_payload: f64,
+    impact_s: f64,
+    /// Acceleration by forces that limits took away lately \[m/s^2\].
+    limited: f64,
+    oscillation: Oscillation,
+}
+
+/// Swings of the error.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+struct Oscillation {
+    /// Error at the last turn, and the farthest from there since.
+    turn: Vector6<f64>,
+    farthest: Vector6<f64>,
+    swing_squared: f64,
+    last_swing_squared: f64,
+    since_turn_s: f64,
+    swings: u32,
+    /// Slow part of the acceleration of the reference, and the largest square of the rest lately.
+    slow_acceleration: Vector6<f64>,
+    shaking_squared: f64,
+}
+
+impl DisturbanceMonitor {
+    /// Records the acceleration by forces that limits took away.
+    pub fn record_limited(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
+        self.limited = self.limited.max(bounds.norm_squared(acceleration).sqrt());
+    }
+
+    /// Checks the estimate after a measurement, `dt` seconds after the last one. `sudden` is the square of the disturbance without its
+    /// mean; zero if the force of one leg explains it.
+    pub fn check(
+        &mut self,
+        bounds: &DisturbanceBounds,
+        estimate: &ErrorState,
+        reference: &Motion,
+        sudden_squared: f64,
+        dt: f64,
+    ) -> Result<(), Diagnostic> {
+        self.since_start_s += dt;
+        self.limited *= 1.0 - (dt / LIMITED_TIME_CONSTANT_S).min(1.0);
+        let payload = self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, dt);
+        let impact = self.check_impact(bounds, sudden_squared, dt);
+        let oscillation =
+            self.oscillation.check(bounds, &estimate.value, &reference.acceleration.vector(), dt);
+        // Control begins with an unknown payload, and rings.
+        let oscillation = if self.since_start_s < START_S { Ok(()) } else { oscillation };
+        oscillation?;
+        impact?;
+        payload
+    }
+
+    fn check_payload(
+        &mut self,
+        bounds: &DisturbanceBounds,
+        disturbance: &Vector6<f64>,
+        acceleration: &Acceleration,
+        dt: f64,
+    ) -> Result<(), Diagnostic> {
+        let weight_ratio = (1.0 - acceleration.linear.dot(&bounds.gravity)).max(LEAST_WEIGHT_RATIO);
+        let payload = bounds.payload_by_disturbance.dot(disturbance) / weight_ratio;
+        self.payload += (payload - self.payload) * (dt / PAYLOAD_TIME_CONSTANT_S).min(1.0);
+        let change = self.payload - self.usual_payload;
+        let is_starting = self.since_start_s < START_S;
+        let share = if is_starting { 1.0 } else { (dt / USUAL_PAYLOAD_TIME_CONSTANT_S).min(1.0) };
+        self.usual_payload += change * share;
+        let bound = bounds.payload + bounds.payload_by_norm * self.limited;
+        if is_starting || change.abs() <= bound {
+            return Ok(());
+        }
+        Err(Diagnostic::new(DiagnosticCode::PayloadChanged, change, bound.copysign(change)))
+    }
+
+    fn check_impact(
+        &mut self,
+        bounds: &DisturbanceBounds,
+        sudden_squared: f64,
+        dt: f64,
+    ) -> Result<(), Diagnostic> {
+        let bound = bounds.impact + self.limited;
+        if sudden_squared <= bound * bound {
+            self.impact_s = 0.0;
+            return Ok(());
+        }
+        self.impact_s += dt;
+        if self.impact_s > MAX_IMPACT_S {
+            return Err(Diagnostic::new(DiagnosticCode::DisturbanceLasting, self.impact_s, MAX_IMPACT_S));
+        }
+        Err(Diagnostic::new(DiagnosticCode::Impact, sudden_squared.sqrt(), bound))
+    }
+}
+
+impl Oscillation {
+    fn check(
+        &mut self,
+        bounds: &DisturbanceBounds,
+        error: &Vector6<f64>,
+        acceleration: &Vector6<f64>,
+        dt: f64,
+    ) -> Result<(), Diagnostic> {
+        let share = (dt * core::f64::consts::PI / bounds.longest_swing_s).min(1.0);
+        let shaking = acceleration - self.slow_acceleration;
+        self.slow_acceleration += shaking * share;
+        self.shaking_squared =
+            (self.shaking_squared * (1.0 - FORGETTING_RATIO * share)).max(bounds.norm_squared(&shaking));
+        self.since_turn_s += dt;
+        let back = error - self.farthest;
+        if bounds.norm_squared(&back) > bounds.swing * bounds.swing
+            && back.dot(&(self.farthest - self.turn)) <= 0.0
+        {
+            return self.count(bounds, error, bounds.norm_squared(&back));
+        }
+        let swing_squared = bounds.norm_squared(&(error - self.turn));
+        if swing_squared >= self.swing_squared {
+            (self.farthest, self.swing_squared) = (*error, swing_squared);
+        }
+        if self.since_turn_s > bounds.longest_swing_s {
+            self.restart(error);
+        }
+        Ok(())
+    }
+
+    /// Begins anew where the error is.
+    // Rare, like `count`: a branch to code elsewhere keeps the cycle short.
+    #[cold]
+    #[inline]
+    fn restart(&mut self, error: &Vector6<f64>) {
+        (self.turn, self.farthest, self.swing_squared) = (*error, *error, 0.0);
+        (self.since_turn_s, self.swings, self.last_swing_squared) = (0.0, 0, 0.0);
+    }
+
+    /// Counts a turn, if the motion of the reference does not explain it.
+    #[cold]
+    #[inline]
+    fn count(
+        &mut self,
+        bounds: &DisturbanceBounds,
+        error: &Vector6<f64>,
+        back_squared: f64,
+    ) -> Result<(), Diagnostic> {
+        let bound = bounds.swing + bounds.swing_by_acceleration * self.shaking_squared.sqrt();
+        if back_squared <= bound * bound {
+            return Ok(());
+        }
+        let swing_squared = self.swing_squared;
+        let decays = swing_squared < LEAST_GROWTH * LEAST_GROWTH * self.last_swing_squared;
+        (self.turn, self.farthest, self.swing_squared) = (self.farthest, *error, back_squared);
+        self.last_swing_squared = swing_squared;
+        (self.since_turn_s, self.swings) = (0.0, if decays { 1 } else { self.swings.saturating_add(1) });
+        if self.swings < SWINGS {
+            return Ok(());
+        }
+        Err(Diagnostic::new(DiagnosticCode::Oscillation, 0.5 * swing_squared.sqrt(), 0.5 * bound))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+//! Errors that swing, payloads that change, impacts; and none of them.
+
+use core::f64::consts::TAU;
+
+use crate::control::monitoring::disturbance_monitor::*;
+use crate::model::task::TaskState;
+
+const BOUNDS: DisturbanceBounds = DisturbanceBounds {
+    payload_by_disturbance: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.2),
+    payload_by_norm: 0.2,
+    gravity: Vector3::new(0.0, 0.0, -1.0 / 9.81),
+    payload: 0.1,
+    impact: 2.0,
+    swing: SWING_M,
+    swing_by_acceleration: 1.0 / SWING_STIFFNESS,
+    longest_swing_s: 0.1,
+    arm_squared: 1.0,
+};
+
+/// The first fault of the estimate, the acceleration of the reference and the sudden disturbance of each instant, and when.
+fn found(at: impl Fn(f64) -> (ErrorState, f64, f64)) -> Option<(DiagnosticCode, f64)> {
+    let mut monitor = DisturbanceMonitor::default();
+    (0..4000).map(|cycle| 1e-3 * f64::from(cycle)).find_map(|t| {
+        let (estimate, acceleration, sudden) = at(t);
+        let mut reference = TaskState::at_rest([0.0; 6]).motion();
+        reference.acceleration.linear.z = acceleration;
+        let result = monitor.check(&BOUNDS, &estimate, &reference, sudden * sudden, 1e-3);
+        result.err().map(|diagnostic| (diagnostic.code, t))
+    })
+}
+
+fn with(error: f64, disturbance: f64) -> ErrorState {
+    let along_z = |value: f64| Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value);
+    ErrorState { value: along_z(error), rate: Vector6::zeros(), disturbance: along_z(disturbance) }
+}
+
+#[test]
+fn an_error_that_swings_is_named() {
+    let swinging = |metres: f64, hertz: f64, acceleration: f64| {
+        found(|t| {
+            let phase = (hertz * TAU * t).sin();
+            (with(1e-3 + metres * phase, 0.0), acceleration * phase, 0.0)
+        })
+    };
+    for hertz in [7.0, 10.0, 30.0, 100.0] {
+        let (code, after_s) = swinging(5e-5, hertz, 0.0).unwrap();
+        assert_eq!(code, DiagnosticCode::Oscillation);
+        // A second after control began, or when it has swung for long enough.
+        assert!(after_s < START_S + 4.0 / hertz, "{hertz} Hz: {after_s} s");
+        assert_eq!(swinging(3.5e-5, hertz, 0.0), None, "{hertz} Hz");
+    }
+    // Motions that are not followed exactly are slow, or the reference shakes as well.
+    assert_eq!(swinging(1e-3, 2.0, 0.0), None);
+    assert_eq!(swinging(2e-4, 8.0, 4.0), None);
+}
+
+/// The end of a disturbance at 1.5 s: each swing is less than the one before by a ratio.
+#[test]
+fn an_error_that_rings_until_it_is_at_rest_is_none() {
+    let ringing = |ratio: f64| {
+        found(|t| {
+            let swings = 20.0 * (t - 1.5);
+            let size = if swings < 0.0 { 0.0 } else { 4e-4 * ratio.powf(swings) };
+            (with(size * (0.5 * TAU * swings).sin(), 0.0), 0.0, 0.0)
+        })
+    };
+    assert_eq!(ringing(0.8), None);
+    assert_eq!(ringing(0.95).map(|(code, _)| code), Some(DiagnosticCode::Oscillation));
+}
+
+#[test]
+fn a_payload_that_changes_is_named_and_one_that_stays_is_not() {
+    let carried = |ratio: f64, from_s: f64, lift: f64| {
+        let load = move |t: f64| if t < from_s { 0.0 } else { ratio };
+        found(|t| {
+            let acceleration = lift * (TAU * t).sin();
+            (with(0.0, load(t) / 0.2 * (1.0 + acceleration / 9.81)), acceleration, 0.0)
+        })
+    };
+    for ratio in [0.2, -0.2] {
+        let (code, at_s) = carried(ratio, 2.0, 0.0).unwrap();
+        assert_eq!(code, DiagnosticCode::PayloadChanged);
+        assert!((2.015..2.03).contains(&at_s), "{ratio}: {at_s}");
+        assert_eq!(carried(ratio, 0.0, 4.0), None, "{ratio}");
+        assert_eq!(carried(0.4 * ratio, 2.0, 4.0), None, "{ratio}");
+    }
+}
+
+#[test]
+fn an_impact_is_brief() {
+    let pushed = |sudden: f64| found(|t| (ErrorState::default(), 0.0, if t >= 1.0 { sudden } else { 0.0 }));
+    assert_eq!(pushed(1.9), None);
+    assert_eq!(pushed(2.1), Some((DiagnosticCode::Impact, 1.0)));
+    let mut monitor = DisturbanceMonitor::default();
+    let lasting = |_| monitor.check_impact(&BOUNDS, 4.1, 1e-3).err().map(|found| found.code);
+    let codes: [_; 25] = core::array::from_fn(lasting);
+    assert_eq!(codes[15], Some(DiagnosticCode::Impact));
+    assert_eq!(codes[24], Some(DiagnosticCode::DisturbanceLasting));
+}
+
+#[test]
+fn what_limits_took_away_is_no_change() {
+    let along_z = |value: f64| Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value);
+    let changed = |limited: f64, disturbance: f64| {
+        let mut monitor = DisturbanceMonitor::default();
+        (0..2000).find_map(|cycle| {
+            let is_cut = cycle >= 1500;
+            if is_cut {
+                monitor.record_limited(&BOUNDS, &along_z(limited));
+            }
+            let disturbance = if is_cut { disturbance } else { 0.0 };
+            let reference = TaskState::at_rest([0.0; 6]).motion();
+            let found =
+                monitor.check(&BOUNDS, &with(0.0, disturbance), &reference, disturbance * disturbance, 1e-3);
+            found.err().map(|found| found.code)
+        })
+    };
+    assert_eq!(changed(0.0, 1.0), Some(DiagnosticCode::PayloadChanged));
+    assert_eq!(changed(1.0, 1.0), None);
+    assert_eq!(changed(2.0, 2.4), None);
+    assert_eq!(changed(2.0, 4.1), Some(DiagnosticCode::Impact));
+    // Forgotten after some seconds.
+    let mut monitor = DisturbanceMonitor::default();
+    monitor.record_limited(&BOUNDS, &along_z(1e3));
+    assert_eq!(monitor.limited, 1e3);
+    let rest = TaskState::at_rest([0.0; 6]).motion();
+    (0..12_000).for_each(|_| assert_eq!(monitor.check(&BOUNDS, &with(0.0, 0.0), &rest, 0.0, 1e-3), Ok(())));
+    assert!(monitor.limited < 0.01, "{}", monitor.limited);
+}

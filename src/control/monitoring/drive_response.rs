@@ -1,0 +1,115 @@
+//! Drives that do not respond: forces that are sent and do not act, without any report of the driver.
+//!
+//! The estimated disturbance is the acceleration that the model and the forces do not explain. If the force of one leg stops, it becomes
+//! within milliseconds the acceleration that this force should have made, whatever the platform does:
+//!
+//! ```text
+//! B = M^-1 N                       accelerations for unit forces of the legs; in modes on legs N^T M^-1 N
+//! f_i = b_i . d / (b_i . b_i)      force of leg i that explains the disturbance best
+//! cos = b_i . d / (|b_i| |d|)      how well
+//! ```
+//!
+//! d is what has changed lately: a payload and friction change slowly, or are there when control begins. Angles count by the radius of the
+//! platform. A force is missing if `cos` is near 1 and f_i a good part of what was sent before, against noise, friction and payloads.
+//!
+//! It does not see a leg that carries little, as friction may be as large, nor several drives at once. That the drive of a leg pushes
+//! more than it should shows in the lengths.
+
+use nalgebra::Vector6;
+
+use crate::control::constants::Constants;
+use crate::control::monitoring::weighting::{LEAST_FORCE_RATIO, weighted};
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::model::LEGS;
+use crate::model::rigid::Pose;
+
+/// Time constant of the disturbance that is usual \[s\]: several times that of the estimator.
+const USUAL_TIME_CONSTANT_S: f64 = 0.15;
+/// Time from the start of control in which every disturbance is usual \[s\]: the payload is not known before.
+const START_S: f64 = 0.25;
+/// Least missing force as a ratio of the force that was sent: twice the friction that a model leaves out.
+const LEAST_MISSING_RATIO: f64 = 0.4;
+/// Most, of the force that was sent: of a drive that pushes the wrong way, with reserve.
+const MOST_MISSING_RATIO: f64 = 2.5;
+/// Least square of the cosine: 18 degrees. The accelerations of two legs differ by more.
+const LEAST_COSINE_SQUARED: f64 = 0.9;
+/// Time for which it is missing \[s\]: an impact is shorter, or passes through other directions.
+const LEAST_MISSING_S: f64 = 0.006;
+
+/// Memory of the check.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct DriveResponse {
+    usual: Vector6<f64>,
+    /// Forces that are usually sent \[N\].
+    usual_force: Vector6<f64>,
+    since_start_s: f64,
+    missing_s: f64,
+    /// Square of the disturbance beyond the usual one, weighted; 0 where the force of one leg explains it.
+    pub unexplained_squared: f64,
+}
+
+impl DriveResponse {
+    /// Checks the disturbance after a measurement, `dt` seconds after the last one.
+    pub fn check(
+        &mut self,
+        constants: &Constants,
+        disturbance: &Vector6<f64>,
+        sent: &[f64; LEGS],
+        pose: &Pose,
+        dt: f64,
+    ) -> Result<(), Diagnostic> {
+        let sudden = disturbance - self.usual;
+        self.since_start_s += dt;
+        let is_starting = self.since_start_s < START_S;
+        let share = if is_starting { 1.0 } else { (dt / USUAL_TIME_CONSTANT_S).min(1.0) };
+        self.usual += sudden * share;
+        let sent = Vector6::from(*sent);
+        self.usual_force += (sent - self.usual_force) * share;
+        let arm = constants.error_arm();
+        let sudden = weighted(&sudden, arm);
+        self.unexplained_squared = if is_starting { 0.0 } else { sudden.norm_squared() };
+        if is_starting || self.unexplained_squared < constants.least_missing_squared {
+            self.missing_s = 0.0;
+            return Ok(());
+        }
+        self.check_legs(constants, &sudden, &sent, pose, dt)
+    }
+
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn check_legs(
+        &mut self,
+        constants: &Constants,
+        sudden: &Vector6<f64>,
+        sent: &Vector6<f64>,
+        pose: &Pose,
+        dt: f64,
+    ) -> Result<(), Diagnostic> {
+        let arm = constants.error_arm();
+        let mut by_force = constants.input_matrix.acceleration_by_force(constants.machine(), pose);
+        by_force.column_iter_mut().for_each(|mut column| {
+            let scaled = weighted(&column.clone_owned(), arm);
+            column.copy_from(&scaled);
+        });
+        let along = by_force.tr_mul(sudden);
+        let squares = by_force.component_mul(&by_force).tr_mul(&Vector6::repeat(1.0));
+        let least = LEAST_COSINE_SQUARED * sudden.norm_squared();
+        let max_force = constants.machine().actuator.max_force;
+        let mut missing = None;
+        let forces = sent.iter().zip(&self.usual_force);
+        for (leg, ((along, square), (sent, usual))) in along.iter().zip(&squares).zip(forces).enumerate() {
+            let force = along / square * if *sent < 0.0 { -1.0 } else { 1.0 };
+            let explains = along * along >= least * square;
+            if explains {
+                self.unexplained_squared = 0.0;
+            }
+            let bound = (LEAST_MISSING_RATIO * usual.abs()).max(LEAST_FORCE_RATIO * max_force);
+            if explains && force >= bound && force <= MOST_MISSING_RATIO * sent.abs() {
+                missing = Some(Diagnostic::new(DiagnosticCode::DriveForceMissing, force, bound).at(leg));
+            }
+        }
+        self.missing_s = if missing.is_some() { self.missing_s + dt } else { 0.0 };
+        missing.filter(|_| self.missing_s > LEAST_MISSING_S).map_or(Ok(()), Err)
+    }
+}

@@ -1,0 +1,251 @@
+//! Frozen sensors: readings that stay the same to the last bit while the reference moves.
+//!
+//! A sensor that is alive changes with every noise, and with every step of motion. Each of three readings in a row must differ, unless
+//! the reference of the leg has moved no further than a bound since the first of them. A frozen sensor makes a false error that
+//! grows with the reference and acts on the platform as long as nobody notices: the slower the motion, the longer.
+//!
+//! A sensor whose noise is at least its resolution does not repeat itself at rest either. One with less noise, or of unknown
+//! resolution, may: a leg that freezes at rest cannot be distinguished then, and the platform drifts away. An independent pose
+//! or a second encoder closes that.
+
+use crate::control::law::estimator::Readings;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::model::LEGS;
+
+/// Equal readings in a row from which on a sensor may be frozen: fewer happen by chance with coarse steps.
+const MIN_EQUAL_READINGS: u32 = 3;
+/// Motion of the reference that six equal lengths allow, and one in a loop of 10 Hz, beside a step of the sensor \[m\]. A drive with
+/// stiction of a thousandth of its largest force leaves 6 and 33 um, those whose friction is known to a fifth 28 and 46 um.
+const ALL_LEGS_BOUND_M: f64 = 32e-6;
+const ONE_LEG_BOUND_M: f64 = 55e-6;
+/// Natural frequency of that loop squared \[1/s^2\].
+const BOUND_STIFFNESS: f64 = 3948.0;
+/// Most for a loop with less.
+const MAX_ONE_LEG_BOUND_M: f64 = 1.5e-4;
+/// Friction that the model may lack, as a ratio of the largest force, with a third in reserve: a fifth of half a per cent, and
+/// stiction of a twentieth of a per cent. While a platform crawls, feedback pushes a leg whose sensor is frozen harder than this long
+/// before the reference has moved by the bounds above.
+const STICTION_RATIO: f64 = 0.002;
+/// A force beyond that ends control only after readings were equal for so long \[s\]: a leg that is not frozen leaves its step sooner.
+const LONG_S: f64 = 0.05;
+/// The reference has to have moved as well: by this length \[m\], and by so many steps of the sensor.
+const LEAST_MOTION_M: f64 = 5e-6;
+const LEAST_MOTION_STEPS: f64 = 10.0;
+/// Equal readings in a row of a sensor whose noise is one step, and of any with noise: by chance at most once in 1e12, with one
+/// step also if the noise is a third of the configured one.
+const MAX_EQUAL_AT_ONE_STEP: f64 = 100.0;
+const MAX_EQUAL_NOISY_READINGS: f64 = 12.0;
+/// The same in steps of a coarse sensor: a payload and friction that are known to a fifth leave 12.1.
+const BOUND_STEPS: f64 = 14.0;
+
+impl Readings {
+    /// Equal readings in a row that noise allows; `None` if its noise is less than a step, or the step is not known.
+    fn most_equal(&self) -> Option<f64> {
+        let steps = self.noise / self.step;
+        (self.step > 0.0 && steps >= 1.0)
+            .then(|| (MAX_EQUAL_AT_ONE_STEP / (steps * steps)).max(MAX_EQUAL_NOISY_READINGS))
+    }
+}
+
+/// What equal readings of one leg allow, beside noise.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrozenLegBounds {
+    /// Motion of the reference \[m\].
+    pub motion: f64,
+    /// Change of the feedback's force on the leg \[N\], if they have been equal for long and the reference has moved at all: less
+    /// may be held by stiction.
+    pub force: f64,
+    /// Number of readings that is long.
+    pub long: u32,
+}
+
+impl FrozenLegBounds {
+    /// Of a loop with the stiffness Kp \[1/s^2\].
+    pub fn new(stiffness: f64, max_force: f64, period_s: f64) -> Self {
+        Self {
+            motion: motion_bound(stiffness),
+            force: STICTION_RATIO * max_force,
+            long: (LONG_S / period_s) as u32,
+        }
+    }
+}
+
+/// Motion of the reference that equal readings of one leg allow, in a loop with this stiffness Kp \[1/s^2\].
+///
+/// A reading that is false by `v t` accelerates the platform by `Kp v t`: when the reference has moved by B the platform is `Kp B^3 / (6 v^2)` off its path.
+/// That shall be the same for all loops. A leg that friction holds moves no less far before the force of feedback frees it, with
+/// less stiffness farther.
+fn motion_bound(stiffness: f64) -> f64 {
+    (ONE_LEG_BOUND_M * libm::cbrt(BOUND_STIFFNESS / stiffness)).min(MAX_ONE_LEG_BOUND_M)
+}
+
+/// Readings that did not change, and where the reference was at the first of them.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct FrozenSensors {
+    last: [f64; LEGS],
+    equal_readings: [u32; LEGS],
+    /// Lengths of the reference at the first of the equal readings \[m\].
+    reference: [f64; LEGS],
+    /// Forces of the feedback on the legs then \[N\].
+    feedback: [f64; LEGS],
+}
+
+impl FrozenSensors {
+    /// Whether a new measurement is alive. `legs` are the lengths of the reference at its instant and the forces of the feedback, evaluated
+    /// only where a reading stayed the same.
+    pub fn check(
+        &mut self,
+        length: &[f64; LEGS],
+        readings: &Readings,
+        one_leg: &FrozenLegBounds,
+        legs: impl FnOnce() -> [[f64; LEGS]; 2],
+    ) -> Result<(), Diagnostic> {
+        let mut is_any_equal = false;
+        for ((last, equal), length) in self.last.iter_mut().zip(&mut self.equal_readings).zip(length) {
+            // To the last bit, as a sensor that is frozen repeats itself.
+            let is_equal = last.to_bits() == length.to_bits();
+            *equal = if is_equal { equal.saturating_add(1) } else { 0 };
+            *last = *length;
+            is_any_equal |= is_equal;
+        }
+        if is_any_equal { self.check_motion(&legs(), readings, one_leg) } else { Ok(()) }
+    }
+
+    /// Whether any length has been the same for so many readings that its sensor may be frozen.
+    pub fn repeat(&self) -> bool {
+        self.equal_readings.iter().any(|equal| *equal + 1 >= MIN_EQUAL_READINGS)
+    }
+
+    /// Whether the reference has not moved while readings stayed the same.
+    // Out of line, as most sensors have noise: the cycle stays short.
+    #[inline(never)]
+    fn check_motion(
+        &mut self,
+        [reference, feedback]: &[[f64; LEGS]; 2],
+        readings: &Readings,
+        one_leg: &FrozenLegBounds,
+    ) -> Result<(), Diagnostic> {
+        let are_all_equal = self.equal_readings.iter().all(|equal| *equal + 1 >= MIN_EQUAL_READINGS);
+        let bound = if are_all_equal { ALL_LEGS_BOUND_M } else { one_leg.motion };
+        let bound = (bound + readings.step).max(BOUND_STEPS * readings.step);
+        let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * readings.step);
+        let mut result = Ok(());
+        let first = self.reference.iter_mut().zip(&mut self.feedback);
+        let legs = first.zip(&self.equal_readings).zip(reference.iter().zip(feedback));
+        for (leg, (((first, first_force), equal), (reference, force))) in legs.enumerate() {
+            if *equal <= 1 {
+                (*first, *first_force) = (*reference, *force);
+            }
+            let moved = (reference - *first).abs();
+            if *equal + 1 >= MIN_EQUAL_READINGS && moved > bound && result.is_ok() {
+                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, bound).at(leg));
+            }
+            let is_long = *equal >= one_leg.long && moved > least_motion;
+            if is_long && (force - *first_force).abs() > one_leg.force && result.is_ok() {
+                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, least_motion).at(leg));
+            }
+            let repeats = |most| f64::from(*equal + 1) > most;
+            if readings.most_equal().is_some_and(repeats) && result.is_ok() {
+                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, readings.step).at(leg));
+            }
+        }
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOUNDS: FrozenLegBounds = FrozenLegBounds { motion: ONE_LEG_BOUND_M, force: 10.0, long: 50 };
+
+    /// Readings of a crawling leg that stays where it is while the feedback's force on it grows by so many newtons.
+    fn is_frozen_at(newtons: f64, readings: u32) -> bool {
+        let mut sensors = FrozenSensors::default();
+        (0..readings).any(|k| {
+            let share = f64::from(k) / f64::from(readings);
+            let legs = [[1.0 + 8e-6 * share; LEGS], [0.0, 0.0, 0.0, newtons * share, 0.0, 0.0]];
+            let length = core::array::from_fn(|leg| if leg == 3 { 1.0 } else { 1.0 + 1e-9 * f64::from(k) });
+            sensors.check(&length, &Readings::default(), &BOUNDS, || legs).is_err()
+        })
+    }
+
+    #[test]
+    fn a_crawling_leg_that_does_not_yield_to_a_force_is_frozen() {
+        assert!(is_frozen_at(20.0, 200));
+        assert!(!is_frozen_at(9.0, 200), "stiction");
+        assert!(!is_frozen_at(20.0, 40), "not long");
+    }
+
+    /// Micrometres of the reference at which frozen legs are noticed, in steps of 5 um.
+    fn noticed_um(frozen: &[usize], step: f64) -> Option<(f64, usize)> {
+        let mut sensors = FrozenSensors::default();
+        for k in 0..100 {
+            let reference = [1.0 + 5e-6 * f64::from(k); LEGS];
+            let mut length = reference;
+            frozen.iter().filter(|_| k > 10).for_each(|leg| length[*leg] = 1.0);
+            if let Err(diagnostic) =
+                sensors.check(&length, &Readings { noise: 0.0, step }, &BOUNDS, || [reference, [0.0; LEGS]])
+            {
+                assert_eq!(diagnostic.code, DiagnosticCode::SensorFrozen);
+                return Some((1e6 * diagnostic.value, diagnostic.index as usize));
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn a_frozen_leg_is_named_after_its_bound_and_all_six_sooner() {
+        assert_eq!(noticed_um(&[], 0.0), None);
+        let (moved, leg) = noticed_um(&[4], 0.0).unwrap();
+        assert!((55.0..61.0).contains(&moved) && leg == 5, "{moved} {leg}");
+        let (moved, _) = noticed_um(&[0, 1, 2, 3, 4, 5], 0.0).unwrap();
+        assert!((32.0..38.0).contains(&moved), "{moved}");
+        let (moved, _) = noticed_um(&[2], 8e-6).unwrap();
+        assert!((112.0..118.0).contains(&moved), "{moved}");
+    }
+
+    #[test]
+    fn equal_readings_at_rest_are_no_fault() {
+        let mut sensors = FrozenSensors::default();
+        for _ in 0..1000 {
+            assert!(sensors.check(&[1.0; LEGS], &Readings::default(), &BOUNDS, || [[1.0; LEGS]; 2]).is_ok());
+        }
+    }
+
+    /// Equal readings at rest until a sensor counts as frozen.
+    fn repeated(noise: f64, step: f64) -> Option<u32> {
+        let mut sensors = FrozenSensors::default();
+        let readings = Readings { noise, step };
+        (1..1000).find(|_| sensors.check(&[1.0; LEGS], &readings, &BOUNDS, || [[1.0; LEGS]; 2]).is_err())
+    }
+
+    #[test]
+    fn a_sensor_with_noise_repeats_itself_only_if_it_is_frozen() {
+        assert_eq!(repeated(5e-6, 1e-6), Some(13));
+        assert_eq!(repeated(2e-6, 1e-6), Some(26));
+        assert_eq!(repeated(1e-6, 1e-6), Some(101));
+        assert_eq!(repeated(0.9e-6, 1e-6), None);
+        assert_eq!(repeated(1e-6, 0.0), None);
+    }
+
+    /// Steps of 1 um at 20 um/s: 50 equal readings in a row.
+    #[test]
+    fn a_coarse_sensor_in_slow_motion_is_no_fault() {
+        let mut sensors = FrozenSensors::default();
+        for k in 0..20_000 {
+            let reference = [1.0 + 2e-8 * f64::from(k); LEGS];
+            let length = reference.map(|length| (length * 1e6).round() * 1e-6);
+            assert!(
+                sensors
+                    .check(&length, &Readings { noise: 0.0, step: 1e-6 }, &BOUNDS, || [
+                        reference,
+                        [0.0; LEGS]
+                    ])
+                    .is_ok(),
+                "{k}"
+            );
+        }
+    }
+}

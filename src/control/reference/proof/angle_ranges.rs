@@ -1,0 +1,182 @@
+//! Whether the Bryan angles of a rotation keep a distance from the ends of their ranges, without the angles.
+//!
+//! The matrix holds sine and cosine of each angle times `c = cos(beta)`. With the angles d and e from both ends of a range of
+//! the width w, up to full turns:
+//!
+//! ```text
+//! sin d >= slack and sin e >= slack                       =>  d, e >= slack      w < pi
+//! the same, or where cos d <= 0 or cos e <= 0 instead     =>  d, e >= slack      pi <= w <= 5
+//! ```
+//!
+//! as `asin(slack) >= slack`. A range ends at most 2.5 rad from where a motion begins, without slack there, so that full turns do
+//! not matter. That is a few products for all ends at once, where each arc tangent takes 100 instructions: an examination asks at
+//! every knot.
+
+use core::f64::consts::{FRAC_PI_2, PI};
+
+use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+use nalgebra::Matrix3;
+
+use crate::control::parameters::Envelope;
+use crate::control::reference::stop::vector_stop::Stop;
+
+/// Part of the width of a range that a slack may use.
+pub(in crate::control::reference) const MAX_SLACK_RATIO: f64 = 0.25;
+
+/// Largest change of an angle along a motion \[rad\].
+const MAX_CHANGE: f64 = 2.5;
+
+/// Low ends of the three ranges and a zero, high ends and a zero.
+const LANES: usize = 8;
+
+/// Ranges of the angles, an end in each lane.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::control::reference) struct AngleRanges {
+    /// Sine and cosine of each end; of the high ones with the opposite sign, as their distance has.
+    sine: [f64; LANES],
+    cosine: [f64; LANES],
+    /// Most slack that is kept from each \[rad\].
+    slack: [f64; LANES],
+    /// Sign of the distance where the range is wide, else 0; and the cosine of a distance that is large then, else none.
+    wide: [f64; LANES],
+    far: [f64; LANES],
+    /// Sign of `cos(beta)`: of the two triples of angles that give the same rotation.
+    sign: f64,
+    /// Whether no range ends before it begins.
+    is_possible: bool,
+}
+
+impl AngleRanges {
+    /// Those of an envelope, for a motion from X.
+    pub fn new(Envelope { lowest, highest }: &Envelope, x: &[f64; 6]) -> Self {
+        let [_, beta, ..] = *x;
+        let zeros = [0.0; LANES];
+        let mut ranges = Self {
+            sine: zeros,
+            cosine: zeros,
+            slack: zeros,
+            wide: zeros,
+            far: [f64::NEG_INFINITY; LANES],
+            sign: 1.0_f64.copysign(libm::cos(beta)),
+            is_possible: true,
+        };
+        for (axis, (x, (low, high))) in x.iter().zip(lowest.iter().zip(highest)).take(3).enumerate() {
+            let slack = (MAX_SLACK_RATIO * (high - low)).min(1.0);
+            let (reached_low, reached_high) = (low.max(x - MAX_CHANGE), high.min(x + MAX_CHANGE));
+            let width = reached_high - reached_low;
+            ranges.is_possible &= width >= 0.0;
+            // An end that is too far to be reached needs no slack.
+            let slacks = [(low, reached_low), (high, reached_high)]
+                .map(|(end, reached)| if *end == reached { slack } else { 0.0 });
+            ranges.set_end(axis, reached_low, 1.0, slacks[0], width >= PI);
+            ranges.set_end(axis + LANES / 2, reached_high, -1.0, slacks[1], width >= PI);
+        }
+        ranges
+    }
+
+    /// Those, if they lack room for some rotation of a stop from X.
+    pub fn without_room(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<Self> {
+        let Envelope { lowest, highest } = envelope;
+        let [_, beta, ..] = x;
+        let turn = stop.peak_velocity * stop.duration;
+        let need = turn / libm::cos((beta.abs() + turn).min(FRAC_PI_2));
+        let mut ranges = x.iter().zip(lowest.iter().zip(highest)).take(3);
+        let have_room = ranges.all(|(x, (low, high))| (x - low).min(high - x) >= need);
+        (!have_room).then(|| Self::new(envelope, x))
+    }
+
+    fn set_end(&mut self, lane: usize, angle: f64, sign: f64, slack: f64, is_wide: bool) {
+        let (sine, cosine) = libm::sincos(angle);
+        let (wide, far) = if is_wide { (sign, 0.0) } else { (0.0, f64::NEG_INFINITY) };
+        let lanes = [&mut self.sine, &mut self.cosine, &mut self.slack, &mut self.wide, &mut self.far];
+        for (lanes, number) in lanes.into_iter().zip([sign * sine, sign * cosine, slack, wide, far]) {
+            if let Some(slot) = lanes.get_mut(lane) {
+                *slot = number;
+            }
+        }
+    }
+
+    /// Whether each angle of a rotation has a distance from the ends of its range \[rad\], or a part of it that is narrower.
+    #[inline(always)]
+    pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, slack: f64) -> bool {
+        let c = cosine_of_beta(r);
+        let both = |lanes: [f64; LANES / 2]| {
+            let lanes = f64x4::load_array(simd, lanes);
+            lanes.combine(lanes)
+        };
+        let load = |lanes: &[f64; LANES]| f64x8::load_array(simd, *lanes);
+        // Of the angles, those of alpha and gamma times c.
+        let sine = both([-r.m23 * self.sign, r.m13, -r.m12 * self.sign, 0.0]);
+        let cosine = both([r.m33 * self.sign, c * self.sign, r.m11 * self.sign, 0.0]);
+        let (end_sine, end_cosine) = (load(&self.sine), load(&self.cosine));
+        let distance_sine = sine * end_cosine - cosine * end_sine;
+        let distance_cosine = (cosine * end_cosine + sine * end_sine) * load(&self.wide);
+        let slack = load(&self.slack).min(f64x8::splat(simd, slack)) * both([c, 1.0, c, 0.0]);
+        let is_kept = distance_sine.simd_ge(slack) | distance_cosine.simd_le(load(&self.far));
+        is_kept.all_true() & self.is_possible
+    }
+}
+
+/// `|cos(beta)|`
+#[inline(always)]
+pub(in crate::control::reference) fn cosine_of_beta(r: &Matrix3<f64>) -> f64 {
+    (r.m11 * r.m11 + r.m12 * r.m12).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+    use crate::control::reference::samples::Samples;
+    use crate::model::machine::at_most_256_bits;
+    use crate::model::task::{TaskState, task_coordinates};
+
+    /// Ranges around random angles, narrow and wide, on both sides of 90 degrees.
+    #[test]
+    fn a_rotation_is_inside_exactly_where_its_angles_are() {
+        let mut samples = Samples::new(1);
+        let level = at_most_256_bits(Level::new());
+        let (mut inside, mut outside) = (0, 0);
+        for k in 0..200_000 {
+            let home_beta = if k % 2 == 0 { 0.0 } else { PI };
+            let home = [0.0, home_beta, 0.0, 0.0, 0.0, 0.0];
+            let mut angle = |center: f64, size: f64| center + size * (2.0 * samples.uniform() - 1.0);
+            let x = [angle(0.0, 1.5), angle(home_beta, 1.5), angle(0.0, 1.5), 0.0, 0.0, 0.0];
+            let mut envelope = Envelope { lowest: [0.0; 6], highest: [0.0; 6] };
+            for (axis, (low, high)) in
+                envelope.lowest.iter_mut().zip(&mut envelope.highest).take(3).enumerate()
+            {
+                let widest = [1e-3, 0.3, 3.5][k / 2 % 3];
+                (*low, *high) = (x[axis] - widest * samples.uniform(), x[axis] + widest * samples.uniform());
+                if samples.uniform() < 0.2 {
+                    (*low, *high) = (*high, *high + widest * samples.uniform());
+                }
+            }
+            let slack = if k % 5 == 0 { 0.0 } else { 0.01 * samples.uniform() };
+            let pose = TaskState::at_rest(x).motion().pose;
+            let angles = task_coordinates(&pose, &home);
+            // By which the worst angle is inside, beyond the slack that a range allows.
+            let room = |slack: f64| {
+                let axes = angles.iter().zip(envelope.lowest.iter().zip(&envelope.highest)).take(3);
+                axes.map(|(x, (low, high))| {
+                    (x - low).min(high - x) - slack.min(MAX_SLACK_RATIO * (high - low))
+                })
+                .fold(f64::INFINITY, f64::min)
+            };
+            let mut start = angles;
+            // On the same side of 90 degrees.
+            for (x, size) in start.iter_mut().zip([0.5, 0.05, 0.5]) {
+                *x += size * (2.0 * samples.uniform() - 1.0);
+            }
+            let ranges = AngleRanges::new(&envelope, &start);
+            let is_contained = dispatch!(level, simd => ranges.contain(simd, &pose.rotation, slack));
+            assert!(!is_contained || room(slack) > -1e-12, "{x:?} {envelope:?} {slack}");
+            assert!(is_contained || room(slack * (1.0 + slack * slack)) < 1e-6, "{x:?} {envelope:?} {slack}");
+            if is_contained { inside += 1 } else { outside += 1 }
+        }
+        assert!(inside > 50_000 && outside > 50_000, "{inside} {outside}");
+    }
+}

@@ -1,0 +1,332 @@
+//! Examination of a stop near a bound, at instants of its way: its [knots](super::knots).
+//!
+//! Between two knots lengths, their rates and the coordinates of C depart little from a cubic, and that is within the hull of its Bezier
+//! points, which are examined too (see [`super::cubic_departure`]). Angles leave their chords by at most `|angle''| dt^2 / 8`, dt the longer
+//! interval beside a knot, and so does every quantity in the step that leads to the motion:
+//!
+//! ```text
+//! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2     s, c = |sin|, cos of beta; of the Bryan angles
+//! |x'''|    <= J (2 |u| + |e|)                      u, e the directions of v, a; of a coordinate of C
+//! ```
+//!
+//! The attitude at the knots is that of the stop that would be followed.
+//! Between knots a length may exceed its bound by 2.5e-5 of the stroke, an angle by as much at the outermost joint.
+//! An axis of the envelope narrower than four times the bound between knots is examined at the knots only.
+
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
+use nalgebra::Vector3;
+
+use crate::control::constants::Constants;
+use crate::control::parameters::Envelope;
+use crate::control::reference::proof::angle_ranges::{AngleRanges, cosine_of_beta};
+use crate::control::reference::proof::cubic_departure::{
+    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk,
+};
+use crate::control::reference::proof::knots::{Beside, Knots, MAX_INTERVALS};
+use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::proof::position_ranges::PositionRanges;
+use crate::control::reference::proof::regularity::{REGULARITY_WORK, RegularBalls, Regularity, Surroundings};
+use crate::control::reference::proof::step::Step;
+use crate::control::reference::stop::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
+use crate::control::signals::limits::{Limit, Limits};
+use crate::model::inverse_geometry::length_and_rate_lanes;
+use crate::model::machine::Machine;
+use crate::model::rigid::{Motion, Pose, Twist};
+use crate::model::task::task_coordinates;
+use crate::model::triples::LegLanes;
+
+/// Departure of a length from its cubic that decides the number of knots \[m\].
+const LENGTH_DEPARTURE_M: f64 = 2e-5;
+/// Departure of a leg's rate from that of its cubic that does so, over the largest rate.
+const RATE_DEPARTURE_RATIO: f64 = 0.01;
+/// Work that a step may do, in knots: those of the longest stop, and the regularity of four poses, of fewer where walls took
+/// their part. It bounds the longest cycle. The balls that were found remain for the next one. With three a reference that presses against its
+/// condition is refused in turns, and the platform jerks.
+pub(in crate::control::reference) const MAX_WORK: u32 = MAX_INTERVALS + 4 * REGULARITY_WORK;
+/// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
+/// it, as the departures are bounded for the worst direction.
+const ROOM_RATIO: f64 = 2.5e-5;
+/// Relative allowance for rounding.
+const ROUNDING: f64 = 1e-9;
+/// Allowance for the rounding of an angle \[rad\].
+const ANGLE_ROUNDING: f64 = 1e-15;
+
+/// Lengths and rates of the legs, in lanes.
+type Legs<S> = (f64x8<S>, f64x8<S>);
+
+/// Examination of a planar stop at knots.
+pub(in crate::control::reference) struct Examination<'a> {
+    constants: &'a Constants,
+    bounds: &'a PoseBounds,
+    stop: &'a PoseStop,
+    knots: Knots,
+    /// Largest third derivative of a length, and largest departures within the step that leads to the motion: of a length \[m\],
+    /// of a rate \[m/s\], and of a coordinate of C \[m\].
+    length_jerk: f64,
+    step_departure: [f64; 3],
+    step_s: f64,
+    /// Directions in which C may depart, per coordinate.
+    directions: Vector3<f64>,
+    /// Whether rates could exceed their limit; the ranges of the envelope, those of the angles if they could leave it.
+    needs_rates: bool,
+    positions: Option<PositionRanges>,
+    angles: Option<AngleRanges>,
+    /// The pose from which the step leads. Where rounding left it beyond a bound, a stop may be as far beyond: or the
+    /// reference could not return.
+    from: Option<&'a Pose>,
+    length_excess: f64,
+    /// Its regularity, and the envelope with room for it, once they are needed.
+    start_regularity: Option<Regularity>,
+    relaxed: Option<(Envelope, AngleRanges)>,
+    /// What is left of the work.
+    work: u32,
+    /// Bounds of the lengths, in lanes.
+    shortest: LegLanes,
+    longest: LegLanes,
+}
+
+impl<'a> Examination<'a> {
+    pub fn new(
+        constants: &'a Constants,
+        bounds: &'a PoseBounds,
+        stop: &'a PoseStop,
+        motion: &Motion,
+        x: Option<&[f64; 6]>,
+        step: &Step<'a>,
+        work: u32,
+    ) -> Result<Self, Limit> {
+        let limits = &constants.parameters.limits;
+        let Limits { orientation, position, .. } = limits;
+        let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
+        let allowed = 1.0 + ROUNDING;
+        let [angular_bulge, linear_bulge] = step.bulge();
+        let is_slow = v <= allowed * position.velocity
+            && w <= allowed * orientation.velocity
+            && motion.twist.linear.norm() + linear_bulge <= position.velocity
+            && motion.twist.angular.norm() + angular_bulge <= orientation.velocity;
+        if !is_slow {
+            return Err(Limit::Velocity);
+        }
+        let curvature = curvature(constants, v, w);
+        let actuator = &constants.machine().actuator;
+        let needs_rates = v + constants.arm * w > actuator.max_rate;
+        let length_jerk = length_jerk(constants, v, w);
+        // As many that the departures of lengths, and of rates where these matter, are small enough.
+        let duration = stop.duration();
+        let (square, cube) = (duration * duration, duration * duration * duration);
+        let length_share = CUBIC_DEPARTURE * length_jerk * cube / LENGTH_DEPARTURE_M;
+        let max_departure = RATE_DEPARTURE_RATIO * actuator.max_rate;
+        let rate_share =
+            if needs_rates { CUBIC_RATE_DEPARTURE * length_jerk * square / max_departure } else { 0.0 };
+        let knots = Knots::new(duration, rate_share, length_share);
+        let chord = step.duration * step.duration / 8.0;
+        // Along the velocity and, across it, along the rest of the present acceleration.
+        let Motion { twist, acceleration, .. } = motion;
+        let u = twist.linear.try_normalize(0.0).unwrap_or_default();
+        let e = acceleration.linear.try_normalize(0.0).unwrap_or_default();
+        Ok(Self {
+            constants,
+            bounds,
+            knots,
+            length_jerk,
+            step_departure: [curvature, length_jerk, position.acceleration].map(|bound| bound * chord),
+            step_s: step.duration,
+            directions: u.abs() * 2.0 + e.abs(),
+            needs_rates,
+            positions: bounds.envelope.as_ref().map(PositionRanges::new),
+            angles: bounds
+                .envelope
+                .as_ref()
+                .zip(x)
+                .and_then(|(envelope, x)| AngleRanges::without_room(envelope, x, &stop.orientation)),
+            from: step.from,
+            length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
+            start_regularity: None,
+            relaxed: None,
+            work: work.saturating_sub(knots.intervals),
+            shortest: constants.machine().joints.triples.pack(&bounds.shortest),
+            longest: constants.machine().joints.triples.pack(&bounds.longest),
+            stop,
+        })
+    }
+
+    /// Examines every knot, in one piece of code for each instruction set.
+    #[inline(never)]
+    pub fn run(&mut self, balls: &mut RegularBalls, start: &Motion) -> Result<(), Limit> {
+        dispatch!(self.constants.machine().level, simd => self.run_in_lanes(simd, balls, start))
+    }
+
+    #[inline(always)]
+    fn run_in_lanes<S: Simd>(
+        &mut self,
+        simd: S,
+        balls: &mut RegularBalls,
+        start: &Motion,
+    ) -> Result<(), Limit> {
+        let mut pose = start.pose;
+        let mut state = PoseStopState::begin(start);
+        let (mut t, mut beside, mut before) = (0.0, Beside::default(), None);
+        let mut k = 0;
+        loop {
+            let next_t = self.knots.instant(k + 1);
+            let is_last = k == self.knots.intervals;
+            beside = Beside { before: beside.after, after: if is_last { 0.0 } else { next_t - t } };
+            before = Some(self.check(simd, balls, &pose, &state, beside, before)?);
+            if is_last {
+                return Ok(());
+            }
+            let next = self.stop.at(simd, next_t);
+            pose = advanced_to_knot(&pose, &state, &next, beside.after);
+            (t, state) = (next_t, next);
+            k += 1;
+        }
+    }
+
+    /// Checks a knot, and the Bezier points in the intervals `beside` it, before and after. Returns its lengths and rates.
+    #[inline(always)]
+    fn check<S: Simd>(
+        &mut self,
+        simd: S,
+        balls: &mut RegularBalls,
+        pose: &Pose,
+        state: &PoseStopState,
+        beside: Beside,
+        before: Option<Legs<S>>,
+    ) -> Result<Legs<S>, Limit> {
+        let dt = beside.longest();
+        let twist = Twist { angular: state.orientation.velocity, linear: state.position.velocity };
+        let legs @ (length, rate) = length_and_rate_lanes(simd, self.constants.machine(), pose, &twist);
+        if self.needs_rates && !self.are_rates_kept(simd, &legs, beside, before.as_ref()) {
+            return Err(Limit::LegRate);
+        }
+        let splat = |number: f64| f64x8::splat(simd, number);
+        let load = |lanes: &LegLanes| f64x8::load_array(simd, lanes.0);
+        let (next, last) = (rate * splat(beside.after / 3.0), rate * splat(-beside.before / 3.0));
+        let (short, long) = (length + next.min(last), length + next.max(last));
+        let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
+        let [in_step, ..] = self.step_departure;
+        let departure = (self.length_jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
+        let slack = (departure - ROOM_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
+        if !room.simd_ge(splat(slack - self.length_excess)).all_true() {
+            return Err(Limit::Stroke);
+        }
+        if !self.is_in_envelope(simd, pose, state, beside) && !self.is_nearer_than_start(pose) {
+            return Err(Limit::Envelope);
+        }
+        self.check_condition(simd, balls, pose, state, dt)?;
+        Ok(legs)
+    }
+
+    /// Whether the rates at a knot and between it and the one before keep their limit.
+    #[inline(always)]
+    fn are_rates_kept<S: Simd>(
+        &self,
+        simd: S,
+        (length, rate): &Legs<S>,
+        beside: Beside,
+        before: Option<&Legs<S>>,
+    ) -> bool {
+        let dt = beside.longest();
+        let [_, in_step, _] = self.step_departure;
+        let slack = (self.length_jerk * CUBIC_RATE_DEPARTURE * dt * dt).max(in_step);
+        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - slack);
+        let between = before.map_or(*rate, |(length_before, rate_before)| {
+            (*length - *length_before) * f64x8::splat(simd, 3.0 / beside.before) - *rate_before - *rate
+        });
+        rate.abs().max(between.abs()).simd_le(limit).all_true()
+    }
+
+    /// Whether the poses around a knot are regular and keep the limit of the condition.
+    #[inline(always)]
+    fn check_condition<S: Simd>(
+        &mut self,
+        simd: S,
+        balls: &mut RegularBalls,
+        pose: &Pose,
+        state: &PoseStopState,
+        dt: f64,
+    ) -> Result<(), Limit> {
+        let constants = self.constants;
+        let reach = self.stop.reach(state, dt, &constants.parameters.limits);
+        if balls.cover_knot(simd, constants, pose, reach) {
+            return Ok(());
+        }
+        let around = Surroundings { pose, reach, required: Regularity::of_surroundings(constants) };
+        let regularity = balls.cover_by_new(constants, &around, &mut self.work).ok_or(Limit::Condition)?;
+        let at_knot = Regularity::of_reference(constants);
+        if at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
+            return Ok(());
+        }
+        Err(Limit::Condition)
+    }
+
+    /// Whether a pose is as regular as the reference must be, or no less so than the start of the step.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> bool {
+        let Self { constants, from: Some(from), .. } = *self else { return false };
+        if self.start_regularity.is_none() {
+            self.start_regularity = Regularity::at(constants, from, &mut self.work);
+        }
+        let at_knot = Regularity::of_reference(constants);
+        self.start_regularity.is_some_and(|start| at_knot.or_less(&start).is_kept_by(regularity))
+    }
+
+    /// Whether a knot, and the Bezier points beside it, are within the envelope.
+    #[inline(always)]
+    fn is_in_envelope<S: Simd>(&self, simd: S, pose: &Pose, state: &PoseStopState, beside: Beside) -> bool {
+        let Some(positions) = &self.positions else { return true };
+        let dt = beside.longest();
+        let [.., in_step] = self.step_departure;
+        let jerk = self.constants.parameters.limits.position.jerk;
+        let slack = self.directions * (jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
+        let at = |t: f64| pose.position + state.position.velocity * t;
+        positions.contain(simd, [&at(beside.after / 3.0), &at(-beside.before / 3.0)], &slack)
+            && self
+                .angles
+                .as_ref()
+                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_slack(pose, state, dt)))
+    }
+
+    /// Departure of the angles from their chords around a knot \[rad\].
+    #[inline(always)]
+    fn angle_slack(&self, pose: &Pose, state: &PoseStopState, dt: f64) -> f64 {
+        if !(self.stop.orientation.duration > 0.0) {
+            return 0.0;
+        }
+        let dt = dt.max(self.step_s);
+        let (s, c) = (pose.rotation.m13.abs(), cosine_of_beta(&pose.rotation));
+        let alpha = self.constants.parameters.limits.orientation.acceleration;
+        let w = state.orientation.velocity.norm() + alpha * dt;
+        let w = self.stop.orientation.peak_velocity.min(w);
+        let curvature = alpha / c + w * w * (1.0 + c + 3.0 * s) / (c * c);
+        let room = ROOM_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
+        (curvature * dt * dt / 8.0 - room).max(0.0)
+    }
+
+    /// Whether the start of the step is beyond the envelope, and a pose no farther beyond it.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn is_nearer_than_start(&mut self, pose: &Pose) -> bool {
+        let (Some(from), Some(envelope)) = (self.from, &self.bounds.envelope) else { return false };
+        let Machine { home, level, .. } = *self.constants.machine();
+        let (relaxed, angles) = self.relaxed.get_or_insert_with(|| {
+            let x = task_coordinates(from, &home);
+            let relaxed = relaxed(envelope, &x);
+            (relaxed, AngleRanges::new(&relaxed, &x))
+        });
+        relaxed != envelope
+            && dispatch!(level, simd => {
+                PositionRanges::new(relaxed).contain(simd, [&pose.position; 2], &Vector3::zeros())
+                    && angles.contain(simd, &pose.rotation, -ANGLE_ROUNDING)
+            })
+    }
+}
+
+/// An envelope with room for X.
+fn relaxed(envelope: &Envelope, x: &[f64; 6]) -> Envelope {
+    let mut relaxed = *envelope;
+    relaxed.lowest.iter_mut().zip(x).for_each(|(low, x)| *low = low.min(*x));
+    relaxed.highest.iter_mut().zip(x).for_each(|(high, x)| *high = high.max(*x));
+    relaxed
+}

@@ -1,0 +1,24 @@
+//! Proof that a stop keeps every limit along its whole way.
+//!
+//! | file | content |
+//! | --- | --- |
+//! | `verification` | free space, where one pose is enough |
+//! | `examination` | a stop near a bound, knot by knot |
+//! | `step` | the step that leads to the stop |
+//! | `knots` | instants at which a stop is examined |
+//! | `cubic_departure` | how far a quantity may depart between two knots |
+//! | `angle_ranges`, `position_ranges` | whether a pose is within the envelope |
+//! | `pose_bounds` | lengths of the legs and envelope |
+//! | `regularity` | balls of poses proved regular, for the limit of the condition |
+//! | `padding` | vectors of three in four lanes |
+
+pub(super) mod angle_ranges;
+pub(super) mod cubic_departure;
+pub(super) mod examination;
+pub(super) mod knots;
+pub(super) mod padding;
+pub(super) mod pose_bounds;
+pub(super) mod position_ranges;
+pub(super) mod regularity;
+pub(super) mod step;
+pub(super) mod verification;

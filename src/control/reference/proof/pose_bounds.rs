@@ -1,0 +1,110 @@
+//! Bounds of the pose that the reference keeps: the lengths of the legs and the envelope of X.
+
+use crate::control::constants::Constants;
+use crate::control::parameters::Envelope;
+use crate::model::LEGS;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::rigid::Pose;
+use crate::model::task::task_coordinates;
+
+/// Room around a pose beyond the nominal bounds, in which the reference may begin to move back, as a ratio of the stroke:
+/// above the noise of lengths.
+const START_ROOM_RATIO: f64 = 2.5e-5;
+/// Distance of relaxed bounds from the end stops, in such rooms: one that a length may use between knots, and one for the following
+/// error. A platform that stands nearer may come back, one that moves on towards the end stop may not begin.
+const END_ROOMS: f64 = 2.0;
+
+/// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
+const ROUNDING: f64 = 1e-9;
+
+/// Bounds of the legs and of X. A platform that is beyond the nominal bounds when control begins may come back: its
+/// bounds are relaxed to where it is, and follow it until they are the nominal ones.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control::reference) struct PoseBounds {
+    /// \[m\]
+    pub shortest: [f64; LEGS],
+    /// \[m\]
+    pub longest: [f64; LEGS],
+    pub envelope: Option<Envelope>,
+    is_relaxed: bool,
+}
+
+impl PoseBounds {
+    /// The nominal bounds: the stroke less the margin, and the configured envelope.
+    pub fn nominal(constants: &Constants) -> Self {
+        let (actuator, parameters) = (&constants.machine().actuator, &constants.parameters);
+        Self {
+            shortest: [actuator.min_length + parameters.stroke_margin; LEGS],
+            longest: [actuator.max_length - parameters.stroke_margin; LEGS],
+            envelope: parameters.envelope.map(|Envelope { lowest, highest }| Envelope {
+                lowest: lowest.map(|x| x - ROUNDING),
+                highest: highest.map(|x| x + ROUNDING),
+            }),
+            is_relaxed: false,
+        }
+    }
+
+    /// The nominal bounds, relaxed where a pose exceeds them.
+    pub fn around(constants: &Constants, pose: &Pose) -> Self {
+        let mut bounds = Self::nominal(constants);
+        let actuator = &constants.machine().actuator;
+        let stroke_room = START_ROOM_RATIO * actuator.stroke();
+        let (lengths, end_room) = (leg_lengths(constants.machine(), pose), END_ROOMS * stroke_room);
+        let (low_end, high_end) = (actuator.min_length + end_room, actuator.max_length - end_room);
+        for (bound, length) in bounds.shortest.iter_mut().zip(lengths) {
+            bounds.is_relaxed |= relax(bound, length, -stroke_room, low_end);
+        }
+        for (bound, length) in bounds.longest.iter_mut().zip(lengths) {
+            bounds.is_relaxed |= relax(bound, length, stroke_room, high_end);
+        }
+        if let Some(Envelope { lowest, highest }) = &mut bounds.envelope {
+            let x = task_coordinates(pose, &constants.machine().home);
+            let turn_room = stroke_room / constants.machine().joints.radius;
+            let rooms = [turn_room, turn_room, turn_room, stroke_room, stroke_room, stroke_room];
+            for ((low, high), (x, room)) in lowest.iter_mut().zip(highest).zip(x.iter().zip(rooms)) {
+                bounds.is_relaxed |=
+                    relax(low, *x, -room, f64::NEG_INFINITY) | relax(high, *x, room, f64::INFINITY);
+            }
+        }
+        bounds
+    }
+
+    /// By how much the worst leg exceeds its bound at a pose; 0 if none does \[m\].
+    pub fn length_excess(&self, constants: &Constants, pose: &Pose) -> f64 {
+        let lengths = leg_lengths(constants.machine(), pose);
+        let ends = self.shortest.iter().zip(&self.longest);
+        let excesses =
+            lengths.iter().zip(ends).map(|(length, (short, long))| (short - length).max(length - long));
+        excesses.fold(0.0, f64::max)
+    }
+
+    /// Lets relaxed bounds follow a pose, never away from the nominal ones.
+    pub fn tighten(&mut self, constants: &Constants, pose: &Pose) {
+        if !self.is_relaxed {
+            return;
+        }
+        let around = Self::around(constants, pose);
+        let inner = |bound: &mut [f64; LEGS], other: &[f64; LEGS], pick: fn(f64, f64) -> f64| {
+            bound.iter_mut().zip(other).for_each(|(bound, other)| *bound = pick(*bound, *other));
+        };
+        inner(&mut self.shortest, &around.shortest, f64::max);
+        inner(&mut self.longest, &around.longest, f64::min);
+        if let (Some(own), Some(other)) = (&mut self.envelope, &around.envelope) {
+            inner(&mut own.lowest, &other.lowest, f64::max);
+            inner(&mut own.highest, &other.highest, f64::min);
+        }
+        self.is_relaxed = around.is_relaxed;
+    }
+}
+
+/// Moves a bound to `room` beyond `value` if the value exceeds it, outward in the direction of `room`, but no farther than an end; to
+/// the value itself where that is beyond the end. True if it exceeds it.
+fn relax(bound: &mut f64, value: f64, room: f64, end: f64) -> bool {
+    let is_beyond = (value - *bound) * room > 0.0;
+    if is_beyond {
+        let wanted = value + room;
+        *bound = if room > 0.0 { wanted.min(end.max(value)) } else { wanted.max(end.min(value)) };
+    }
+    is_beyond
+}

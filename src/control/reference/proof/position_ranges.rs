@@ -1,0 +1,66 @@
+//! Whether coordinates of C keep a distance from the ends of their ranges, a coordinate in each lane.
+
+use fearless_simd::{Simd, f64x4, prelude::*};
+use nalgebra::Vector3;
+
+use crate::control::parameters::Envelope;
+use crate::control::reference::proof::angle_ranges::MAX_SLACK_RATIO;
+use crate::control::reference::proof::padding::{Padded, padded};
+
+/// Ranges of the coordinates of C \[m\], and one of zeros, which contains the zero of a padded vector.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::control::reference) struct PositionRanges {
+    lowest: Padded,
+    highest: Padded,
+    /// Most slack that is kept from each end.
+    slack: Padded,
+}
+
+impl PositionRanges {
+    /// Those of an envelope.
+    pub fn new(Envelope { lowest: [.., x0, y0, z0], highest: [.., x1, y1, z1] }: &Envelope) -> Self {
+        let (low, high) = (Vector3::new(*x0, *y0, *z0), Vector3::new(*x1, *y1, *z1));
+        let slack = (high - low) * MAX_SLACK_RATIO;
+        Self { lowest: padded(&low), highest: padded(&high), slack: padded(&slack) }
+    }
+
+    /// Whether each coordinate of both positions has a distance from the ends of its range, or a part of it that is narrower.
+    #[inline(always)]
+    pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], slack: &Vector3<f64>) -> bool {
+        let load = |lanes: Padded| f64x4::load_array(simd, lanes);
+        let [first, second] = positions.map(|position| load(padded(position)));
+        let room = (first.min(second) - load(self.lowest)).min(load(self.highest) - first.max(second));
+        room.simd_ge(load(padded(slack)).min(load(self.slack))).all_true()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, dispatch};
+
+    use super::*;
+
+    /// Of each coordinate, at both ends, either position alone decides; and a narrow range keeps a quarter of its width.
+    #[test]
+    fn each_end_is_kept_by_both_positions() {
+        let envelope =
+            Envelope { lowest: [9.0, 9.0, 9.0, -1.0, 1.0, 0.0], highest: [9.0, 9.0, 9.0, 2.0, 3.0, 1e-3] };
+        let ranges = PositionRanges::new(&envelope);
+        let middle = Vector3::new(0.5, 2.0, 5e-4);
+        let slacks = [0.3, 0.1, 0.1];
+        let kept = [0.3, 0.1, 2.5e-4];
+        let contain = |positions: [&Vector3<f64>; 2]| dispatch!(Level::new(), simd => ranges.contain(simd, positions, &slacks.into()));
+        for axis in 0..3 {
+            let (low, high) = (envelope.lowest[3 + axis], envelope.highest[3 + axis]);
+            for (share, is_contained) in [(1.01, true), (0.99, false)] {
+                for coordinate in [low + share * kept[axis], high - share * kept[axis]] {
+                    let mut moved = middle;
+                    moved[axis] = coordinate;
+                    for positions in [[&moved, &middle], [&middle, &moved], [&moved; 2]] {
+                        assert_eq!(contain(positions), is_contained, "{axis} {coordinate}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! Balls of poses in which no pose is singular and none has a condition beyond the limit, and no leg comes near the first
+//! axis of its universal joint: in line with it the joint has lost a freedom, and the leg's spin is unbounded.
+//!
+//! With N the wrenches of the legs at the centre of a ball, `F = |N|`, `B = |N^-1|` (Frobenius norms, torques about the mean
+//! of the joints and divided by the radius r), a pose displaced by at most d and turned by at most t, the arms `a` of the
+//! joints from C and `a'` from their mean:
+//!
+//! ```text
+//! s = d + a t                           displacement of a joint
+//! q = s / sqrt(L (L - s))               change of a leg's direction, L the shortest leg at the centre
+//! |N - N0| <= D = sqrt(6 q^2 + 6 (t + q)^2)                      as the mean of (a'/r)^2 is 1
+//! condition <= min(F + D, sqrt 12) B / (1 - B D)                 where B D < 1
+//! sine of the angle between a leg and that axis >= that at the centre - q
+//! ```
+//!
+//! The same bounds as those of a cell in the search for the workspace. A ball found once holds for many cycles.
+//! All balls of a group are tried at once: a lane each, without a branch, so that the work does not depend on which one covers.
+
+use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
+
+use crate::control::constants::Constants;
+use crate::model::conditioning::Conditioning;
+use crate::model::rigid::Pose;
+use crate::model::sensitivity::{MAX_WRENCH_NORM, Sensitivity};
+
+/// Balls side by side: one in each lane.
+const LANES: usize = 4;
+/// Of the balls that are kept: those along one stop.
+const GROUPS: usize = 3;
+
+/// Largest `|R - R0| / sqrt 2` for which an angle is bounded, and its ratio to the angle's bound: `2 asin(1/2)`.
+const MAX_CHORD: f64 = 1.0;
+const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
+
+/// Work for the regularity of a pose, in knots of an [examination](super::examination), and more where its factorization has pivots.
+pub(in crate::control::reference) const REGULARITY_WORK: u32 = 1;
+const PIVOTING_WORK: u32 = 2;
+
+/// Least part of the sine of the reference that is allowed between knots, whatever the limits of the condition.
+const LEAST_SINE_SHARE: f64 = 0.5;
+
+/// How regular a pose is, or must be at least.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::control::reference) struct Regularity {
+    /// Condition, at most.
+    condition: f64,
+    /// Sine of the angle between a leg and the first axis of its universal joint, at least.
+    universal_sine: f64,
+}
+
+impl Regularity {
+    /// That of a pose, if so much work may be done.
+    pub fn at(constants: &Constants, pose: &Pose, work: &mut u32) -> Option<Self> {
+        Ball::new(constants, pose, work).map(|ball| ball.regularity)
+    }
+
+    /// What the reference must keep.
+    pub fn of_reference(constants: &Constants) -> Self {
+        Self { condition: constants.reference_condition, universal_sine: constants.universal_sine }
+    }
+
+    /// What the poses between knots must keep: the condition of the platform, and a sine that is less in the same ratio.
+    pub fn of_surroundings(constants: &Constants) -> Self {
+        let condition = constants.parameters.condition;
+        let share = (constants.reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0);
+        Self { condition, universal_sine: constants.universal_sine * share }
+    }
+
+    /// The looser bounds of both.
+    pub fn or_less(&self, other: &Self) -> Self {
+        Self {
+            condition: self.condition.max(other.condition),
+            universal_sine: self.universal_sine.min(other.universal_sine),
+        }
+    }
+
+    /// Whether another keeps both bounds.
+    pub fn is_kept_by(&self, other: &Self) -> bool {
+        other.condition <= self.condition && other.universal_sine >= self.universal_sine
+    }
+}
+
+/// Balls in lanes: a column holds the same number of each. One without legs covers nothing.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+struct BallGroup {
+    /// Centre: position, and rotation column by column.
+    position: [[f64; LANES]; 3],
+    rotation: [[f64; LANES]; 9],
+    /// F, B, and the length of the shortest leg \[m\].
+    norm: [f64; LANES],
+    inverse_norm: [f64; LANES],
+    shortest: [f64; LANES],
+    /// Least sine of the angle between a leg and the first axis of its universal joint.
+    universal_sine: [f64; LANES],
+}
+
+impl BallGroup {
+    /// Puts a ball around a pose into a lane.
+    fn set(&mut self, lane: usize, center: &Pose, ball: &Ball) {
+        let put = |column: &mut [f64; LANES], number: f64| {
+            if let Some(lane) = column.get_mut(lane) {
+                *lane = number;
+            }
+        };
+        self.position.iter_mut().zip(center.position.as_slice()).for_each(|(column, x)| put(column, *x));
+        self.rotation.iter_mut().zip(center.rotation.as_slice()).for_each(|(column, r)| put(column, *r));
+        put(&mut self.norm, ball.norm);
+        put(&mut self.inverse_norm, ball.inverse_norm);
+        put(&mut self.shortest, ball.shortest);
+        put(&mut self.universal_sine, ball.regularity.universal_sine);
+    }
+
+    /// How far a pose is from each centre.
+    #[inline(always)]
+    fn displacements<S: Simd>(&self, simd: S, pose: &Pose) -> Displacements<S> {
+        let squared = |columns: &[[f64; LANES]], numbers: &[f64]| {
+            let columns = columns.iter().zip(numbers);
+            let differences = columns
+                .map(|(center, number)| f64x4::splat(simd, *number) - f64x4::load_array(simd, *center));
+            differences.fold(f64x4::splat(simd, 0.0), |sum, difference| sum + difference * difference)
+        };
+        let shift = squared(&self.position, pose.position.as_slice()).sqrt();
+        let half = f64x4::splat(simd, 0.5);
+        let chord = (squared(&self.rotation, pose.rotation.as_slice()) * half).sqrt();
+        let turn = chord * f64x4::splat(simd, ANGLE_PER_CHORD);
+        Displacements { shift, turn, chord }
+    }
+
+    /// Whether every pose within a reach of a displaced one is as regular as required, by any ball.
+    #[inline(always)]
+    fn covers<S: Simd>(
+        &self,
+        simd: S,
+        constants: &Constants,
+        displacements: &Displacements<S>,
+        [shift, turn]: Reach,
+        required: &Regularity,
+    ) -> bool {
+        let splat = |number: f64| f64x4::splat(simd, number);
+        let load = |column: &[f64; LANES]| f64x4::load_array(simd, *column);
+        let (norm, inverse_norm) = (load(&self.norm), load(&self.inverse_norm));
+        let (shortest, universal_sine) = (load(&self.shortest), load(&self.universal_sine));
+        let turn = displacements.turn + splat(turn);
+        let moved = displacements.shift + splat(shift) + splat(constants.arm) * turn;
+        let left = shortest - moved;
+        let turned_squared = moved * moved / (shortest * left);
+        let turned_leg = turned_squared.sqrt();
+        let turned_arm = turn + turned_leg;
+        let change = (splat(6.0) * (turned_squared + turned_arm * turned_arm)).sqrt();
+        let largest_norm = (norm + change).min(splat(MAX_WRENCH_NORM));
+        let Regularity { condition, universal_sine: least_sine } = *required;
+        let is_covered = left.simd_gt(splat(0.0))
+            & displacements.chord.simd_le(splat(MAX_CHORD))
+            & (universal_sine - turned_leg).simd_ge(splat(least_sine))
+            & (largest_norm * inverse_norm).simd_le(splat(condition) * (splat(1.0) - inverse_norm * change));
+        is_covered.any_true()
+    }
+}
+
+/// Bounds on how far a pose is from each centre: shift \[m\] and turn \[rad\], and the chord of the turn.
+struct Displacements<S: Simd> {
+    shift: f64x4<S>,
+    turn: f64x4<S>,
+    chord: f64x4<S>,
+}
+
+/// A ball without its centre.
+struct Ball {
+    norm: f64,
+    inverse_norm: f64,
+    shortest: f64,
+    /// Of the centre.
+    regularity: Regularity,
+}
+
+impl Ball {
+    /// If so much work may be done; pivots are known only afterwards.
+    fn new(constants: &Constants, center: &Pose, work: &mut u32) -> Option<Self> {
+        *work = work.checked_sub(REGULARITY_WORK)?;
+        let Conditioning { sensitivity, shortest, universal_sine, is_pivoted } =
+            Conditioning::new(constants.machine(), center);
+        if is_pivoted {
+            *work = work.saturating_sub(PIVOTING_WORK);
+        }
+        let Sensitivity { condition, norm, .. } = sensitivity;
+        let regularity = Regularity { condition, universal_sine };
+        Some(Self { norm, inverse_norm: condition / norm, shortest, regularity })
+    }
+}
+
+/// Poses around one: within a shift \[m\] and a turn \[rad\].
+pub(in crate::control::reference) type Reach = [f64; 2];
+
+/// Poses around one, and how regular they shall be.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::control::reference) struct Surroundings<'a> {
+    pub pose: &'a Pose,
+    pub reach: Reach,
+    pub required: Regularity,
+}
+
+/// The balls found last.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control::reference) struct RegularBalls {
+    groups: [BallGroup; GROUPS],
+    /// Index of the group that covered the last pose.
+    recent: usize,
+    /// Number of balls that were kept, modulo those that can be: the next one takes the place of the oldest.
+    kept: usize,
+}
+
+impl RegularBalls {
+    /// Whether the surroundings are regular, by work that may be done. `false` is no proof of the contrary.
+    pub fn cover(&mut self, constants: &Constants, around: &Surroundings<'_>, work: &mut u32) -> bool {
+        self.cover_by_known(constants, around) || self.cover_by_new(constants, around, work).is_some()
+    }
+
+    /// The same by the balls that are kept.
+    fn cover_by_known(&mut self, constants: &Constants, around: &Surroundings<'_>) -> bool {
+        let Surroundings { pose, reach, required } = around;
+        dispatch!(constants.machine().level, simd => {
+            for index in self.recent_first() {
+                if let Some(group) = self.groups.get(index) {
+                    let displacements = group.displacements(simd, pose);
+                    if group.covers(simd, constants, &displacements, *reach, required) {
+                        self.recent = index;
+                        return true;
+                    }
+                }
+            }
+            false
+        })
+    }
+
+    /// The groups: next to a pose there is another of the same way, so the last one that covered is tried first.
+    #[inline(always)]
+    fn recent_first(&self) -> impl Iterator<Item = usize> + use<> {
+        let recent = self.recent;
+        (0..GROUPS).map(move |k| (recent + k) % GROUPS)
+    }
+
+    /// Whether the balls that are kept cover a knot, as regular as the reference must be, and the poses around it, as regular as they
+    /// must be: less so, else a reference at its own limit could not leave it.
+    #[inline(always)]
+    pub fn cover_knot<S: Simd>(&mut self, simd: S, constants: &Constants, pose: &Pose, reach: Reach) -> bool {
+        let [at_knot, around] = [Regularity::of_reference(constants), Regularity::of_surroundings(constants)];
+        let mut are_surroundings_covered = false;
+        for index in self.recent_first() {
+            let Some(group) = self.groups.get(index) else { continue };
+            let displacements = group.displacements(simd, pose);
+            let covers = |reach, required| group.covers(simd, constants, &displacements, reach, required);
+            are_surroundings_covered = are_surroundings_covered || covers(reach, &around);
+            // Where they are not, the knot becomes the centre of a new ball.
+            if are_surroundings_covered && covers([0.0; 2], &at_knot) {
+                self.recent = index;
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Covers the surroundings by a new ball. Returns the regularity of the pose.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    pub fn cover_by_new(
+        &mut self,
+        constants: &Constants,
+        around: &Surroundings<'_>,
+        work: &mut u32,
+    ) -> Option<Regularity> {
+        let Surroundings { pose, reach, required } = around;
+        let ball = Ball::new(constants, pose, work)?;
+        let index = self.kept / LANES;
+        let group = self.groups.get_mut(index)?;
+        group.set(self.kept % LANES, pose, &ball);
+        // By any ball of the group, which is as good. A new one that is too small for its reach may cover a knot: it stays until
+        // the next one.
+        let is_covered = dispatch!(constants.machine().level, simd => {
+            let displacements = group.displacements(simd, pose);
+            group.covers(simd, constants, &displacements, *reach, required)
+        });
+        if !is_covered {
+            return None;
+        }
+        self.recent = index;
+        self.kept = (self.kept + 1) % (GROUPS * LANES);
+        Some(ball.regularity)
+    }
+}

@@ -1,0 +1,23 @@
+//! The step that leads to a motion.
+
+use crate::model::rigid::Pose;
+
+/// The step of constant jerk that leads to the motion from which a stop is verified.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::control::reference) struct Step<'a> {
+    /// The pose from which it leads; `None` if the motion is the first.
+    pub from: Option<&'a Pose>,
+    /// \[s\]
+    pub duration: f64,
+    /// Change of the acceleration: angular \[rad/s^2\], linear \[m/s^2\].
+    pub change: [f64; 2],
+    /// Work that it took to propose it, in knots of an examination.
+    pub work: u32,
+}
+
+impl Step<'_> {
+    /// Largest velocities within the step beyond those at its ends.
+    pub fn bulge(&self) -> [f64; 2] {
+        self.change.map(|change| change * self.duration / 8.0)
+    }
+}

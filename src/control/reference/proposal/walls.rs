@@ -1,0 +1,330 @@
+//! Walls: bounds that the wanted velocity approaches softly, so that a platform pressed against them slides.
+//!
+//! Each bound leaves a gap `g`: of a leg to the ends of its stroke, of a coordinate to the envelope. With its gradient G,
+//! `g' = -G V`. The wanted twist V and its derivative are changed least (rotations weighted by the radius of the joints) so that
+//!
+//! ```text
+//! G V  <= phi(g)                    phi: the lesser of the braking curve of the approach, on a part of the limits, and 2 g / T
+//! G V' = -phi'(g) G Q - G' Q        Q: the present twist; where this bound is active
+//! ```
+//!
+//! T is the duration of the stop. It brakes along V: a leg that is approached slowly by a platform that slides past fast
+//! moves on for half of T at its rate. Where rotation and translation cancel in a leg, the one that stops later remains.
+//!
+//! The more an active wall takes away from V, the more of its bound on V' holds: all of it from the velocity `a^2/j` on that the
+//! acceleration builds up in. Else V' would jump wherever another wall becomes active, and in a corner they would take turns.
+//!
+//! Both ends of a leg or of a coordinate are one wall with two sides. V is found by Hildreth's method (C. Hildreth, "A quadratic
+//! programming procedure", 1957), a few sweeps over all walls. The walls prove nothing: the verified stop keeps the bounds. Without
+//! them it would do so at the limits of jerk.
+//!
+//! Used under `on_violation = "limit"` only: a certified trajectory may go as near to a bound as it can be stopped.
+
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+use nalgebra::{Vector3, Vector6};
+
+use crate::control::constants::Constants;
+use crate::control::parameters::Envelope;
+use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::proposal::approach::{Approach, WantedVelocity};
+use crate::control::reference::proposal::walls::derivative_bound::DerivativeBound;
+use crate::control::reference::stop::vector_stop::straight_extent;
+use crate::control::signals::limits::{Limit, LimitSet, Limits};
+use crate::model::LEGS;
+use crate::model::inverse_geometry::{LegMotion, leg_motion};
+use crate::model::inverse_jacobian::leg_wrenches;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+use crate::model::task::task_coordinates;
+
+/// Part of the limits with which a wall is approached: several walls and the motion along them take the rest.
+const CLOSING_SHARE: f64 = 0.6;
+/// Distance kept from a bound, so that the examination of the stop between knots finds room, as a ratio of the stroke.
+const KEPT_RATIO: f64 = 5e-3;
+/// Sweeps over the walls: two walls at 60 degrees converge to 1e-4. Fewer where many walls are active, as this many visits of
+/// them bound the longest cycle: six hold every direction, more contradict each other.
+const SWEEPS: usize = 8;
+const MAX_VISITS: usize = 24;
+/// One sweep of so many is over all walls, the others over the active ones.
+const FULL_SWEEP: usize = 3;
+/// Visits that take about as long as the examination of a knot.
+const VISITS_PER_WORK: usize = 24;
+/// Slowness of the return from a gap that is negative, over that of the approach.
+const RETURN_RATIO: f64 = 4.0;
+
+/// Of a gradient, in memory.
+const LANES: usize = 8;
+/// Every leg and every coordinate.
+const WALL_COUNT: usize = 12;
+
+/// One end of a leg or of a coordinate.
+#[derive(Clone, Copy, Debug, Default)]
+struct Side {
+    /// Largest closing rate \[m/s\].
+    rate: f64,
+    /// Its derivative at the present rate, less the curvature \[m/s^2\].
+    derivative: f64,
+}
+
+impl Side {
+    /// `closing` and `curvature`: rate of the leg or coordinate towards this end, and its curvature; `per_way`: rate over the way of the
+    /// stop \[1/s\].
+    fn new(approach: &Approach, gap: f64, closing: f64, curvature: f64, per_way: f64) -> Self {
+        let (rate, slope) = if gap > 0.0 {
+            let (rate, slope) = approach.closing_velocity(gap);
+            if gap * per_way < rate { (gap * per_way, per_way) } else { (rate, slope) }
+        } else {
+            let slope = approach.slowest_slope() / RETURN_RATIO;
+            (gap * slope, slope)
+        };
+        Self { rate, derivative: -slope * closing - curvature }
+    }
+}
+
+/// Both ends of a leg or of a coordinate, in coordinates in which rotations are multiplied by the radius of the joints.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wall {
+    /// Bit of the limit that it stands for.
+    limit: LimitSet,
+    /// Six numbers, and zeros.
+    gradient: [f64; LANES],
+    /// Of the square of its norm.
+    inverse_square: f64,
+    /// Against the gradient, along it.
+    sides: [Side; 2],
+    /// Positive where the end along the gradient is active, negative at the other.
+    multiplier: f64,
+    /// Part of the bound on the derivative that holds, per multiplier, up to all of it.
+    weight: f64,
+}
+
+/// Walls around one pose.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::control::reference) struct Walls {
+    walls: [Wall; WALL_COUNT],
+    count: usize,
+    radius: f64,
+    /// Visits of walls so far.
+    visits: usize,
+}
+
+impl Walls {
+    /// Those around a motion, for the twist that it leads to a step later.
+    pub fn new(
+        constants: &Constants,
+        bounds: &PoseBounds,
+        motion: &Motion,
+        led: &Twist,
+        step_s: f64,
+    ) -> Self {
+        let (machine, limits) = (constants.machine(), &constants.parameters.limits);
+        let radius = machine.joints.radius;
+        let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius, visits: 0 };
+        let kept = KEPT_RATIO * machine.actuator.stroke();
+        let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
+        let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
+        let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
+        let approach = Approach::new(limits.position, CLOSING_SHARE, step_s);
+        let [turn_s, shift_s] = half_durations(limits, led);
+        let half_s = turn_s.max(shift_s);
+        let per_way = 1.0 / half_s;
+        let ends = bounds.shortest.iter().zip(&bounds.longest);
+        let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
+        for (column, ((length, (rate, curvature)), (shortest, longest))) in wrenches.into_iter().zip(legs) {
+            let [mx, my, mz, nx, ny, nz] = column;
+            let (moment, direction) = (Vector3::new(mx, my, mz), Vector3::new(nx, ny, nz));
+            let gradient = stacked(&(moment / radius), &direction);
+            let next = length + rate * step_s;
+            // What the way of the stop departs from `rate T / 2`: it leads straight on, and one of rotation and translation ends
+            // sooner.
+            let departure = 0.5 * curvature * half_s * half_s
+                + moment.dot(&led.angular) * (turn_s - half_s)
+                + direction.dot(&led.linear) * (shift_s - half_s);
+            let gaps = [longest - next - departure.max(0.0), next - shortest + departure.min(0.0)];
+            let [long, short] = gaps.map(|gap| gap - kept);
+            let sides = [(short, -rate, -curvature), (long, *rate, *curvature)];
+            let sides =
+                sides.map(|(gap, closing, curvature)| Side::new(&approach, gap, closing, curvature, per_way));
+            walls.push(Limit::Stroke, &approach, gradient, sides);
+        }
+        if let Some(envelope) = &bounds.envelope {
+            walls.push_envelope(constants, envelope, motion, led, step_s, kept);
+        }
+        walls
+    }
+
+    fn push_envelope(
+        &mut self,
+        constants: &Constants,
+        Envelope { lowest, highest }: &Envelope,
+        motion: &Motion,
+        led: &Twist,
+        step_s: f64,
+        kept: f64,
+    ) {
+        let (machine, limits) = (constants.machine(), &constants.parameters.limits);
+        let x = task_coordinates(&motion.pose, &machine.home);
+        let radius = self.radius;
+        // Rates of the Bryan angles: alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w / c^2.
+        // Of the rotation, n is the last column, and c e2 is across it and e1.
+        let [_, beta, ..] = x;
+        let (e1, n) = (Vector3::x(), motion.pose.rotation.column(2).into_owned());
+        let (s, c) = (n.x, (n.y * n.y + n.z * n.z).sqrt().copysign(libm::cos(beta)));
+        let e2 = Vector3::new(0.0, n.z, -n.y) / c;
+        let zero = Vector3::zeros();
+        let gradients = [
+            stacked(&((e1 - n * s) / (c * c * radius)), &zero),
+            stacked(&(e2 / radius), &zero),
+            stacked(&((n - e1 * s) / (c * c * radius)), &zero),
+            stacked(&zero, &Vector3::x()),
+            stacked(&zero, &Vector3::y()),
+            stacked(&zero, &Vector3::z()),
+        ];
+        let turning = Approach::new(limits.orientation, CLOSING_SHARE, step_s);
+        let shifting = Approach::new(limits.position, CLOSING_SHARE, step_s);
+        let velocity = stacked(&(led.angular * radius), &led.linear);
+        let [turn_per_way, shift_per_way] = half_durations(limits, led).map(f64::recip);
+        let ranges = lowest.iter().zip(highest);
+        for (axis, ((x, gradient), (low, high))) in x.iter().zip(gradients).zip(ranges).enumerate() {
+            let (approach, kept, per_way) = if axis < 3 {
+                (&turning, kept / radius, turn_per_way)
+            } else {
+                (&shifting, kept, shift_per_way)
+            };
+            let kept = kept.min(0.05 * (high - low));
+            let rate = gradient.dot(&velocity);
+            let next = x + rate * step_s;
+            let sides = [(next - low - kept, -rate), (high - next - kept, rate)];
+            let sides = sides.map(|(gap, closing)| Side::new(approach, gap, closing, 0.0, per_way));
+            self.push(Limit::Envelope, approach, gradient, sides);
+        }
+    }
+
+    fn push(&mut self, limit: Limit, approach: &Approach, gradient: Vector6<f64>, sides: [Side; 2]) {
+        if let Some(wall) = self.walls.get_mut(self.count) {
+            let square = gradient.norm_squared();
+            *wall = Wall {
+                limit: LimitSet::default().with(limit, true),
+                inverse_square: 1.0 / square.max(f64::MIN_POSITIVE),
+                gradient: padded(&gradient),
+                sides,
+                weight: square / approach.build_up_velocity(),
+                ..Wall::default()
+            };
+            self.count += 1;
+        }
+    }
+
+    /// The work so far, in knots of an examination.
+    pub fn work(&self) -> u32 {
+        (self.visits / VISITS_PER_WORK) as u32
+    }
+
+    /// Changes the wanted velocities of rotation and translation least, so that no wall is approached too fast. Returns the
+    /// limits that required it.
+    pub fn restrict(
+        &mut self,
+        level: Level,
+        turn: &mut WantedVelocity,
+        shift: &mut WantedVelocity,
+    ) -> LimitSet {
+        dispatch!(level, simd => self.restrict_in_lanes(simd, turn, shift))
+    }
+
+    #[inline(always)]
+    fn restrict_in_lanes<S: Simd>(
+        &mut self,
+        simd: S,
+        turn: &mut WantedVelocity,
+        shift: &mut WantedVelocity,
+    ) -> LimitSet {
+        let load = |turn: &Vector3<f64>, shift: &Vector3<f64>| {
+            f64x8::load_array(simd, padded(&stacked(&(turn * self.radius), shift)))
+        };
+        let mut velocity = load(&turn.velocity, &shift.velocity);
+        let walls = self.walls.get_mut(..self.count).unwrap_or_default();
+        let mut sweeps = SWEEPS;
+        let mut sweep = 0;
+        while sweep < sweeps {
+            let (mut is_changed, mut active) = (false, 0);
+            let is_full = sweep % FULL_SWEEP == 0;
+            for wall in walls.iter_mut() {
+                if !is_full && wall.multiplier == 0.0 {
+                    continue;
+                }
+                let [against, along] = &wall.sides;
+                let gradient = f64x8::load_array(simd, wall.gradient);
+                // The closing rate without this wall, and what of it is beyond the ends.
+                let rate = dot(gradient, velocity) * wall.inverse_square + wall.multiplier;
+                let allowed =
+                    rate.min(along.rate * wall.inverse_square).max(-against.rate * wall.inverse_square);
+                let multiplier = rate - allowed;
+                if multiplier != wall.multiplier {
+                    velocity -= gradient * f64x8::splat(simd, multiplier - wall.multiplier);
+                    wall.multiplier = multiplier;
+                    is_changed = true;
+                }
+                active += usize::from(multiplier != 0.0);
+                self.visits += 1;
+            }
+            if is_full && !is_changed {
+                break;
+            }
+            sweep += 1;
+            sweeps = SWEEPS.min(MAX_VISITS / active.max(1));
+        }
+        let mut restricting = LimitSet::default();
+        let mut active = heapless::Vec::<_, WALL_COUNT>::new();
+        for wall in walls.iter().filter(|wall| wall.multiplier != 0.0) {
+            restricting = restricting.union(wall.limit);
+            active.push(DerivativeBound::new(wall)).ok();
+        }
+        if restricting.is_empty() {
+            return restricting;
+        }
+        let mut derivative = load(&turn.derivative, &shift.derivative);
+        for _ in 0..sweeps {
+            for bound in &mut active {
+                let gradient = f64x8::load_array(simd, *bound.gradient);
+                let change = bound.change(dot(gradient, derivative));
+                derivative -= gradient * f64x8::splat(simd, change);
+            }
+        }
+        self.visits += sweeps * active.len();
+        let store = |lanes: f64x8<S>, turn: &mut Vector3<f64>, shift: &mut Vector3<f64>| {
+            let [mx, my, mz, x, y, z, ..] = lanes.to_array();
+            (*turn, *shift) = (Vector3::new(mx, my, mz) / self.radius, Vector3::new(x, y, z));
+        };
+        store(velocity, &mut turn.velocity, &mut shift.velocity);
+        store(derivative, &mut turn.derivative, &mut shift.derivative);
+        restricting
+    }
+}
+
+/// The sum of the products, in the same order on every processor.
+#[inline(always)]
+fn dot<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64 {
+    let (low, high) = (a * b).split();
+    let [a, b, c, d] = (low + high).to_array();
+    (a + b) + (c + d)
+}
+
+fn padded(v: &Vector6<f64>) -> [f64; LANES] {
+    let [a, b, c, d, e, f] = (*v).into();
+    [a, b, c, d, e, f, 0.0, 0.0]
+}
+
+/// Half of the durations of the stops of rotation and translation from a twist without acceleration, their ways over the velocities \[s\].
+fn half_durations(limits: &Limits, twist: &Twist) -> [f64; 2] {
+    [(&twist.angular, &limits.orientation), (&twist.linear, &limits.position)]
+        .map(|(velocity, limits)| 0.5 * straight_extent(velocity.norm(), limits).duration)
+}
+
+fn stacked(first: &Vector3<f64>, second: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(first.x, first.y, first.z, second.x, second.y, second.z)
+}
+
+mod derivative_bound;
+#[cfg(test)]
+mod tests;

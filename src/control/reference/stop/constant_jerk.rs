@@ -1,0 +1,27 @@
+//! Step of a motion with constant jerk in base axes.
+
+use nalgebra::Vector3;
+
+use crate::model::rigid::{Motion, Twist};
+
+/// Moves a motion `h` seconds on, in which its acceleration changes linearly to another one. In place: a copy of what was just
+/// written waits for it.
+pub(in crate::control::reference) fn move_on(
+    motion: &mut Motion,
+    angular: &Vector3<f64>,
+    linear: &Vector3<f64>,
+    h: f64,
+) {
+    let Motion { pose, twist, acceleration } = motion;
+    let shift = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| (v + (a * 2.0 + a1) * (h / 6.0)) * h;
+    let velocity = |v: &Vector3<f64>, a: &Vector3<f64>, a1: &Vector3<f64>| v + (a + a1) * (0.5 * h);
+    // Magnus: the axis of rotation turns meanwhile.
+    let commutator = twist.angular.cross(&acceleration.angular) * (h * h * h / 12.0);
+    *pose = pose.displaced(&Twist {
+        angular: shift(&twist.angular, &acceleration.angular, angular) - commutator,
+        linear: shift(&twist.linear, &acceleration.linear, linear),
+    });
+    twist.angular = velocity(&twist.angular, &acceleration.angular, angular);
+    twist.linear = velocity(&twist.linear, &acceleration.linear, linear);
+    (acceleration.angular, acceleration.linear) = (*angular, *linear);
+}

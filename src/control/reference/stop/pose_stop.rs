@@ -1,0 +1,141 @@
+//! Stop of position and orientation at once.
+//!
+//! In base axes `v' = a` and `w' = al`: one stop of a vector serves both. Only attitude is not linear,
+//! `R <- exp(W) R` with `W = theta - dt^2/12 w0 x w1`, theta the integral of w (Magnus; the remainder is of order dt^5).
+
+use fearless_simd::{Level, Simd, dispatch};
+use nalgebra::Vector3;
+
+use crate::control::reference::proof::regularity::Reach;
+use crate::control::reference::stop::vector_stop::{Stop, StopState};
+use crate::control::signals::limits::{DerivativeLimits, Limits};
+use crate::model::rigid::{Motion, Pose, Twist};
+
+/// Stop that was verified.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control::reference) enum StopKind {
+    /// See [`super::stop`].
+    #[default]
+    ReleaseFirst,
+    /// See [`super::stop`].
+    Planar,
+}
+
+/// Stop of orientation and position.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control::reference) struct PoseStop {
+    pub orientation: Stop,
+    pub position: Stop,
+}
+
+/// Motion parameters of a stop at one instant, relative to its start.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control::reference) struct PoseStopState {
+    pub orientation: StopState,
+    pub position: StopState,
+}
+
+impl PoseStopState {
+    /// Where a stop from a motion begins.
+    pub fn begin(Motion { twist, acceleration, .. }: &Motion) -> Self {
+        let state = |velocity: &Vector3<f64>, acceleration: &Vector3<f64>| StopState {
+            displacement: Vector3::zeros(),
+            velocity: *velocity,
+            acceleration: *acceleration,
+        };
+        Self {
+            orientation: state(&twist.angular, &acceleration.angular),
+            position: state(&twist.linear, &acceleration.linear),
+        }
+    }
+}
+
+impl PoseStop {
+    /// The stop of a kind from a motion.
+    #[cfg(test)]
+    pub fn new(kind: StopKind, motion: &Motion, limits: &Limits) -> Self {
+        let mut stop = Self::default();
+        stop.plan(Level::new(), kind, motion, limits);
+        stop
+    }
+
+    /// Becomes the stop of a kind from a motion.
+    #[inline(never)]
+    pub fn plan(&mut self, level: Level, kind: StopKind, motion: &Motion, limits: &Limits) {
+        dispatch!(level, simd => self.plan_in_lanes(simd, kind, motion, limits));
+    }
+
+    #[inline(always)]
+    fn plan_in_lanes<S: Simd>(&mut self, simd: S, kind: StopKind, motion: &Motion, limits: &Limits) {
+        let Motion { twist, acceleration, .. } = motion;
+        let orientation = (&mut self.orientation, &twist.angular, &acceleration.angular, &limits.orientation);
+        let position = (&mut self.position, &twist.linear, &acceleration.linear, &limits.position);
+        // One piece of code for both: the cycle stays short.
+        for (stop, v, a, limits) in [orientation, position] {
+            match kind {
+                StopKind::ReleaseFirst => stop.release_first(simd, v, a, limits),
+                StopKind::Planar => stop.planar(simd, v, a, limits),
+            }
+        }
+    }
+
+    /// State `t` seconds after the start.
+    pub fn state_at(&self, level: Level, t: f64) -> PoseStopState {
+        dispatch!(level, simd => self.at(simd, t))
+    }
+
+    /// Time to rest \[s\].
+    pub fn duration(&self) -> f64 {
+        self.orientation.duration.max(self.position.duration)
+    }
+
+    /// The same in lanes.
+    #[inline(always)]
+    pub fn at<S: Simd>(&self, simd: S, t: f64) -> PoseStopState {
+        PoseStopState { orientation: self.orientation.at(simd, t), position: self.position.at(simd, t) }
+    }
+
+    /// Bounds on how far the stop moves within half of `dt` after a state, or before it: around one of the knots `dt` apart.
+    #[inline(always)]
+    pub fn reach(&self, state: &PoseStopState, dt: f64, limits: &Limits) -> Reach {
+        let half = 0.5 * dt;
+        let way = |stop: &Stop, state: &StopState, limits: &DerivativeLimits| {
+            half * stop.peak_velocity.min(state.velocity.norm() + 0.5 * half * limits.acceleration)
+        };
+        [
+            way(&self.position, &state.position, &limits.position),
+            way(&self.orientation, &state.orientation, &limits.orientation),
+        ]
+    }
+}
+
+/// Pose after the part of a stop from one state to the next, `dt` seconds later.
+pub(in crate::control::reference) fn advanced(
+    pose: &Pose,
+    from: &PoseStopState,
+    to: &PoseStopState,
+    dt: f64,
+) -> Pose {
+    pose.displaced(&displacement(from, to, dt))
+}
+
+/// The same without bringing the rotation back to an orthonormal matrix: for the few knots of an examination.
+#[inline(always)]
+pub(in crate::control::reference) fn advanced_to_knot(
+    pose: &Pose,
+    from: &PoseStopState,
+    to: &PoseStopState,
+    dt: f64,
+) -> Pose {
+    pose.extrapolated(&displacement(from, to, dt))
+}
+
+#[inline(always)]
+fn displacement(from: &PoseStopState, to: &PoseStopState, dt: f64) -> Twist {
+    let turn = to.orientation.displacement - from.orientation.displacement;
+    let commutator = from.orientation.velocity.cross(&to.orientation.velocity) * (dt * dt / 12.0);
+    Twist { angular: turn - commutator, linear: to.position.displacement - from.position.displacement }
+}

@@ -1,0 +1,106 @@
+//! Status that a driver reports of its drives: whether they are enabled, their brakes open, and the forces that arrive.
+//!
+//! A driver reports what it has; what it does not report is not checked. After `engage` the platform is held where it stands until
+//! all drives are ready.
+
+use crate::control::cycle::Cycle;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::time::seconds_between;
+use crate::model::LEGS;
+
+/// Time for which a drive that was ready may report that it is not \[s\]: one message may be wrong, and a brake that closes against
+/// its motor is noticed by the motion as well.
+const MAX_UNREADY_S: f64 = 0.02;
+
+/// Time constant of commanded and actual forces \[s\]: several times the dead time of a drive, so that it does not count.
+const FORCE_TIME_CONSTANT_S: f64 = 0.03;
+/// Plausible difference between the two, as a ratio of the command and of the largest force: scale, offset and friction of a drive.
+const FORCE_DIFFERENCE_RATIO: f64 = 0.2;
+const FORCE_OFFSET_RATIO: f64 = 0.02;
+/// Time for which the difference may be larger \[s\]: after a step of the command the actual force is behind.
+const MAX_MISSING_S: f64 = 0.05;
+
+/// Supervision of the drives.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct DriveMonitor {
+    /// Force of the cycle before \[N\].
+    sent: [f64; LEGS],
+    commanded: [f64; LEGS],
+    actual: [f64; LEGS],
+    /// Time for which each force has been missing \[s\].
+    missing_s: [f64; LEGS],
+    /// When all were ready last, or control began \[ns\].
+    ready_ns: u64,
+    /// Of the newest measurement \[ns\].
+    measured_ns: u64,
+    /// Whether all drives were ready since control began.
+    has_been_ready: bool,
+    /// Whether all are ready now, or nothing is reported.
+    pub is_ready: bool,
+}
+
+impl DriveMonitor {
+    /// Checks the status of a measurement.
+    #[inline(never)]
+    pub fn check(&mut self, cycle: &Cycle<'_>, measurement: Option<&Measurement>) -> Result<(), Diagnostic> {
+        let Some(Measurement { drives, time_ns, .. }) = measurement else { return Ok(()) };
+        // A driver that is silent says nothing about the force that is sent meanwhile.
+        let dt = seconds_between(self.measured_ns, *time_ns).clamp(0.0, FORCE_TIME_CONSTANT_S);
+        self.measured_ns = *time_ns;
+        let unready = drives.unready();
+        self.is_ready = unready.is_none();
+        if let Some(leg) = drives.faulty() {
+            return Err(Diagnostic::from(DiagnosticCode::DriveFault).at(leg));
+        }
+        if !cycle.state.has_control() {
+            let ready_ns = cycle.release_ns;
+            let Self { measured_ns, is_ready, .. } = *self;
+            *self = Self { ready_ns, measured_ns, is_ready, ..Self::default() };
+            return Ok(());
+        }
+        self.check_ready(cycle, unready)?;
+        match drives.force.filter(|_| self.is_ready) {
+            Some(force) => self.check_force(cycle.constants.machine().actuator.max_force, &force, dt),
+            None => Ok(()),
+        }
+    }
+
+    /// Records the force that is sent in this cycle.
+    pub fn record_sent(&mut self, force: &[f64; LEGS]) {
+        self.sent = *force;
+    }
+
+    fn check_ready(&mut self, cycle: &Cycle<'_>, unready: Option<usize>) -> Result<(), Diagnostic> {
+        let Some(leg) = unready else {
+            (self.ready_ns, self.has_been_ready) = (cycle.release_ns, true);
+            return Ok(());
+        };
+        let longest_s = cycle.constants.parameters.ready_timeout_ns as f64 * 1e-9;
+        let bound_s = if self.has_been_ready { MAX_UNREADY_S } else { longest_s };
+        let waited_s = seconds_between(self.ready_ns, cycle.release_ns);
+        if waited_s <= bound_s {
+            return Ok(());
+        }
+        Err(Diagnostic::new(DiagnosticCode::DriveNotReady, waited_s, bound_s).at(leg))
+    }
+
+    fn check_force(&mut self, max_force: f64, force: &[f64; LEGS], dt: f64) -> Result<(), Diagnostic> {
+        let share = dt / FORCE_TIME_CONSTANT_S;
+        let filtered = self.commanded.iter_mut().zip(&mut self.actual).zip(&mut self.missing_s);
+        for (leg, (((commanded, actual), missing_s), (sent, force))) in
+            filtered.zip(self.sent.iter().zip(force)).enumerate()
+        {
+            *commanded += (sent - *commanded) * share;
+            *actual += (force - *actual) * share;
+            let difference = (*commanded - *actual).abs();
+            let bound = FORCE_OFFSET_RATIO * max_force + FORCE_DIFFERENCE_RATIO * commanded.abs();
+            *missing_s = if difference <= bound { 0.0 } else { *missing_s + dt };
+            if *missing_s > MAX_MISSING_S {
+                return Err(Diagnostic::new(DiagnosticCode::DriveForceMissing, difference, bound).at(leg));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,57 @@
+//! Comparison of a pose that another sensor measures with the leg lengths.
+//!
+//! A wrong homing, a wrong scale or a slipped encoder moves the pose of forward kinematics, and with lengths alone nothing contradicts
+//! it. The lengths that the other pose has say which leg is wrong.
+
+use crate::control::cycle::Cycle;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::time::seconds_between;
+use crate::model::LEGS;
+use crate::model::inverse_geometry::leg_lengths;
+use crate::model::task::TaskState;
+
+/// Time constant of the differences \[s\]: noise of a tracker fades, and slips and drifts are slower.
+const TIME_CONSTANT_S: f64 = 0.03;
+
+/// Differences between measured lengths and those of the other pose.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct ExternalPose {
+    difference: [f64; LEGS],
+    time_ns: u64,
+}
+
+impl ExternalPose {
+    /// Compares the two of a measurement, if it has both. One that was compared before changes nothing.
+    #[inline(never)]
+    pub fn check(&mut self, cycle: &Cycle<'_>, measurement: Option<&Measurement>) -> Result<(), Diagnostic> {
+        let Some((measurement, x)) = measurement.and_then(|new| Some((new, new.pose?))) else {
+            *self = Self::default();
+            return Ok(());
+        };
+        let constants = cycle.constants;
+        let dt = seconds_between(self.time_ns, measurement.time_ns).max(0.0);
+        // The first counts as it is.
+        let share = (dt / TIME_CONSTANT_S).min(1.0);
+        self.time_ns = measurement.time_ns;
+        let length = leg_lengths(constants.machine(), &TaskState::at_rest(x).motion().pose);
+        let bound = constants.parameters.pose_tolerance;
+        let pairs = self.difference.iter_mut().zip(measurement.length.iter().zip(&length));
+        let mut largest = (0.0, 0);
+        for (leg, (difference, (measured, expected))) in pairs.enumerate() {
+            *difference += (measured - expected - *difference) * share;
+            // Also what is no number.
+            if !(difference.abs() <= largest.0) {
+                largest = (difference.abs(), leg);
+            }
+        }
+        if largest.0 <= bound {
+            return Ok(());
+        }
+        if !largest.0.is_finite() {
+            *self = Self::default();
+        }
+        Err(Diagnostic::new(DiagnosticCode::ExternalPoseMismatch, largest.0, bound).at(largest.1))
+    }
+}

@@ -1,0 +1,152 @@
+//! Motion of a platform without force: its pose and twist at the instant at which the force of this cycle begins, and with it
+//! control.
+//!
+//! A measurement is older than that, and meanwhile closing brakes have changed the twist: by 0.2 m/s within 20 ms at
+//! twice gravity. A reference that began with the measured twist would leave the platform at once. So two measurements
+//! without force give the deceleration, and the motion goes on with it:
+//!
+//! ```text
+//! speed(t) = |v| + d t, at least 0       d = (|v| - |v0|) / (t - t0), along the twist, as all legs come to rest at once
+//! ```
+//!
+//! Until there are two, the motion of a platform that moves is unknown, and control does not begin. Where the driver sends no rates,
+//! it begins at rest only, which the lengths have to show ([`super::standstill`]). Nor does it begin where brakes take a
+//! large part of the velocity limit within a period: until the force acts, which may be some part of a period late, the platform would
+//! have another velocity than its reference. Such brakes soon have it at rest.
+
+use crate::control::constants::Constants;
+use crate::control::cycle::Cycle;
+use crate::control::parameters::Parameters;
+use crate::control::sensing::localization::{Localization, Located, PlatformState};
+use crate::control::sensing::standstill::{Standstill, standing_speed};
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::limits::largest_ratio;
+use crate::control::signals::time::seconds_between;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+
+/// Largest change of the twist within a period with which control begins, over the limits of velocity: a force that acts a fifth of a
+/// period late makes 2 % of them.
+const MAX_CHANGE_RATIO: f64 = 0.1;
+
+/// What a measurement without force has shown.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+struct Sample {
+    time_ns: u64,
+    pose: Pose,
+    twist: Twist,
+    /// Bound on the speed of a joint \[m/s\].
+    speed: f64,
+}
+
+impl Sample {
+    fn new(constants: &Constants, Located { measurement, platform, .. }: &Located<'_>) -> Self {
+        let PlatformState { pose, twist, .. } = *platform;
+        Self { time_ns: measurement.time_ns, pose, twist, speed: speed(constants, &twist) }
+    }
+}
+
+/// Bound on the speed of a joint \[m/s\].
+fn speed(constants: &Constants, twist: &Twist) -> f64 {
+    twist.linear.norm() + constants.arm * twist.angular.norm()
+}
+
+/// The last measurements without force.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct FreeMotion {
+    /// The instant until which the last force was held \[ns\].
+    held_until_ns: u64,
+    /// Of the newest measurement \[ns\].
+    newest_ns: Option<u64>,
+    /// The last two, if both have rates.
+    before: Option<Sample>,
+    last: Option<Sample>,
+    /// All lengths.
+    standstill: Standstill,
+}
+
+impl FreeMotion {
+    /// The motion at the instant at which the force of a cycle that begins without one would begin; why control does not begin if it
+    /// is unknown.
+    pub fn update(
+        &mut self,
+        cycle: &Cycle<'_>,
+        localization: &Localization,
+        located: Option<&Located<'_>>,
+    ) -> Result<Motion, Diagnostic> {
+        let Cycle { constants, release_ns, state } = *cycle;
+        let begin_ns = release_ns.saturating_add(constants.parameters.force_delay_ns);
+        // Where the pose is unknown, what came before is another motion.
+        let Some(located) = located.filter(|_| !state.has_control()) else {
+            // The force of the cycle before is held until that of this one would begin, at most a period late.
+            let held_until_ns = begin_ns.saturating_add(constants.parameters.period_ns);
+            let held_until_ns = if state.has_control() { held_until_ns } else { self.held_until_ns };
+            *self = Self { held_until_ns, ..Self::default() };
+            return Err(DiagnosticCode::PlatformMoving.into());
+        };
+        let measurement = located.measurement;
+        let is_new = self.newest_ns.is_none_or(|newest_ns| measurement.time_ns > newest_ns);
+        if measurement.time_ns >= self.held_until_ns && is_new {
+            self.newest_ns = Some(measurement.time_ns);
+            self.standstill.add(&constants.parameters, constants.rest_window_s, measurement);
+            let new = measurement.rate.is_some().then(|| Sample::new(constants, located));
+            (self.before, self.last) = (new.and(self.last), new);
+        }
+        match self.at(constants, begin_ns) {
+            Some(motion) => Ok(motion),
+            None if measurement.rate.is_some() => Err(DiagnosticCode::PlatformMoving.into()),
+            None => self.at_rest(constants, localization, &located.platform.pose),
+        }
+    }
+
+    /// Rest, if the lengths show it.
+    fn at_rest(
+        &self,
+        constants: &Constants,
+        localization: &Localization,
+        pose: &Pose,
+    ) -> Result<Motion, Diagnostic> {
+        let largest = standing_speed(&constants.parameters);
+        let found = self.standstill.latest();
+        let speed = found.map_or(f64::INFINITY, |rates| {
+            let twist = localization.twist_of(constants, &rates.rate.into());
+            twist.map_or(f64::INFINITY, |twist| speed(constants, &twist) + rates.uncertainty)
+        });
+        if self.standstill.rates().is_some() && speed <= largest {
+            let (twist, acceleration) = (Twist::default(), Acceleration::default());
+            return Ok(Motion { pose: *pose, twist, acceleration });
+        }
+        Err(Diagnostic::new(DiagnosticCode::RestNotShown, speed, largest))
+    }
+
+    fn at(&self, constants: &Constants, instant_ns: u64) -> Option<Motion> {
+        let last = self.last?;
+        let standing = standing_speed(&constants.parameters);
+        let change = match self.before {
+            Some(before) => (last.speed - before.speed) / seconds_between(before.time_ns, last.time_ns),
+            None if last.speed <= standing => 0.0,
+            None => return None,
+        };
+        let age_s = seconds_between(last.time_ns, instant_ns).max(0.0);
+        let moves_s = if change < 0.0 { age_s.min(last.speed / -change) } else { age_s };
+        let share = if last.speed > 0.0 { (1.0 + change * moves_s / last.speed).max(0.0) } else { 0.0 };
+        let scaled = |factor: f64| Twist::from_vector(&(last.twist.vector() * factor));
+        let Parameters { limits, period_ns, .. } = &constants.parameters;
+        let in_period = scaled(change / last.speed * *period_ns as f64 * 1e-9);
+        let change_ratio = largest_ratio([
+            in_period.linear.norm() / limits.position.velocity,
+            in_period.angular.norm() / limits.orientation.velocity,
+        ]);
+        // Of a platform that will be at rest, the speed is known.
+        if share > 0.0 && change_ratio > MAX_CHANGE_RATIO {
+            return None;
+        }
+        Some(Motion {
+            pose: last.pose.displaced(&scaled(0.5 * (1.0 + share) * moves_s)),
+            twist: scaled(share),
+            // That of the brakes ends with them: the drives take over from none.
+            acceleration: Acceleration::default(),
+        })
+    }
+}

@@ -1,0 +1,125 @@
+//! Validation of the inputs: whether a measurement or a setpoint is plausible.
+//!
+//! A rejected input changes nothing: the last valid one stays and its age keeps counting, so invalid data never
+//! restarts a watchdog. When the timeout is exceeded, the diagnostic is that of the rejection.
+
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::time::seconds_between;
+use crate::model::LEGS;
+use crate::model::machine::Actuator;
+
+/// Tolerance at the ends of the stroke, as a ratio of the stroke: encoders have offsets, end stops have springs.
+const STROKE_TOLERANCE_RATIO: f64 = 0.02;
+
+/// The plausible change grows with the time since the last valid input, for at most this many intervals of the messages,
+/// so that a series of rejected inputs cannot widen it without limit. Two, as one message may get lost. The longest
+/// interval counts: after a pause of the loop the first message may be too old, and the next one shows the motion of the
+/// whole pause.
+const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
+
+/// The last valid input, and why the one after it was rejected. `Valid` is what a valid input stands for.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct LastValid<Input, Valid> {
+    pub valid: Option<Valid>,
+    /// The last input since then, and why it was rejected, or the first of several.
+    rejected: Option<(Input, Diagnostic)>,
+    /// Release of the cycle that validated the last input.
+    newest_ns: u64,
+    /// Longest time between two inputs since the last valid one \[ns\].
+    longest_interval_ns: u64,
+}
+
+impl<Input, Valid> Default for LastValid<Input, Valid> {
+    fn default() -> Self {
+        Self { valid: None, rejected: None, newest_ns: 0, longest_interval_ns: 0 }
+    }
+}
+
+impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid> {
+    /// Whether an input is another than the last one, valid or not: each is validated once.
+    pub fn is_new(&self, input: &Input) -> bool {
+        let valid = || self.valid.as_ref().map(AsRef::as_ref);
+        self.rejected.as_ref().map(|(rejected, _)| rejected).or_else(valid) != Some(input)
+    }
+
+    /// Upper bound on the time used for the plausible change \[s\]; infinite if no input was rejected since the last
+    /// valid one.
+    pub fn plausibility_window_s(&self, now_ns: u64, period_ns: u64) -> f64 {
+        if self.rejected.is_none() {
+            return f64::INFINITY;
+        }
+        let interval_ns = self.interval_ns(now_ns).max(period_ns);
+        MAX_PLAUSIBLE_INTERVALS * (interval_ns as f64 * 1e-9)
+    }
+
+    /// The longest time between two inputs since the last valid one, if the next is now \[ns\].
+    fn interval_ns(&self, now_ns: u64) -> u64 {
+        now_ns.saturating_sub(self.newest_ns).max(self.longest_interval_ns)
+    }
+
+    /// Records an input with the result of its validation. With `keep_first` the first of several rejections stays:
+    /// later ones may be rejected merely because the last valid input is old.
+    pub fn record(
+        &mut self,
+        input: &Input,
+        result: Result<&Valid, Diagnostic>,
+        now_ns: u64,
+        keep_first: bool,
+    ) {
+        match result {
+            Ok(valid) => (self.valid, self.rejected, self.longest_interval_ns) = (Some(*valid), None, 0),
+            Err(diagnostic) => {
+                self.longest_interval_ns = self.interval_ns(now_ns);
+                let first = self.rejected.filter(|_| keep_first).map(|(_, first)| first);
+                self.rejected = Some((*input, first.unwrap_or(diagnostic)));
+            }
+        }
+        self.newest_ns = now_ns;
+    }
+
+    /// The last rejection, or `otherwise` if nothing was rejected since the last valid input.
+    pub fn rejection_or(&self, otherwise: impl Into<Diagnostic>) -> Diagnostic {
+        self.rejected.map_or_else(|| otherwise.into(), |(_, rejection)| rejection)
+    }
+}
+
+/// Whether a time stamp is at most `timeout_ns` before or after now.
+pub(in crate::control) fn check_time_stamp(
+    code: DiagnosticCode,
+    time_ns: u64,
+    now_ns: u64,
+    timeout_ns: u64,
+) -> Result<(), Diagnostic> {
+    if now_ns.abs_diff(time_ns) <= timeout_ns {
+        return Ok(());
+    }
+    Err(Diagnostic::new(code, seconds_between(time_ns, now_ns), timeout_ns as f64 * 1e-9))
+}
+
+/// Whether all lengths are within the stroke and the tolerance of a measurement.
+pub(in crate::control) fn check_stroke_with_tolerance(
+    actuator: &Actuator,
+    code: DiagnosticCode,
+    length: &[f64; LEGS],
+) -> Result<(), Diagnostic> {
+    check_stroke(actuator, STROKE_TOLERANCE_RATIO * actuator.stroke(), code, length)
+}
+
+/// Whether all lengths are within the stroke and `tolerance` \[m\].
+pub(in crate::control) fn check_stroke(
+    actuator: &Actuator,
+    tolerance: f64,
+    code: DiagnosticCode,
+    length: &[f64; LEGS],
+) -> Result<(), Diagnostic> {
+    let (shortest, longest) = (actuator.min_length - tolerance, actuator.max_length + tolerance);
+    for (leg, length) in length.iter().enumerate() {
+        if *length >= shortest && *length <= longest {
+            continue;
+        }
+        let bound = if *length < shortest { shortest } else { longest };
+        return Err(Diagnostic::new(code, *length, bound).at(leg));
+    }
+    Ok(())
+}

@@ -1,0 +1,43 @@
+//! Rates of the legs where the driver sends none: the estimator without a reference and without a model.
+
+use nalgebra::Vector6;
+
+use crate::control::law::estimator::{EstimatorConstants, Filter};
+use crate::control::signals::errors::FeedbackError;
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::time::seconds_between;
+use crate::model::LEGS;
+
+/// Gap between two measurements \[s\] after which the estimate begins anew, at rest.
+const MAX_GAP_S: f64 = 0.1;
+
+/// Estimator of the rates of the legs. It takes the acceleration of a leg for constant.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct LegRateEstimator {
+    filter: Option<Filter>,
+}
+
+impl LegRateEstimator {
+    /// The rates at the instant of a measurement: as measured, or estimated.
+    pub fn rates(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
+        measurement.rate.unwrap_or_else(|| self.estimated(constants, measurement))
+    }
+
+    #[inline(never)]
+    fn estimated(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
+        let time_ns = measurement.time_ns;
+        let measured = FeedbackError { value: Vector6::from(measurement.length), rate: Vector6::zeros() };
+        let elapsed_s = |filter: &Filter| seconds_between(filter.time_ns, time_ns);
+        let filter = match &mut self.filter {
+            Some(filter) if (0.0..MAX_GAP_S).contains(&elapsed_s(filter)) => filter,
+            other => other.insert(Filter::new(constants, time_ns, &measured)),
+        };
+        let dt = elapsed_s(filter);
+        if dt > 0.0 {
+            filter.state.advance(dt, &Vector6::zeros());
+            filter.correct(constants, time_ns, &measured);
+        }
+        filter.state.rate.into()
+    }
+}

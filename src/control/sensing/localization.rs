@@ -1,0 +1,210 @@
+//! Pose and twist of the platform from a valid measurement, by forward kinematics along its motion since home.
+//!
+//! Other poses have the same leg lengths (assembly modes). Home is on the right side of every singularity, and the
+//! pose is followed from there without a gap. If the platform may have crossed a singularity, its assembly mode is
+//! uncertain: forces are disabled until an operator has inspected the platform and sent `clear`.
+
+use crate::control::constants::Constants;
+use crate::control::cycle::Cycle;
+use crate::control::parameters::Parameters;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::limits::{Limit, LimitSet};
+use crate::control::signals::time::seconds_between;
+use crate::model::LEGS;
+use crate::model::forward_kinematics::{Outcome, Tracker, TrackingResult};
+use crate::model::kinematic_state::KinematicState;
+use crate::model::rigid::{Pose, Twist};
+use crate::model::sensitivity::Sensitivity;
+use nalgebra::Vector6;
+
+/// Most Newton steps per cycle under control. One step covers far more than a cycle's motion; after a gap in the
+/// measurements several may be needed.
+const MAX_NEWTON_STEPS_PER_CYCLE: u32 = 8;
+
+/// Above this condition (or `limits.condition`, if that is less) a change of pose longer than a trusted step, within which
+/// forward kinematics has one solution, may have crossed a singularity. Below it, the singularity is too far away to be
+/// crossed between two measurements.
+const MAX_CERTAIN_CONDITION: f64 = 300.0;
+
+/// Pose and twist of the platform at the instant of a measurement, and how near they are to a singularity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlatformState {
+    /// Measured pose by forward kinematics: R, and C \[m\], in the base frame.
+    pub pose: Pose,
+    /// Measured omega \[rad/s\] and v \[m/s\], base axes.
+    pub twist: Twist,
+    /// Of the pose, see [`crate::model::sensitivity`].
+    pub condition: f64,
+    /// Time to a singular pose if the motion continues \[s\]; infinite if it leads to none.
+    pub time_to_singularity: f64,
+}
+
+/// A measurement with the state of the platform it stands for.
+pub(in crate::control) struct Located<'a> {
+    pub measurement: &'a Measurement,
+    /// Rates of the legs, measured or estimated \[m/s\].
+    pub rate: [f64; LEGS],
+    pub platform: PlatformState,
+}
+
+/// Rate at which the determinant approaches zero, from one measurement to the next.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+struct SingularityApproach {
+    /// Of the last measurement.
+    time_ns: u64,
+    determinant: f64,
+    time_to_singularity: f64,
+}
+
+/// Second stage of the cycle: follows the pose of the platform.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct Localization {
+    tracker: Tracker,
+    /// Whether the pose was followed from home on without a gap.
+    is_known: bool,
+    approach: Option<SingularityApproach>,
+    /// Why the assembly mode is uncertain, until cleared.
+    assembly_mode_fault: Option<Diagnostic>,
+}
+
+impl Localization {
+    /// Starts at the home pose.
+    pub fn new(constants: &Constants) -> Self {
+        Self {
+            tracker: Tracker::new(constants.machine(), *constants.home.pose()),
+            is_known: false,
+            approach: None,
+            assembly_mode_fault: None,
+        }
+    }
+
+    /// The platform at the instant of a measurement, by a bounded number of steps of forward kinematics.
+    pub fn locate<'a>(
+        &mut self,
+        cycle: &Cycle<'_>,
+        measurement: &'a Measurement,
+        rate: [f64; LEGS],
+    ) -> Result<Located<'a>, Diagnostic> {
+        self.assembly_mode_fault.map_or(Ok(()), Err)?;
+        let Cycle { constants, state, .. } = *cycle;
+        let (machine, parameters) = (constants.machine(), &constants.parameters);
+        let start = *self.tracker.pose();
+        let start_length = self.tracker.kinematic_state().lengths(machine);
+        let mut tracked = self.tracker.advance(machine, &measurement.length).0;
+        for _ in 1..if state.has_control() { MAX_NEWTON_STEPS_PER_CYCLE } else { 1 } {
+            if tracked == TrackingResult::Approaching {
+                tracked = self.tracker.advance(machine, &measurement.length).0;
+            }
+        }
+        let is_uncertain = self.is_known
+            && match tracked {
+                TrackingResult::NotConverged => self.tracker.outcome() == Outcome::NearSingular,
+                _ => self.is_assembly_mode_uncertain(constants, &start),
+            };
+        if is_uncertain {
+            return Err(self.fail_assembly_mode(parameters));
+        }
+        match tracked {
+            TrackingResult::Found => self.is_known = true,
+            TrackingResult::Approaching if state.has_control() => {
+                return Err(self.jump_diagnostic(constants, &start_length, &measurement.length));
+            }
+            TrackingResult::Approaching => return Err(DiagnosticCode::FindingPose.into()),
+            TrackingResult::NotConverged => {
+                self.is_known = false;
+                self.restart(&constants.home);
+                return Err(DiagnosticCode::PoseNotFound.into());
+            }
+        }
+        let kinematic_state = self.tracker.kinematic_state();
+        let twist = kinematic_state.twist(machine, &rate).ok_or(DiagnosticCode::SingularPose)?;
+        let Sensitivity { condition, determinant, .. } = *kinematic_state.sensitivity();
+        let time_to_singularity = self.time_to_singularity(measurement.time_ns, determinant);
+        let pose = *self.tracker.pose();
+        Ok(Located {
+            measurement,
+            rate,
+            platform: PlatformState { pose, twist, condition, time_to_singularity },
+        })
+    }
+
+    /// The twist of the platform that gives these rates of the legs; `None` at a singular pose.
+    pub fn twist_of(&self, constants: &Constants, rate: &Vector6<f64>) -> Option<Twist> {
+        self.tracker.kinematic_state().twist(constants.machine(), &(*rate).into())
+    }
+
+    /// Ends an assembly mode fault: an operator has inspected the platform.
+    pub fn clear_assembly_mode_fault(&mut self, home: &KinematicState) {
+        if self.assembly_mode_fault.take().is_some() {
+            self.restart(home);
+        }
+    }
+
+    /// Whether the pose is far enough from singular ones.
+    pub fn check_condition(&self, bound: f64, active: &mut LimitSet) -> Result<(), Diagnostic> {
+        let condition = self.tracker.kinematic_state().sensitivity().condition;
+        if active.check(Limit::Condition, condition / bound) {
+            return Ok(());
+        }
+        Err(Diagnostic::new(DiagnosticCode::NearSingular, condition, bound))
+    }
+
+    /// Starts again at home, the one pose of which the assembly mode is known.
+    // Out of line, as it is rare: the cycle stays short.
+    #[inline(never)]
+    fn restart(&mut self, home: &KinematicState) {
+        self.tracker.restart(home);
+    }
+
+    /// Beyond a singularity are poses with the same lengths as before it, and forward kinematics cannot distinguish
+    /// them. Near one the assembly mode is uncertain if the change of pose is so long that the next measurement may
+    /// belong to the other branch.
+    fn is_assembly_mode_uncertain(&self, constants: &Constants, start: &Pose) -> bool {
+        let kinematic_state = self.tracker.kinematic_state();
+        let Sensitivity { condition, trusted_step, .. } = *kinematic_state.sensitivity();
+        condition > assembly_mode_condition_bound(&constants.parameters)
+            && constants.machine().joints.distance(start, kinematic_state.pose()) > trusted_step
+    }
+
+    fn fail_assembly_mode(&mut self, parameters: &Parameters) -> Diagnostic {
+        self.is_known = false;
+        let condition = self.tracker.kinematic_state().sensitivity().condition;
+        let bound = assembly_mode_condition_bound(parameters);
+        *self.assembly_mode_fault.insert(Diagnostic::new(DiagnosticCode::SingularPose, condition, bound))
+    }
+
+    /// Diagnostic of lengths that the steps of one cycle do not reach. Its bound is the largest change of a leg reached.
+    fn jump_diagnostic(
+        &self,
+        constants: &Constants,
+        start: &[f64; LEGS],
+        measured: &[f64; LEGS],
+    ) -> Diagnostic {
+        let largest_change =
+            |to: &[f64; LEGS]| to.iter().zip(start).map(|(to, start)| (to - start).abs()).fold(0.0, f64::max);
+        let reached = largest_change(&self.tracker.kinematic_state().lengths(constants.machine()));
+        Diagnostic::new(DiagnosticCode::MeasurementJumped, largest_change(measured), reached)
+    }
+
+    /// By linear extrapolation of the determinant: near a singular pose it is linear in time.
+    fn time_to_singularity(&mut self, time_ns: u64, determinant: f64) -> f64 {
+        let time_to_singularity = match self.approach {
+            Some(last) if last.time_ns == time_ns => return last.time_to_singularity,
+            Some(last) => {
+                let dt = seconds_between(last.time_ns, time_ns);
+                determinant * dt / (last.determinant - determinant)
+            }
+            None => f64::INFINITY,
+        };
+        let time_to_singularity = if time_to_singularity > 0.0 { time_to_singularity } else { f64::INFINITY };
+        self.approach = Some(SingularityApproach { time_ns, determinant, time_to_singularity });
+        time_to_singularity
+    }
+}
+
+fn assembly_mode_condition_bound(parameters: &Parameters) -> f64 {
+    parameters.condition.min(MAX_CERTAIN_CONDITION)
+}

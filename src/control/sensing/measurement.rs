@@ -1,0 +1,264 @@
+//! Validation of measurements: stroke, change of lengths and rates, and rates that are those of the lengths.
+
+#[cfg(not(feature = "client"))]
+use nalgebra::ComplexField as _;
+
+use crate::control::cycle::Cycle;
+use crate::control::parameters::Parameters;
+use crate::control::sensing::last_valid::{LastValid, check_stroke_with_tolerance, check_time_stamp};
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::inputs::Measurement;
+use crate::control::signals::time::seconds_between;
+use crate::model::LEGS;
+use crate::model::machine::Actuator;
+
+/// Plausible rate of a leg over its largest: an external force may move it faster.
+const LEG_RATE_FACTOR: f64 = 1.5;
+
+/// Change of length that is always plausible, as a ratio of the stroke: noise.
+const LENGTH_NOISE_RATIO: f64 = 1e-3;
+
+/// Tolerance of lengths against integrated rates, as a ratio of the travel: rates are filtered, late, and not
+/// quite to scale. A wrong sign leaves twice the travel, a wrong unit a thousand times.
+const RESIDUAL_PER_TRAVEL: f64 = 0.3;
+
+/// The constant part of that tolerance, as a ratio of the stroke: noise and delay of the rates. Small, as with a
+/// wrong sign the error of the loop doubles within milliseconds.
+const RESIDUAL_NOISE_RATIO: f64 = 3e-4;
+
+/// Time constant of residual and travel \[s\]: long against the delay of a filter, short against a motion.
+const RESIDUAL_TIME_CONSTANT_S: f64 = 0.03;
+
+/// Acceleration that no drive gives a leg \[m/s^2\], five times gravity: more is an impact. The bound is the larger of
+/// this and ten times the linear acceleration limit.
+const MAX_LEG_ACCELERATION_M_S2: f64 = 50.0;
+const ACCELERATION_LIMIT_FACTOR: f64 = 10.0;
+
+/// Change of a rate that is always plausible, as a ratio of the largest rate: noise.
+const RATE_NOISE_RATIO: f64 = 0.02;
+
+/// Lead of a stamp over the release that is plausible, as a ratio of the period: a measurement of the future has not been
+/// made. The estimator would take it for what it is not, by velocity times the lead.
+const LEAD_RATIO: f64 = 0.1;
+/// The same at high rates \[ns\]: clocks of processors and of drives agree no better.
+const MIN_LEAD_NS: u64 = 10_000;
+
+/// Difference between each leg's change of length and the integral of its rate, with the travel. Both decay.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+struct RateConsistency {
+    residual: [f64; LEGS],
+    travel: [f64; LEGS],
+}
+
+impl RateConsistency {
+    /// After the step from one measurement to the next, with the rates of both.
+    fn updated(
+        &self,
+        now: &Measurement,
+        before: &Measurement,
+        [now_rate, before_rate]: [&[f64; LEGS]; 2],
+    ) -> Self {
+        let dt = seconds_between(before.time_ns, now.time_ns);
+        let decay = 1.0 - dt / RESIDUAL_TIME_CONSTANT_S;
+        if !(decay > 0.0) {
+            return Self::default();
+        }
+        let mut next = *self;
+        let rates = now_rate.iter().zip(before_rate);
+        let lengths = now.length.iter().zip(&before.length);
+        for ((residual, travel), ((now, before), (rate, rate_before))) in
+            next.residual.iter_mut().zip(&mut next.travel).zip(lengths.zip(rates))
+        {
+            let change = now - before;
+            *residual = *residual * decay + change - 0.5 * (rate + rate_before) * dt;
+            *travel = *travel * decay + change.abs();
+        }
+        next
+    }
+
+    /// `step_error`: what the trapezoidal rule leaves over of a motion within the limits, from one measurement to the next.
+    fn check(&self, actuator: &Actuator, step_error: f64) -> Result<(), Diagnostic> {
+        for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
+            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * actuator.stroke() + step_error;
+            if residual.abs() > bound {
+                let code = DiagnosticCode::RateInconsistent;
+                return Err(Diagnostic::new(code, residual.abs(), bound).at(leg));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// First stage of the cycle: validates each new measurement and keeps the last valid one.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct MeasurementValidator {
+    last: LastValid<Measurement, Measurement>,
+    consistency: RateConsistency,
+    /// Cycles under control without a new valid measurement.
+    pub missed: u64,
+    /// Release of the cycle before \[ns\]; 0 before the first.
+    released_before_ns: u64,
+    /// Release of this cycle \[ns\].
+    released_ns: u64,
+}
+
+impl MeasurementValidator {
+    /// The last valid measurement if it is recent. Under control, the one held before this cycle must also still be within
+    /// the timeout.
+    pub fn validate(
+        &mut self,
+        cycle: &Cycle<'_>,
+        newest: Option<&Measurement>,
+    ) -> Result<&Measurement, Diagnostic> {
+        (self.released_before_ns, self.released_ns) = (self.released_ns, cycle.release_ns);
+        let continuity = self.check_input_continuity(cycle);
+        let new = newest.filter(|newest| self.last.is_new(newest));
+        let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
+        self.missed += u64::from(cycle.state.has_control() && !is_accepted);
+        continuity?;
+        let Some(valid) = &self.last.valid else {
+            return Err(self.last.rejection_or(DiagnosticCode::NoMeasurement));
+        };
+        self.check_age(cycle, valid)?;
+        Ok(valid)
+    }
+
+    /// After a pause of the loop the inputs may be fresh again, but meanwhile the drives had no force and the brakes
+    /// closed: control does not continue.
+    fn check_input_continuity(&self, cycle: &Cycle<'_>) -> Result<(), Diagnostic> {
+        let last = self.last.valid.as_ref().filter(|_| cycle.state.has_control());
+        last.map_or(Ok(()), |last| self.check_age(cycle, last))
+    }
+
+    fn check_age(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Result<(), Diagnostic> {
+        let timeout_ns = cycle.constants.parameters.measured_timeout_ns;
+        check_time_stamp(DiagnosticCode::MeasurementLost, measurement.time_ns, cycle.release_ns, timeout_ns)
+            .map_err(|lost| self.pause(cycle, measurement).unwrap_or_else(|| self.last.rejection_or(lost)))
+    }
+
+    /// The pause of the loop that made a measurement too old, if that is why: not the driver is to blame.
+    fn pause(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Option<Diagnostic> {
+        let Parameters { measured_timeout_ns, longest_pause_ns, .. } = cycle.constants.parameters;
+        let before_ns = self.released_before_ns;
+        let pause_ns = self.released_ns.saturating_sub(before_ns);
+        let was_recent = before_ns > 0 && before_ns.abs_diff(measurement.time_ns) <= measured_timeout_ns;
+        let [pause_s, longest_s] = [pause_ns, longest_pause_ns].map(|time_ns| time_ns as f64 * 1e-9);
+        (was_recent && pause_ns > longest_pause_ns)
+            .then(|| Diagnostic::new(DiagnosticCode::DaemonHeld, pause_s, longest_s))
+    }
+
+    /// Validates a new measurement and records it. It must continue the last valid one if that is young or the
+    /// platform is under control.
+    fn accept(&mut self, cycle: &Cycle<'_>, new: &Measurement) -> Result<(), Diagnostic> {
+        let (parameters, now_ns) = (&cycle.constants.parameters, cycle.release_ns);
+        let timeout_ns = parameters.measured_timeout_ns;
+        let has_control = cycle.state.has_control();
+        let window_s = self.last.plausibility_window_s(now_ns, parameters.period_ns);
+        let is_binding = |valid: &&Measurement| has_control || now_ns.abs_diff(valid.time_ns) <= timeout_ns;
+        let before = self.last.valid.as_ref().filter(is_binding);
+        let consistency = &mut self.consistency;
+        let mut check = || {
+            check_time_stamp(DiagnosticCode::MeasurementStampInvalid, new.time_ns, now_ns, timeout_ns)?;
+            check_lead(new.time_ns, now_ns, parameters.period_ns)?;
+            check_age_at_arrival(new.time_ns, now_ns, parameters.max_measured_age_ns)?;
+            check_measurement(cycle, new, before, window_s, consistency)
+        };
+        let result = check();
+        self.last.record(new, result.map(|()| new), now_ns, has_control);
+        result
+    }
+}
+
+/// Whether the legs can be where a measurement says after `before`, and the rates are consistent up to it.
+fn check_measurement(
+    cycle: &Cycle<'_>,
+    now: &Measurement,
+    before: Option<&Measurement>,
+    window_s: f64,
+    consistency: &mut RateConsistency,
+) -> Result<(), Diagnostic> {
+    let actuator = &cycle.constants.machine().actuator;
+    if now.length.iter().chain(now.rate.iter().flatten()).any(|value| !value.is_finite()) {
+        return Err(DiagnosticCode::MeasurementNotFinite.into());
+    }
+    check_stroke_with_tolerance(actuator, DiagnosticCode::LengthOutOfStroke, &now.length)?;
+    let Some(before) = before else {
+        *consistency = RateConsistency::default();
+        return Ok(());
+    };
+    let dt = seconds_between(before.time_ns, now.time_ns);
+    if dt < 0.0 {
+        return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
+    }
+    let noise = LENGTH_NOISE_RATIO * actuator.stroke();
+    let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
+    check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
+    match (&now.rate, &before.rate) {
+        (Some(rate), Some(before_rate)) => {
+            check_rates(cycle, [now, before], [rate, before_rate], dt.min(window_s), consistency)
+        }
+        _ => {
+            *consistency = RateConsistency::default();
+            Ok(())
+        }
+    }
+}
+
+/// Whether measured rates change as actuators can, and are the derivatives of the lengths.
+fn check_rates(
+    cycle: &Cycle<'_>,
+    [now, before]: [&Measurement; 2],
+    [rate, before_rate]: [&[f64; LEGS]; 2],
+    plausible_s: f64,
+    consistency: &mut RateConsistency,
+) -> Result<(), Diagnostic> {
+    let actuator = &cycle.constants.machine().actuator;
+    let limits = &cycle.constants.parameters.limits;
+    let acceleration =
+        MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
+    let bound = acceleration * plausible_s + RATE_NOISE_RATIO * actuator.max_rate;
+    check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
+    let updated = consistency.updated(now, before, [rate, before_rate]);
+    // J dt^3 / 12 per step, over the steps of the time constant.
+    let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
+    updated.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * plausible_s.powi(2) / 12.0)?;
+    *consistency = updated;
+    Ok(())
+}
+
+/// Whether a stamp is not of the future.
+fn check_lead(time_ns: u64, now_ns: u64, period_ns: u64) -> Result<(), Diagnostic> {
+    let bound_ns = MIN_LEAD_NS.max((LEAD_RATIO * period_ns as f64) as u64);
+    if time_ns <= now_ns.saturating_add(bound_ns) {
+        return Ok(());
+    }
+    let age_s = seconds_between(time_ns, now_ns);
+    Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, age_s, -1e-9 * bound_ns as f64))
+}
+
+/// Whether the loop stands measurements of this age. Without new ones the age of the last one may grow further, until the
+/// timeout: that is a gap, after which the loop is what it was.
+fn check_age_at_arrival(time_ns: u64, now_ns: u64, max_age_ns: u64) -> Result<(), Diagnostic> {
+    if now_ns.saturating_sub(time_ns) <= max_age_ns {
+        return Ok(());
+    }
+    let age_s = seconds_between(time_ns, now_ns);
+    Err(Diagnostic::new(DiagnosticCode::MeasurementTooOld, age_s, 1e-9 * max_age_ns as f64))
+}
+
+fn check_change(
+    code: DiagnosticCode,
+    now: &[f64; LEGS],
+    before: &[f64; LEGS],
+    bound: f64,
+) -> Result<(), Diagnostic> {
+    for (leg, (now, before)) in now.iter().zip(before).enumerate() {
+        let change = (now - before).abs();
+        if change > bound {
+            return Err(Diagnostic::new(code, change, bound).at(leg));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,44 @@
+//! Comparison of the clock that stamps measurements with the daemon's, where the stamps release the cycles.
+//!
+//! With external release every age is computed from stamps alone. Were they frozen or slow, nothing would ever be too old. So
+//! the offset between the two clocks is followed, no faster than clocks drift, and a stamp that is away from it is a fault.
+
+use crate::control::cycle::Cycle;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+
+/// Largest drift of the offset, as a ratio of the time: a hundred times that of two crystals; frozen and doubled stamps drift by
+/// the whole time.
+const MAX_DRIFT: f64 = 0.01;
+
+/// Offset between the clocks.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct StampClock {
+    /// Clock of the stamps less that of the daemon, as it was followed \[ns\].
+    offset_ns: i64,
+    /// The daemon's clock at the last cycle \[ns\].
+    clock_ns: u64,
+}
+
+impl StampClock {
+    /// Compares the offset of this cycle \[ns\]. Without control it is only followed: the one of the freshest message counts.
+    pub fn check(&mut self, cycle: &Cycle<'_>, offset_ns: i64) -> Result<(), Diagnostic> {
+        let bound_ns = cycle.constants.parameters.measured_timeout_ns;
+        let clock_ns = cycle.release_ns.wrapping_sub(offset_ns as u64);
+        let drift_ns = (MAX_DRIFT * clock_ns.saturating_sub(self.clock_ns) as f64) as i64;
+        self.clock_ns = clock_ns;
+        let deviation_ns = offset_ns.saturating_sub(self.offset_ns);
+        let is_beyond = deviation_ns.unsigned_abs() > bound_ns;
+        if !cycle.state.has_control() && (is_beyond || deviation_ns > 0) {
+            self.offset_ns = offset_ns;
+            return Ok(());
+        }
+        let step_ns = deviation_ns.max(-drift_ns).min(drift_ns);
+        self.offset_ns = self.offset_ns.saturating_add(step_ns);
+        if !is_beyond {
+            return Ok(());
+        }
+        let [deviation_s, bound_s] = [deviation_ns as f64, bound_ns as f64].map(|ns| ns * 1e-9);
+        Err(Diagnostic::new(DiagnosticCode::StampClockInvalid, deviation_s, bound_s))
+    }
+}

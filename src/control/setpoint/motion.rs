@@ -1,0 +1,107 @@
+//! Motion of the platform that a setpoint describes, and its continuation until the force acts.
+
+use nalgebra::{Vector3, Vector6};
+
+use crate::control::parameters::Parameters;
+use crate::control::signals::inputs::{Setpoint, SetpointKind};
+use crate::control::signals::time::seconds_between;
+use crate::model::rigid::{Acceleration, Motion, Twist};
+
+/// Longest interval of the messages over which their accelerations give a jerk \[s\].
+const MAX_JERK_INTERVAL_S: f64 = 0.025;
+/// Time for which a jerk lasts, over the interval of the messages, beside the time to the end of the force's hold: as two
+/// messages may be lost. After it the acceleration is constant.
+const JERK_INTERVALS: f64 = 3.0;
+
+/// A setpoint with the motion of the platform it describes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct SetpointMotion {
+    /// The setpoint as received: time stamp and X, X', X''.
+    pub setpoint: Setpoint,
+    /// Pose, twist and acceleration of the platform at its time stamp, base axes.
+    pub motion: Motion,
+    /// Jerk after it, by the change of acceleration since the setpoint before; zero after a gap \[rad/s^3\], \[m/s^3\].
+    jerk: Vector6<f64>,
+    /// Time for which the jerk lasts \[s\].
+    jerk_s: f64,
+}
+
+/// Continuation of a setpoint: displacement, twist and acceleration.
+pub(in crate::control) struct Continuation {
+    pub displacement: Vector6<f64>,
+    pub twist: Vector6<f64>,
+    pub acceleration: Vector6<f64>,
+}
+
+impl AsRef<Setpoint> for SetpointMotion {
+    fn as_ref(&self) -> &Setpoint {
+        &self.setpoint
+    }
+}
+
+impl SetpointMotion {
+    /// Evaluates the motion of a setpoint. Poses alone have no derivatives.
+    pub fn new(setpoint: Setpoint) -> Self {
+        let motion = setpoint.task.motion();
+        let mut new = Self { setpoint, motion, jerk: Vector6::zeros(), jerk_s: 0.0 };
+        if matches!(setpoint.kind, SetpointKind::Pose | SetpointKind::Target) {
+            (new.motion.twist, new.motion.acceleration) = (Twist::default(), Acceleration::default());
+        }
+        new
+    }
+
+    /// Sets the jerk that leads on from the setpoint before. Accelerations alone, carried on to the instant of the force,
+    /// would lag by the time between: `jerk dt / Kp` of error.
+    pub fn lead_on(&mut self, parameters: &Parameters, before: Option<&Self>) {
+        let Some(before) = before.filter(|_| self.setpoint.kind == SetpointKind::Motion) else { return };
+        let dt = seconds_between(before.setpoint.time_ns, self.setpoint.time_ns);
+        if !(dt > 0.0 && dt <= MAX_JERK_INTERVAL_S) || before.setpoint.kind != SetpointKind::Motion {
+            return;
+        }
+        let limits = &parameters.limits;
+        let clamped = |change: Vector3<f64>, limit: f64| {
+            let jerk = change / dt;
+            jerk * (limit / jerk.norm().max(limit))
+        };
+        let (now, then) = (&self.motion.acceleration, &before.motion.acceleration);
+        let angular = clamped(now.angular - then.angular, limits.orientation.jerk);
+        let linear = clamped(now.linear - then.linear, limits.position.jerk);
+        self.jerk = Acceleration { angular, linear }.vector();
+        let ahead_s = parameters.force_delay_ns.saturating_add(parameters.period_ns) as f64 * 1e-9;
+        self.jerk_s = JERK_INTERVALS * dt + ahead_s;
+    }
+
+    /// The motion `dt` seconds later, to first order in the angle between.
+    pub(in crate::control) fn continued(&self, dt: f64) -> Continuation {
+        let (v, a, j) = (self.motion.twist.vector(), self.motion.acceleration.vector(), &self.jerk);
+        let t = dt.max(0.0).min(self.jerk_s);
+        let rest = dt.max(0.0) - t;
+        let by_jerk = t * (t * t / 6.0 + rest * (0.5 * t + 0.5 * rest));
+        Continuation {
+            displacement: (v + a * (0.5 * dt)) * dt + j * by_jerk,
+            twist: v + a * dt + j * (t * (0.5 * t + rest)),
+            acceleration: a + j * t,
+        }
+    }
+
+    /// The motion at another instant, extrapolated no further than a setpoint may be.
+    pub(in crate::control) fn motion_at(&self, parameters: &Parameters, instant_ns: u64) -> Motion {
+        if instant_ns == self.setpoint.time_ns {
+            return self.motion;
+        }
+        // Of the motion and not of X: rates of the angles are unbounded near gimbal lock.
+        let continued = self.continued(self.extrapolation_s(parameters, instant_ns));
+        Motion {
+            pose: self.motion.pose.extrapolated(&Twist::from_vector(&continued.displacement)),
+            twist: Twist::from_vector(&continued.twist),
+            acceleration: Acceleration::from_vector(&continued.acceleration),
+        }
+    }
+
+    /// Time from its instant to another \[s\], no longer than a setpoint may be extrapolated.
+    pub(in crate::control) fn extrapolation_s(&self, parameters: &Parameters, instant_ns: u64) -> f64 {
+        let longest = parameters.max_extrapolation_s();
+        seconds_between(self.setpoint.time_ns, instant_ns).max(-longest).min(longest)
+    }
+}

@@ -1,0 +1,124 @@
+//! Target of the reference in one cycle: where it shall go, and with which share of the limits.
+
+use nalgebra::Vector6;
+
+use crate::control::parameters::Parameters;
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::pose_samples::PoseSamples;
+use crate::control::signals::inputs::SetpointKind;
+use crate::control::signals::limits::Limits;
+use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
+
+/// Target of one cycle.
+#[derive(Clone, Copy, Debug)]
+pub enum Target<'a> {
+    /// The motion of a setpoint, which goes on between the messages.
+    Motion(&'a SetpointMotion),
+    /// Samples of a motion.
+    Samples(&'a PoseSamples),
+    /// A pose to move to and stand at, with a share of the limits of autonomous motions.
+    Pose(&'a Pose, f64),
+}
+
+/// A motion as seen from a pose.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::control) struct RelativeMotion {
+    /// What leads from the pose to that of the motion \[rad\], \[m\].
+    pub displacement: Vector6<f64>,
+    pub twist: Twist,
+    pub acceleration: Acceleration,
+}
+
+/// Least share of the limits of autonomous motions: with less the numbers of the approach lose their digits.
+const MIN_TARGET_SPEED: f64 = 0.01;
+
+impl<'a> Target<'a> {
+    /// The target that a valid setpoint stands for.
+    pub fn of_setpoint(setpoint: &'a SetpointMotion, samples: &'a PoseSamples) -> Self {
+        // No `match`: a jump table inside the cycle is beyond the proof on its machine code.
+        if setpoint.setpoint.kind == SetpointKind::Pose {
+            Self::Samples(samples)
+        } else if setpoint.setpoint.kind == SetpointKind::Target {
+            Self::Pose(&setpoint.motion.pose, share(setpoint.setpoint.target_speed))
+        } else {
+            Self::Motion(setpoint)
+        }
+    }
+
+    /// The motion of the target at an instant.
+    pub(in crate::control) fn motion_at(&self, parameters: &Parameters, instant_ns: u64) -> Option<Motion> {
+        match self {
+            Self::Motion(setpoint) => Some(setpoint.motion_at(parameters, instant_ns)),
+            Self::Samples(samples) => samples.target(instant_ns),
+            Self::Pose(pose, _) => Some(at_rest(pose)),
+        }
+    }
+
+    /// The motion at an instant as seen from a pose; a continuation is added to first order in its displacement.
+    pub(in crate::control) fn relative_to(
+        &self,
+        pose: &Pose,
+        parameters: &Parameters,
+        instant_ns: u64,
+    ) -> Option<RelativeMotion> {
+        if let Self::Motion(setpoint) = self {
+            let continued = setpoint.continued(setpoint.extrapolation_s(parameters, instant_ns));
+            let displacement = pose.displacement_to(&setpoint.motion.pose).vector() + continued.displacement;
+            let twist = Twist::from_vector(&continued.twist);
+            let acceleration = Acceleration::from_vector(&continued.acceleration);
+            return Some(RelativeMotion { displacement, twist, acceleration });
+        }
+        let Motion { pose: desired, twist, acceleration } = self.motion_at(parameters, instant_ns)?;
+        Some(RelativeMotion { displacement: pose.displacement_to(&desired).vector(), twist, acceleration })
+    }
+
+    /// Share of its limits with which the distance is closed: those of a pose are scaled already.
+    pub(in crate::control) fn closing_scale(&self, scale: f64) -> f64 {
+        if let Self::Pose(..) = self { 1.0 } else { scale }
+    }
+
+    /// The limits of the way to it.
+    pub(in crate::control) fn limits(&self, limits: &Limits) -> Limits {
+        match self {
+            Self::Motion(_) | Self::Samples(_) => *limits,
+            Self::Pose(_, share) => limits.scaled(limits.autonomous_scale * share),
+        }
+    }
+}
+
+/// Share of the limits that a setpoint's speed means; what is no share is all.
+pub(crate) fn share(target_speed: f64) -> f64 {
+    if target_speed > 0.0 { target_speed.clamp(MIN_TARGET_SPEED, 1.0) } else { 1.0 }
+}
+
+/// A pose without motion.
+pub(in crate::control) fn at_rest(pose: &Pose) -> Motion {
+    Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::signals::inputs::Setpoint;
+    use crate::control::signals::limits::DerivativeLimits;
+
+    #[test]
+    fn the_speed_of_a_target_is_a_share_of_the_limits_of_autonomous_motions() {
+        let one = DerivativeLimits { velocity: 1.0, acceleration: 1.0, jerk: 1.0 };
+        let limits = Limits { position: one, orientation: one, autonomous_scale: 0.5 };
+        for (target_speed, share) in
+            [(0.0, 1.0), (0.25, 0.25), (1.0, 1.0), (2.0, 1.0), (1e-300, 0.01), (-1.0, 1.0), (f64::NAN, 1.0)]
+        {
+            for (kind, scale) in [(SetpointKind::Target, 0.5 * share), (SetpointKind::Motion, 1.0)] {
+                let setpoint = Setpoint { kind, target_speed, ..Setpoint::default() };
+                let (setpoint, samples) = (SetpointMotion::new(setpoint), PoseSamples::default());
+                let found = Target::of_setpoint(&setpoint, &samples).limits(&limits);
+                assert_eq!(
+                    (found.position.jerk, found.orientation.velocity),
+                    (scale, scale),
+                    "{target_speed}"
+                );
+            }
+        }
+    }
+}

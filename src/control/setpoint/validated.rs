@@ -1,0 +1,31 @@
+//! The last valid setpoint, and what it means for a state.
+
+use crate::control::constants::Constants;
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::target::Target;
+use crate::control::signals::diagnostic::Diagnostic;
+use crate::control::signals::limits::LimitSet;
+use crate::control::signals::state::State;
+
+/// The last valid setpoint, whether it may be followed, and the limits it is near to.
+pub(in crate::control) struct ValidatedSetpoint<'a> {
+    pub valid: Option<&'a SetpointMotion>,
+    /// What the reference shall approach.
+    pub target: Option<Target<'a>>,
+    /// Whether the valid setpoint is young enough.
+    pub status: Result<(), Diagnostic>,
+    /// Of the newest setpoint.
+    pub active_limits: LimitSet,
+}
+
+impl<'a> ValidatedSetpoint<'a> {
+    /// What the reference shall approach in a state; nothing where it follows its stop.
+    #[inline(never)]
+    pub fn target_in(&self, constants: &'a Constants, state: State) -> Option<Target<'a>> {
+        match state {
+            State::Engaging | State::Active => self.target.filter(|_| self.status.is_ok()),
+            State::Parking => Some(Target::Pose(constants.home.pose(), 1.0)),
+            State::Off | State::Standby | State::Stopping | State::Fault => None,
+        }
+    }
+}

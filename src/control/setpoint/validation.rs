@@ -1,0 +1,256 @@
+//! Validation of setpoints.
+//!
+//! The reference keeps its limits whatever is sent, so none of these checks is needed for them. Under
+//! `on_violation = "stop"` they find a trajectory that the machine cannot follow, and say why:
+//!
+//! | check | of |
+//! | --- | --- |
+//! | numbers, time stamp, kind | every setpoint |
+//! | velocity, acceleration, leg rates, stroke, envelope | a motion; of a target stroke and envelope; under "stop" |
+//! | deviation from the reference, or while engaging from the setpoint before, within the engage tolerance | a motion that is followed, under "stop" |
+
+use crate::control::cycle::Cycle;
+use crate::control::parameters::{Parameters, ViolationPolicy};
+use crate::control::reference::ReferenceGenerator;
+use crate::control::sensing::last_valid::{LastValid, check_stroke, check_time_stamp};
+use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::pose_samples::PoseSamples;
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::validated::ValidatedSetpoint;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::{Setpoint, SetpointKind};
+use crate::control::signals::limits::{Limit, LimitSet, Limits, largest_ratio};
+use crate::control::signals::state::State;
+use crate::control::signals::time::seconds_between;
+use crate::model::inverse_geometry::leg_lengths_and_rates;
+use crate::model::machine::Machine;
+use crate::model::rigid::Motion;
+
+/// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
+const ENVELOPE_ROUNDING: f64 = 1e-9;
+
+/// Deviation from the continuation of the setpoint before that is a jump, over the engage tolerance.
+const JUMP_RATIO: f64 = 0.5;
+
+/// First stage of the cycle: validates each new setpoint and keeps the last valid one.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct SetpointValidator {
+    last: LastValid<Setpoint, SetpointMotion>,
+    samples: PoseSamples,
+    /// Of the newest setpoint.
+    active_limits: LimitSet,
+    /// Cycles under control without a new valid setpoint.
+    pub missed: u64,
+}
+
+impl SetpointValidator {
+    /// Validates the newest setpoint, if it is new.
+    pub fn validate(
+        &mut self,
+        cycle: &Cycle<'_>,
+        newest: Option<&Setpoint>,
+        reference: &ReferenceGenerator,
+    ) -> ValidatedSetpoint<'_> {
+        let new = newest.filter(|newest| self.last.is_new(newest));
+        let is_accepted = new.is_some_and(|new| {
+            let parameters = &cycle.constants.parameters;
+            let mut new = SetpointMotion::new(*new);
+            new.lead_on(parameters, self.last.valid.as_ref());
+            self.accept(cycle, &new, reference)
+        });
+        self.missed += u64::from(cycle.state.has_control() && !is_accepted);
+        let valid = self.last.valid.as_ref();
+        ValidatedSetpoint {
+            valid,
+            target: valid.map(|valid| Target::of_setpoint(valid, &self.samples)),
+            status: self.check_age(cycle),
+            active_limits: self.active_limits,
+        }
+    }
+
+    /// Forgets every setpoint; the newest is then validated anew.
+    pub fn forget(&mut self) {
+        *self = Self { missed: self.missed, ..Self::default() };
+    }
+
+    /// Whether the valid setpoint is young enough to be followed. One that holds without end stays valid while it is
+    /// followed.
+    fn check_age(&self, cycle: &Cycle<'_>) -> Result<(), Diagnostic> {
+        let Some(SetpointMotion { setpoint, motion, .. }) = &self.last.valid else {
+            return Err(self.last.rejection_or(DiagnosticCode::NoSetpoint));
+        };
+        let is_followed = is_following(cycle.state);
+        if is_followed && setpoint.kind == SetpointKind::Target {
+            return Ok(());
+        }
+        let Parameters { on_violation, setpoint_timeout_ns, .. } = &cycle.constants.parameters;
+        let is_at_rest = motion.twist.vector().amax() == 0.0 && motion.acceleration.vector().amax() == 0.0;
+        let (release_ns, timeout_ns) = (cycle.release_ns, *setpoint_timeout_ns);
+        if *on_violation == ViolationPolicy::Limit && is_followed {
+            return check_time_stamp(DiagnosticCode::HoldingPose, setpoint.time_ns, release_ns, timeout_ns);
+        }
+        let code = if is_at_rest { DiagnosticCode::SetpointEnded } else { DiagnosticCode::SetpointLost };
+        check_time_stamp(code, setpoint.time_ns, release_ns, timeout_ns)
+            .map_err(|lost| self.last.rejection_or(lost))
+    }
+
+    /// Validates a new setpoint and records it. True if it is accepted.
+    fn accept(&mut self, cycle: &Cycle<'_>, new: &SetpointMotion, reference: &ReferenceGenerator) -> bool {
+        let (constants, now_ns) = (cycle.constants, cycle.release_ns);
+        let parameters = &constants.parameters;
+        let followed = self.last.valid.as_ref().filter(|_| is_following(cycle.state));
+        let timeout_ns = parameters.setpoint_timeout_ns;
+        let mut active_limits = LimitSet::default();
+        let mut check = || {
+            let (code, time_ns) = (DiagnosticCode::SetpointStampInvalid, new.setpoint.time_ns);
+            check_time_stamp(code, time_ns, now_ns, timeout_ns)?;
+            check_kind(parameters, &new.setpoint)?;
+            check_order(new, followed)?;
+            if parameters.on_violation == ViolationPolicy::Stop {
+                check_setpoint(constants.machine(), parameters, new, &mut active_limits)?;
+                check_continuation(cycle, new, followed, reference)?;
+            }
+            Ok(())
+        };
+        let result = check();
+        self.active_limits = active_limits;
+        if result.is_ok() && new.setpoint.kind == SetpointKind::Pose {
+            self.samples.push(now_ns, new.setpoint.time_ns, &new.motion.pose);
+        }
+        self.last.record(&new.setpoint, result.map(|()| new), now_ns, is_following(cycle.state));
+        result.is_ok()
+    }
+}
+
+fn is_following(state: State) -> bool {
+    matches!(state, State::Engaging | State::Active)
+}
+
+/// Whether the numbers are finite and the policy allows the kind.
+#[inline(never)]
+fn check_kind(parameters: &Parameters, setpoint: &Setpoint) -> Result<(), Diagnostic> {
+    if !setpoint.task.is_finite() {
+        return Err(DiagnosticCode::SetpointNotFinite.into());
+    }
+    // Out of line, as is its table of kinds: inside `step` it is beyond the proof on the machine code.
+    let is_pose_allowed = parameters.on_violation == ViolationPolicy::Limit;
+    let is_allowed = setpoint.kind == SetpointKind::Motion
+        || setpoint.kind == SetpointKind::Target
+        || setpoint.kind == SetpointKind::Pose && is_pose_allowed;
+    if is_allowed { Ok(()) } else { Err(DiagnosticCode::SetpointKindInvalid.into()) }
+}
+
+/// Whether the time stamp is after that of the setpoint before.
+fn check_order(new: &SetpointMotion, before: Option<&SetpointMotion>) -> Result<(), Diagnostic> {
+    let dt = before.map_or(1.0, |before| seconds_between(before.setpoint.time_ns, new.setpoint.time_ns));
+    if dt > 0.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointStampInvalid, -dt, 0.0)) }
+}
+
+/// Whether a motion that is followed continues: from the reference, or while engaging from the setpoint before.
+fn check_continuation(
+    cycle: &Cycle<'_>,
+    new: &SetpointMotion,
+    followed: Option<&SetpointMotion>,
+    reference: &ReferenceGenerator,
+) -> Result<(), Diagnostic> {
+    let (Some(before), SetpointKind::Motion) = (followed, new.setpoint.kind) else { return Ok(()) };
+    let parameters = &cycle.constants.parameters;
+    if cycle.state == State::Active {
+        return check_deviation(parameters, reference, before, new);
+    }
+    let ratio = jump_ratio(parameters, before, new);
+    if ratio <= 1.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointJumped, ratio, 1.0)) }
+}
+
+/// Whether the reference is within the engage tolerance of a setpoint. If not, either the setpoint has jumped from the one
+/// before, or the limits kept the reference from following.
+pub fn check_deviation(
+    parameters: &Parameters,
+    reference: &ReferenceGenerator,
+    before: &SetpointMotion,
+    setpoint: &SetpointMotion,
+) -> Result<(), Diagnostic> {
+    let ratio = parameters.tolerance_ratio(&reference.deviation_of(parameters, setpoint));
+    if ratio <= 1.0 {
+        return Ok(());
+    }
+    let has_jumped = jump_ratio(parameters, before, setpoint) > JUMP_RATIO;
+    let code = if has_jumped { DiagnosticCode::SetpointJumped } else { DiagnosticCode::SetpointBeyondLimits };
+    Err(Diagnostic::new(code, ratio, 1.0))
+}
+
+/// Deviation of a setpoint from the continuation of the one before, over the engage tolerance.
+fn jump_ratio(parameters: &Parameters, before: &SetpointMotion, setpoint: &SetpointMotion) -> f64 {
+    let continued = before.motion_at(parameters, setpoint.setpoint.time_ns);
+    parameters.tolerance_ratio(&TrackingError::new(&setpoint.motion, &continued.pose, &continued.twist))
+}
+
+/// Checks that a setpoint keeps the limits at its instant. Adds those that it is near to, up to the check that failed.
+pub fn check_setpoint(
+    machine: &Machine,
+    parameters: &Parameters,
+    SetpointMotion { setpoint, motion, .. }: &SetpointMotion,
+    active: &mut LimitSet,
+) -> Result<(), Diagnostic> {
+    check_velocity_and_acceleration(parameters, motion, active)?;
+    check_envelope(parameters, setpoint, active)?;
+    check_legs(machine, parameters, motion, active)
+}
+
+fn check_velocity_and_acceleration(
+    parameters: &Parameters,
+    motion: &Motion,
+    active: &mut LimitSet,
+) -> Result<(), Diagnostic> {
+    let Motion { twist, acceleration, .. } = motion;
+    let Limits { orientation, position, .. } = &parameters.limits;
+    let velocity =
+        largest_ratio([twist.angular.norm() / orientation.velocity, twist.linear.norm() / position.velocity]);
+    let acceleration = largest_ratio([
+        acceleration.angular.norm() / orientation.acceleration,
+        acceleration.linear.norm() / position.acceleration,
+    ]);
+    for (limit, ratio) in [(Limit::Velocity, velocity), (Limit::Acceleration, acceleration)] {
+        if !active.check(limit, ratio) {
+            return Err(Diagnostic::new(DiagnosticCode::SetpointTooFast, ratio, 1.0));
+        }
+    }
+    Ok(())
+}
+
+fn check_envelope(
+    parameters: &Parameters,
+    setpoint: &Setpoint,
+    active: &mut LimitSet,
+) -> Result<(), Diagnostic> {
+    let Some(envelope) = &parameters.envelope else { return Ok(()) };
+    let ranges = envelope.lowest.iter().zip(&envelope.highest);
+    for (axis, (x, (low, high))) in setpoint.task.x.iter().zip(ranges).enumerate() {
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let distance = (x - middle).abs();
+        if !active.check(Limit::Envelope, distance / (half + ENVELOPE_ROUNDING)) {
+            let bound = if *x > middle { *high } else { *low };
+            return Err(Diagnostic::new(DiagnosticCode::SetpointOutOfEnvelope, *x, bound).at(axis));
+        }
+    }
+    Ok(())
+}
+
+fn check_legs(
+    machine: &Machine,
+    parameters: &Parameters,
+    motion: &Motion,
+    active: &mut LimitSet,
+) -> Result<(), Diagnostic> {
+    let actuator = &machine.actuator;
+    let (lengths, rates) = leg_lengths_and_rates(machine, &motion.pose, &motion.twist);
+    for (leg, rate) in rates.iter().enumerate() {
+        let ratio = rate.abs() / actuator.max_rate;
+        if !active.check(Limit::LegRate, ratio) {
+            return Err(Diagnostic::new(DiagnosticCode::SetpointTooFast, ratio, 1.0).at(leg));
+        }
+    }
+    check_stroke(actuator, -parameters.stroke_margin, DiagnosticCode::SetpointOutOfReach, &lengths)
+}

@@ -1,0 +1,97 @@
+//! Errors of the platform: of its pose, of what feedback acts on, and as estimated. All are desired minus true.
+
+use nalgebra::Vector6;
+
+use crate::model::LEGS;
+use crate::model::inverse_geometry::leg_lengths_and_rates;
+use crate::model::machine::Machine;
+use crate::model::rigid::{Motion, Pose, Twist};
+
+/// Tracking error of pose and twist, desired minus measured, base axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct TrackingError {
+    /// `[e_R; e_p]` \[rad\], \[m\].
+    pub pose: Twist,
+    /// `[omega_d - omega; v_d - v]` \[rad/s\], \[m/s\].
+    pub twist: Twist,
+}
+
+impl TrackingError {
+    /// The error at one instant.
+    pub fn new(desired: &Motion, pose: &Pose, twist: &Twist) -> Self {
+        Self {
+            pose: pose.displacement_to(&desired.pose),
+            twist: Twist {
+                angular: desired.twist.angular - twist.angular,
+                linear: desired.twist.linear - twist.linear,
+            },
+        }
+    }
+}
+
+/// Error that feedback acts on, desired minus measured: of the pose, or in modes on legs of their lengths.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct FeedbackError {
+    /// Desired minus measured: angles \[rad\] and position \[m\], or leg lengths \[m\].
+    pub value: Vector6<f64>,
+    /// Its time derivative.
+    pub rate: Vector6<f64>,
+}
+
+impl FeedbackError {
+    /// Of the legs.
+    pub fn of_legs(machine: &Machine, desired: &Motion, length: &[f64; LEGS], rate: &[f64; LEGS]) -> Self {
+        let (desired, desired_rate) = leg_lengths_and_rates(machine, &desired.pose, &desired.twist);
+        Self {
+            value: Vector6::from(desired) - Vector6::from(*length),
+            rate: Vector6::from(desired_rate) - Vector6::from(*rate),
+        }
+    }
+}
+
+impl From<&TrackingError> for FeedbackError {
+    fn from(error: &TrackingError) -> Self {
+        Self { value: error.pose.vector(), rate: error.twist.vector() }
+    }
+}
+
+impl From<&FeedbackError> for TrackingError {
+    fn from(deviation: &FeedbackError) -> Self {
+        Self { pose: Twist::from_vector(&deviation.value), twist: Twist::from_vector(&deviation.rate) }
+    }
+}
+
+/// Estimate of one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct ErrorState {
+    /// e, desired minus true: angles \[rad\] and position \[m\], or leg lengths \[m\].
+    pub value: Vector6<f64>,
+    /// w, its rate.
+    pub rate: Vector6<f64>,
+    /// d, the acceleration that nothing in the model explains.
+    pub disturbance: Vector6<f64>,
+}
+
+impl ErrorState {
+    /// Moves it over `dt` seconds in which feedback accelerates the platform by u.
+    pub fn advance(&mut self, dt: f64, u: &Vector6<f64>) {
+        let acceleration = self.disturbance - u;
+        self.value += (self.rate + acceleration * (0.5 * dt)) * dt;
+        self.rate += acceleration * dt;
+    }
+
+    /// It `dt` seconds later.
+    pub fn after(&self, dt: f64, u: &Vector6<f64>) -> Self {
+        let mut after = *self;
+        after.advance(dt, u);
+        after
+    }
+
+    /// Without the disturbance.
+    pub fn error(&self) -> FeedbackError {
+        FeedbackError { value: self.value, rate: self.rate }
+    }
+}

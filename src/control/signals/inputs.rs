@@ -1,0 +1,125 @@
+//! What the controller is told in one cycle: setpoint, measurement, request, and which processes sent them.
+
+use crate::control::signals::state::OperatorRequest;
+use crate::model::LEGS;
+use crate::model::task::TaskState;
+
+/// Meaning of the numbers of a setpoint, as the messages carry it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[repr(u32)]
+pub enum SetpointKind {
+    /// X, X' and X'' of a motion at one instant.
+    #[default]
+    Motion = 0,
+    /// X of a motion at one instant, without derivatives; the messages may arrive more slowly than the cycles.
+    Pose = 1,
+    /// X of a pose to move to and to stand at.
+    Target = 2,
+    /// No kind has the number of the message: the setpoint is rejected.
+    Unknown = 3,
+}
+
+impl SetpointKind {
+    /// The kinds that a message may have, in the order of their numbers.
+    pub const ALL: [Self; 3] = [Self::Motion, Self::Pose, Self::Target];
+}
+
+/// Task coordinates, with their derivatives, that the platform shall have at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct Setpoint {
+    /// Which of the numbers hold, and for how long.
+    pub kind: SetpointKind,
+    /// Instant for which the setpoint holds, on the clock of the releases \[ns\].
+    pub time_ns: u64,
+    /// X, X', X'' at that instant.
+    pub task: TaskState,
+    /// Share of the limits of autonomous motions with which a target is approached, up to 1; 0 is all of them.
+    pub target_speed: f64,
+}
+
+impl Setpoint {
+    /// X, X' and X'' of a motion at an instant.
+    pub fn motion(time_ns: u64, task: TaskState) -> Self {
+        Self { kind: SetpointKind::Motion, time_ns, task, target_speed: 0.0 }
+    }
+}
+
+/// Lengths \[m\] and rates \[m/s\] of the legs at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct Measurement {
+    /// Instant of the measurement, on the clock of the releases \[ns\].
+    pub time_ns: u64,
+    /// Measured leg lengths L, from base joint to platform joint \[m\].
+    pub length: [f64; LEGS],
+    /// Measured leg rates L' \[m/s\]; `None` if the driver does not measure them.
+    pub rate: Option<[f64; LEGS]>,
+    /// X by another sensor at the same instant; `None` if there is none.
+    pub pose: Option<[f64; 6]>,
+    /// Status of the drives.
+    pub drives: DriveStatus,
+}
+
+impl AsRef<Self> for Measurement {
+    fn as_ref(&self) -> &Self {
+        self
+    }
+}
+
+/// Drives as a driver reports them. The sets have a bit for each leg, the lowest for leg 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct DriveStatus {
+    /// Drives that are enabled; `None` if it is not reported.
+    pub enabled: Option<u32>,
+    /// Brakes that are open.
+    pub brake_open: Option<u32>,
+    /// Drives with a fault.
+    pub fault: Option<u32>,
+    /// Forces that act \[N\].
+    pub force: Option<[f64; LEGS]>,
+}
+
+impl DriveStatus {
+    /// The first drive that is not enabled, or whose brake is closed.
+    pub(in crate::control) fn unready(&self) -> Option<usize> {
+        let ready = self.enabled.unwrap_or(u32::MAX) & self.brake_open.unwrap_or(u32::MAX);
+        (0..LEGS).find(|leg| ready >> leg & 1 == 0)
+    }
+
+    pub(in crate::control) fn faulty(&self) -> Option<usize> {
+        (0..LEGS).find(|leg| self.fault.unwrap_or_default() >> leg & 1 == 1)
+    }
+}
+
+/// Processes that publish an input: of the publisher that counts, and of another one that lives beside it. 0: none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Publishers {
+    /// Process whose messages count.
+    pub counting: u32,
+    /// Process whose messages are ignored.
+    pub ignored: u32,
+}
+
+/// Inputs of one cycle: with the controller's own state they determine its output.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Input {
+    /// The instant of release of this cycle, on the grid.
+    pub release_ns: u64,
+    /// The clock of the releases less the daemon's \[ns\]: not zero where measurements release the cycles.
+    pub clock_offset_ns: i64,
+    /// The newest setpoint; `None` if none ever arrived.
+    pub setpoint: Option<Setpoint>,
+    /// The newest measurement; `None` if none ever arrived.
+    pub measurement: Option<Measurement>,
+    /// The newest request; `None` if none ever arrived. Each is carried out once.
+    pub request: Option<OperatorRequest>,
+    /// Processes that publish setpoints.
+    pub setpoint_publishers: Publishers,
+    /// Processes that publish measurements.
+    pub measured_publishers: Publishers,
+    /// Whether cycles were missed since the last one, and the deployment makes that a fault.
+    pub deadline_missed: bool,
+}

@@ -1,0 +1,8 @@
+//! What the stages of a cycle pass to each other: types that import no stage.
+
+pub mod diagnostic;
+pub mod errors;
+pub mod inputs;
+pub mod limits;
+pub mod state;
+pub mod time;

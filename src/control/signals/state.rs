@@ -1,0 +1,136 @@
+//! States of the controller and requests of operators, by number, as the messages carry them.
+//!
+//! | state | force | ends with |
+//! | --- | --- | --- |
+//! | off | not valid: brake | the pose is known: standby; after the request `off`: `clear`, `engage` or `park` |
+//! | standby | not valid: brake | `engage`: engaging; `park`: stopping, then parking; the pose is lost: off |
+//! | engaging | controlled, from the measured motion onto the setpoint; without setpoints at rest, see below | on the setpoint: active; `stop`, `park`, a setpoint that ended, was lost or rejected: stopping |
+//! | active | controlled, on the setpoint | `stop`, `park`, a setpoint that ended, was lost or rejected: stopping; without setpoints, see below: engaging |
+//! | stopping | controlled, to rest along a verified stop | at rest: standby, parking or fault |
+//! | parking | controlled, to the home pose | at home: off; `stop`, a fault that stops: stopping |
+//! | fault | not valid: brake | `clear`: off, and on to standby |
+//!
+//! In every state `off` leads to off and `estop` to fault, within the cycle; only `clear` ends a fault. There is no
+//! gravity support without control: a driver brakes when it receives no valid force.
+//!
+//! The platform may still move when control begins, by `engage` or `park`. Both are refused if no stop within every limit
+//! exists for its motion. Under `[setpoint] on_violation = "limit"` a platform without setpoints comes to rest and holds its
+//! pose in the state engaging, which is no fault; when setpoints arrive again, it moves onto them.
+
+/// State of the controller, which decides whether forces are valid and which reference the platform follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[repr(u32)]
+pub enum State {
+    /// No force: the pose is unknown, or an operator requested it.
+    #[default]
+    Off = 0,
+    /// No force; ready to engage.
+    Standby = 1,
+    /// Moves from the measured motion onto the setpoint, or holds its pose until setpoints arrive.
+    Engaging = 2,
+    /// Follows the setpoint.
+    Active = 3,
+    /// Decelerates to rest along a verified stop.
+    Stopping = 4,
+    /// Moves to the home pose.
+    Parking = 5,
+    /// No force until cleared.
+    Fault = 6,
+}
+
+impl State {
+    /// Every state, in the order of their numbers.
+    pub const ALL: [Self; 7] =
+        [Self::Off, Self::Standby, Self::Engaging, Self::Active, Self::Stopping, Self::Parking, Self::Fault];
+
+    /// Whether the platform is under control: forces are valid in these states and in no other.
+    pub fn has_control(self) -> bool {
+        matches!(self, Self::Engaging | Self::Active | Self::Stopping | Self::Parking)
+    }
+
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Standby => "standby",
+            Self::Engaging => "engaging",
+            Self::Active => "active",
+            Self::Stopping => "stopping",
+            Self::Parking => "parking",
+            Self::Fault => "fault",
+        }
+    }
+
+    /// Reads the number of a message.
+    pub fn from_number(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| *state as u32 == number)
+    }
+}
+
+/// Operator request, one per message. Of several within one cycle the last in this order counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u32)]
+pub enum Request {
+    /// Take control and follow the setpoint.
+    Engage = 1,
+    /// Leave the fault.
+    Clear = 2,
+    /// Come to rest, go home, disable the forces.
+    Park = 3,
+    /// Come to rest, disable the forces.
+    Stop = 4,
+    /// Disable the forces at once; brakes close.
+    Off = 5,
+    /// Disable the forces at once, until cleared.
+    Estop = 6,
+}
+
+impl Request {
+    /// Every request, in ascending order of precedence.
+    pub const ALL: [Self; 6] = [Self::Engage, Self::Clear, Self::Park, Self::Stop, Self::Off, Self::Estop];
+
+    /// Whether it may begin control of the platform.
+    pub fn can_begin_control(self) -> bool {
+        matches!(self, Self::Engage | Self::Park)
+    }
+
+    /// Name for people; the command of the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Engage => "engage",
+            Self::Clear => "clear",
+            Self::Park => "park",
+            Self::Stop => "stop",
+            Self::Off => "off",
+            Self::Estop => "estop",
+        }
+    }
+
+    /// Reads the number of a message.
+    pub fn from_number(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|request| *request as u32 == number)
+    }
+}
+
+/// An operator's request with the identity of its message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OperatorRequest {
+    /// Change of state that the operator requests.
+    pub request: Request,
+    /// Epoch and sequence number of the message.
+    pub message: (u64, u64),
+}
+
+/// Goal of a stop: the state that follows once the platform is at rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub enum AfterStop {
+    /// Forces are disabled; brakes close.
+    #[default]
+    Standby,
+    /// Moves to the home pose.
+    Park,
+    /// Forces are disabled until cleared.
+    Fault,
+}

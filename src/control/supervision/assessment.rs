@@ -1,0 +1,198 @@
+//! Assessment of a cycle: whether the platform is located, may be engaged, and can follow its reference further.
+
+use crate::control::cycle::Cycle;
+use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::parameters::Parameters;
+use crate::control::reference::ReferenceGenerator;
+use crate::control::sensing::localization::{Localization, Located};
+use crate::control::setpoint::target::Target;
+use crate::control::setpoint::validated::ValidatedSetpoint;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::TrackingError;
+use crate::control::signals::inputs::{Input, Publishers, SetpointKind};
+use crate::control::signals::limits::{Limit, LimitSet, largest_ratio};
+use crate::control::signals::state::State;
+use crate::control::supervision::supervisor::Findings;
+use crate::model::rigid::Motion;
+
+/// Deviation of the reference from a target at which it counts as reached, over the engage tolerance: near enough to a
+/// setpoint in motion, and at home almost at rest.
+const REACHED_RATIO: f64 = 0.05;
+const AT_HOME_RATIO: f64 = 0.005;
+
+/// Inputs of an assessment, beside the memory of the stages.
+pub(in crate::control) struct Evidence<'a> {
+    pub input: &'a Input,
+    pub setpoint: &'a ValidatedSetpoint<'a>,
+    pub located: Result<&'a Located<'a>, Diagnostic>,
+    pub error: Option<&'a TrackingError>,
+    pub feedback: &'a FeedbackBound,
+    /// What the measurements and the prediction disagree in.
+    pub distrust: Option<&'a Diagnostic>,
+    /// What has changed of payload and surroundings, or that the platform oscillates.
+    pub change: Option<&'a Diagnostic>,
+    /// Whether drives and external sensors report nothing that contradicts.
+    pub reports: &'a [Result<(), Diagnostic>; 2],
+    /// Whether the drives are ready, or nothing else is reported.
+    pub is_ready: bool,
+    /// The motion with which control would begin, or why it is not known.
+    pub free_motion: Result<&'a Motion, Diagnostic>,
+    /// Whether a length repeats itself.
+    pub is_doubtful: bool,
+}
+
+// Out of line, as is `target` in the controller: jump tables inside `step` are beyond the proof on the machine code.
+/// The findings that decide the next state, and the limits that the platform is near to.
+#[inline(never)]
+pub(in crate::control) fn assess(
+    cycle: &Cycle<'_>,
+    evidence: &Evidence<'_>,
+    localization: &Localization,
+    reference: &mut ReferenceGenerator,
+    active_limits: &mut LimitSet,
+) -> Findings {
+    let Evidence { setpoint, located, is_ready, .. } = evidence;
+    let conditioned = localization.check_condition(cycle.constants.parameters.condition, active_limits);
+    let tracking = match cycle.state.has_control() {
+        true => check_tracking(cycle, evidence, &conditioned, active_limits),
+        false => conditioned,
+    };
+    let start = match cycle.state.has_control() || located.is_err() {
+        true => Ok(()),
+        false => check_start(cycle, evidence, reference),
+    };
+    // Nothing depends on it while the setpoint is followed.
+    let engagement = match cycle.state {
+        State::Engaging | State::Active => Ok(()),
+        _ => check_engagement(cycle, evidence, &conditioned, &start),
+    };
+    let is_waiting = cycle.state == State::Engaging && !is_ready;
+    let has_ended = !is_waiting && has_ended(cycle, setpoint, reference);
+    let localization = located.map(drop);
+    Findings { localization, start, engagement, tracking, is_doubtful: evidence.is_doubtful, has_ended }
+}
+
+// In the checks each result is looked at where it is, as copies of many that are in order take time.
+/// Whether the reference can be followed further.
+fn check_tracking(
+    cycle: &Cycle<'_>,
+    evidence: &Evidence<'_>,
+    conditioned: &Result<(), Diagnostic>,
+    active_limits: &mut LimitSet,
+) -> Result<(), Diagnostic> {
+    let Evidence { input, setpoint, error, feedback, distrust, change, .. } = evidence;
+    check_reports(evidence)?;
+    if let Some(distrust) = distrust {
+        return Err(**distrust);
+    }
+    check_following_error(&cycle.constants.parameters, *error, active_limits)?;
+    feedback.check()?;
+    if let Some(change) = change {
+        return Err(**change);
+    }
+    check_deadline(input)?;
+    if let State::Engaging | State::Active = cycle.state {
+        setpoint.status?;
+    }
+    *conditioned
+}
+
+/// Whether control may begin on the setpoint.
+fn check_engagement(
+    cycle: &Cycle<'_>,
+    evidence: &Evidence<'_>,
+    conditioned: &Result<(), Diagnostic>,
+    start: &Result<(), Diagnostic>,
+) -> Result<(), Diagnostic> {
+    let Evidence { input, setpoint, error, .. } = evidence;
+    check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)?;
+    check_publishers(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers)?;
+    check_reports(evidence)?;
+    (*conditioned)?;
+    setpoint.status?;
+    check_engage_tolerance(&cycle.constants.parameters, setpoint, *error)?;
+    *start
+}
+
+fn check_reports(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
+    let [drives, external_pose] = evidence.reports;
+    (*drives)?;
+    *external_pose
+}
+
+/// Whether the motion of the state has come to its end.
+#[inline(never)]
+fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &ReferenceGenerator) -> bool {
+    let parameters = &cycle.constants.parameters;
+    let is_within = |target: &Target<'_>, ratio: f64| {
+        let deviation = reference.deviation(cycle.constants, target);
+        deviation.is_some_and(|deviation| parameters.tolerance_ratio(&deviation) <= ratio)
+    };
+    match cycle.state {
+        State::Engaging => setpoint.target.as_ref().is_some_and(|target| is_within(target, REACHED_RATIO)),
+        State::Stopping => reference.is_at_rest(),
+        State::Parking => is_within(&Target::Pose(cycle.constants.home.pose(), 1.0), AT_HOME_RATIO),
+        State::Off | State::Standby | State::Active | State::Fault => false,
+    }
+}
+
+/// Control may begin only if closing the loop does not itself move the platform: near the setpoint in pose and velocity.
+/// A pose to move to may be anywhere.
+fn check_engage_tolerance(
+    parameters: &Parameters,
+    setpoint: &ValidatedSetpoint<'_>,
+    error: Option<&TrackingError>,
+) -> Result<(), Diagnostic> {
+    let Some(error) = error else { return Err(DiagnosticCode::NoSetpoint.into()) };
+    let is_target = setpoint.valid.is_some_and(|valid| valid.setpoint.kind == SetpointKind::Target);
+    let ratio = parameters.tolerance_ratio(error);
+    if ratio <= 1.0 || is_target {
+        return Ok(());
+    }
+    Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))
+}
+
+/// Control begins only with one publisher of each input: nobody knows which of two is the true one.
+fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
+    let Publishers { counting, ignored } = publishers;
+    if ignored == 0 { Ok(()) } else { Err(Diagnostic::new(code, counting.into(), ignored.into())) }
+}
+
+/// Control may begin if the motion without force is known and a stop from it was verified. Places the reference there.
+fn check_start(
+    cycle: &Cycle<'_>,
+    evidence: &Evidence<'_>,
+    reference: &mut ReferenceGenerator,
+) -> Result<(), Diagnostic> {
+    check_publishers(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
+    check_reports(evidence)?;
+    let moving = Diagnostic::from(DiagnosticCode::PlatformMoving);
+    reference.place(cycle.constants, evidence.free_motion?).map_err(|limit| moving.at(limit as usize))
+}
+
+fn check_following_error(
+    parameters: &Parameters,
+    error: Option<&TrackingError>,
+    active: &mut LimitSet,
+) -> Result<(), Diagnostic> {
+    let Some(TrackingError { pose, twist }) = error else { return Ok(()) };
+    let Parameters { following_position, following_orientation, .. } = parameters;
+    let Parameters { following_velocity, following_angular_velocity, .. } = parameters;
+    let ratio =
+        largest_ratio([pose.linear.norm() / following_position, pose.angular.norm() / following_orientation]);
+    if !active.check(Limit::Following, ratio) {
+        return Err(Diagnostic::new(DiagnosticCode::FollowingError, ratio, 1.0));
+    }
+    let ratio = largest_ratio([
+        twist.linear.norm() / following_velocity,
+        twist.angular.norm() / following_angular_velocity,
+    ]);
+    if active.check(Limit::Following, ratio) {
+        return Ok(());
+    }
+    Err(Diagnostic::new(DiagnosticCode::VelocityError, ratio, 1.0))
+}
+
+fn check_deadline(input: &Input) -> Result<(), Diagnostic> {
+    if input.deadline_missed { Err(DiagnosticCode::DeadlineMissed.into()) } else { Ok(()) }
+}

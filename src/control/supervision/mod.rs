@@ -1,0 +1,4 @@
+//! Decisions: whether control may begin or must end, and the next state. Pure functions.
+
+pub(super) mod assessment;
+pub mod supervisor;

@@ -1,0 +1,350 @@
+//! The state machine: the next state, as a pure and total function of requests and findings.
+//!
+//! Order of precedence: the emergency stop, a fault that brakes, `off`, a fault that stops, then what the
+//! state itself does. In states without force a fault is only reported: no force is to be disabled.
+//!
+//! Control begins in engaging, or by `park` in stopping: a platform that moves without force comes to rest before it goes
+//! home. A setpoint that is lost while the policy is to hold the pose leads to engaging and not to a stop.
+
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
+use crate::control::signals::inputs::Input;
+use crate::control::signals::state::AfterStop;
+use crate::control::signals::state::{OperatorRequest, Request, State};
+
+/// State of the controller, with its reason and the goal of a stop.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct SupervisorState {
+    /// State of the controller; it decides whether forces are applied.
+    pub state: State,
+    /// Why it is not active, or soon will not be.
+    pub diagnostic: Diagnostic,
+    /// Used only while stopping.
+    pub after: AfterStop,
+}
+
+/// Findings of one cycle that decide the next state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Findings {
+    /// Whether the pose is known, from valid measurements.
+    pub localization: Result<(), Diagnostic>,
+    /// Whether a verified stop exists for the platform as it moves without force. `engagement` contains it.
+    pub start: Result<(), Diagnostic>,
+    /// Whether control may begin on the setpoint.
+    pub engagement: Result<(), Diagnostic>,
+    /// Whether the reference can be followed further. A diagnostic that is no fault ends it by a stop.
+    pub tracking: Result<(), Diagnostic>,
+    /// Whether a length repeats itself: a stop under control may then follow a frozen sensor.
+    pub is_doubtful: bool,
+    /// The reference of engaging, stopping or parking has come to its end.
+    pub has_ended: bool,
+}
+
+/// Third stage of the cycle: the state, and the answer to the last request.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub(in crate::control) struct Supervisor {
+    pub mode: SupervisorState,
+    /// Message of the last request carried out or refused.
+    pub answered: (u64, u64),
+    /// Why that one was refused; code `None` if it was not.
+    pub request_diagnostic: Diagnostic,
+}
+
+impl Supervisor {
+    /// The request of an input if it was not answered before: each is carried out once.
+    pub fn new_request(&self, input: &Input) -> Option<OperatorRequest> {
+        input.request.filter(|request| request.message != self.answered)
+    }
+
+    /// Decides the next state. Returns it.
+    pub fn decide(
+        &mut self,
+        request: Option<OperatorRequest>,
+        findings: &Findings,
+        after_loss: AfterStop,
+    ) -> State {
+        let (mode, refusal) = next(self.mode, request.map(|new| new.request), findings, after_loss);
+        self.mode = mode;
+        if let Some(OperatorRequest { message, .. }) = request {
+            (self.answered, self.request_diagnostic) = (message, refusal.unwrap_or_default());
+        }
+        mode.state
+    }
+
+    /// Enters the state fault: no valid force could be computed.
+    pub fn fail(&mut self, diagnostic: Diagnostic) {
+        self.mode = fault(diagnostic);
+    }
+}
+
+/// The next state, and why a request was refused if it was. `after_loss` follows the stop of a platform that lost its
+/// setpoint.
+pub fn next(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+    after_loss: AfterStop,
+) -> (SupervisorState, Option<Diagnostic>) {
+    if request == Some(Request::Estop) {
+        return (fault(DiagnosticCode::EmergencyStop.into()), None);
+    }
+    if mode.state.has_control() {
+        // Control needs the pose, whatever the reason it is unknown.
+        if let Err(diagnostic) = findings.localization {
+            return (fault(diagnostic), None);
+        }
+        if let Err(diagnostic) = findings.tracking
+            && diagnostic.code.reaction() == Reaction::Brake
+        {
+            return (fault(diagnostic), None);
+        }
+        // A payload or an impact that a frozen sensor has made looks like any other.
+        let under_way = (mode.state == State::Stopping).then_some(mode.diagnostic);
+        let change = findings.tracking.err().into_iter().chain(under_way).find(|cause| is_change(cause.code));
+        if let Some(cause) = change.filter(|_| findings.is_doubtful) {
+            return (fault(cause), None);
+        }
+    }
+    if request == Some(Request::Off) && mode.state != State::Fault {
+        return (OFF_BY_REQUEST, None);
+    }
+    match mode.state {
+        State::Off | State::Standby => without_force(mode, request, findings),
+        State::Fault => in_fault(mode, request),
+        State::Engaging | State::Active => following(mode, request, findings, after_loss),
+        State::Stopping => stopping(mode, request, findings),
+        State::Parking => parking(mode, request, findings),
+    }
+}
+
+/// Whether readings alone have shown it, and its reaction is a stop under control.
+fn is_change(code: DiagnosticCode) -> bool {
+    matches!(code, DiagnosticCode::PayloadChanged | DiagnosticCode::Impact)
+}
+
+/// Off by request of an operator: it does not become standby by itself.
+const OFF_BY_REQUEST: SupervisorState =
+    SupervisorState { state: State::Off, diagnostic: REQUESTED, after: AfterStop::Standby };
+
+const REQUESTED: Diagnostic =
+    Diagnostic { code: DiagnosticCode::OperatorRequest, value: 0.0, bound: 0.0, index: 0 };
+
+fn fault(diagnostic: Diagnostic) -> SupervisorState {
+    SupervisorState { state: State::Fault, diagnostic, ..SupervisorState::default() }
+}
+
+fn stop(diagnostic: Diagnostic, after: AfterStop) -> SupervisorState {
+    SupervisorState { state: State::Stopping, diagnostic, after }
+}
+
+fn standby(diagnostic: Diagnostic) -> SupervisorState {
+    SupervisorState { state: State::Standby, diagnostic, ..SupervisorState::default() }
+}
+
+fn without_force(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+) -> (SupervisorState, Option<Diagnostic>) {
+    let ready = match findings.localization {
+        Ok(()) => standby(findings.engagement.err().unwrap_or(DiagnosticCode::ReadyToEngage.into())),
+        Err(diagnostic) => SupervisorState { state: State::Off, diagnostic, ..SupervisorState::default() },
+    };
+    let rest = if mode == OFF_BY_REQUEST { mode } else { ready };
+    match request {
+        Some(Request::Engage) => match findings.localization.and(findings.engagement) {
+            Ok(()) => (SupervisorState { state: State::Engaging, ..SupervisorState::default() }, None),
+            Err(diagnostic) => (rest, Some(diagnostic)),
+        },
+        Some(Request::Clear) => (ready, None),
+        // Parking needs no setpoint. A platform that still moves is brought to rest first.
+        Some(Request::Park) => match findings.localization.and(findings.start) {
+            Ok(()) => (stop(REQUESTED, AfterStop::Park), None),
+            Err(diagnostic) => (rest, Some(diagnostic)),
+        },
+        None | Some(Request::Stop | Request::Off | Request::Estop) => (rest, None),
+    }
+}
+
+fn in_fault(mode: SupervisorState, request: Option<Request>) -> (SupervisorState, Option<Diagnostic>) {
+    match request {
+        Some(Request::Clear) => (SupervisorState::default(), None),
+        Some(Request::Engage | Request::Park) => (mode, Some(DiagnosticCode::InvalidInState.into())),
+        Some(Request::Stop | Request::Off | Request::Estop) | None => (mode, None),
+    }
+}
+
+fn following(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+    after_loss: AfterStop,
+) -> (SupervisorState, Option<Diagnostic>) {
+    let (mut mode, mut has_ended) = (mode, findings.has_ended);
+    if let Err(diagnostic) = findings.tracking {
+        let after = match diagnostic.code {
+            // Holds its pose; from there it engages again.
+            DiagnosticCode::HoldingPose => {
+                (mode, has_ended) = (SupervisorState { state: State::Engaging, diagnostic, ..mode }, false);
+                None
+            }
+            DiagnosticCode::SetpointLost => Some(after_loss),
+            code if code.is_fault() => Some(AfterStop::Fault),
+            _ => Some(AfterStop::Standby),
+        };
+        if let Some(after) = after {
+            return (stop(diagnostic, after), None);
+        }
+    } else {
+        mode.diagnostic = Diagnostic::default();
+    }
+    match request {
+        Some(Request::Stop) => (stop(REQUESTED, AfterStop::Standby), None),
+        Some(Request::Park) => (stop(REQUESTED, AfterStop::Park), None),
+        Some(Request::Clear) => (mode, Some(DiagnosticCode::InvalidInState.into())),
+        Some(Request::Engage | Request::Off | Request::Estop) | None => {
+            let state = if has_ended { State::Active } else { mode.state };
+            (SupervisorState { state, ..mode }, None)
+        }
+    }
+}
+
+fn stopping(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+) -> (SupervisorState, Option<Diagnostic>) {
+    let (mode, refused) = match (request, mode.after) {
+        _ if findings.tracking.is_err() && mode.after != AfterStop::Fault => {
+            (findings.tracking.map_or_else(|diagnostic| stop(diagnostic, AfterStop::Fault), |()| mode), None)
+        }
+        (Some(Request::Park), AfterStop::Standby) => (stop(REQUESTED, AfterStop::Park), None),
+        (Some(Request::Stop), AfterStop::Park) => (stop(REQUESTED, AfterStop::Standby), None),
+        (Some(Request::Engage | Request::Clear | Request::Park), _) => {
+            (mode, Some(DiagnosticCode::InvalidInState.into()))
+        }
+        _ => (mode, None),
+    };
+    if !findings.has_ended {
+        return (mode, refused);
+    }
+    let rest = match mode.after {
+        AfterStop::Standby => standby(current(mode.diagnostic.code, findings)),
+        AfterStop::Park => SupervisorState { state: State::Parking, after: AfterStop::default(), ..mode },
+        AfterStop::Fault => fault(mode.diagnostic),
+    };
+    (rest, refused)
+}
+
+fn parking(
+    mode: SupervisorState,
+    request: Option<Request>,
+    findings: &Findings,
+) -> (SupervisorState, Option<Diagnostic>) {
+    if let Err(diagnostic) = findings.tracking {
+        return (stop(diagnostic, AfterStop::Fault), None);
+    }
+    match request {
+        Some(Request::Stop) => return (stop(REQUESTED, AfterStop::Standby), None),
+        Some(Request::Engage | Request::Clear) => return (mode, Some(DiagnosticCode::InvalidInState.into())),
+        Some(Request::Park | Request::Off | Request::Estop) | None => {}
+    }
+    (if findings.has_ended { OFF_BY_REQUEST } else { mode }, None)
+}
+
+/// The diagnostic of a code with the number of this cycle, if the code still prevents control.
+fn current(code: DiagnosticCode, findings: &Findings) -> Diagnostic {
+    findings.engagement.err().filter(|found| found.code == code).unwrap_or(code.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FOUND: Diagnostic =
+        Diagnostic { code: DiagnosticCode::FollowingError, value: 0.03, bound: 0.02, index: 4 };
+    const OTHER: Diagnostic =
+        Diagnostic { code: DiagnosticCode::MeasurementLost, value: 9.0, bound: 0.4, index: 1 };
+    const IN_ORDER: Findings = Findings {
+        localization: Ok(()),
+        start: Ok(()),
+        engagement: Ok(()),
+        tracking: Ok(()),
+        is_doubtful: false,
+        has_ended: false,
+    };
+
+    /// The mode after one cycle.
+    fn after(mode: SupervisorState, findings: &Findings) -> SupervisorState {
+        next(mode, None, findings, AfterStop::Fault).0
+    }
+
+    #[test]
+    fn a_fault_keeps_value_and_bound_of_its_first_cycle() {
+        let active = SupervisorState { state: State::Active, ..SupervisorState::default() };
+        for findings in
+            [Findings { localization: Err(FOUND), ..IN_ORDER }, Findings { tracking: Err(FOUND), ..IN_ORDER }]
+        {
+            let mut mode = after(active, &findings);
+            assert_eq!((mode.state, mode.diagnostic), (State::Fault, FOUND), "{findings:?}");
+            for later in [IN_ORDER, Findings { localization: Err(OTHER), tracking: Err(OTHER), ..IN_ORDER }] {
+                mode = after(mode, &later);
+                assert_eq!((mode.state, mode.diagnostic), (State::Fault, FOUND), "{later:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_stop_that_ends_in_a_fault_keeps_value_and_bound_of_its_cause() {
+        let cause = Diagnostic { code: DiagnosticCode::SetpointTooFast, ..FOUND };
+        let active = SupervisorState { state: State::Active, ..SupervisorState::default() };
+        let mut mode = after(active, &Findings { tracking: Err(cause), ..IN_ORDER });
+        assert_eq!((mode.state, mode.diagnostic), (State::Stopping, cause));
+        mode = after(mode, &IN_ORDER);
+        assert_eq!((mode.state, mode.diagnostic), (State::Stopping, cause));
+        mode = after(mode, &Findings { has_ended: true, ..IN_ORDER });
+        assert_eq!((mode.state, mode.diagnostic), (State::Fault, cause));
+    }
+
+    #[test]
+    fn a_stop_that_ends_in_a_fault_keeps_its_cause_beside_a_later_one() {
+        let stopping = stop(FOUND, AfterStop::Fault);
+        let later = Findings { tracking: Err(DiagnosticCode::SetpointTooFast.into()), ..IN_ORDER };
+        assert_eq!(after(stopping, &later), stopping);
+        // A stop for another reason becomes one that ends in a fault.
+        let mode = after(stop(REQUESTED, AfterStop::Standby), &later);
+        assert_eq!(mode, stop(DiagnosticCode::SetpointTooFast.into(), AfterStop::Fault));
+    }
+
+    /// The reason of a stop with the value of this cycle, if it still prevents control.
+    #[test]
+    fn standby_after_a_stop_shows_the_present_value_of_its_reason() {
+        let ended = Findings { has_ended: true, ..IN_ORDER };
+        let stopping = stop(Diagnostic { value: 0.5, ..FOUND }, AfterStop::Standby);
+        let of_code = Diagnostic::from(FOUND.code);
+        for (engagement, shown) in [(Ok(()), of_code), (Err(FOUND), FOUND), (Err(OTHER), of_code)] {
+            let mode = after(stopping, &Findings { engagement, ..ended });
+            assert_eq!((mode.state, mode.diagnostic), (State::Standby, shown));
+        }
+    }
+
+    /// A stop under control for a change follows readings; with one that repeats itself the brakes close, at once or during the stop.
+    #[test]
+    fn a_change_that_a_frozen_sensor_may_have_made_closes_the_brakes() {
+        let active = SupervisorState { state: State::Active, ..SupervisorState::default() };
+        for code in [DiagnosticCode::PayloadChanged, DiagnosticCode::Impact, DiagnosticCode::DeadlineMissed] {
+            let brakes = code != DiagnosticCode::DeadlineMissed;
+            let found = Findings { tracking: Err(code.into()), ..IN_ORDER };
+            let expected = |mode: SupervisorState| {
+                let state = if brakes { State::Fault } else { State::Stopping };
+                assert_eq!((mode.state, mode.diagnostic.code), (state, code));
+            };
+            expected(after(active, &Findings { is_doubtful: true, ..found }));
+            let stopping = after(active, &found);
+            assert_eq!(stopping.state, State::Stopping);
+            expected(after(stopping, &Findings { is_doubtful: true, ..IN_ORDER }));
+        }
+        assert_eq!(after(active, &Findings { is_doubtful: true, ..IN_ORDER }).state, State::Active);
+    }
+}
