@@ -42,7 +42,7 @@
 //!
 //! | word | meaning |
 //! | --- | --- |
-//! | active, engaging, parking, stopping, standby, off, fault | states of the controller, see [`control::state`] |
+//! | active, engaging, parking, stopping, standby, off, fault | states of the controller, see [`control::signals::state`] |
 //! | actuator, drive | prismatic joint of a leg with its motor; stroke, rate and force are limited |
 //! | assembly mode | one of the up to 40 poses that share the same six leg lengths |
 //! | axial, transverse | along a leg; normal to it |
@@ -91,7 +91,7 @@
 //! | replay | computing the cycles of a recording again, compared bit for bit |
 //! | replica | controller that repeats every cycle in the recorder, for its memory |
 //! | reservation | processor time that SCHED_DEADLINE guarantees in each period |
-//! | sample | pose of a motion at one instant, without derivatives, see [`control::reference::pose_samples`] |
+//! | sample | pose of a motion at one instant, without derivatives, see [`control::setpoint::pose_samples`] |
 //! | saturation | a quantity held at its limit |
 //! | setpoint | X, X', X'' that a source requests for an instant; or samples of X, or one X to stand at |
 //! | shortfall | set-up step that the kernel refused, with reason and remedy |

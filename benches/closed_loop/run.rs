@@ -9,7 +9,7 @@ use hexad::control::controller::Controller;
 use hexad::control::law::ControlMode;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::task::TaskState;
@@ -119,7 +119,10 @@ impl Run {
                     rate: Some(rate),
                     ..Measurement::default()
                 }),
-                request: (cycle > 0).then_some(OperatorRequest { request: Request::Engage, message: (1, 1) }),
+                request: (cycle > 0).then_some(OperatorRequest {
+                    request: Request::Engage,
+                    message: MessageId { epoch: 1, sequence: 1 },
+                }),
                 ..Input::default()
             };
             watch(&input);

@@ -13,7 +13,7 @@ use hexad::config::Config;
 use hexad::control::controller::{Controller, Output};
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::daemon::cycle::CycleRecord;
 use hexad::daemon::parameters;
 use hexad::messages::clock::monotonic_ns;
@@ -90,7 +90,10 @@ impl Fleet {
         };
         for number in 1..=WARM_UP_STEPS as u64 {
             fleet.cycle += stride;
-            fleet.step_all(Some(OperatorRequest { request: Request::Engage, message: (1, number) }));
+            fleet.step_all(Some(OperatorRequest {
+                request: Request::Engage,
+                message: MessageId { epoch: 1, sequence: number },
+            }));
         }
         (fleet.inactive, fleet.first_inactive) = (0, None);
         fleet

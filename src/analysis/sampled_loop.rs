@@ -22,7 +22,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::control::law::estimator::covariance::{Gains, NoiseModel};
+use crate::control::law::estimator::covariance::{KalmanGains, NoiseModel};
 
 /// Longest delay that is computed, in periods; a loop that is stable with more counts as stable with this one.
 pub const MAX_DELAY_PERIODS: usize = 64;
@@ -124,7 +124,7 @@ impl Axis {
 /// One period as a linear map.
 struct Period<'a> {
     of: &'a SampledLoop,
-    gains: [Gains; 2],
+    gains: [KalmanGains; 2],
     pending: usize,
 }
 
@@ -156,7 +156,7 @@ impl<'a> Period<'a> {
         let at = |k: usize| z.get(k).copied().unwrap_or_default();
         let mut platform = Axis { e: at(0), v: at(1), d: 0.0, pole: held_pole };
         let mut estimate = Axis { e: at(2), v: at(3), d: at(4), pole: 0.0 };
-        let correct = |[by_e, by_v, by_d]: Gains, innovation: f64, estimate: &mut Axis| {
+        let correct = |[by_e, by_v, by_d]: KalmanGains, innovation: f64, estimate: &mut Axis| {
             estimate.e += by_e * innovation;
             estimate.v += by_v * innovation;
             estimate.d += by_d * innovation;

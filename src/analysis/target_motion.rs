@@ -205,7 +205,8 @@ pub fn target_motion(
     let period_ns = constants.parameters.period_ns;
     let mut reference = ReferenceGenerator::new(constants);
     let start = Motion { pose: *from, twist: Twist::default(), acceleration: Acceleration::default() };
-    reference.start(constants, 0, &start);
+    reference.verify_start(constants, &start).ok();
+    reference.begin_at(0);
     let whole = distance(from, to);
     let mut survey = Survey::new(constants, &start);
     let (mut nearest_yet, mut progress_ns, mut stopped_by) = (whole, 0, LimitSet::default());

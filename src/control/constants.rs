@@ -41,7 +41,7 @@ pub struct Constants {
     /// Of the estimator under control.
     pub estimator: EstimatorConstants,
     /// Square of the least disturbance that may be a force that a drive does not deliver; infinite where the law leaves forces to feedback.
-    pub least_missing_squared: f64,
+    pub least_missing_acceleration_squared: f64,
     /// Changes of the disturbance that are no fault.
     pub disturbance_bounds: DisturbanceBounds,
     /// What equal readings of one leg allow.
@@ -75,7 +75,7 @@ impl Constants {
             parameters.fidelity,
         );
         let Law { saturation, compensates_disturbance, .. } = &parameters.law;
-        let disturbance = input_matrix.largest_disturbance(saturation);
+        let disturbance = input_matrix.largest_compensable(saturation);
         let acts_on_legs = parameters.law.mode.acts_on_legs();
         let least_missing = least_disturbance(
             &input_matrix.acceleration_by_force(machine, home.pose()),
@@ -95,7 +95,11 @@ impl Constants {
             disturbance_bounds,
             dynamics: InverseDynamics::new(machine),
             input_matrix,
-            least_missing_squared: if expects_forces { least_missing * least_missing } else { f64::INFINITY },
+            least_missing_acceleration_squared: if expects_forces {
+                least_missing * least_missing
+            } else {
+                f64::INFINITY
+            },
             frozen_leg: FrozenLegBounds::new(
                 parameters.law.position.stiffness,
                 machine.actuator.max_force,
@@ -103,13 +107,18 @@ impl Constants {
             ),
             estimator: EstimatorConstants::new(
                 parameters.noise,
-                parameters.readings,
+                parameters.reading_errors,
                 if *compensates_disturbance { disturbance } else { unbounded },
                 parameters.limits.position.acceleration
                     + parameters.law.acceleration_left_to_feedback(&parameters.limits, arm, &disturbance),
             ),
             rest_window_s: window_s(&parameters),
-            leg_rates: EstimatorConstants::new(lengths_only, parameters.readings, unbounded, f64::INFINITY),
+            leg_rates: EstimatorConstants::new(
+                lengths_only,
+                parameters.reading_errors,
+                unbounded,
+                f64::INFINITY,
+            ),
             parameters,
             home,
             arm,
@@ -119,7 +128,7 @@ impl Constants {
     }
 
     /// Length by which angles of the error become distances \[m\]; errors of legs have no angles.
-    pub(super) fn error_arm(&self) -> f64 {
+    pub(super) fn error_radius(&self) -> f64 {
         if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm }
     }
 

@@ -1,14 +1,14 @@
 //! One cycle of control: from the newest setpoint and measurement to six forces, or the diagnostic why there are none.
 //!
 //! [`Controller::step`] shows the stages in order. Each is a function of its arguments and of the memory of its own
-//! struct; none changes the memory of another. A cycle does a bounded amount of work.
+//! struct, and changes no other memory. A cycle does a bounded amount of work.
 
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
+use crate::control::law::actuation::actuate;
 use crate::control::law::error_tracker::{ErrorTracker, setpoint_error};
-use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::law::force_limits::{ForceLimiter, LimitedForces};
-use crate::control::law::forces::forces;
 use crate::control::parameters::Parameters;
 use crate::control::reference::ReferenceGenerator;
 use crate::control::sensing::drive_monitor::DriveMonitor;
@@ -18,12 +18,13 @@ use crate::control::sensing::leg_rates::LegRateEstimator;
 use crate::control::sensing::localization::{Localization, PlatformState};
 use crate::control::sensing::measurement::MeasurementValidator;
 use crate::control::sensing::stamp_clock::StampClock;
+use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::setpoint::validation::SetpointValidator;
-use crate::control::signals::diagnostic::Diagnostic;
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::Input;
-use crate::control::signals::limits::LimitSet;
-use crate::control::signals::state::{Request, State};
+use crate::control::signals::limits::{Limit, LimitSet};
+use crate::control::signals::state::{MessageId, Request, State};
 use crate::control::supervision::assessment::{Evidence, assess};
 use crate::control::supervision::supervisor::Supervisor;
 use crate::model::LEGS;
@@ -38,7 +39,7 @@ pub struct Output {
     /// Why the state is not active, or soon will not be; code `None` while engaging and active.
     pub diagnostic: Diagnostic,
     /// The message of the last request carried out or refused.
-    pub answered: (u64, u64),
+    pub answered_message: MessageId,
     /// Why that request was refused; code `None` if it was not.
     pub request_diagnostic: Diagnostic,
     /// Forces \[N\]; zero unless the state has control.
@@ -54,7 +55,7 @@ pub struct Output {
     /// The measured state of the platform; `None` if the pose is unknown.
     pub platform: Option<PlatformState>,
     /// Reference minus measured under control; else setpoint minus measured, if both are known.
-    pub error: Option<TrackingError>,
+    pub error: Option<PoseError>,
     /// The reference at the end of the hold of this cycle's force, under control.
     pub reference: Option<Motion>,
 }
@@ -81,7 +82,7 @@ pub struct Memory {
     supervisor: Supervisor,
     reference: ReferenceGenerator,
     leg_rates: LegRateEstimator,
-    feedback: FeedbackBound,
+    feedback: FeedbackLimiter,
     limiter: ForceLimiter,
 }
 
@@ -101,7 +102,7 @@ impl Controller {
             errors: ErrorTracker::default(),
             supervisor: Supervisor::default(),
             leg_rates: LegRateEstimator::default(),
-            feedback: FeedbackBound::default(),
+            feedback: FeedbackLimiter::default(),
             limiter: ForceLimiter::default(),
         };
         Self { constants, memory }
@@ -119,7 +120,7 @@ impl Controller {
 
     /// State since the last cycle.
     pub fn state(&self) -> State {
-        self.memory.supervisor.mode.state
+        self.memory.supervisor.current.state
     }
 
     /// Exchanges the constants for those of a controller of the same machine before its first cycle. Not under control.
@@ -138,9 +139,7 @@ impl Controller {
         let Self { constants, memory } = self;
         let Memory { measurements, setpoints, localization, supervisor, reference, .. } = memory;
         let Memory { stamp_clock, drives, external_pose, free_motion, errors, leg_rates, .. } = memory;
-        let Memory { feedback, limiter, .. } = memory;
-        let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.mode.state };
-        let parameters = &constants.parameters;
+        let cycle = Cycle { constants, release_ns: input.release_ns, state: supervisor.current.state };
 
         // Validate inputs.
         let clock = stamp_clock.check(&cycle, input.clock_offset_ns);
@@ -149,7 +148,7 @@ impl Controller {
         let reported = measurement.as_ref().ok().copied();
         let reports = [drives.check(&cycle, reported), external_pose.check(&cycle, reported)];
 
-        // Locate platform.
+        // Locate the platform.
         let mut located = measurement.and_then(|measurement| {
             let rate = leg_rates.rates(&constants.leg_rates, measurement);
             localization.locate(&cycle, measurement, rate)
@@ -157,105 +156,65 @@ impl Controller {
         let free_motion = free_motion.update(&cycle, localization, located.as_ref().ok());
         let mut error = match &mut located {
             Ok(located) if cycle.state.has_control() => {
-                Some(errors.update(&cycle, reference, localization, located))
+                let error;
+                (error, located.platform.twist) = errors.update(&cycle, reference, localization, located);
+                Some(error)
             }
             Ok(located) => setpoint_error(&cycle, &setpoint, located),
             Err(_) => None,
         };
 
-        // Decide state.
-        let request = supervisor.new_request(input);
+        // Decide the state.
+        let mut active_limits = setpoint.active_limits;
+        let start = match cycle.state.has_control() || located.is_err() {
+            true => Ok(()),
+            false => verify_start(&cycle, localization, reference, free_motion),
+        };
+        let (located_or_cause, error_now) = (located.as_ref().map_err(|cause| *cause), error.as_ref());
         let evidence = Evidence {
             input,
             setpoint: &setpoint,
-            located: located.as_ref().map_err(|diagnostic| *diagnostic),
-            error: error.as_ref(),
-            feedback,
-            distrust: errors.distrust(),
-            change: errors.change(),
+            localization: located_or_cause.map(drop),
+            error: error_now,
+            start,
             reports: &reports,
             is_ready: drives.is_ready,
-            free_motion: free_motion.as_ref().map_err(|diagnostic| *diagnostic),
-            is_doubtful: errors.is_doubtful(),
+            feedback: &memory.feedback,
+            sensor_diagnostic: errors.sensor_diagnostic(),
+            disturbance_diagnostic: errors.disturbance_diagnostic(),
+            may_be_frozen: errors.may_be_frozen(),
         };
-        let mut assessed_limits = LimitSet::default();
-        let findings = assess(&cycle, &evidence, localization, reference, &mut assessed_limits);
-        let next = supervisor.decide(request, &findings, parameters.after_loss);
+        let request = supervisor.new_request(input);
+        let findings = assess(&cycle, &evidence, localization, reference, &mut active_limits);
+        let next = supervisor.decide(request, &findings, constants.parameters.after_loss);
         if request.is_some_and(|new| new.request == Request::Clear) {
             localization.clear_assembly_mode_fault(&constants.home);
         }
 
-        // Reference.
-        let begin_ns = cycle.release_ns.saturating_add(parameters.force_delay_ns);
-        let begins = next.has_control() && !cycle.state.has_control();
-        if begins {
-            reference.begin(begin_ns);
-            let measured_ns = located.as_ref().map_or(begin_ns, |located| located.measurement.time_ns);
-            error = Some(errors.start(constants, measured_ns, begin_ns));
-        }
-        if next.has_control() {
-            // Until the drives are ready it stays where it is, or comes to rest. So it does in the first cycle, in which its stop
-            // was verified: there is one examination in a cycle.
-            let is_waiting = begins || next == State::Engaging && !drives.is_ready;
-            let target = setpoint.target_in(constants, next).filter(|_| !is_waiting);
-            reference.set_closing_scale(closing_scale(parameters, next));
-            reference.advance(constants, begin_ns.saturating_add(parameters.period_ns), target.as_ref());
-        }
-
-        // Control law, forces, checks.
+        // Move the reference, and compute the forces that move the platform with it.
         let mut limited = LimitedForces::default();
-        let mut actuate = || {
-            let desired = reference.motion_of_hold(begin_ns.saturating_add(parameters.period_ns / 2));
-            let estimator = errors.estimator();
-            let mut at_begin = *estimator.state();
-            estimator.predict(&mut at_begin, begin_ns);
-            let wanted = parameters.law.acceleration(&at_begin, &constants.input_matrix);
-            let acceleration = feedback.limit(&cycle, &desired.acceleration, &wanted);
-            let mut sent = constants.input_matrix.acceleration(&acceleration);
-            let in_middle = at_begin.after(0.5 * parameters.period_s(), &sent);
-            let motion =
-                parameters.law.dynamics_motion(desired, &errors.without_lag(&in_middle), &acceleration);
-            let force = forces(constants, &motion, &acceleration)?;
-            limiter.limit(&cycle, &force, &motion, &mut limited)?;
-            if limited.force != force {
-                let (machine, missing) = (constants.machine(), &limited.wrench_error);
-                let acceleration = constants.input_matrix.acceleration_of(machine, &motion.pose, missing);
-                sent += acceleration;
-                errors.record_limited(constants, &acceleration);
+        if next.has_control() {
+            let begin_ns = cycle.release_ns.saturating_add(constants.parameters.force_delay_ns);
+            if !cycle.state.has_control() {
+                reference.begin_at(begin_ns);
+                let measured_ns = located.as_ref().map_or(begin_ns, |located| located.measurement.time_ns);
+                error = Some(errors.start(constants, measured_ns, begin_ns));
             }
-            errors.record_sent(begin_ns, &sent, &limited.force);
-            Ok(())
-        };
-        let actuated = if next.has_control() { actuate() } else { Ok(()) };
-        if let Err(diagnostic) = actuated {
-            supervisor.fail(diagnostic);
+            let desired = advance(&cycle, reference, next, begin_ns, &setpoint, drives.is_ready);
+            let stages = (&mut memory.feedback, &mut memory.limiter);
+            if let Err(diagnostic) = actuate(&cycle, begin_ns, desired, errors, stages, &mut limited) {
+                supervisor.fail(diagnostic);
+            }
         }
-        let LimitedForces { force, wrench_error, active_limits } = limited;
-        drives.record_sent(&force);
-        let mut output = Output {
-            state: supervisor.mode.state,
-            diagnostic: supervisor.mode.diagnostic,
-            answered: supervisor.answered,
-            request_diagnostic: supervisor.request_diagnostic,
-            force,
-            wrench_error,
-            active_limits: setpoint
-                .active_limits
-                .union(assessed_limits)
-                .union(reference.active_limits())
-                .union(active_limits),
-            missed_measurements: 0,
-            missed_setpoints: setpoints.missed,
-            platform: None,
-            error,
-            reference: None,
-        };
-        // Written where they stay: the largest fields, and the count, which `located` holds
-        // borrowed until here.
+        drives.record_sent(&limited.force);
+
+        let mut output = Output::new(supervisor, &limited, error);
+        output.active_limits = active_limits.union(reference.active_limits()).union(limited.active_limits);
+        // Written where they stay: the largest fields, and the count, which `located` holds borrowed until here.
         if let Ok(located) = &located {
             output.platform = Some(located.platform);
         }
-        output.missed_measurements = measurements.missed;
+        (output.missed_measurements, output.missed_setpoints) = (measurements.missed, setpoints.missed);
         if output.state.has_control() {
             output.reference = Some(*reference.motion());
         }
@@ -263,7 +222,59 @@ impl Controller {
     }
 }
 
-/// Share of the limits with which the distance to the target is closed.
-fn closing_scale(parameters: &Parameters, state: State) -> f64 {
-    if state == State::Engaging { parameters.limits.autonomous_scale } else { 1.0 }
+impl Output {
+    /// That of a state, without the motions of platform and reference, and without counts.
+    #[inline(always)]
+    fn new(supervisor: &Supervisor, limited: &LimitedForces, error: Option<PoseError>) -> Self {
+        let LimitedForces { force, wrench_error, active_limits } = *limited;
+        Self {
+            state: supervisor.current.state,
+            diagnostic: supervisor.current.diagnostic,
+            answered_message: supervisor.answered_message,
+            request_diagnostic: supervisor.request_diagnostic,
+            force,
+            wrench_error,
+            active_limits,
+            missed_measurements: 0,
+            missed_setpoints: 0,
+            platform: None,
+            error,
+            reference: None,
+        }
+    }
+}
+
+/// Places the reference where control would begin, and verifies a stop from there; why control does not begin if none keeps
+/// every limit.
+#[inline(always)]
+pub(in crate::control) fn verify_start(
+    cycle: &Cycle<'_>,
+    localization: &Localization,
+    reference: &mut ReferenceGenerator,
+    free_motion: Result<Motion, Diagnostic>,
+) -> Result<(), Diagnostic> {
+    reference.verify_start(cycle.constants, &free_motion?).map_err(|limit| match limit {
+        Limit::Condition => localization.near_singular(cycle.constants.reference_condition),
+        _ => Diagnostic::from(DiagnosticCode::PlatformMoving).at(limit as usize),
+    })
+}
+
+/// Moves the reference on to the end of the hold of this cycle's force. Returns the motion that the force shall give.
+#[inline(always)]
+fn advance(
+    cycle: &Cycle<'_>,
+    reference: &mut ReferenceGenerator,
+    next: State,
+    begin_ns: u64,
+    setpoint: &ValidatedSetpoint<'_>,
+    are_drives_ready: bool,
+) -> Motion {
+    let Parameters { period_ns, limits, .. } = &cycle.constants.parameters;
+    // Until the drives are ready the reference stays where it is, or comes to rest. So it does in the first cycle, in which
+    // its stop was verified: there is one examination in a cycle.
+    let is_waiting = !cycle.state.has_control() || next == State::Engaging && !are_drives_ready;
+    let target = setpoint.target_in(cycle.constants, next).filter(|_| !is_waiting);
+    reference.set_closing_scale(if next == State::Engaging { limits.autonomous_scale } else { 1.0 });
+    reference.advance(cycle.constants, begin_ns.saturating_add(*period_ns), target.as_ref());
+    reference.motion_of_hold(begin_ns.saturating_add(period_ns / 2))
 }

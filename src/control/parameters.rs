@@ -4,9 +4,9 @@
 use nalgebra::ComplexField as _;
 
 use crate::control::law::Law;
-use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::estimator::covariance::NoiseModel;
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::Limits;
 use crate::control::signals::limits::largest_ratio;
 use crate::control::signals::state::AfterStop;
@@ -22,7 +22,7 @@ pub struct Parameters {
     /// What the gains of the estimator follow from.
     pub noise: NoiseModel,
     /// Errors of the readings of lengths.
-    pub readings: Readings,
+    pub reading_errors: ReadingErrors,
     /// From the release to the instant at which its force begins to act \[ns\].
     pub force_delay_ns: u64,
     /// Which terms of the dynamics are evaluated. Inertia must be one of them: the law commands an
@@ -69,7 +69,7 @@ pub struct Parameters {
     /// Largest difference of a length from that of a pose measured by another sensor \[m\].
     pub pose_tolerance: f64,
     /// Largest age of a measurement that arrives: the loop is stable if all are as old.
-    pub max_measured_age_ns: u64,
+    pub max_age_at_arrival_ns: u64,
     /// Longest time between two cycles of a daemon that runs, also without messages \[ns\].
     pub longest_pause_ns: u64,
 }
@@ -82,9 +82,9 @@ impl Parameters {
 
     /// An error over the engage tolerance, the largest of its four parts. A velocity error is
     /// divided by `wn = sqrt(Kp)`, so that it compares with a pose error.
-    pub(super) fn tolerance_ratio(&self, error: &TrackingError) -> f64 {
+    pub(super) fn tolerance_ratio(&self, error: &PoseError) -> f64 {
         let Self { law, engage_position, engage_orientation, .. } = self;
-        let TrackingError { pose, twist } = error;
+        let PoseError { pose, twist } = error;
         largest_ratio([
             pose.linear.norm() / engage_position,
             pose.angular.norm() / engage_orientation,

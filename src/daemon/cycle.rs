@@ -2,7 +2,7 @@
 
 use crate::control::controller::Output;
 use crate::control::signals::inputs::Input;
-use crate::control::signals::state::{OperatorRequest, Request, State};
+use crate::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use crate::messages::{CycleMessage, MAX_REQUEST_AGE_NS};
 use crate::realtime::cyclic::{self, CyclicInput};
 use crate::realtime::exchange;
@@ -21,7 +21,7 @@ pub type RealtimeSide = exchange::RealtimeSide<Input, Output>;
 
 impl CyclicInput for Input {
     fn begin_cycle(&mut self, release_ns: u64, clock_ns: u64, deadline_missed: bool) {
-        (self.release_ns, self.deadline_missed) = (release_ns, deadline_missed);
+        (self.release_ns, self.overrun_is_fault) = (release_ns, deadline_missed);
         self.clock_offset_ns = release_ns.wrapping_sub(clock_ns) as i64;
     }
 
@@ -39,7 +39,7 @@ pub struct RequestIntake {
     /// The last word that was seen.
     word: u64,
     /// The last message of the command topic that was seen.
-    message: (u64, u64),
+    message: MessageId,
     /// Longest time between two cycles \[ns\] behind which a request of the topic may begin control: it may have been received
     /// before. 0 without a bound, in simulated time.
     longest_pause_ns: u64,
@@ -92,7 +92,8 @@ pub fn of_word(word: u64, now_ns: u64) -> Option<OperatorRequest> {
     let request = Request::from_number(request_word::number(word))?;
     let is_too_old = now_ns.saturating_sub(request_word::time_ns(word)) > MAX_REQUEST_AGE_NS;
     let is_lost = request.can_begin_control() && is_too_old;
-    (!is_lost).then_some(OperatorRequest { request, message: (WORD_EPOCH, word) })
+    (!is_lost)
+        .then_some(OperatorRequest { request, message: MessageId { epoch: WORD_EPOCH, sequence: word } })
 }
 
 /// A cycle as a recording holds it.
@@ -125,7 +126,7 @@ mod tests {
     }
 
     fn topic(request: Request, sequence: u64) -> Option<OperatorRequest> {
-        Some(OperatorRequest { request, message: (7, sequence) })
+        Some(OperatorRequest { request, message: MessageId { epoch: 7, sequence } })
     }
 
     fn chosen(intake: &mut RequestIntake, from_topic: Option<OperatorRequest>, word: u64) -> Option<Request> {

@@ -7,7 +7,7 @@ use nalgebra::Vector6;
 use crate::config::control_loops::longest_age_s;
 use crate::config::deployment::Deployment;
 use crate::control::law::Law;
-use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::estimator::covariance::NoiseModel;
 use crate::control::law::gains::Gains;
 use crate::control::parameters::{Envelope, Parameters};
@@ -41,7 +41,10 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
             rate_noise_ratio: deployment.noise.rate_m_s.map(|rate| rate / deployment.noise.length_m),
             period_s: deployment.realtime.period_s(),
         },
-        readings: Readings { noise: deployment.noise.length_m, step: deployment.noise.length_step_m },
+        reading_errors: ReadingErrors {
+            deviation: deployment.noise.length_m,
+            resolution: deployment.noise.length_step_m,
+        },
         force_delay_ns: nanoseconds(deployment.drive.total_delay_s()),
         fidelity,
         engage_position: control.engage_position_m,
@@ -52,7 +55,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         measured_timeout_ns: nanoseconds(timeouts.measured_s),
         ready_timeout_ns: nanoseconds(deployment.drive.ready_timeout_s),
         pose_tolerance: deployment.noise.pose_tolerance_m,
-        max_measured_age_ns: nanoseconds(longest_age_s(deployment)),
+        max_age_at_arrival_ns: nanoseconds(longest_age_s(deployment)),
         longest_pause_ns: nanoseconds(longest_pause_s(deployment)),
         limits: limits.reference,
         force_rate: limits.force_rate_n_s,

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::control::signals::diagnostic::{BoundDescription, Diagnostic};
+use crate::control::signals::diagnostic::{Comparison, Diagnostic};
 
 /// Command of a process; empty if it has ended.
 pub fn command(process_id: u32) -> String {
@@ -12,7 +12,7 @@ pub fn command(process_id: u32) -> String {
 /// The sentence of a diagnostic. Processes are named by command and number.
 pub fn sentence(diagnostic: &Diagnostic) -> String {
     let Diagnostic { code, value, bound, .. } = diagnostic;
-    if code.comparison() != BoundDescription::Processes || *bound == 0.0 {
+    if code.comparison() != Comparison::Processes || *bound == 0.0 {
         return diagnostic.to_string();
     }
     let [counts, ignored] = [value, bound].map(|number| named(*number as u32));

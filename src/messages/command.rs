@@ -3,7 +3,7 @@
 use iceoryx2::prelude::ZeroCopySend;
 
 use super::layout::message;
-use crate::control::signals::state::{OperatorRequest, Request};
+use crate::control::signals::state::{MessageId, OperatorRequest, Request};
 
 message! {
     /// Request of a program that sends it in step with its setpoints, one per message. Operators use the control socket.
@@ -30,6 +30,9 @@ impl CommandMessage {
     /// The request with the message's epoch and sequence number; `None` if no request has its number.
     pub fn request(&self) -> Option<OperatorRequest> {
         let request = Request::from_number(self.request)?;
-        Some(OperatorRequest { request, message: (self.header.epoch, self.header.sequence) })
+        Some(OperatorRequest {
+            request,
+            message: MessageId { epoch: self.header.epoch, sequence: self.header.sequence },
+        })
     }
 }

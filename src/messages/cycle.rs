@@ -6,10 +6,10 @@ use super::layout::message;
 use super::{DiagnosticRecord, MeasuredMessage};
 use crate::control::controller::Output;
 use crate::control::sensing::localization::PlatformState;
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
 use crate::control::signals::limits::LimitSet;
-use crate::control::signals::state::{OperatorRequest, Request, State};
+use crate::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 use crate::model::task::TaskState;
 
@@ -161,7 +161,7 @@ impl CycleMessage {
     }
 
     fn set_input(&mut self, input: &Input) {
-        (self.release_ns, self.deadline_missed) = (input.release_ns, u32::from(input.deadline_missed));
+        (self.release_ns, self.deadline_missed) = (input.release_ns, u32::from(input.overrun_is_fault));
         self.clock_offset_ns = input.clock_offset_ns.cast_unsigned();
         let Publishers { counting, ignored } = input.setpoint_publishers;
         (self.setpoint_process, self.setpoint_process_ignored) = (counting, ignored);
@@ -185,14 +185,15 @@ impl CycleMessage {
         }
         if let Some(OperatorRequest { request, message }) = input.request {
             (self.has_request, self.request) = (1, request as u32);
-            (self.request_epoch, self.request_sequence) = message;
+            (self.request_epoch, self.request_sequence) = (message.epoch, message.sequence);
         }
     }
 
     fn set_output(&mut self, output: &Output) {
         (self.state, self.active_limits) = (output.state as u32, output.active_limits.0);
         self.diagnostic = output.diagnostic.into();
-        (self.answered_epoch, self.answered_sequence) = output.answered;
+        let MessageId { epoch, sequence } = output.answered_message;
+        (self.answered_epoch, self.answered_sequence) = (epoch, sequence);
         self.request_diagnostic = output.request_diagnostic.into();
         (self.force_n, self.wrench_error) = (output.force, output.wrench_error.vector().into());
         (self.missed_measurements, self.missed_setpoints) =
@@ -203,7 +204,7 @@ impl CycleMessage {
             self.twist = twist.vector().into();
             (self.condition, self.time_to_singularity_s) = (*condition, *time_to_singularity);
         }
-        if let Some(TrackingError { pose, twist }) = &output.error {
+        if let Some(PoseError { pose, twist }) = &output.error {
             self.has_error = 1;
             [self.error, self.error_rate] = [pose, twist].map(|it| it.vector().into());
         }
@@ -251,7 +252,7 @@ impl CycleMessage {
         };
         let measurement = Measurement { time_ns: self.measured_time_ns, ..Measurement::from(&measured) };
         let request = if self.has_request == 1 {
-            let message = (self.request_epoch, self.request_sequence);
+            let message = MessageId { epoch: self.request_epoch, sequence: self.request_sequence };
             Some(OperatorRequest { request: Request::from_number(self.request)?, message })
         } else {
             None
@@ -270,7 +271,7 @@ impl CycleMessage {
                 counting: self.measured_process,
                 ignored: self.measured_process_ignored,
             },
-            deadline_missed: self.deadline_missed == 1,
+            overrun_is_fault: self.deadline_missed == 1,
         })
     }
 
@@ -292,7 +293,7 @@ impl CycleMessage {
         Some(Output {
             state: State::from_number(self.state)?,
             diagnostic: self.diagnostic.diagnostic()?,
-            answered: (self.answered_epoch, self.answered_sequence),
+            answered_message: MessageId { epoch: self.answered_epoch, sequence: self.answered_sequence },
             request_diagnostic: self.request_diagnostic.diagnostic()?,
             force: self.force_n,
             wrench_error: Wrench::from_vector(&self.wrench_error.into()),
@@ -300,7 +301,7 @@ impl CycleMessage {
             missed_measurements: self.missed_measurements,
             missed_setpoints: self.missed_setpoints,
             platform: (self.has_platform == 1).then_some(platform),
-            error: (self.has_error == 1).then_some(TrackingError { pose: error_pose, twist: error_twist }),
+            error: (self.has_error == 1).then_some(PoseError { pose: error_pose, twist: error_twist }),
             reference: (self.has_reference == 1).then_some(reference),
         })
     }

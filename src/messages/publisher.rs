@@ -1,5 +1,6 @@
 //! Publishing one topic.
 
+use crate::control::signals::state::MessageId;
 use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::prelude::ipc;
 
@@ -24,9 +25,9 @@ impl<T: Message> Publisher<T> {
         Self { epoch: None, ..self }
     }
 
-    /// Epoch and sequence number of the next message.
-    pub fn next_message(&self) -> (u64, u64) {
-        (self.epoch.unwrap_or_default(), self.sequence + 1)
+    /// Identity of the next message.
+    pub fn next_message(&self) -> MessageId {
+        MessageId { epoch: self.epoch.unwrap_or_default(), sequence: self.sequence + 1 }
     }
 
     /// Fills in the header and sends. `time_ns` is the instant at which the content holds.

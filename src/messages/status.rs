@@ -94,8 +94,8 @@ impl StatusMessage {
             state: output.state as u32,
             active_limits: output.active_limits.0,
             diagnostic: output.diagnostic.into(),
-            request_epoch: output.answered.0,
-            request_sequence: output.answered.1,
+            request_epoch: output.answered_message.epoch,
+            request_sequence: output.answered_message.sequence,
             request_diagnostic: output.request_diagnostic.into(),
             missed_measurements: output.missed_measurements,
             missed_setpoints: output.missed_setpoints,
@@ -127,7 +127,7 @@ impl StatusMessage {
 mod tests {
     use super::*;
     use crate::control::sensing::localization::PlatformState;
-    use crate::control::signals::errors::TrackingError;
+    use crate::control::signals::errors::PoseError;
     use crate::control::signals::limits::LimitSet;
     use crate::model::rigid::{Twist, Wrench};
     use crate::model::task::TaskState;
@@ -145,7 +145,7 @@ mod tests {
         Output {
             state: State::Active,
             diagnostic: Diagnostic { code: DiagnosticCode::SetpointTooFar, value: 1.0, bound: 2.0, index: 3 },
-            answered: (4, 5),
+            answered_message: crate::control::signals::state::MessageId { epoch: 4, sequence: 5 },
             request_diagnostic: Diagnostic::new(DiagnosticCode::NearSingular, 143.0, 100.0).at(6),
             force: six(10.0),
             wrench_error: Wrench::from_vector(&Vector6::from(six(20.0))),
@@ -158,7 +158,7 @@ mod tests {
                 condition: 50.0,
                 time_to_singularity: 51.0,
             }),
-            error: Some(TrackingError { pose: twist(60.0), twist: twist(70.0) }),
+            error: Some(PoseError { pose: twist(60.0), twist: twist(70.0) }),
             reference: None,
         }
     }

@@ -34,7 +34,7 @@ impl Conditioning {
                 sensitivity: Sensitivity::new(simd, joints, &legs, &factorization),
                 shortest: least_of_legs(legs.length),
                 universal_sine: legs.universal_sine(simd, joints),
-                is_pivoted: !factorization.is_regular,
+                is_pivoted: !factorization.uses_blocks,
             }
         })
     }

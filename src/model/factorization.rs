@@ -38,7 +38,7 @@ use super::triples::{LegLanes, Triples};
 /// ten machines of `tests/data` have 0.22 to 0.98 in their vectors.
 const MIN_DET_A: f64 = 0.2;
 
-/// Smallest `|dS| / radius^3`. Given a is_regular A the blocks lose nothing as S becomes singular (each lane is
+/// Smallest `|dS| / radius^3`. Given a uses_blocks A the blocks lose nothing as S becomes singular (each lane is
 /// Cramer's rule, forward stable), but two singular values may become small together, where cross products
 /// cancel. Measured as above: 1.5 with 1e-2 and with 1e-3, 2.3 with 1e-4. Vectors of `tests/data`: 1.2 to 5.
 const MIN_RELATIVE_DET_S: f64 = 1e-3;
@@ -60,7 +60,7 @@ pub(super) struct Factorization<'a, S: Simd> {
     /// dA, dS, as the first leg of each computes it.
     pub determinants: [f64; 2],
     /// Both determinants are large enough.
-    pub is_regular: bool,
+    pub uses_blocks: bool,
 }
 
 /// A [`Factorization`] in memory, the halves of both triples in one lane.
@@ -74,7 +74,7 @@ pub(super) struct StoredFactorization {
     /// 1 / dS, twice.
     inverse_d_s: LegLanes,
     determinants: [f64; 2],
-    pub is_regular: bool,
+    pub uses_blocks: bool,
 }
 
 /// A wrench about C as the sum of four lanes.
@@ -104,9 +104,9 @@ impl<'a, S: Simd> Factorization<'a, S> {
         let inverse_d_s = one / d_s;
 
         let ([d_a, ..], [d_s, ..]) = (d_a.legs(), d_s.legs());
-        let is_regular = d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * joints.radius_cubed;
+        let uses_blocks = d_a.abs() >= MIN_DET_A && d_s.abs() >= MIN_RELATIVE_DET_S * joints.radius_cubed;
         let determinants = [d_a, d_s];
-        Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, is_regular }
+        Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, uses_blocks }
     }
 
     /// From memory.
@@ -124,7 +124,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
             adjugate_s: Lanes3 { x: c_x, y: c_y, z: c_z },
             inverse_d_s: load(&factors.inverse_d_s).0,
             determinants: factors.determinants,
-            is_regular: factors.is_regular,
+            uses_blocks: factors.uses_blocks,
         }
     }
 
@@ -138,7 +138,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
             inverse_x: [store(i.x, x_0), store(i.y, x_1), store(i.z, x_2)],
             inverse_d_s: store(self.inverse_d_s, self.inverse_d_s),
             determinants: self.determinants,
-            is_regular: self.is_regular,
+            uses_blocks: self.uses_blocks,
         }
     }
 
@@ -154,7 +154,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
     pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, axial: f64x8<S>) -> Option<LegLanes> {
         let simd = self.simd;
         let triples = &self.joints.triples;
-        if !self.is_regular {
+        if !self.uses_blocks {
             let n = wrench_columns(triples, legs);
             let forces = forces_by_lu(simd.level(), &n, &wrench.sum(), &triples.unpack(&axial.into()))?;
             return Some(triples.pack(&forces));
@@ -175,7 +175,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
     #[inline(always)]
     pub fn twist(&self, legs: &LegGeometry<S>, rates: f64x8<S>) -> Option<LaneTwist<S>> {
         let simd = self.simd;
-        if !self.is_regular {
+        if !self.uses_blocks {
             let triples = &self.joints.triples;
             let n = wrench_columns(triples, legs);
             return twist_by_lu(simd.level(), &n, &triples.unpack(&rates.into())).map(

@@ -91,7 +91,7 @@ fn sum_legs<S: Simd>(v: f64x8<S>) -> f64 {
 #[inline(always)]
 fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeometry<S>) -> f64 {
     let simd = factorization.simd;
-    if !factorization.is_regular {
+    if !factorization.uses_blocks {
         let n = wrench_columns(&factorization.joints.triples, legs);
         return inverse_norm_squared_by_lu(simd.level(), &n, factorization.joints.radius);
     }

@@ -2,7 +2,7 @@
 
 use crate::messages::clock::monotonic_ns;
 
-/// Readings per measurement, so that the two that time them do not count.
+/// ReadingErrors per measurement, so that the two that time them do not count.
 const READINGS_PER_ROW: u32 = 1_000;
 /// Measurements, of which the cheapest counts: others were interrupted.
 const ROW_COUNT: u32 = 20;

@@ -2,7 +2,7 @@
 
 use hexad::control::controller::Output;
 use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::errors::TrackingError;
+use hexad::control::signals::errors::PoseError;
 use hexad::control::signals::inputs::Input;
 use hexad::model::inverse_geometry::universal_sine;
 use hexad::model::kinematic_state::KinematicState;
@@ -34,7 +34,7 @@ pub fn print(observed: &Observed, input: &Input, output: &Output, before: &mut E
     let condition = KinematicState::new(&observed.machine, state.pose).sensitivity().condition;
     let sine = universal_sine(&observed.machine, &state.pose);
     let force = output.force.iter().fold(0.0_f64, |largest, force| largest.max(force.abs()));
-    let (away, away_rate) = output.error.map_or((f64::NAN, f64::NAN), |TrackingError { pose, twist }| {
+    let (away, away_rate) = output.error.map_or((f64::NAN, f64::NAN), |PoseError { pose, twist }| {
         (pose.vector().norm(), twist.vector().norm())
     });
     let age_ms =

@@ -8,7 +8,7 @@ use hexad::config::control_loops::longest_age_s;
 use hexad::control::controller::Controller;
 use hexad::control::parameters::Parameters;
 use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::plant::imperfections::Imperfections;
 
@@ -49,8 +49,10 @@ fn wobble_with(
         input.measurement = if measured.len() > periods { measured.pop_front().unwrap() } else { None };
         // Again and again, until it is carried out.
         let number = (control.time_s() / 0.1) as u64;
-        input.request = (last.0 == State::Standby)
-            .then_some(OperatorRequest { request: Request::Engage, message: (1, number) });
+        input.request = (last.0 == State::Standby).then_some(OperatorRequest {
+            request: Request::Engage,
+            message: MessageId { epoch: 1, sequence: number },
+        });
         let output = control.cycle(&input);
         last = (
             output.state,
@@ -149,7 +151,7 @@ fn near_singular_poses_measurements_twice_as_old_would_lose_the_platform() {
     let (config, _) = at_fastest_pose("tsai2000", "[limits]\ncondition = 50.0\n");
     let age_ms = 2.0 * 1e3 * longest_age_s(&config.deployment);
     let accepting = Parameters {
-        max_measured_age_ns: A_SECOND_NS,
+        max_age_at_arrival_ns: A_SECOND_NS,
         measured_timeout_ns: A_SECOND_NS,
         ..parameters(&config)
     };

@@ -50,7 +50,7 @@ fn without_messages_the_controller_is_off() {
     assert_without_force(&rig.controller.step(&full), State::Standby, DiagnosticCode::ReadyToEngage);
     let output = rig.controller.step(&Input { request: rig.asked, ..full });
     assert_eq!(
-        (output.state, output.request_diagnostic.code, output.answered),
+        (output.state, output.request_diagnostic.code, output.answered_message),
         (State::Engaging, DiagnosticCode::None, rig.asked.unwrap().message)
     );
 }

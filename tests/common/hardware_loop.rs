@@ -8,7 +8,7 @@ use hexad::config::Config;
 use hexad::control::controller::{Controller, Output};
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::model::LEGS;
 use hexad::model::machine::Machine;
 use hexad::model::task::TaskState;
@@ -93,7 +93,10 @@ impl HardwareLoop {
             release_ns: self.now_ns + self.period_ns / 2,
             setpoint: Some(Setpoint::motion(self.now_ns, *task)),
             measurement: Some(Measurement { time_ns: self.now_ns, length, rate, ..Measurement::default() }),
-            request: Some(OperatorRequest { request: Request::Engage, message: (1, self.asked) }),
+            request: Some(OperatorRequest {
+                request: Request::Engage,
+                message: MessageId { epoch: 1, sequence: self.asked },
+            }),
             ..Input::default()
         }
     }

@@ -5,7 +5,7 @@ use hexad::config::Config;
 use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::model::LEGS;
 use hexad::model::machine::Machine;
 use hexad::model::rigid::Motion;
@@ -127,8 +127,9 @@ impl Observed {
 
     /// A request, from the next input on.
     pub fn ask(&mut self, request: Request) {
-        let number = self.asked.map_or(1, |asked| asked.message.1 + 1);
-        self.asked = Some(OperatorRequest { request, message: (START_NS, number) });
+        let number = self.asked.map_or(1, |asked| asked.message.sequence + 1);
+        self.asked =
+            Some(OperatorRequest { request, message: MessageId { epoch: START_NS, sequence: number } });
     }
 
     /// X of the true platform.

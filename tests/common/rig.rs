@@ -12,9 +12,9 @@ use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
 use hexad::control::law::input_matrix::InputMatrix;
 use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::errors::ErrorState;
+use hexad::control::signals::errors::ErrorEstimate;
 use hexad::control::signals::limits::Limit;
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::LEGS;
 use hexad::model::fidelity::Fidelity;
@@ -59,13 +59,13 @@ pub fn answer(config: &Config, error: &Vector6<f64>) -> Vector6<f64> {
         &parameters.law.leg_masses,
         parameters.fidelity,
     );
-    let largest = input_matrix.largest_disturbance(&parameters.law.saturation);
-    let estimate = ErrorState {
+    let largest = input_matrix.largest_compensable(&parameters.law.saturation);
+    let estimate = ErrorEstimate {
         value: error * by_e,
         rate: error * (by_w / period_s),
         disturbance: (error * (by_d / (period_s * period_s))).sup(&-largest).inf(&largest),
     };
-    parameters.law.acceleration(&estimate.after(0.6 * period_s, &Vector6::zeros()), &input_matrix)
+    parameters.law.feedback_acceleration(&estimate.after(0.6 * period_s, &Vector6::zeros()), &input_matrix)
 }
 
 /// A controller, a platform, and what is between them.
@@ -105,8 +105,9 @@ impl Rig {
 
     /// A request, from the next input on.
     pub fn ask(&mut self, request: Request) {
-        let number = self.asked.map_or(1, |asked| asked.message.1 + 1);
-        self.asked = Some(OperatorRequest { request, message: (START_NS, number) });
+        let number = self.asked.map_or(1, |asked| asked.message.sequence + 1);
+        self.asked =
+            Some(OperatorRequest { request, message: MessageId { epoch: START_NS, sequence: number } });
     }
 
     /// Asks to engage and goes on until active, on a setpoint at rest.

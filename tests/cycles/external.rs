@@ -69,7 +69,7 @@ impl Loop {
             let (records_in, mut records) = queue.split();
             let mut seen = vec![];
             let step = |input: &mut Input, _: u64| {
-                seen.push((input.release_ns, input.deadline_missed));
+                seen.push((input.release_ns, input.overrun_is_fault));
                 if slow.is_some_and(|number| input.release_ns == drive(number)) {
                     sleep(Duration::from_nanos(2 * DRIVE_PERIOD_NS));
                 }

@@ -75,7 +75,7 @@ fn perform(release: ReleaseMode, on_overrun: OverrunPolicy) -> (Vec<Cycle>, Vec<
         if burns(seen.len() as u64 + 1) {
             while monotonic_ns() < began_ns + PERIOD_NS * 5 / 2 {}
         }
-        let (due_ns, told) = (input.release_ns, input.deadline_missed);
+        let (due_ns, told) = (input.release_ns, input.overrun_is_fault);
         seen.push(Cycle { due_ns, began_ns, ended_ns: monotonic_ns(), told });
         stop.store(seen.len() as u64 == CYCLES, Ordering::Relaxed);
         Output::default()

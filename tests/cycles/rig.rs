@@ -90,7 +90,7 @@ pub fn perform(script: &Script, on_overrun: OverrunPolicy, cycles: usize) -> (Ve
     let step = |input: &mut Input, _: u64| {
         // The record of the cycle before; the queue never fills.
         written.extend(records.dequeue());
-        let (due_ns, began_ns, told_of_miss) = (input.release_ns, now_ns.get(), input.deadline_missed);
+        let (due_ns, began_ns, told_of_miss) = (input.release_ns, now_ns.get(), input.overrun_is_fault);
         begun.push(Seen { due_ns, began_ns, told_of_miss, wakeup_ns: 0, compute_ns: 0 });
         now_ns.set(began_ns + burns_ns.next().unwrap_or(&100));
         stop.store(begun.len() == cycles, Ordering::Relaxed);

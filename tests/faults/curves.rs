@@ -125,7 +125,8 @@ impl Window<'_> {
     fn refusals(&self) -> Vec<Line> {
         let code = |at: &Sample| at.output.request_diagnostic.code;
         let refused = |pair: &&[Sample]| {
-            code(&pair[1]) != DiagnosticCode::None && pair[1].output.answered != pair[0].output.answered
+            code(&pair[1]) != DiagnosticCode::None
+                && pair[1].output.answered_message != pair[0].output.answered_message
         };
         self.samples
             .windows(2)

@@ -68,7 +68,7 @@ impl Situation {
         if self == Self::Engaging {
             config.deployment.limits.reference.autonomous_scale = SLOW_SCALE;
         }
-        let parameters = Parameters { max_measured_age_ns: MAX_MEASURED_AGE_NS, ..parameters(&config) };
+        let parameters = Parameters { max_age_at_arrival_ns: MAX_MEASURED_AGE_NS, ..parameters(&config) };
         let mut rig = Rig::new(&config, &config.machine);
         rig.controller = Controller::new(&config.machine, parameters);
         let mut world = World::new(rig, &config.machine, parameters);

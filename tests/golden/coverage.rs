@@ -71,7 +71,7 @@ impl Seen {
         self.add_if(input.clock_offset_ns != 0, "another clock");
         self.add_if(input.setpoint_publishers.ignored != 0, "two sources of setpoints");
         self.add_if(input.measured_publishers.ignored != 0, "two sources of measurements");
-        self.add_if(input.deadline_missed, "a missed deadline");
+        self.add_if(input.overrun_is_fault, "a missed deadline");
     }
 
     /// The output of an input that follows another output.
@@ -79,7 +79,7 @@ impl Seen {
         self.add(output.state);
         self.add(output.diagnostic.code);
         self.add(output.request_diagnostic.code);
-        if let Some(request) = input.request.filter(|_| output.answered != before.answered) {
+        if let Some(request) = input.request.filter(|_| output.answered_message != before.answered_message) {
             self.add(request.request);
         }
         let active = Limit::ALL.into_iter().filter(|limit| output.active_limits.contains(*limit));

@@ -17,7 +17,7 @@
 
 use hexad::control::signals::inputs::DriveStatus;
 use hexad::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
-use hexad::control::signals::state::{OperatorRequest, Request};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request};
 use hexad::model::task::TaskState;
 use nalgebra::Vector6;
 
@@ -82,7 +82,7 @@ pub fn input(row: &Row) -> Input {
     let drives = DriveStatus { enabled, brake_open, fault, force };
     let request = reader.optional().map(|[number, epoch, sequence]| OperatorRequest {
         request: Request::from_number(number as u32).expect("the number of a request"),
-        message: (epoch, sequence),
+        message: MessageId { epoch, sequence },
     });
     Input {
         release_ns,

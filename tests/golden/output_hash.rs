@@ -7,7 +7,7 @@
 use hexad::control::controller::Output;
 use hexad::control::sensing::localization::PlatformState;
 use hexad::control::signals::diagnostic::Diagnostic;
-use hexad::control::signals::errors::TrackingError;
+use hexad::control::signals::errors::PoseError;
 use hexad::control::signals::limits::LimitSet;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 
@@ -53,7 +53,7 @@ impl OutputHash {
             hash.twist(twist);
             hash.numbers([condition, time_to_singularity]);
         });
-        self.optional(error.as_ref(), |hash, TrackingError { pose, twist }| {
+        self.optional(error.as_ref(), |hash, PoseError { pose, twist }| {
             hash.twist(pose);
             hash.twist(twist);
         });

@@ -45,7 +45,7 @@ fn release_and_park(name: &str, requests: &[Request], runs: &mut Runs) {
                 }
                 let task = heave.moving([from, to], duration_s, observed.time_s() - start_s);
                 let output = observed.cycle(&observed.input(&task));
-                let refused = Some(output.answered) == observed.asked.map(|asked| asked.message)
+                let refused = Some(output.answered_message) == observed.asked.map(|asked| asked.message)
                     && !output.state.has_control();
                 has_begun |= output.state == State::Parking;
                 has_parked = asked == requests.len() && (output.state == State::Off || refused);

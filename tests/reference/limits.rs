@@ -81,7 +81,8 @@ fn run(name: &str, seed: u64) -> (Largest, u64) {
     let mut stream = Stream::new(seed, &machine.home, &size);
     let mut reference = ReferenceGenerator::new(&constants);
     let home = *reference.motion();
-    reference.start(&constants, 0, &home);
+    reference.verify_start(&constants, &home).ok();
+    reference.begin_at(0);
     let samples = Default::default();
     let mut largest = Largest::default();
     let cycles = (SECONDS / period_s) as u64;

@@ -33,7 +33,8 @@ fn motion(rate_hz: u64) -> Vec<Pose> {
     let constants = Constants::new(&config.machine, parameters);
     let mut reference = ReferenceGenerator::new(&constants);
     let home = *reference.motion();
-    reference.start(&constants, 0, &home);
+    reference.verify_start(&constants, &home).ok();
+    reference.begin_at(0);
     let mut poses = Vec::new();
     for k in 1..=SECONDS * rate_hz {
         let end_ns = k * parameters.period_ns;

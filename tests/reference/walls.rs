@@ -50,7 +50,8 @@ fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines)
     let constants = Constants::new(&config.machine, parameters);
     let mut reference = ReferenceGenerator::new(&constants);
     let start = *reference.motion();
-    reference.start(&constants, 0, &start);
+    reference.verify_start(&constants, &start).ok();
+    reference.begin_at(0);
     let period_s = parameters.period_ns as f64 * 1e-9;
     let (mut squares, mut count, mut reversals, mut largest) = ([0.0; 2], 0.0, 0, Largest::default());
     let mut last = [Vector3::zeros(); 2];
@@ -144,7 +145,8 @@ fn certificate_a_platform_pressed_into_any_corner_comes_back() {
             failures.par_extend(directions.par_iter().filter_map(|direction| {
                 let mut reference = ReferenceGenerator::new(&constants);
                 let home = *reference.motion();
-                reference.start(&constants, 0, &home);
+                reference.verify_start(&constants, &home).ok();
+                reference.begin_at(0);
                 let far = direction.component_mul(&Vector6::new(1.5, 1.5, 1.5, 2.0, 2.0, 2.0));
                 let away = Vector6::from(config.machine.home) + far;
                 for (seconds, x) in [(4, away.into()), (8, config.machine.home)] {

@@ -149,7 +149,7 @@ impl Watched {
             Wrong::OldMeasurement => measured.time_ns -= 1_000_000_000,
             Wrong::FarSetpoint => setpoint.task.x[4] += 0.03,
             Wrong::FarMeasurement => measured.length[4] += 0.03,
-            Wrong::DeadlineMissed => input.deadline_missed = true,
+            Wrong::DeadlineMissed => input.overrun_is_fault = true,
         }
         input
     }
@@ -195,12 +195,12 @@ impl Watched {
             assert!(matches!(before.state, State::Engaging | State::Active));
         }
         // A request is answered in its cycle, and only then.
-        let asked = self.rig.asked.map_or((0, 0), |asked| asked.message);
-        assert_eq!(now.answered, asked);
+        let asked = self.rig.asked.map_or_else(Default::default, |asked| asked.message);
+        assert_eq!(now.answered_message, asked);
         if request.is_none() {
             assert_eq!(
-                (now.answered, now.request_diagnostic.code),
-                (before.answered, before.request_diagnostic.code)
+                (now.answered_message, now.request_diagnostic.code),
+                (before.answered_message, before.request_diagnostic.code)
             );
         }
         // A cause where something is in the way, none where nothing is.
@@ -304,7 +304,7 @@ fn off_and_estop_let_go_within_the_cycle_from_every_state() {
                     "{state:?} {request:?}"
                 );
                 assert_eq!(output.force, [0.0; 6]);
-                assert_eq!(output.answered, rig.asked.unwrap().message);
+                assert_eq!(output.answered_message, rig.asked.unwrap().message);
             }
         }
     }

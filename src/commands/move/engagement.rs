@@ -7,7 +7,7 @@ use super::MoveError;
 use crate::commands::request::carry_out_in_background;
 use crate::config::Config;
 use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::state::Request;
+use crate::control::signals::state::{MessageId, Request};
 use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage};
 use crate::operator::{OperatorError, Order};
 use crate::realtime::stop_request::Stop;
@@ -19,7 +19,7 @@ pub enum Engagement {
     /// Over the control socket, by a thread.
     Socket { config: Box<Config>, began: Instant, within: Duration, stop: Stop, result: Option<Outcome> },
     /// In step with the setpoints, in simulated time; the last request.
-    InStep { commands: Publisher<CommandMessage>, sent: Option<(u64, u64)> },
+    InStep { commands: Publisher<CommandMessage>, sent: Option<MessageId> },
 }
 
 type Outcome = Receiver<Result<(), OperatorError>>;
@@ -63,7 +63,8 @@ impl Engagement {
             }
             Self::InStep { commands, sent } => {
                 let refusal = status.request_diagnostic.diagnostic().unwrap_or_default();
-                let is_answer = *sent == Some((status.request_epoch, status.request_sequence));
+                let is_answer = *sent
+                    == Some(MessageId { epoch: status.request_epoch, sequence: status.request_sequence });
                 if is_answer && refusal.code == DiagnosticCode::InvalidInState {
                     let state = status.state().unwrap_or_default().name();
                     let reason = format!("not possible in state {state}");

@@ -86,7 +86,8 @@ impl<'a> Precheck<'a> {
         let mut reference = ReferenceGenerator::new(&constants);
         let mut now = setpoint(0);
         let mut before = now;
-        reference.start(&constants, 0, &now.motion);
+        reference.verify_start(&constants, &now.motion).ok();
+        reference.begin_at(0);
         let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
         let bar = time_bar(to - from).with_message("checking the whole motion");
         for k in 0..=steps {
@@ -102,7 +103,8 @@ impl<'a> Precheck<'a> {
                 if refused(refusal).is_break() {
                     break;
                 }
-                reference.start(&constants, k * period_ns, &now.motion);
+                reference.verify_start(&constants, &now.motion).ok();
+                reference.begin_at(k * period_ns);
             }
             reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
             (before, now) = (now, setpoint(k + 1));

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use crate::config::Config;
 use crate::control::controller::Output;
 use crate::control::sensing::localization::PlatformState;
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Input, Measurement, Setpoint};
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
@@ -111,7 +111,7 @@ fn cycle(
         condition: status.condition,
         time_to_singularity: status.time_to_singularity_s,
     });
-    let error = (status.error_valid == 1).then(|| TrackingError {
+    let error = (status.error_valid == 1).then(|| PoseError {
         pose: Twist { angular: status.orientation_error_rad.into(), linear: status.position_error_m.into() },
         twist: Twist::default(),
     });

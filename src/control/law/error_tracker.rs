@@ -3,8 +3,6 @@
 //! The error is taken at the instant of the measurement, where both sides are known; the [`estimator`](super::estimator) predicts
 //! it to the instant at which the force acts. Without a new measurement the checks use the prediction.
 
-#[cfg(not(feature = "client"))]
-use nalgebra::ComplexField as _;
 use nalgebra::Vector6;
 
 use crate::control::constants::Constants;
@@ -17,8 +15,8 @@ use crate::control::reference::ReferenceGenerator;
 use crate::control::sensing::localization::{Localization, Located};
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::ErrorState;
-use crate::control::signals::errors::{FeedbackError, TrackingError};
+use crate::control::signals::errors::ErrorEstimate;
+use crate::control::signals::errors::{ErrorCoordinates, PoseError};
 use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::leg_wrenches;
@@ -29,10 +27,10 @@ pub(in crate::control) fn setpoint_error(
     cycle: &Cycle<'_>,
     setpoint: &ValidatedSetpoint<'_>,
     Located { measurement, platform, .. }: &Located<'_>,
-) -> Option<TrackingError> {
+) -> Option<PoseError> {
     let target = setpoint.target.as_ref().filter(|_| setpoint.status.is_ok())?;
     let desired = target.motion_at(&cycle.constants.parameters, measurement.time_ns)?;
-    Some(TrackingError::new(&desired, &platform.pose, &platform.twist))
+    Some(PoseError::new(&desired, &platform.pose, &platform.twist))
 }
 
 /// Error of the platform against the reference, under control.
@@ -47,36 +45,36 @@ pub(in crate::control) struct ErrorTracker {
     sent: [f64; LEGS],
     sent_acceleration: Vector6<f64>,
     /// Measured; while there is no new measurement, predicted.
-    error: TrackingError,
+    error: PoseError,
     /// Measured minus estimated, after the last measurement has corrected the estimate.
     residual: Vector6<f64>,
     /// What the last measurement and the prediction disagree in.
-    distrust: Option<Diagnostic>,
+    sensor_diagnostic: Option<Diagnostic>,
     /// What has changed on the platform.
-    change: Option<Diagnostic>,
+    disturbance_diagnostic: Option<Diagnostic>,
 }
 
 impl ErrorTracker {
     /// Begins without an error at an instant after a measurement: the reference begins there with the motion that the platform
     /// has then. Returns the error.
-    pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> TrackingError {
-        self.estimator.start(&constants.estimator, measured_ns, begin_ns, &FeedbackError::default());
-        (self.sensors, self.drives, self.distrust) =
+    pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> PoseError {
+        self.estimator.start(&constants.estimator, measured_ns, begin_ns, &ErrorCoordinates::default());
+        (self.sensors, self.drives, self.sensor_diagnostic) =
             (FrozenSensors::default(), DriveResponse::default(), None);
-        (self.disturbance, self.change) = (DisturbanceMonitor::default(), None);
-        (self.error, self.residual) = (TrackingError::default(), Vector6::zeros());
+        (self.disturbance, self.disturbance_diagnostic) = (DisturbanceMonitor::default(), None);
+        (self.error, self.residual) = (PoseError::default(), Vector6::zeros());
         self.error
     }
 
-    /// Corrects the estimate by a measurement, if it is new. Returns the error. Where the driver sends no rates, the twist of
-    /// the platform becomes the estimated one.
+    /// Corrects the estimate by a measurement, if it is new. Returns the error, and the twist of the platform: the estimated one
+    /// where the driver sends no rates.
     pub fn update(
         &mut self,
         cycle: &Cycle<'_>,
         reference: &ReferenceGenerator,
         localization: &Localization,
-        located: &mut Located<'_>,
-    ) -> TrackingError {
+        located: &Located<'_>,
+    ) -> (PoseError, Twist) {
         let Self { estimator, sensors, drives, disturbance, sent, sent_acceleration, .. } = self;
         let constants = cycle.constants;
         let time_ns = located.measurement.time_ns;
@@ -92,24 +90,25 @@ impl ErrorTracker {
                 let feedback = feedback_forces(constants, sent_acceleration, &desired.pose);
                 [leg_lengths(constants.machine(), &desired.pose), feedback]
             };
-            let EstimatorConstants { readings, .. } = &constants.estimator;
+            let EstimatorConstants { reading_errors, .. } = &constants.estimator;
             let disturbance_now = &estimator.state().disturbance;
             let mut check = || {
-                sensors.check(&located.measurement.length, readings, &constants.frozen_leg, legs)?;
+                sensors.check(&located.measurement.length, reading_errors, &constants.frozen_leg, legs)?;
                 check_innovation(constants, &innovation, interval_s, located)?;
                 drives.check(constants, disturbance_now, sent, &located.platform.pose, interval_s)
             };
-            self.distrust = check().err();
-            self.change = disturbance
+            self.sensor_diagnostic = check().err();
+            self.disturbance_diagnostic = disturbance
                 .check(
                     &constants.disturbance_bounds,
                     estimator.state(),
                     &desired,
-                    drives.unexplained_squared,
+                    drives.sudden_disturbance_squared,
                     interval_s,
                 )
                 .err();
         }
+        let mut twist = located.platform.twist;
         // A measurement from before control began shows another motion.
         if located.measurement.rate.is_none() && interval_s >= 0.0 {
             let rate = &estimator.state().rate;
@@ -118,7 +117,6 @@ impl ErrorTracker {
             } else {
                 Twist::from_vector(rate)
             };
-            let twist = &mut located.platform.twist;
             twist.angular = desired.twist.angular - error.twist.angular;
             twist.linear = desired.twist.linear - error.twist.linear;
         }
@@ -127,24 +125,24 @@ impl ErrorTracker {
         } else if !acts_on_legs {
             let mut predicted = *estimator.state();
             estimator.predict(&mut predicted, cycle.release_ns);
-            self.error = TrackingError::from(&predicted.error());
+            self.error = PoseError::from(&predicted.error());
         }
-        self.error
+        (self.error, twist)
     }
 
     /// What the last measurement and the prediction disagree in, or which sensor is frozen.
-    pub fn distrust(&self) -> Option<&Diagnostic> {
-        self.distrust.as_ref()
+    pub fn sensor_diagnostic(&self) -> Option<&Diagnostic> {
+        self.sensor_diagnostic.as_ref()
     }
 
     /// Whether a length repeats itself: its sensor may be frozen.
-    pub fn is_doubtful(&self) -> bool {
+    pub fn may_be_frozen(&self) -> bool {
         self.sensors.repeat()
     }
 
     /// What has changed on the platform, or that it oscillates.
-    pub fn change(&self) -> Option<&Diagnostic> {
-        self.change.as_ref()
+    pub fn disturbance_diagnostic(&self) -> Option<&Diagnostic> {
+        self.disturbance_diagnostic.as_ref()
     }
 
     /// The estimator, after the last measurement.
@@ -154,13 +152,13 @@ impl ErrorTracker {
 
     /// A predicted error with the value that was measured: where the legs are, by which forces act. The estimate follows it
     /// with a lag, and forces for a pose that lags are a negative stiffness, which grows with the condition.
-    pub fn without_lag(&self, predicted: &ErrorState) -> FeedbackError {
-        FeedbackError { value: predicted.value + self.residual, rate: predicted.rate }
+    pub fn corrected_to_last_measurement(&self, predicted: &ErrorEstimate) -> ErrorCoordinates {
+        ErrorCoordinates { value: predicted.value + self.residual, rate: predicted.rate }
     }
 
     /// Records the acceleration by forces that limits take away.
-    pub fn record_limited(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
-        self.disturbance.record_limited(&constants.disturbance_bounds, acceleration);
+    pub fn record_missing(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
+        self.disturbance.record_missing(&constants.disturbance_bounds, acceleration);
     }
 
     /// Records the acceleration that feedback sends, after all limits, with the force, and the instant from which on it acts.
@@ -177,7 +175,7 @@ fn feedback_forces(constants: &Constants, acceleration: &Vector6<f64>, pose: &Po
         true => *acceleration,
         false => leg_wrenches(constants.machine(), pose).tr_mul(acceleration),
     };
-    law.feedback_leg_forces(&of_legs)
+    law.forces_of_leg_accelerations(&of_legs)
 }
 
 /// Whether each leg is where the prediction has it. Its innovation is `N^T nu`, at most `|nu_p| + r |nu_R|`.
@@ -216,12 +214,12 @@ fn measured(
     cycle: &Cycle<'_>,
     desired: &Motion,
     Located { measurement, rate, platform }: &Located<'_>,
-) -> (TrackingError, FeedbackError) {
+) -> (PoseError, ErrorCoordinates) {
     let constants = cycle.constants;
-    let error = TrackingError::new(desired, &platform.pose, &platform.twist);
+    let error = PoseError::new(desired, &platform.pose, &platform.twist);
     let deviation = match constants.parameters.law.mode.acts_on_legs() {
-        true => FeedbackError::of_legs(constants.machine(), desired, &measurement.length, rate),
-        false => FeedbackError::from(&error),
+        true => ErrorCoordinates::of_legs(constants.machine(), desired, &measurement.length, rate),
+        false => ErrorCoordinates::from(&error),
     };
     (error, deviation)
 }

@@ -27,8 +27,8 @@ use crate::control::law::gains::Gains;
 use crate::control::law::input_matrix::InputMatrix;
 use crate::control::law::leg_masses::LegMasses;
 use crate::control::law::mode::ControlMode;
-use crate::control::signals::errors::ErrorState;
-use crate::control::signals::errors::FeedbackError;
+use crate::control::signals::errors::ErrorCoordinates;
+use crate::control::signals::errors::ErrorEstimate;
 use crate::control::signals::limits::Limits;
 use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
@@ -108,7 +108,11 @@ impl Law {
     }
 
     /// `Kp e + Kd e' + B^-1 d` of an estimate at the instant at which the force begins.
-    pub fn acceleration(&self, estimate: &ErrorState, input_matrix: &InputMatrix) -> Vector6<f64> {
+    pub fn feedback_acceleration(
+        &self,
+        estimate: &ErrorEstimate,
+        input_matrix: &InputMatrix,
+    ) -> Vector6<f64> {
         let (stiffness, damping) = self.gains();
         let feedback = estimate.value.component_mul(&stiffness) + estimate.rate.component_mul(&damping);
         if !self.compensates_disturbance {
@@ -123,7 +127,7 @@ impl Law {
     pub(in crate::control) fn dynamics_motion(
         &self,
         desired: Motion,
-        error: &FeedbackError,
+        error: &ErrorCoordinates,
         acceleration: &Vector6<f64>,
     ) -> Motion {
         if self.mode.acts_on_legs() {
@@ -141,7 +145,7 @@ impl Law {
     }
 
     /// Forces `m_i a_i` of the drives for accelerations of the legs.
-    pub fn feedback_leg_forces(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
+    pub fn forces_of_leg_accelerations(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
         acceleration.component_mul(&self.leg_masses.mass).into()
     }
 }

@@ -22,7 +22,8 @@ pub(in crate::control) fn forces(
         ControlMode::GravityJointPd => Some(Fidelity::Gravity),
         ControlMode::JointPd => None,
     };
-    let mut force = if law.mode.acts_on_legs() { law.feedback_leg_forces(acceleration) } else { [0.0; LEGS] };
+    let mut force =
+        if law.mode.acts_on_legs() { law.forces_of_leg_accelerations(acceleration) } else { [0.0; LEGS] };
     if let Some(fidelity) = fidelity {
         let modelled = constants.dynamics.forces_of(fidelity, motion).ok_or(DiagnosticCode::SingularPose)?;
         force.iter_mut().zip(modelled).for_each(|(force, modelled)| *force += modelled);

@@ -57,7 +57,7 @@ impl InputMatrix {
     }
 
     /// Largest disturbance that a law with this bound of its acceleration can compensate, axis by axis.
-    pub fn largest_disturbance(&self, bound: &Vector6<f64>) -> Vector6<f64> {
+    pub fn largest_compensable(&self, bound: &Vector6<f64>) -> Vector6<f64> {
         self.by_command.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
     }
 
@@ -78,7 +78,7 @@ impl InputMatrix {
     }
 
     /// The wrench about C that a disturbance, in the coordinates of the error, would need at home.
-    pub fn wrench_of_disturbance(&self, machine: &Machine) -> Matrix6<f64> {
+    pub fn home_wrench_by_disturbance(&self, machine: &Machine) -> Matrix6<f64> {
         let inertia = self.mobility.try_inverse().unwrap_or_default();
         if !self.acts_on_legs {
             return inertia;

@@ -4,13 +4,15 @@
 //! | --- | --- |
 //! | error against the reference, its estimate | `error_tracker`, [`estimator`] |
 //! | acceleration by feedback | `feedback_law`, with [`gains`], [`leg_masses`], [`input_matrix`] and `mode` |
-//! | bound on feedback | `feedback_bound` |
+//! | bound on feedback | `feedback_limiter` |
 //! | forces, and their limits | `forces`, `force_limits` |
+//! | all of it in a cycle | `actuation` |
 
+pub(super) mod actuation;
 pub(super) mod error_tracker;
 pub mod estimator;
-pub(super) mod feedback_bound;
 mod feedback_law;
+pub(super) mod feedback_limiter;
 pub(super) mod force_limits;
 pub(super) mod forces;
 pub mod gains;

@@ -23,11 +23,11 @@
 use nalgebra::ComplexField as _;
 use nalgebra::{Vector3, Vector6};
 
-use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::input_matrix::InputMatrix;
 use crate::control::parameters::Parameters;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::ErrorState;
+use crate::control::signals::errors::ErrorEstimate;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Acceleration, Motion};
@@ -109,7 +109,7 @@ impl DisturbanceBounds {
         arm: f64,
     ) -> Self {
         let Parameters { law, limits, payload_change_kg, disturbance_step, .. } = parameters;
-        let Readings { noise, .. } = parameters.readings;
+        let ReadingErrors { deviation: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
         let has_weight = expects_forces && machine.gravity.norm_squared() > 0.0;
         let gravity = machine.gravity / machine.gravity.norm_squared().max(f64::MIN_POSITIVE);
@@ -123,7 +123,7 @@ impl DisturbanceBounds {
         let swing = (SWING_M * softness * softness).min(MAX_SWING_M);
         let by_step = SWING_BY_STEP * disturbance_step.unwrap_or(0.0) / softest;
         let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
-        let payload_by_disturbance = -input_matrix.wrench_of_disturbance(machine).tr_mul(&along_gravity);
+        let payload_by_disturbance = -input_matrix.home_wrench_by_disturbance(machine).tr_mul(&along_gravity);
         let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm;
         Self {
             payload_by_disturbance,
@@ -175,7 +175,7 @@ struct Oscillation {
 
 impl DisturbanceMonitor {
     /// Records the acceleration by forces that limits took away.
-    pub fn record_limited(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
+    pub fn record_missing(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
         self.limited = self.limited.max(bounds.norm_squared(acceleration).sqrt());
     }
 
@@ -184,7 +184,7 @@ impl DisturbanceMonitor {
     pub fn check(
         &mut self,
         bounds: &DisturbanceBounds,
-        estimate: &ErrorState,
+        estimate: &ErrorEstimate,
         reference: &Motion,
         sudden_squared: f64,
         dt: f64,

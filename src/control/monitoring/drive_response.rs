@@ -46,7 +46,7 @@ pub(in crate::control) struct DriveResponse {
     since_start_s: f64,
     missing_s: f64,
     /// Square of the disturbance beyond the usual one, weighted; 0 where the force of one leg explains it.
-    pub unexplained_squared: f64,
+    pub sudden_disturbance_squared: f64,
 }
 
 impl DriveResponse {
@@ -66,10 +66,10 @@ impl DriveResponse {
         self.usual += sudden * share;
         let sent = Vector6::from(*sent);
         self.usual_force += (sent - self.usual_force) * share;
-        let arm = constants.error_arm();
+        let arm = constants.error_radius();
         let sudden = weighted(&sudden, arm);
-        self.unexplained_squared = if is_starting { 0.0 } else { sudden.norm_squared() };
-        if is_starting || self.unexplained_squared < constants.least_missing_squared {
+        self.sudden_disturbance_squared = if is_starting { 0.0 } else { sudden.norm_squared() };
+        if is_starting || self.sudden_disturbance_squared < constants.least_missing_acceleration_squared {
             self.missing_s = 0.0;
             return Ok(());
         }
@@ -86,7 +86,7 @@ impl DriveResponse {
         pose: &Pose,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let arm = constants.error_arm();
+        let arm = constants.error_radius();
         let mut by_force = constants.input_matrix.acceleration_by_force(constants.machine(), pose);
         by_force.column_iter_mut().for_each(|mut column| {
             let scaled = weighted(&column.clone_owned(), arm);
@@ -102,7 +102,7 @@ impl DriveResponse {
             let force = along / square * if *sent < 0.0 { -1.0 } else { 1.0 };
             let explains = along * along >= least * square;
             if explains {
-                self.unexplained_squared = 0.0;
+                self.sudden_disturbance_squared = 0.0;
             }
             let bound = (LEAST_MISSING_RATIO * usual.abs()).max(LEAST_FORCE_RATIO * max_force);
             if explains && force >= bound && force <= MOST_MISSING_RATIO * sent.abs() {

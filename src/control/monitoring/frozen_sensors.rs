@@ -8,7 +8,7 @@
 //! resolution, may: a leg that freezes at rest cannot be distinguished then, and the platform drifts away. An independent pose
 //! or a second encoder closes that.
 
-use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::ReadingErrors;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;
 
@@ -38,11 +38,11 @@ const MAX_EQUAL_NOISY_READINGS: f64 = 12.0;
 /// The same in steps of a coarse sensor: a payload and friction that are known to a fifth leave 12.1.
 const BOUND_STEPS: f64 = 14.0;
 
-impl Readings {
+impl ReadingErrors {
     /// Equal readings in a row that noise allows; `None` if its noise is less than a step, or the step is not known.
     fn most_equal(&self) -> Option<f64> {
-        let steps = self.noise / self.step;
-        (self.step > 0.0 && steps >= 1.0)
+        let steps = self.deviation / self.resolution;
+        (self.resolution > 0.0 && steps >= 1.0)
             .then(|| (MAX_EQUAL_AT_ONE_STEP / (steps * steps)).max(MAX_EQUAL_NOISY_READINGS))
     }
 }
@@ -97,7 +97,7 @@ impl FrozenSensors {
     pub fn check(
         &mut self,
         length: &[f64; LEGS],
-        readings: &Readings,
+        errors: &ReadingErrors,
         one_leg: &FrozenLegBounds,
         legs: impl FnOnce() -> [[f64; LEGS]; 2],
     ) -> Result<(), Diagnostic> {
@@ -109,7 +109,7 @@ impl FrozenSensors {
             *last = *length;
             is_any_equal |= is_equal;
         }
-        if is_any_equal { self.check_motion(&legs(), readings, one_leg) } else { Ok(()) }
+        if is_any_equal { self.check_motion(&legs(), errors, one_leg) } else { Ok(()) }
     }
 
     /// Whether any length has been the same for so many readings that its sensor may be frozen.
@@ -123,13 +123,13 @@ impl FrozenSensors {
     fn check_motion(
         &mut self,
         [reference, feedback]: &[[f64; LEGS]; 2],
-        readings: &Readings,
+        errors: &ReadingErrors,
         one_leg: &FrozenLegBounds,
     ) -> Result<(), Diagnostic> {
         let are_all_equal = self.equal_readings.iter().all(|equal| *equal + 1 >= MIN_EQUAL_READINGS);
         let bound = if are_all_equal { ALL_LEGS_BOUND_M } else { one_leg.motion };
-        let bound = (bound + readings.step).max(BOUND_STEPS * readings.step);
-        let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * readings.step);
+        let bound = (bound + errors.resolution).max(BOUND_STEPS * errors.resolution);
+        let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * errors.resolution);
         let mut result = Ok(());
         let first = self.reference.iter_mut().zip(&mut self.feedback);
         let legs = first.zip(&self.equal_readings).zip(reference.iter().zip(feedback));
@@ -146,8 +146,8 @@ impl FrozenSensors {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, least_motion).at(leg));
             }
             let repeats = |most| f64::from(*equal + 1) > most;
-            if readings.most_equal().is_some_and(repeats) && result.is_ok() {
-                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, readings.step).at(leg));
+            if errors.most_equal().is_some_and(repeats) && result.is_ok() {
+                result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution).at(leg));
             }
         }
         result
@@ -167,7 +167,7 @@ mod tests {
             let share = f64::from(k) / f64::from(readings);
             let legs = [[1.0 + 8e-6 * share; LEGS], [0.0, 0.0, 0.0, newtons * share, 0.0, 0.0]];
             let length = core::array::from_fn(|leg| if leg == 3 { 1.0 } else { 1.0 + 1e-9 * f64::from(k) });
-            sensors.check(&length, &Readings::default(), &BOUNDS, || legs).is_err()
+            sensors.check(&length, &ReadingErrors::default(), &BOUNDS, || legs).is_err()
         })
     }
 
@@ -186,7 +186,9 @@ mod tests {
             let mut length = reference;
             frozen.iter().filter(|_| k > 10).for_each(|leg| length[*leg] = 1.0);
             if let Err(diagnostic) =
-                sensors.check(&length, &Readings { noise: 0.0, step }, &BOUNDS, || [reference, [0.0; LEGS]])
+                sensors.check(&length, &ReadingErrors { deviation: 0.0, resolution: step }, &BOUNDS, || {
+                    [reference, [0.0; LEGS]]
+                })
             {
                 assert_eq!(diagnostic.code, DiagnosticCode::SensorFrozen);
                 return Some((1e6 * diagnostic.value, diagnostic.index as usize));
@@ -210,14 +212,16 @@ mod tests {
     fn equal_readings_at_rest_are_no_fault() {
         let mut sensors = FrozenSensors::default();
         for _ in 0..1000 {
-            assert!(sensors.check(&[1.0; LEGS], &Readings::default(), &BOUNDS, || [[1.0; LEGS]; 2]).is_ok());
+            assert!(
+                sensors.check(&[1.0; LEGS], &ReadingErrors::default(), &BOUNDS, || [[1.0; LEGS]; 2]).is_ok()
+            );
         }
     }
 
     /// Equal readings at rest until a sensor counts as frozen.
     fn repeated(noise: f64, step: f64) -> Option<u32> {
         let mut sensors = FrozenSensors::default();
-        let readings = Readings { noise, step };
+        let readings = ReadingErrors { deviation: noise, resolution: step };
         (1..1000).find(|_| sensors.check(&[1.0; LEGS], &readings, &BOUNDS, || [[1.0; LEGS]; 2]).is_err())
     }
 
@@ -239,7 +243,7 @@ mod tests {
             let length = reference.map(|length| (length * 1e6).round() * 1e-6);
             assert!(
                 sensors
-                    .check(&length, &Readings { noise: 0.0, step: 1e-6 }, &BOUNDS, || [
+                    .check(&length, &ReadingErrors { deviation: 0.0, resolution: 1e-6 }, &BOUNDS, || [
                         reference,
                         [0.0; LEGS]
                     ])

@@ -22,13 +22,13 @@ use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::{step::Step, verification::Verifier};
 use crate::control::reference::proposal::approach::{Approach, TargetOffset, limit_leg_rates};
 use crate::control::reference::proposal::walls::Walls;
-use crate::control::reference::stop::constant_jerk::move_on;
+use crate::control::reference::stop::constant_jerk::step_constant_jerk;
 use crate::control::reference::stop::held_stop::HeldStop;
 use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::setpoint::motion::SetpointMotion;
 use crate::control::setpoint::target::Target;
 use crate::control::setpoint::target::{RelativeMotion, at_rest};
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::{Limit, LimitSet};
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
@@ -37,7 +37,7 @@ mod history;
 mod proof;
 mod proposal;
 #[cfg(test)]
-mod samples;
+mod random_vectors;
 mod stop;
 #[cfg(test)]
 mod tests;
@@ -88,34 +88,23 @@ impl ReferenceGenerator {
         }
     }
 
-    /// Places the reference at a motion, as that of a platform without force, and holds the stop from there. If none was verified,
-    /// the limit that none was proved to keep: it must not begin there.
+    /// Places the reference at a motion, as that of a platform without force, and verifies a stop from there. If none was verified,
+    /// returns the limit that none was proved to keep: the reference must not begin there.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    pub fn place(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Limit> {
+    pub fn verify_start(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Limit> {
         self.motion = *motion;
         self.bounds = PoseBounds::around(constants, &motion.pose);
-        let verified = self.verifier.verify(
-            constants,
-            &self.bounds,
-            &self.motion,
-            &Step::default(),
-            self.stop.candidate(),
-        );
-        self.stop.hold(verified.unwrap_or(StopKind::Planar));
+        let (step, spare) = (Step::default(), self.stop.spare());
+        let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step, spare);
+        self.stop.adopt(verified.unwrap_or(StopKind::BrakeAtOnce));
         verified.map(drop)
     }
 
     /// Begins at an instant with the motion at which it was placed.
-    pub fn begin(&mut self, time_ns: u64) {
+    pub fn begin_at(&mut self, time_ns: u64) {
         (self.time_ns, self.in_proportion_steps) = (time_ns, 0);
         self.history.clear();
-    }
-
-    /// Begins at an instant with a motion for which a stop exists.
-    pub fn start(&mut self, constants: &Constants, time_ns: u64, motion: &Motion) {
-        self.place(constants, motion).ok();
-        self.begin(time_ns);
     }
 
     /// Sets the share of the limits with which the distance to a target is closed.
@@ -156,17 +145,17 @@ impl ReferenceGenerator {
     }
 
     /// Target minus reference at the end of the last cycle.
-    pub fn deviation(&self, constants: &Constants, target: &Target<'_>) -> Option<TrackingError> {
+    pub fn deviation(&self, constants: &Constants, target: &Target<'_>) -> Option<PoseError> {
         let desired = target.motion_at(&constants.parameters, self.time_ns)?;
-        Some(TrackingError::new(&desired, &self.motion.pose, &self.motion.twist))
+        Some(PoseError::new(&desired, &self.motion.pose, &self.motion.twist))
     }
 
     /// The motion of a setpoint minus the reference at the end of the last cycle, to first order in the time between.
-    pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> TrackingError {
+    pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> PoseError {
         let motion = &setpoint.motion;
         let continued = setpoint.continued(setpoint.extrapolation_s(parameters, self.time_ns));
-        let error = TrackingError::new(motion, &self.motion.pose, &self.motion.twist);
-        TrackingError {
+        let error = PoseError::new(motion, &self.motion.pose, &self.motion.twist);
+        PoseError {
             pose: Twist::from_vector(&(error.pose.vector() + continued.displacement)),
             twist: Twist::from_vector(&(continued.twist - self.motion.twist.vector())),
         }
@@ -204,13 +193,14 @@ impl ReferenceGenerator {
         });
         // Without a target nothing is refused.
         let verified = desired.map(|(target, desired)| {
-            let (Acceleration { angular, linear }, work) = self.proposed(constants, target, &desired, step_s);
-            move_on(&mut self.motion, &angular, &linear, step_s);
+            let (Acceleration { angular, linear }, effort) =
+                self.proposed(constants, target, &desired, step_s);
+            step_constant_jerk(&mut self.motion, &angular, &linear, step_s);
             let (now, next) = (&begin.acceleration, &self.motion.acceleration);
             let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
-            let step = Step { from: Some(&begin.pose), duration: step_s, change, work };
+            let step = Step { from: Some(&begin.pose), duration: step_s, change, effort };
             let verified =
-                self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.candidate());
+                self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
             self.in_proportion_steps = match verified {
                 Ok(_) => self.in_proportion_steps.saturating_sub(1),
                 Err(_) => IN_PROPORTION_STEPS,
@@ -218,7 +208,7 @@ impl ReferenceGenerator {
             verified
         });
         match verified {
-            Some(Ok(kind)) => self.stop.hold(kind),
+            Some(Ok(kind)) => self.stop.adopt(kind),
             refused => {
                 if let Some(Err(limit)) = refused {
                     self.active_limits = self.active_limits.with(limit, true);
@@ -230,7 +220,7 @@ impl ReferenceGenerator {
         self.time_ns = end_ns;
     }
 
-    /// Acceleration of the next instant, towards its desired motion, and the work of the walls for it.
+    /// Acceleration of the next instant, towards its desired motion, and the effort of the walls for it.
     fn proposed(
         &mut self,
         constants: &Constants,
@@ -263,11 +253,11 @@ impl ReferenceGenerator {
         if limit_leg_rates(constants, pose, &mut turn, &mut shift) {
             self.active_limits = self.active_limits.with(Limit::LegRate, true);
         }
-        let (mut work, mut in_proportion) = (0, self.in_proportion_steps > 0);
+        let (mut effort, mut in_proportion) = (0, self.in_proportion_steps > 0);
         if constants.parameters.on_violation == ViolationPolicy::Limit {
             let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
-            let restricting = walls.restrict(constants.machine().level, &mut turn, &mut shift);
-            work = walls.work();
+            let restricting = walls.project(constants.machine().level, &mut turn, &mut shift);
+            effort = walls.effort();
             if !restricting.is_empty() {
                 in_proportion = true;
                 turning.limit_velocity(&mut turn);
@@ -287,6 +277,6 @@ impl ReferenceGenerator {
             .with(Limit::Velocity, turn.is_limited | shift.is_limited)
             .with(Limit::Acceleration, by_acceleration)
             .with(Limit::Jerk, by_jerk);
-        (Acceleration { angular, linear }, work)
+        (Acceleration { angular, linear }, effort)
     }
 }

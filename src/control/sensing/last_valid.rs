@@ -25,14 +25,14 @@ pub(in crate::control) struct LastValid<Input, Valid> {
     /// The last input since then, and why it was rejected, or the first of several.
     rejected: Option<(Input, Diagnostic)>,
     /// Release of the cycle that validated the last input.
-    newest_ns: u64,
+    validated_ns: u64,
     /// Longest time between two inputs since the last valid one \[ns\].
     longest_interval_ns: u64,
 }
 
 impl<Input, Valid> Default for LastValid<Input, Valid> {
     fn default() -> Self {
-        Self { valid: None, rejected: None, newest_ns: 0, longest_interval_ns: 0 }
+        Self { valid: None, rejected: None, validated_ns: 0, longest_interval_ns: 0 }
     }
 }
 
@@ -55,7 +55,7 @@ impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid
 
     /// The longest time between two inputs since the last valid one, if the next is now \[ns\].
     fn interval_ns(&self, now_ns: u64) -> u64 {
-        now_ns.saturating_sub(self.newest_ns).max(self.longest_interval_ns)
+        now_ns.saturating_sub(self.validated_ns).max(self.longest_interval_ns)
     }
 
     /// Records an input with the result of its validation. With `keep_first` the first of several rejections stays:
@@ -75,7 +75,7 @@ impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid
                 self.rejected = Some((*input, first.unwrap_or(diagnostic)));
             }
         }
-        self.newest_ns = now_ns;
+        self.validated_ns = now_ns;
     }
 
     /// The last rejection, or `otherwise` if nothing was rejected since the last valid input.

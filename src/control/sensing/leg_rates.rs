@@ -3,7 +3,7 @@
 use nalgebra::Vector6;
 
 use crate::control::law::estimator::{EstimatorConstants, Filter};
-use crate::control::signals::errors::FeedbackError;
+use crate::control::signals::errors::ErrorCoordinates;
 use crate::control::signals::inputs::Measurement;
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
@@ -27,7 +27,7 @@ impl LegRateEstimator {
     #[inline(never)]
     fn estimated(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
         let time_ns = measurement.time_ns;
-        let measured = FeedbackError { value: Vector6::from(measurement.length), rate: Vector6::zeros() };
+        let measured = ErrorCoordinates { value: Vector6::from(measurement.length), rate: Vector6::zeros() };
         let elapsed_s = |filter: &Filter| seconds_between(filter.time_ns, time_ns);
         let filter = match &mut self.filter {
             Some(filter) if (0.0..MAX_GAP_S).contains(&elapsed_s(filter)) => filter,

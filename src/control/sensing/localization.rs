@@ -149,7 +149,13 @@ impl Localization {
         if active.check(Limit::Condition, condition / bound) {
             return Ok(());
         }
-        Err(Diagnostic::new(DiagnosticCode::NearSingular, condition, bound))
+        Err(self.near_singular(bound))
+    }
+
+    /// Why a pose that is not singular is refused: its condition exceeds a bound.
+    pub fn near_singular(&self, bound: f64) -> Diagnostic {
+        let condition = self.tracker.kinematic_state().sensitivity().condition;
+        Diagnostic::new(DiagnosticCode::NearSingular, condition, bound)
     }
 
     /// Starts again at home, the one pose of which the assembly mode is known.

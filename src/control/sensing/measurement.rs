@@ -162,7 +162,7 @@ impl MeasurementValidator {
         let mut check = || {
             check_time_stamp(DiagnosticCode::MeasurementStampInvalid, new.time_ns, now_ns, timeout_ns)?;
             check_lead(new.time_ns, now_ns, parameters.period_ns)?;
-            check_age_at_arrival(new.time_ns, now_ns, parameters.max_measured_age_ns)?;
+            check_age_at_arrival(new.time_ns, now_ns, parameters.max_age_at_arrival_ns)?;
             check_measurement(cycle, new, before, window_s, consistency)
         };
         let result = check();

@@ -44,7 +44,7 @@ pub(in crate::control) fn standing_speed(parameters: &Parameters) -> f64 {
 /// With n = T / period, evenly spread, the deviation of the slope is `s sqrt(12 / n) / T`.
 pub(in crate::control) fn window_s(parameters: &Parameters) -> f64 {
     let allowed = NOISE_SHARE * standing_speed(parameters) / DEVIATIONS;
-    let needed = parameters.readings.noise * (12.0 * parameters.period_s()).sqrt() / allowed;
+    let needed = parameters.reading_errors.deviation * (12.0 * parameters.period_s()).sqrt() / allowed;
     libm::cbrt(needed * needed).max(MIN_WINDOW_S)
 }
 
@@ -137,7 +137,7 @@ impl Standstill {
             moved
                 > SCATTER_DEVIATIONS * rates.scatter
                     + standing_speed(parameters) * t
-                    + parameters.readings.step
+                    + parameters.reading_errors.resolution
         }) {
             (self.window, self.rates) = (Some(Window::new(measurement)), None);
         } else if t >= window_s {

@@ -18,7 +18,7 @@ use crate::control::setpoint::pose_samples::PoseSamples;
 use crate::control::setpoint::target::Target;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::limits::{Limit, LimitSet, Limits, largest_ratio};
 use crate::control::signals::state::State;
@@ -184,7 +184,7 @@ pub fn check_deviation(
 /// Deviation of a setpoint from the continuation of the one before, over the engage tolerance.
 fn jump_ratio(parameters: &Parameters, before: &SetpointMotion, setpoint: &SetpointMotion) -> f64 {
     let continued = before.motion_at(parameters, setpoint.setpoint.time_ns);
-    parameters.tolerance_ratio(&TrackingError::new(&setpoint.motion, &continued.pose, &continued.twist))
+    parameters.tolerance_ratio(&PoseError::new(&setpoint.motion, &continued.pose, &continued.twist))
 }
 
 /// Checks that a setpoint keeps the limits at its instant. Adds those that it is near to, up to the check that failed.

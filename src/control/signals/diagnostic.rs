@@ -18,7 +18,7 @@ pub enum Reaction {
 
 /// Meaning of the number of a diagnostic and source of its bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BoundDescription {
+pub enum Comparison {
     /// The code has no number.
     None,
     /// A quantity with a unit, compared with a bound in the same unit.
@@ -48,21 +48,21 @@ const fn absolute(
     unit: &'static str,
     relation: &'static str,
     bound: &'static str,
-) -> BoundDescription {
-    BoundDescription::Absolute { quantity, unit, relation, bound }
+) -> Comparison {
+    Comparison::Absolute { quantity, unit, relation, bound }
 }
 
-const fn ratio(quantity: &'static str, bound: &'static str) -> BoundDescription {
-    BoundDescription::Ratio { quantity, bound }
+const fn ratio(quantity: &'static str, bound: &'static str) -> Comparison {
+    Comparison::Ratio { quantity, bound }
 }
 
-const NO_NUMBER: BoundDescription = BoundDescription::None;
+const NO_NUMBER: Comparison = Comparison::None;
 
 /// Remedy of a code that asks nothing of the operator.
 const NO_REMEDY: &str = "nothing";
 
 /// Leg lengths and the stroke.
-const STROKE: BoundDescription = absolute(
+const STROKE: Comparison = absolute(
     "leg length",
     "m",
     "is outside",
@@ -109,7 +109,7 @@ macro_rules! codes {
             }
 
             /// The quantity that was compared, and the source of its bound.
-            pub fn comparison(self) -> BoundDescription {
+            pub fn comparison(self) -> Comparison {
                 match self { $(Self::$variant => $comparison,)* }
             }
 
@@ -152,9 +152,9 @@ codes! {
     /// Without setpoints the platform holds its pose, as `[setpoint] on_violation` is `limit`.
     HoldingPose = 11, None, absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"), "no setpoints: the platform holds its pose", "start a setpoint source";
     /// Two processes publish measurements; control does not begin before one of them ends.
-    TwoMeasuredSources = 12, None, BoundDescription::Processes, "two sources of measurements", "end one of them";
+    TwoMeasuredSources = 12, None, Comparison::Processes, "two sources of measurements", "end one of them";
     /// Two processes publish setpoints; control does not begin before one of them ends.
-    TwoSetpointSources = 13, None, BoundDescription::Processes, "two sources of setpoints", "end one of them";
+    TwoSetpointSources = 13, None, Comparison::Processes, "two sources of setpoints", "end one of them";
     /// The lengths do not show that the platform stands, and the driver sends no rates.
     RestNotShown = 14, None, absolute("speed of a joint by the lengths", "m/s", "exceeds", "that of a platform that stands,"), "the lengths do not show that the platform stands", "wait until it stands; a start in motion needs measured rates; [measured] length_noise_m says how long the lengths are watched";
     /// Setpoints stopped arriving while the setpoint was in motion.
@@ -198,7 +198,7 @@ codes! {
     MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range from a tenth of a period ahead to timeouts.measured_ms, whose bound is"), "measurement with an invalid time stamp", "stamp with the CLOCK_MONOTONIC instant of sampling";
     /// The pose is so near a singular one that `limits.condition` is exceeded, or a setpoint could only be stopped
     /// where it would be.
-    NearSingular = 119, Stop, absolute("condition", "", "exceeds", "limits.condition"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
+    NearSingular = 119, Stop, absolute("condition", "", "exceeds", "limits.condition, or the part of it that a reference may use,"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
     /// The measured rates changed faster than actuators can.
     RateJumped = 120, Brake, absolute("change of rate", "m/s", "exceeds", "the plausible change,"), "measured rates jumped", "check for a collision; check the encoders and the driver";
     /// A setpoint of an unknown kind, or of poses alone under `on_violation = "stop"`.
@@ -297,17 +297,17 @@ impl fmt::Display for Diagnostic {
             };
             let (value, bound) = (Rounded(*value), Rounded(*bound));
             match code.comparison() {
-                BoundDescription::None => {}
-                BoundDescription::Processes => {
+                Comparison::None => {}
+                Comparison::Processes => {
                     write!(f, ": process {value} counts, process {bound} does not")?;
                 }
-                BoundDescription::Absolute { quantity, unit, relation, bound: source } => {
+                Comparison::Absolute { quantity, unit, relation, bound: source } => {
                     let space = if unit.is_empty() { "" } else { " " };
                     write!(f, ": {quantity} {value}{space}{unit}")?;
                     place(f)?;
                     write!(f, " {relation} {source} {bound}{space}{unit}")?;
                 }
-                BoundDescription::Ratio { quantity, bound: source } => {
+                Comparison::Ratio { quantity, bound: source } => {
                     write!(f, ": {quantity}")?;
                     place(f)?;
                     write!(f, " is {value} times {source}")?;

@@ -10,14 +10,14 @@ use crate::model::rigid::{Motion, Pose, Twist};
 /// Tracking error of pose and twist, desired minus measured, base axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-pub struct TrackingError {
+pub struct PoseError {
     /// `[e_R; e_p]` \[rad\], \[m\].
     pub pose: Twist,
     /// `[omega_d - omega; v_d - v]` \[rad/s\], \[m/s\].
     pub twist: Twist,
 }
 
-impl TrackingError {
+impl PoseError {
     /// The error at one instant.
     pub fn new(desired: &Motion, pose: &Pose, twist: &Twist) -> Self {
         Self {
@@ -33,14 +33,14 @@ impl TrackingError {
 /// Error that feedback acts on, desired minus measured: of the pose, or in modes on legs of their lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-pub struct FeedbackError {
+pub struct ErrorCoordinates {
     /// Desired minus measured: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,
     /// Its time derivative.
     pub rate: Vector6<f64>,
 }
 
-impl FeedbackError {
+impl ErrorCoordinates {
     /// Of the legs.
     pub fn of_legs(machine: &Machine, desired: &Motion, length: &[f64; LEGS], rate: &[f64; LEGS]) -> Self {
         let (desired, desired_rate) = leg_lengths_and_rates(machine, &desired.pose, &desired.twist);
@@ -51,14 +51,14 @@ impl FeedbackError {
     }
 }
 
-impl From<&TrackingError> for FeedbackError {
-    fn from(error: &TrackingError) -> Self {
+impl From<&PoseError> for ErrorCoordinates {
+    fn from(error: &PoseError) -> Self {
         Self { value: error.pose.vector(), rate: error.twist.vector() }
     }
 }
 
-impl From<&FeedbackError> for TrackingError {
-    fn from(deviation: &FeedbackError) -> Self {
+impl From<&ErrorCoordinates> for PoseError {
+    fn from(deviation: &ErrorCoordinates) -> Self {
         Self { pose: Twist::from_vector(&deviation.value), twist: Twist::from_vector(&deviation.rate) }
     }
 }
@@ -66,7 +66,7 @@ impl From<&FeedbackError> for TrackingError {
 /// Estimate of one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-pub struct ErrorState {
+pub struct ErrorEstimate {
     /// e, desired minus true: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,
     /// w, its rate.
@@ -75,7 +75,7 @@ pub struct ErrorState {
     pub disturbance: Vector6<f64>,
 }
 
-impl ErrorState {
+impl ErrorEstimate {
     /// Moves it over `dt` seconds in which feedback accelerates the platform by u.
     pub fn advance(&mut self, dt: f64, u: &Vector6<f64>) {
         let acceleration = self.disturbance - u;
@@ -91,7 +91,7 @@ impl ErrorState {
     }
 
     /// Without the disturbance.
-    pub fn error(&self) -> FeedbackError {
-        FeedbackError { value: self.value, rate: self.rate }
+    pub fn error(&self) -> ErrorCoordinates {
+        ErrorCoordinates { value: self.value, rate: self.rate }
     }
 }

@@ -121,5 +121,5 @@ pub struct Input {
     /// Processes that publish measurements.
     pub measured_publishers: Publishers,
     /// Whether cycles were missed since the last one, and the deployment makes that a fault.
-    pub deadline_missed: bool,
+    pub overrun_is_fault: bool,
 }

@@ -113,13 +113,23 @@ impl Request {
     }
 }
 
+/// Identity of a message: two of one topic differ in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+pub struct MessageId {
+    /// Start of the publisher, or of the request words of a daemon.
+    pub epoch: u64,
+    /// Counts the messages of the epoch.
+    pub sequence: u64,
+}
+
 /// An operator's request with the identity of its message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OperatorRequest {
     /// Change of state that the operator requests.
     pub request: Request,
-    /// Epoch and sequence number of the message.
-    pub message: (u64, u64),
+    /// The message that brought it.
+    pub message: MessageId,
 }
 
 /// Goal of a stop: the state that follows once the platform is at rest.

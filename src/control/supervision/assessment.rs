@@ -1,19 +1,18 @@
 //! Assessment of a cycle: whether the platform is located, may be engaged, and can follow its reference further.
 
 use crate::control::cycle::Cycle;
-use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::parameters::Parameters;
 use crate::control::reference::ReferenceGenerator;
-use crate::control::sensing::localization::{Localization, Located};
+use crate::control::sensing::localization::Localization;
 use crate::control::setpoint::target::Target;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Input, Publishers, SetpointKind};
 use crate::control::signals::limits::{Limit, LimitSet, largest_ratio};
 use crate::control::signals::state::State;
 use crate::control::supervision::supervisor::Findings;
-use crate::model::rigid::Motion;
 
 /// Deviation of the reference from a target at which it counts as reached, over the engage tolerance: near enough to a
 /// setpoint in motion, and at home almost at rest.
@@ -24,21 +23,22 @@ const AT_HOME_RATIO: f64 = 0.005;
 pub(in crate::control) struct Evidence<'a> {
     pub input: &'a Input,
     pub setpoint: &'a ValidatedSetpoint<'a>,
-    pub located: Result<&'a Located<'a>, Diagnostic>,
-    pub error: Option<&'a TrackingError>,
-    pub feedback: &'a FeedbackBound,
-    /// What the measurements and the prediction disagree in.
-    pub distrust: Option<&'a Diagnostic>,
-    /// What has changed of payload and surroundings, or that the platform oscillates.
-    pub change: Option<&'a Diagnostic>,
+    /// Whether the pose is known.
+    pub localization: Result<(), Diagnostic>,
+    pub error: Option<&'a PoseError>,
+    /// Whether the reference was placed, with a verified stop, where control would begin; without control.
+    pub start: Result<(), Diagnostic>,
     /// Whether drives and external sensors report nothing that contradicts.
     pub reports: &'a [Result<(), Diagnostic>; 2],
     /// Whether the drives are ready, or nothing else is reported.
     pub is_ready: bool,
-    /// The motion with which control would begin, or why it is not known.
-    pub free_motion: Result<&'a Motion, Diagnostic>,
-    /// Whether a length repeats itself.
-    pub is_doubtful: bool,
+    pub feedback: &'a FeedbackLimiter,
+    /// What the last measurement and the prediction disagree in, or which sensor is frozen.
+    pub sensor_diagnostic: Option<&'a Diagnostic>,
+    /// What has changed of payload and surroundings, or that the platform oscillates.
+    pub disturbance_diagnostic: Option<&'a Diagnostic>,
+    /// Whether a length repeats itself: its sensor may be frozen.
+    pub may_be_frozen: bool,
 }
 
 // Out of line, as is `target` in the controller: jump tables inside `step` are beyond the proof on the machine code.
@@ -48,10 +48,10 @@ pub(in crate::control) fn assess(
     cycle: &Cycle<'_>,
     evidence: &Evidence<'_>,
     localization: &Localization,
-    reference: &mut ReferenceGenerator,
+    reference: &ReferenceGenerator,
     active_limits: &mut LimitSet,
 ) -> Findings {
-    let Evidence { setpoint, located, is_ready, .. } = evidence;
+    let Evidence { setpoint, localization: located, is_ready, .. } = evidence;
     let conditioned = localization.check_condition(cycle.constants.parameters.condition, active_limits);
     let tracking = match cycle.state.has_control() {
         true => check_tracking(cycle, evidence, &conditioned, active_limits),
@@ -59,7 +59,7 @@ pub(in crate::control) fn assess(
     };
     let start = match cycle.state.has_control() || located.is_err() {
         true => Ok(()),
-        false => check_start(cycle, evidence, reference),
+        false => check_start(evidence),
     };
     // Nothing depends on it while the setpoint is followed.
     let engagement = match cycle.state {
@@ -68,8 +68,8 @@ pub(in crate::control) fn assess(
     };
     let is_waiting = cycle.state == State::Engaging && !is_ready;
     let has_ended = !is_waiting && has_ended(cycle, setpoint, reference);
-    let localization = located.map(drop);
-    Findings { localization, start, engagement, tracking, is_doubtful: evidence.is_doubtful, has_ended }
+    let is_doubtful = evidence.may_be_frozen;
+    Findings { localization: *located, start, engagement, tracking, is_doubtful, has_ended }
 }
 
 // In the checks each result is looked at where it is, as copies of many that are in order take time.
@@ -80,15 +80,15 @@ fn check_tracking(
     conditioned: &Result<(), Diagnostic>,
     active_limits: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
-    let Evidence { input, setpoint, error, feedback, distrust, change, .. } = evidence;
+    let Evidence { input, setpoint, error, feedback, .. } = evidence;
     check_reports(evidence)?;
-    if let Some(distrust) = distrust {
-        return Err(**distrust);
+    if let Some(diagnostic) = evidence.sensor_diagnostic {
+        return Err(*diagnostic);
     }
     check_following_error(&cycle.constants.parameters, *error, active_limits)?;
-    feedback.check()?;
-    if let Some(change) = change {
-        return Err(**change);
+    feedback.check_saturation_time()?;
+    if let Some(diagnostic) = evidence.disturbance_diagnostic {
+        return Err(*diagnostic);
     }
     check_deadline(input)?;
     if let State::Engaging | State::Active = cycle.state {
@@ -141,7 +141,7 @@ fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &Re
 fn check_engage_tolerance(
     parameters: &Parameters,
     setpoint: &ValidatedSetpoint<'_>,
-    error: Option<&TrackingError>,
+    error: Option<&PoseError>,
 ) -> Result<(), Diagnostic> {
     let Some(error) = error else { return Err(DiagnosticCode::NoSetpoint.into()) };
     let is_target = setpoint.valid.is_some_and(|valid| valid.setpoint.kind == SetpointKind::Target);
@@ -158,24 +158,19 @@ fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), 
     if ignored == 0 { Ok(()) } else { Err(Diagnostic::new(code, counting.into(), ignored.into())) }
 }
 
-/// Control may begin if the motion without force is known and a stop from it was verified. Places the reference there.
-fn check_start(
-    cycle: &Cycle<'_>,
-    evidence: &Evidence<'_>,
-    reference: &mut ReferenceGenerator,
-) -> Result<(), Diagnostic> {
+/// Control may begin if the motion without force is known and a stop from it was verified.
+fn check_start(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
     check_publishers(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
     check_reports(evidence)?;
-    let moving = Diagnostic::from(DiagnosticCode::PlatformMoving);
-    reference.place(cycle.constants, evidence.free_motion?).map_err(|limit| moving.at(limit as usize))
+    evidence.start
 }
 
 fn check_following_error(
     parameters: &Parameters,
-    error: Option<&TrackingError>,
+    error: Option<&PoseError>,
     active: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
-    let Some(TrackingError { pose, twist }) = error else { return Ok(()) };
+    let Some(PoseError { pose, twist }) = error else { return Ok(()) };
     let Parameters { following_position, following_orientation, .. } = parameters;
     let Parameters { following_velocity, following_angular_velocity, .. } = parameters;
     let ratio =
@@ -194,5 +189,5 @@ fn check_following_error(
 }
 
 fn check_deadline(input: &Input) -> Result<(), Diagnostic> {
-    if input.deadline_missed { Err(DiagnosticCode::DeadlineMissed.into()) } else { Ok(()) }
+    if input.overrun_is_fault { Err(DiagnosticCode::DeadlineMissed.into()) } else { Ok(()) }
 }

@@ -9,7 +9,7 @@
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
 use crate::control::signals::inputs::Input;
 use crate::control::signals::state::AfterStop;
-use crate::control::signals::state::{OperatorRequest, Request, State};
+use crate::control::signals::state::{MessageId, OperatorRequest, Request, State};
 
 /// State of the controller, with its reason and the goal of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,9 +44,9 @@ pub struct Findings {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct Supervisor {
-    pub mode: SupervisorState,
+    pub current: SupervisorState,
     /// Message of the last request carried out or refused.
-    pub answered: (u64, u64),
+    pub answered_message: MessageId,
     /// Why that one was refused; code `None` if it was not.
     pub request_diagnostic: Diagnostic,
 }
@@ -54,7 +54,7 @@ pub(in crate::control) struct Supervisor {
 impl Supervisor {
     /// The request of an input if it was not answered before: each is carried out once.
     pub fn new_request(&self, input: &Input) -> Option<OperatorRequest> {
-        input.request.filter(|request| request.message != self.answered)
+        input.request.filter(|request| request.message != self.answered_message)
     }
 
     /// Decides the next state. Returns it.
@@ -64,24 +64,24 @@ impl Supervisor {
         findings: &Findings,
         after_loss: AfterStop,
     ) -> State {
-        let (mode, refusal) = next(self.mode, request.map(|new| new.request), findings, after_loss);
-        self.mode = mode;
+        let (current, refusal) = next(self.current, request.map(|new| new.request), findings, after_loss);
+        self.current = current;
         if let Some(OperatorRequest { message, .. }) = request {
-            (self.answered, self.request_diagnostic) = (message, refusal.unwrap_or_default());
+            (self.answered_message, self.request_diagnostic) = (message, refusal.unwrap_or_default());
         }
-        mode.state
+        current.state
     }
 
     /// Enters the state fault: no valid force could be computed.
     pub fn fail(&mut self, diagnostic: Diagnostic) {
-        self.mode = fault(diagnostic);
+        self.current = fault(diagnostic);
     }
 }
 
 /// The next state, and why a request was refused if it was. `after_loss` follows the stop of a platform that lost its
 /// setpoint.
 pub fn next(
-    mode: SupervisorState,
+    current: SupervisorState,
     request: Option<Request>,
     findings: &Findings,
     after_loss: AfterStop,
@@ -89,7 +89,7 @@ pub fn next(
     if request == Some(Request::Estop) {
         return (fault(DiagnosticCode::EmergencyStop.into()), None);
     }
-    if mode.state.has_control() {
+    if current.state.has_control() {
         // Control needs the pose, whatever the reason it is unknown.
         if let Err(diagnostic) = findings.localization {
             return (fault(diagnostic), None);
@@ -100,21 +100,21 @@ pub fn next(
             return (fault(diagnostic), None);
         }
         // A payload or an impact that a frozen sensor has made looks like any other.
-        let under_way = (mode.state == State::Stopping).then_some(mode.diagnostic);
+        let under_way = (current.state == State::Stopping).then_some(current.diagnostic);
         let change = findings.tracking.err().into_iter().chain(under_way).find(|cause| is_change(cause.code));
         if let Some(cause) = change.filter(|_| findings.is_doubtful) {
             return (fault(cause), None);
         }
     }
-    if request == Some(Request::Off) && mode.state != State::Fault {
+    if request == Some(Request::Off) && current.state != State::Fault {
         return (OFF_BY_REQUEST, None);
     }
-    match mode.state {
-        State::Off | State::Standby => without_force(mode, request, findings),
-        State::Fault => in_fault(mode, request),
-        State::Engaging | State::Active => following(mode, request, findings, after_loss),
-        State::Stopping => stopping(mode, request, findings),
-        State::Parking => parking(mode, request, findings),
+    match current.state {
+        State::Off | State::Standby => without_force(current, request, findings),
+        State::Fault => in_fault(current, request),
+        State::Engaging | State::Active => following(current, request, findings, after_loss),
+        State::Stopping => stopping(current, request, findings),
+        State::Parking => parking(current, request, findings),
     }
 }
 
@@ -143,7 +143,7 @@ fn standby(diagnostic: Diagnostic) -> SupervisorState {
 }
 
 fn without_force(
-    mode: SupervisorState,
+    current: SupervisorState,
     request: Option<Request>,
     findings: &Findings,
 ) -> (SupervisorState, Option<Diagnostic>) {
@@ -151,7 +151,7 @@ fn without_force(
         Ok(()) => standby(findings.engagement.err().unwrap_or(DiagnosticCode::ReadyToEngage.into())),
         Err(diagnostic) => SupervisorState { state: State::Off, diagnostic, ..SupervisorState::default() },
     };
-    let rest = if mode == OFF_BY_REQUEST { mode } else { ready };
+    let rest = if current == OFF_BY_REQUEST { current } else { ready };
     match request {
         Some(Request::Engage) => match findings.localization.and(findings.engagement) {
             Ok(()) => (SupervisorState { state: State::Engaging, ..SupervisorState::default() }, None),
@@ -167,26 +167,27 @@ fn without_force(
     }
 }
 
-fn in_fault(mode: SupervisorState, request: Option<Request>) -> (SupervisorState, Option<Diagnostic>) {
+fn in_fault(current: SupervisorState, request: Option<Request>) -> (SupervisorState, Option<Diagnostic>) {
     match request {
         Some(Request::Clear) => (SupervisorState::default(), None),
-        Some(Request::Engage | Request::Park) => (mode, Some(DiagnosticCode::InvalidInState.into())),
-        Some(Request::Stop | Request::Off | Request::Estop) | None => (mode, None),
+        Some(Request::Engage | Request::Park) => (current, Some(DiagnosticCode::InvalidInState.into())),
+        Some(Request::Stop | Request::Off | Request::Estop) | None => (current, None),
     }
 }
 
 fn following(
-    mode: SupervisorState,
+    current: SupervisorState,
     request: Option<Request>,
     findings: &Findings,
     after_loss: AfterStop,
 ) -> (SupervisorState, Option<Diagnostic>) {
-    let (mut mode, mut has_ended) = (mode, findings.has_ended);
+    let (mut current, mut has_ended) = (current, findings.has_ended);
     if let Err(diagnostic) = findings.tracking {
         let after = match diagnostic.code {
             // Holds its pose; from there it engages again.
             DiagnosticCode::HoldingPose => {
-                (mode, has_ended) = (SupervisorState { state: State::Engaging, diagnostic, ..mode }, false);
+                (current, has_ended) =
+                    (SupervisorState { state: State::Engaging, diagnostic, ..current }, false);
                 None
             }
             DiagnosticCode::SetpointLost => Some(after_loss),
@@ -197,48 +198,49 @@ fn following(
             return (stop(diagnostic, after), None);
         }
     } else {
-        mode.diagnostic = Diagnostic::default();
+        current.diagnostic = Diagnostic::default();
     }
     match request {
         Some(Request::Stop) => (stop(REQUESTED, AfterStop::Standby), None),
         Some(Request::Park) => (stop(REQUESTED, AfterStop::Park), None),
-        Some(Request::Clear) => (mode, Some(DiagnosticCode::InvalidInState.into())),
+        Some(Request::Clear) => (current, Some(DiagnosticCode::InvalidInState.into())),
         Some(Request::Engage | Request::Off | Request::Estop) | None => {
-            let state = if has_ended { State::Active } else { mode.state };
-            (SupervisorState { state, ..mode }, None)
+            let state = if has_ended { State::Active } else { current.state };
+            (SupervisorState { state, ..current }, None)
         }
     }
 }
 
 fn stopping(
-    mode: SupervisorState,
+    current: SupervisorState,
     request: Option<Request>,
     findings: &Findings,
 ) -> (SupervisorState, Option<Diagnostic>) {
-    let (mode, refused) = match (request, mode.after) {
-        _ if findings.tracking.is_err() && mode.after != AfterStop::Fault => {
-            (findings.tracking.map_or_else(|diagnostic| stop(diagnostic, AfterStop::Fault), |()| mode), None)
-        }
+    let (current, refused) = match (request, current.after) {
+        _ if findings.tracking.is_err() && current.after != AfterStop::Fault => (
+            findings.tracking.map_or_else(|diagnostic| stop(diagnostic, AfterStop::Fault), |()| current),
+            None,
+        ),
         (Some(Request::Park), AfterStop::Standby) => (stop(REQUESTED, AfterStop::Park), None),
         (Some(Request::Stop), AfterStop::Park) => (stop(REQUESTED, AfterStop::Standby), None),
         (Some(Request::Engage | Request::Clear | Request::Park), _) => {
-            (mode, Some(DiagnosticCode::InvalidInState.into()))
+            (current, Some(DiagnosticCode::InvalidInState.into()))
         }
-        _ => (mode, None),
+        _ => (current, None),
     };
     if !findings.has_ended {
-        return (mode, refused);
+        return (current, refused);
     }
-    let rest = match mode.after {
-        AfterStop::Standby => standby(current(mode.diagnostic.code, findings)),
-        AfterStop::Park => SupervisorState { state: State::Parking, after: AfterStop::default(), ..mode },
-        AfterStop::Fault => fault(mode.diagnostic),
+    let rest = match current.after {
+        AfterStop::Standby => standby(present(current.diagnostic.code, findings)),
+        AfterStop::Park => SupervisorState { state: State::Parking, after: AfterStop::default(), ..current },
+        AfterStop::Fault => fault(current.diagnostic),
     };
     (rest, refused)
 }
 
 fn parking(
-    mode: SupervisorState,
+    current: SupervisorState,
     request: Option<Request>,
     findings: &Findings,
 ) -> (SupervisorState, Option<Diagnostic>) {
@@ -247,14 +249,16 @@ fn parking(
     }
     match request {
         Some(Request::Stop) => return (stop(REQUESTED, AfterStop::Standby), None),
-        Some(Request::Engage | Request::Clear) => return (mode, Some(DiagnosticCode::InvalidInState.into())),
+        Some(Request::Engage | Request::Clear) => {
+            return (current, Some(DiagnosticCode::InvalidInState.into()));
+        }
         Some(Request::Park | Request::Off | Request::Estop) | None => {}
     }
-    (if findings.has_ended { OFF_BY_REQUEST } else { mode }, None)
+    (if findings.has_ended { OFF_BY_REQUEST } else { current }, None)
 }
 
 /// The diagnostic of a code with the number of this cycle, if the code still prevents control.
-fn current(code: DiagnosticCode, findings: &Findings) -> Diagnostic {
+fn present(code: DiagnosticCode, findings: &Findings) -> Diagnostic {
     findings.engagement.err().filter(|found| found.code == code).unwrap_or(code.into())
 }
 
@@ -275,9 +279,9 @@ mod tests {
         has_ended: false,
     };
 
-    /// The mode after one cycle.
-    fn after(mode: SupervisorState, findings: &Findings) -> SupervisorState {
-        next(mode, None, findings, AfterStop::Fault).0
+    /// The current after one cycle.
+    fn after(current: SupervisorState, findings: &Findings) -> SupervisorState {
+        next(current, None, findings, AfterStop::Fault).0
     }
 
     #[test]
@@ -286,11 +290,11 @@ mod tests {
         for findings in
             [Findings { localization: Err(FOUND), ..IN_ORDER }, Findings { tracking: Err(FOUND), ..IN_ORDER }]
         {
-            let mut mode = after(active, &findings);
-            assert_eq!((mode.state, mode.diagnostic), (State::Fault, FOUND), "{findings:?}");
+            let mut current = after(active, &findings);
+            assert_eq!((current.state, current.diagnostic), (State::Fault, FOUND), "{findings:?}");
             for later in [IN_ORDER, Findings { localization: Err(OTHER), tracking: Err(OTHER), ..IN_ORDER }] {
-                mode = after(mode, &later);
-                assert_eq!((mode.state, mode.diagnostic), (State::Fault, FOUND), "{later:?}");
+                current = after(current, &later);
+                assert_eq!((current.state, current.diagnostic), (State::Fault, FOUND), "{later:?}");
             }
         }
     }
@@ -299,12 +303,12 @@ mod tests {
     fn a_stop_that_ends_in_a_fault_keeps_value_and_bound_of_its_cause() {
         let cause = Diagnostic { code: DiagnosticCode::SetpointTooFast, ..FOUND };
         let active = SupervisorState { state: State::Active, ..SupervisorState::default() };
-        let mut mode = after(active, &Findings { tracking: Err(cause), ..IN_ORDER });
-        assert_eq!((mode.state, mode.diagnostic), (State::Stopping, cause));
-        mode = after(mode, &IN_ORDER);
-        assert_eq!((mode.state, mode.diagnostic), (State::Stopping, cause));
-        mode = after(mode, &Findings { has_ended: true, ..IN_ORDER });
-        assert_eq!((mode.state, mode.diagnostic), (State::Fault, cause));
+        let mut current = after(active, &Findings { tracking: Err(cause), ..IN_ORDER });
+        assert_eq!((current.state, current.diagnostic), (State::Stopping, cause));
+        current = after(current, &IN_ORDER);
+        assert_eq!((current.state, current.diagnostic), (State::Stopping, cause));
+        current = after(current, &Findings { has_ended: true, ..IN_ORDER });
+        assert_eq!((current.state, current.diagnostic), (State::Fault, cause));
     }
 
     #[test]
@@ -313,8 +317,8 @@ mod tests {
         let later = Findings { tracking: Err(DiagnosticCode::SetpointTooFast.into()), ..IN_ORDER };
         assert_eq!(after(stopping, &later), stopping);
         // A stop for another reason becomes one that ends in a fault.
-        let mode = after(stop(REQUESTED, AfterStop::Standby), &later);
-        assert_eq!(mode, stop(DiagnosticCode::SetpointTooFast.into(), AfterStop::Fault));
+        let current = after(stop(REQUESTED, AfterStop::Standby), &later);
+        assert_eq!(current, stop(DiagnosticCode::SetpointTooFast.into(), AfterStop::Fault));
     }
 
     /// The reason of a stop with the value of this cycle, if it still prevents control.
@@ -324,8 +328,8 @@ mod tests {
         let stopping = stop(Diagnostic { value: 0.5, ..FOUND }, AfterStop::Standby);
         let of_code = Diagnostic::from(FOUND.code);
         for (engagement, shown) in [(Ok(()), of_code), (Err(FOUND), FOUND), (Err(OTHER), of_code)] {
-            let mode = after(stopping, &Findings { engagement, ..ended });
-            assert_eq!((mode.state, mode.diagnostic), (State::Standby, shown));
+            let current = after(stopping, &Findings { engagement, ..ended });
+            assert_eq!((current.state, current.diagnostic), (State::Standby, shown));
         }
     }
 
@@ -336,9 +340,9 @@ mod tests {
         for code in [DiagnosticCode::PayloadChanged, DiagnosticCode::Impact, DiagnosticCode::DeadlineMissed] {
             let brakes = code != DiagnosticCode::DeadlineMissed;
             let found = Findings { tracking: Err(code.into()), ..IN_ORDER };
-            let expected = |mode: SupervisorState| {
+            let expected = |current: SupervisorState| {
                 let state = if brakes { State::Fault } else { State::Stopping };
-                assert_eq!((mode.state, mode.diagnostic.code), (state, code));
+                assert_eq!((current.state, current.diagnostic.code), (state, code));
             };
             expected(after(active, &Findings { is_doubtful: true, ..found }));
             let stopping = after(active, &found);

@@ -1,7 +1,7 @@
 //! Inputs of the controller: the newest message of each topic, and the request that is pending.
 
 use crate::control::signals::inputs::{Input, Measurement, Setpoint};
-use crate::control::signals::state::{OperatorRequest, Request};
+use crate::control::signals::state::{MessageId, OperatorRequest, Request};
 use crate::daemon::cycle::CycleInput;
 use crate::daemon::reload::timeouts::TimeoutsNs;
 use crate::messages::clock::monotonic_ns;
@@ -11,7 +11,8 @@ use crate::messages::{
 };
 
 /// The daemon's own request before it ends; no message has this epoch.
-const STOP_BEFORE_END: OperatorRequest = OperatorRequest { request: Request::Stop, message: (0, 1) };
+const STOP_BEFORE_END: OperatorRequest =
+    OperatorRequest { request: Request::Stop, message: MessageId { epoch: 0, sequence: 1 } };
 
 /// Messages kept per topic between two reads. Only the newest counts.
 const DEPTH: usize = 8;
@@ -35,7 +36,7 @@ pub struct InputFilter {
     /// The platform is under control: no publisher takes over from one that lives, nor one that was ignored.
     pub has_control: bool,
     /// The last request that the controller has carried out or refused.
-    pub answered: (u64, u64),
+    pub answered_message: MessageId,
     /// The daemon is to end: no request may start control, and the platform is to come to rest.
     pub is_ending: bool,
     /// The request word. A new one replaces what is pending: it came later, or has precedence.
@@ -117,11 +118,11 @@ impl Inputs {
     /// Of the requests that are not yet answered the one of highest precedence counts. The clock is read behind each message: this
     /// thread may have been held just before it.
     pub fn receive_requests(&mut self, clock: impl Fn() -> u64, filter: InputFilter) {
-        let InputFilter { answered, is_ending, word, word_ns, .. } = filter;
+        let InputFilter { answered_message, is_ending, word, word_ns, .. } = filter;
         if word != self.word {
             (self.word, self.cycle.input.request) = (word, None);
         }
-        let is_pending = |request: &OperatorRequest| request.message != answered;
+        let is_pending = |request: &OperatorRequest| request.message != answered_message;
         for _ in 0..REQUESTS_PER_ROUND {
             let Some(message) = self.commands.receive_from_any() else { break };
             let Some(request) = message.request() else { continue };
@@ -160,20 +161,25 @@ mod tests {
         let bus = Bus::join(&format!("old-requests-{}", std::process::id())).unwrap();
         let mut inputs = Inputs::open(&bus, TimeoutsNs { setpoint_ns: 1, measured_ns: 1 }).unwrap();
         let mut commands = bus.publisher::<CommandMessage>().unwrap();
-        let mut answered = (0, 0);
+        let mut answered_message = MessageId::default();
         for request in Request::ALL {
             for (age_ns, is_old) in [(MAX_REQUEST_AGE_NS, false), (MAX_REQUEST_AGE_NS + 1, true)] {
                 let sent_ns = monotonic_ns();
                 let message = commands.next_message();
                 commands.publish(sent_ns, request.into()).unwrap();
-                let filter =
-                    InputFilter { has_control: false, answered, is_ending: false, word: 0, word_ns: 0 };
+                let filter = InputFilter {
+                    has_control: false,
+                    answered_message,
+                    is_ending: false,
+                    word: 0,
+                    word_ns: 0,
+                };
                 inputs.receive_requests(|| sent_ns + age_ns, filter);
                 let found = inputs.input().request.filter(|found| found.message == message);
                 let is_accepted = !(is_old && request.can_begin_control());
                 let expected = is_accepted.then_some(OperatorRequest { request, message });
                 assert_eq!(found, expected, "{request:?} after {age_ns} ns");
-                answered = found.map_or(answered, |found| found.message);
+                answered_message = found.map_or(answered_message, |found| found.message);
             }
         }
     }
@@ -190,8 +196,13 @@ mod tests {
                 commands.publish(sent_ns, request.into()).unwrap();
                 let word = 2 * word + later_ns;
                 let word_ns = sent_ns + later_ns;
-                let filter =
-                    InputFilter { has_control: false, answered: (0, 0), is_ending: false, word, word_ns };
+                let filter = InputFilter {
+                    has_control: false,
+                    answered_message: MessageId::default(),
+                    is_ending: false,
+                    word,
+                    word_ns,
+                };
                 inputs.receive_requests(|| sent_ns, filter);
                 let is_accepted = !(is_overtaken && request.can_begin_control());
                 let expected = is_accepted.then_some(OperatorRequest { request, message });

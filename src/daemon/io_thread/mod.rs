@@ -5,6 +5,7 @@
 //! participants. When a peer connects or disappears, the port calls here allocate and block for a moment; the real-time
 //! thread continues with data of known age.
 
+use crate::control::signals::state::MessageId;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use heapless::spsc::Producer;
@@ -99,7 +100,7 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
     let at_start = ThreadUsage::of_this_thread();
     let Ports { inputs, outputs } = ports;
     let allocations_at_start = at_start.allocations;
-    let (published, answered, snapshot) = (0, (0, 0), Snapshot::default());
+    let (published, answered_message, snapshot) = (0, MessageId::default(), Snapshot::default());
     // Every wait looks at it.
     let progress = links.progress;
     let mut io = IoThread {
@@ -108,7 +109,7 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
         outputs,
         links,
         published,
-        answered,
+        answered_message,
         has_control: false,
         snapshot,
         allocations_at_start,
@@ -138,7 +139,7 @@ struct IoThread<'a> {
     /// Number of the cycle that was published last.
     published: u64,
     /// The last request that the controller has carried out or refused.
-    answered: (u64, u64),
+    answered_message: MessageId,
     /// The platform is under control.
     has_control: bool,
     /// What the control thread received last.
@@ -229,7 +230,13 @@ impl IoThread<'_> {
         let word = self.links.word.load();
         let is_simulated = self.settings.timing.release == ReleaseMode::Lockstep;
         let word_ns = if is_simulated { 0 } else { request_word::time_ns(word) };
-        InputFilter { has_control: self.has_control, answered: self.answered, is_ending, word, word_ns }
+        InputFilter {
+            has_control: self.has_control,
+            answered_message: self.answered_message,
+            is_ending,
+            word,
+            word_ns,
+        }
     }
 
     fn hand_over_inputs(&mut self) {
@@ -239,9 +246,9 @@ impl IoThread<'_> {
     /// Publishes the newest output unless it was published before; returns when it was due \[ns\].
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
-        (self.answered, self.has_control) = (output.answered, output.state.has_control());
+        (self.answered_message, self.has_control) = (output.answered_message, output.state.has_control());
         self.inputs.set_timeouts(self.links.timeouts.get());
-        if let (WORD_EPOCH, word) = output.answered {
+        if let MessageId { epoch: WORD_EPOCH, sequence: word } = output.answered_message {
             (self.snapshot.answered, self.snapshot.refusal) = (word, output.request_diagnostic);
             self.links.word.set_seen(word);
         }

@@ -9,12 +9,12 @@ use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
 use hexad::analysis::sampled_loop::SampledLoop;
 use hexad::config::Config;
 use hexad::config::deployment::FidelityChoice;
-use hexad::control::law::estimator::Readings;
+use hexad::control::law::estimator::ReadingErrors;
 use hexad::control::law::estimator::covariance::NoiseModel;
 use hexad::control::law::gains::Gains;
 use hexad::control::law::{ControlMode, Law};
 use hexad::control::signals::diagnostic::DiagnosticCode;
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
@@ -110,7 +110,10 @@ impl Delayed {
             release_ns: time_ns + self.age_ns,
             setpoint: Some(Setpoint::motion(time_ns, task)),
             measurement: Some(Measurement { time_ns, length, rate: Some(rate), ..Measurement::default() }),
-            request: Some(OperatorRequest { request: Request::Engage, message: (START_NS, 1) }),
+            request: Some(OperatorRequest {
+                request: Request::Engage,
+                message: MessageId { epoch: START_NS, sequence: 1 },
+            }),
             ..Input::default()
         });
         self.hardware.advance(self.age_ns, self.force);
@@ -168,7 +171,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
             as u64,
         force_rate: UNLIMITED,
         feedback_scale: UNLIMITED,
-        readings: Readings { noise: UNLIMITED, step: 0.0 },
+        reading_errors: ReadingErrors { deviation: UNLIMITED, resolution: 0.0 },
         ..parameters
     }
 }

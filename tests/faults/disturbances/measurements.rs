@@ -88,7 +88,7 @@ pub fn stamps_1_s_ahead(m: &mut Moment) {
 
 /// The way from the sensors has become longer.
 pub fn older_than_the_loop_stands(m: &mut Moment) {
-    let age_ns = m.world.parameters.max_measured_age_ns + 1_000_000;
+    let age_ns = m.world.parameters.max_age_at_arrival_ns + 1_000_000;
     m.measured().time_ns -= age_ns;
 }
 

@@ -12,7 +12,7 @@ use hexad::control::law::ControlMode;
 use hexad::control::sensing::localization::PlatformState;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::limits::Limit;
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::leg_motion;
@@ -119,9 +119,10 @@ impl<'a> Play<'a> {
 
     fn ask(&mut self, number: u8) {
         let request = Request::from_number(u32::from(number % 8));
-        let sequence = self.asked.map_or(1, |asked| asked.message.1 + 1);
-        self.asked =
-            request.map(|request| OperatorRequest { request, message: (7, sequence) }).or(self.asked);
+        let sequence = self.asked.map_or(1, |asked| asked.message.sequence + 1);
+        self.asked = request
+            .map(|request| OperatorRequest { request, message: MessageId { epoch: 7, sequence } })
+            .or(self.asked);
     }
 
     /// One instruction; false at the end.
@@ -170,10 +171,12 @@ impl<'a> Play<'a> {
             14 => match place % 4 {
                 0 => input.setpoint = None,
                 1 => input.measurement = None,
-                2 => input.deadline_missed = true,
+                2 => input.overrun_is_fault = true,
                 _ => {
-                    input.request =
-                        Some(OperatorRequest { request: Request::ALL[place % 6], message: (bits, bits) })
+                    input.request = Some(OperatorRequest {
+                        request: Request::ALL[place % 6],
+                        message: MessageId { epoch: bits, sequence: bits },
+                    })
                 }
             },
             _ => {
@@ -193,7 +196,7 @@ impl<'a> Play<'a> {
     }
 
     fn step(&mut self, input: Input) {
-        let request = input.request.filter(|asked| asked.message != self.last.answered);
+        let request = input.request.filter(|asked| asked.message != self.last.answered_message);
         let output = self.controller.step(&input);
         self.check(&output, request.map(|asked| asked.request));
         self.controlled |= output.state == State::Active;

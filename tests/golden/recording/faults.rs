@@ -153,7 +153,7 @@ fn stamps(recorder: &mut Recorder) {
     recorder.engage();
     recorder.go(MOVES, 0.5);
     recorder.run(150);
-    recorder.run_with(1, |m| m.input.deadline_missed = true);
+    recorder.run_with(1, |m| m.input.overrun_is_fault = true);
     recorder.until(State::Fault);
     recorder.engage();
     recorder.play(BuiltInMotion::Circle, 3.0);

@@ -6,7 +6,7 @@ use hexad::control::controller::{Controller, Output};
 use hexad::control::parameters::Parameters;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint, SetpointKind};
-use hexad::control::signals::state::{OperatorRequest, Request, State};
+use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::model::LEGS;
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, fit};
@@ -147,8 +147,9 @@ impl Recorder {
 
     /// A request, from the next input on.
     pub fn ask(&mut self, request: Request) {
-        let number = self.asked.map_or(1, |asked| asked.message.1 + 1);
-        self.asked = Some(OperatorRequest { request, message: (START_NS, number) });
+        let number = self.asked.map_or(1, |asked| asked.message.sequence + 1);
+        self.asked =
+            Some(OperatorRequest { request, message: MessageId { epoch: START_NS, sequence: number } });
     }
 
     /// Stops, clears a fault, and engages where the platform stands.

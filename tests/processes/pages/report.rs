@@ -7,7 +7,7 @@ use hexad::config::Config;
 use hexad::control::controller::Output;
 use hexad::control::sensing::localization::PlatformState;
 use hexad::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use hexad::control::signals::errors::TrackingError;
+use hexad::control::signals::errors::PoseError;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint};
 use hexad::control::signals::state::State;
 use hexad::messages::CycleMessage;
@@ -70,7 +70,7 @@ fn cycle(config: &Config, number: u64) -> CycleMessage {
             condition: 8.0,
             time_to_singularity: f64::INFINITY,
         }),
-        error: Some(TrackingError { pose: error, twist: Twist::default() }),
+        error: Some(PoseError { pose: error, twist: Twist::default() }),
         reference: Some(TaskState::at_rest(x).motion()),
         ..Output::default()
     };

@@ -39,7 +39,7 @@ pub struct Covariance {
 }
 
 /// Gains of a reading for e \[1\], w \[1/T\] and d \[1/T^2\], the latter two without their unit.
-pub type Gains = [f64; 3];
+pub type KalmanGains = [f64; 3];
 
 /// Relative change of a gain in an update below which the covariance counts as steady.
 const STEADY_CHANGE: f64 = 1e-13;
@@ -48,14 +48,15 @@ const MAX_STEADY_UPDATES: u32 = 1_000_000;
 
 impl NoiseModel {
     /// The covariance after a reading, when readings have come once a period for long, and the gains of the last.
-    pub fn steady(&self) -> (Covariance, [Gains; 2]) {
+    pub fn steady(&self) -> (Covariance, [KalmanGains; 2]) {
         let mut covariance = Covariance::default();
-        let mut gains = [Gains::default(); 2];
+        let mut gains = [KalmanGains::default(); 2];
         for _ in 0..MAX_STEADY_UPDATES {
             let before = gains[0];
             covariance.advance(self, 1.0);
-            gains[0] = covariance.correct_length();
-            gains[1] = self.rate_noise().map_or(Gains::default(), |noise| covariance.correct_rate(noise));
+            gains[0] = covariance.correct_value();
+            gains[1] =
+                self.rate_noise().map_or(KalmanGains::default(), |noise| covariance.correct_rate(noise));
             let [e, _, d] = gains[0];
             if (e - before[0]).abs() <= STEADY_CHANGE * e && (d - before[2]).abs() <= STEADY_CHANGE * d.abs()
             {
@@ -92,20 +93,20 @@ impl Covariance {
     }
 
     /// After a reading of e. Returns its gains.
-    pub fn correct_length(&mut self) -> Gains {
+    pub fn correct_value(&mut self) -> KalmanGains {
         let Self { ee, ew, ed, .. } = *self;
         let share = 1.0 / (ee + 1.0);
         self.correct([ee, ew, ed], share)
     }
 
     /// After a reading of T w with this variance. Returns its gains.
-    pub fn correct_rate(&mut self, noise: f64) -> Gains {
+    pub fn correct_rate(&mut self, noise: f64) -> KalmanGains {
         let Self { ew, ww, wd, .. } = *self;
         let share = 1.0 / (ww + noise);
         self.correct([ew, ww, wd], share)
     }
 
-    fn correct(&mut self, [e, w, d]: [f64; 3], share: f64) -> Gains {
+    fn correct(&mut self, [e, w, d]: [f64; 3], share: f64) -> KalmanGains {
         let gains = [e * share, w * share, d * share];
         let [by_e, by_w, by_d] = gains;
         self.ee -= by_e * e;
@@ -167,7 +168,7 @@ mod tests {
                 let (covariance, [gains, _]) = model.steady();
                 let mut next = covariance;
                 next.advance(&model, 1.0);
-                let again = next.correct_length();
+                let again = next.correct_value();
                 for (gain, again) in gains.iter().zip(again) {
                     assert!((gain / again - 1.0).abs() < 1e-9, "{hertz} Hz: {gains:?} {again:?}");
                 }

@@ -2,7 +2,7 @@
 //!
 //! It works in error coordinates, reference minus platform, of the pose or in modes on legs of their lengths. There the
 //! reference cancels. With u the acceleration of the platform by what feedback has *sent*, after all limits
-//! ([`input_matrix`]), and d the disturbance, the sum of all
+//! ([`input_matrix`](super::input_matrix)), and d the disturbance, the sum of all
 //! accelerations that the model does not contain:
 //!
 //! ```text
@@ -16,7 +16,7 @@
 //! sensors is filtered.
 //!
 //! The disturbance takes what feedback would otherwise need an error for: a payload, friction, a force of the process. Where it
-//! is compensated it stays within [`Law::saturation`](super::law::Law), so that a long contact is forgotten at once. Source of the structure: Luenberger (1971), Smith (1957) for the dead time.
+//! is compensated it stays within [`Law::max_compensated`](super::Law), so that a long contact is forgotten at once. Source of the structure: Luenberger (1971), Smith (1957) for the dead time.
 //!
 //! What it does not know: elastic legs, the lag of drives but as a dead time, and coloured noise.
 
@@ -28,13 +28,18 @@ use nalgebra::Vector6;
 use crate::control::law::estimator::covariance::{Covariance, NoiseModel};
 pub use crate::control::law::estimator::sent_accelerations::CAPACITY as SENT_ACCELERATIONS;
 use crate::control::law::estimator::sent_accelerations::SentAccelerations;
-use crate::control::signals::errors::ErrorState;
-use crate::control::signals::errors::FeedbackError;
+use crate::control::signals::errors::ErrorCoordinates;
+use crate::control::signals::errors::ErrorEstimate;
 use crate::control::signals::time::seconds_between;
 
-impl ErrorState {
+impl ErrorEstimate {
     /// Corrects it by gains times differences of a reading from the prediction.
-    fn correct(&mut self, [by_e, by_w, by_d]: covariance::Gains, rate_hz: f64, innovation: &Vector6<f64>) {
+    fn correct(
+        &mut self,
+        [by_e, by_w, by_d]: covariance::KalmanGains,
+        rate_hz: f64,
+        innovation: &Vector6<f64>,
+    ) {
         self.value += innovation * by_e;
         self.rate += innovation * (by_w * rate_hz);
         self.disturbance += innovation * (by_d * rate_hz * rate_hz);
@@ -45,15 +50,15 @@ impl ErrorState {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct Filter {
-    pub state: ErrorState,
+    pub state: ErrorEstimate,
     pub time_ns: u64,
     covariance: Covariance,
 }
 
 impl Filter {
-    pub fn new(constants: &EstimatorConstants, time_ns: u64, error: &FeedbackError) -> Self {
-        let FeedbackError { value, rate } = *error;
-        let state = ErrorState { value, rate, disturbance: Vector6::zeros() };
+    pub fn new(constants: &EstimatorConstants, time_ns: u64, error: &ErrorCoordinates) -> Self {
+        let ErrorCoordinates { value, rate } = *error;
+        let state = ErrorEstimate { value, rate, disturbance: Vector6::zeros() };
         Self { state, time_ns, covariance: constants.covariance }
     }
 
@@ -62,19 +67,19 @@ impl Filter {
         &mut self,
         constants: &EstimatorConstants,
         time_ns: u64,
-        measured: &FeedbackError,
+        measured: &ErrorCoordinates,
     ) -> Vector6<f64> {
-        let EstimatorConstants { noise, saturation, .. } = constants;
+        let EstimatorConstants { noise, max_compensated, .. } = constants;
         let Self { state, covariance, .. } = self;
         let rate_hz = 1.0 / noise.period_s;
         covariance.advance(noise, seconds_between(self.time_ns, time_ns) * rate_hz);
         let innovation = measured.value - state.value;
-        state.correct(covariance.correct_length(), rate_hz, &innovation);
+        state.correct(covariance.correct_value(), rate_hz, &innovation);
         if let Some(variance) = noise.rate_noise() {
             let difference = (measured.rate - state.rate) * noise.period_s;
             state.correct(covariance.correct_rate(variance), rate_hz, &difference);
         }
-        state.disturbance = state.disturbance.sup(&-saturation).inf(saturation);
+        state.disturbance = state.disturbance.sup(&-max_compensated).inf(max_compensated);
         self.time_ns = time_ns;
         innovation
     }
@@ -97,20 +102,20 @@ pub struct EstimatorConstants {
     pub covariance: Covariance,
     /// Largest estimate of the disturbance of each axis: what is compensated at most. Without compensation it has no bound, or
     /// the estimated error would be wrong by what is beyond.
-    pub saturation: Vector6<f64>,
+    pub max_compensated: Vector6<f64>,
     /// Noise of a reading of a length, and its resolution \[m\].
-    pub readings: Readings,
+    pub reading_errors: ReadingErrors,
     /// Largest plausible acceleration of the platform that the model does not contain \[m/s^2\].
     pub largest_disturbance: f64,
 }
 
 /// Errors of the readings of lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Readings {
+pub struct ReadingErrors {
     /// Standard deviation \[m\].
-    pub noise: f64,
+    pub deviation: f64,
     /// Resolution \[m\]; 0 if it is not known.
-    pub step: f64,
+    pub resolution: f64,
 }
 
 /// Innovations beyond the disturbance that are noise, over its standard deviation: once in years.
@@ -122,18 +127,18 @@ impl EstimatorConstants {
     /// Evaluates them.
     pub fn new(
         noise: NoiseModel,
-        readings: Readings,
-        saturation: Vector6<f64>,
+        reading_errors: ReadingErrors,
+        max_compensated: Vector6<f64>,
         largest_disturbance: f64,
     ) -> Self {
-        Self { noise, covariance: noise.steady().0, saturation, readings, largest_disturbance }
+        Self { noise, covariance: noise.steady().0, max_compensated, reading_errors, largest_disturbance }
     }
 
     /// Largest plausible innovation of a leg, `dt` after the last measurement \[m\]: noise, and the way of a disturbance that the
     /// estimate does not know yet, `a (1 / we^2 + dt^2 / 2)`.
     pub fn innovation_bound(&self, dt: f64) -> f64 {
         let lag = 1.0 / self.noise.bandwidth;
-        MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.readings.noise)
+        MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.reading_errors.deviation)
             + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
     }
 }
@@ -148,7 +153,7 @@ impl Estimator {
         constants: &EstimatorConstants,
         measured_ns: u64,
         begin_ns: u64,
-        error: &FeedbackError,
+        error: &ErrorCoordinates,
     ) {
         let NoiseModel { period_s, .. } = constants.noise;
         self.filter = Filter::new(constants, begin_ns, error);
@@ -162,7 +167,7 @@ impl Estimator {
         &mut self,
         constants: &EstimatorConstants,
         time_ns: u64,
-        measured: &FeedbackError,
+        measured: &ErrorCoordinates,
     ) -> Option<Vector6<f64>> {
         let Self { filter, sent } = self;
         if seconds_between(filter.time_ns, time_ns) <= 0.0 {
@@ -178,12 +183,12 @@ impl Estimator {
     }
 
     /// The estimate at the instant of the last measurement.
-    pub fn state(&self) -> &ErrorState {
+    pub fn state(&self) -> &ErrorEstimate {
         &self.filter.state
     }
 
     /// Moves the estimate from the instant of the last measurement to a later one.
-    pub fn predict(&self, state: &mut ErrorState, instant_ns: u64) {
+    pub fn predict(&self, state: &mut ErrorEstimate, instant_ns: u64) {
         self.sent.advance(state, self.filter.time_ns, instant_ns);
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector6;
 
-use crate::control::signals::errors::ErrorState;
+use crate::control::signals::errors::ErrorEstimate;
 use crate::control::signals::time::seconds_between;
 
 /// Accelerations kept, a power of two: at 10 kHz those of 25 ms, the longest delay of the drives with the age of a measurement.
@@ -57,7 +57,7 @@ impl SentAccelerations {
     }
 
     /// Moves an error from an instant to a later one, under the accelerations that act between them.
-    pub fn advance(&self, state: &mut ErrorState, from_ns: u64, to_ns: u64) {
+    pub fn advance(&self, state: &mut ErrorEstimate, from_ns: u64, to_ns: u64) {
         let mut age = 0;
         while self.recorded(age).is_some_and(|sent| sent.begin_ns > from_ns) {
             age += 1;

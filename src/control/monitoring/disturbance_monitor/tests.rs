@@ -18,7 +18,7 @@ const BOUNDS: DisturbanceBounds = DisturbanceBounds {
 };
 
 /// The first fault of the estimate, the acceleration of the reference and the sudden disturbance of each instant, and when.
-fn found(at: impl Fn(f64) -> (ErrorState, f64, f64)) -> Option<(DiagnosticCode, f64)> {
+fn found(at: impl Fn(f64) -> (ErrorEstimate, f64, f64)) -> Option<(DiagnosticCode, f64)> {
     let mut monitor = DisturbanceMonitor::default();
     (0..4000).map(|cycle| 1e-3 * f64::from(cycle)).find_map(|t| {
         let (estimate, acceleration, sudden) = at(t);
@@ -29,9 +29,9 @@ fn found(at: impl Fn(f64) -> (ErrorState, f64, f64)) -> Option<(DiagnosticCode, 
     })
 }
 
-fn with(error: f64, disturbance: f64) -> ErrorState {
+fn with(error: f64, disturbance: f64) -> ErrorEstimate {
     let along_z = |value: f64| Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, value);
-    ErrorState { value: along_z(error), rate: Vector6::zeros(), disturbance: along_z(disturbance) }
+    ErrorEstimate { value: along_z(error), rate: Vector6::zeros(), disturbance: along_z(disturbance) }
 }
 
 #[test]
@@ -88,7 +88,8 @@ fn a_payload_that_changes_is_named_and_one_that_stays_is_not() {
 
 #[test]
 fn an_impact_is_brief() {
-    let pushed = |sudden: f64| found(|t| (ErrorState::default(), 0.0, if t >= 1.0 { sudden } else { 0.0 }));
+    let pushed =
+        |sudden: f64| found(|t| (ErrorEstimate::default(), 0.0, if t >= 1.0 { sudden } else { 0.0 }));
     assert_eq!(pushed(1.9), None);
     assert_eq!(pushed(2.1), Some((DiagnosticCode::Impact, 1.0)));
     let mut monitor = DisturbanceMonitor::default();
@@ -106,7 +107,7 @@ fn what_limits_took_away_is_no_change() {
         (0..2000).find_map(|cycle| {
             let is_cut = cycle >= 1500;
             if is_cut {
-                monitor.record_limited(&BOUNDS, &along_z(limited));
+                monitor.record_missing(&BOUNDS, &along_z(limited));
             }
             let disturbance = if is_cut { disturbance } else { 0.0 };
             let reference = TaskState::at_rest([0.0; 6]).motion();
@@ -121,7 +122,7 @@ fn what_limits_took_away_is_no_change() {
     assert_eq!(changed(2.0, 4.1), Some(DiagnosticCode::Impact));
     // Forgotten after some seconds.
     let mut monitor = DisturbanceMonitor::default();
-    monitor.record_limited(&BOUNDS, &along_z(1e3));
+    monitor.record_missing(&BOUNDS, &along_z(1e3));
     assert_eq!(monitor.limited, 1e3);
     let rest = TaskState::at_rest([0.0; 6]).motion();
     (0..12_000).for_each(|_| assert_eq!(monitor.check(&BOUNDS, &with(0.0, 0.0), &rest, 0.0, 1e-3), Ok(())));

@@ -22,8 +22,8 @@ use nalgebra::Matrix3;
 use crate::control::parameters::Envelope;
 use crate::control::reference::stop::vector_stop::Stop;
 
-/// Part of the width of a range that a slack may use.
-pub(in crate::control::reference) const MAX_SLACK_RATIO: f64 = 0.25;
+/// Largest margin as a ratio of the width of a range.
+pub(in crate::control::reference) const MAX_MARGIN_RATIO: f64 = 0.25;
 
 /// Largest change of an angle along a motion \[rad\].
 const MAX_CHANGE: f64 = 2.5;
@@ -37,15 +37,15 @@ pub(in crate::control::reference) struct AngleRanges {
     /// Sine and cosine of each end; of the high ones with the opposite sign, as their distance has.
     sine: [f64; LANES],
     cosine: [f64; LANES],
-    /// Most slack that is kept from each \[rad\].
-    slack: [f64; LANES],
+    /// Largest margin that is kept from each \[rad\].
+    max_margin: [f64; LANES],
     /// Sign of the distance where the range is wide, else 0; and the cosine of a distance that is large then, else none.
-    wide: [f64; LANES],
-    far: [f64; LANES],
+    wide_sign: [f64; LANES],
+    far_cosine: [f64; LANES],
     /// Sign of `cos(beta)`: of the two triples of angles that give the same rotation.
-    sign: f64,
+    cos_beta_sign: f64,
     /// Whether no range ends before it begins.
-    is_possible: bool,
+    is_nonempty: bool,
 }
 
 impl AngleRanges {
@@ -56,22 +56,22 @@ impl AngleRanges {
         let mut ranges = Self {
             sine: zeros,
             cosine: zeros,
-            slack: zeros,
-            wide: zeros,
-            far: [f64::NEG_INFINITY; LANES],
-            sign: 1.0_f64.copysign(libm::cos(beta)),
-            is_possible: true,
+            max_margin: zeros,
+            wide_sign: zeros,
+            far_cosine: [f64::NEG_INFINITY; LANES],
+            cos_beta_sign: 1.0_f64.copysign(libm::cos(beta)),
+            is_nonempty: true,
         };
         for (axis, (x, (low, high))) in x.iter().zip(lowest.iter().zip(highest)).take(3).enumerate() {
-            let slack = (MAX_SLACK_RATIO * (high - low)).min(1.0);
+            let margin = (MAX_MARGIN_RATIO * (high - low)).min(1.0);
             let (reached_low, reached_high) = (low.max(x - MAX_CHANGE), high.min(x + MAX_CHANGE));
             let width = reached_high - reached_low;
-            ranges.is_possible &= width >= 0.0;
-            // An end that is too far to be reached needs no slack.
-            let slacks = [(low, reached_low), (high, reached_high)]
-                .map(|(end, reached)| if *end == reached { slack } else { 0.0 });
-            ranges.set_end(axis, reached_low, 1.0, slacks[0], width >= PI);
-            ranges.set_end(axis + LANES / 2, reached_high, -1.0, slacks[1], width >= PI);
+            ranges.is_nonempty &= width >= 0.0;
+            // An end that is too far to be reached needs no margin.
+            let margins = [(low, reached_low), (high, reached_high)]
+                .map(|(end, reached)| if *end == reached { margin } else { 0.0 });
+            ranges.set_end(axis, reached_low, 1.0, margins[0], width >= PI);
+            ranges.set_end(axis + LANES / 2, reached_high, -1.0, margins[1], width >= PI);
         }
         ranges
     }
@@ -87,11 +87,17 @@ impl AngleRanges {
         (!have_room).then(|| Self::new(envelope, x))
     }
 
-    fn set_end(&mut self, lane: usize, angle: f64, sign: f64, slack: f64, is_wide: bool) {
+    fn set_end(&mut self, lane: usize, angle: f64, sign: f64, margin: f64, is_wide: bool) {
         let (sine, cosine) = libm::sincos(angle);
         let (wide, far) = if is_wide { (sign, 0.0) } else { (0.0, f64::NEG_INFINITY) };
-        let lanes = [&mut self.sine, &mut self.cosine, &mut self.slack, &mut self.wide, &mut self.far];
-        for (lanes, number) in lanes.into_iter().zip([sign * sine, sign * cosine, slack, wide, far]) {
+        let lanes = [
+            &mut self.sine,
+            &mut self.cosine,
+            &mut self.max_margin,
+            &mut self.wide_sign,
+            &mut self.far_cosine,
+        ];
+        for (lanes, number) in lanes.into_iter().zip([sign * sine, sign * cosine, margin, wide, far]) {
             if let Some(slot) = lanes.get_mut(lane) {
                 *slot = number;
             }
@@ -100,7 +106,7 @@ impl AngleRanges {
 
     /// Whether each angle of a rotation has a distance from the ends of its range \[rad\], or a part of it that is narrower.
     #[inline(always)]
-    pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, slack: f64) -> bool {
+    pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, margin: f64) -> bool {
         let c = cosine_of_beta(r);
         let both = |lanes: [f64; LANES / 2]| {
             let lanes = f64x4::load_array(simd, lanes);
@@ -108,14 +114,15 @@ impl AngleRanges {
         };
         let load = |lanes: &[f64; LANES]| f64x8::load_array(simd, *lanes);
         // Of the angles, those of alpha and gamma times c.
-        let sine = both([-r.m23 * self.sign, r.m13, -r.m12 * self.sign, 0.0]);
-        let cosine = both([r.m33 * self.sign, c * self.sign, r.m11 * self.sign, 0.0]);
+        let sine = both([-r.m23 * self.cos_beta_sign, r.m13, -r.m12 * self.cos_beta_sign, 0.0]);
+        let cosine =
+            both([r.m33 * self.cos_beta_sign, c * self.cos_beta_sign, r.m11 * self.cos_beta_sign, 0.0]);
         let (end_sine, end_cosine) = (load(&self.sine), load(&self.cosine));
         let distance_sine = sine * end_cosine - cosine * end_sine;
-        let distance_cosine = (cosine * end_cosine + sine * end_sine) * load(&self.wide);
-        let slack = load(&self.slack).min(f64x8::splat(simd, slack)) * both([c, 1.0, c, 0.0]);
-        let is_kept = distance_sine.simd_ge(slack) | distance_cosine.simd_le(load(&self.far));
-        is_kept.all_true() & self.is_possible
+        let distance_cosine = (cosine * end_cosine + sine * end_sine) * load(&self.wide_sign);
+        let margin = load(&self.max_margin).min(f64x8::splat(simd, margin)) * both([c, 1.0, c, 0.0]);
+        let is_kept = distance_sine.simd_ge(margin) | distance_cosine.simd_le(load(&self.far_cosine));
+        is_kept.all_true() & self.is_nonempty
     }
 }
 
@@ -130,14 +137,14 @@ mod tests {
     use fearless_simd::{Level, dispatch};
 
     use super::*;
-    use crate::control::reference::samples::Samples;
+    use crate::control::reference::random_vectors::RandomVectors;
     use crate::model::machine::at_most_256_bits;
     use crate::model::task::{TaskState, task_coordinates};
 
     /// Ranges around random angles, narrow and wide, on both sides of 90 degrees.
     #[test]
     fn a_rotation_is_inside_exactly_where_its_angles_are() {
-        let mut samples = Samples::new(1);
+        let mut samples = RandomVectors::new(1);
         let level = at_most_256_bits(Level::new());
         let (mut inside, mut outside) = (0, 0);
         for k in 0..200_000 {
@@ -162,7 +169,7 @@ mod tests {
             let room = |slack: f64| {
                 let axes = angles.iter().zip(envelope.lowest.iter().zip(&envelope.highest)).take(3);
                 axes.map(|(x, (low, high))| {
-                    (x - low).min(high - x) - slack.min(MAX_SLACK_RATIO * (high - low))
+                    (x - low).min(high - x) - slack.min(MAX_MARGIN_RATIO * (high - low))
                 })
                 .fold(f64::INFINITY, f64::min)
             };

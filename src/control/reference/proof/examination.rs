@@ -2,7 +2,7 @@
 //!
 //! Between two knots lengths, their rates and the coordinates of C depart little from a cubic, and that is within the hull of its Bezier
 //! points, which are examined too (see [`super::cubic_departure`]). Angles leave their chords by at most `|angle''| dt^2 / 8`, dt the longer
-//! interval beside a knot, and so does every quantity in the step that leads to the motion:
+//! interval adjacent a knot, and so does every quantity in the step that leads to the motion:
 //!
 //! ```text
 //! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2     s, c = |sin|, cos of beta; of the Bryan angles
@@ -22,10 +22,12 @@ use crate::control::reference::proof::angle_ranges::{AngleRanges, cosine_of_beta
 use crate::control::reference::proof::cubic_departure::{
     CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk,
 };
-use crate::control::reference::proof::knots::{Beside, Knots, MAX_INTERVALS};
+use crate::control::reference::proof::knots::{AdjacentIntervals, Knots, MAX_INTERVALS};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::position_ranges::PositionRanges;
-use crate::control::reference::proof::regularity::{REGULARITY_WORK, RegularBalls, Regularity, Surroundings};
+use crate::control::reference::proof::regularity::{
+    REGULARITY_EFFORT, RegularBalls, Regularity, RegularityQuery,
+};
 use crate::control::reference::proof::step::Step;
 use crate::control::reference::stop::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
 use crate::control::signals::limits::{Limit, Limits};
@@ -42,7 +44,7 @@ const RATE_DEPARTURE_RATIO: f64 = 0.01;
 /// Work that a step may do, in knots: those of the longest stop, and the regularity of four poses, of fewer where walls took
 /// their part. It bounds the longest cycle. The balls that were found remain for the next one. With three a reference that presses against its
 /// condition is refused in turns, and the platform jerks.
-pub(in crate::control::reference) const MAX_WORK: u32 = MAX_INTERVALS + 4 * REGULARITY_WORK;
+pub(in crate::control::reference) const MAX_EFFORT: u32 = MAX_INTERVALS + 4 * REGULARITY_EFFORT;
 /// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
 /// it, as the departures are bounded for the worst direction.
 const ROOM_RATIO: f64 = 2.5e-5;
@@ -54,7 +56,7 @@ const ANGLE_ROUNDING: f64 = 1e-15;
 /// Lengths and rates of the legs, in lanes.
 type Legs<S> = (f64x8<S>, f64x8<S>);
 
-/// Examination of a planar stop at knots.
+/// Examination of a brake_at_once stop at knots.
 pub(in crate::control::reference) struct Examination<'a> {
     constants: &'a Constants,
     bounds: &'a PoseBounds,
@@ -78,8 +80,8 @@ pub(in crate::control::reference) struct Examination<'a> {
     /// Its regularity, and the envelope with room for it, once they are needed.
     start_regularity: Option<Regularity>,
     relaxed: Option<(Envelope, AngleRanges)>,
-    /// What is left of the work.
-    work: u32,
+    /// What is left of the effort.
+    effort: u32,
     /// Bounds of the lengths, in lanes.
     shortest: LegLanes,
     longest: LegLanes,
@@ -93,13 +95,13 @@ impl<'a> Examination<'a> {
         motion: &Motion,
         x: Option<&[f64; 6]>,
         step: &Step<'a>,
-        work: u32,
+        effort: u32,
     ) -> Result<Self, Limit> {
         let limits = &constants.parameters.limits;
         let Limits { orientation, position, .. } = limits;
         let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
         let allowed = 1.0 + ROUNDING;
-        let [angular_bulge, linear_bulge] = step.bulge();
+        let [angular_bulge, linear_bulge] = step.velocity_overshoot();
         let is_slow = v <= allowed * position.velocity
             && w <= allowed * orientation.velocity
             && motion.twist.linear.norm() + linear_bulge <= position.velocity
@@ -143,7 +145,7 @@ impl<'a> Examination<'a> {
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
             relaxed: None,
-            work: work.saturating_sub(knots.intervals),
+            effort: effort.saturating_sub(knots.intervals),
             shortest: constants.machine().joints.triples.pack(&bounds.shortest),
             longest: constants.machine().joints.triples.pack(&bounds.longest),
             stop,
@@ -165,24 +167,27 @@ impl<'a> Examination<'a> {
     ) -> Result<(), Limit> {
         let mut pose = start.pose;
         let mut state = PoseStopState::begin(start);
-        let (mut t, mut beside, mut before) = (0.0, Beside::default(), None);
+        let (mut t, mut adjacent, mut before) = (0.0, AdjacentIntervals::default(), None);
         let mut k = 0;
         loop {
             let next_t = self.knots.instant(k + 1);
             let is_last = k == self.knots.intervals;
-            beside = Beside { before: beside.after, after: if is_last { 0.0 } else { next_t - t } };
-            before = Some(self.check(simd, balls, &pose, &state, beside, before)?);
+            adjacent = AdjacentIntervals {
+                before_s: adjacent.after_s,
+                after_s: if is_last { 0.0 } else { next_t - t },
+            };
+            before = Some(self.check(simd, balls, &pose, &state, adjacent, before)?);
             if is_last {
                 return Ok(());
             }
             let next = self.stop.at(simd, next_t);
-            pose = advanced_to_knot(&pose, &state, &next, beside.after);
+            pose = advanced_to_knot(&pose, &state, &next, adjacent.after_s);
             (t, state) = (next_t, next);
             k += 1;
         }
     }
 
-    /// Checks a knot, and the Bezier points in the intervals `beside` it, before and after. Returns its lengths and rates.
+    /// Checks a knot, and the Bezier points in the intervals `adjacent` it, before and after. Returns its lengths and rates.
     #[inline(always)]
     fn check<S: Simd>(
         &mut self,
@@ -190,27 +195,27 @@ impl<'a> Examination<'a> {
         balls: &mut RegularBalls,
         pose: &Pose,
         state: &PoseStopState,
-        beside: Beside,
+        adjacent: AdjacentIntervals,
         before: Option<Legs<S>>,
     ) -> Result<Legs<S>, Limit> {
-        let dt = beside.longest();
+        let dt = adjacent.longest();
         let twist = Twist { angular: state.orientation.velocity, linear: state.position.velocity };
         let legs @ (length, rate) = length_and_rate_lanes(simd, self.constants.machine(), pose, &twist);
-        if self.needs_rates && !self.are_rates_kept(simd, &legs, beside, before.as_ref()) {
+        if self.needs_rates && !self.are_rates_kept(simd, &legs, adjacent, before.as_ref()) {
             return Err(Limit::LegRate);
         }
         let splat = |number: f64| f64x8::splat(simd, number);
         let load = |lanes: &LegLanes| f64x8::load_array(simd, lanes.0);
-        let (next, last) = (rate * splat(beside.after / 3.0), rate * splat(-beside.before / 3.0));
+        let (next, last) = (rate * splat(adjacent.after_s / 3.0), rate * splat(-adjacent.before_s / 3.0));
         let (short, long) = (length + next.min(last), length + next.max(last));
         let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
         let [in_step, ..] = self.step_departure;
         let departure = (self.length_jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
-        let slack = (departure - ROOM_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
-        if !room.simd_ge(splat(slack - self.length_excess)).all_true() {
+        let margin = (departure - ROOM_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
+        if !room.simd_ge(splat(margin - self.length_excess)).all_true() {
             return Err(Limit::Stroke);
         }
-        if !self.is_in_envelope(simd, pose, state, beside) && !self.is_nearer_than_start(pose) {
+        if !self.is_in_envelope(simd, pose, state, adjacent) && !self.is_nearer_than_start(pose) {
             return Err(Limit::Envelope);
         }
         self.check_condition(simd, balls, pose, state, dt)?;
@@ -223,15 +228,15 @@ impl<'a> Examination<'a> {
         &self,
         simd: S,
         (length, rate): &Legs<S>,
-        beside: Beside,
+        adjacent: AdjacentIntervals,
         before: Option<&Legs<S>>,
     ) -> bool {
-        let dt = beside.longest();
+        let dt = adjacent.longest();
         let [_, in_step, _] = self.step_departure;
-        let slack = (self.length_jerk * CUBIC_RATE_DEPARTURE * dt * dt).max(in_step);
-        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - slack);
+        let margin = (self.length_jerk * CUBIC_RATE_DEPARTURE * dt * dt).max(in_step);
+        let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - margin);
         let between = before.map_or(*rate, |(length_before, rate_before)| {
-            (*length - *length_before) * f64x8::splat(simd, 3.0 / beside.before) - *rate_before - *rate
+            (*length - *length_before) * f64x8::splat(simd, 3.0 / adjacent.before_s) - *rate_before - *rate
         });
         rate.abs().max(between.abs()).simd_le(limit).all_true()
     }
@@ -248,11 +253,12 @@ impl<'a> Examination<'a> {
     ) -> Result<(), Limit> {
         let constants = self.constants;
         let reach = self.stop.reach(state, dt, &constants.parameters.limits);
-        if balls.cover_knot(simd, constants, pose, reach) {
+        if balls.prove_knot_from_kept(simd, constants, pose, reach) {
             return Ok(());
         }
-        let around = Surroundings { pose, reach, required: Regularity::of_surroundings(constants) };
-        let regularity = balls.cover_by_new(constants, &around, &mut self.work).ok_or(Limit::Condition)?;
+        let around = RegularityQuery { pose, reach, required: Regularity::around_reference(constants) };
+        let regularity =
+            balls.prove_from_new(constants, &around, &mut self.effort).ok_or(Limit::Condition)?;
         let at_knot = Regularity::of_reference(constants);
         if at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
             return Ok(());
@@ -266,31 +272,37 @@ impl<'a> Examination<'a> {
     fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> bool {
         let Self { constants, from: Some(from), .. } = *self else { return false };
         if self.start_regularity.is_none() {
-            self.start_regularity = Regularity::at(constants, from, &mut self.work);
+            self.start_regularity = Regularity::at(constants, from, &mut self.effort);
         }
         let at_knot = Regularity::of_reference(constants);
         self.start_regularity.is_some_and(|start| at_knot.or_less(&start).is_kept_by(regularity))
     }
 
-    /// Whether a knot, and the Bezier points beside it, are within the envelope.
+    /// Whether a knot, and the Bezier points adjacent it, are within the envelope.
     #[inline(always)]
-    fn is_in_envelope<S: Simd>(&self, simd: S, pose: &Pose, state: &PoseStopState, beside: Beside) -> bool {
+    fn is_in_envelope<S: Simd>(
+        &self,
+        simd: S,
+        pose: &Pose,
+        state: &PoseStopState,
+        adjacent: AdjacentIntervals,
+    ) -> bool {
         let Some(positions) = &self.positions else { return true };
-        let dt = beside.longest();
+        let dt = adjacent.longest();
         let [.., in_step] = self.step_departure;
         let jerk = self.constants.parameters.limits.position.jerk;
-        let slack = self.directions * (jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
+        let margin = self.directions * (jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
         let at = |t: f64| pose.position + state.position.velocity * t;
-        positions.contain(simd, [&at(beside.after / 3.0), &at(-beside.before / 3.0)], &slack)
+        positions.contain(simd, [&at(adjacent.after_s / 3.0), &at(-adjacent.before_s / 3.0)], &margin)
             && self
                 .angles
                 .as_ref()
-                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_slack(pose, state, dt)))
+                .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_margin(pose, state, dt)))
     }
 
     /// Departure of the angles from their chords around a knot \[rad\].
     #[inline(always)]
-    fn angle_slack(&self, pose: &Pose, state: &PoseStopState, dt: f64) -> f64 {
+    fn angle_margin(&self, pose: &Pose, state: &PoseStopState, dt: f64) -> f64 {
         if !(self.stop.orientation.duration > 0.0) {
             return 0.0;
         }

@@ -36,16 +36,16 @@ impl Knots {
 
 /// Durations of the intervals beside a knot \[s\]; 0 where there is none.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::control::reference) struct Beside {
-    pub before: f64,
-    pub after: f64,
+pub(in crate::control::reference) struct AdjacentIntervals {
+    pub before_s: f64,
+    pub after_s: f64,
 }
 
-impl Beside {
+impl AdjacentIntervals {
     /// The longer one.
     #[inline(always)]
     pub fn longest(&self) -> f64 {
-        self.before.max(self.after)
+        self.before_s.max(self.after_s)
     }
 }
 

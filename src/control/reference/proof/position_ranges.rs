@@ -4,7 +4,7 @@ use fearless_simd::{Simd, f64x4, prelude::*};
 use nalgebra::Vector3;
 
 use crate::control::parameters::Envelope;
-use crate::control::reference::proof::angle_ranges::MAX_SLACK_RATIO;
+use crate::control::reference::proof::angle_ranges::MAX_MARGIN_RATIO;
 use crate::control::reference::proof::padding::{Padded, padded};
 
 /// Ranges of the coordinates of C \[m\], and one of zeros, which contains the zero of a padded vector.
@@ -12,25 +12,25 @@ use crate::control::reference::proof::padding::{Padded, padded};
 pub(in crate::control::reference) struct PositionRanges {
     lowest: Padded,
     highest: Padded,
-    /// Most slack that is kept from each end.
-    slack: Padded,
+    /// Largest margin that is kept from each end.
+    max_margin: Padded,
 }
 
 impl PositionRanges {
     /// Those of an envelope.
     pub fn new(Envelope { lowest: [.., x0, y0, z0], highest: [.., x1, y1, z1] }: &Envelope) -> Self {
         let (low, high) = (Vector3::new(*x0, *y0, *z0), Vector3::new(*x1, *y1, *z1));
-        let slack = (high - low) * MAX_SLACK_RATIO;
-        Self { lowest: padded(&low), highest: padded(&high), slack: padded(&slack) }
+        let max_margin = (high - low) * MAX_MARGIN_RATIO;
+        Self { lowest: padded(&low), highest: padded(&high), max_margin: padded(&max_margin) }
     }
 
     /// Whether each coordinate of both positions has a distance from the ends of its range, or a part of it that is narrower.
     #[inline(always)]
-    pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], slack: &Vector3<f64>) -> bool {
+    pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], margin: &Vector3<f64>) -> bool {
         let load = |lanes: Padded| f64x4::load_array(simd, lanes);
         let [first, second] = positions.map(|position| load(padded(position)));
         let room = (first.min(second) - load(self.lowest)).min(load(self.highest) - first.max(second));
-        room.simd_ge(load(padded(slack)).min(load(self.slack))).all_true()
+        room.simd_ge(load(padded(margin)).min(load(self.max_margin))).all_true()
     }
 }
 

@@ -14,7 +14,7 @@
 //! ```
 //!
 //! The same bounds as those of a cell in the search for the workspace. A ball found once holds for many cycles.
-//! All balls of a group are tried at once: a lane each, without a branch, so that the work does not depend on which one covers.
+//! All balls of a group are tried at once: a lane each, without a branch, so that the effort does not depend on which one covers.
 
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 
@@ -33,7 +33,7 @@ const MAX_CHORD: f64 = 1.0;
 const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
 
 /// Work for the regularity of a pose, in knots of an [examination](super::examination), and more where its factorization has pivots.
-pub(in crate::control::reference) const REGULARITY_WORK: u32 = 1;
+pub(in crate::control::reference) const REGULARITY_EFFORT: u32 = 1;
 const PIVOTING_WORK: u32 = 2;
 
 /// Least part of the sine of the reference that is allowed between knots, whatever the limits of the condition.
@@ -49,9 +49,9 @@ pub(in crate::control::reference) struct Regularity {
 }
 
 impl Regularity {
-    /// That of a pose, if so much work may be done.
-    pub fn at(constants: &Constants, pose: &Pose, work: &mut u32) -> Option<Self> {
-        Ball::new(constants, pose, work).map(|ball| ball.regularity)
+    /// That of a pose, if so much effort may be done.
+    pub fn at(constants: &Constants, pose: &Pose, effort: &mut u32) -> Option<Self> {
+        Ball::new(constants, pose, effort).map(|ball| ball.regularity)
     }
 
     /// What the reference must keep.
@@ -60,7 +60,7 @@ impl Regularity {
     }
 
     /// What the poses between knots must keep: the condition of the platform, and a sine that is less in the same ratio.
-    pub fn of_surroundings(constants: &Constants) -> Self {
+    pub fn around_reference(constants: &Constants) -> Self {
         let condition = constants.parameters.condition;
         let share = (constants.reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0);
         Self { condition, universal_sine: constants.universal_sine * share }
@@ -175,13 +175,13 @@ struct Ball {
 }
 
 impl Ball {
-    /// If so much work may be done; pivots are known only afterwards.
-    fn new(constants: &Constants, center: &Pose, work: &mut u32) -> Option<Self> {
-        *work = work.checked_sub(REGULARITY_WORK)?;
+    /// If so much effort may be done; pivots are known only afterwards.
+    fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Option<Self> {
+        *effort = effort.checked_sub(REGULARITY_EFFORT)?;
         let Conditioning { sensitivity, shortest, universal_sine, is_pivoted } =
             Conditioning::new(constants.machine(), center);
         if is_pivoted {
-            *work = work.saturating_sub(PIVOTING_WORK);
+            *effort = effort.saturating_sub(PIVOTING_WORK);
         }
         let Sensitivity { condition, norm, .. } = sensitivity;
         let regularity = Regularity { condition, universal_sine };
@@ -194,7 +194,7 @@ pub(in crate::control::reference) type Reach = [f64; 2];
 
 /// Poses around one, and how regular they shall be.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::control::reference) struct Surroundings<'a> {
+pub(in crate::control::reference) struct RegularityQuery<'a> {
     pub pose: &'a Pose,
     pub reach: Reach,
     pub required: Regularity,
@@ -212,14 +212,14 @@ pub(in crate::control::reference) struct RegularBalls {
 }
 
 impl RegularBalls {
-    /// Whether the surroundings are regular, by work that may be done. `false` is no proof of the contrary.
-    pub fn cover(&mut self, constants: &Constants, around: &Surroundings<'_>, work: &mut u32) -> bool {
-        self.cover_by_known(constants, around) || self.cover_by_new(constants, around, work).is_some()
+    /// Whether the surroundings are regular, by effort that may be done. `false` is no proof of the contrary.
+    pub fn prove(&mut self, constants: &Constants, around: &RegularityQuery<'_>, effort: &mut u32) -> bool {
+        self.prove_from_kept(constants, around) || self.prove_from_new(constants, around, effort).is_some()
     }
 
     /// The same by the balls that are kept.
-    fn cover_by_known(&mut self, constants: &Constants, around: &Surroundings<'_>) -> bool {
-        let Surroundings { pose, reach, required } = around;
+    fn prove_from_kept(&mut self, constants: &Constants, around: &RegularityQuery<'_>) -> bool {
+        let RegularityQuery { pose, reach, required } = around;
         dispatch!(constants.machine().level, simd => {
             for index in self.recent_first() {
                 if let Some(group) = self.groups.get(index) {
@@ -241,11 +241,18 @@ impl RegularBalls {
         (0..GROUPS).map(move |k| (recent + k) % GROUPS)
     }
 
-    /// Whether the balls that are kept cover a knot, as regular as the reference must be, and the poses around it, as regular as they
+    /// Whether the balls that are kept prove a knot, as regular as the reference must be, and the poses around it, as regular as they
     /// must be: less so, else a reference at its own limit could not leave it.
     #[inline(always)]
-    pub fn cover_knot<S: Simd>(&mut self, simd: S, constants: &Constants, pose: &Pose, reach: Reach) -> bool {
-        let [at_knot, around] = [Regularity::of_reference(constants), Regularity::of_surroundings(constants)];
+    pub fn prove_knot_from_kept<S: Simd>(
+        &mut self,
+        simd: S,
+        constants: &Constants,
+        pose: &Pose,
+        reach: Reach,
+    ) -> bool {
+        let [at_knot, around] =
+            [Regularity::of_reference(constants), Regularity::around_reference(constants)];
         let mut are_surroundings_covered = false;
         for index in self.recent_first() {
             let Some(group) = self.groups.get(index) else { continue };
@@ -264,18 +271,18 @@ impl RegularBalls {
     /// Covers the surroundings by a new ball. Returns the regularity of the pose.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    pub fn cover_by_new(
+    pub fn prove_from_new(
         &mut self,
         constants: &Constants,
-        around: &Surroundings<'_>,
-        work: &mut u32,
+        around: &RegularityQuery<'_>,
+        effort: &mut u32,
     ) -> Option<Regularity> {
-        let Surroundings { pose, reach, required } = around;
-        let ball = Ball::new(constants, pose, work)?;
+        let RegularityQuery { pose, reach, required } = around;
+        let ball = Ball::new(constants, pose, effort)?;
         let index = self.kept / LANES;
         let group = self.groups.get_mut(index)?;
         group.set(self.kept % LANES, pose, &ball);
-        // By any ball of the group, which is as good. A new one that is too small for its reach may cover a knot: it stays until
+        // By any ball of the group, which is as good. A new one that is too small for its reach may prove a knot: it stays until
         // the next one.
         let is_covered = dispatch!(constants.machine().level, simd => {
             let displacements = group.displacements(simd, pose);

@@ -12,12 +12,12 @@ pub(in crate::control::reference) struct Step<'a> {
     /// Change of the acceleration: angular \[rad/s^2\], linear \[m/s^2\].
     pub change: [f64; 2],
     /// Work that it took to propose it, in knots of an examination.
-    pub work: u32,
+    pub effort: u32,
 }
 
 impl Step<'_> {
     /// Largest velocities within the step beyond those at its ends.
-    pub fn bulge(&self) -> [f64; 2] {
+    pub fn velocity_overshoot(&self) -> [f64; 2] {
         self.change.map(|change| change * self.duration / 8.0)
     }
 }

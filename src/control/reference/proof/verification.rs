@@ -6,9 +6,9 @@
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::cubic_departure::curvature;
-use crate::control::reference::proof::examination::{Examination, MAX_WORK};
+use crate::control::reference::proof::examination::{Examination, MAX_EFFORT};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
-use crate::control::reference::proof::regularity::{RegularBalls, Regularity, Surroundings};
+use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::stop::vector_stop::{StopExtent, release_first_extent};
@@ -26,40 +26,45 @@ pub(in crate::control::reference) struct Verifier {
 
 impl Verifier {
     /// Verifies a step and the stop from the motion at its end. Returns which stop, or the limit that no stop was proved to
-    /// keep. A planar one is planned in a given place.
+    /// keep. A brake_at_once one is planned in a given place.
     pub fn verify(
         &mut self,
         constants: &Constants,
         bounds: &PoseBounds,
         motion: &Motion,
         step: &Step<'_>,
-        planar: &mut PoseStop,
+        brake_at_once: &mut PoseStop,
     ) -> Result<StopKind, Limit> {
         let Limits { orientation, position, .. } = &constants.parameters.limits;
         let Motion { pose, twist, acceleration } = motion;
         let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
-        let [angular_bulge, linear_bulge] = step.bulge();
+        let [angular_bulge, linear_bulge] = step.velocity_overshoot();
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
-        let around = Surroundings {
+        let around = RegularityQuery {
             pose,
             reach: [shift.length, turn.length],
             required: Regularity::of_reference(constants),
         };
-        let mut work = MAX_WORK.saturating_sub(step.work);
+        let mut effort = MAX_EFFORT.saturating_sub(step.effort);
         let is_free = shift.peak_velocity + linear_bulge <= position.velocity
             && turn.peak_velocity + angular_bulge <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity
                 <= constants.machine().actuator.max_rate
             && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)
-            && self.balls.cover(constants, &around, &mut work);
+            && self.balls.prove(constants, &around, &mut effort);
         if is_free {
             return Ok(StopKind::ReleaseFirst);
         }
-        planar.plan(constants.machine().level, StopKind::Planar, motion, &constants.parameters.limits);
-        Examination::new(constants, bounds, planar, motion, x.as_ref(), step, work)?
+        brake_at_once.plan(
+            constants.machine().level,
+            StopKind::BrakeAtOnce,
+            motion,
+            &constants.parameters.limits,
+        );
+        Examination::new(constants, bounds, brake_at_once, motion, x.as_ref(), step, effort)?
             .run(&mut self.balls, motion)?;
-        Ok(StopKind::Planar)
+        Ok(StopKind::BrakeAtOnce)
     }
 }
 
@@ -73,8 +78,8 @@ fn has_room(
     turn: &StopExtent,
     step_s: f64,
 ) -> bool {
-    let slack = curvature(constants, shift.peak_velocity, turn.peak_velocity) * step_s * step_s / 8.0;
-    let need = shift.length + constants.arm * turn.length + slack;
+    let margin = curvature(constants, shift.peak_velocity, turn.peak_velocity) * step_s * step_s / 8.0;
+    let need = shift.length + constants.arm * turn.length + margin;
     let lengths = leg_lengths(constants.machine(), pose);
     let legs = lengths.iter().zip(bounds.shortest.iter().zip(&bounds.longest));
     let is_within_stroke = legs
@@ -86,8 +91,8 @@ fn has_room(
     };
     let [_, beta, ..] = x;
     let c = libm::cos((beta.abs() + turn.length).min(core::f64::consts::FRAC_PI_2));
-    let turned = turn.length / c + slack / constants.arm;
-    let needs = [turned, turned, turned, shift.length + slack, shift.length + slack, shift.length + slack];
+    let turned = turn.length / c + margin / constants.arm;
+    let needs = [turned, turned, turned, shift.length + margin, shift.length + margin, shift.length + margin];
     let Envelope { lowest, highest } = envelope;
     x.iter()
         .zip(needs)

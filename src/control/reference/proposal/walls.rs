@@ -14,7 +14,7 @@
 //! The more an active wall takes away from V, the more of its bound on V' holds: all of it from the velocity `a^2/j` on that the
 //! acceleration builds up in. Else V' would jump wherever another wall becomes active, and in a corner they would take turns.
 //!
-//! Both ends of a leg or of a coordinate are one wall with two sides. V is found by Hildreth's method (C. Hildreth, "A quadratic
+//! Both ends of a leg or of a coordinate are one wall with two ends. V is found by Hildreth's method (C. Hildreth, "A quadratic
 //! programming procedure", 1957), a few sweeps over all walls. The walls prove nothing: the verified stop keeps the bounds. Without
 //! them it would do so at the limits of jerk.
 //!
@@ -60,14 +60,14 @@ const WALL_COUNT: usize = 12;
 
 /// One end of a leg or of a coordinate.
 #[derive(Clone, Copy, Debug, Default)]
-struct Side {
+struct End {
     /// Largest closing rate \[m/s\].
     rate: f64,
     /// Its derivative at the present rate, less the curvature \[m/s^2\].
     derivative: f64,
 }
 
-impl Side {
+impl End {
     /// `closing` and `curvature`: rate of the leg or coordinate towards this end, and its curvature; `per_way`: rate over the way of the
     /// stop \[1/s\].
     fn new(approach: &Approach, gap: f64, closing: f64, curvature: f64, per_way: f64) -> Self {
@@ -92,11 +92,11 @@ struct Wall {
     /// Of the square of its norm.
     inverse_square: f64,
     /// Against the gradient, along it.
-    sides: [Side; 2],
+    ends: [End; 2],
     /// Positive where the end along the gradient is active, negative at the other.
     multiplier: f64,
     /// Part of the bound on the derivative that holds, per multiplier, up to all of it.
-    weight: f64,
+    blend_rate: f64,
 }
 
 /// Walls around one pose.
@@ -143,10 +143,10 @@ impl Walls {
                 + direction.dot(&led.linear) * (shift_s - half_s);
             let gaps = [longest - next - departure.max(0.0), next - shortest + departure.min(0.0)];
             let [long, short] = gaps.map(|gap| gap - kept);
-            let sides = [(short, -rate, -curvature), (long, *rate, *curvature)];
-            let sides =
-                sides.map(|(gap, closing, curvature)| Side::new(&approach, gap, closing, curvature, per_way));
-            walls.push(Limit::Stroke, &approach, gradient, sides);
+            let ends = [(short, -rate, -curvature), (long, *rate, *curvature)];
+            let ends =
+                ends.map(|(gap, closing, curvature)| End::new(&approach, gap, closing, curvature, per_way));
+            walls.push(Limit::Stroke, &approach, gradient, ends);
         }
         if let Some(envelope) = &bounds.envelope {
             walls.push_envelope(constants, envelope, motion, led, step_s, kept);
@@ -195,45 +195,45 @@ impl Walls {
             let kept = kept.min(0.05 * (high - low));
             let rate = gradient.dot(&velocity);
             let next = x + rate * step_s;
-            let sides = [(next - low - kept, -rate), (high - next - kept, rate)];
-            let sides = sides.map(|(gap, closing)| Side::new(approach, gap, closing, 0.0, per_way));
-            self.push(Limit::Envelope, approach, gradient, sides);
+            let ends = [(next - low - kept, -rate), (high - next - kept, rate)];
+            let ends = ends.map(|(gap, closing)| End::new(approach, gap, closing, 0.0, per_way));
+            self.push(Limit::Envelope, approach, gradient, ends);
         }
     }
 
-    fn push(&mut self, limit: Limit, approach: &Approach, gradient: Vector6<f64>, sides: [Side; 2]) {
+    fn push(&mut self, limit: Limit, approach: &Approach, gradient: Vector6<f64>, ends: [End; 2]) {
         if let Some(wall) = self.walls.get_mut(self.count) {
             let square = gradient.norm_squared();
             *wall = Wall {
                 limit: LimitSet::default().with(limit, true),
                 inverse_square: 1.0 / square.max(f64::MIN_POSITIVE),
                 gradient: padded(&gradient),
-                sides,
-                weight: square / approach.build_up_velocity(),
+                ends,
+                blend_rate: square / approach.build_up_velocity(),
                 ..Wall::default()
             };
             self.count += 1;
         }
     }
 
-    /// The work so far, in knots of an examination.
-    pub fn work(&self) -> u32 {
+    /// The effort so far, in knots of an examination.
+    pub fn effort(&self) -> u32 {
         (self.visits / VISITS_PER_WORK) as u32
     }
 
     /// Changes the wanted velocities of rotation and translation least, so that no wall is approached too fast. Returns the
     /// limits that required it.
-    pub fn restrict(
+    pub fn project(
         &mut self,
         level: Level,
         turn: &mut WantedVelocity,
         shift: &mut WantedVelocity,
     ) -> LimitSet {
-        dispatch!(level, simd => self.restrict_in_lanes(simd, turn, shift))
+        dispatch!(level, simd => self.project_in_lanes(simd, turn, shift))
     }
 
     #[inline(always)]
-    fn restrict_in_lanes<S: Simd>(
+    fn project_in_lanes<S: Simd>(
         &mut self,
         simd: S,
         turn: &mut WantedVelocity,
@@ -253,7 +253,7 @@ impl Walls {
                 if !is_full && wall.multiplier == 0.0 {
                     continue;
                 }
-                let [against, along] = &wall.sides;
+                let [against, along] = &wall.ends;
                 let gradient = f64x8::load_array(simd, wall.gradient);
                 // The closing rate without this wall, and what of it is beyond the ends.
                 let rate = dot(gradient, velocity) * wall.inverse_square + wall.multiplier;

@@ -6,7 +6,7 @@ use crate::model::rigid::{Motion, Twist};
 
 /// Moves a motion `h` seconds on, in which its acceleration changes linearly to another one. In place: a copy of what was just
 /// written waits for it.
-pub(in crate::control::reference) fn move_on(
+pub(in crate::control::reference) fn step_constant_jerk(
     motion: &mut Motion,
     angular: &Vector3<f64>,
     linear: &Vector3<f64>,

@@ -23,7 +23,7 @@ pub(in crate::control::reference) enum Phase {
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control::reference) struct HeldStop {
     pub(in crate::control::reference) phase: Phase,
-    /// One is held, if it is planar or followed: the other kind is planned once it is needed. In the place of the other one the next is
+    /// One is held, if it is brake_at_once or followed: the other kind is planned once it is needed. In the place of the other one the next is
     /// planned: to copy a stop would take a third of the time of planning it.
     stops: [PoseStop; 2],
     is_second_held: bool,
@@ -32,15 +32,15 @@ pub(in crate::control::reference) struct HeldStop {
 }
 
 impl HeldStop {
-    /// The place for a planar stop that may become the held one.
-    pub fn candidate(&mut self) -> &mut PoseStop {
+    /// The place for a brake_at_once stop that may become the held one.
+    pub fn spare(&mut self) -> &mut PoseStop {
         let [first, second] = &mut self.stops;
         if self.is_second_held { first } else { second }
     }
 
-    /// Holds the stop of a kind, verified from the present motion on; a planar one as it was planned in the place of the next.
-    pub fn hold(&mut self, kind: StopKind) {
-        self.is_second_held ^= kind == StopKind::Planar;
+    /// Holds the stop of a kind, verified from the present motion on; a brake_at_once one as it was planned in the place of the next.
+    pub fn adopt(&mut self, kind: StopKind) {
+        self.is_second_held ^= kind == StopKind::BrakeAtOnce;
         self.phase = Phase::Verified(kind);
     }
 
@@ -81,7 +81,7 @@ impl HeldStop {
 
     fn begin(&mut self, constants: &Constants, kind: StopKind, motion: &Motion) {
         if let StopKind::ReleaseFirst = kind {
-            self.candidate().plan(constants.machine().level, kind, motion, &constants.parameters.limits);
+            self.spare().plan(constants.machine().level, kind, motion, &constants.parameters.limits);
             self.is_second_held ^= true;
         }
         (self.phase, self.state, self.elapsed_s) = (Phase::Followed, PoseStopState::begin(motion), 0.0);

@@ -19,7 +19,7 @@ pub(in crate::control::reference) enum StopKind {
     #[default]
     ReleaseFirst,
     /// See [`super::stop`].
-    Planar,
+    BrakeAtOnce,
 }
 
 /// Stop of orientation and position.
@@ -77,7 +77,7 @@ impl PoseStop {
         for (stop, v, a, limits) in [orientation, position] {
             match kind {
                 StopKind::ReleaseFirst => stop.release_first(simd, v, a, limits),
-                StopKind::Planar => stop.planar(simd, v, a, limits),
+                StopKind::BrakeAtOnce => stop.brake_at_once(simd, v, a, limits),
             }
         }
     }

@@ -11,7 +11,7 @@
 //! length  <= max(|v|, |v1|) |a|/J + length(v1)    d = 2 sqrt(v/J), length v sqrt(v/J)        below
 //! ```
 //!
-//! **Planar**, near a wall, where releasing the brake first would waste room: with `u = v/|v|` and
+//! **BrakeAtOnce**, near a wall, where releasing the brake first would waste room: with `u = v/|v|` and
 //! `a = a_p u + c e`, `c >= 0`, the part across (along e) ends with neither velocity nor acceleration:
 //!
 //! ```text
@@ -171,9 +171,9 @@ impl Stop {
         pieces.finish(v.norm().max(speed));
     }
 
-    /// Becomes the planar stop.
+    /// Becomes the brake_at_once stop.
     #[inline(always)]
-    pub fn planar<S: Simd>(
+    pub fn brake_at_once<S: Simd>(
         &mut self,
         simd: S,
         v: &Vector3<f64>,

@@ -52,7 +52,7 @@ fn the_closing_velocity_is_the_inverse_of_the_braking_way() {
 /// Also on the sphere of the limit of velocity, where it can only turn.
 #[test]
 fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
-    let mut samples = Samples::new(51);
+    let mut samples = RandomVectors::new(51);
     let mut limited = 0;
     for _ in 0..2000 {
         let (approach, other) = (Approach::new(P, 0.9, 1e-3), Approach::new(P, 0.4, 2e-3));
@@ -90,7 +90,7 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
 /// The curve of the last equation, limited in magnitude and in its change.
 #[test]
 fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
-    let mut samples = Samples::new(52);
+    let mut samples = RandomVectors::new(52);
     let step_s = 1e-3;
     let approach = Approach::new(P, 1.0, step_s);
     let time = 0.5 * constants_of(1.0, step_s).0;
@@ -132,7 +132,7 @@ fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
 /// From rest without acceleration, where both are limited: the first change has the direction of both aims.
 #[test]
 fn accelerations_in_proportion_keep_their_direction() {
-    let mut samples = Samples::new(54);
+    let mut samples = RandomVectors::new(54);
     let (step_s, still) = (1e-3, Vector3::zeros());
     let approaches = [&Approach::new(P, 1.0, step_s), &Approach::new(P.scaled(0.5), 1.0, step_s)];
     let mut turned = 0;
@@ -157,7 +157,7 @@ fn accelerations_in_proportion_keep_their_direction() {
 
 #[test]
 fn wanted_velocities_are_reduced_by_one_factor_until_no_leg_moves_too_fast() {
-    let mut samples = Samples::new(53);
+    let mut samples = RandomVectors::new(53);
     let machine = machine(&mut samples);
     let constants = Constants::new(&machine, parameters(&machine));
     let limit = 0.97 * machine.actuator.max_rate;

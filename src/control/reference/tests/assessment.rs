@@ -1,16 +1,17 @@
 //! Assessment of a cycle: each finding alone decides.
 
+use crate::control::controller::verify_start;
 use crate::control::cycle::Cycle;
-use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::reference::ReferenceGenerator;
 use crate::control::reference::tests::*;
-use crate::control::sensing::localization::{Localization, Located, PlatformState};
+use crate::control::sensing::localization::Localization;
 use crate::control::setpoint::motion::SetpointMotion;
 use crate::control::setpoint::target::Target;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::TrackingError;
-use crate::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
+use crate::control::signals::errors::PoseError;
+use crate::control::signals::inputs::{Input, Publishers, Setpoint, SetpointKind};
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
 use crate::control::supervision::assessment::{Evidence, assess};
@@ -24,10 +25,10 @@ struct Scene {
     input: Input,
     status: Result<(), Diagnostic>,
     kind: SetpointKind,
-    error: Option<TrackingError>,
-    feedback: FeedbackBound,
-    distrust: Option<Diagnostic>,
-    change: Option<Diagnostic>,
+    error: Option<PoseError>,
+    feedback: FeedbackLimiter,
+    sensor_diagnostic: Option<Diagnostic>,
+    disturbance_diagnostic: Option<Diagnostic>,
     reports: [Result<(), Diagnostic>; 2],
     is_ready: bool,
     twist: Option<Twist>,
@@ -40,10 +41,10 @@ impl Default for Scene {
             input: Input::default(),
             status: Ok(()),
             kind: SetpointKind::Motion,
-            error: Some(TrackingError::default()),
-            feedback: FeedbackBound::default(),
-            distrust: None,
-            change: None,
+            error: Some(PoseError::default()),
+            feedback: FeedbackLimiter::default(),
+            sensor_diagnostic: None,
+            disturbance_diagnostic: None,
             reports: [Ok(()); 2],
             is_ready: true,
             twist: Some(Twist::default()),
@@ -58,7 +59,7 @@ const FOUND: Diagnostic =
 
 impl Scene {
     fn assess(&self, state: State) -> Findings {
-        let machine = machine(&mut Samples::new(61));
+        let machine = machine(&mut RandomVectors::new(61));
         let constants = Constants::new(&machine, parameters(&machine));
         let pose = *constants.home.pose();
         let cycle = Cycle { constants: &constants, release_ns: 0, state };
@@ -70,32 +71,25 @@ impl Scene {
             status: self.status,
             active_limits: LimitSet::default(),
         };
-        let measurement = Measurement::default();
-        let platform = PlatformState {
-            pose,
-            twist: Twist::default(),
-            condition: 2.0,
-            time_to_singularity: f64::INFINITY,
-        };
-        let located = Located { measurement: &measurement, rate: [0.0; LEGS], platform };
         let free_motion =
             self.twist.map(|twist| Motion { pose, twist, acceleration: Acceleration::default() });
+        let free_motion = free_motion.ok_or(DiagnosticCode::PlatformMoving.into());
+        let mut reference = ReferenceGenerator::new(&constants);
+        let localization = Localization::new(&constants);
         let evidence = Evidence {
             input: &self.input,
             setpoint: &setpoint,
-            located: if self.is_located { Ok(&located) } else { Err(FOUND) },
+            localization: if self.is_located { Ok(()) } else { Err(FOUND) },
             error: self.error.as_ref(),
             feedback: &self.feedback,
-            distrust: self.distrust.as_ref(),
-            change: self.change.as_ref(),
+            sensor_diagnostic: self.sensor_diagnostic.as_ref(),
+            disturbance_diagnostic: self.disturbance_diagnostic.as_ref(),
             reports: &self.reports,
             is_ready: self.is_ready,
-            free_motion: free_motion.as_ref().ok_or(DiagnosticCode::PlatformMoving.into()),
-            is_doubtful: false,
+            start: verify_start(&cycle, &localization, &mut reference, free_motion),
+            may_be_frozen: false,
         };
-        let mut reference = ReferenceGenerator::new(&constants);
-        let localization = Localization::new(&constants);
-        assess(&cycle, &evidence, &localization, &mut reference, &mut LimitSet::default())
+        assess(&cycle, &evidence, &localization, &reference, &mut LimitSet::default())
     }
 
     fn tracking(&self, state: State) -> Option<DiagnosticCode> {
@@ -110,9 +104,9 @@ impl Scene {
 }
 
 /// An error along one axis of its four parts.
-fn error(part: usize, size: f64) -> TrackingError {
-    let mut error = TrackingError::default();
-    let TrackingError { pose, twist } = &mut error;
+fn error(part: usize, size: f64) -> PoseError {
+    let mut error = PoseError::default();
+    let PoseError { pose, twist } = &mut error;
     let parts = [&mut pose.linear, &mut pose.angular, &mut twist.linear, &mut twist.angular];
     parts.into_iter().nth(part).unwrap().y = size;
     error
@@ -128,14 +122,17 @@ fn each_finding_alone_ends_the_tracking() {
         for reports in [[Err(FOUND), Ok(())], [Ok(()), Err(FOUND)]] {
             assert_eq!(Scene { reports, ..Scene::default() }.tracking(state), found);
         }
-        assert_eq!(Scene { distrust: Some(FOUND), ..Scene::default() }.tracking(state), found);
-        assert_eq!(Scene { change: Some(FOUND), ..Scene::default() }.tracking(state), found);
+        assert_eq!(Scene { sensor_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
+        assert_eq!(Scene { disturbance_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
         // A stop for a change hides no reason to brake.
         let impact = Some(DiagnosticCode::Impact.into());
         let following = Some(DiagnosticCode::FollowingError);
         let far = Some(error(0, 0.06));
-        assert_eq!(Scene { change: impact, error: far, ..Scene::default() }.tracking(state), following);
-        let input = Input { deadline_missed: true, ..Input::default() };
+        assert_eq!(
+            Scene { disturbance_diagnostic: impact, error: far, ..Scene::default() }.tracking(state),
+            following
+        );
+        let input = Input { overrun_is_fault: true, ..Input::default() };
         let late = Some(DiagnosticCode::DeadlineMissed);
         assert_eq!(Scene { input, ..Scene::default() }.tracking(state), late);
         // A setpoint matters where it is followed.
@@ -155,8 +152,8 @@ fn each_finding_alone_ends_the_tracking() {
             assert_eq!((found(0.99), found(1.01)), (None, Some(code)), "{part}");
             assert_eq!(found(f64::NAN), Some(code), "{part}: no number in one part alone");
         }
-        let mut feedback = FeedbackBound::default();
-        let machine = machine(&mut Samples::new(61));
+        let mut feedback = FeedbackLimiter::default();
+        let machine = machine(&mut RandomVectors::new(61));
         let constants = Constants::new(&machine, parameters(&machine));
         let cycle = Cycle { constants: &constants, release_ns: 0, state };
         for _ in 0..102 {
@@ -166,7 +163,7 @@ fn each_finding_alone_ends_the_tracking() {
         assert_eq!(Scene { feedback, ..Scene::default() }.tracking(state), saturated);
     }
     // Without control nothing is tracked.
-    assert_eq!(Scene { distrust: Some(FOUND), ..Scene::default() }.tracking(State::Standby), None);
+    assert_eq!(Scene { sensor_diagnostic: Some(FOUND), ..Scene::default() }.tracking(State::Standby), None);
 }
 
 #[test]
@@ -204,7 +201,7 @@ fn each_finding_alone_prevents_control() {
 
 #[test]
 fn control_begins_on_a_motion_within_the_tolerance_and_on_any_target() {
-    let machine = machine(&mut Samples::new(61));
+    let machine = machine(&mut RandomVectors::new(61));
     let law = parameters(&machine).law;
     let (shift, turn) = (law.position.stiffness.sqrt(), law.orientation.stiffness.sqrt());
     for (part, wn) in [(0, 1.0), (1, 1.0), (2, shift), (3, turn)] {

@@ -10,7 +10,7 @@ use crate::model::task::task_coordinates;
 const ROOM_RATIO: f64 = 2.6e-5;
 
 /// Standing at home with limits of acceleration and jerk times factors, every bound wide.
-pub(super) fn scene(samples: &mut Samples, acceleration: f64, jerk: f64) -> Scene {
+pub(super) fn scene(samples: &mut RandomVectors, acceleration: f64, jerk: f64) -> Scene {
     let mut scene = Scene::new(samples);
     let limits = &mut scene.constants.parameters.limits;
     *limits = LIMITS;
@@ -34,7 +34,7 @@ pub(super) fn scene(samples: &mut Samples, acceleration: f64, jerk: f64) -> Scen
 /// A coordinate that turns back early in a long stop: a small velocity against the acceleration, a large one across.
 #[test]
 fn coordinates_that_turn_back_between_knots_keep_the_envelope() {
-    let mut samples = Samples::new(81);
+    let mut samples = RandomVectors::new(81);
     let mut largest = [f64::NEG_INFINITY; 2];
     for k in 0..600 {
         let [acceleration, jerk] = [[1.0, 1.0], [0.2, 0.1], [0.05, 0.05]][k % 3];
@@ -73,7 +73,7 @@ fn coordinates_that_turn_back_between_knots_keep_the_envelope() {
 /// An angle that turns back although the attitude does not: the axis of rotation leads around it.
 #[test]
 fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
-    let mut samples = Samples::new(87);
+    let mut samples = RandomVectors::new(87);
     let mut count = 0;
     for k in 0..300 {
         let mut scene = scene(&mut samples, 0.05, 0.05);
@@ -108,7 +108,7 @@ fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
 /// A leg that turns back between two knots: its velocity is along it, against its acceleration.
 #[test]
 fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {
-    let mut samples = Samples::new(82);
+    let mut samples = RandomVectors::new(82);
     let mut largest = [f64::NEG_INFINITY; 2];
     for k in 0..400 {
         let [acceleration, jerk] = [[1.0, 1.0], [0.2, 0.1]][k % 2];
@@ -148,7 +148,7 @@ fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {
 /// A step that ends where it began, and turns in its middle: speeds, lengths and coordinates are larger there.
 #[test]
 fn the_middle_of_a_long_step_keeps_every_bound() {
-    let mut samples = Samples::new(83);
+    let mut samples = RandomVectors::new(83);
     for (part, duration) in [(0, 0.3), (1, 0.3), (0, 0.02), (1, 0.02)] {
         let mut scene = scene(&mut samples, 1.0, 1.0);
         scene.step.duration = duration;
@@ -192,7 +192,7 @@ fn the_middle_of_a_long_step_keeps_every_bound() {
 /// The speed in the middle of a step exceeds that at both ends by an eighth of the change of acceleration times the step.
 #[test]
 fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
-    let mut samples = Samples::new(84);
+    let mut samples = RandomVectors::new(84);
     for (part, is_free) in [(0, false), (1, false), (0, true), (1, true)] {
         let mut scene = scene(&mut samples, 1.0, 1.0);
         scene.is_free = is_free;
@@ -230,7 +230,7 @@ fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
 /// A leg whose rate is largest in the middle of a long step: its acceleration changes sign there.
 #[test]
 fn the_rate_in_the_middle_of_a_long_step_is_within_a_limit_that_is_just_accepted() {
-    let mut samples = Samples::new(95);
+    let mut samples = RandomVectors::new(95);
     for h in [0.03, 0.05] {
         let mut scene = scene(&mut samples, 1.0, 1.0);
         let (v, jerk) = (Vector3::z() * 0.3, Vector3::z() * -LIMITS.position.jerk);
@@ -255,7 +255,7 @@ fn the_rate_in_the_middle_of_a_long_step_is_within_a_limit_that_is_just_accepted
 /// At knots the condition keeps the limit of the reference, whatever that of the platform.
 #[test]
 fn the_condition_at_knots_keeps_the_limit_of_the_reference() {
-    let mut samples = Samples::new(86);
+    let mut samples = RandomVectors::new(86);
     let mut count = [0; 2];
     for _ in 0..300 {
         let mut scene = Scene::new(&mut samples);

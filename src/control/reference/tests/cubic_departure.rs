@@ -11,7 +11,7 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 /// The largest second derivative of a length, for one limit or velocity at a time: each term is needed.
 #[test]
 fn no_length_is_curved_more_than_its_bound() {
-    let mut samples = Samples::new(85);
+    let mut samples = RandomVectors::new(85);
     let mut used = [0.0_f64; 3];
     for k in 0..6000 {
         let (term, mut scene) = (k % 3, scene(&mut samples, 1.0, 1.0));
@@ -21,7 +21,7 @@ fn no_length_is_curved_more_than_its_bound() {
         limits.position.acceleration *= sizes[0];
         limits.orientation.acceleration *= sizes[1];
         let [a, alpha] = [limits.position.acceleration, limits.orientation.acceleration];
-        let unit = |samples: &mut Samples| samples.vector(1.0);
+        let unit = |samples: &mut RandomVectors| samples.vector(1.0);
         scene.motion.twist =
             Twist { angular: unit(&mut samples) * sizes[3], linear: unit(&mut samples) * sizes[2] };
         scene.motion.acceleration =
@@ -38,7 +38,7 @@ fn no_length_is_curved_more_than_its_bound() {
 /// as much.
 #[test]
 fn a_function_departs_from_its_cubic_by_no_more_than_its_bound() {
-    let mut samples = Samples::new(89);
+    let mut samples = RandomVectors::new(89);
     let mut largest = [0.0_f64; 2];
     for _ in 0..200_000 {
         let mut switches = [0.0, samples.uniform(), samples.uniform(), 1.0];
@@ -65,7 +65,7 @@ fn a_function_departs_from_its_cubic_by_no_more_than_its_bound() {
 #[test]
 fn no_length_has_a_third_derivative_beyond_its_bound() {
     const H: f64 = 1e-4;
-    let mut samples = Samples::new(88);
+    let mut samples = RandomVectors::new(88);
     let mut used = [0.0_f64; 5];
     for k in 0..10_000 {
         let (term, mut scene) = (k % 5, scene(&mut samples, 1.0, 1.0));
@@ -85,7 +85,7 @@ fn no_length_has_a_third_derivative_beyond_its_bound() {
             limits.acceleration *= acceleration;
         }
         let Limits { position, orientation, .. } = scene.constants.parameters.limits;
-        let unit = |samples: &mut Samples| samples.vector(1.0).normalize();
+        let unit = |samples: &mut RandomVectors| samples.vector(1.0).normalize();
         let mut pair = |angular: f64, linear: f64| Twist {
             angular: unit(&mut samples) * angular,
             linear: unit(&mut samples) * linear,

@@ -4,7 +4,7 @@
 use nalgebra::Vector6;
 
 use crate::control::cycle::Cycle;
-use crate::control::law::feedback_bound::FeedbackBound;
+use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::law::forces::forces;
 use crate::control::reference::tests::*;
 use crate::control::signals::diagnostic::DiagnosticCode;
@@ -13,7 +13,7 @@ use crate::model::rigid::{Acceleration, Motion};
 use crate::model::task::TaskState;
 
 fn constants(mode: ControlMode) -> Constants {
-    let machine = machine(&mut Samples::new(41));
+    let machine = machine(&mut RandomVectors::new(41));
     let mut parameters = parameters(&machine);
     parameters.law.mode = mode;
     parameters.law.saturation = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
@@ -27,7 +27,7 @@ fn cycle(constants: &Constants) -> Cycle<'_> {
 #[test]
 fn feedback_keeps_its_direction_and_takes_the_largest_share_within_the_bound() {
     let constants = constants(ControlMode::ComputedTorque);
-    let mut samples = Samples::new(42);
+    let mut samples = RandomVectors::new(42);
     let mut saturated = 0;
     for _ in 0..2000 {
         let [angular, linear] = [LIMITS.orientation.acceleration, LIMITS.position.acceleration];
@@ -35,7 +35,7 @@ fn feedback_keeps_its_direction_and_takes_the_largest_share_within_the_bound() {
         let scale = 10.0_f64.powf(2.0 * samples.uniform() - 1.0);
         let added =
             Acceleration { angular: samples.vector(angular * scale), linear: samples.vector(linear * scale) };
-        let mut bound = FeedbackBound::default();
+        let mut bound = FeedbackLimiter::default();
         let limited = bound.limit(&cycle(&constants), &desired, &added.vector());
         let got = Acceleration::from_vector(&limited);
         let mut is_saturated = false;
@@ -63,7 +63,7 @@ fn feedback_on_legs_is_scaled_by_the_leg_that_exceeds_its_bound_most() {
         for (ratio, is_saturated) in [(0.999, false), (-0.999, false), (1.001, true), (-4.0, true)] {
             let mut wanted = bounds * 0.3;
             wanted[leg] = ratio * bounds[leg];
-            let mut bound = FeedbackBound::default();
+            let mut bound = FeedbackLimiter::default();
             let got = bound.limit(&cycle(&constants), &Acceleration::default(), &wanted);
             let expected = if is_saturated { wanted / ratio.abs() } else { wanted };
             assert!((got - expected).norm() < 1e-12 && (got != wanted) == is_saturated);
@@ -76,11 +76,11 @@ fn feedback_on_legs_is_scaled_by_the_leg_that_exceeds_its_bound_most() {
 fn saturation_that_lasts_is_a_fault() {
     let constants = constants(ControlMode::ComputedTorque);
     let run = |pattern: &dyn Fn(u32) -> bool, cycles: u32| {
-        let mut bound = FeedbackBound::default();
+        let mut bound = FeedbackLimiter::default();
         (0..cycles).find(|k| {
             let wanted = if pattern(*k) { Vector6::repeat(1e3) } else { Vector6::zeros() };
             bound.limit(&cycle(&constants), &Acceleration::default(), &wanted);
-            bound.check().is_err()
+            bound.check_saturation_time().is_err()
         })
     };
     // The period is 1 ms: the first cycle beyond 100 ms, or for the rounding of sums the one before.

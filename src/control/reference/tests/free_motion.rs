@@ -13,7 +13,7 @@ use crate::model::rigid::{Motion, Twist};
 const MS: u64 = 1_000_000;
 
 fn constants() -> Constants {
-    let machine = machine(&mut Samples::new(72));
+    let machine = machine(&mut RandomVectors::new(72));
     Constants::new(&machine, Parameters { force_delay_ns: 2 * MS, ..parameters(&machine) })
 }
 
@@ -149,7 +149,7 @@ fn without_rates_control_begins_at_rest_only() {
 /// Noise of 2 um, which the machine file does not state.
 #[test]
 fn a_platform_at_rest_with_noise_is_accepted_in_time() {
-    let mut samples = Samples::new(37);
+    let mut samples = RandomVectors::new(37);
     let mut normal = || (0..12).map(|_| samples.uniform()).sum::<f64>() - 6.0;
     let (mut in_time, trials) = (0, 1000);
     for _ in 0..trials {

@@ -19,7 +19,7 @@ use crate::model::task::{TaskState, task_coordinates};
 pub(super) const MS: u64 = 1_000_000;
 
 pub(super) fn constants(change: impl FnOnce(&mut Machine, &mut Parameters)) -> Constants {
-    let mut machine = machine(&mut Samples::new(61));
+    let mut machine = machine(&mut RandomVectors::new(61));
     let mut parameters = parameters(&machine);
     change(&mut machine, &mut parameters);
     Constants::new(&machine, parameters)
@@ -34,7 +34,8 @@ pub(super) fn standing(constants: &Constants, offset: [f64; 6]) -> SetpointMotio
 
 pub(super) fn started(constants: &Constants, motion: &Motion) -> ReferenceGenerator {
     let mut reference = ReferenceGenerator::new(constants);
-    reference.start(constants, 0, motion);
+    reference.verify_start(constants, motion).ok();
+    reference.begin_at(0);
     reference
 }
 
@@ -122,7 +123,8 @@ fn a_start_clears_the_history() {
     let aside = standing(&constants, [0.0, 0.0, 0.0, 0.1, 0.0, 0.0]);
     let mut reference = started(&constants, &at_rest(constants.home.pose()));
     run(&constants, &mut reference, &Target::Motion(&aside), 50);
-    reference.start(&constants, 50 * MS, &aside.motion);
+    reference.verify_start(&constants, &aside.motion).ok();
+    reference.begin_at(50 * MS);
     assert_eq!(reference.motion_at(50 * MS), aside.motion);
     assert_eq!(reference.motion_at(49 * MS).pose, aside.motion.pose);
 }

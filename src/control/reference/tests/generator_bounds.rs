@@ -27,7 +27,7 @@ fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
     let beyond = standing(&constants, [0.0, 0.0, 0.0, 0.12, 0.0, 0.0]);
     let home = standing(&constants, [0.0; 6]);
     let mut reference = started(&constants, &at_rest(&beyond.motion.pose));
-    assert_eq!(reference.place(&constants, &at_rest(&beyond.motion.pose)), Ok(()));
+    assert_eq!(reference.verify_start(&constants, &at_rest(&beyond.motion.pose)), Ok(()));
     run(&constants, &mut reference, &Target::Motion(&beyond), 200);
     assert!((x(&constants, &reference)[3] - 0.12).abs() < 1e-4);
     // At some millimetres per second, as the bounds follow closely.
@@ -37,7 +37,8 @@ fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
     assert!((0.09..=0.1 + 2e-9).contains(&x(&constants, &reference)[3]), "{:?}", x(&constants, &reference));
     // Also where control begins anew within the envelope before the bounds have followed the platform back.
     let mut reference = started(&constants, &at_rest(&beyond.motion.pose));
-    reference.start(&constants, 0, &home.motion);
+    reference.verify_start(&constants, &home.motion).ok();
+    reference.begin_at(0);
     run(&constants, &mut reference, &Target::Motion(&beyond), 2000);
     assert!((0.09..=0.1 + 2e-9).contains(&x(&constants, &reference)[3]), "{:?}", x(&constants, &reference));
 }
@@ -63,20 +64,23 @@ fn a_start_is_refused_with_the_limit_that_no_stop_keeps() {
         let constants = constants(change(limit));
         let mut reference = ReferenceGenerator::new(&constants);
         assert_eq!(
-            reference.place(&constants, &Motion { twist, ..at_rest(constants.home.pose()) }),
+            reference.verify_start(&constants, &Motion { twist, ..at_rest(constants.home.pose()) }),
             Err(limit)
         );
     }
     let constants = constants(|_, _| ());
     let mut reference = ReferenceGenerator::new(&constants);
-    assert_eq!(reference.place(&constants, &Motion { twist, ..at_rest(constants.home.pose()) }), Ok(()));
+    assert_eq!(
+        reference.verify_start(&constants, &Motion { twist, ..at_rest(constants.home.pose()) }),
+        Ok(())
+    );
 }
 
 /// A platform that brakes have carried beyond the margin: at rest it may begin and comes back, from a step of the room of its bounds
 /// off the end stop it may not begin with a motion that ends at the stop.
 #[test]
 fn a_start_beside_an_end_stop_never_leads_into_it() {
-    let mut samples = Samples::new(31);
+    let mut samples = RandomVectors::new(31);
     let (mut refused, mut begun) = (0, 0);
     for _ in 0..2000 {
         let free = constants(|_, parameters| parameters.stroke_margin = 0.01);
@@ -92,13 +96,14 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
         let speed = 0.03 * samples.uniform() * samples.uniform();
         let twist = Twist { angular: Vector3::zeros(), linear: Vector3::new(0.0, 0.0, speed) };
         let mut reference = ReferenceGenerator::new(&at_end);
-        assert_ne!(reference.place(&at_end, &at_rest(&pose)), Err(Limit::Stroke), "at rest");
-        if reference.place(&at_end, &Motion { twist, ..at_rest(&pose) }).is_err() {
+        assert_ne!(reference.verify_start(&at_end, &at_rest(&pose)), Err(Limit::Stroke), "at rest");
+        if reference.verify_start(&at_end, &Motion { twist, ..at_rest(&pose) }).is_err() {
             refused += 1;
             continue;
         }
         begun += 1;
-        reference.start(&at_end, 0, &Motion { twist, ..at_rest(&pose) });
+        reference.verify_start(&at_end, &Motion { twist, ..at_rest(&pose) }).ok();
+        reference.begin_at(0);
         let mut time_ns = 0;
         while !reference.is_at_rest() {
             time_ns += MS / 10;
@@ -213,7 +218,7 @@ fn walls_keep_their_distance_under_limit_only() {
 /// The stop that is held from the start, and followed, is the one that was verified.
 #[test]
 fn a_start_holds_the_stop_that_was_verified() {
-    for (half, expected) in [(1.0, StopKind::ReleaseFirst), (0.05, StopKind::Planar)] {
+    for (half, expected) in [(1.0, StopKind::ReleaseFirst), (0.05, StopKind::BrakeAtOnce)] {
         let constants = constants(|_, parameters| {
             let [lowest, highest] = [-half, half]
                 .map(|size| core::array::from_fn(|axis| [0.0, 0.0, 0.0, 0.0, 0.0, 1.5][axis] + size));

@@ -1,8 +1,8 @@
-//! Regularity at the knots of a stop near a bound: of the pose itself, of the poses around it, and the work for it.
+//! Regularity at the knots of a stop near a bound: of the pose itself, of the poses around it, and the effort for it.
 
 use fearless_simd::{Level, dispatch};
 
-use crate::control::reference::proof::examination::MAX_WORK;
+use crate::control::reference::proof::examination::MAX_EFFORT;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::regularity::RegularBalls;
 use crate::control::reference::proof::{step::Step, verification::Verifier};
@@ -18,7 +18,7 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 /// of a reference that is there already.
 #[test]
 fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
-    let mut samples = Samples::new(91);
+    let mut samples = RandomVectors::new(91);
     for _ in 0..20 {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
@@ -35,7 +35,7 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
         assert_eq!(verified(&constants, None), Ok(StopKind::ReleaseFirst));
         constants.universal_sine = 1.01 * sine;
         assert_eq!(verified(&constants, None), Err(Limit::Condition));
-        assert_eq!(verified(&constants, Some(&pose)), Ok(StopKind::Planar));
+        assert_eq!(verified(&constants, Some(&pose)), Ok(StopKind::BrakeAtOnce));
         constants.universal_sine = 2.02 * sine;
         assert_eq!(verified(&constants, Some(&pose)), Err(Limit::Condition));
     }
@@ -44,12 +44,12 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
 /// A ball that covers only a knot, or only the poses around it, which may be less regular, leaves a knot to examine.
 #[test]
 fn a_knot_is_covered_with_the_poses_around_it() {
-    let mut samples = Samples::new(92);
+    let mut samples = RandomVectors::new(92);
     for _ in 0..20 {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
-        let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| dispatch!(machine.level, simd => balls.cover_knot(simd, constants, &pose, [reach, 0.0]));
+        let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| dispatch!(machine.level, simd => balls.prove_knot_from_kept(simd, constants, &pose, [reach, 0.0]));
         let mut balls = RegularBalls::default();
         assert!(!covered(&mut balls, &constants, 0.0));
         // Too small for its reach, it is kept all the same for the knot itself.
@@ -63,15 +63,22 @@ fn a_knot_is_covered_with_the_poses_around_it() {
 /// A stop that needs more balls than a cycle may compute is refused, and accepted in a later cycle with those that were kept.
 #[test]
 fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
-    let mut samples = Samples::new(93);
+    let mut samples = RandomVectors::new(93);
     let mut later = 0;
     for _ in 0..2000 {
         let mut scene = Scene::new(&mut samples);
         scene.constants.parameters.condition = 60.0;
         scene.constants.reference_condition = 50.0;
-        let (mut verifier, mut planar) = (Verifier::default(), PoseStop::default());
-        let mut verified =
-            || verifier.verify(&scene.constants, &scene.bounds, &scene.motion, &Step::default(), &mut planar);
+        let (mut verifier, mut brake_at_once) = (Verifier::default(), PoseStop::default());
+        let mut verified = || {
+            verifier.verify(
+                &scene.constants,
+                &scene.bounds,
+                &scene.motion,
+                &Step::default(),
+                &mut brake_at_once,
+            )
+        };
         if verified() == Err(Limit::Condition) {
             later += u32::from((0..3).any(|_| verified().is_ok()));
         }
@@ -79,16 +86,16 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
     assert!(later > 4, "{later}");
 }
 
-/// What the walls took of the work of a step is missing for its verification.
+/// What the walls took of the effort of a step is missing for its verification.
 #[test]
 fn a_step_whose_work_is_done_is_refused() {
-    let mut samples = Samples::new(95);
+    let mut samples = RandomVectors::new(95);
     for _ in 0..20 {
         let machine = machine(&mut samples);
         let constants = Constants::new(&machine, parameters(&machine));
         let pose = *constants.home.pose();
-        let verified = |work: u32| {
-            let step = Step { work, ..Step::default() };
+        let verified = |effort: u32| {
+            let step = Step { effort, ..Step::default() };
             Verifier::default().verify(
                 &constants,
                 &PoseBounds::nominal(&constants),
@@ -97,15 +104,15 @@ fn a_step_whose_work_is_done_is_refused() {
                 &mut PoseStop::default(),
             )
         };
-        assert_eq!(verified(MAX_WORK - 1), Ok(StopKind::ReleaseFirst));
-        assert_eq!(verified(MAX_WORK), Err(Limit::Condition));
+        assert_eq!(verified(MAX_EFFORT - 1), Ok(StopKind::ReleaseFirst));
+        assert_eq!(verified(MAX_EFFORT), Err(Limit::Condition));
     }
 }
 
 /// No pose of a stop is farther from a state than the reach around it, and where the velocity is small some are almost as far.
 #[test]
 fn a_stop_moves_no_farther_than_its_reach() {
-    let mut samples = Samples::new(94);
+    let mut samples = RandomVectors::new(94);
     let mut nearest = [0.0_f64; 2];
     for _ in 0..3000 {
         let part = samples.uniform();
@@ -121,7 +128,7 @@ fn a_stop_moves_no_farther_than_its_reach() {
             },
             ..at_rest(&Pose { rotation: Matrix3::identity(), position: Vector3::zeros() })
         };
-        let stop = PoseStop::new(StopKind::Planar, &motion, &LIMITS);
+        let stop = PoseStop::new(StopKind::BrakeAtOnce, &motion, &LIMITS);
         let (t, dt) = (samples.uniform() * stop.duration(), 0.06 * samples.uniform());
         let state = stop.state_at(Level::new(), t);
         let reach = stop.reach(&state, dt, &LIMITS);

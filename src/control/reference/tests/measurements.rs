@@ -12,8 +12,8 @@ const MS: u64 = 1_000_000;
 const START_NS: u64 = 1000 * MS;
 
 fn constants() -> Constants {
-    let machine = machine(&mut Samples::new(71));
-    Constants::new(&machine, Parameters { max_measured_age_ns: 5 * MS, ..parameters(&machine) })
+    let machine = machine(&mut RandomVectors::new(71));
+    Constants::new(&machine, Parameters { max_age_at_arrival_ns: 5 * MS, ..parameters(&machine) })
 }
 
 /// Validators in a state, and the lengths at home.
@@ -65,7 +65,7 @@ impl Bench {
 
 #[test]
 fn the_first_measurement_is_finite_within_the_stroke_and_recent() {
-    let machine = machine(&mut Samples::new(71));
+    let machine = machine(&mut RandomVectors::new(71));
     let Actuator { min_length, max_length, .. } = machine.actuator;
     let tolerance = 0.02 * machine.actuator.stroke();
     for leg in 0..LEGS {

@@ -3,14 +3,14 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::control::constants::Constants;
-use crate::control::law::estimator::Readings;
+use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::estimator::covariance::NoiseModel;
 use crate::control::law::gains::Gains;
 use crate::control::law::leg_masses::LegMasses;
 use crate::control::law::{ControlMode, Law};
 use crate::control::parameters::{Parameters, ViolationPolicy};
-use crate::control::reference::proof::regularity::{RegularBalls, Regularity, Surroundings};
-use crate::control::reference::samples::Samples;
+use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
+use crate::control::reference::random_vectors::RandomVectors;
 use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::control::signals::state::AfterStop;
 use crate::model::LEGS;
@@ -44,7 +44,7 @@ const LIMITS: Limits = Limits {
 };
 
 /// A machine of about two metres with pairs of joints, some of them scattered.
-pub(super) fn machine(samples: &mut Samples) -> Machine {
+pub(super) fn machine(samples: &mut RandomVectors) -> Machine {
     let scatter = 0.1 * samples.uniform();
     let mut ring = |radius: f64, offset: f64, spread: f64| {
         core::array::from_fn(|leg| {
@@ -94,7 +94,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         period_ns: 1_000_000,
         law: Law::new(machine, ControlMode::default(), gains, LegMasses::at_home(machine), false, &LIMITS),
         noise: NoiseModel { bandwidth: 50.0, rate_noise_ratio: None, period_s: 1e-3 },
-        readings: Readings::default(),
+        reading_errors: ReadingErrors::default(),
         force_delay_ns: 0,
         fidelity: Fidelity::Exact,
         limits: LIMITS,
@@ -115,7 +115,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         following_orientation: 0.05,
         setpoint_timeout_ns: 20_000_000,
         measured_timeout_ns: 10_000_000,
-        max_measured_age_ns: 10_000_000,
+        max_age_at_arrival_ns: 10_000_000,
         ready_timeout_ns: 500_000_000,
         pose_tolerance: 5e-4,
         longest_pause_ns: 10_000_000,
@@ -123,7 +123,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
 }
 
 /// A pose around home whose legs are within the stroke and whose condition is below that of the limit.
-pub(super) fn pose(samples: &mut Samples, constants: &Constants) -> Pose {
+pub(super) fn pose(samples: &mut RandomVectors, constants: &Constants) -> Pose {
     let Pose { rotation, position } = *constants.home.pose();
     loop {
         let pose =
@@ -147,8 +147,8 @@ fn bisected(mut holds: f64, mut fails: f64, mut test: impl FnMut(f64) -> bool) -
     holds
 }
 
-/// Whether balls, and new ones as far as needed, cover the poses within a reach of one, within the condition of the reference.
+/// Whether balls, and new ones as far as needed, prove the poses within a reach of one, within the condition of the reference.
 fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: [f64; 2]) -> bool {
-    let around = Surroundings { pose, reach, required: Regularity::of_reference(constants) };
-    balls.cover(constants, &around, &mut u32::MAX.clone())
+    let around = RegularityQuery { pose, reach, required: Regularity::of_reference(constants) };
+    balls.prove(constants, &around, &mut u32::MAX.clone())
 }

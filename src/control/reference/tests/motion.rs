@@ -7,7 +7,7 @@ use fearless_simd::Level;
 use crate::control::reference::ReferenceGenerator;
 use crate::control::reference::history::History;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
-use crate::control::reference::stop::constant_jerk::move_on;
+use crate::control::reference::stop::constant_jerk::step_constant_jerk;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind, advanced};
 use crate::control::reference::tests::*;
 use crate::control::setpoint::motion::SetpointMotion;
@@ -20,7 +20,7 @@ use crate::model::task::TaskState;
 const MS: u64 = 1_000_000;
 
 /// A motion around home in every coordinate.
-fn moving(samples: &mut Samples, constants: &Constants) -> Motion {
+fn moving(samples: &mut RandomVectors, constants: &Constants) -> Motion {
     let twist = Twist { angular: samples.vector(0.4), linear: samples.vector(0.4) };
     let acceleration = Acceleration { angular: samples.vector(3.0), linear: samples.vector(3.0) };
     Motion { twist, acceleration, ..at_rest(&pose(samples, constants)) }
@@ -51,7 +51,7 @@ fn assert_near(a: &Motion, b: &Motion, tolerances: [f64; 3]) {
 
 #[test]
 fn the_history_returns_the_motion_of_each_instant() {
-    let mut samples = Samples::new(31);
+    let mut samples = RandomVectors::new(31);
     let machine = machine(&mut samples);
     let constants = Constants::new(&machine, parameters(&machine));
     let mut history = History::default();
@@ -89,13 +89,14 @@ fn the_history_returns_the_motion_of_each_instant() {
 /// `deviation_of` against the deviation from the motion that is extrapolated on its own: the rest is of second order.
 #[test]
 fn the_deviation_of_a_setpoint_is_right_to_first_order() {
-    let mut samples = Samples::new(32);
+    let mut samples = RandomVectors::new(32);
     let machine = machine(&mut samples);
     let constants = Constants::new(&machine, parameters(&machine));
     for _ in 0..200 {
         let motion = moving(&mut samples, &constants);
         let mut reference = ReferenceGenerator::new(&constants);
-        reference.start(&constants, 1000 * MS, &motion);
+        reference.verify_start(&constants, &motion).ok();
+        reference.begin_at(1000 * MS);
         let offset = Twist { angular: samples.vector(1e-3), linear: samples.vector(1e-2) };
         let task = TaskState::at_rest(crate::model::task::task_coordinates(&motion.pose, &machine.home));
         let mut setpoint = SetpointMotion::new(Setpoint::motion(0, task));
@@ -119,7 +120,7 @@ fn the_deviation_of_a_setpoint_is_right_to_first_order() {
 /// A step of the generator, and a stop that it follows, against the integration of what it did.
 #[test]
 fn steps_and_stops_move_the_pose_as_their_twist_says() {
-    let mut samples = Samples::new(33);
+    let mut samples = RandomVectors::new(33);
     let machine = machine(&mut samples);
     let constants = Constants::new(&machine, parameters(&machine));
     let mut steps = 0;
@@ -127,7 +128,8 @@ fn steps_and_stops_move_the_pose_as_their_twist_says() {
         let mut motion = moving(&mut samples, &constants);
         motion.acceleration = Acceleration::default();
         let mut reference = ReferenceGenerator::new(&constants);
-        reference.start(&constants, 0, &motion);
+        reference.verify_start(&constants, &motion).ok();
+        reference.begin_at(0);
         let home = at_rest(constants.home.pose()).pose;
         let target = Target::Pose(&home, 1.0);
         let mut expected = motion;
@@ -155,7 +157,7 @@ fn steps_and_stops_move_the_pose_as_their_twist_says() {
 
 #[test]
 fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
-    let mut samples = Samples::new(34);
+    let mut samples = RandomVectors::new(34);
     let machine = machine(&mut samples);
     let mut parameters = parameters(&machine);
     parameters.stroke_margin = 0.1;
@@ -236,7 +238,7 @@ fn relaxed_bounds_keep_their_distance_from_the_end_stops() {
 /// With the axis of rotation turning meanwhile: to fourth order in the step.
 #[test]
 fn a_long_step_turns_as_its_angular_velocity_says() {
-    let mut samples = Samples::new(35);
+    let mut samples = RandomVectors::new(35);
     let machine = machine(&mut samples);
     let constants = Constants::new(&machine, parameters(&machine));
     for _ in 0..200 {
@@ -244,7 +246,7 @@ fn a_long_step_turns_as_its_angular_velocity_says() {
         let h = 0.02;
         let Acceleration { angular, linear } = motion.acceleration;
         let mut found = motion;
-        move_on(&mut found, &angular, &linear, h);
+        step_constant_jerk(&mut found, &angular, &linear, h);
         assert_near(&found, &integrated(&motion, &Vector6::zeros(), h), [6e-8, 1e-12, 1e-9]);
     }
 }
@@ -252,7 +254,7 @@ fn a_long_step_turns_as_its_angular_velocity_says() {
 /// A part of a stop also: the sign of the commutator shows.
 #[test]
 fn a_part_of_a_stop_turns_as_its_angular_velocity_says() {
-    let mut samples = Samples::new(36);
+    let mut samples = RandomVectors::new(36);
     let machine = machine(&mut samples);
     let constants = Constants::new(&machine, parameters(&machine));
     for _ in 0..200 {

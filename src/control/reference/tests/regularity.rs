@@ -23,7 +23,7 @@ fn inverse_condition(constants: &Constants, pose: &Pose) -> f64 {
 }
 
 /// The smallest inverse condition that a climb finds in a ball.
-fn worst(samples: &mut Samples, constants: &Constants, center: &Pose, reach: [f64; 2]) -> f64 {
+fn worst(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: [f64; 2]) -> f64 {
     let mut worst = f64::INFINITY;
     for _ in 0..3 {
         let mut best = Vector6::from_fn(|_, _| 2.0 * samples.uniform() - 1.0);
@@ -41,7 +41,7 @@ fn worst(samples: &mut Samples, constants: &Constants, center: &Pose, reach: [f6
 
 #[test]
 fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
-    let mut samples = Samples::new(11);
+    let mut samples = RandomVectors::new(11);
     let (mut closest, mut accepted) = (0.0_f64, 0);
     for _ in 0..12 {
         let machine = machine(&mut samples);
@@ -80,7 +80,7 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
 #[test]
 fn a_ball_ends_where_its_equations_say() {
     use crate::model::inverse_jacobian::scaled_wrenches;
-    let mut samples = Samples::new(12);
+    let mut samples = RandomVectors::new(12);
     for _ in 0..12 {
         let machine = machine(&mut samples);
         let constants = Constants::new(&machine, parameters(&machine));
@@ -100,7 +100,7 @@ fn a_ball_ends_where_its_equations_say() {
             let center = pose(&mut samples, &constants);
             let ratio = [samples.uniform(), samples.uniform()];
             let reach = |size: f64| ratio.map(|ratio| ratio * size);
-            // Beside the centre of a ball that is kept: by this ball or by a new one.
+            // AdjacentIntervals the centre of a ball that is kept: by this ball or by a new one.
             let mut balls = RegularBalls::default();
             assert!(is_covered(&mut balls, &constants, &center, [0.0; 2]));
             let offset = Twist { angular: samples.vector(0.05), linear: samples.vector(0.05) };
@@ -112,10 +112,10 @@ fn a_ball_ends_where_its_equations_say() {
                 let from_kept = [d + offset.linear.norm(), t + offset.angular.norm()];
                 assert!(holds(&center, from_kept) || holds(&beside, [d, t]), "{size}");
             }
-            let cover =
+            let prove =
                 |size: f64| is_covered(&mut RegularBalls::default(), &constants, &center, reach(size));
             let expected = bisected(0.0, 2.0, |size| holds(&center, reach(size)));
-            let own = bisected(0.0, 2.0, cover);
+            let own = bisected(0.0, 2.0, prove);
             assert!((own - expected).abs() < 1e-7, "{own} {expected}");
         }
     }

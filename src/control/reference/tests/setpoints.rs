@@ -9,7 +9,7 @@ use crate::control::setpoint::pose_samples::PoseSamples;
 use crate::control::setpoint::target::Target;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Measurement, Setpoint};
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
@@ -20,7 +20,7 @@ const MS: u64 = 1_000_000;
 
 #[test]
 fn a_setpoint_that_is_not_valid_is_neither_approached_nor_compared_with() {
-    let machine = machine(&mut Samples::new(73));
+    let machine = machine(&mut RandomVectors::new(73));
     let constants = Constants::new(&machine, parameters(&machine));
     let motion = SetpointMotion::new(Setpoint::motion(0, TaskState::at_rest(machine.home)));
     let samples = PoseSamples::default();
@@ -47,14 +47,14 @@ fn a_setpoint_that_is_not_valid_is_neither_approached_nor_compared_with() {
         assert!(setpoint.target_in(&constants, State::Parking).is_some());
         let cycle = Cycle { constants: &constants, release_ns: 0, state: State::Standby };
         let error = setpoint_error(&cycle, &setpoint, &located);
-        assert_eq!(error, is_valid.then(TrackingError::default));
+        assert_eq!(error, is_valid.then(PoseError::default));
     }
 }
 
 /// Of accelerations at most 25 ms apart, in the order of their stamps.
 #[test]
 fn the_jerk_of_a_setpoint_is_that_of_motions_without_a_gap() {
-    let machine = machine(&mut Samples::new(73));
+    let machine = machine(&mut RandomVectors::new(73));
     let parameters = parameters(&machine);
     let motion = |time_ns: u64, acceleration: f64| {
         let mut task = TaskState::at_rest(machine.home);

@@ -9,7 +9,7 @@ use crate::control::reference::tests::*;
 use crate::control::sensing::localization::{Localization, Located, PlatformState};
 use crate::control::setpoint::target::at_rest;
 use crate::control::signals::diagnostic::DiagnosticCode;
-use crate::control::signals::errors::TrackingError;
+use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::Measurement;
 use crate::control::signals::state::State;
 use crate::model::inverse_jacobian::leg_wrenches;
@@ -18,12 +18,13 @@ use crate::model::rigid::Twist;
 const MS: u64 = 1_000_000;
 
 /// Updates of a tracker that began at 0: the error, for each a time stamp \[ms\] and a displacement from home.
-fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, Twist)]) -> TrackingError {
+fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, Twist)]) -> PoseError {
     let home = *constants.home.pose();
     let mut reference = ReferenceGenerator::new(constants);
-    reference.start(constants, 0, &at_rest(&home));
+    reference.verify_start(constants, &at_rest(&home)).ok();
+    reference.begin_at(0);
     tracker.start(constants, 0, 0);
-    let mut error = TrackingError::default();
+    let mut error = PoseError::default();
     for (k, (time_ms, displacement)) in measured.iter().enumerate() {
         let pose = home.displaced(displacement);
         let length = leg_lengths(constants.machine(), &pose);
@@ -35,16 +36,16 @@ fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, 
             condition: 2.0,
             time_to_singularity: f64::INFINITY,
         };
-        let mut located = Located { measurement: &measurement, rate: [0.0; LEGS], platform };
+        let located = Located { measurement: &measurement, rate: [0.0; LEGS], platform };
         let cycle = Cycle { constants, release_ns: (k as u64 + 1) * MS, state: State::Active };
-        error = tracker.update(&cycle, &reference, &Localization::new(constants), &mut located);
+        (error, _) = tracker.update(&cycle, &reference, &Localization::new(constants), &located);
     }
     error
 }
 
 #[test]
 fn a_leg_that_leaves_the_prediction_ends_the_trust() {
-    let machine = machine(&mut Samples::new(74));
+    let machine = machine(&mut RandomVectors::new(74));
     let constants = Constants::new(&machine, parameters(&machine));
     let bound = constants.estimator.innovation_bound(1e-3);
     for axis in 0..3 {
@@ -58,7 +59,7 @@ fn a_leg_that_leaves_the_prediction_ends_the_trust() {
             let mut tracker = ErrorTracker::default();
             let displacement = Twist { linear: direction * (distance * bound), ..Twist::default() };
             updated(&constants, &mut tracker, &[(1, displacement)]);
-            let found = tracker.distrust().copied();
+            let found = tracker.sensor_diagnostic().copied();
             assert_eq!(found.is_none(), is_trusted, "{axis} {distance}");
             if let Some(found) = found {
                 assert_eq!(found.code, DiagnosticCode::MeasurementImplausible);
@@ -70,7 +71,7 @@ fn a_leg_that_leaves_the_prediction_ends_the_trust() {
 
 #[test]
 fn in_modes_on_legs_the_error_stays_that_of_the_last_measurement() {
-    let machine = machine(&mut Samples::new(74));
+    let machine = machine(&mut RandomVectors::new(74));
     let mut parameters = parameters(&machine);
     parameters.law.mode = ControlMode::JointPd;
     let constants = Constants::new(&machine, parameters);

@@ -8,7 +8,7 @@ use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::universal_sine;
 
 /// The least sine that a climb finds in a ball.
-fn least(samples: &mut Samples, constants: &Constants, center: &Pose, reach: [f64; 2]) -> f64 {
+fn least(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: [f64; 2]) -> f64 {
     let sine = |numbers: &Vector6<f64>| universal_sine(constants.machine(), &within(center, reach, numbers));
     let mut best = Vector6::from_fn(|_, _| 2.0 * samples.uniform() - 1.0);
     let (mut lowest, mut step) = (sine(&best), 1.0);
@@ -22,7 +22,7 @@ fn least(samples: &mut Samples, constants: &Constants, center: &Pose, reach: [f6
 
 #[test]
 fn no_leg_of_a_ball_just_accepted_is_nearer_to_its_axis_than_the_limit() {
-    let mut samples = Samples::new(17);
+    let mut samples = RandomVectors::new(17);
     let (mut closest, mut accepted) = (f64::INFINITY, 0);
     for _ in 0..40 {
         let machine = machine(&mut samples);

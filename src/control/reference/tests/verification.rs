@@ -111,12 +111,12 @@ pub(super) struct PlayedStep {
 impl PlayedStep {
     fn step(&self) -> Step<'_> {
         let change = [self.jerk.angular.norm() * self.duration, self.jerk.linear.norm() * self.duration];
-        Step { from: self.from.as_ref(), duration: self.duration, change, work: 0 }
+        Step { from: self.from.as_ref(), duration: self.duration, change, effort: 0 }
     }
 }
 
 /// A motion within the limits, often with a part of them only.
-fn motion(samples: &mut Samples, constants: &Constants) -> (Motion, PlayedStep) {
+fn motion(samples: &mut RandomVectors, constants: &Constants) -> (Motion, PlayedStep) {
     let Limits { position, orientation, .. } = constants.parameters.limits;
     let part = 10.0_f64.powf(-samples.uniform());
     let turning = if samples.below(3) == 0 { 0.0 } else { part };
@@ -149,7 +149,7 @@ pub(super) struct Scene {
 }
 
 impl Scene {
-    pub fn new(samples: &mut Samples) -> Self {
+    pub fn new(samples: &mut RandomVectors) -> Self {
         let mut machine = machine(samples);
         machine.actuator.max_rate = 100.0;
         let mut parameters = parameters(&machine);
@@ -177,13 +177,20 @@ impl Scene {
         self.constants.reference_condition = condition;
     }
 
-    /// In one of the cycles that share the work of a long stop.
+    /// In one of the cycles that share the effort of a long stop.
     pub fn verify(&self) -> Result<StopKind, Limit> {
-        let (mut verifier, mut planar) = (Verifier::default(), PoseStop::default());
-        let mut verify =
-            || verifier.verify(&self.constants, &self.bounds, &self.motion, &self.step.step(), &mut planar);
+        let (mut verifier, mut brake_at_once) = (Verifier::default(), PoseStop::default());
+        let mut verify = || {
+            verifier.verify(
+                &self.constants,
+                &self.bounds,
+                &self.motion,
+                &self.step.step(),
+                &mut brake_at_once,
+            )
+        };
         match verify().or_else(|_| verify()).or_else(|_| verify())? {
-            StopKind::Planar if self.is_free => Err(Limit::Stroke),
+            StopKind::BrakeAtOnce if self.is_free => Err(Limit::Stroke),
             kind => Ok(kind),
         }
     }
@@ -230,7 +237,7 @@ impl Uses {
 
 #[test]
 fn lengths_stay_within_bounds_that_are_just_accepted() {
-    let mut samples = Samples::new(21);
+    let mut samples = RandomVectors::new(21);
     let mut uses = Uses::default();
     for k in 0..600 {
         let mut scene = Scene::new(&mut samples);
@@ -252,7 +259,7 @@ fn lengths_stay_within_bounds_that_are_just_accepted() {
 
 #[test]
 fn rates_stay_within_a_limit_that_is_just_accepted() {
-    let mut samples = Samples::new(22);
+    let mut samples = RandomVectors::new(22);
     let mut uses = Uses::default();
     for _ in 0..400 {
         let mut scene = Scene::new(&mut samples);
@@ -265,7 +272,7 @@ fn rates_stay_within_a_limit_that_is_just_accepted() {
 
 #[test]
 fn coordinates_stay_within_an_envelope_that_is_just_accepted() {
-    let mut samples = Samples::new(23);
+    let mut samples = RandomVectors::new(23);
     let mut uses = [Uses::default(), Uses::default()];
     for k in 0..900 {
         let mut scene = Scene::new(&mut samples);
@@ -295,7 +302,7 @@ fn coordinates_stay_within_an_envelope_that_is_just_accepted() {
 
 #[test]
 fn the_condition_stays_within_a_limit_that_is_just_accepted() {
-    let mut samples = Samples::new(24);
+    let mut samples = RandomVectors::new(24);
     let mut uses = Uses::default();
     for _ in 0..400 {
         let mut scene = Scene::new(&mut samples);
@@ -312,7 +319,7 @@ fn the_condition_stays_within_a_limit_that_is_just_accepted() {
 
 #[test]
 fn velocities_stay_within_limits_that_are_just_accepted() {
-    let mut samples = Samples::new(25);
+    let mut samples = RandomVectors::new(25);
     for part in 0..2 {
         let mut uses = Uses::default();
         for _ in 0..400 {

@@ -8,24 +8,24 @@ pub(in crate::control::reference::proposal::walls) struct DerivativeBound<'a> {
     /// `G V'` at the bound.
     wanted: f64,
     /// The part of the bound that holds, over the square of the norm of the gradient; and the part that does not.
-    weight_per_square: f64,
-    rest: f64,
+    blend_per_square: f64,
+    unblended: f64,
     multiplier: f64,
 }
 
 impl<'a> DerivativeBound<'a> {
     pub fn new(wall: &'a Wall) -> Self {
-        let [against, along] = &wall.sides;
+        let [against, along] = &wall.ends;
         let wanted = if wall.multiplier > 0.0 { along.derivative } else { -against.derivative };
-        let weight = (wall.multiplier.abs() * wall.weight).min(1.0);
-        let weight_per_square = weight * wall.inverse_square;
-        Self { gradient: &wall.gradient, wanted, weight_per_square, rest: 1.0 - weight, multiplier: 0.0 }
+        let blend = (wall.multiplier.abs() * wall.blend_rate).min(1.0);
+        let blend_per_square = blend * wall.inverse_square;
+        Self { gradient: &wall.gradient, wanted, blend_per_square, unblended: 1.0 - blend, multiplier: 0.0 }
     }
 
     /// Change of the multiplier for the present `G V'`.
     #[inline(always)]
     pub fn change(&mut self, present: f64) -> f64 {
-        let change = (present - self.wanted) * self.weight_per_square - self.rest * self.multiplier;
+        let change = (present - self.wanted) * self.blend_per_square - self.unblended * self.multiplier;
         self.multiplier += change;
         change
     }

@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 use fearless_simd::Level;
 
 use crate::control::reference::proposal::walls::*;
-use crate::control::reference::samples::Samples;
+use crate::control::reference::random_vectors::RandomVectors;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind, advanced};
 use crate::control::reference::tests::{machine, parameters, pose};
 use crate::control::setpoint::target::at_rest;
@@ -17,24 +17,24 @@ const STEP_S: f64 = 1e-3;
 
 /// One end of a wall, its gradient towards that end.
 #[derive(Clone, Copy)]
-struct End {
+struct WallEnd {
     limit: LimitSet,
     gradient: Vector6<f64>,
-    side: Side,
+    end: End,
     /// Positive where it is active.
     multiplier: f64,
 }
 
 /// Both ends of each wall, the one along the gradient first.
-fn ends(walls: &Walls) -> Vec<End> {
-    let of = |wall: &Wall, sign: f64, side: Side| End {
+fn ends(walls: &Walls) -> Vec<WallEnd> {
+    let of = |wall: &Wall, sign: f64, end: End| WallEnd {
         limit: wall.limit,
         gradient: Vector6::from_row_slice(&wall.gradient[..6]) * sign,
-        side,
+        end,
         multiplier: (wall.multiplier * sign).max(0.0),
     };
     let kept = walls.walls.iter().take(walls.count);
-    kept.flat_map(|wall| [of(wall, 1.0, wall.sides[1]), of(wall, -1.0, wall.sides[0])]).collect()
+    kept.flat_map(|wall| [of(wall, 1.0, wall.ends[1]), of(wall, -1.0, wall.ends[0])]).collect()
 }
 
 struct Scene {
@@ -44,7 +44,7 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(samples: &mut Samples) -> Self {
+    fn new(samples: &mut RandomVectors) -> Self {
         let machine = machine(samples);
         let mut parameters = parameters(&machine);
         parameters.envelope = Some(Envelope {
@@ -77,7 +77,7 @@ fn approach(constants: &Constants, is_angle: bool) -> Approach {
 
 #[test]
 fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
-    let mut samples = Samples::new(71);
+    let mut samples = RandomVectors::new(71);
     let mut outside = 0;
     for _ in 0..300 {
         let scene = Scene::new(&mut samples);
@@ -148,23 +148,23 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
                 (gap * approach.slowest_slope() / 4.0, approach.slowest_slope() / 4.0)
             };
             // To second order in the step.
-            assert!((wall.side.rate - rate).abs() < 2e-4, "{k}: {} not {rate}, gap {gap}", wall.side.rate);
+            assert!((wall.end.rate - rate).abs() < 2e-4, "{k}: {} not {rate}, gap {gap}", wall.end.rate);
             let velocity = stacked(&(twist.angular * radius), &twist.linear);
             let derivative = -slope * wall.gradient.dot(&velocity) - curvature;
             assert!(
-                (wall.side.derivative - derivative).abs() < 2e-2,
+                (wall.end.derivative - derivative).abs() < 2e-2,
                 "{k}: {} not {derivative}",
-                wall.side.derivative
+                wall.end.derivative
             );
         }
     }
     assert!(outside > 100, "{outside}");
 }
 
-/// A platform that approaches no wall too fast can stop before it: the planar stop, in fine steps.
+/// A platform that approaches no wall too fast can stop before it: the brake_at_once stop, in fine steps.
 #[test]
 fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
-    let mut samples = Samples::new(74);
+    let mut samples = RandomVectors::new(74);
     let (mut nearest, mut worst) = (0, f64::INFINITY);
     for _ in 0..2000 {
         let mut scene = Scene::new(&mut samples);
@@ -181,7 +181,7 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
                 &(scene.motion.twist.angular * scene.constants.machine().joints.radius),
                 &scene.motion.twist.linear,
             );
-            ends(&scene.walls()).iter().all(|end| end.gradient.dot(&velocity) <= end.side.rate)
+            ends(&scene.walls()).iter().all(|end| end.gradient.dot(&velocity) <= end.end.rate)
         };
         let (mut low, mut high) = (0.0, 1.0);
         for _ in 0..20 {
@@ -195,7 +195,7 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
         }
         nearest += 1;
         let Scene { constants, bounds, motion } = &scene;
-        let stop = PoseStop::new(StopKind::Planar, motion, &constants.parameters.limits);
+        let stop = PoseStop::new(StopKind::BrakeAtOnce, motion, &constants.parameters.limits);
         let (mut pose, mut state, dt) =
             (motion.pose, stop.state_at(Level::new(), 0.0), stop.duration() / 100.0);
         for k in 1..=100 {
@@ -217,7 +217,7 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
 /// gradients that are active, none of them negative.
 #[test]
 fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
-    let mut samples = Samples::new(72);
+    let mut samples = RandomVectors::new(72);
     let (mut several, mut free, mut partly, mut most_work) = (0, 0, 0, 0);
     for _ in 0..500 {
         let scene = Scene::new(&mut samples);
@@ -229,24 +229,24 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
         };
         let [turn, shift] = [wanted(1.2), wanted(1.2)];
         let (mut new_turn, mut new_shift) = (turn, shift);
-        let limits = walls.restrict(scene.constants.machine().level, &mut new_turn, &mut new_shift);
+        let limits = walls.project(scene.constants.machine().level, &mut new_turn, &mut new_shift);
         let of = |first: &Vector3<f64>, second: &Vector3<f64>| stacked(&(first * walls.radius), second);
         let [before, after] = [(&turn, &shift), (&new_turn, &new_shift)]
             .map(|(turn, shift)| of(&turn.velocity, &shift.velocity));
         let ends = ends(&walls);
-        let active: Vec<&End> = ends.iter().filter(|end| end.multiplier > 0.0).collect();
+        let active: Vec<&WallEnd> = ends.iter().filter(|end| end.multiplier > 0.0).collect();
         for (k, wall) in ends.iter().enumerate() {
             // Far beyond one end the return is no faster than the other end may be approached.
-            let excess = wall.gradient.dot(&after) - wall.side.rate.max(-ends[k ^ 1].side.rate);
+            let excess = wall.gradient.dot(&after) - wall.end.rate.max(-ends[k ^ 1].end.rate);
             if active.len() <= 1 {
                 assert!(excess < 1e-9, "{excess}");
             }
         }
         let change: Vector6<f64> = active.iter().map(|wall| wall.gradient * wall.multiplier).sum();
         assert!((before - change - after).norm() < 1e-9);
-        // The more walls are active, the more work is left to others.
-        most_work = most_work.max(walls.work());
-        assert!(walls.work() <= 4 && (!active.is_empty() || walls.work() == 0), "{}", walls.work());
+        // The more walls are active, the more effort is left to others.
+        most_work = most_work.max(walls.effort());
+        assert!(walls.effort() <= 4 && (!active.is_empty() || walls.effort() == 0), "{}", walls.effort());
         let expected = active.iter().fold(LimitSet::default(), |set, wall| set.union(wall.limit));
         assert_eq!(limits, expected);
         let derivative = of(&new_turn.derivative, &new_shift.derivative);
@@ -257,7 +257,7 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
             }
             [wall] => {
                 let rate = wall.gradient.dot(&after);
-                assert!(rate >= wall.side.rate - 1e-9 && (rate <= 0.0 || rate <= wall.side.rate + 1e-9));
+                assert!(rate >= wall.end.rate - 1e-9 && (rate <= 0.0 || rate <= wall.end.rate + 1e-9));
                 // The bound on the derivative holds by a weight, from 0.6 a^2/j of the velocity that is taken away on wholly.
                 let is_angle = ends[12..18].iter().any(|end| core::ptr::eq(end, *wall));
                 let limits = &scene.constants.parameters.limits;
@@ -267,7 +267,7 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
                 partly += u32::from(weight < 1.0);
                 let weight = weight.min(1.0);
                 let before = wall.gradient.dot(&of(&turn.derivative, &shift.derivative));
-                let expected = weight * wall.side.derivative + (1.0 - weight) * before;
+                let expected = weight * wall.end.derivative + (1.0 - weight) * before;
                 assert!((wall.gradient.dot(&derivative) - expected).abs() < 1e-6, "{weight}");
             }
             _ => several += 1,
@@ -282,7 +282,7 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
 /// Two walls at 60 degrees, as the faces of a wedge: 8 sweeps leave 1e-4 of the excess.
 #[test]
 fn two_walls_at_60_degrees_converge() {
-    let mut samples = Samples::new(73);
+    let mut samples = RandomVectors::new(73);
     let scene = Scene::new(&mut samples);
     let mut walls = scene.walls();
     walls.count = 0;
@@ -290,15 +290,15 @@ fn two_walls_at_60_degrees_converge() {
         [Vector3::x(), Matrix3::new(0.5, 0.0, 0.0, 0.75_f64.sqrt(), 0.0, 0.0, 0.0, 0.0, 1.0) * Vector3::x()];
     for direction in directions {
         let gradient = stacked(&Vector3::zeros(), &direction);
-        let free = Side { rate: f64::INFINITY, derivative: 0.0 };
+        let free = End { rate: f64::INFINITY, derivative: 0.0 };
         let approach = approach(&scene.constants, false);
-        walls.push(Limit::Stroke, &approach, gradient, [free, Side::default()]);
+        walls.push(Limit::Stroke, &approach, gradient, [free, End::default()]);
     }
     let still =
         WantedVelocity { velocity: Vector3::zeros(), derivative: Vector3::zeros(), is_limited: false };
     let along = directions[0] + directions[1];
     let (mut turn, mut shift) = (still, WantedVelocity { velocity: along, derivative: along * 3.0, ..still });
-    walls.restrict(scene.constants.machine().level, &mut turn, &mut shift);
+    walls.project(scene.constants.machine().level, &mut turn, &mut shift);
     for direction in directions {
         assert!(direction.dot(&shift.velocity).abs() < 1e-4, "{}", shift.velocity);
         assert!(direction.dot(&shift.derivative).abs() < 1e-4, "{}", shift.derivative);

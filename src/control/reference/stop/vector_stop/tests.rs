@@ -1,6 +1,6 @@
 use fearless_simd::{Level, dispatch};
 
-use crate::control::reference::samples::Samples;
+use crate::control::reference::random_vectors::RandomVectors;
 use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::reference::stop::vector_stop::*;
 
@@ -13,7 +13,7 @@ const LIMITS: [DerivativeLimits; 5] = [
 ];
 
 /// A velocity and an acceleration within the limits: of any direction, often at the limits or aligned.
-fn start(samples: &mut Samples, limits: &DerivativeLimits) -> [Vector3<f64>; 2] {
+fn start(samples: &mut RandomVectors, limits: &DerivativeLimits) -> [Vector3<f64>; 2] {
     let v = samples.vector(limits.velocity);
     let a = match samples.below(4) {
         0 => v * (-limits.acceleration / v.norm().max(1e-30) * samples.uniform()),
@@ -28,7 +28,7 @@ fn planned(kind: StopKind, v: &Vector3<f64>, a: &Vector3<f64>, limits: &Derivati
         Stop { count: 9, begins: [0.0; MAX_PIECES], peak_velocity: 9.0, duration: 9.0, ..Stop::default() };
     dispatch!(Level::new(), simd => match kind {
         StopKind::ReleaseFirst => stop.release_first(simd, v, a, limits),
-        StopKind::Planar => stop.planar(simd, v, a, limits),
+        StopKind::BrakeAtOnce => stop.brake_at_once(simd, v, a, limits),
     });
     stop
 }
@@ -43,12 +43,12 @@ fn state(stop: &Stop, t: f64) -> StopState {
 
 #[test]
 fn a_stop_keeps_acceleration_jerk_and_its_peak_velocity_and_ends_at_rest() {
-    let mut samples = Samples::new(1);
+    let mut samples = RandomVectors::new(1);
     let mut worst = [0.0_f64; 4];
     for limits in LIMITS {
         for _ in 0..20_000 {
             let [v, a] = start(&mut samples, &limits);
-            for kind in [StopKind::ReleaseFirst, StopKind::Planar] {
+            for kind in [StopKind::ReleaseFirst, StopKind::BrakeAtOnce] {
                 let stop = planned(kind, &v, &a, &limits);
                 let first = state(&stop, 0.0);
                 assert!((first.velocity - v).norm() <= 1e-12 && (first.acceleration - a).norm() <= 1e-12);
@@ -78,7 +78,7 @@ fn a_stop_keeps_acceleration_jerk_and_its_peak_velocity_and_ends_at_rest() {
 
 #[test]
 fn the_extent_bounds_the_stop_that_releases_first() {
-    let mut samples = Samples::new(2);
+    let mut samples = RandomVectors::new(2);
     let mut largest_use: f64 = 0.0;
     for limits in LIMITS {
         for _ in 0..10_000 {
@@ -102,15 +102,18 @@ fn the_extent_bounds_the_stop_that_releases_first() {
 fn a_stop_takes_little_more_than_the_shortest_way() {
     let [limits, ..] = LIMITS;
     let v = Vector3::new(1.0, 0.0, 0.0);
-    for (a, planar, release_first) in [
+    for (a, brake_at_once, release_first) in [
         ([0.0, 0.0, 0.0], 105.0, 105.0),
         ([-5.0, 0.0, 0.0], 100.0, 110.0),
         ([0.0, 5.0, 0.0], 113.0, 115.0),
         ([-3.5, 3.5, 0.0], 104.0, 111.0),
     ] {
         let end = |kind| state(&planned(kind, &v, &a.into(), &limits), 10.0).displacement.norm() * 1e3;
-        let ways = [end(StopKind::Planar), end(StopKind::ReleaseFirst)];
-        assert!((ways[0] - planar).abs() < 1.0 && (ways[1] - release_first).abs() < 1.0, "{a:?} {ways:?}");
+        let ways = [end(StopKind::BrakeAtOnce), end(StopKind::ReleaseFirst)];
+        assert!(
+            (ways[0] - brake_at_once).abs() < 1.0 && (ways[1] - release_first).abs() < 1.0,
+            "{a:?} {ways:?}"
+        );
     }
 }
 
@@ -119,7 +122,7 @@ fn a_stop_takes_little_more_than_the_shortest_way() {
 fn the_peak_velocity_of_a_planar_stop_is_that_of_its_parts() {
     let [limits, ..] = LIMITS;
     let (v, a) = (Vector3::new(0.5, 0.0, 0.0), Vector3::new(0.0, 5.0, 0.0));
-    let stop = planned(StopKind::Planar, &v, &a, &limits);
+    let stop = planned(StopKind::BrakeAtOnce, &v, &a, &limits);
     // Across `c^2 / 2 Jc` with `Jc = 0.8 J`.
     let across = 25.0 / (2.0 * 400.0);
     assert!((stop.peak_velocity - 0.5_f64.hypot(across)).abs() < 1e-12, "{}", stop.peak_velocity);

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 /// Sequence of random numbers: SplitMix64.
-pub(super) struct Samples(u64);
+pub(super) struct RandomVectors(u64);
 
-impl Samples {
+impl RandomVectors {
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }

@@ -28,13 +28,13 @@ const FORGETTING_RATIO: f64 = 0.03;
 /// Bound of the feedback, and for how long it was reached lately.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
-pub(in crate::control) struct FeedbackBound {
+pub(in crate::control) struct FeedbackLimiter {
     saturated_s: f64,
 }
 
-impl FeedbackBound {
-    /// Whether saturation has not lasted too long.
-    pub fn check(&self) -> Result<(), Diagnostic> {
+impl FeedbackLimiter {
+    /// Whether the total of the time in saturation, as far as it is not forgotten, is within its bound.
+    pub fn check_saturation_time(&self) -> Result<(), Diagnostic> {
         if self.saturated_s <= MAX_SATURATION_S {
             return Ok(());
         }

@@ -1,0 +1,43 @@
+//! Actuation: the forces of a cycle under control, from the reference and the estimated error.
+
+use crate::control::cycle::Cycle;
+use crate::control::law::error_tracker::ErrorTracker;
+use crate::control::law::feedback_limiter::FeedbackLimiter;
+use crate::control::law::force_limits::{ForceLimiter, LimitedForces};
+use crate::control::law::forces::forces;
+use crate::control::signals::diagnostic::Diagnostic;
+use crate::model::rigid::Motion;
+
+/// Evaluates the law at `begin_ns`, when the forces begin to act, for a desired motion in the middle of their hold. Records
+/// for the estimator what is sent after all limits.
+#[inline(always)]
+pub(in crate::control) fn actuate(
+    cycle: &Cycle<'_>,
+    begin_ns: u64,
+    desired: Motion,
+    errors: &mut ErrorTracker,
+    (feedback, limiter): (&mut FeedbackLimiter, &mut ForceLimiter),
+    limited: &mut LimitedForces,
+) -> Result<(), Diagnostic> {
+    let constants = cycle.constants;
+    let parameters = &constants.parameters;
+    let estimator = errors.estimator();
+    let mut at_begin = *estimator.state();
+    estimator.predict(&mut at_begin, begin_ns);
+    let wanted = parameters.law.feedback_acceleration(&at_begin, &constants.input_matrix);
+    let acceleration = feedback.limit(cycle, &desired.acceleration, &wanted);
+    let mut sent = constants.input_matrix.acceleration(&acceleration);
+    let in_middle = at_begin.after(0.5 * parameters.period_s(), &sent);
+    let error = errors.corrected_to_last_measurement(&in_middle);
+    let motion = parameters.law.dynamics_motion(desired, &error, &acceleration);
+    let force = forces(constants, &motion, &acceleration)?;
+    limiter.limit(cycle, &force, &motion, limited)?;
+    if limited.force != force {
+        let (machine, missing) = (constants.machine(), &limited.wrench_error);
+        let missing = constants.input_matrix.acceleration_of(machine, &motion.pose, missing);
+        sent += missing;
+        errors.record_missing(constants, &missing);
+    }
+    errors.record_sent(begin_ns, &sent, &limited.force);
+    Ok(())
+}
