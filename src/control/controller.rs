@@ -15,7 +15,7 @@ use crate::control::sensing::drive_monitor::DriveMonitor;
 use crate::control::sensing::external_pose::ExternalPose;
 use crate::control::sensing::free_motion::FreeMotion;
 use crate::control::sensing::leg_rates::LegRateEstimator;
-use crate::control::sensing::localization::{Localization, PlatformState};
+use crate::control::sensing::localization::{Localization, Located, PlatformState};
 use crate::control::sensing::measurement::MeasurementValidator;
 use crate::control::sensing::stamp_clock::StampClock;
 use crate::control::setpoint::validated::ValidatedSetpoint;
@@ -154,28 +154,16 @@ impl Controller {
             localization.locate(&cycle, measurement, rate)
         });
         let free_motion = free_motion.update(&cycle, localization, located.as_ref().ok());
-        let mut error = match &mut located {
-            Ok(located) if cycle.state.has_control() => {
-                let error;
-                (error, located.platform.twist) = errors.update(&cycle, reference, localization, located);
-                Some(error)
-            }
-            Ok(located) => setpoint_error(&cycle, &setpoint, located),
-            Err(_) => None,
-        };
+        let mut error = platform_error(&cycle, &setpoint, errors, reference, localization, &mut located);
 
         // Decide the state.
         let mut active_limits = setpoint.active_limits;
-        let start = match cycle.state.has_control() || located.is_err() {
-            true => Ok(()),
-            false => verify_start(&cycle, localization, reference, free_motion),
-        };
-        let (located_or_cause, error_now) = (located.as_ref().map_err(|cause| *cause), error.as_ref());
+        let start = verify_start(&cycle, localization, reference, &located, free_motion);
         let evidence = Evidence {
             input,
             setpoint: &setpoint,
-            localization: located_or_cause.map(drop),
-            error: error_now,
+            localization: located.as_ref().map(drop).map_err(|cause| *cause),
+            error: error.as_ref(),
             start,
             reports: &reports,
             is_ready: drives.is_ready,
@@ -211,13 +199,9 @@ impl Controller {
         let mut output = Output::new(supervisor, &limited, error);
         output.active_limits = active_limits.union(reference.active_limits()).union(limited.active_limits);
         // Written where they stay: the largest fields, and the count, which `located` holds borrowed until here.
-        if let Ok(located) = &located {
-            output.platform = Some(located.platform);
-        }
+        output.platform = located.as_ref().ok().map(|located| located.platform);
         (output.missed_measurements, output.missed_setpoints) = (measurements.missed, setpoints.missed);
-        if output.state.has_control() {
-            output.reference = Some(*reference.motion());
-        }
+        output.reference = output.state.has_control().then(|| *reference.motion());
         output
     }
 }
@@ -244,15 +228,39 @@ impl Output {
     }
 }
 
-/// Places the reference where control would begin, and verifies a stop from there; why control does not begin if none keeps
-/// every limit.
+/// Error of the platform: under control against the reference, else against the setpoint. Under control it gives the platform
+/// the estimated twist where the driver sends no rates.
+#[inline(always)]
+fn platform_error(
+    cycle: &Cycle<'_>,
+    setpoint: &ValidatedSetpoint<'_>,
+    errors: &mut ErrorTracker,
+    reference: &ReferenceGenerator,
+    localization: &Localization,
+    located: &mut Result<Located<'_>, Diagnostic>,
+) -> Option<PoseError> {
+    let located = located.as_mut().ok()?;
+    if !cycle.state.has_control() {
+        return setpoint_error(cycle, setpoint, located);
+    }
+    let (error, twist) = errors.update(cycle, reference, localization, located);
+    located.platform.twist = twist;
+    Some(error)
+}
+
+/// Without control, places the reference where control would begin, and verifies a stop from there; why control does not begin
+/// if none keeps every limit.
 #[inline(always)]
 pub(in crate::control) fn verify_start(
     cycle: &Cycle<'_>,
     localization: &Localization,
     reference: &mut ReferenceGenerator,
+    located: &Result<Located<'_>, Diagnostic>,
     free_motion: Result<Motion, Diagnostic>,
 ) -> Result<(), Diagnostic> {
+    if cycle.state.has_control() || located.is_err() {
+        return Ok(());
+    }
     reference.verify_start(cycle.constants, &free_motion?).map_err(|limit| match limit {
         Limit::Condition => localization.near_singular(cycle.constants.reference_condition),
         _ => Diagnostic::from(DiagnosticCode::PlatformMoving).at(limit as usize),

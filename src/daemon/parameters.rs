@@ -11,6 +11,7 @@ use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::estimator::covariance::NoiseModel;
 use crate::control::law::gains::Gains;
 use crate::control::parameters::{Envelope, Parameters};
+use crate::control::signals::pair::Pair;
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
 use crate::realtime::cyclic::{ReleaseMode, Timing};
@@ -28,10 +29,10 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         law: Law::new(
             machine,
             control.mode,
-            [
-                Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
-                Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
-            ],
+            Pair {
+                angular: Gains::new(control.orientation_bandwidth_hz, control.orientation_damping_ratio),
+                linear: Gains::new(control.position_bandwidth_hz, control.position_damping_ratio),
+            },
             control.leg_masses,
             control.compensate_disturbances,
             &limits.reference,

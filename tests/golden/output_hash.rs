@@ -9,6 +9,7 @@ use hexad::control::sensing::localization::PlatformState;
 use hexad::control::signals::diagnostic::Diagnostic;
 use hexad::control::signals::errors::PoseError;
 use hexad::control::signals::limits::LimitSet;
+use hexad::control::signals::state::MessageId;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, Wrench};
 
 /// Hash of the outputs so far.
@@ -27,7 +28,7 @@ impl OutputHash {
         let Output {
             state,
             diagnostic,
-            answered,
+            answered_message: MessageId { epoch, sequence },
             request_diagnostic,
             force,
             wrench_error: Wrench { torque, force: wrench_force },
@@ -40,8 +41,8 @@ impl OutputHash {
         } = output;
         self.word(*state as u64);
         self.diagnostic(diagnostic);
-        self.word(answered.0);
-        self.word(answered.1);
+        self.word(*epoch);
+        self.word(*sequence);
         self.diagnostic(request_diagnostic);
         self.numbers(force.iter().chain(torque).chain(wrench_force));
         self.word((*limits).into());

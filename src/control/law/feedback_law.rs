@@ -30,6 +30,7 @@ use crate::control::law::mode::ControlMode;
 use crate::control::signals::errors::ErrorCoordinates;
 use crate::control::signals::errors::ErrorEstimate;
 use crate::control::signals::limits::Limits;
+use crate::control::signals::pair::Pair;
 use crate::model::LEGS;
 use crate::model::active_forces::InverseDynamics;
 use crate::model::fidelity::Gravity;
@@ -64,7 +65,7 @@ impl Law {
     pub fn new(
         machine: &Machine,
         mode: ControlMode,
-        [position, orientation]: [Gains; 2],
+        gains: Pair<Gains>,
         leg_masses: LegMasses,
         compensates_disturbance: bool,
         limits: &Limits,
@@ -82,6 +83,7 @@ impl Law {
             }
             ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
         }
+        let Pair { angular: orientation, linear: position } = gains;
         Self { mode, position, orientation, compensates_disturbance, leg_masses, saturation }
     }
 

@@ -30,6 +30,7 @@ use crate::control::setpoint::target::Target;
 use crate::control::setpoint::target::{RelativeMotion, at_rest};
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::{Limit, LimitSet};
+use crate::control::signals::pair::Pair;
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
@@ -197,8 +198,11 @@ impl ReferenceGenerator {
                 self.proposed(constants, target, &desired, step_s);
             step_constant_jerk(&mut self.motion, &angular, &linear, step_s);
             let (now, next) = (&begin.acceleration, &self.motion.acceleration);
-            let change = [(next.angular - now.angular).norm(), (next.linear - now.linear).norm()];
-            let step = Step { from: Some(&begin.pose), duration: step_s, change, effort };
+            let acceleration_change = Pair {
+                angular: (next.angular - now.angular).norm(),
+                linear: (next.linear - now.linear).norm(),
+            };
+            let step = Step { from: Some(&begin.pose), duration: step_s, acceleration_change, effort };
             let verified =
                 self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
             self.in_proportion_steps = match verified {
@@ -248,8 +252,10 @@ impl ReferenceGenerator {
             velocity: desired.twist.linear,
             acceleration: desired.acceleration.linear,
         };
-        let [mut turn, mut shift] =
-            Approach::wanted([&turning, &shifting], [&orientation, &position], [&led.angular, &led.linear]);
+        let approaches = Pair { angular: &turning, linear: &shifting };
+        let ahead = Pair { angular: &led.angular, linear: &led.linear };
+        let targets = Pair { angular: &orientation, linear: &position };
+        let Pair { angular: mut turn, linear: mut shift } = Approach::wanted(approaches, targets, ahead);
         if limit_leg_rates(constants, pose, &mut turn, &mut shift) {
             self.active_limits = self.active_limits.with(Limit::LegRate, true);
         }
@@ -265,18 +271,12 @@ impl ReferenceGenerator {
                 self.active_limits = self.active_limits.union(restricting);
             }
         }
-        let ([angular, linear], [by_acceleration, by_jerk]) = Approach::accelerations(
-            [&turning, &shifting],
-            [&turn, &shift],
-            [&led.angular, &led.linear],
-            [&acceleration.angular, &acceleration.linear],
-            in_proportion,
-        );
-        self.active_limits = self
-            .active_limits
-            .with(Limit::Velocity, turn.is_limited | shift.is_limited)
-            .with(Limit::Acceleration, by_acceleration)
-            .with(Limit::Jerk, by_jerk);
+        let wanted = Pair { angular: &turn, linear: &shift };
+        let present = Pair { angular: &acceleration.angular, linear: &acceleration.linear };
+        let (Pair { angular, linear }, limits) =
+            Approach::accelerations(approaches, wanted, ahead, present, in_proportion);
+        let is_too_fast = turn.is_limited | shift.is_limited;
+        self.active_limits = self.active_limits.with(Limit::Velocity, is_too_fast).union(limits);
         (Acceleration { angular, linear }, effort)
     }
 }

@@ -4,5 +4,6 @@ pub mod diagnostic;
 pub mod errors;
 pub mod inputs;
 pub mod limits;
+pub mod pair;
 pub mod state;
 pub mod time;

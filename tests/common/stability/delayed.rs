@@ -14,6 +14,7 @@ use hexad::control::law::estimator::covariance::NoiseModel;
 use hexad::control::law::gains::Gains;
 use hexad::control::law::{ControlMode, Law};
 use hexad::control::signals::diagnostic::DiagnosticCode;
+use hexad::control::signals::pair::Pair;
 use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::daemon;
 use hexad::model::LEGS;
@@ -154,7 +155,7 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
     let law = Law::new(
         &config.machine,
         ControlMode::ComputedTorque,
-        [gains; 2],
+        Pair { angular: gains, linear: gains },
         config.deployment.control.leg_masses,
         setup.sampled.compensates_disturbance,
         &parameters.limits,

@@ -101,11 +101,11 @@ impl<'a> Examination<'a> {
         let Limits { orientation, position, .. } = limits;
         let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
         let allowed = 1.0 + ROUNDING;
-        let [angular_bulge, linear_bulge] = step.velocity_overshoot();
+        let overshoot = step.velocity_overshoot();
         let is_slow = v <= allowed * position.velocity
             && w <= allowed * orientation.velocity
-            && motion.twist.linear.norm() + linear_bulge <= position.velocity
-            && motion.twist.angular.norm() + angular_bulge <= orientation.velocity;
+            && motion.twist.linear.norm() + overshoot.linear <= position.velocity
+            && motion.twist.angular.norm() + overshoot.angular <= orientation.velocity;
         if !is_slow {
             return Err(Limit::Velocity);
         }

@@ -19,6 +19,7 @@
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 
 use crate::control::constants::Constants;
+use crate::control::signals::pair::Pair;
 use crate::model::conditioning::Conditioning;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::{MAX_WRENCH_NORM, Sensitivity};
@@ -134,15 +135,15 @@ impl BallGroup {
         simd: S,
         constants: &Constants,
         displacements: &Displacements<S>,
-        [shift, turn]: Reach,
+        reach: Reach,
         required: &Regularity,
     ) -> bool {
         let splat = |number: f64| f64x4::splat(simd, number);
         let load = |column: &[f64; LANES]| f64x4::load_array(simd, *column);
         let (norm, inverse_norm) = (load(&self.norm), load(&self.inverse_norm));
         let (shortest, universal_sine) = (load(&self.shortest), load(&self.universal_sine));
-        let turn = displacements.turn + splat(turn);
-        let moved = displacements.shift + splat(shift) + splat(constants.arm) * turn;
+        let turn = displacements.turn + splat(reach.angular);
+        let moved = displacements.shift + splat(reach.linear) + splat(constants.arm) * turn;
         let left = shortest - moved;
         let turned_squared = moved * moved / (shortest * left);
         let turned_leg = turned_squared.sqrt();
@@ -190,7 +191,7 @@ impl Ball {
 }
 
 /// Poses around one: within a shift \[m\] and a turn \[rad\].
-pub(in crate::control::reference) type Reach = [f64; 2];
+pub(in crate::control::reference) type Reach = Pair<f64>;
 
 /// Poses around one, and how regular they shall be.
 #[derive(Clone, Copy, Debug)]
@@ -260,7 +261,7 @@ impl RegularBalls {
             let covers = |reach, required| group.covers(simd, constants, &displacements, reach, required);
             are_surroundings_covered = are_surroundings_covered || covers(reach, &around);
             // Where they are not, the knot becomes the centre of a new ball.
-            if are_surroundings_covered && covers([0.0; 2], &at_knot) {
+            if are_surroundings_covered && covers(Reach::default(), &at_knot) {
                 self.recent = index;
                 return true;
             }

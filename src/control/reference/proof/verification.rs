@@ -13,6 +13,7 @@ use crate::control::reference::proof::step::Step;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::stop::vector_stop::{StopExtent, release_first_extent};
 use crate::control::signals::limits::{Limit, Limits};
+use crate::control::signals::pair::Pair;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::{Motion, Pose};
 use crate::model::task::task_coordinates;
@@ -39,16 +40,16 @@ impl Verifier {
         let Motion { pose, twist, acceleration } = motion;
         let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);
         let shift = release_first_extent(&twist.linear, &acceleration.linear, position);
-        let [angular_bulge, linear_bulge] = step.velocity_overshoot();
+        let overshoot = step.velocity_overshoot();
         let x = bounds.envelope.as_ref().map(|_| task_coordinates(pose, &constants.machine().home));
         let around = RegularityQuery {
             pose,
-            reach: [shift.length, turn.length],
+            reach: Pair { angular: turn.length, linear: shift.length },
             required: Regularity::of_reference(constants),
         };
         let mut effort = MAX_EFFORT.saturating_sub(step.effort);
-        let is_free = shift.peak_velocity + linear_bulge <= position.velocity
-            && turn.peak_velocity + angular_bulge <= orientation.velocity
+        let is_free = shift.peak_velocity + overshoot.linear <= position.velocity
+            && turn.peak_velocity + overshoot.angular <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity
                 <= constants.machine().actuator.max_rate
             && has_room(constants, bounds, pose, x.as_ref(), &shift, &turn, step.duration)

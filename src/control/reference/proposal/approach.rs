@@ -21,7 +21,8 @@ use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
 
 use crate::control::constants::Constants;
-use crate::control::signals::limits::DerivativeLimits;
+use crate::control::signals::limits::{DerivativeLimits, Limit, LimitSet};
+use crate::control::signals::pair::Pair;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::rigid::{Pose, Twist};
 
@@ -80,16 +81,16 @@ impl Approach {
 
     /// The velocities of two vectors that are wanted where the present motion leads with the velocities `ahead`.
     pub fn wanted(
-        approaches: [&Self; 2],
-        targets: [&TargetOffset; 2],
-        ahead: [&Vector3<f64>; 2],
-    ) -> [WantedVelocity; 2] {
+        approaches: Pair<&Self>,
+        targets: Pair<&TargetOffset>,
+        ahead: Pair<&Vector3<f64>>,
+    ) -> Pair<WantedVelocity> {
         let distances = targets.map(|target| target.offset.norm());
-        let roots = closing_roots(approaches, distances);
-        [
-            approaches[0].wanted_at(targets[0], ahead[0], distances[0], roots[0]),
-            approaches[1].wanted_at(targets[1], ahead[1], distances[1], roots[1]),
-        ]
+        let roots =
+            closing_roots([approaches.angular, approaches.linear], [distances.angular, distances.linear]);
+        let roots = Pair { angular: roots[0], linear: roots[1] };
+        let at = approaches.zip(targets).zip(ahead).zip(distances.zip(roots));
+        at.map(|(((it, target), ahead), (distance, root))| it.wanted_at(target, ahead, distance, root))
     }
 
     fn wanted_at(
@@ -157,19 +158,21 @@ impl Approach {
     /// The accelerations of the next instant of two vectors for their wanted velocities, and whether the limits of acceleration
     /// and jerk hold them back. `in_proportion`: both by the factor of the one that needs the smaller, which keeps the direction.
     pub fn accelerations(
-        approaches: [&Self; 2],
-        wanted: [&WantedVelocity; 2],
-        ahead: [&Vector3<f64>; 2],
-        present: [&Vector3<f64>; 2],
+        approaches: Pair<&Self>,
+        wanted: Pair<&WantedVelocity>,
+        ahead: Pair<&Vector3<f64>>,
+        present: Pair<&Vector3<f64>>,
         in_proportion: bool,
-    ) -> ([Vector3<f64>; 2], [bool; 2]) {
-        let aim = [approaches[0].aim(wanted[0], ahead[0]), approaches[1].aim(wanted[1], ahead[1])];
+    ) -> (Pair<Vector3<f64>>, LimitSet) {
+        let aim = approaches.zip(wanted).zip(ahead).map(|((it, wanted), ahead)| it.aim(wanted, ahead));
         let largest = approaches.map(|approach| approach.limits.acceleration);
-        let (aim, by_acceleration) = limited(&aim, largest, in_proportion);
-        let change = [aim[0] - present[0], aim[1] - present[1]];
+        let (aim, by_acceleration) = limited(aim, largest, in_proportion);
+        let change = aim.zip(present).map(|(aim, present)| aim - present);
         let largest = approaches.map(|approach| approach.limits.jerk * approach.step_s);
-        let (change, by_jerk) = limited(&change, largest, in_proportion);
-        ([present[0] + change[0], present[1] + change[1]], [by_acceleration, by_jerk])
+        let (change, by_jerk) = limited(change, largest, in_proportion);
+        let limits =
+            LimitSet::default().with(Limit::Acceleration, by_acceleration).with(Limit::Jerk, by_jerk);
+        (present.zip(change).map(|(present, change)| present + change), limits)
     }
 
     /// `a*` without limits.
@@ -233,13 +236,16 @@ pub(in crate::control::reference) fn limit_leg_rates(
 }
 
 /// Two vectors shortened to at most `largest`, each by its own factor or both by the smaller, and whether one was longer.
-fn limited(vectors: &[Vector3<f64>; 2], largest: [f64; 2], in_proportion: bool) -> ([Vector3<f64>; 2], bool) {
-    let factor = |v: &Vector3<f64>, largest: f64| {
+fn limited(
+    vectors: Pair<Vector3<f64>>,
+    largest: Pair<f64>,
+    in_proportion: bool,
+) -> (Pair<Vector3<f64>>, bool) {
+    let factors = vectors.zip(largest).map(|(v, largest)| {
         let norm = v.norm();
         if norm > largest { largest / norm } else { 1.0 }
-    };
-    let [first, second] = [factor(&vectors[0], largest[0]), factor(&vectors[1], largest[1])];
-    let least = first.min(second);
-    let [first, second] = if in_proportion { [least; 2] } else { [first, second] };
-    ([vectors[0] * first, vectors[1] * second], least < 1.0)
+    });
+    let least = factors.angular.min(factors.linear);
+    let factors = if in_proportion { Pair { angular: least, linear: least } } else { factors };
+    (vectors.zip(factors).map(|(v, factor)| v * factor), least < 1.0)
 }

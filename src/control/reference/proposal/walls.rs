@@ -32,6 +32,7 @@ use crate::control::reference::proposal::approach::{Approach, WantedVelocity};
 use crate::control::reference::proposal::walls::derivative_bound::DerivativeBound;
 use crate::control::reference::stop::vector_stop::straight_extent;
 use crate::control::signals::limits::{Limit, LimitSet, Limits};
+use crate::control::signals::pair::Pair;
 use crate::model::LEGS;
 use crate::model::inverse_geometry::{LegMotion, leg_motion};
 use crate::model::inverse_jacobian::leg_wrenches;
@@ -126,8 +127,8 @@ impl Walls {
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();
         let approach = Approach::new(limits.position, CLOSING_SHARE, step_s);
-        let [turn_s, shift_s] = half_durations(limits, led);
-        let half_s = turn_s.max(shift_s);
+        let halves_s = half_durations(limits, led);
+        let half_s = halves_s.angular.max(halves_s.linear);
         let per_way = 1.0 / half_s;
         let ends = bounds.shortest.iter().zip(&bounds.longest);
         let legs = length.iter().zip(rate.iter().zip(&accel)).zip(ends);
@@ -139,8 +140,8 @@ impl Walls {
             // What the way of the stop departs from `rate T / 2`: it leads straight on, and one of rotation and translation ends
             // sooner.
             let departure = 0.5 * curvature * half_s * half_s
-                + moment.dot(&led.angular) * (turn_s - half_s)
-                + direction.dot(&led.linear) * (shift_s - half_s);
+                + moment.dot(&led.angular) * (halves_s.angular - half_s)
+                + direction.dot(&led.linear) * (halves_s.linear - half_s);
             let gaps = [longest - next - departure.max(0.0), next - shortest + departure.min(0.0)];
             let [long, short] = gaps.map(|gap| gap - kept);
             let ends = [(short, -rate, -curvature), (long, *rate, *curvature)];
@@ -184,13 +185,13 @@ impl Walls {
         let turning = Approach::new(limits.orientation, CLOSING_SHARE, step_s);
         let shifting = Approach::new(limits.position, CLOSING_SHARE, step_s);
         let velocity = stacked(&(led.angular * radius), &led.linear);
-        let [turn_per_way, shift_per_way] = half_durations(limits, led).map(f64::recip);
+        let per_way = half_durations(limits, led).map(f64::recip);
         let ranges = lowest.iter().zip(highest);
         for (axis, ((x, gradient), (low, high))) in x.iter().zip(gradients).zip(ranges).enumerate() {
             let (approach, kept, per_way) = if axis < 3 {
-                (&turning, kept / radius, turn_per_way)
+                (&turning, kept / radius, per_way.angular)
             } else {
-                (&shifting, kept, shift_per_way)
+                (&shifting, kept, per_way.linear)
             };
             let kept = kept.min(0.05 * (high - low));
             let rate = gradient.dot(&velocity);
@@ -316,9 +317,9 @@ fn padded(v: &Vector6<f64>) -> [f64; LANES] {
 }
 
 /// Half of the durations of the stops of rotation and translation from a twist without acceleration, their ways over the velocities \[s\].
-fn half_durations(limits: &Limits, twist: &Twist) -> [f64; 2] {
-    [(&twist.angular, &limits.orientation), (&twist.linear, &limits.position)]
-        .map(|(velocity, limits)| 0.5 * straight_extent(velocity.norm(), limits).duration)
+fn half_durations(limits: &Limits, twist: &Twist) -> Pair<f64> {
+    let half = |velocity: &Vector3<f64>, limits| 0.5 * straight_extent(velocity.norm(), limits).duration;
+    Pair { angular: half(&twist.angular, &limits.orientation), linear: half(&twist.linear, &limits.position) }
 }
 
 fn stacked(first: &Vector3<f64>, second: &Vector3<f64>) -> Vector6<f64> {

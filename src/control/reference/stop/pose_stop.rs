@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 use crate::control::reference::proof::regularity::Reach;
 use crate::control::reference::stop::vector_stop::{Stop, StopState};
 use crate::control::signals::limits::{DerivativeLimits, Limits};
+use crate::control::signals::pair::Pair;
 use crate::model::rigid::{Motion, Pose, Twist};
 
 /// Stop that was verified.
@@ -105,10 +106,10 @@ impl PoseStop {
         let way = |stop: &Stop, state: &StopState, limits: &DerivativeLimits| {
             half * stop.peak_velocity.min(state.velocity.norm() + 0.5 * half * limits.acceleration)
         };
-        [
-            way(&self.position, &state.position, &limits.position),
-            way(&self.orientation, &state.orientation, &limits.orientation),
-        ]
+        Pair {
+            angular: way(&self.orientation, &state.orientation, &limits.orientation),
+            linear: way(&self.position, &state.position, &limits.position),
+        }
     }
 }
 

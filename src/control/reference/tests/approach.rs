@@ -4,6 +4,7 @@ use crate::control::reference::proposal::approach::{
     Approach, TargetOffset, WantedVelocity, limit_leg_rates,
 };
 use crate::control::reference::tests::*;
+use crate::control::signals::limits::{Limit, LimitSet};
 use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::rigid::Twist;
 
@@ -64,8 +65,13 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
             let target = TargetOffset { offset, velocity: velocity + acceleration * dt, acceleration };
             // Whatever is beside it.
             let beside = TargetOffset { offset: 3.0 * offset, ..target };
-            let [wanted, _] = Approach::wanted([&approach, &other], [&target, &beside], [&ahead; 2]);
-            let [_, second] = Approach::wanted([&other, &approach], [&beside, &target], [&ahead; 2]);
+            let both = Pair { angular: &ahead, linear: &ahead };
+            let approaches = Pair { angular: &approach, linear: &other };
+            let wanted =
+                Approach::wanted(approaches, Pair { angular: &target, linear: &beside }, both).angular;
+            let approaches = Pair { angular: &other, linear: &approach };
+            let second =
+                Approach::wanted(approaches, Pair { angular: &beside, linear: &target }, both).linear;
             assert_eq!((wanted.velocity, wanted.derivative), (second.velocity, second.derivative));
             wanted
         };
@@ -110,20 +116,22 @@ fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
         let present = if samples.below(2) == 0 { near } else { samples.vector(P.acceleration) };
         let still = Vector3::zeros();
         let none = WantedVelocity { velocity: still, derivative: still, is_limited: false };
-        let ([found, other], is_limited) = Approach::accelerations(
-            [&approach; 2],
-            [&wanted, &none],
-            [&ahead, &still],
-            [&present, &still],
+        let (Pair { angular: found, linear: other }, limits) = Approach::accelerations(
+            Pair { angular: &approach, linear: &approach },
+            Pair { angular: &wanted, linear: &none },
+            Pair { angular: &ahead, linear: &still },
+            Pair { angular: &present, linear: &still },
             false,
         );
         assert_eq!(other, still);
         let change = aim - present;
         let expected = present + change * (P.jerk * step_s / change.norm()).min(1.0);
         assert!((found - expected).norm() < 1e-9, "{found}, not {expected}");
-        let limits = [free.norm() > P.acceleration, change.norm() > P.jerk * step_s];
-        assert_eq!(is_limited, limits);
-        let kinds = [limits[0], limits[1], limits == [false; 2]];
+        let is_limited = [free.norm() > P.acceleration, change.norm() > P.jerk * step_s];
+        let expected =
+            LimitSet::default().with(Limit::Acceleration, is_limited[0]).with(Limit::Jerk, is_limited[1]);
+        assert_eq!(limits, expected);
+        let kinds = [is_limited[0], is_limited[1], is_limited == [false; 2]];
         seen = core::array::from_fn(|kind| seen[kind] + u32::from(kinds[kind]));
     }
     assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
@@ -134,16 +142,19 @@ fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
 fn accelerations_in_proportion_keep_their_direction() {
     let mut samples = RandomVectors::new(54);
     let (step_s, still) = (1e-3, Vector3::zeros());
-    let approaches = [&Approach::new(P, 1.0, step_s), &Approach::new(P.scaled(0.5), 1.0, step_s)];
+    let approaches = [Approach::new(P, 1.0, step_s), Approach::new(P.scaled(0.5), 1.0, step_s)];
+    let approaches = Pair { angular: &approaches[0], linear: &approaches[1] };
+    let at_rest = Pair { angular: &still, linear: &still };
     let mut turned = 0;
     for _ in 0..500 {
         let mut wanted =
             || WantedVelocity { velocity: still, derivative: samples.vector(20.0), is_limited: false };
         let [turn, shift] = [wanted(), wanted()];
         let of = |in_proportion| {
-            let (found, _) =
-                Approach::accelerations(approaches, [&turn, &shift], [&still; 2], [&still; 2], in_proportion);
-            found
+            let wanted = Pair { angular: &turn, linear: &shift };
+            let (Pair { angular, linear }, _) =
+                Approach::accelerations(approaches, wanted, at_rest, at_rest, in_proportion);
+            [angular, linear]
         };
         let [found, separate] = [of(true), of(false)];
         let limits = [P.jerk * step_s, 0.5 * P.jerk * step_s];

@@ -5,13 +5,13 @@ use crate::control::cycle::Cycle;
 use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::reference::ReferenceGenerator;
 use crate::control::reference::tests::*;
-use crate::control::sensing::localization::Localization;
+use crate::control::sensing::localization::{Localization, Located, PlatformState};
 use crate::control::setpoint::motion::SetpointMotion;
 use crate::control::setpoint::target::Target;
 use crate::control::setpoint::validated::ValidatedSetpoint;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::errors::PoseError;
-use crate::control::signals::inputs::{Input, Publishers, Setpoint, SetpointKind};
+use crate::control::signals::inputs::{Input, Measurement, Publishers, Setpoint, SetpointKind};
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
 use crate::control::supervision::assessment::{Evidence, assess};
@@ -76,17 +76,29 @@ impl Scene {
         let free_motion = free_motion.ok_or(DiagnosticCode::PlatformMoving.into());
         let mut reference = ReferenceGenerator::new(&constants);
         let localization = Localization::new(&constants);
+        let measurement = Measurement::default();
+        let platform = PlatformState {
+            pose,
+            twist: Twist::default(),
+            condition: 2.0,
+            time_to_singularity: f64::INFINITY,
+        };
+        let located = match self.is_located {
+            true => Ok(Located { measurement: &measurement, rate: [0.0; LEGS], platform }),
+            false => Err(FOUND),
+        };
+        let start = verify_start(&cycle, &localization, &mut reference, &located, free_motion);
         let evidence = Evidence {
             input: &self.input,
             setpoint: &setpoint,
-            localization: if self.is_located { Ok(()) } else { Err(FOUND) },
+            localization: located.map(drop),
             error: self.error.as_ref(),
             feedback: &self.feedback,
             sensor_diagnostic: self.sensor_diagnostic.as_ref(),
             disturbance_diagnostic: self.disturbance_diagnostic.as_ref(),
             reports: &self.reports,
             is_ready: self.is_ready,
-            start: verify_start(&cycle, &localization, &mut reference, free_motion),
+            start,
             may_be_frozen: false,
         };
         assess(&cycle, &evidence, &localization, &reference, &mut LimitSet::default())

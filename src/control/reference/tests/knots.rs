@@ -49,11 +49,11 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
-        let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| dispatch!(machine.level, simd => balls.prove_knot_from_kept(simd, constants, &pose, [reach, 0.0]));
+        let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| dispatch!(machine.level, simd => balls.prove_knot_from_kept(simd, constants, &pose, Pair { angular: 0.0, linear: reach }));
         let mut balls = RegularBalls::default();
         assert!(!covered(&mut balls, &constants, 0.0));
         // Too small for its reach, it is kept all the same for the knot itself.
-        assert!(!is_covered(&mut balls, &constants, &pose, [10.0, 0.0]));
+        assert!(!is_covered(&mut balls, &constants, &pose, Pair { angular: 0.0, linear: 10.0 }));
         assert!(covered(&mut balls, &constants, 0.0) && !covered(&mut balls, &constants, 10.0));
         constants.reference_condition = 1.0;
         assert!(!covered(&mut balls, &constants, 0.0));
@@ -137,7 +137,8 @@ fn a_stop_moves_no_farther_than_its_reach() {
                 (other.position.displacement - state.position.displacement).norm(),
                 (other.orientation.displacement - state.orientation.displacement).norm(),
             ];
-            for ((nearest, moved), reach) in nearest.iter_mut().zip(moved).zip(reach) {
+            for ((nearest, moved), reach) in nearest.iter_mut().zip(moved).zip([reach.linear, reach.angular])
+            {
                 assert!(moved <= reach * (1.0 + 1e-9), "{moved} {reach} {motion:?}");
                 if state.position.velocity.norm().max(state.orientation.velocity.norm()) < 0.02 {
                     *nearest = nearest.max(moved / reach);

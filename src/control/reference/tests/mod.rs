@@ -12,6 +12,7 @@ use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
 use crate::control::reference::random_vectors::RandomVectors;
 use crate::control::signals::limits::{DerivativeLimits, Limits};
+use crate::control::signals::pair::Pair;
 use crate::control::signals::state::AfterStop;
 use crate::model::LEGS;
 use crate::model::fidelity::Fidelity;
@@ -89,10 +90,17 @@ pub(super) fn machine(samples: &mut RandomVectors) -> Machine {
 }
 
 pub(super) fn parameters(machine: &Machine) -> Parameters {
-    let gains = [Gains::new(8.0, 1.0); 2];
+    let gains = Gains::new(8.0, 1.0);
     Parameters {
         period_ns: 1_000_000,
-        law: Law::new(machine, ControlMode::default(), gains, LegMasses::at_home(machine), false, &LIMITS),
+        law: Law::new(
+            machine,
+            ControlMode::default(),
+            Pair { angular: gains, linear: gains },
+            LegMasses::at_home(machine),
+            false,
+            &LIMITS,
+        ),
         noise: NoiseModel { bandwidth: 50.0, rate_noise_ratio: None, period_s: 1e-3 },
         reading_errors: ReadingErrors::default(),
         force_delay_ns: 0,
@@ -148,7 +156,7 @@ fn bisected(mut holds: f64, mut fails: f64, mut test: impl FnMut(f64) -> bool) -
 }
 
 /// Whether balls, and new ones as far as needed, prove the poses within a reach of one, within the condition of the reference.
-fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: [f64; 2]) -> bool {
+fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: Pair<f64>) -> bool {
     let around = RegularityQuery { pose, reach, required: Regularity::of_reference(constants) };
     balls.prove(constants, &around, &mut u32::MAX.clone())
 }

@@ -7,7 +7,11 @@ use crate::control::reference::tests::*;
 use crate::model::rigid::Twist;
 
 /// The pose of a ball at six numbers: rotation and shift as parts of the largest.
-pub(super) fn within(center: &Pose, [shift, turn]: [f64; 2], numbers: &Vector6<f64>) -> Pose {
+pub(super) fn within(
+    center: &Pose,
+    Pair { angular: turn, linear: shift }: Pair<f64>,
+    numbers: &Vector6<f64>,
+) -> Pose {
     let part = |k: usize| {
         let v: Vector3<f64> = numbers.fixed_rows::<3>(k).into();
         v / v.norm().max(1.0)
@@ -23,7 +27,7 @@ fn inverse_condition(constants: &Constants, pose: &Pose) -> f64 {
 }
 
 /// The smallest inverse condition that a climb finds in a ball.
-fn worst(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: [f64; 2]) -> f64 {
+fn worst(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: Pair<f64>) -> f64 {
     let mut worst = f64::INFINITY;
     for _ in 0..3 {
         let mut best = Vector6::from_fn(|_, _| 2.0 * samples.uniform() - 1.0);
@@ -54,12 +58,14 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
             };
             let at = KinematicState::new(&machine, near).sensitivity().condition;
             constants.reference_condition = at * (1.0 + 10.0_f64.powf(3.0 * samples.uniform() - 2.0));
-            let ratio = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
+            let [linear, angular] =
+                [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
             // The ball that is asked about is beside the one that is kept.
             let mut balls = RegularBalls::default();
-            if !is_covered(&mut balls, &constants, &near, [0.0; 2]) {
+            if !is_covered(&mut balls, &constants, &near, Pair::default()) {
                 continue;
             }
+            let ratio = Pair { angular, linear };
             let reach = |size: f64| ratio.map(|ratio| ratio * size);
             let size =
                 bisected(0.0, 2.0, |size| is_covered(&mut { balls }, &constants, &center, reach(size)));
@@ -84,7 +90,7 @@ fn a_ball_ends_where_its_equations_say() {
     for _ in 0..12 {
         let machine = machine(&mut samples);
         let constants = Constants::new(&machine, parameters(&machine));
-        let holds = |center: &Pose, [d, t]: [f64; 2]| {
+        let holds = |center: &Pose, Pair { angular: t, linear: d }: Pair<f64>| {
             let wrenches = scaled_wrenches(&machine, center);
             let inverse = wrenches.try_inverse().map_or(f64::INFINITY, |inverse| inverse.norm());
             let shortest = leg_lengths(&machine, center).into_iter().fold(f64::INFINITY, f64::min);
@@ -98,19 +104,21 @@ fn a_ball_ends_where_its_equations_say() {
         };
         for _ in 0..30 {
             let center = pose(&mut samples, &constants);
-            let ratio = [samples.uniform(), samples.uniform()];
+            let [linear, angular] = [samples.uniform(), samples.uniform()];
+            let ratio = Pair { angular, linear };
             let reach = |size: f64| ratio.map(|ratio| ratio * size);
-            // AdjacentIntervals the centre of a ball that is kept: by this ball or by a new one.
+            // Beside the centre of a ball that is kept: by this ball or by a new one.
             let mut balls = RegularBalls::default();
-            assert!(is_covered(&mut balls, &constants, &center, [0.0; 2]));
+            assert!(is_covered(&mut balls, &constants, &center, Pair::default()));
             let offset = Twist { angular: samples.vector(0.05), linear: samples.vector(0.05) };
             let beside = center.displaced(&offset);
             let size =
                 bisected(0.0, 2.0, |size| is_covered(&mut { balls }, &constants, &beside, reach(size)));
             if is_covered(&mut { balls }, &constants, &beside, reach(size)) {
-                let [d, t] = reach(size * (1.0 - 1e-9));
-                let from_kept = [d + offset.linear.norm(), t + offset.angular.norm()];
-                assert!(holds(&center, from_kept) || holds(&beside, [d, t]), "{size}");
+                let smaller = reach(size * (1.0 - 1e-9));
+                let offsets = Pair { angular: offset.angular.norm(), linear: offset.linear.norm() };
+                let from_kept = smaller.zip(offsets).map(|(reach, offset)| reach + offset);
+                assert!(holds(&center, from_kept) || holds(&beside, smaller), "{size}");
             }
             let prove =
                 |size: f64| is_covered(&mut RegularBalls::default(), &constants, &center, reach(size));

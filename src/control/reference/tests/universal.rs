@@ -8,7 +8,7 @@ use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::universal_sine;
 
 /// The least sine that a climb finds in a ball.
-fn least(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: [f64; 2]) -> f64 {
+fn least(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: Pair<f64>) -> f64 {
     let sine = |numbers: &Vector6<f64>| universal_sine(constants.machine(), &within(center, reach, numbers));
     let mut best = Vector6::from_fn(|_, _| 2.0 * samples.uniform() - 1.0);
     let (mut lowest, mut step) = (sine(&best), 1.0);
@@ -30,7 +30,8 @@ fn no_leg_of_a_ball_just_accepted_is_nearer_to_its_axis_than_the_limit() {
         (constants.reference_condition, constants.parameters.condition) = (1e9, 1e9);
         let center = pose(&mut samples, &constants);
         constants.universal_sine = universal_sine(&machine, &center) * samples.uniform();
-        let ratio = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
+        let [linear, angular] = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
+        let ratio = Pair { angular, linear };
         let reach = |size: f64| ratio.map(|ratio| ratio * size);
         let size = bisected(0.0, 2.0, |size| {
             is_covered(&mut RegularBalls::default(), &constants, &center, reach(size))

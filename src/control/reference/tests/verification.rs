@@ -110,8 +110,9 @@ pub(super) struct PlayedStep {
 
 impl PlayedStep {
     fn step(&self) -> Step<'_> {
-        let change = [self.jerk.angular.norm() * self.duration, self.jerk.linear.norm() * self.duration];
-        Step { from: self.from.as_ref(), duration: self.duration, change, effort: 0 }
+        let norms = Pair { angular: self.jerk.angular.norm(), linear: self.jerk.linear.norm() };
+        let acceleration_change = norms.map(|jerk| jerk * self.duration);
+        Step { from: self.from.as_ref(), duration: self.duration, acceleration_change, effort: 0 }
     }
 }
 
