@@ -20,6 +20,8 @@ const LONG_EPISODE_S: f64 = 20.0;
 /// One of each machine and speed; in ten hours.
 const EPISODES: u64 = 12;
 const LONG_EPISODES: u64 = 1800;
+/// Those that lead nearest to an alarm: in them legs stick longest.
+const NEAREST: [u64; 4] = [68, 776, 1328, 1516];
 /// Two seconds to engage and to estimate the disturbance, one more with the setpoint at rest.
 const SETTLED_S: f64 = 2.0;
 
@@ -86,7 +88,10 @@ fn certificate_realistic_hardware_gives_no_alarm() {
         certificate.advance(1);
         ended.err()
     };
-    let alarms: Vec<String> = (0..episodes).into_par_iter().filter_map(alarm).collect();
+    let mut alarms: Vec<String> = (0..episodes).into_par_iter().filter_map(alarm).collect();
+    alarms.extend(
+        NEAREST.into_par_iter().filter_map(|seed| episode(seed, duration_s).err()).collect::<Vec<_>>(),
+    );
     certificate.finish(format_args!("{episodes} episodes of {duration_s} s, {} alarms", alarms.len()));
     let shown: Vec<_> = alarms.iter().take(20).cloned().collect();
     assert!(alarms.is_empty(), "{} of {episodes}:\n{}", alarms.len(), shown.join("\n"));

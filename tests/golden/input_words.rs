@@ -34,9 +34,9 @@ pub fn row(input: &Input, before: &Row) -> Row {
         request,
         setpoint_publishers,
         measured_publishers,
-        deadline_missed,
+        overrun_is_fault,
     } = *input;
-    let mut writer = Writer { row: *before, next: 1, flags: u64::from(deadline_missed), flag: 1 };
+    let mut writer = Writer { row: *before, next: 1, flags: u64::from(overrun_is_fault), flag: 1 };
     writer.words([release_ns, clock_offset_ns.cast_unsigned()]);
     for Publishers { counting, ignored } in [setpoint_publishers, measured_publishers] {
         writer.words([counting, ignored].map(u64::from));
@@ -52,7 +52,8 @@ pub fn row(input: &Input, before: &Row) -> Row {
         writer.optional(set.map(|set| [set.into()]));
     }
     writer.optional(force.map(|force| force.map(f64::to_bits)));
-    let request = request.map(|OperatorRequest { request, message }| [request as u64, message.0, message.1]);
+    let request =
+        request.map(|OperatorRequest { request, message }| [request as u64, message.epoch, message.sequence]);
     writer.optional(request);
     assert_eq!(writer.next, WORDS);
     writer.row[0] = writer.flags;
@@ -95,7 +96,7 @@ pub fn input(row: &Row) -> Input {
         request,
         setpoint_publishers,
         measured_publishers,
-        deadline_missed: row[0] & 1 == 1,
+        overrun_is_fault: row[0] & 1 == 1,
     }
 }
 
