@@ -56,8 +56,8 @@ const ANGLE_ROUNDING: f64 = 1e-15;
 /// Lengths and rates of the legs, in lanes.
 type Legs<S> = (f64x8<S>, f64x8<S>);
 
-/// Examination of a brake_at_once stop at knots.
-pub(in crate::control::reference) struct Examination<'a> {
+/// Examination of a stop that brakes at once.
+pub(in crate::control::reference) struct StopExamination<'a> {
     constants: &'a Constants,
     bounds: &'a PoseBounds,
     stop: &'a PoseStop,
@@ -87,7 +87,7 @@ pub(in crate::control::reference) struct Examination<'a> {
     longest: LegLanes,
 }
 
-impl<'a> Examination<'a> {
+impl<'a> StopExamination<'a> {
     pub fn new(
         constants: &'a Constants,
         bounds: &'a PoseBounds,
@@ -154,12 +154,12 @@ impl<'a> Examination<'a> {
 
     /// Examines every knot, in one piece of code for each instruction set.
     #[inline(never)]
-    pub fn run(&mut self, balls: &mut RegularBalls, start: &Motion) -> Result<(), Limit> {
-        dispatch!(self.constants.machine().level, simd => self.run_in_lanes(simd, balls, start))
+    pub fn check_knots(&mut self, balls: &mut RegularBalls, start: &Motion) -> Result<(), Limit> {
+        dispatch!(self.constants.machine().level, simd => self.check_knots_in_lanes(simd, balls, start))
     }
 
     #[inline(always)]
-    fn run_in_lanes<S: Simd>(
+    fn check_knots_in_lanes<S: Simd>(
         &mut self,
         simd: S,
         balls: &mut RegularBalls,

@@ -6,7 +6,7 @@
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::cubic_departure::curvature;
-use crate::control::reference::proof::examination::{Examination, MAX_EFFORT};
+use crate::control::reference::proof::examination::{MAX_EFFORT, StopExamination};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
@@ -63,8 +63,8 @@ impl Verifier {
             motion,
             &constants.parameters.limits,
         );
-        Examination::new(constants, bounds, brake_at_once, motion, x.as_ref(), step, effort)?
-            .run(&mut self.balls, motion)?;
+        StopExamination::new(constants, bounds, brake_at_once, motion, x.as_ref(), step, effort)?
+            .check_knots(&mut self.balls, motion)?;
         Ok(StopKind::BrakeAtOnce)
     }
 }
