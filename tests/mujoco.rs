@@ -23,9 +23,9 @@ use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::{Link, Machine};
+use hexad::model::random::Random;
 use hexad::model::rigid::Motion;
 use hexad::model::task::TaskState;
-use hexad::plant::random::Random;
 use mujoco::python;
 use nalgebra::Vector3;
 

@@ -8,7 +8,7 @@ use hexad::control::controller::Controller;
 use hexad::control::parameters::ViolationPolicy;
 use hexad::control::signals::inputs::Input;
 use hexad::control::signals::state::State;
-use hexad::plant::random::Random;
+use hexad::model::random::Random;
 
 use super::count::instructions;
 use super::genome::{Genome, Sensors};

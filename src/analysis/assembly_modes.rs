@@ -15,8 +15,8 @@ use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
+use crate::model::random::Random;
 use crate::model::rigid::{Pose, Twist};
-use crate::plant::random::Random;
 
 /// Bound on the steps from a start; most need ten to twenty.
 const MAX_STEPS_PER_START: usize = 400;

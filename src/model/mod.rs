@@ -50,6 +50,7 @@ mod lu;
 pub mod machine;
 pub mod mass_matrix;
 pub mod platform;
+pub mod random;
 pub mod regressor;
 pub mod rigid;
 pub mod sensitivity;

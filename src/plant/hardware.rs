@@ -2,10 +2,10 @@
 
 use super::delay::{DeadTime, DriveCommand};
 use super::imperfections::{DriveErrors, Imperfections, SensorErrors};
-use super::random::Random;
 use super::simulator::Simulator;
 use crate::model::LEGS;
 use crate::model::machine::Machine;
+use crate::model::random::Random;
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 

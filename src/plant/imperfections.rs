@@ -17,9 +17,8 @@ use nalgebra::Vector3;
 
 use crate::model::LEGS;
 use crate::model::machine::{Joints, Machine};
+use crate::model::random::Random;
 use crate::model::rigid::Wrench;
-
-use super::random::Random;
 
 /// All imperfections of a plant; by default there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

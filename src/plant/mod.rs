@@ -10,6 +10,5 @@ pub mod forward_dynamics;
 pub mod hardware;
 pub mod imperfections;
 pub mod integrator;
-pub mod random;
 pub mod simulator;
 pub mod terms;

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use hexad::control::parameters::ViolationPolicy;
-use hexad::plant::random::Random;
+use hexad::model::random::Random;
 
 use super::common::observed::Rates;
 use super::machines::MACHINES;

@@ -1,8 +1,8 @@
 //! How setpoints and measurements travel: kinds, rates, delays, jitter and losses.
 
 use hexad::control::signals::inputs::{Measurement, Setpoint, SetpointKind};
+use hexad::model::random::Random;
 use hexad::model::task::TaskState;
-use hexad::plant::random::Random;
 use nalgebra::Vector6;
 
 use super::genome::Reader;

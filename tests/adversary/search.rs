@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::{available_parallelism, scope};
 
 use hexad::control::parameters::ViolationPolicy;
-use hexad::plant::random::Random;
+use hexad::model::random::Random;
 
 use super::common::extremes::Quantity;
 use super::genome::{Genome, Sensors};

@@ -6,9 +6,9 @@ use hexad::control::parameters::Parameters;
 use hexad::control::signals::limits::DerivativeLimits;
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::machine::Machine;
+use hexad::model::random::Random;
 use hexad::model::task::TaskState;
 use hexad::motion::minimum_jerk::{Profile, rise, shortest_duration};
-use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};
 
 use super::genome::Reader;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::{env, fs};
 
 use hexad::control::parameters::ViolationPolicy;
-use hexad::plant::random::Random;
+use hexad::model::random::Random;
 
 use super::common::certificate::Certificate;
 use super::common::extremes::Extremes;

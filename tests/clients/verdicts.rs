@@ -8,7 +8,7 @@ use std::process::Command;
 
 use hexad::messages::layout::{FieldType, Layout};
 use hexad::messages::{ForceMessage, MESSAGES, Message};
-use hexad::plant::random::Random;
+use hexad::model::random::Random;
 
 use crate::common::libhexad::with_library;
 use crate::common::python::output;

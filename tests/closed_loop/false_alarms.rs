@@ -5,8 +5,8 @@
 use hexad::control::controller::Output;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::State;
+use hexad::model::random::Random;
 use hexad::plant::imperfections::{BuildErrors, DriveErrors, Friction, Imperfections, SensorErrors};
-use hexad::plant::random::Random;
 use rayon::prelude::*;
 
 use super::common::certificate::Certificate;

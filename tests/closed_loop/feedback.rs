@@ -7,10 +7,10 @@ use hexad::control::parameters::Parameters;
 use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::state::State;
 use hexad::model::machine::Machine;
+use hexad::model::random::Random;
 use hexad::model::rigid::{Acceleration, Twist};
 use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::random::Random;
 use hexad::plant::simulator::Simulator;
 use nalgebra::{Vector3, Vector6};
 

@@ -6,9 +6,9 @@ use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::SetpointKind;
 use hexad::control::signals::limits::Limit;
 use hexad::control::signals::state::State;
+use hexad::model::random::Random;
 use hexad::model::task::TaskState;
 use hexad::motion::built_in::{BuiltInMotion, fit};
-use hexad::plant::random::Random;
 use nalgebra::Vector6;
 
 use super::ride::{MACHINES, Ride, beside, with_policy};

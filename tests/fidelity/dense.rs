@@ -8,29 +8,13 @@ use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Fidelity;
 use hexad::model::inverse_geometry::{leg_lengths, leg_motion};
 use hexad::model::machine::Machine;
+use hexad::model::random::Random;
 
 use super::common::{MACHINES, machine};
 use super::scenes::{Scene, scenes};
 
 /// Motions per set.
 const DENSE: u32 = 50_000;
-
-/// SplitMix64 (Steele, Lea and Flood, 2014): nothing in common with the chooser's spread.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 fn tally(scene: &Scene, mut shares: impl FnMut() -> EnvelopePoint) -> ErrorStatistics {
     let mut tally = ErrorStatistics::default();
@@ -42,10 +26,10 @@ fn tally(scene: &Scene, mut shares: impl FnMut() -> EnvelopePoint) -> ErrorStati
 
 /// Anywhere in the envelope, and at any of its 262,144 corners.
 fn dense(scene: &Scene) -> [ErrorStatistics; 2] {
-    let mut random = Random(2008);
-    let inside = tally(scene, || EnvelopePoint::from_fn(|_, _| random.unit()));
+    let mut random = Random::new(2008);
+    let inside = tally(scene, || EnvelopePoint::from_fn(|_, _| random.uniform()));
     let corners = tally(scene, || {
-        let bits = random.next();
+        let bits = random.bits();
         EnvelopePoint::from_fn(|k, _| ((bits >> k) & 1) as f64)
     });
     [inside, corners]

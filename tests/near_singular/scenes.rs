@@ -3,6 +3,7 @@
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::inverse_jacobian::{condition, leg_wrenches};
 use hexad::model::machine::Machine;
+use hexad::model::random::Random;
 use hexad::model::rigid::{Acceleration, Motion, Pose, Twist, exp};
 use hexad::model::task::TaskState;
 use hexad::plant::forward_dynamics::ForwardDynamics;
@@ -21,17 +22,17 @@ pub struct Scene {
     pub condition: f64,
 }
 
-/// Numbers that are the same in every run (splitmix64).
-pub struct Numbers(pub u64);
+/// Vectors that are the same in every run.
+pub struct Numbers(Random);
 
 impl Numbers {
+    pub fn new(seed: u64) -> Self {
+        Self(Random::new(seed))
+    }
+
     /// Evenly in -1..1.
     pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-52) - 1.0
+        self.0.signed()
     }
 
     pub fn vector(&mut self) -> Vector3<f64> {
@@ -138,7 +139,7 @@ fn approach(
 
 /// All of them.
 pub fn scenes(visit: &mut dyn FnMut(&Scene)) {
-    let mut numbers = Numbers(2008);
+    let mut numbers = Numbers::new(2008);
     let det = |machine: &Machine, pose: &Pose| leg_wrenches(machine, pose).determinant();
     for name in MACHINES {
         let machine = machine(name);

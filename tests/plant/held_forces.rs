@@ -5,9 +5,9 @@ use hexad::control::signals::limits::{DerivativeLimits, Limits};
 use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_jacobian::leg_wrenches;
+use hexad::model::random::Random;
 use hexad::model::rigid::{Acceleration, Motion, Twist};
 use hexad::plant::forward_dynamics::ForwardDynamics;
-use hexad::plant::random::Random;
 use nalgebra::Vector6;
 
 use super::common::{MACHINES, machine};

@@ -5,10 +5,10 @@ use hexad::model::active_forces::inverse_dynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::inverse_jacobian::leg_wrenches;
 use hexad::model::machine::Machine;
+use hexad::model::random::Random;
 use hexad::model::rigid::{Acceleration, Motion, Twist, Wrench};
 use hexad::plant::forward_dynamics::ForwardDynamics;
 use hexad::plant::imperfections::{BuildErrors, Friction, Imperfections};
-use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};
 
 use super::common::{Errors, MACHINES, largest, machine, motions};

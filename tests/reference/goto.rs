@@ -7,9 +7,9 @@ use hexad::analysis::target_motion::{
 use hexad::config::Config;
 use hexad::control::constants::Constants;
 use hexad::control::signals::limits::Limit;
+use hexad::model::random::Random;
 use hexad::model::rigid::{Pose, Twist};
 use hexad::model::task::TaskState;
-use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 

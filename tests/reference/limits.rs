@@ -7,7 +7,7 @@ use hexad::control::reference::ReferenceGenerator;
 use hexad::control::setpoint::motion::SetpointMotion;
 use hexad::control::setpoint::target::Target;
 use hexad::control::signals::limits::DerivativeLimits;
-use hexad::plant::random::Random;
+use hexad::model::random::Random;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 

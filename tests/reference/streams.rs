@@ -1,8 +1,8 @@
 //! Streams of targets, each by a seed.
 
 use hexad::control::signals::inputs::{Setpoint, SetpointKind};
+use hexad::model::random::Random;
 use hexad::model::task::TaskState;
-use hexad::plant::random::Random;
 use nalgebra::Vector6;
 
 /// Stream of setpoints around home.

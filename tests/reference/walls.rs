@@ -7,8 +7,8 @@ use hexad::control::reference::ReferenceGenerator;
 use hexad::control::setpoint::motion::SetpointMotion;
 use hexad::control::setpoint::target::Target;
 use hexad::control::signals::inputs::Setpoint;
+use hexad::model::random::Random;
 use hexad::model::task::TaskState;
-use hexad::plant::random::Random;
 use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 

@@ -52,6 +52,33 @@ const MAX_STEPS: f64 = 32.0;
 const IN_PROPORTION_STEPS: u32 = 50;
 
 /// Reference generator.
+///
+/// ```
+/// use hexad::config::Config;
+/// use hexad::control::constants::Constants;
+/// use hexad::control::reference::ReferenceGenerator;
+/// use hexad::control::setpoint::target::Target;
+/// use hexad::model::fidelity::Fidelity;
+///
+/// let config = Config::load("config/fried2008.toml".as_ref())?;
+/// let parameters = hexad::daemon::parameters(&config.machine, &config.deployment, Fidelity::Exact);
+/// let constants = Constants::new(&config.machine, parameters);
+/// let mut reference = ReferenceGenerator::new(&constants);
+/// // From rest at home to a pose 1 cm higher: within every limit all the way, and at rest there.
+/// let mut goal = *constants.home.pose();
+/// goal.position.z += 0.01;
+/// let start = *reference.motion();
+/// assert!(reference.verify_start(&constants, &start).is_ok());
+/// reference.begin_at(0);
+/// let mut fastest = 0.0_f64;
+/// for cycle in 1..5000 {
+///     reference.advance(&constants, cycle * parameters.period_ns, Some(&Target::Pose(&goal, 1.0)));
+///     fastest = fastest.max(reference.motion().twist.linear.norm());
+/// }
+/// assert!((reference.motion().pose.position.z - goal.position.z).abs() < 1e-6);
+/// assert!(fastest > 0.0 && fastest <= parameters.limits.position.velocity);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReferenceGenerator {

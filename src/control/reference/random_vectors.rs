@@ -2,21 +2,19 @@
 
 use nalgebra::Vector3;
 
-/// Sequence of random numbers: SplitMix64.
-pub(super) struct RandomVectors(u64);
+use crate::model::random::Random;
+
+/// Sequence of random vectors.
+pub(super) struct RandomVectors(Random);
 
 impl RandomVectors {
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        Self(Random::new(seed))
     }
 
     /// In \[0, 1).
     pub fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        self.0.uniform()
     }
 
     pub fn below(&mut self, count: u32) -> u32 {

@@ -6,9 +6,9 @@ use hexad::model::LEGS;
 use hexad::model::active_forces::InverseDynamics;
 use hexad::model::fidelity::Exact;
 use hexad::model::machine::Machine;
+use hexad::model::random::Random;
 use hexad::model::rigid::{Acceleration, Motion};
 use hexad::model::task::TaskState;
-use hexad::plant::random::Random;
 
 /// What a failure can know.
 pub struct Context<'a> {

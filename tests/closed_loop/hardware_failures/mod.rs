@@ -15,9 +15,9 @@ use hexad::control::signals::inputs::DriveStatus;
 use hexad::control::signals::inputs::Measurement;
 use hexad::control::signals::state::State;
 use hexad::model::LEGS;
+use hexad::model::random::Random;
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::plant::imperfections::{Imperfections, SensorErrors};
-use hexad::plant::random::Random;
 
 use rayon::prelude::*;
 

@@ -7,6 +7,7 @@ use hexad::model::forward_kinematics::{Outcome, Tracker, TrackingResult, refine}
 use hexad::model::inverse_geometry::leg_lengths;
 use hexad::model::kinematic_state::KinematicState;
 use hexad::model::machine::Machine;
+use hexad::model::random::Random;
 use hexad::model::rigid::Pose;
 use hexad::model::task::TaskState;
 
@@ -44,18 +45,10 @@ pub enum End {
 
 /// X of a pose, up to `angle` \[rad\] from home on every axis, by number.
 pub fn pose(machine: &Machine, angle: f64, number: u64) -> [f64; 6] {
-    let mut state = number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 2008;
-    // splitmix64
-    let mut unit = || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * 2f64.powi(-52) - 1.0
-    };
+    let mut random = Random::new(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 2008);
     let shift = SHIFT * machine.joints.radius;
     let sizes = [angle, angle, angle, shift, shift, shift];
-    std::array::from_fn(|i| machine.home[i] + sizes[i] * unit())
+    std::array::from_fn(|i| machine.home[i] + sizes[i] * random.signed())
 }
 
 /// R and C of X.

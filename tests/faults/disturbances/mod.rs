@@ -2,6 +2,7 @@
 
 use hexad::control::signals::inputs::{Input, Measurement};
 use hexad::control::signals::state::Request;
+use hexad::model::random::Random;
 
 use super::world::{World, measured, wanted};
 
@@ -68,10 +69,7 @@ impl Moment<'_> {
 
 /// Numbers that look random, of magnitude up to 1, the same in every run.
 pub fn noise(seed: u64) -> f64 {
-    let mut x = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((x ^ (x >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    Random::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)).signed()
 }
 
 pub type Disturbance = fn(&mut Moment);

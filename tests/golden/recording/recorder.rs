@@ -8,11 +8,11 @@ use hexad::control::signals::diagnostic::DiagnosticCode;
 use hexad::control::signals::inputs::{Input, Measurement, Setpoint, SetpointKind};
 use hexad::control::signals::state::{MessageId, OperatorRequest, Request, State};
 use hexad::model::LEGS;
+use hexad::model::random::Random;
 use hexad::model::task::{TaskState, task_coordinates};
 use hexad::motion::built_in::{BuiltInMotion, fit};
 use hexad::motion::minimum_jerk::{rise, straight_move};
 use hexad::plant::hardware::Hardware;
-use hexad::plant::random::Random;
 use nalgebra::Vector6;
 
 use super::super::stream::CYCLES;

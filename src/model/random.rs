@@ -5,7 +5,7 @@
 /// Sequence of random numbers.
 ///
 /// ```
-/// use hexad::plant::random::Random;
+/// use hexad::model::random::Random;
 /// let draw = |seed| Random::new(seed).uniform();
 /// assert_eq!(draw(7), draw(7));
 /// assert!(draw(7) != draw(8) && (0.0..1.0).contains(&draw(7)));
@@ -21,14 +21,24 @@ impl Random {
         Self { state: seed }
     }
 
-    /// Uniform in \[0, 1).
-    pub fn uniform(&mut self) -> f64 {
+    /// 64 bits.
+    pub fn bits(&mut self) -> u64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.state;
         bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        bits ^ (bits >> 31)
+    }
+
+    /// Uniform in \[0, 1).
+    pub fn uniform(&mut self) -> f64 {
         // The 53 bits that a double holds.
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Uniform in \[-1, 1).
+    pub fn signed(&mut self) -> f64 {
+        2.0 * self.uniform() - 1.0
     }
 
     /// Mean 0, variance 1: the sum of twelve uniform numbers less six. As good as Gaussian to three
