@@ -7,6 +7,7 @@
 mod common;
 
 mod golden;
+mod longest_cycle;
 mod no_panic;
 mod vectors;
 

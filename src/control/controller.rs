@@ -10,7 +10,7 @@ use crate::control::law::error_tracker::{ErrorTracker, setpoint_error};
 use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::law::force_limits::{ForceLimiter, LimitedForces};
 use crate::control::parameters::Parameters;
-use crate::control::reference::ReferenceGenerator;
+use crate::control::reference::{ReferenceGenerator, Refusal};
 use crate::control::sensing::drive_monitor::DriveMonitor;
 use crate::control::sensing::external_pose::ExternalPose;
 use crate::control::sensing::free_motion::FreeMotion;
@@ -261,9 +261,9 @@ pub(in crate::control) fn verify_start(
     if cycle.state.has_control() || located.is_err() {
         return Ok(());
     }
-    reference.verify_start(cycle.constants, &free_motion?).map_err(|limit| match limit {
-        Limit::Condition => localization.near_singular(cycle.constants.reference_condition),
-        _ => Diagnostic::from(DiagnosticCode::PlatformMoving).at(limit as usize),
+    reference.verify_start(cycle.constants, &free_motion?).map_err(|refusal| match refusal {
+        Refusal::Limit(Limit::Condition) => localization.near_singular(cycle.constants.reference_condition),
+        Refusal::Limit(_) | Refusal::Effort => DiagnosticCode::PlatformMoving.into(),
     })
 }
 

@@ -43,6 +43,8 @@ mod stop;
 #[cfg(test)]
 mod tests;
 
+pub use self::proof::refusal::Refusal;
+
 /// Longest step of the generator \[s\], so that slow loops give the same motion as fast ones.
 const MAX_STEP_S: f64 = 1e-3;
 /// Most steps in a cycle: after missed cycles they are longer, which is as safe and less smooth.
@@ -117,10 +119,10 @@ impl ReferenceGenerator {
     }
 
     /// Places the reference at a motion, as that of a platform without force, and verifies a stop from there. If none was verified,
-    /// returns the limit that none was proved to keep: the reference must not begin there.
+    /// returns why: the reference must not begin there.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    pub fn verify_start(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Limit> {
+    pub fn verify_start(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Refusal> {
         self.motion = *motion;
         self.bounds = PoseBounds::around(constants, &motion.pose);
         let (step, spare) = (Step::default(), self.stop.spare());
@@ -241,7 +243,7 @@ impl ReferenceGenerator {
         match verified {
             Some(Ok(kind)) => self.stop.adopt(kind),
             refused => {
-                if let Some(Err(limit)) = refused {
+                if let Some(Err(Refusal::Limit(limit))) = refused {
                     self.active_limits = self.active_limits.with(limit, true);
                 }
                 self.motion = self.stop.follow(constants, &begin, step_s);

@@ -25,10 +25,12 @@ use crate::control::reference::proof::cubic_departure::{
 use crate::control::reference::proof::knots::{AdjacentIntervals, Knots, MAX_INTERVALS};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::position_ranges::PositionRanges;
+use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regularity::{
     REGULARITY_EFFORT, RegularBalls, Regularity, RegularityQuery,
 };
 use crate::control::reference::proof::step::Step;
+use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING, BETWEEN_KNOTS_RATIO, ROUNDING};
 use crate::control::reference::stop::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
 use crate::control::signals::limits::{Limit, Limits};
 use crate::model::inverse_geometry::length_and_rate_lanes;
@@ -45,13 +47,6 @@ const RATE_DEPARTURE_RATIO: f64 = 0.01;
 /// their part. It bounds the longest cycle. The balls that were found remain for the next one. With three a reference that presses against its
 /// condition is refused in turns, and the platform jerks.
 pub(in crate::control::reference) const MAX_EFFORT: u32 = MAX_INTERVALS + 4 * REGULARITY_EFFORT;
-/// Part of the stroke by which a length may exceed its bound between knots: else a platform at the bound could not leave
-/// it, as the departures are bounded for the worst direction.
-const ROOM_RATIO: f64 = 2.5e-5;
-/// Relative allowance for rounding.
-const ROUNDING: f64 = 1e-9;
-/// Allowance for the rounding of an angle \[rad\].
-const ANGLE_ROUNDING: f64 = 1e-15;
 
 /// Lengths and rates of the legs, in lanes.
 type Legs<S> = (f64x8<S>, f64x8<S>);
@@ -96,7 +91,7 @@ impl<'a> StopExamination<'a> {
         x: Option<&[f64; 6]>,
         step: &Step<'a>,
         effort: u32,
-    ) -> Result<Self, Limit> {
+    ) -> Result<Self, Refusal> {
         let limits = &constants.parameters.limits;
         let Limits { orientation, position, .. } = limits;
         let (v, w) = (stop.position.peak_velocity, stop.orientation.peak_velocity);
@@ -107,7 +102,7 @@ impl<'a> StopExamination<'a> {
             && motion.twist.linear.norm() + overshoot.linear <= position.velocity
             && motion.twist.angular.norm() + overshoot.angular <= orientation.velocity;
         if !is_slow {
-            return Err(Limit::Velocity);
+            return Err(Limit::Velocity.into());
         }
         let curvature = curvature(constants, v, w);
         let actuator = &constants.machine().actuator;
@@ -154,7 +149,7 @@ impl<'a> StopExamination<'a> {
 
     /// Examines every knot, in one piece of code for each instruction set.
     #[inline(never)]
-    pub fn check_knots(&mut self, balls: &mut RegularBalls, start: &Motion) -> Result<(), Limit> {
+    pub fn check_knots(&mut self, balls: &mut RegularBalls, start: &Motion) -> Result<(), Refusal> {
         dispatch!(self.constants.machine().level, simd => self.check_knots_in_lanes(simd, balls, start))
     }
 
@@ -164,7 +159,7 @@ impl<'a> StopExamination<'a> {
         simd: S,
         balls: &mut RegularBalls,
         start: &Motion,
-    ) -> Result<(), Limit> {
+    ) -> Result<(), Refusal> {
         let mut pose = start.pose;
         let mut state = PoseStopState::begin(start);
         let (mut t, mut adjacent, mut before) = (0.0, AdjacentIntervals::default(), None);
@@ -197,12 +192,12 @@ impl<'a> StopExamination<'a> {
         state: &PoseStopState,
         adjacent: AdjacentIntervals,
         before: Option<Legs<S>>,
-    ) -> Result<Legs<S>, Limit> {
+    ) -> Result<Legs<S>, Refusal> {
         let dt = adjacent.longest();
         let twist = Twist { angular: state.orientation.velocity, linear: state.position.velocity };
         let legs @ (length, rate) = length_and_rate_lanes(simd, self.constants.machine(), pose, &twist);
         if self.needs_rates && !self.are_rates_kept(simd, &legs, adjacent, before.as_ref()) {
-            return Err(Limit::LegRate);
+            return Err(Limit::LegRate.into());
         }
         let splat = |number: f64| f64x8::splat(simd, number);
         let load = |lanes: &LegLanes| f64x8::load_array(simd, lanes.0);
@@ -211,12 +206,12 @@ impl<'a> StopExamination<'a> {
         let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
         let [in_step, ..] = self.step_departure;
         let departure = (self.length_jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
-        let margin = (departure - ROOM_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
+        let margin = (departure - BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
         if !room.simd_ge(splat(margin - self.length_excess)).all_true() {
-            return Err(Limit::Stroke);
+            return Err(Limit::Stroke.into());
         }
         if !self.is_in_envelope(simd, pose, state, adjacent) && !self.is_nearer_than_start(pose) {
-            return Err(Limit::Envelope);
+            return Err(Limit::Envelope.into());
         }
         self.check_condition(simd, balls, pose, state, dt)?;
         Ok(legs)
@@ -250,32 +245,32 @@ impl<'a> StopExamination<'a> {
         pose: &Pose,
         state: &PoseStopState,
         dt: f64,
-    ) -> Result<(), Limit> {
+    ) -> Result<(), Refusal> {
         let constants = self.constants;
         let reach = self.stop.reach(state, dt, &constants.parameters.limits);
         if balls.prove_knot_from_kept(simd, constants, pose, reach) {
             return Ok(());
         }
         let around = RegularityQuery { pose, reach, required: Regularity::around_reference(constants) };
-        let regularity =
-            balls.prove_from_new(constants, &around, &mut self.effort).ok_or(Limit::Condition)?;
+        let regularity = balls.prove_from_new(constants, &around, &mut self.effort)?;
         let at_knot = Regularity::of_reference(constants);
-        if at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity) {
+        if at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity)? {
             return Ok(());
         }
-        Err(Limit::Condition)
+        Err(Limit::Condition.into())
     }
 
     /// Whether a pose is as regular as the reference must be, or no less so than the start of the step.
     // Out of line, as it is rare: the cycle stays short.
     #[inline(never)]
-    fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> bool {
-        let Self { constants, from: Some(from), .. } = *self else { return false };
-        if self.start_regularity.is_none() {
-            self.start_regularity = Regularity::at(constants, from, &mut self.effort);
-        }
+    fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> Result<bool, Refusal> {
+        let Self { constants, from: Some(from), .. } = *self else { return Ok(false) };
+        let start = match self.start_regularity {
+            Some(start) => start,
+            None => *self.start_regularity.insert(Regularity::at(constants, from, &mut self.effort)?),
+        };
         let at_knot = Regularity::of_reference(constants);
-        self.start_regularity.is_some_and(|start| at_knot.or_less(&start).is_kept_by(regularity))
+        Ok(at_knot.or_less(&start).is_kept_by(regularity))
     }
 
     /// Whether a knot, and the Bezier points adjacent it, are within the envelope.
@@ -312,7 +307,7 @@ impl<'a> StopExamination<'a> {
         let w = state.orientation.velocity.norm() + alpha * dt;
         let w = self.stop.orientation.peak_velocity.min(w);
         let curvature = alpha / c + w * w * (1.0 + c + 3.0 * s) / (c * c);
-        let room = ROOM_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
+        let room = BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke() / self.constants.arm;
         (curvature * dt * dt / 8.0 - room).max(0.0)
     }
 

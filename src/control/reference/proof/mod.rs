@@ -10,6 +10,8 @@
 //! | `angle_ranges`, `position_ranges` | whether a pose is within the envelope |
 //! | `pose_bounds` | lengths of the legs and envelope |
 //! | `regularity` | balls of poses proved regular, for the limit of the condition |
+//! | `refusal` | why a step is refused |
+//! | `tolerances` | allowances for rounding and between knots |
 //! | `padding` | vectors of three in four lanes |
 
 pub(super) mod angle_ranges;
@@ -19,6 +21,8 @@ pub(super) mod knots;
 pub(super) mod padding;
 pub(super) mod pose_bounds;
 pub(super) mod position_ranges;
+pub(super) mod refusal;
 pub(super) mod regularity;
 pub(super) mod step;
+pub(super) mod tolerances;
 pub(super) mod verification;

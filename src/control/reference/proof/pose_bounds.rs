@@ -2,20 +2,11 @@
 
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
+use crate::control::reference::proof::tolerances::{END_STOP_RATIO, ROUNDING, START_RATIO};
 use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::Pose;
 use crate::model::task::task_coordinates;
-
-/// Room around a pose beyond the nominal bounds, in which the reference may begin to move back, as a ratio of the stroke:
-/// above the noise of lengths.
-const START_ROOM_RATIO: f64 = 2.5e-5;
-/// Distance of relaxed bounds from the end stops, in such rooms: one that a length may use between knots, and one for the following
-/// error. A platform that stands nearer may come back, one that moves on towards the end stop may not begin.
-const END_ROOMS: f64 = 2.0;
-
-/// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
-const ROUNDING: f64 = 1e-9;
 
 /// Bounds of the legs and of X. A platform that is beyond the nominal bounds when control begins may come back: its
 /// bounds are relaxed to where it is, and follow it until they are the nominal ones.
@@ -49,8 +40,8 @@ impl PoseBounds {
     pub fn around(constants: &Constants, pose: &Pose) -> Self {
         let mut bounds = Self::nominal(constants);
         let actuator = &constants.machine().actuator;
-        let stroke_room = START_ROOM_RATIO * actuator.stroke();
-        let (lengths, end_room) = (leg_lengths(constants.machine(), pose), END_ROOMS * stroke_room);
+        let [stroke_room, end_room] = [START_RATIO, END_STOP_RATIO].map(|ratio| ratio * actuator.stroke());
+        let lengths = leg_lengths(constants.machine(), pose);
         let (low_end, high_end) = (actuator.min_length + end_room, actuator.max_length - end_room);
         for (bound, length) in bounds.shortest.iter_mut().zip(lengths) {
             bounds.is_relaxed |= relax(bound, length, -stroke_room, low_end);

@@ -19,6 +19,8 @@
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 
 use crate::control::constants::Constants;
+use crate::control::reference::proof::refusal::Refusal;
+use crate::control::signals::limits::Limit;
 use crate::control::signals::pair::Pair;
 use crate::model::conditioning::Conditioning;
 use crate::model::rigid::Pose;
@@ -50,8 +52,8 @@ pub(in crate::control::reference) struct Regularity {
 }
 
 impl Regularity {
-    /// That of a pose, if so much effort may be done.
-    pub fn at(constants: &Constants, pose: &Pose, effort: &mut u32) -> Option<Self> {
+    /// Regularity of a pose, if the effort suffices.
+    pub fn at(constants: &Constants, pose: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         Ball::new(constants, pose, effort).map(|ball| ball.regularity)
     }
 
@@ -176,9 +178,9 @@ struct Ball {
 }
 
 impl Ball {
-    /// If so much effort may be done; pivots are known only afterwards.
-    fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Option<Self> {
-        *effort = effort.checked_sub(REGULARITY_EFFORT)?;
+    /// The ball around a pose, if the effort suffices; pivots are known only afterwards.
+    fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
+        *effort = effort.checked_sub(REGULARITY_EFFORT).ok_or(Refusal::Effort)?;
         let Conditioning { sensitivity, shortest, universal_sine, is_pivoted } =
             Conditioning::new(constants.machine(), center);
         if is_pivoted {
@@ -186,7 +188,7 @@ impl Ball {
         }
         let Sensitivity { condition, norm, .. } = sensitivity;
         let regularity = Regularity { condition, universal_sine };
-        Some(Self { norm, inverse_norm: condition / norm, shortest, regularity })
+        Ok(Self { norm, inverse_norm: condition / norm, shortest, regularity })
     }
 }
 
@@ -215,7 +217,7 @@ pub(in crate::control::reference) struct RegularBalls {
 impl RegularBalls {
     /// Whether the surroundings are regular, by effort that may be done. `false` is no proof of the contrary.
     pub fn prove(&mut self, constants: &Constants, around: &RegularityQuery<'_>, effort: &mut u32) -> bool {
-        self.prove_from_kept(constants, around) || self.prove_from_new(constants, around, effort).is_some()
+        self.prove_from_kept(constants, around) || self.prove_from_new(constants, around, effort).is_ok()
     }
 
     /// The same by the balls that are kept.
@@ -277,11 +279,11 @@ impl RegularBalls {
         constants: &Constants,
         around: &RegularityQuery<'_>,
         effort: &mut u32,
-    ) -> Option<Regularity> {
+    ) -> Result<Regularity, Refusal> {
         let RegularityQuery { pose, reach, required } = around;
         let ball = Ball::new(constants, pose, effort)?;
         let index = self.kept / LANES;
-        let group = self.groups.get_mut(index)?;
+        let group = self.groups.get_mut(index).ok_or(Refusal::Effort)?;
         group.set(self.kept % LANES, pose, &ball);
         // By any ball of the group, which is as good. A new one that is too small for its reach may prove a knot: it stays until
         // the next one.
@@ -290,10 +292,10 @@ impl RegularBalls {
             group.covers(simd, constants, &displacements, *reach, required)
         });
         if !is_covered {
-            return None;
+            return Err(Limit::Condition.into());
         }
         self.recent = index;
         self.kept = (self.kept + 1) % (GROUPS * LANES);
-        Some(ball.regularity)
+        Ok(ball.regularity)
     }
 }

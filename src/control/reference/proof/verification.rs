@@ -8,11 +8,12 @@ use crate::control::parameters::Envelope;
 use crate::control::reference::proof::cubic_departure::curvature;
 use crate::control::reference::proof::examination::{MAX_EFFORT, StopExamination};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
 use crate::control::reference::proof::step::Step;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
 use crate::control::reference::stop::vector_stop::{StopExtent, release_first_extent};
-use crate::control::signals::limits::{Limit, Limits};
+use crate::control::signals::limits::Limits;
 use crate::control::signals::pair::Pair;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::{Motion, Pose};
@@ -26,8 +27,8 @@ pub(in crate::control::reference) struct Verifier {
 }
 
 impl Verifier {
-    /// Verifies a step and the stop from the motion at its end. Returns which stop, or the limit that no stop was proved to
-    /// keep. A brake_at_once one is planned in a given place.
+    /// Verifies a step and the stop from the motion at its end. Returns which stop, or why none was proved.
+    /// The stop that brakes at once is planned in place of `brake_at_once`.
     pub fn verify(
         &mut self,
         constants: &Constants,
@@ -35,7 +36,7 @@ impl Verifier {
         motion: &Motion,
         step: &Step<'_>,
         brake_at_once: &mut PoseStop,
-    ) -> Result<StopKind, Limit> {
+    ) -> Result<StopKind, Refusal> {
         let Limits { orientation, position, .. } = &constants.parameters.limits;
         let Motion { pose, twist, acceleration } = motion;
         let turn = release_first_extent(&twist.angular, &acceleration.angular, orientation);

@@ -28,6 +28,7 @@ use nalgebra::{Vector3, Vector6};
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
+use crate::control::reference::proof::tolerances::WALL_RATIO;
 use crate::control::reference::proposal::approach::{Approach, WantedVelocity};
 use crate::control::reference::proposal::walls::derivative_bound::DerivativeBound;
 use crate::control::reference::stop::vector_stop::straight_extent;
@@ -41,8 +42,6 @@ use crate::model::task::task_coordinates;
 
 /// Part of the limits with which a wall is approached: several walls and the motion along them take the rest.
 const CLOSING_SHARE: f64 = 0.6;
-/// Distance kept from a bound, so that the examination of the stop between knots finds room, as a ratio of the stroke.
-const KEPT_RATIO: f64 = 5e-3;
 /// Sweeps over the walls: two walls at 60 degrees converge to 1e-4. Fewer where many walls are active, as this many visits of
 /// them bound the longest cycle: six hold every direction, more contradict each other.
 const SWEEPS: usize = 8;
@@ -122,7 +121,7 @@ impl Walls {
         let (machine, limits) = (constants.machine(), &constants.parameters.limits);
         let radius = machine.joints.radius;
         let mut walls = Self { walls: [Wall::default(); WALL_COUNT], count: 0, radius, visits: 0 };
-        let kept = KEPT_RATIO * machine.actuator.stroke();
+        let kept = WALL_RATIO * machine.actuator.stroke();
         let without_acceleration = Motion { twist: *led, acceleration: Acceleration::default(), ..*motion };
         let LegMotion { length, rate, accel } = leg_motion(machine, &without_acceleration);
         let wrenches: [[f64; 6]; LEGS] = leg_wrenches(machine, &motion.pose).into();

@@ -65,7 +65,7 @@ fn a_start_is_refused_with_the_limit_that_no_stop_keeps() {
         let mut reference = ReferenceGenerator::new(&constants);
         assert_eq!(
             reference.verify_start(&constants, &Motion { twist, ..at_rest(constants.home.pose()) }),
-            Err(limit)
+            Err(limit.into())
         );
     }
     let constants = constants(|_, _| ());
@@ -96,7 +96,7 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
         let speed = 0.03 * samples.uniform() * samples.uniform();
         let twist = Twist { angular: Vector3::zeros(), linear: Vector3::new(0.0, 0.0, speed) };
         let mut reference = ReferenceGenerator::new(&at_end);
-        assert_ne!(reference.verify_start(&at_end, &at_rest(&pose)), Err(Limit::Stroke), "at rest");
+        assert_ne!(reference.verify_start(&at_end, &at_rest(&pose)), Err(Limit::Stroke.into()), "at rest");
         if reference.verify_start(&at_end, &Motion { twist, ..at_rest(&pose) }).is_err() {
             refused += 1;
             continue;

@@ -2,6 +2,7 @@
 
 use fearless_simd::{Level, dispatch};
 
+use crate::control::reference::Refusal;
 use crate::control::reference::proof::examination::MAX_EFFORT;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::regularity::RegularBalls;
@@ -34,10 +35,10 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
         constants.universal_sine = 0.99 * sine;
         assert_eq!(verified(&constants, None), Ok(StopKind::ReleaseFirst));
         constants.universal_sine = 1.01 * sine;
-        assert_eq!(verified(&constants, None), Err(Limit::Condition));
+        assert_eq!(verified(&constants, None), Err(Limit::Condition.into()));
         assert_eq!(verified(&constants, Some(&pose)), Ok(StopKind::BrakeAtOnce));
         constants.universal_sine = 2.02 * sine;
-        assert_eq!(verified(&constants, Some(&pose)), Err(Limit::Condition));
+        assert_eq!(verified(&constants, Some(&pose)), Err(Limit::Condition.into()));
     }
 }
 
@@ -79,7 +80,7 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
                 &mut brake_at_once,
             )
         };
-        if verified() == Err(Limit::Condition) {
+        if verified() == Err(Refusal::Effort) {
             later += u32::from((0..3).any(|_| verified().is_ok()));
         }
     }
@@ -88,7 +89,7 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
 
 /// What the walls took of the effort of a step is missing for its verification.
 #[test]
-fn a_step_whose_work_is_done_is_refused() {
+fn a_step_without_effort_left_is_refused() {
     let mut samples = RandomVectors::new(95);
     for _ in 0..20 {
         let machine = machine(&mut samples);
@@ -105,7 +106,7 @@ fn a_step_whose_work_is_done_is_refused() {
             )
         };
         assert_eq!(verified(MAX_EFFORT - 1), Ok(StopKind::ReleaseFirst));
-        assert_eq!(verified(MAX_EFFORT), Err(Limit::Condition));
+        assert_eq!(verified(MAX_EFFORT), Err(Refusal::Effort));
     }
 }
 

@@ -3,6 +3,7 @@
 use fearless_simd::Level;
 
 use crate::control::parameters::Envelope;
+use crate::control::reference::Refusal;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::{step::Step, verification::Verifier};
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind};
@@ -179,7 +180,7 @@ impl Scene {
     }
 
     /// In one of the cycles that share the effort of a long stop.
-    pub fn verify(&self) -> Result<StopKind, Limit> {
+    pub fn verify(&self) -> Result<StopKind, Refusal> {
         let (mut verifier, mut brake_at_once) = (Verifier::default(), PoseStop::default());
         let mut verify = || {
             verifier.verify(
@@ -191,7 +192,7 @@ impl Scene {
             )
         };
         match verify().or_else(|_| verify()).or_else(|_| verify())? {
-            StopKind::BrakeAtOnce if self.is_free => Err(Limit::Stroke),
+            StopKind::BrakeAtOnce if self.is_free => Err(Limit::Stroke.into()),
             kind => Ok(kind),
         }
     }

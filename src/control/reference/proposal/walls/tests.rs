@@ -210,7 +210,7 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
             }
         }
     }
-    assert!(nearest > 1000 && worst > 0.95 * KEPT_RATIO, "{nearest}: {worst}");
+    assert!(nearest > 1000 && worst > 0.95 * WALL_RATIO, "{nearest}: {worst}");
 }
 
 /// The conditions of the nearest velocity: no wall is approached too fast, and the change is a sum of multiples of the

@@ -1,0 +1,82 @@
+//! The longest cycles that a search has found, replayed and counted in instructions, on the code that ships.
+//!
+//! The search is `benches/longest_cycle`; its file names the runs and the cycle of each.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::indexing_slicing,
+    reason = "helpers of tests"
+)]
+#![allow(dead_code, reason = "a part of the adversary's modules is used")]
+
+use hexad::control::controller::Controller;
+use hexad::realtime::setup::denormals;
+
+use crate::common;
+use common::not_run::lacking;
+use genome::Genome;
+use machines::MACHINES;
+
+#[path = "../benches/longest_cycle/count.rs"]
+mod count;
+#[path = "adversary/genome.rs"]
+mod genome;
+#[path = "adversary/machines.rs"]
+mod machines;
+#[path = "adversary/messages.rs"]
+mod messages;
+#[path = "adversary/run.rs"]
+mod run;
+#[path = "adversary/scenario.rs"]
+mod scenario;
+#[path = "adversary/stream.rs"]
+mod stream;
+#[path = "../benches/longest_cycle/usual.rs"]
+mod usual;
+
+const LONGEST: &str = include_str!("../benches/longest_cycle/longest.txt");
+
+/// Bounds of any cycle: instructions, and their ratio to the median of the fast scene of the same machine.
+const MAX_INSTRUCTIONS: u64 = 33_000;
+const MAX_MEDIANS: f64 = 3.2;
+/// Cycles of which a median is taken.
+const COUNTED: usize = 5;
+
+/// Instructions of one cycle of a run.
+fn instructions(genome: &Genome, cycle: usize) -> u64 {
+    let (mut number, mut before, mut counted): (_, Option<Controller>, _) = (0, None, None);
+    run::run_with(genome, None, |observed, input, _| {
+        if number == cycle {
+            counted = before.take().map(|before| count::instructions(&before, input));
+        }
+        before = (number + 1 == cycle).then(|| observed.controller.clone());
+        number += 1;
+    });
+    counted.unwrap_or_else(|| panic!("no cycle {cycle} of {number}: {genome}"))
+}
+
+#[test]
+fn the_longest_cycles_that_are_known_stay_within_their_bounds() {
+    if let Err(errno) = count::require_tracing() {
+        return lacking(&format!("the right to trace a child: {errno}"));
+    }
+    denormals::flush();
+    let mut runs: Vec<_> = LONGEST.lines().filter_map(|line| Some((Genome::parse(line)?, line))).collect();
+    // The longest of a machine and policy comes first.
+    runs.dedup_by_key(|(genome, _)| (genome.machine, genome.policy));
+    for (genome, line) in &runs {
+        let cycle = line.rsplit_once(" cycle ").expect("its longest cycle").1.parse().unwrap();
+        let (longest, median) =
+            (instructions(genome, cycle), usual::median(genome.machine, genome.policy, COUNTED));
+        let ratio = longest as f64 / median as f64;
+        let what = format!(
+            "{}, {:?}: {longest} instructions, {ratio:.2} medians",
+            MACHINES[genome.machine], genome.policy
+        );
+        println!("{what}");
+        assert!(longest <= MAX_INSTRUCTIONS && ratio <= MAX_MEDIANS, "{what}");
+    }
+    assert!(runs.len() >= 15, "{} runs", runs.len());
+}
