@@ -1,6 +1,6 @@
 //! Hard real-time computed-torque control of Gough-Stewart platforms.
 //!
-//! The command `hexad` (see `hexad --help`) is the product; this library is what it is made of.
+//! The product is the command `hexad` (see `hexad --help`); this library is its implementation.
 //!
 //! # Map
 //!
@@ -10,8 +10,9 @@
 //! | [`control`] | input validation, states, reference, control law, limits: one cycle | |
 //! | [`motion`] | trajectories, profiles, built-in motions | |
 //! | [`plant`] | simulated platform: forward dynamics, drives, sensors | |
-//! | `messages` | message structs and ports: what a driver needs | `client` |
 //! | `analysis` | workspace, clearance, fidelity of a motion, loop margins, assembly modes | `daemon` |
+//! | `messages` | message structs and ports, for drivers | `client` |
+//! | `operator` | operator requests to the daemons of this host | `client` |
 //! | `realtime` | threads, clock, cyclic loop, exchange between threads | `daemon` |
 //! | `output` | charts, tables, CSV and JSON files | `daemon` |
 //! | `config` | machine and deployment files | `daemon` |
@@ -19,9 +20,10 @@
 //! | `daemon` | the threads, translation between messages and controller, reports | `daemon` |
 //! | `commands` | one file or folder for each command of the command line | `daemon` |
 //!
-//! A folder uses folders above it in this table and no other; `tests/wall.rs` checks that. `output` stands above
-//! `config` and `daemon`, as both write files. The first four neither allocate nor do I/O nor read a clock. Without a
-//! feature the crate is these four alone, `no_std`; `client` adds what a driver needs, `daemon` (the default) all else.
+//! A folder uses only folders above it in this table; `tests/wall.rs` checks this. `output` is above `config`
+//! and `daemon` because both write files. The first four folders neither allocate nor do I/O nor read a clock.
+//! Without features the crate consists of these four and is `no_std`. `client` adds the needs of a driver,
+//! `daemon` (the default) everything else.
 //!
 //! # Notation, frames, units
 //!
@@ -35,8 +37,8 @@
 //! | N = `J^-T` | [`inverse_jacobian`](model::inverse_jacobian) | leg forces to the wrench about C |
 //! | Gamma | [`active_forces`](model::active_forces) | actuator forces; positive pushes the platform away |
 //!
-//! Everything is in base axes unless it says otherwise; angular parts come first; legs count 1..6 for
-//! people and 0..5 in arrays. SI units and radians; names at the edges carry their unit.
+//! Quantities are in base axes unless stated otherwise. Angular parts come first. Legs are numbered 1..6 for
+//! people and 0..5 in arrays. Units are SI and radians; names at the interfaces contain their unit.
 //!
 //! # Glossary
 //!
@@ -52,7 +54,7 @@
 //! | condition | ratio of the largest to the smallest amplification of leg forces, see [`model::sensitivity`] |
 //! | cycle | one run of the controller, from measurement to force |
 //! | demand | accelerations that a task requires in every direction |
-//! | deployment | how a machine is run: rate, processors, gains, limits, timeouts, topics |
+//! | deployment | configuration of a running machine: rate, processors, gains, limits, timeouts, topics |
 //! | diagnostic | result of a check: code, value, bound, index |
 //! | disturbance | acceleration of the platform that the model does not contain: payload, friction, process forces |
 //! | driver | process that measures the legs and applies the forces |
@@ -65,8 +67,8 @@
 //! | fit | shrinking a built-in motion until stroke, rates and forces keep a reserve |
 //! | following error | distance of the platform from the reference |
 //! | hold | constant force or pose between two instants |
-//! | home | pose of the machine's configuration from which it is started and to which it parks |
-//! | innovation | measured minus predicted motion |
+//! | home | configured pose from which the machine starts and to which it parks |
+//! | innovation | measured minus predicted tracking error |
 //! | jog | motion by keys, while they are held |
 //! | kinematic state | pose with its leg lengths and the factorization of N, see [`model::kinematic_state`] |
 //! | lane | element of a SIMD vector; one leg each |
@@ -85,24 +87,24 @@
 //! | prefault | touch memory in advance, so that no cycle causes a page fault |
 //! | recording | file with every cycle of a run: timing, input, output, see [`recording`] |
 //! | reference | motion that the controller tracks; generated from the target, within all limits |
-//! | reference generator | moves the reference towards the target, only to where a verified stop exists |
+//! | reference generator | moves the reference towards the target, only to states with a verified stop |
 //! | regressor | matrix that takes inertial parameters to forces, see [`model::regressor`] |
 //! | release | instant at which a cycle begins, on a fixed grid |
 //! | replay | computing the cycles of a recording again, compared bit for bit |
-//! | replica | controller that repeats every cycle in the recorder, for its memory |
+//! | replica | controller that repeats every cycle in the recorder, so that the recorder has its internal state |
 //! | reservation | processor time that SCHED_DEADLINE guarantees in each period |
 //! | sample | pose of a motion at one instant, without derivatives, see [`control::setpoint::pose_samples`] |
 //! | saturation | a quantity held at its limit |
-//! | setpoint | X, X', X'' that a source requests for an instant; or samples of X, or one X to stand at |
+//! | setpoint | X, X', X'' that a source requests for an instant; or samples of X, or one X to hold |
 //! | shortfall | set-up step that the kernel refused, with reason and remedy |
 //! | singular pose, singularity | pose at which the legs cannot hold the platform; det N = 0 |
 //! | stamp | CLOCK_MONOTONIC time in a message \[ns\] |
 //! | stroke | range of a leg's length |
-//! | target | where the reference goes: the setpoint, or a pose to stand at |
+//! | target | goal of the reference: the setpoint, or a pose to hold |
 //! | timeline | hold, approach, settle, motion, settle |
 //! | trusted step | change of pose for which Newton's method is proved to find the only solution |
 //! | twist, wrench | angular and linear velocity; torque and force; angular part first |
-//! | verified stop | way to rest from the reference that was proved to keep every limit along its whole length |
+//! | verified stop | motion from the reference to rest, proved to keep every limit over its whole length |
 #![cfg_attr(not(any(feature = "client", test)), no_std)]
 
 #[cfg(feature = "daemon")]
@@ -129,7 +131,7 @@ pub mod realtime;
 #[cfg(feature = "daemon")]
 pub mod recording;
 
-/// The driver in the README compiles.
+/// README with the example driver, compiled as a doctest.
 #[cfg(all(doctest, feature = "daemon"))]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,4 +1,4 @@
-//! Active forces (paper, eq. 94-97): the inverse dynamic model from motion to the six actuator forces.
+//! Active forces (paper, eq. 94-97): inverse dynamic model from a motion to the six actuator forces.
 //!
 //! ```text
 //! W = [torque; force] of the platform + sum_i [ b_i x F_i ; F_i ]       (97), inside the brackets
@@ -6,7 +6,8 @@
 //! Gamma_i += reflected L''_i + viscous L'_i + coulomb sign(L'_i)        the drives
 //! ```
 //!
-//! The part of `F_i` along leg i is balanced by that leg's actuator alone: only the transverse part goes into W.
+//! The actuator of leg i alone balances the part of `F_i` along the leg, so only the transverse part enters
+//! W.
 //!
 //! Positive forces push the platform away from the base. `Gamma` is linear in the acceleration.
 //! Conditioning: relative errors grow with the condition of N, see [`super::inverse_jacobian::condition`].
@@ -46,30 +47,30 @@ pub struct InverseDynamics {
     joints: Joints,
     legs: LegConstants,
     axes: PrincipalAxes,
-    /// 1 / smoothing speed of Coulomb friction \[s/m\].
+    /// Inverse of the smoothing speed of Coulomb friction \[s/m\].
     inverse_smoothing: f64,
 }
 
-/// Load on the actuators of one motion: `N (Gamma - axial_forces) = wrench`.
+/// Load of one motion on the actuators: `N (Gamma - axial_forces) = wrench`.
 #[derive(Clone, Copy, Debug)]
 pub struct TaskLoad {
-    /// N, see [`super::inverse_jacobian::leg_wrenches`].
+    /// Matrix N, see [`super::inverse_jacobian::leg_wrenches`].
     pub leg_wrenches: Matrix6<f64>,
-    /// W without the forces along the legs, torque about C first \[N m\], \[N\].
+    /// W without the axial forces; torque about C \[N m\], then force \[N\].
     pub wrench: Vector6<f64>,
     /// Load along each leg, drive included \[N\].
     pub axial_forces: Vector6<f64>,
 }
 
 impl TaskLoad {
-    /// `W + N axial_forces`: the whole load as a wrench about C \[N m\], \[N\].
+    /// Whole load as a wrench about C \[N m\], \[N\]: `W + N axial_forces`.
     pub fn total(&self) -> Vector6<f64> {
         self.wrench + self.leg_wrenches * self.axial_forces
     }
 }
 
 impl InverseDynamics {
-    /// Derives the constants of the model. Not for the cycle: it decomposes the inertia tensor.
+    /// Computes the constants of the model. Not for the cycle: it decomposes the inertia tensor.
     pub fn new(machine: &Machine) -> Self {
         Self {
             joints: machine.joints.with_point(&machine.platform.center_of_mass),
@@ -80,18 +81,18 @@ impl InverseDynamics {
         }
     }
 
-    /// The machine that this model describes.
+    /// Machine that this model describes.
     pub fn machine(&self) -> &Machine {
         &self.machine
     }
 
-    /// The six actuator forces Gamma \[N\] for a motion of the platform, `None` at a singular pose.
+    /// Actuator forces Gamma \[N\] for a motion of the platform; `None` at a singular pose.
     pub fn forces<M: ModelTerms>(&self, motion: &Motion) -> Option<[f64; LEGS]> {
         let lane = dispatch!(self.machine.level, simd => self.balanced::<_, M>(simd, motion))?;
         Some(self.joints.triples.unpack(&lane))
     }
 
-    /// [`InverseDynamics::forces`] of a fidelity chosen at run time.
+    /// Actuator forces as by [`InverseDynamics::forces`], with a fidelity chosen at run time.
     pub fn forces_of(&self, fidelity: Fidelity, motion: &Motion) -> Option<[f64; LEGS]> {
         match fidelity {
             Fidelity::Gravity => self.forces::<Gravity>(motion),
@@ -103,8 +104,8 @@ impl InverseDynamics {
         }
     }
 
-    /// In lanes: sorting them is left to code for any CPU, which loads one number after the other. With
-    /// AVX-512 the compiler would gather them, and a gather waits until its operands are in the cache.
+    /// Actuator forces in lanes. Code for the generic instruction set sorts them, one load after another.
+    /// With AVX-512 the compiler would use a gather, which waits until its operands are in the cache.
     #[inline(always)]
     fn balanced<S: Simd, M: ModelTerms>(&self, simd: S, motion: &Motion) -> Option<LegLanes> {
         let legs = LegGeometry::new(simd, &self.joints, &motion.pose);
@@ -113,7 +114,7 @@ impl InverseDynamics {
         factorization.forces(&legs, &wrench, axial)
     }
 
-    /// The load of a motion, before the six forces are solved for.
+    /// Load of a motion, before solving for the six forces.
     pub fn load_of<M: ModelTerms>(&self, motion: &Motion) -> TaskLoad {
         dispatch!(self.machine.level, simd => {
             let triples = &self.joints.triples;
@@ -127,7 +128,7 @@ impl InverseDynamics {
         })
     }
 
-    /// W, and the load along the legs.
+    /// W and the axial load.
     #[inline(always)]
     fn load<S: Simd, M: ModelTerms>(
         &self,
@@ -137,7 +138,7 @@ impl InverseDynamics {
     ) -> (LaneWrench<S>, f64x8<S>) {
         let machine = &self.machine;
         let velocity = legs.velocity(simd, &motion.twist);
-        // Terms that the fidelity leaves out are those of a platform at rest.
+        // Terms that the fidelity omits are evaluated as for a platform at rest.
         let twist = if M::VELOCITY { motion.twist } else { Twist::default() };
         let acceleration = if M::ACCELERATION { motion.acceleration } else { Acceleration::default() };
         let map = acceleration_map(&twist, &acceleration);
@@ -158,7 +159,8 @@ impl InverseDynamics {
         (wrench, reaction.axial + self.drive_force(simd, velocity.rate, accel))
     }
 
-    /// `reflected L'' + viscous L' + coulomb sign(L')`, the sign proportional below the smoothing speed.
+    /// Drive force `reflected L'' + viscous L' + coulomb sign(L')`; the sign is proportional below the
+    /// smoothing speed.
     #[inline(always)]
     fn drive_force<S: Simd>(&self, simd: S, rate: f64x8<S>, accel: f64x8<S>) -> f64x8<S> {
         let Actuator { reflected_mass, viscous_friction, coulomb_friction, .. } = self.machine.actuator;
@@ -170,7 +172,8 @@ impl InverseDynamics {
     }
 }
 
-/// The six actuator forces \[N\] of one motion, with constants derived anew; for more than one keep an [`InverseDynamics`].
+/// Actuator forces \[N\] of one motion. It computes the constants anew; use an [`InverseDynamics`] for more
+/// than one motion.
 pub fn inverse_dynamics<M: ModelTerms>(machine: &Machine, motion: &Motion) -> Option<[f64; LEGS]> {
     InverseDynamics::new(machine).forces::<M>(motion)
 }

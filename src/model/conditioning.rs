@@ -1,5 +1,5 @@
-//! Conditioning of a pose: what proofs about the poses around it begin with. Of a [kinematic state](super::kinematic_state) only the
-//! numbers, without the factorization behind them.
+//! Conditioning of a pose: the numbers of a [kinematic state](super::kinematic_state) without its
+//! factorization. Proofs about neighbouring poses begin with it.
 
 use fearless_simd::dispatch;
 
@@ -19,12 +19,13 @@ pub(crate) struct Conditioning {
     pub shortest: f64,
     /// See [`super::inverse_geometry::universal_sine`].
     pub universal_sine: f64,
-    /// Whether the blocks of the factorization are too near to singular, so that it was LU with pivoting instead.
+    /// Whether the blocks of the factorization are too close to singular, so that LU with pivoting replaced
+    /// them.
     pub is_pivoted: bool,
 }
 
 impl Conditioning {
-    /// That of a machine at a pose.
+    /// Evaluates the conditioning of a machine at a pose.
     pub fn new(machine: &Machine, pose: &Pose) -> Self {
         let joints = &machine.joints;
         dispatch!(machine.level, simd => {

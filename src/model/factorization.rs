@@ -1,5 +1,5 @@
-//! Factorization of `N`, for the balance of forces `N Gamma = W`, `N = [m; n]` with `m_i = b_i x n_i`, and its transpose
-//! `N^T [omega; v] = L'`, by block elimination on two triples of legs, A and B.
+//! Factorization of `N` by block elimination on two triples of legs, A and B. It solves the balance of forces
+//! `N Gamma = W`, `N = [m; n]` with `m_i = b_i x n_i`, and the transpose `N^T [omega; v] = L'`.
 //!
 //! ```text
 //! a_i  = n_i+1 x n_i+2          dA = n_i . a_i           rows of D_A^-1 = a_i / dA        (i in A, cyclic)
@@ -12,11 +12,11 @@
 //!                     v = sum_i a_i (r_i - m_i . omega) / dA
 //! ```
 //!
-//! Every 3 x 3 inverse is cross products of rotated lanes: two divisions in all, where an LU of the 6 x 6
-//! matrix has six one after the other. The pivoting is done in advance: [`Triples::best`] splits the legs
-//! so that A spans the largest volume at home. Where a pose comes too near to a singularity of A or of S (both
-//! determinants are at hand) LU with partial pivoting takes over: over many poses
-//! no worse than twice that method.
+//! Every 3 x 3 inverse consists of cross products of rotated lanes. This takes two divisions in all; an LU of
+//! the 6 x 6 matrix has six, one after the other. Pivoting is done in advance: [`Triples::best`] splits the
+//! legs so that A spans the largest volume at home. If a pose is too close to a singularity of A or of S (the
+//! determinants are available), LU with partial pivoting takes over. Over many poses the error is at most
+//! twice the error of LU.
 
 use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
@@ -32,59 +32,60 @@ use super::triples::{LegLanes, Triples};
 
 /// Smallest `|dA|`, the volume spanned by the three unit vectors of A, for which the blocks are used.
 ///
-/// Measured (`tests/near_singular`, 53 830 motions, condition 1 to 1e13): largest error per decade of the
-/// condition, over that of LU with partial pivoting, forces / twist: 28 / 28 with 0.03 (and dS 1e-2),
-/// 4.2 / 3.4 with 0.1, 4.2 / 2.6 with 0.15, **1.3 / 1.5 with 0.2**, the same with 0.25; RMS 0.7 to 1.0. The
-/// ten machines of `tests/data` have 0.22 to 0.98 in their vectors.
+/// Measured (2026-11-20, `tests/near_singular`, 53 830 motions, condition 1 to 1e13): largest error per
+/// decade of the condition, relative to LU with partial pivoting, forces / twist: 28 / 28 with 0.03 (and dS
+/// 1e-2), 4.2 / 3.4 with 0.1, 4.2 / 2.6 with 0.15, **1.3 / 1.5 with 0.2**, the same with 0.25; RMS 0.7 to
+/// 1.0. The ten machines of `tests/data` have 0.22 to 0.98 in their vectors.
 const MIN_DET_A: f64 = 0.2;
 
-/// Smallest `|dS| / radius^3`. Given a uses_blocks A the blocks lose nothing as S becomes singular (each lane is
-/// Cramer's rule, forward stable), but two singular values may become small together, where cross products
-/// cancel. Measured as above: 1.5 with 1e-2 and with 1e-3, 2.3 with 1e-4. Vectors of `tests/data`: 1.2 to 5.
+/// Smallest `|dS| / radius^3` for which the blocks are used. If A is well conditioned, block elimination
+/// stays accurate even when S is nearly singular (each lane is Cramer's rule, forward stable). But two
+/// singular values may become small together, and then cross products cancel. Measured as above: 1.5 with
+/// 1e-2 and with 1e-3, 2.3 with 1e-4. Vectors of `tests/data`: 1.2 to 5.
 const MIN_RELATIVE_DET_S: f64 = 1e-3;
 
-/// `N^-1` and `N^-T` at one pose.
+/// Factors of `N^-1` and `N^-T` at one pose.
 pub(super) struct Factorization<'a, S: Simd> {
     pub simd: S,
     pub joints: &'a Joints,
-    /// m of A.
+    /// Moments m of A.
     pub moment_a: Lanes3<f64x4<S>>,
-    /// a / dA
+    /// Inverse of D_A, rows `a / dA`.
     pub inverse_a: Lanes3<f64x4<S>>,
-    /// X: a vector for each i over the lanes j.
+    /// Matrix X: one vector per i over the lanes j.
     pub x: [f64x4<S>; 3],
-    /// c
+    /// Adjugate of S, rows c.
     pub adjugate_s: Lanes3<f64x4<S>>,
-    /// 1 / dS, in each lane as that leg computes it.
+    /// `1 / dS`, computed by each lane for its own leg.
     pub inverse_d_s: f64x4<S>,
-    /// dA, dS, as the first leg of each computes it.
+    /// dA and dS, computed by the first leg of each triple.
     pub determinants: [f64; 2],
-    /// Both determinants are large enough.
+    /// Whether both determinants are large enough for block elimination.
     pub uses_blocks: bool,
 }
 
-/// A [`Factorization`] in memory, the halves of both triples in one lane.
+/// Stored [`Factorization`]: each [`LegLanes`] holds the lanes of two factors.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StoredFactorization {
-    /// m of A, c.
+    /// m of A, and c.
     moment_adjugate: [LegLanes; 3],
-    /// a / dA, X.
+    /// `a / dA`, and X.
     inverse_x: [LegLanes; 3],
-    /// 1 / dS, twice.
+    /// `1 / dS`, stored twice.
     inverse_d_s: LegLanes,
     determinants: [f64; 2],
     pub uses_blocks: bool,
 }
 
-/// A wrench about C as the sum of four lanes.
+/// Wrench about C, as the sum of four lanes.
 pub(super) struct LaneWrench<S: Simd> {
     pub torque: Lanes3<f64x4<S>>,
     pub force: Lanes3<f64x4<S>>,
 }
 
 impl<'a, S: Simd> Factorization<'a, S> {
-    /// Factorizes. At a singular pose the factors are not finite.
+    /// Factorizes N. At a singular pose the factors are not finite.
     #[inline(always)]
     pub fn new(simd: S, joints: &'a Joints, legs: &LegGeometry<S>) -> Self {
         let moment = legs.arm.cross(legs.direction);
@@ -109,7 +110,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         Self { simd, joints, moment_a, inverse_a, x, adjugate_s: c, inverse_d_s, determinants, uses_blocks }
     }
 
-    /// From memory.
+    /// Loads a stored factorization.
     #[inline(always)]
     pub fn load(simd: S, joints: &'a Joints, factors: &StoredFactorization) -> Self {
         let load = |lane: &LegLanes| lane.load(simd).split();
@@ -128,7 +129,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         }
     }
 
-    /// To memory.
+    /// Stores the factorization.
     #[inline(always)]
     pub fn store(&self) -> StoredFactorization {
         let (m, i, c, [x_0, x_1, x_2]) = (self.moment_a, self.inverse_a, self.adjugate_s, self.x);
@@ -142,14 +143,14 @@ impl<'a, S: Simd> Factorization<'a, S> {
         }
     }
 
-    /// `det N`, columns in the order of the lanes.
+    /// `det N`, with the columns in lane order.
     #[inline(always)]
     pub fn determinant(&self) -> f64 {
         let [d_a, d_s] = self.determinants;
         -d_a * d_s
     }
 
-    /// `Gamma + axial` with `N Gamma = W`, still in lanes; `None` at a singular pose.
+    /// Returns `Gamma + axial` with `N Gamma = W`, in lanes; `None` at a singular pose.
     #[inline(always)]
     pub fn forces(&self, legs: &LegGeometry<S>, wrench: &LaneWrench<S>, axial: f64x8<S>) -> Option<LegLanes> {
         let simd = self.simd;
@@ -161,7 +162,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         }
         let force = wrench.force.total();
         let g = self.inverse_a.dot(force);
-        // The lane of padding is no leg's force.
+        // The lane of padding is not a leg: its force is set to zero.
         let g_of_legs = g * f64x4::load_array(simd, [1.0, 1.0, 1.0, 0.0]);
         let torque = wrench.torque.minus_scaled(g_of_legs, self.moment_a);
         let gamma_b = self.adjugate_s.dot(torque.total()) * self.inverse_d_s;
@@ -171,7 +172,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
         Some((gamma_a.combine(gamma_b) + axial).into())
     }
 
-    /// `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
+    /// Returns `[omega; v]` with `N^T [omega; v] = rates`; `None` at a singular pose.
     #[inline(always)]
     pub fn twist(&self, legs: &LegGeometry<S>, rates: f64x8<S>) -> Option<LaneTwist<S>> {
         let simd = self.simd;
@@ -183,13 +184,14 @@ impl<'a, S: Simd> Factorization<'a, S> {
                 |twist| LaneTwist::splat(simd, &twist),
             );
         }
-        // The lane of padding is no leg's rate.
+        // The lane of padding is not a leg: its rate is set to zero.
         let of_legs = f64x4::load_array(simd, [1.0, 1.0, 1.0, 0.0]);
         let (r_a, r_b) = rates.split();
         let [r0, r1, r2] = broadcasts(r_a);
         let [x0, x1, x2] = self.x;
-        // One dS for all three: near a singular pose the lanes' own differ by rounding times the condition,
-        // and the sum, where large terms cancel, would lose the condition a second time.
+        // One dS for all three lanes. Near a singular pose the lanes' own values differ by rounding times the
+        // condition. Large terms cancel in the sum, so the error would be multiplied by the condition a
+        // second time.
         let inverse_d_s = self.inverse_d_s.broadcast::<0>();
         let rest = (r_b - r0 * x0 - r1 * x1 - r2 * x2) * of_legs;
         let angular = (self.adjugate_s * rest).total() * inverse_d_s;
@@ -198,7 +200,7 @@ impl<'a, S: Simd> Factorization<'a, S> {
     }
 }
 
-/// A twist, each number of it in all lanes.
+/// Twist, each component in all lanes.
 #[derive(Clone, Copy)]
 pub(super) struct LaneTwist<S: Simd> {
     pub angular: Lanes3<f64x4<S>>,
@@ -211,14 +213,14 @@ impl<S: Simd> LaneTwist<S> {
         Self { angular: Lanes3::splat(simd, &twist.angular), linear: Lanes3::splat(simd, &twist.linear) }
     }
 
-    /// `|omega|^2 + |v|^2 linear_weight`
+    /// Weighted square of the twist: `|omega|^2 + |v|^2 linear_weight`.
     #[inline(always)]
     pub fn size_squared(&self, linear_weight: f64x4<S>) -> f64 {
         let linear = self.linear.dot(self.linear);
         linear.fused_mul_add(linear_weight, self.angular.dot(self.angular)).first()
     }
 
-    /// The twist itself.
+    /// Twist as two 3-vectors.
     #[inline(always)]
     pub fn first(&self) -> Twist {
         Twist { angular: self.angular.first(), linear: self.linear.first() }
@@ -226,13 +228,13 @@ impl<S: Simd> LaneTwist<S> {
 }
 
 impl<S: Simd> LaneWrench<S> {
-    /// The wrench itself.
+    /// Wrench as two 3-vectors.
     pub fn sum(&self) -> Wrench {
         Wrench { torque: self.torque.sum(), force: self.force.sum() }
     }
 }
 
-/// By LU with partial pivoting.
+/// Forces by LU with partial pivoting.
 #[cold]
 #[inline(never)]
 fn forces_by_lu(level: Level, n: &Matrix6<f64>, wrench: &Wrench, axial: &[f64; LEGS]) -> Option<[f64; LEGS]> {
@@ -240,7 +242,7 @@ fn forces_by_lu(level: Level, n: &Matrix6<f64>, wrench: &Wrench, axial: &[f64; L
     Some((Vector6::from(balancing) + Vector6::from(*axial)).into())
 }
 
-/// By LU with partial pivoting.
+/// Twist by LU with partial pivoting.
 #[cold]
 #[inline(never)]
 fn twist_by_lu(level: Level, n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Twist> {
@@ -248,7 +250,7 @@ fn twist_by_lu(level: Level, n: &Matrix6<f64>, rates: &[f64; LEGS]) -> Option<Tw
     lu::solve(level, n.as_ref(), rates).map(|twist| Twist::from_vector(&twist.into()))
 }
 
-/// N, columns in the order of the legs.
+/// Matrix N, columns in the order of the legs.
 #[inline(always)]
 pub(super) fn wrench_columns<S: Simd>(triples: &Triples, legs: &LegGeometry<S>) -> Matrix6<f64> {
     let rows = [legs.arm.cross(legs.direction).store(), legs.direction.store()];
@@ -259,7 +261,7 @@ pub(super) fn wrench_columns<S: Simd>(triples: &Triples, legs: &LegGeometry<S>) 
     n
 }
 
-/// `v_i+1 x v_i+2` in each lane i.
+/// Returns `v_i+1 x v_i+2` in each lane i.
 #[inline(always)]
 fn adjugate<S: Simd>(v: Lanes3<f64x4<S>>) -> Lanes3<f64x4<S>> {
     v.next().cross(v.previous())

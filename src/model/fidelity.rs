@@ -1,38 +1,38 @@
-//! Model fidelity: which terms of the dynamics are evaluated, known at compile time.
+//! Model fidelity: terms of the dynamics that are evaluated, chosen at compile time.
 //!
-//! All fidelities share one code path; a term that a fidelity leaves out costs nothing. Every fidelity above gravity
-//! keeps the drives (reflected mass, friction), which belong to the actuator and not to a link.
-//! `tests/ladder.rs` computes the terms that each leaves out independently and compares them with the difference.
+//! All fidelities share one code path; an omitted term costs nothing. Every fidelity above gravity includes
+//! the drives (reflected mass, friction), which belong to the actuator and not to a link. `tests/ladder.rs`
+//! computes the omitted terms of each fidelity independently and compares them with the difference.
 //!
 //! | fidelity | leaves out | allowed when |
 //! | --- | --- | --- |
 //! | [`Gravity`] | every acceleration and velocity, drives included | the platform only holds or creeps |
 //! | [`MasslessLegs`] | mass and inertia of the legs | the platform outweighs the legs |
-//! | [`LumpedLegs`] | inertia of the legs but for points at A and B that have their mass and centre | legs turn little |
-//! | [`NoVelocity`] | centrifugal and Coriolis forces; the spin of the legs, its inertia included; friction stays | slow motion, whatever the acceleration |
-//! | [`RigidLegs`] | spin of the legs about their own axes: the paper's model | thin legs, or joints across the legs |
+//! | [`LumpedLegs`] | inertia of the legs, except points at A and B with their mass and centre of mass | legs turn little |
+//! | [`NoVelocity`] | centrifugal and Coriolis forces; spin of the legs and its inertia; friction stays | slow motion at any acceleration |
+//! | [`RigidLegs`] | spin of the legs about their own axes, as in the paper | thin legs, or joints across the legs |
 //! | [`Exact`] | nothing | always |
 
-/// How the mass of the legs enters the dynamics.
+/// Representation of the leg mass in the dynamics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LegInertia {
-    /// Not at all.
+    /// Legs without mass.
     Massless,
-    /// As a point mass at B.
+    /// Point masses at B and A; A does not move.
     Lumped,
-    /// As two links.
+    /// Two rigid links per leg.
     Links,
 }
 
 /// Terms of the dynamics that a fidelity evaluates, as constants for the compiler.
 pub trait ModelTerms {
-    /// Mass and inertia of the legs.
+    /// Representation of mass and inertia of the legs.
     const LEGS: LegInertia;
-    /// Accelerations, and with them the drives.
+    /// Whether accelerations are included, and with them the drives.
     const ACCELERATION: bool;
-    /// Centrifugal and Coriolis forces.
+    /// Whether centrifugal and Coriolis forces are included.
     const VELOCITY: bool;
-    /// Spin of the legs about their own axes.
+    /// Whether the spin of the legs about their own axes is included.
     const SPIN: bool;
 }
 
@@ -60,20 +60,20 @@ fidelity!(
     MasslessLegs, Massless, true, true, false
 );
 fidelity!(
-    /// Each leg as a point mass at B and one at A, the first part of the platform. They have the mass and
-    /// the centre of mass of a leg of the mean length at home.
+    /// Each leg as a point mass at B and one at A, the first part of the platform. Together they have the
+    /// mass and the centre of mass of a leg of the mean length at home.
     LumpedLegs, Lumped, true, true, false
 );
 fidelity!(
-    /// All masses, no forces that grow with velocity but friction. The legs do not spin, also at rest.
+    /// All masses, but no forces that grow with velocity except friction. Legs do not spin, not even at rest.
     NoVelocity, Links, true, false, false
 );
 fidelity!(
-    /// The paper's model: rigid legs that do not spin.
+    /// The paper's model: rigid legs without spin.
     RigidLegs, Links, true, true, false
 );
 fidelity!(
-    /// Every term.
+    /// All terms.
     Exact, Links, true, true, true
 );
 
@@ -104,7 +104,7 @@ pub enum Fidelity {
 }
 
 impl Fidelity {
-    /// From the cheapest to the exact one.
+    /// All fidelities, from the cheapest to the exact one.
     pub const ALL: [Self; 6] =
         [Self::Gravity, Self::MasslessLegs, Self::LumpedLegs, Self::NoVelocity, Self::RigidLegs, Self::Exact];
 
@@ -120,7 +120,7 @@ impl Fidelity {
         }
     }
 
-    /// The terms that it leaves out, in a few words.
+    /// Short description of the omitted terms.
     pub fn left_out_terms(self) -> &'static str {
         match self {
             Self::Gravity => "motion and drives",
@@ -132,7 +132,8 @@ impl Fidelity {
         }
     }
 
-    /// Whether accelerations make forces. A control law commands an acceleration, so it needs a fidelity that has.
+    /// Whether accelerations cause forces. A control law commands an acceleration, so its fidelity must have
+    /// inertia.
     pub fn has_inertia(self) -> bool {
         self != Self::Gravity
     }

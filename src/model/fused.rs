@@ -1,24 +1,31 @@
-//! `a b + c` rounded once, without an instruction for it: the lanes of AVX2, AVX-512 and NEON, to the bit, on any processor.
+//! Fused multiply-add in software: `a b + c` rounded once, bit-identical to AVX2, AVX-512 and NEON on any
+//! processor.
 //!
-//! Two arithmetics cover all processors. AVX2, AVX-512 and NEON round a product and its sum once; SSE4.2 rounds twice, and
-//! stays as fast as it is. SSE2 uses these functions: every x86 processor has it, so that it repeats what any other has
-//! recorded, some fifty times as slow. Processors that have no more, those before 2011, compute so in the loop as well: forces in 5 us.
+//! Two arithmetics cover all processors. AVX2, AVX-512 and NEON round a product and its sum once. SSE4.2
+//! rounds twice and keeps its speed. SSE2 uses these functions. Every x86 processor has SSE2 and can
+//! therefore replay any recording, about fifty times slower. Processors with nothing beyond SSE2, built
+//! before 2011, use these functions in the loop as well; forces then take 5 us.
 //!
-//! Algorithm 9 of Graillat and Muller (Numerische Mathematik 2025, doi 10.1007/s00211-025-01487-2) on the product of Dekker:
+//! Algorithm 9 of Graillat and Muller (Numerische Mathematik 2025, doi 10.1007/s00211-025-01487-2) with
+//! Dekker's product:
 //!
-//! | step | |
+//! | step | result |
 //! | --- | --- |
-//! | `p + e = a b` | exactly, by halves of the factors |
-//! | `s + r = p + c` | exactly |
-//! | `v + w = e + r` | exactly |
-//! | `s + v` | is `a b + c` rounded once, unless `w != 0` and `v` is `2^k` or `3 2^k`: then `v` decides a tie that `w` would break, and an eighth of it does instead |
+//! | `p + e = a b` | exact, by halves of the factors |
+//! | `s + r = p + c` | exact |
+//! | `v + w = e + r` | exact |
+//! | `s + v` | `a b + c` rounded once, unless `w != 0` and `v` is `2^k` or `3 2^k` |
 //!
-//! Range: the same bits as the instruction where `a b` and `c` are zero or from 1e-280 to 1e280, and where the result is not
-//! finite. Outside, the error of two roundings.
+//! In the exceptional case `v` alone decides a tie that `w` should break. `v` is then changed by an eighth of
+//! itself in the direction of `w`.
+//!
+//! Range: identical to the instruction if `a b` and `c` are zero or from 1e-280 to 1e280, and if the result
+//! is not finite. Outside this range the error is that of two roundings.
 
 use fearless_simd::Simd;
 
-/// Whether the lanes use the processor's own multiplication and addition. A constant in the function that was dispatched.
+/// Whether the lanes use the processor's own multiplication and addition. It is a constant in the dispatched
+/// function.
 #[inline(always)]
 pub(super) fn is_native<S: Simd>(simd: S) -> bool {
     let level = simd.level();
@@ -28,15 +35,15 @@ pub(super) fn is_native<S: Simd>(simd: S) -> bool {
     return !level.is_fallback();
 }
 
-/// `2^27 + 1` halves the 53 bits of a number.
+/// Factor `2^27 + 1` that splits the 53 bits of a number into two halves.
 const HALVING: f64 = 134_217_729.0;
 
-/// Bits of a fraction but the first: zero for `2^k` and `3 2^k`.
+/// Bits of the fraction except the first; all zero for `2^k` and `3 2^k`.
 const REST_OF_FRACTION: u64 = (1 << 51) - 1;
 
 const SIGN: u64 = 1 << 63;
 
-/// The upper 26 bits of a number, and the rest.
+/// Upper 26 bits of a number, and the rest.
 #[inline(always)]
 fn halves(a: f64) -> (f64, f64) {
     let scaled = a * HALVING;
@@ -44,7 +51,7 @@ fn halves(a: f64) -> (f64, f64) {
     (upper, a - upper)
 }
 
-/// `a b` and its rounding error.
+/// Product `a b` and its rounding error.
 #[inline(always)]
 fn product(a: f64, b: f64) -> (f64, f64) {
     let ((a_upper, a_lower), (b_upper, b_lower)) = (halves(a), halves(b));
@@ -53,7 +60,7 @@ fn product(a: f64, b: f64) -> (f64, f64) {
     (p, error)
 }
 
-/// `a + b` and its rounding error.
+/// Sum `a + b` and its rounding error.
 #[inline(always)]
 fn sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
@@ -61,7 +68,7 @@ fn sum(a: f64, b: f64) -> (f64, f64) {
     (s, (a - (s - of_b)) + (b - of_b))
 }
 
-/// `a b + c` in each lane, rounded once. Not inlined: the model has hundreds of them.
+/// `a b + c` in each lane, rounded once. Not inlined, because the model has hundreds of calls.
 #[inline(never)]
 pub(super) fn mul_add<const LANES: usize>(
     a: &[f64; LANES],
@@ -77,9 +84,9 @@ pub(super) fn mul_add<const LANES: usize>(
         let is_opposed = (v.to_bits() ^ w.to_bits()) & SIGN != 0;
         let decided = v * if is_opposed { 0.875 } else { 1.125 };
         let v = if is_tie { decided } else { v };
-        // A zero added to a zero would lose its sign.
+        // Adding two zeros would lose the sign.
         let once = if v == 0.0 { s } else { s + v };
-        // Halves and errors of what is not finite are not numbers.
+        // For results that are not finite, halves and errors are NaN.
         *result = if once.is_finite() { once } else { a * b + c };
     }
     results
@@ -89,7 +96,7 @@ pub(super) fn mul_add<const LANES: usize>(
 mod tests {
     use super::*;
 
-    /// A number of random sign, exponent and few or many bits.
+    /// Random number: sign, exponent, few or many bits.
     fn number(state: &mut u64) -> f64 {
         let mut next = || {
             *state ^= *state << 13;
@@ -113,7 +120,7 @@ mod tests {
             let [a, b, mut c]: [[f64; 8]; 3] =
                 core::array::from_fn(|_| core::array::from_fn(|_| number(&mut state)));
             if k % 2 == 0 {
-                // Nearly the product: what is left is its rounding error and a few units more.
+                // Nearly the product: the result is its rounding error plus a few units.
                 c = core::array::from_fn(|lane| {
                     let units = f64::from((state >> (8 * lane) & 3) as u8);
                     -a[lane] * b[lane] * (1.0 + units * f64::EPSILON)
@@ -132,7 +139,7 @@ mod tests {
     fn a_tie_is_broken_by_the_last_error() {
         let half_unit = 0.5 * f64::EPSILON;
         for tiny in [half_unit * half_unit, -half_unit * half_unit] {
-            // (1 + x)(half_unit) + 1 with x small, in both directions.
+            // (1 + x)(half_unit) + 1 with small x, in both directions.
             let a = [half_unit; 8];
             let b = [1.0 + tiny.signum() * f64::EPSILON; 8];
             let expected = half_unit.mul_add(b[0], 1.0);

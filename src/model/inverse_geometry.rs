@@ -6,7 +6,7 @@
 //! aB  = v' + S b                L'' = n . aB + L |n'|^2           n'' = (aB - L'' n - 2 L' n') / L
 //! ```
 //!
-//! with `S b = omega' x b + omega x (omega x b)`; n'' itself is nowhere needed.
+//! with `S b = omega' x b + omega x (omega x b)`; n'' itself is not evaluated here.
 //!
 //! Valid for L > 0. No leg angles appear, hence no joint-angle singularity.
 
@@ -26,7 +26,7 @@ use super::triples::LegLanes;
 /// Geometry of the six legs at one pose, in lanes.
 #[derive(Clone, Copy)]
 pub(super) struct LegGeometry<S: Simd> {
-    /// b, from C to the joint on the platform.
+    /// b, from C or the mean of the joints to the joint on the platform.
     pub arm: Lanes3<f64x8<S>>,
     /// n, unit vector from base to platform.
     pub direction: Lanes3<f64x8<S>>,
@@ -46,13 +46,13 @@ pub(super) struct LegVelocity<S: Simd> {
 }
 
 impl<S: Simd> LegGeometry<S> {
-    /// With arms from C.
+    /// Geometry with arms from C.
     #[inline(always)]
     pub fn new(simd: S, joints: &Joints, pose: &Pose) -> Self {
         Self::of(simd, &joints.platform, joints, pose)
     }
 
-    /// With arms from the mean of the joints on the platform, wherever C is.
+    /// Geometry with arms from the mean of the joints on the platform, independent of C.
     #[inline(always)]
     pub fn around_center(simd: S, joints: &Joints, pose: &Pose) -> Self {
         let position = pose.position + pose.rotation * joints.center;
@@ -68,14 +68,14 @@ impl<S: Simd> LegGeometry<S> {
         Self { arm, direction: s * inverse_length, length, inverse_length }
     }
 
-    /// See [`universal_sine`].
+    /// Smallest sine of a leg's angle to its universal joint, see [`universal_sine`].
     #[inline(always)]
     pub fn universal_sine(&self, simd: S, joints: &Joints) -> f64 {
         let normal = self.direction.cross(Lanes3::load(simd, &joints.universal_axis));
         least_of_legs(normal.dot(normal)).min(1.0).sqrt()
     }
 
-    /// L' and n'.
+    /// Rates L' and n' for a twist.
     #[inline(always)]
     pub fn velocity(&self, simd: S, twist: &Twist) -> LegVelocity<S> {
         let joint = Lanes3::splat(simd, &twist.linear) + Lanes3::splat(simd, &twist.angular).cross(self.arm);
@@ -84,7 +84,7 @@ impl<S: Simd> LegGeometry<S> {
         LegVelocity { rate, direction }
     }
 
-    /// aB, with `acceleration_map` from [`super::platform::acceleration_map`].
+    /// Joint accelerations aB, with `acceleration_map` from [`super::platform::acceleration_map`].
     #[inline(always)]
     pub fn joint_acceleration(
         &self,
@@ -95,7 +95,7 @@ impl<S: Simd> LegGeometry<S> {
         Lanes3::splat(simd, &acceleration.linear) + self.arm.transformed(simd, acceleration_map)
     }
 
-    /// L''
+    /// Accelerations L''.
     #[inline(always)]
     pub fn accel(&self, velocity: &LegVelocity<S>, joint_acceleration: Lanes3<f64x8<S>>) -> f64x8<S> {
         let turn = velocity.direction;
@@ -157,7 +157,8 @@ pub fn leg_lengths_and_rates(machine: &Machine, pose: &Pose, twist: &Twist) -> (
     })
 }
 
-/// Lengths and rates of [`leg_lengths_and_rates`] in lanes, for a loop over poses that is one piece of code for each instruction set.
+/// Lengths and rates of [`leg_lengths_and_rates`] in lanes, for loops over poses that are compiled as one
+/// function per instruction set.
 #[inline(always)]
 pub(crate) fn length_and_rate_lanes<S: Simd>(
     simd: S,
@@ -177,8 +178,8 @@ pub fn leg_directions(machine: &Machine, pose: &Pose) -> [Vector3<f64>; LEGS] {
     })
 }
 
-/// Least sine of the angle between a leg and the first axis of its universal joint, over the six legs: 0 where one is in
-/// line with it.
+/// Smallest sine of the angle between a leg and the first axis of its universal joint, over the six legs. It
+/// is 0 if a leg is aligned with its axis.
 pub fn universal_sine(machine: &Machine, pose: &Pose) -> f64 {
     let joints = &machine.joints;
     dispatch!(machine.level, simd => LegGeometry::new(simd, joints, pose).universal_sine(simd, joints))

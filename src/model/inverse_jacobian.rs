@@ -1,8 +1,8 @@
 //! Inverse Jacobian (paper, eq. 6-9).
 //!
-//! `J^-1` has the rows `[(b_i x n_i)^T  n_i^T]`, so `L' = J^-1 [omega; v]`. Its transpose
-//! `N = [b x n; n]`, a column per leg, takes leg forces to the wrench on the platform about C:
-//! `W = N Gamma`. The paper orders legs 6..1, this project 1..6.
+//! `J^-1` has the rows `[(b_i x n_i)^T  n_i^T]`, so `L' = J^-1 [omega; v]`. Its transpose `N = [b x n; n]`,
+//! one column per leg, takes leg forces to the wrench on the platform about C: `W = N Gamma`. The paper
+//! orders legs 6..1, this project 1..6.
 
 use fearless_simd::dispatch;
 use nalgebra::Matrix6;
@@ -13,8 +13,8 @@ use super::inverse_geometry::LegGeometry;
 use super::machine::Machine;
 use super::rigid::{Pose, Twist};
 
-/// Matrix N, 6 x 6: column i is the wrench on the platform of a unit force in leg i, torque rows first \[m\],
-/// force rows below \[1\].
+/// Matrix N, 6 x 6. Column i is the wrench on the platform of a unit force in leg i: torque rows first \[m\],
+/// then force rows \[1\].
 ///
 /// ```
 /// use hexad::model::{inverse_jacobian::{leg_wrenches, twist_from_rates}, rigid::Twist};
@@ -32,15 +32,15 @@ pub fn leg_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     })
 }
 
-/// 2-norm condition number of N, torques about the mean of the joints on the platform and in units of the
-/// characteristic length, so that metres and radians compare and nothing depends on where C is. Infinite at a
-/// singular pose. Not for the loop: it computes singular values.
+/// Condition number of N in the 2-norm. Torques are taken about the mean of the joints on the platform and in
+/// units of the characteristic length, so that metres and radians are comparable and the choice of C has no
+/// effect. Infinite at a singular pose. Not for the loop: it computes singular values.
 pub fn condition(machine: &Machine, pose: &Pose) -> f64 {
     let singular_values = scaled_wrenches(machine, pose).singular_values();
     singular_values.max() / singular_values.min()
 }
 
-/// The matrix whose condition is [`condition`]: N with torques about the mean of the joints over the radius.
+/// N with torques about the mean of the joints, divided by the radius: the matrix of [`condition`].
 pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     let mut scaled = dispatch!(machine.level, simd => {
         let legs = LegGeometry::around_center(simd, &machine.joints, pose);
@@ -50,9 +50,9 @@ pub fn scaled_wrenches(machine: &Machine, pose: &Pose) -> Matrix6<f64> {
     scaled
 }
 
-/// The twist that gives the measured leg rates: solves `J^-1 [omega; v] = L'`.
+/// Twist of the platform for measured leg rates: solves `J^-1 [omega; v] = L'`.
 ///
-/// `None` at a singular pose. Errors of the rates are amplified by the condition of the pose.
+/// `None` at a singular pose. The condition of the pose amplifies errors of the rates.
 pub fn twist_from_rates(machine: &Machine, pose: &Pose, rates: &[f64; LEGS]) -> Option<Twist> {
     let rates = machine.joints.triples.pack(rates);
     dispatch!(machine.level, simd => {

@@ -1,7 +1,8 @@
-//! The platform at one pose with its legs and the factorization of `N`, computed once.
+//! Kinematic state of the platform: a pose with its legs and the factorization of `N`, computed once.
 //!
-//! Forward kinematics ends with a kinematic state; twist, condition and determinant then need no second factorization.
-//! Legs have their arms from the mean of the joints on the platform, so that nothing depends on the choice of C.
+//! Forward kinematics ends with a kinematic state, so twist, condition and determinant need no second
+//! factorization. The arms of the legs start at the mean of the joints on the platform, so that nothing
+//! depends on the choice of C.
 
 use fearless_simd::{Simd, dispatch};
 
@@ -66,7 +67,7 @@ impl StoredLegs {
 }
 
 impl KinematicState {
-    /// The kinematic state at a pose.
+    /// Computes the kinematic state at a pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
         let joints = &machine.joints;
         dispatch!(machine.level, simd => {
@@ -81,7 +82,7 @@ impl KinematicState {
         })
     }
 
-    /// The pose.
+    /// Pose of the platform.
     pub fn pose(&self) -> &Pose {
         &self.pose
     }
@@ -96,7 +97,7 @@ impl KinematicState {
         &self.sensitivity
     }
 
-    /// The twist that gives the measured leg rates, see [`super::inverse_jacobian::twist_from_rates`].
+    /// Twist of the platform for measured leg rates, see [`super::inverse_jacobian::twist_from_rates`].
     pub fn twist(&self, machine: &Machine, rates: &[f64; LEGS]) -> Option<Twist> {
         let joints = &machine.joints;
         let rates = joints.triples.pack(rates);

@@ -1,13 +1,14 @@
-//! Six legs as the lanes of one SIMD vector, laid out as [`super::triples`] says.
+//! Lanes: six legs in one SIMD vector, in the layout of [`super::triples`].
 //!
-//! This is today's form of the paper's parallel algorithm: one processor per leg becomes one lane per leg. Within a
-//! triple, determinants and inverses of 3 x 3 matrices are cross products of rotated lanes, the base of
-//! `super::factorization`. Everything is generic over the instruction set and inlined into the one function that was
-//! dispatched for it.
+//! This is the present form of the paper's parallel algorithm: one lane per leg instead of one processor per
+//! leg. Within a triple, determinants and inverses of 3 x 3 matrices are cross products of rotated lanes, as
+//! `super::factorization` uses them. All code is generic over the instruction set and is inlined into the
+//! function dispatched for it.
 //!
-//! Double precision only. Lanes of f32 were measured (exact model, ns for one evaluation, f32 against f64): 68.8 against
-//! 66.6 on one processor with AVX-512; 60.7 against 73.4 with AVX2 and 90.9 against 142 with SSE2 on another. That is no
-//! gain on every instruction set, for errors of 4e-7 of the largest force instead of 1e-15.
+//! Double precision only. f32 lanes were measured (2026-11-21, exact model, ns per evaluation, f32 against
+//! f64): 68.8 against 66.6 on one processor with AVX-512; 60.7 against 73.4 with AVX2 and 90.9 against 142
+//! with SSE2 on another. f32 is not faster on every instruction set, and its errors are 4e-7 of the largest
+//! force instead of 1e-15.
 
 use core::ops::{Add, Mul, Neg, Sub};
 
@@ -15,13 +16,13 @@ use fearless_simd::{Simd, f64x4, f64x8, prelude::*};
 
 use super::fused;
 
-/// Arithmetic on all lanes of a vector, whatever their number.
+/// Arithmetic on all lanes of a vector of any width.
 pub(super) trait LaneArithmetic:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// `self a + b`, rounded once but on SSE4.2, see `super::fused`.
+    /// `self a + b`, rounded once except on SSE4.2, see `super::fused`.
     fn fused_mul_add(self, a: Self, b: Self) -> Self;
-    /// `self a - b`, rounded once but on SSE4.2, see `super::fused`.
+    /// `self a - b`, rounded once except on SSE4.2, see `super::fused`.
     fn fused_mul_sub(self, a: Self, b: Self) -> Self;
 }
 
@@ -50,21 +51,21 @@ macro_rules! lane_arithmetic {
 
 lane_arithmetic!(f64x8, f64x4);
 
-/// One triple of legs in four lanes, the last of which is padding.
+/// One triple of legs in four lanes; the last lane is padding.
 pub(super) trait Triple: Sized {
-    /// In each lane, the next leg of the triple: `[1 2 0 -]`.
+    /// Next leg of the triple, in each lane: `[1 2 0 -]`.
     fn next(self) -> Self;
-    /// In each lane, the previous leg of the triple: `[2 0 1 -]`.
+    /// Previous leg of the triple, in each lane: `[2 0 1 -]`.
     fn previous(self) -> Self;
-    /// The sum of all four lanes, in all lanes.
+    /// Sum of all four lanes, in all lanes.
     fn total(self) -> Self;
-    /// One leg's number in all lanes.
+    /// Value of one leg, in all lanes.
     fn broadcast<const LEG: usize>(self) -> Self;
-    /// Three vectors, one for each i over the lanes j, to one for each j over the lanes i.
+    /// Transpose: rows i over the lanes j become rows j over the lanes i.
     fn transposed(rows: [Self; 3]) -> [Self; 3];
-    /// The numbers of the three legs.
+    /// Values of the three legs.
     fn legs(self) -> [f64; 3];
-    /// The number in the first lane.
+    /// Value in the first lane.
     fn first(self) -> f64;
 }
 
@@ -122,7 +123,7 @@ impl<S: Simd> Triple for f64x4<S> {
     }
 }
 
-/// The least of the numbers of the six legs.
+/// Smallest value of the six legs.
 #[inline(always)]
 pub(super) fn least_of_legs<S: Simd>(lanes: f64x8<S>) -> f64 {
     let (first, second) = lanes.split();

@@ -1,4 +1,4 @@
-//! One 3-vector per lane: the vector algebra of the legs.
+//! Vector algebra of the legs: one 3-vector per lane.
 
 use core::ops::{Add, Mul, Sub};
 
@@ -17,13 +17,13 @@ pub(super) struct Lanes3<V> {
 }
 
 impl<V: LaneArithmetic> Lanes3<V> {
-    /// `self . b`
+    /// Dot product `self . b`.
     #[inline(always)]
     pub fn dot(self, b: Self) -> V {
         self.x.fused_mul_add(b.x, self.y.fused_mul_add(b.y, self.z * b.z))
     }
 
-    /// `self x b`
+    /// Cross product `self x b`.
     #[inline(always)]
     pub fn cross(self, b: Self) -> Self {
         Self {
@@ -33,7 +33,7 @@ impl<V: LaneArithmetic> Lanes3<V> {
         }
     }
 
-    /// `self + s b`
+    /// Sum `self + s b`.
     #[inline(always)]
     pub fn plus_scaled(self, s: V, b: Self) -> Self {
         Self {
@@ -43,13 +43,13 @@ impl<V: LaneArithmetic> Lanes3<V> {
         }
     }
 
-    /// `self - s b`
+    /// Difference `self - s b`.
     #[inline(always)]
     pub fn minus_scaled(self, s: V, b: Self) -> Self {
         self.plus_scaled(-s, b)
     }
 
-    /// `m self`, the same matrix in all lanes.
+    /// Product `m self`, with the same matrix in all lanes.
     #[inline(always)]
     pub fn transformed<S: Simd>(self, simd: S, m: &Matrix3<f64>) -> Self
     where
@@ -61,14 +61,14 @@ impl<V: LaneArithmetic> Lanes3<V> {
             .plus_scaled(self.x, column(m.m11, m.m21, m.m31))
     }
 
-    /// Turned by Cayley's rotation of `2 u`: `v + k (u x v + u x (u x v))`, `k = 2 / (1 + u.u)`.
+    /// Vector rotated by Cayley's rotation of `2 u`: `v + k (u x v + u x (u x v))`, `k = 2 / (1 + u.u)`.
     #[inline(always)]
     pub fn turned(self, u: Self, k: V) -> Self {
         let once = u.cross(self);
         self.plus_scaled(k, once + u.cross(once))
     }
 
-    /// The same vector in all lanes.
+    /// Same vector in all lanes.
     #[inline(always)]
     pub fn splat<S: Simd>(simd: S, v: &Vector3<f64>) -> Self
     where
@@ -79,26 +79,26 @@ impl<V: LaneArithmetic> Lanes3<V> {
 }
 
 impl<S: Simd> Lanes3<f64x8<S>> {
-    /// From memory, one vector per leg.
+    /// Loads one vector per leg.
     #[inline(always)]
     pub fn load(simd: S, [x, y, z]: &[LegLanes; 3]) -> Self {
         Self { x: x.load(simd), y: y.load(simd), z: z.load(simd) }
     }
 
-    /// To memory.
+    /// Stores one vector per leg.
     #[inline(always)]
     pub fn store(self) -> [LegLanes; 3] {
         [self.x.into(), self.y.into(), self.z.into()]
     }
 
-    /// The two triples.
+    /// Splits into the two triples.
     #[inline(always)]
     pub fn split(self) -> (Lanes3<f64x4<S>>, Lanes3<f64x4<S>>) {
         let ((x0, x1), (y0, y1), (z0, z1)) = (self.x.split(), self.y.split(), self.z.split());
         (Lanes3 { x: x0, y: y0, z: z0 }, Lanes3 { x: x1, y: y1, z: z1 })
     }
 
-    /// Four lanes with the same sum.
+    /// Sum of the two triples, lane by lane.
     #[inline(always)]
     pub fn folded(self) -> Lanes3<f64x4<S>> {
         let (first, second) = self.split();
@@ -107,19 +107,19 @@ impl<S: Simd> Lanes3<f64x8<S>> {
 }
 
 impl<S: Simd> Lanes3<f64x4<S>> {
-    /// The next leg's vector in each lane.
+    /// Vector of the next leg, in each lane.
     #[inline(always)]
     pub fn next(self) -> Self {
         Self { x: self.x.next(), y: self.y.next(), z: self.z.next() }
     }
 
-    /// The previous leg's vector in each lane.
+    /// Vector of the previous leg, in each lane.
     #[inline(always)]
     pub fn previous(self) -> Self {
         Self { x: self.x.previous(), y: self.y.previous(), z: self.z.previous() }
     }
 
-    /// Each leg's vector in all lanes.
+    /// Vector of each leg, in all lanes.
     #[inline(always)]
     pub fn broadcasts(self) -> [Self; 3] {
         let ([x0, x1, x2], [y0, y1, y2], [z0, z1, z2]) =
@@ -127,19 +127,19 @@ impl<S: Simd> Lanes3<f64x4<S>> {
         [Self { x: x0, y: y0, z: z0 }, Self { x: x1, y: y1, z: z1 }, Self { x: x2, y: y2, z: z2 }]
     }
 
-    /// The sum of all four lanes, in all lanes.
+    /// Sum of all four lanes, in all lanes.
     #[inline(always)]
     pub fn total(self) -> Self {
         Self { x: self.x.total(), y: self.y.total(), z: self.z.total() }
     }
 
-    /// The same four lanes for both triples.
+    /// Copies the four lanes to both triples.
     #[inline(always)]
     pub fn doubled(self) -> Lanes3<f64x8<S>> {
         Lanes3 { x: self.x.combine(self.x), y: self.y.combine(self.y), z: self.z.combine(self.z) }
     }
 
-    /// The vector in the first lane.
+    /// Vector in the first lane.
     #[inline(always)]
     pub fn first(self) -> Vector3<f64> {
         Vector3::new(self.x.first(), self.y.first(), self.z.first())
@@ -153,7 +153,7 @@ impl<S: Simd> Lanes3<f64x4<S>> {
     }
 }
 
-/// Each leg's number in all lanes.
+/// Value of each leg, in all lanes.
 #[inline(always)]
 pub(super) fn broadcasts<S: Simd>(v: f64x4<S>) -> [f64x4<S>; 3] {
     [v.broadcast::<0>(), v.broadcast::<1>(), v.broadcast::<2>()]

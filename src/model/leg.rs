@@ -1,9 +1,9 @@
-//! One leg as a serial robot (paper, eq. 13-33, 53, 73-87), all six alike.
+//! Leg as a serial robot (paper, eq. 13-33, 53, 73-87); all six legs are alike.
 //!
-//! The paper writes the leg's dynamics in joint coordinates, `D_i = M_i Qdd_i + C_i + G_i` (87), and takes
-//! them to the platform by `J_Bv^-T`. The closed vector form below is the same force without the joint
-//! angles: the moment balance of the leg about A gives the part of F across the leg, the force balance of
-//! the rod the part along it.
+//! The paper writes the dynamics of a leg in joint coordinates, `D_i = M_i Qdd_i + C_i + G_i` (87), and
+//! transforms them to the platform by `J_Bv^-T`. The vector form below is the same force without joint
+//! angles. The moment balance of the leg about A gives the transverse part of F, and the force balance of the
+//! rod gives the axial part.
 //!
 //! ```text
 //! r   = L - e2                         Jt = m1 e1^2 + m2 r^2 + It1 + It2
@@ -11,15 +11,15 @@
 //! F   = (Q - (Q.n) n) / L  +  m2 (L'' - r |n'|^2 - g.n) n
 //! ```
 //!
-//! F is what the platform exerts on the leg at B, without the actuator's force. Written in the acceleration
-//! `aB` of the joint, with `proj(w) = w - (w.n) n`, and using `proj(n'') = (proj(aB) - 2 L' n') / L`:
+//! F is the force of the platform on the leg at B, without the actuator force. In terms of the joint
+//! acceleration `aB`, with `proj(w) = w - (w.n) n` and `proj(n'') = (proj(aB) - 2 L' n') / L`:
 //!
 //! ```text
 //! transverse = proj(j aB - mu g) + 2 L' (m2 r / L - j) n' + spin / L       j = Jt / L^2,  mu = (m1 e1 + m2 r) / L
 //! axial      = m2 (aB.n + e2 |n'|^2 - g.n)
 //! ```
 //!
-//! Spin: the universal joint, with first axis u, forces an angular velocity wx about n on the leg.
+//! Spin: the universal joint, with first axis u, imposes an angular velocity wx about n on the leg.
 //!
 //! ```text
 //! k  = u x n    un = u.n    un' = u.n'    yy = k.k    p = n'.k    p' = n''.k = (aB.k - 2 L' p) / L
@@ -27,9 +27,9 @@
 //! spin = (Ix1 + Ix2) ( wx n' x n + (un / yy) wx' k )
 //! ```
 //!
-//! The paper leaves the spin out: (74)-(82) give the leg no angular velocity about n. That is exact only
-//! for legs without axial inertia; the effect is 1e-5 to 1e-2 of the force, larger near `u || n`, where
-//! the spin itself is singular; `MIN_UNIVERSAL_SINE_SQUARED` keeps the arithmetic finite there.
+//! The paper neglects the spin: (74)-(82) give the leg no angular velocity about n. This is exact only for
+//! legs without axial inertia. The effect is 1e-5 to 1e-2 of the force. It is larger near `u || n`, where the
+//! spin is singular; `MIN_UNIVERSAL_SINE_SQUARED` keeps the arithmetic finite there.
 
 use fearless_simd::{Simd, f64x8, prelude::*};
 
@@ -41,30 +41,31 @@ use super::lanes3::Lanes3;
 use super::machine::Machine;
 use super::triples::{LegLanes, Triples};
 
-/// Smallest `|u x n|^2` that divides: a leg within 1e-6 rad of its universal joint's first axis.
+/// Smallest `|u x n|^2` used as a divisor: a leg within 1e-6 rad of the first axis of its universal joint.
 pub(super) const MIN_UNIVERSAL_SINE_SQUARED: f64 = 1e-12;
 
-/// The constants of the legs as lanes.
+/// Constants of the legs, in lanes.
 ///
-/// The lanes of padding, which the six legs leave free, carry the platform's mass as one more point with a
-/// force `m (aB - g)`: its arm is the centre of mass, `j` and `mu` come out as m, and `legs_only` keeps it
-/// from being projected. See [`super::platform`].
+/// The platform's mass is one more point, in the first lane of padding, with the force `m (aB - g)`. Its arm
+/// is the centre of mass, `j` and `mu` equal m, and `legs_only` excludes it from the projection. See
+/// [`super::platform`].
 #[derive(Clone, Debug)]
 pub(super) struct LegConstants {
-    /// `Jt = jt[0] L^2 + jt[1] L + jt[2]`: the transverse inertias are quadratic in L as well.
+    /// Coefficients of `Jt = jt[0] L^2 + jt[1] L + jt[2]`; the transverse inertias are quadratic in L as
+    /// well.
     jt: [LegLanes; 3],
-    /// m2, and `m1 e1 - m2 e2`.
+    /// m2 \[kg\], and `m1 e1 - m2 e2` \[kg m\].
     rod_mass: LegLanes,
     first_moment: LegLanes,
-    /// `m2 e2`
+    /// `m2 e2` \[kg m\].
     rod_moment: LegLanes,
-    /// `Ix1 + Ix2`
+    /// `Ix1 + Ix2` \[kg m^2\].
     axial_inertia: LegLanes,
     /// 1 for legs, 0 for padding.
     legs_only: LegLanes,
-    /// Mass of the leg that is concentrated at B in the lumped model; the platform's mass in its padding.
+    /// Mass of a leg at B in the lumped model; the platform's mass in the padding.
     lumped_mass: LegLanes,
-    /// The padding alone.
+    /// The platform's mass in the padding, 0 for legs.
     platform_mass: LegLanes,
 }
 
@@ -99,24 +100,24 @@ impl LegConstants {
     }
 }
 
-/// The mass at B that, with the rest at A, has the mass and the centre of mass of a leg of its length at
-/// home: `(m1 e1 + m2 (L - e2)) / L`.
+/// Mass at B in the lumped model: `(m1 e1 + m2 (L - e2)) / L`, with the mean leg length at home. With the
+/// rest of the leg's mass at A, it has the mass and the centre of mass of the leg.
 fn lumped_mass(machine: &Machine) -> f64 {
     let (cylinder, rod) = (&machine.cylinder, &machine.rod);
     let length = leg_lengths(machine, &machine.home_pose()).iter().sum::<f64>() / LEGS as f64;
     (cylinder.mass * cylinder.center_of_mass + rod.mass * (length - rod.center_of_mass)) / length
 }
 
-/// Force F of the platform on each leg \[N\], base axes, in two parts.
+/// Force F of the platform on each leg \[N\], base axes, split in two parts.
 pub(super) struct LegReaction<S: Simd> {
-    /// Normal to the leg.
+    /// Part normal to the leg.
     pub transverse: Lanes3<f64x8<S>>,
-    /// Along n.
+    /// Part along n.
     pub axial: f64x8<S>,
 }
 
 impl<S: Simd> LegReaction<S> {
-    /// `joint_acceleration` is aB.
+    /// Evaluates the force; `joint_acceleration` is aB.
     #[inline(always)]
     pub fn new<M: ModelTerms>(
         simd: S,
@@ -129,7 +130,7 @@ impl<S: Simd> LegReaction<S> {
         let load = |lanes: &LegLanes| lanes.load(simd);
         let gravity = Lanes3::splat(simd, &machine.gravity);
         if M::LEGS != LegInertia::Links {
-            // Points at B, the platform's among them: nothing is projected.
+            // Points at B, including the platform's point: no projection.
             let mass =
                 if M::LEGS == LegInertia::Lumped { &constants.lumped_mass } else { &constants.platform_mass };
             return Self {
@@ -154,7 +155,7 @@ impl<S: Simd> LegReaction<S> {
             let ix_over_l = load(&constants.axial_inertia) * inverse_length;
             transverse = spin(simd, machine, legs, velocity, joint_acceleration, ix_over_l, transverse);
         }
-        // n' and the spin are normal to n already: projecting them too costs nothing.
+        // n' and the spin are already normal to n: projecting them as well costs nothing.
         transverse = transverse.minus_scaled(transverse.dot(n) * load(&constants.legs_only), n);
         let mut axial = m2 * (joint_acceleration - gravity).dot(n);
         if M::VELOCITY {
@@ -164,7 +165,7 @@ impl<S: Simd> LegReaction<S> {
     }
 }
 
-/// `sum + Ix / L ( wx n' x n + (un / yy) wx' k )`
+/// Returns `sum + Ix / L ( wx n' x n + (un / yy) wx' k )`.
 #[inline(always)]
 fn spin<S: Simd>(
     simd: S,

@@ -1,33 +1,35 @@
-//! Six linear equations by LU with partial pivoting, and the norm of an inverse by Gauss-Jordan elimination.
+//! Solver for six linear equations by LU with partial pivoting, and norm of an inverse by Gauss-Jordan
+//! elimination.
 //!
 //! ```text
-//! step k: the row with the largest |a_kk| goes first; below, a_ij -= (a_ik / a_kk) a_kj
-//! LU:     the right-hand side carried along; then x_k = b_k / a_kk, and above b_i -= a_ik x_k,   last to first
-//! G.-J.:  also above, and column k becomes that of the inverse: a_kk <- 1, row k / a_kk; a_ik <- 0, minus a_ik row k
+//! step k: the row with the largest |a_kk| moves to the top; below, a_ij -= (a_ik / a_kk) a_kj
+//! LU:     the right-hand side takes part; then x_k = b_k / a_kk, and above b_i -= a_ik x_k,   last to first
+//! G.-J.:  also above; column k becomes the inverse's: a_kk <- 1, row k / a_kk; a_ik <- 0, minus a_ik row k
 //! ```
 //!
-//! In the end Gauss-Jordan leaves `A^-1` with its columns in the order of the pivots, which no norm sees.
+//! Gauss-Jordan leaves `A^-1` with its columns in pivot order, which does not affect the norm.
 //!
-//! A row is changed as a whole in each step of an elimination, in lanes, also the columns that are done: without a branch that is
-//! faster. Nothing is found by an index that could be out of range, and so nothing could panic. That is why it is not nalgebra's.
-//! The instruction set changes the time, not one bit of a result.
+//! Each step changes whole rows in lanes, finished columns included, because this is faster than a branch. No
+//! index can be out of range, so the code cannot panic; this is why nalgebra's LU is not used. The
+//! instruction set changes the time, but no bit of a result.
 
 use fearless_simd::{Level, Simd, dispatch, f64x4, prelude::*};
 
 use super::LEGS;
 
-/// Numbers in a vector of lanes.
+/// Values per vector.
 const LANES: usize = 4;
 
-/// A row in memory: its coefficients, its right-hand side, and a zero.
+/// Row in memory: coefficients, right-hand side, and a zero.
 type Row = [[f64; LANES]; 2];
 
-/// x of `A x = b`; `None` if a pivot is zero. A is given by rows.
+/// Solution x of `A x = b`; `None` if a pivot is zero. A is given by rows.
 pub(super) fn solve(level: Level, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<[f64; LEGS]> {
     dispatch!(level, simd => solved(simd, a, b))
 }
 
-/// `|W A^-1|^2` (Frobenius) with the diagonal W of the weights; `None` if a pivot is zero. A is given by rows.
+/// Frobenius norm `|W A^-1|^2`, with W the diagonal matrix of the weights; `None` if a pivot is zero. A is
+/// given by rows.
 pub(super) fn inverse_norm_squared(
     level: Level,
     a: &[[f64; LEGS]; LEGS],
@@ -39,7 +41,7 @@ pub(super) fn inverse_norm_squared(
 #[inline(always)]
 fn solved<S: Simd>(simd: S, a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> Option<[f64; LEGS]> {
     let mut rows = rows_of(a, b);
-    // Each column is a constant of its own code, so that every place in the rows is known.
+    // Each column has its own code with a constant index, so that all positions in the rows are known.
     eliminate::<_, 0>(simd, &mut rows)?;
     eliminate::<_, 1>(simd, &mut rows)?;
     eliminate::<_, 2>(simd, &mut rows)?;
@@ -84,22 +86,22 @@ fn rows_of(a: &[[f64; LEGS]; LEGS], b: &[f64; LEGS]) -> [Row; LEGS] {
     rows
 }
 
-/// The row with the largest number in a column goes first, of those from the column's own on. Returns the others above and below, and
-/// that row.
+/// Moves the row with the largest value in a column to the top of the remaining rows. Returns the rows above,
+/// that row, and the rows below.
 #[inline(always)]
 fn pivoted<const COLUMN: usize>(rows: &mut [Row; LEGS]) -> Option<(&mut [Row], &mut Row, &mut [Row])> {
     let (above, rest) = rows.split_at_mut(COLUMN);
     let (top, below) = rest.split_first_mut()?;
     for row in below.iter_mut() {
         if number::<COLUMN>(row).abs() > number::<COLUMN>(top).abs() {
-            // Vector by vector: of a whole row it would be a call.
+            // Vector by vector, because swapping a whole row would be a function call.
             row.iter_mut().zip(top.iter_mut()).for_each(|(a, b)| core::mem::swap(a, b));
         }
     }
     (number::<COLUMN>(top) != 0.0).then_some((above, top, below))
 }
 
-/// Clears a column below its row, up to rounding: it is not read again.
+/// Clears a column below its pivot row, up to rounding: the column is not read again.
 #[inline(always)]
 fn eliminate<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> Option<()> {
     let (_, top, below) = pivoted::<COLUMN>(rows)?;
@@ -110,7 +112,7 @@ fn eliminate<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> O
     Some(())
 }
 
-/// Exchanges a column of the matrix for one of its inverse.
+/// Exchanges a column of the matrix for a column of its inverse.
 #[inline(always)]
 fn exchange<S: Simd, const COLUMN: usize>(simd: S, rows: &mut [Row; LEGS]) -> Option<()> {
     let (above, top, below) = pivoted::<COLUMN>(rows)?;
@@ -129,7 +131,7 @@ fn exchange_row<S: Simd, const COLUMN: usize>(simd: S, row: &mut Row, top: &Row)
     subtract(simd, row, factor, top);
 }
 
-/// The unknown of a column, in place of the right-hand side of its row, and out of those above.
+/// Computes one unknown in place of its right-hand side, and removes it from the rows above.
 #[inline(always)]
 fn substitute<const COLUMN: usize>(rows: &[Row; LEGS], x: &mut [f64; LEGS]) -> Option<()> {
     let (rows_above, [row, ..]) = rows.split_at(COLUMN) else { return None };
@@ -143,7 +145,7 @@ fn substitute<const COLUMN: usize>(rows: &[Row; LEGS], x: &mut [f64; LEGS]) -> O
     Some(())
 }
 
-/// `row /= divisor`
+/// Computes `row /= divisor`.
 #[inline(always)]
 fn divide<S: Simd>(simd: S, row: &mut Row, divisor: f64) {
     for vector in row {
@@ -151,7 +153,7 @@ fn divide<S: Simd>(simd: S, row: &mut Row, divisor: f64) {
     }
 }
 
-/// `row -= factor other`
+/// Computes `row -= factor other`.
 #[inline(always)]
 fn subtract<S: Simd>(simd: S, row: &mut Row, factor: f64, other: &Row) {
     for (vector, other) in row.iter_mut().zip(other) {
@@ -165,7 +167,8 @@ fn number<const COLUMN: usize>(row: &Row) -> f64 {
     row.as_flattened().get(COLUMN).copied().unwrap_or_default()
 }
 
-/// Puts a number into a column, with the vector that holds it: one of which a part was just written is read late.
+/// Writes one value by writing its whole lane vector. Writing only the element and reading the vector back
+/// would stall.
 #[inline(always)]
 fn change_column<S: Simd, const COLUMN: usize>(simd: S, row: &mut Row, number: f64) {
     let numbers = core::array::from_fn(|lane| if lane == COLUMN % LANES { number } else { 0.0 });
@@ -187,7 +190,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
-        /// Against nalgebra's, also where a zero stands in the place of a pivot; and a matrix without an inverse has none.
+        /// Compares with nalgebra, also with zeros on the diagonal. A singular matrix gives `None`.
         #[test]
         fn solutions_and_norms_of_inverses_are_right(
             numbers in uniform6(uniform6(-1.0..1.0_f64)),

@@ -1,9 +1,10 @@
-//! The machine: every constant the equations need, validated once and immutable afterwards.
+//! Machine: all constants of the equations, validated once and immutable afterwards.
 //!
-//! Notation of the paper's section 2 in brackets. Legs are stored as lanes ([`LegLanes`]): one array per
-//! coordinate, so that all six are evaluated by the same instructions.
+//! Symbols of the paper's section 2 stand beside the fields. Legs are stored as lanes ([`LegLanes`]): one
+//! array per coordinate, so that the same instructions evaluate all six.
 //!
-//! This file neither reads nor validates values; `config::machine` does, and reports key, value and bound.
+//! This file neither reads nor validates values; `config::machine` does both and reports key, value and
+//! bound.
 
 use fearless_simd::Level;
 #[cfg(not(feature = "client"))]
@@ -27,7 +28,7 @@ use super::triples::{LegLanes, Triples};
 pub struct Machine {
     /// Acceleration of gravity in base axes, g \[m/s^2\].
     pub gravity: Vector3<f64>,
-    /// All that moves with the end effector, payload included.
+    /// Everything that moves with the end effector, payload included.
     pub platform: Platform,
     /// Joint centres and universal-joint axes.
     pub joints: Joints,
@@ -39,14 +40,15 @@ pub struct Machine {
     pub actuator: Actuator,
     /// Task coordinates X of the home pose: Bryan angles \[rad\], position \[m\].
     pub home: [f64; 6],
-    /// The instruction set the lanes run on; detected once. See [`at_most_256_bits`].
+    /// Instruction set of the lanes, detected once. See [`at_most_256_bits`].
     pub level: Level,
 }
 
-/// The instruction set to use on a CPU that has `level`: no lanes beyond 256 bits.
+/// Instruction set to use on a CPU with `level`: lanes of at most 256 bits.
 ///
-/// Measured: 512-bit lanes take as long in throughput and an eighth longer for one evaluation alone. The 3 x 3 half of the work has no use for them, and while they are at work
-/// the second port for narrower vectors is shut.
+/// Measured (2026-11-20): 512-bit lanes have the same throughput, and one evaluation alone takes an eighth
+/// longer. The 3 x 3 half of the computation cannot use them, and they block the second port for narrower
+/// vectors.
 pub fn at_most_256_bits(level: Level) -> Level {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(avx2) = level.as_avx2() {
@@ -55,10 +57,10 @@ pub fn at_most_256_bits(level: Level) -> Level {
     level
 }
 
-/// The mobile platform as a rigid body, in platform axes.
+/// Mobile platform as a rigid body, in platform axes.
 #[derive(Clone, Debug)]
 pub struct Platform {
-    /// \[kg\]
+    /// Mass \[kg\].
     pub mass: f64,
     /// CG, from the platform origin C to the centre of mass \[m\].
     pub center_of_mass: Vector3<f64>,
@@ -66,10 +68,10 @@ pub struct Platform {
     pub inertia: Matrix3<f64>,
 }
 
-/// Joint centres as lanes.
+/// Joint centres in lanes.
 #[derive(Clone, Debug)]
 pub struct Joints {
-    /// Which leg is in which lane.
+    /// Assignment of the legs to lanes.
     pub triples: Triples,
     /// `A_i`, joint centres on the base, in base axes \[m\].
     pub base: [LegLanes; 3],
@@ -77,31 +79,31 @@ pub struct Joints {
     pub platform: [LegLanes; 3],
     /// `u_i`, first axis of the universal joint, fixed in the base, unit length.
     pub universal_axis: [LegLanes; 3],
-    /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. Turns
-    /// radians into metres wherever a tolerance must not depend on the size of the machine.
+    /// Characteristic length: root mean square distance of the `B_i` from their mean \[m\]. It converts
+    /// radians to metres where a tolerance must not depend on the size of the machine.
     pub radius: f64,
-    /// Its cube, and the inverse of it with the sign of the order of the lanes.
+    /// Cube of the radius \[m^3\], and its inverse with the parity of the lane order as sign.
     pub(super) radius_cubed: f64,
     pub(super) inverse_radius_cubed: f64,
-    /// Mean of the `B_i`, from C, in platform axes \[m\]: the point that does not depend on the choice of C.
+    /// Mean of the `B_i`, from C, in platform axes \[m\]. This point does not depend on the choice of C.
     pub(super) center: Vector3<f64>,
     /// The `B_i` from their mean, in platform axes \[m\].
     pub(super) around_center: [LegLanes; 3],
-    /// The length `a` of that arm as a share of the radius, and `(1 + a^2) radius`: see `super::kinematic_state`.
+    /// Length `a` of that arm relative to the radius, and `(1 + a^2) radius`: see `super::sensitivity`.
     pub(super) arm_share: LegLanes,
     pub(super) arm_curvature: LegLanes,
 }
 
 impl Machine {
-    /// Home as a pose.
+    /// Home pose.
     pub fn home_pose(&self) -> Pose {
         TaskState::at_rest(self.home).motion().pose
     }
 }
 
 impl Joints {
-    /// Packs six legs into lanes, in the order that suits them at the home pose, and derives the
-    /// characteristic length.
+    /// Packs six legs into lanes and derives the characteristic length. The lane order is the best one at the
+    /// home pose.
     pub fn new(
         base: &[Vector3<f64>; LEGS],
         platform: &[Vector3<f64>; LEGS],
@@ -132,7 +134,8 @@ impl Joints {
         }
     }
 
-    /// Distance of two poses: norm of the rotation \[rad\] and of the shift of the mean of the joints \[radius\].
+    /// Distance of two poses: norm of the rotation \[rad\] and of the shift of the mean of the joints
+    /// \[radius\].
     pub fn distance(&self, a: &Pose, b: &Pose) -> f64 {
         let turn = a.displacement_to(b).angular;
         let center = |pose: &Pose| pose.position + pose.rotation * self.center;
@@ -140,14 +143,14 @@ impl Joints {
         (turn.norm_squared() + shift.norm_squared()).sqrt()
     }
 
-    /// The twist at C of a twist at the mean of the joints on the platform.
+    /// Converts a twist at the mean of the joints on the platform to a twist at C.
     pub(super) fn twist_of_origin(&self, twist: &Twist, rotation: &Matrix3<f64>) -> Twist {
         let arm = rotation * self.center;
         Twist { angular: twist.angular, linear: twist.linear - twist.angular.cross(&arm) }
     }
 
-    /// The same joints with a point of the platform (from C, in platform axes) in the first lane of
-    /// padding. The leg that ends there begins where no platform ever is.
+    /// The same joints, with a point of the platform (from C, in platform axes) in the first lane of padding.
+    /// The leg in that lane begins far outside any platform.
     pub(super) fn with_point(&self, point: &Vector3<f64>) -> Self {
         let mut joints = self.clone();
         for (lane, value) in joints.platform.iter_mut().zip(point.iter()) {
@@ -162,7 +165,7 @@ impl Joints {
 /// One link of a leg: a body of revolution about the leg's axis.
 #[derive(Clone, Debug)]
 pub struct Link {
-    /// \[kg\]
+    /// Mass \[kg\].
     pub mass: f64,
     /// Distance of the centre of mass from the link's own joint \[m\]: cylinder, `e1`, from `A_i`
     /// toward `B_i`; rod, `e2`, from `B_i` back toward `A_i`.
@@ -175,19 +178,19 @@ pub struct Link {
 
 /// Transverse inertia `constant + quadratic (L - reference_length)^2`, L the length of the leg.
 ///
-/// With `quadratic != 0` (the paper's Table 1) the body is not rigid. The instantaneous value enters
-/// Newton-Euler, as in the paper; `dI/dt` terms are left out, so power does not balance exactly.
+/// With `quadratic != 0` (the paper's Table 1) the body is not rigid. Newton-Euler uses the instantaneous
+/// value, as in the paper. `dI/dt` terms are left out, so power does not balance exactly.
 #[derive(Clone, Debug)]
 pub struct TransverseInertia {
-    /// \[kg m^2\]
+    /// Constant part \[kg m^2\].
     pub constant: f64,
-    /// \[kg\]
+    /// Quadratic coefficient \[kg\].
     pub quadratic: f64,
-    /// \[m\]
+    /// Reference length of the leg \[m\].
     pub reference_length: f64,
 }
 
-/// The prismatic joint and its drive.
+/// Prismatic joint and its drive.
 #[derive(Clone, Debug)]
 pub struct Actuator {
     /// Shortest leg \[m\].
@@ -200,17 +203,18 @@ pub struct Actuator {
     pub max_force: f64,
     /// Inertia of motor and screw, seen along the leg \[kg\].
     pub reflected_mass: f64,
-    /// \[N s/m\]
+    /// Viscous friction \[N s/m\].
     pub viscous_friction: f64,
-    /// \[N\]
+    /// Coulomb friction \[N\].
     pub coulomb_friction: f64,
-    /// Speed above which the Coulomb force has its full value \[m/s\]; below it is proportional.
+    /// Speed above which the Coulomb force has its full value \[m/s\]; below it the force is proportional to
+    /// speed.
     pub coulomb_smoothing: f64,
 }
 
 impl Actuator {
-    /// The `coulomb_smoothing` of a controller: sign(L') is exact above 0.1 mm/s, slow enough for a
-    /// telescope's legs, and one count of a usual encoder at 1 kHz does not make the force chatter.
+    /// Value of `coulomb_smoothing` for controllers. sign(L') is exact above 0.1 mm/s, which is slow enough
+    /// for the legs of a telescope. One count of a usual encoder at 1 kHz does not make the force chatter.
     pub const COULOMB_SMOOTHING_M_S: f64 = 1e-4;
 
     /// Length of the stroke \[m\].
@@ -218,12 +222,12 @@ impl Actuator {
         self.max_length - self.min_length
     }
 
-    /// Whether a leg of this length is within the stroke; false for NaN.
+    /// Whether a leg length is within the stroke; false for NaN.
     pub fn contains(&self, length: f64) -> bool {
         (self.min_length..=self.max_length).contains(&length)
     }
 
-    /// Distance of a leg's length from the nearer end of the stroke \[m\]; negative outside of it.
+    /// Distance of a leg length from the nearer end of the stroke \[m\]; negative outside the stroke.
     ///
     /// ```
     /// # let actuator = hexad::config::Config::load("config/tsai2000.toml".as_ref()).unwrap().machine.actuator;

@@ -5,17 +5,17 @@
 //! x^T M x / 2 = kinetic energy of platform, legs and drives at the twist x
 //! ```
 //!
-//! In the paper's terms, M is the platform's matrix plus `sum_i [b_i~ ; U] J_Bv^-T M_i J_Bv^-1 [b_i~ ; U]^T`
-//! of the legs (73), (88)-(97). It is not assembled from those: column k is the load of unit acceleration k
-//! at rest without gravity, by the same code that the controller runs, so the two cannot disagree, and
-//! nothing cancels.
+//! In the paper's notation, M is the platform's matrix plus
+//! `sum_i [b_i~ ; U] J_Bv^-T M_i J_Bv^-1 [b_i~ ; U]^T` of the legs (73), (88)-(97). It is not assembled from
+//! these matrices: column k is the load of unit acceleration k at rest without gravity, computed by the code
+//! of the controller. The two therefore cannot disagree, and nothing cancels.
 //!
-//! Angular parts first, about C, in base axes: the blocks are \[kg m^2\], \[kg m\] and \[kg\]. M is symmetric
-//! to rounding and positive definite at every pose with legs of positive length, singular ones included
-//! (N is not inverted), as long as the platform has mass and inertia. Reflected masses are part of it:
+//! Angular parts come first, about C, in base axes; the blocks are \[kg m^2\], \[kg m\] and \[kg\]. M is
+//! symmetric to rounding. If the platform has mass and inertia, M is positive definite at every pose with
+//! legs of positive length, even a singular pose, because N is not inverted. M includes the reflected masses:
 //! `N diag(reflected) N^T`.
 //!
-//! What it does not do: links whose inertia varies with the length have their instantaneous value.
+//! Limitation: links whose inertia varies with the length enter with their instantaneous value.
 //!
 //! Cost: six evaluations of the load, most of the time of the simulated platform. Forces need no mass matrix.
 
@@ -38,18 +38,18 @@ use super::rigid::{Acceleration, Motion, Pose, Twist};
 /// ```
 #[derive(Clone, Debug)]
 pub struct MassMatrix {
-    /// The machine without gravity.
+    /// Inverse dynamics of the machine without gravity.
     weightless: InverseDynamics,
 }
 
 impl MassMatrix {
-    /// Derives the constants.
+    /// Computes the constants.
     pub fn new(machine: &Machine) -> Self {
         let weightless = Machine { gravity: Vector3::zeros(), ..machine.clone() };
         Self { weightless: InverseDynamics::new(&weightless) }
     }
 
-    /// M, 6 x 6, drives included.
+    /// Mass matrix M at a pose, 6 x 6, drives included.
     pub fn at(&self, pose: &Pose) -> Matrix6<f64> {
         let mut mass = Matrix6::zeros();
         for (k, mut column) in mass.column_iter_mut().enumerate() {
@@ -64,8 +64,8 @@ impl MassMatrix {
         mass
     }
 
-    /// `N^T M^-1 N` \[1/kg\], how each leg accelerates under a unit force in each; `None` if M is not positive
-    /// definite (a pose that is not one).
+    /// Mobility of the legs `N^T M^-1 N` \[1/kg\]: acceleration of each leg under a unit force in each leg.
+    /// `None` if M is not positive definite, which means that `pose` is invalid.
     pub fn leg_mobility(&self, pose: &Pose) -> Option<Matrix6<f64>> {
         let n = leg_wrenches(self.weightless.machine(), pose);
         let mass: Cholesky<f64, U6> = Cholesky::new(self.at(pose))?;

@@ -1,8 +1,8 @@
-//! Mathematics of the machine. No allocation, no I/O, no clock, no panic.
+//! Mathematics of the machine: geometry, kinematics, dynamics. No allocation, no I/O, no clock, no panic.
 //!
 //! The source is Fried, Djouani, Borojeni and Iqbal, "An Inverse Dynamic Model of the Gough-Stewart
-//! Platform", WSEAS Transactions on Systems 7(2), 2008, 88-98; "the paper" everywhere below. Where its
-//! printed equations disagree with each other, the file that implements them says so.
+//! Platform", WSEAS Transactions on Systems 7(2), 2008, 88-98; "the paper" everywhere below. If its printed
+//! equations contradict each other, the file that implements them says so.
 //!
 //! | paper | file |
 //! | --- | --- |
@@ -12,26 +12,27 @@
 //! | (13)-(33), (53), (73)-(87), one leg as a serial robot | [`leg`] |
 //! | (88)-(93), mobile platform | [`platform`] |
 //! | (94)-(97), active forces | [`active_forces`] |
-//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], [`triples`], `conditioning`, `lanes`, `lanes3`, `factorization`, `lu` |
+//! | not in the paper | [`forward_kinematics`], [`mass_matrix`], [`regressor`], [`fidelity`], [`rigid`], [`sensitivity`], [`kinematic_state`], [`machine`], |
+//! | | [`triples`], `conditioning`, `factorization`, `fused`, `lanes`, `lanes3`, `lu` |
 //!
 //! # Errata of the print
 //!
-//! Size: largest error of a force as a share of the largest force of its row, on the states of `tests/data`.
-//! `tests/paper` evaluates the paper's dense matrices, measures each of these, and lists the parts of the print that are
-//! not legible.
+//! Size: largest error of a force, relative to the largest force of its row, on the states of `tests/data`.
+//! `tests/paper` evaluates the paper's dense matrices, measures each error, and lists the illegible parts of
+//! the print.
 //!
-//! | | equation | printed | right | size |
+//! | | equation | printed | correct | size |
 //! | --- | --- | --- | --- | --- |
 //! | 1 | (25), (27), (39) | `v_B = R_b [L', L gamma', -L beta']` with Euler rates | `-L beta' cos(gamma)` | fried2008 4e-2, tsai2000 4e-1 |
 //! | 2 | (43), (45), last term | units do not fit | `+ R_b L'~ L~ R_b^T / L^2` on the leg's angular velocity | fried2008 2e-2 for L instead of L^2 |
 //! | 3 | (74)-(82), H_1 | legs do not spin | they do, [`leg`] | scattered 1e-2, motion_base 1e-3, fried2008 1e-4 |
-//! | 4 | (88), (93) | g with the other sign than (74)-(81) | `v' - g` everywhere | fried2008 1.2 |
+//! | 4 | (88), (93) | g with the sign opposite to (74)-(81) | `v' - g` everywhere | fried2008 1.2 |
 //! | 5 | (90), (91) | inertia about the centre of mass, moments about C | parallel-axis term, [`platform`] | motion_base 1e-1 |
 //! | 6 | (92) | sign of the centrifugal term | `+ m omega x (omega x CG)` | motion_base 7e-2 |
-//! | 7 | Table 1 | a link whose inertia varies with L, as if rigid | `dI/dt omega`, `-1/2 dI/dL omega^2` too | fried2008 7e-3; kept as printed |
+//! | 7 | Table 1 | an inertia that varies with L, as if rigid | `dI/dt omega`, `-1/2 dI/dL omega^2` too | fried2008 7e-3; kept as printed |
 //!
-//! Frames: base axes unless a name says otherwise. `rotation` is R, platform axes expressed in base axes,
-//! so `v_base = R v_platform`. Units: SI, radians. Twists and wrenches have the angular part first and
+//! Frames: base axes unless a name states another frame. `rotation` is R, platform axes expressed in base
+//! axes, so `v_base = R v_platform`. Units: SI, radians. Twists and wrenches have the angular part first and
 //! refer to the platform origin C.
 
 pub mod active_forces;

@@ -1,19 +1,19 @@
-//! Mobile platform (paper, eq. 88-93): the wrench its own motion needs.
+//! Mobile platform (paper, eq. 88-93): wrench that its own motion requires.
 //!
 //! ```text
 //! S = omega'~ + omega~ omega~          acceleration of a point r of the platform: v' + S r
 //! f = m (v' + S c - g)                 c = R CG
-//! torque about C = c x f + sum_k p_k x S p_k                              then force: the paper's order
+//! torque about C = c x f + sum_k p_k x S p_k                              torque first, as in the paper
 //! ```
 //!
-//! The `p_k` are the principal axes of the mass distribution about its centre, in base axes, so long that
-//! `sum_k p_k p_k^T = integral of r r^T dm`; the sum is `I omega' + omega x I omega` with
-//! `I = sum_k (|p_k|^2 - p_k p_k^T)`. In this form the platform is made of points, which the lanes that
-//! evaluate the legs evaluate as well: the centre of mass is the point in their padding (see
-//! `super::leg::LegConstants`), the three axes are one triple of lanes of their own.
+//! The `p_k` are the principal axes of the mass distribution about its centre, in base axes, scaled so that
+//! `sum_k p_k p_k^T = integral of r r^T dm`. The sum is `I omega' + omega x I omega` with
+//! `I = sum_k (|p_k|^2 - p_k p_k^T)`. In this form the platform consists of points, which the lanes of the
+//! legs can evaluate too. The centre of mass is the point in the legs' padding (see
+//! `super::leg::LegConstants`); the three axes are one more triple of lanes.
 //!
-//! Against the print: (88), (93) have g with the sign opposite to (74)-(81); (90), (91) put an inertia
-//! about the centre of mass beside moments about C, without the parallel-axis term, which here is `c x f`.
+//! Difference from the print: (88), (93) have g with the sign opposite to (74)-(81). (90), (91) combine an
+//! inertia about the centre of mass with moments about C and lack the parallel-axis term, here `c x f`.
 
 use fearless_simd::{Simd, SimdBase, f64x4};
 #[cfg(not(feature = "client"))]
@@ -24,7 +24,7 @@ use super::lanes3::Lanes3;
 use super::machine::Machine;
 use super::rigid::{Acceleration, Twist};
 
-/// The `p_k` in platform axes: x, y, z over the lanes k.
+/// Principal axes `p_k` in platform axes: x, y, z over the lanes k.
 #[derive(Clone, Debug)]
 pub(super) struct PrincipalAxes([[f64; 4]; 3]);
 
@@ -33,14 +33,14 @@ impl PrincipalAxes {
         let inertia = &machine.platform.inertia;
         let distribution = Matrix3::identity() * (0.5 * inertia.trace()) - inertia;
         let SymmetricEigen { eigenvectors, eigenvalues } = distribution.symmetric_eigen();
-        // A flat plate has one eigenvalue of zero, or just below by rounding.
+        // A flat plate has one eigenvalue of zero, or slightly below by rounding.
         let axes = eigenvectors * Matrix3::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
         let row = |x: &Vector3<f64>| [x.x, x.y, x.z, 0.0];
         let rows = axes.transpose();
         Self([row(&rows.column(0).into()), row(&rows.column(1).into()), row(&rows.column(2).into())])
     }
 
-    /// `p_k x S p_k`, k in lanes; their sum is the torque of the rotation.
+    /// `p_k x S p_k` with k in lanes; the sum of the lanes is the torque of the rotation.
     #[inline(always)]
     pub fn torques<S: Simd>(
         &self,
@@ -54,7 +54,7 @@ impl PrincipalAxes {
     }
 }
 
-/// S, which takes a point of the platform (from C, in base axes) to its acceleration relative to C.
+/// Matrix S, which takes a point of the platform (from C, in base axes) to its acceleration relative to C.
 #[inline(always)]
 pub(super) fn acceleration_map(twist: &Twist, acceleration: &Acceleration) -> Matrix3<f64> {
     let (w, a) = (&twist.angular, &acceleration.angular);

@@ -1,8 +1,8 @@
-//! Regressor form of the inverse dynamics: `Gamma = Y(motion) p`, linear in masses, first moments,
-//! inertias and friction. For identification and adaptation, off the loop.
+//! Regressor form of the inverse dynamics: `Gamma = Y(motion) p`, linear in masses, first moments, inertias
+//! and friction. For identification and adaptation outside the loop.
 //!
-//! Geometry, gravity, the reference lengths of the inertias and the smoothing of sign(L') are given; the
-//! rest of the machine is the vector p. Column k of Y is the force that parameter k alone would need:
+//! Geometry, gravity, the reference lengths of the inertias and the smoothing of sign(L') are given; all
+//! other constants of the machine form the vector p. Column k of Y is the force of a unit of parameter k:
 //!
 //! ```text
 //! mass of the platform      [ 0 ; v' - g ]
@@ -20,22 +20,21 @@
 //! Y = N^-1 (these wrenches)      and for the drives   L'', L', sign(L')   in the row of the leg
 //! ```
 //!
-//! This is the expansion of [`super::leg`] and [`super::platform`] in powers of the parameters: both are
-//! linear once J1 and J2 are taken about the joints and the platform's inertia about C, where the
-//! parallel-axis terms are parameters of their own. It is written out plainly, with n'' and without lanes,
-//! and shares no code with them but the geometry of the legs.
+//! This is the expansion of [`super::leg`] and [`super::platform`] in the parameters. Both are linear if J1
+//! and J2 are taken about the joints and the platform's inertia about C, so that parallel-axis terms are part
+//! of the parameters. The code uses n'' and no lanes, and shares only the geometry of the legs with them.
 //!
-//! The mass of the cylinder is no parameter: A does not move, so only `m1 e1` and `J1` act.
+//! The mass of the cylinder is not a parameter: A does not move, so only `m1 e1` and `J1` have an effect.
 //!
-//! Identifiable are at most 19 of the 22 parameters (18 if both links have the same reference length,
-//! where q1 and q2 are alike). No motion distinguishes
+//! At most 19 of the 22 parameters are identifiable (18 if both links have the same reference length, because
+//! q1 and q2 then have the same effect). No motion distinguishes
 //!
-//! - `J1` from `J2` and `Ix1` from `Ix2`: the links turn together; only the sums act;
-//! - `m2` from six points of that mass in the platform at the `B_i`: `m2` can be traded for mass, first
+//! - `J1` from `J2`, and `Ix1` from `Ix2`: the links turn together, so only the sums have an effect;
+//! - `m2` from six points of that mass in the platform at the `B_i`: `m2` can be exchanged for mass, first
 //!   moment and inertia of the platform.
 //!
-//! [`INDISTINGUISHABLE_PAIRS`] and [`rod_mass_null_direction`] name these directions. Slow motions identify less:
-//! without velocity neither spin nor friction, at rest only the first moments.
+//! [`INDISTINGUISHABLE_PAIRS`] and [`rod_mass_null_direction`] contain these directions. Slow motions
+//! identify less: without velocity neither spin nor friction, at rest only the first moments.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -72,13 +71,14 @@ pub const PARAMETER_COUNT: usize = 22;
 /// | 21 | Coulomb friction | N |
 pub type InertialParameters = SVector<f64, PARAMETER_COUNT>;
 
-/// Regressor matrix Y, 6 x 22: a row per leg in the order 1..6, a column per parameter, \[N\] per unit of the parameter.
+/// Regressor matrix Y, 6 x 22: one row per leg in the order 1..6, one column per parameter, \[N\] per unit of
+/// parameter.
 pub type Regressor = SMatrix<f64, 6, PARAMETER_COUNT>;
 
-/// Pairs of parameters whose columns are the same at every motion: J1 and J2, Ix1 and Ix2.
+/// Pairs of parameters whose columns are equal at every motion: J1 and J2, Ix1 and Ix2.
 pub const INDISTINGUISHABLE_PAIRS: [[usize; 2]; 2] = [[11, 16], [12, 17]];
 
-/// The parameters p of a machine.
+/// Parameter vector p of a machine.
 pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
     let (platform, cylinder, rod, actuator) =
         (&machine.platform, &machine.cylinder, &machine.rod, &machine.actuator);
@@ -111,8 +111,8 @@ pub fn inertial_parameters(machine: &Machine) -> InertialParameters {
     ])
 }
 
-/// Direction of p in the null space of Y at every motion: the rods heavier by 1 kg each, with the same `m2 e2` and `J2`,
-/// the platform lighter by points of 1 kg at the `B_i`.
+/// Direction of p in the null space of Y at every motion. Each rod is 1 kg heavier with the same `m2 e2` and
+/// `J2`; the platform is lighter by points of 1 kg at the `B_i`.
 pub fn rod_mass_null_direction(machine: &Machine) -> InertialParameters {
     let mut direction = InertialParameters::zeros();
     for b in machine.joints.triples.unpack_vectors(&machine.joints.platform) {
@@ -135,7 +135,7 @@ pub fn rod_mass_null_direction(machine: &Machine) -> InertialParameters {
     direction + rod_mass
 }
 
-/// The regressor Y at a motion; `None` at a singular pose.
+/// Regressor Y at a motion; `None` at a singular pose.
 ///
 /// ```
 /// # use hexad::{config::Config, model::{active_forces::inverse_dynamics, fidelity::Exact, regressor::*, task::TaskState}};
@@ -146,9 +146,9 @@ pub fn rod_mass_null_direction(machine: &Machine) -> InertialParameters {
 /// assert!((forces - nalgebra::Vector6::from(expected)).amax() < 1e-9 * forces.amax());
 /// ```
 ///
-/// `Y inertial_parameters(machine)` are the forces of [`Exact`](super::fidelity::Exact), to rounding times the
-/// condition of N (LU with partial pivoting, see [`super::inverse_jacobian::condition`]). Of `machine`,
-/// only geometry, gravity, reference lengths and smoothing are read.
+/// `Y inertial_parameters(machine)` equals the forces of [`Exact`](super::fidelity::Exact), up to rounding
+/// times the condition of N (LU with partial pivoting, see [`super::inverse_jacobian::condition`]). The
+/// function uses only geometry, gravity, reference lengths and smoothing of `machine`.
 pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
     let joints = &machine.joints;
     let [platform, axes] =
@@ -183,7 +183,7 @@ pub fn regressor(machine: &Machine, motion: &Motion) -> Option<Regressor> {
     Some(forces)
 }
 
-/// Columns 0..9, as wrenches about C.
+/// Adds columns 0..9, as wrenches about C.
 fn add_platform(wrenches: &mut Regressor, machine: &Machine, motion: &Motion, map: &Matrix3<f64>) {
     let rotation = &motion.pose.rotation;
     let (omega, omega_rate) = (&motion.twist.angular, &motion.acceleration.angular);
@@ -204,7 +204,7 @@ fn add_platform(wrenches: &mut Regressor, machine: &Machine, motion: &Motion, ma
     }
 }
 
-/// The elements xx, yy, zz, xy, xz, yz of a symmetric matrix.
+/// Basis of the symmetric matrices: elements xx, yy, zz, xy, xz, yz.
 const SYMMETRIC_BASIS: [[[f64; 3]; 3]; 6] = [
     [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
     [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]],
@@ -227,14 +227,14 @@ struct LegKinematics {
 }
 
 impl LegKinematics {
-    /// Columns 10..18, as wrenches about C.
+    /// Adds columns 10..18, as wrenches about C.
     fn add(&self, wrenches: &mut Regressor, machine: &Machine, universal_axis: &Vector3<f64>) {
         let Self { arm, n, n_rate, n_accel, length, rate, accel } = self;
         let g = &machine.gravity;
         let turning = n_rate.norm_squared();
         let spin = self.spin(universal_axis);
         let quadratic = |reference: f64| n_accel * (length - reference).powi(2);
-        // Q and the force along n, for each parameter.
+        // Q and the force along n of each parameter.
         let terms = [
             (-g, 0.0),
             (*n_accel, 0.0),
@@ -265,7 +265,7 @@ impl LegKinematics {
     }
 }
 
-/// sign(L'), proportional below the smoothing speed.
+/// sign(L'), proportional to L' below the smoothing speed.
 fn smooth_sign(actuator: &Actuator, rate: f64) -> f64 {
     (rate / actuator.coulomb_smoothing).clamp(-1.0, 1.0)
 }

@@ -1,4 +1,4 @@
-//! Pose, twist, acceleration and wrench of the mobile platform: distinct types for distinct things.
+//! Pose, twist, acceleration and wrench of the mobile platform, each a type of its own.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -75,8 +75,8 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// `dt` seconds later (or earlier) if the acceleration stays as it is. The rotation is about one axis: the
-    /// rotation of the axis itself, `|omega x omega'| dt^3 / 12`, is left out.
+    /// Motion `dt` seconds later (or earlier) under constant acceleration. The rotation is about a fixed
+    /// axis: the rotation of the axis itself, `|omega x omega'| dt^3 / 12`, is left out.
     pub fn after(&self, dt: f64) -> Self {
         let (v, a) = (self.twist.vector(), self.acceleration.vector());
         Self {
@@ -109,10 +109,10 @@ six_numbers!(Acceleration, angular, linear, "`[omega'; v']`");
 six_numbers!(Wrench, torque, force, "`[torque; force]`");
 
 impl Pose {
-    /// The pose after the displacement `[dw; dv]`: `R <- exp(dw~) R`, `C <- C + dv`, both in base axes.
+    /// Pose after the displacement `[dw; dv]`: `R <- exp(dw~) R`, `C <- C + dv`, both in base axes.
     ///
-    /// R is brought back to an orthonormal matrix by one step of Newton's iteration for the polar factor,
-    /// so that millions of displacements in a row do not accumulate rounding.
+    /// One step of Newton's iteration for the polar factor makes R orthonormal again, so that rounding does
+    /// not accumulate over millions of displacements.
     pub fn displaced(&self, displacement: &Twist) -> Self {
         Self {
             rotation: orthonormalized(&(exp(&displacement.angular) * self.rotation)),
@@ -120,7 +120,7 @@ impl Pose {
         }
     }
 
-    /// The same without bringing R back: for a pose from which no further one follows.
+    /// The same pose without making R orthonormal again, for poses that are not displaced further.
     #[inline(always)]
     pub fn extrapolated(&self, displacement: &Twist) -> Self {
         Self {
@@ -129,7 +129,7 @@ impl Pose {
         }
     }
 
-    /// The displacement `[dw; dv]` that leads from `self` to `target`: `dw = log(R_target R^T)`.
+    /// Displacement `[dw; dv]` from `self` to `target`: `dw = log(R_target R^T)`.
     pub fn displacement_to(&self, target: &Self) -> Twist {
         Twist {
             angular: log(&(target.rotation * self.rotation.transpose())),
@@ -138,11 +138,11 @@ impl Pose {
     }
 }
 
-/// Rotation by the rotation vector `w`: Rodrigues' formula, exact for every angle.
+/// Rotation matrix of a rotation vector `w`: Rodrigues' formula, exact for every angle.
 #[inline(always)]
 pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
     let x = w.norm_squared();
-    // Below 0.05 rad the series is exact to rounding, and takes a third of the time.
+    // Below 0.05 rad the series is exact to rounding and takes a third of the time.
     let (a, b) = if x < 2.5e-3 {
         (
             1.0 - x * (1.0 / 6.0 - x * (1.0 / 120.0 - x / 5040.0)),
@@ -174,7 +174,7 @@ pub fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
 ///
 /// Well conditioned below about 3 rad. At pi the axis is determined up to sign.
 pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
-    // twice the sine of the angle, times the axis
+    // Axis times twice the sine of the angle.
     let axial = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12);
     let twice_cos = r.trace() - 1.0;
     let x = 0.25 * axial.norm_squared();
@@ -187,7 +187,7 @@ pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
     if twice_sin > 1e-4 {
         return axial * (angle / twice_sin);
     }
-    // Next to a half turn the axis comes from R + I = 2 a a^T.
+    // Near a half turn the axis comes from R + I = 2 a a^T.
     let symmetric = r + r.transpose() + Matrix3::identity() * 2.0;
     let column = symmetric.column(symmetric.diagonal().imax());
     let axis = Vector3::from(column) / column.norm().max(f64::MIN_POSITIVE);

@@ -1,12 +1,12 @@
-//! Sensitivity of a pose, from its factorization: condition, determinant, and the step for which Newton's method is
-//! proved to converge.
+//! Sensitivity of a pose, from its factorization: condition, determinant, and trusted step, for which
+//! Newton's method is proved to converge.
 //!
 //! ```text
 //! condition = |N| |N^-1|      determinant = det N / radius^3      trusted_step = h / (|K| |N^-1|),  h = 0.4
 //! ```
 //!
-//! Frobenius norms, torques about the mean of the joints and divided by the radius. Valid at every pose; at a singular one
-//! the condition is not finite and the trusted step is zero or not a number.
+//! Norms are Frobenius norms; torques are taken about the mean of the joints and divided by the radius. Valid
+//! at every pose. At a singular pose the condition is not finite and the trusted step is zero or NaN.
 
 use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
@@ -19,39 +19,44 @@ use super::lanes::{LaneArithmetic as _, Triple};
 use super::lu;
 use super::machine::Joints;
 
-/// Largest Frobenius norm of N, the root of 12, as no moment exceeds its arm: six directions, and six arms whose mean square is 1.
+/// Largest Frobenius norm of N: the root of 12, from six directions and six arms whose mean square is 1. No
+/// moment exceeds its arm.
 pub(crate) const MAX_WRENCH_NORM: f64 = 3.464_101_615_137_755;
 
-/// Meaning of the condition, for people.
+/// Explanation of the condition in reports.
 pub const CONDITION_MEANING: &str = "6 is best; errors and forces grow with it";
 
-/// Sensitivity of a pose to errors of leg lengths, torques and angles measured at the radius. All without units.
+/// Sensitivity of a pose to errors of the leg lengths. All values are dimensionless: torques and angles refer
+/// to the radius.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sensitivity {
-    /// Frobenius condition of N: never below the 2-norm condition and at most six times it, at a singular pose
-    /// not finite.
+    /// Frobenius condition of N: at least the 2-norm condition and at most six times it; not finite at a
+    /// singular pose.
     pub condition: f64,
     /// Frobenius norm of N: between `sqrt 6` and `sqrt 12`.
     pub norm: f64,
-    /// `det N / radius^3`: changes its sign where the platform passes a singular pose.
+    /// `det N / radius^3`; its sign changes where the platform crosses a singular pose.
     pub determinant: f64,
     /// Largest step (radian, or radius) for which Newton's method is proved to find the only pose nearby.
     pub trusted_step: f64,
 }
 
-/// Largest h of a trusted step. Kantorovich's theorem: from a start with `h = B K s <= 1/2` (B norm of the
-/// inverse Jacobian, K Lipschitz constant of the Jacobian, s size of the first step) Newton's method converges
-/// quadratically to a solution, and within the radius `(1 - sqrt(1 - 2 h)) / (B K)` there is no other. K is
-/// taken at the start; that it grows along the step costs less than the fifth that is left.
+/// Largest h of a trusted step, by Kantorovich's theorem. Let `h = B K s <= 1/2` at the start (B norm of the
+/// inverse Jacobian, K Lipschitz constant of the Jacobian, s size of the first step). Then Newton's method
+/// converges quadratically to a solution, and there is no other solution within the radius
+/// `(1 - sqrt(1 - 2 h)) / (B K)`. K is taken at the start. Its growth along the step costs less than the
+/// fifth of h that is left.
 const MAX_KANTOROVICH_H: f64 = 0.4;
 
 impl Sensitivity {
-    /// Of legs with arms from the mean of the joints, and their factorization.
+    /// Computes the sensitivity from legs with arms from the mean of the joints, and from their
+    /// factorization.
     ///
-    /// Along a step `(dw, dv)` a length L has the second derivative at most `(|dv| + |dw| a)^2 / L + |dw|^2 a`,
-    /// a the length of the arm. With `rho = a / radius` that is a Lipschitz constant
-    /// `K_i radius = (1 + rho^2) radius / L + rho`, and the root of the sum of squares for all six.
+    /// Along a step `(dw, dv)` the second derivative of a length L is at most
+    /// `(|dv| + |dw| a)^2 / L + |dw|^2 a`, a the length of the arm. With `rho = a / radius` this gives a
+    /// Lipschitz constant `K_i radius = (1 + rho^2) radius / L + rho` per leg, and the root of the sum of
+    /// squares for all six.
     #[inline(always)]
     pub(super) fn new<S: Simd>(
         simd: S,
@@ -81,8 +86,8 @@ fn sum_legs<S: Simd>(v: f64x8<S>) -> f64 {
     (first + second).legs().into_iter().sum()
 }
 
-/// Square of the Frobenius norm of `N^-1`, torques divided by the radius: a bound on the leg forces that balance a unit
-/// wrench, in newtons at the radius. Not finite at a singular pose.
+/// Square of the Frobenius norm of `N^-1`, torques divided by the radius. It bounds the leg forces that
+/// balance a unit wrench, in newtons at the radius. Not finite at a singular pose.
 ///
 /// ```text
 /// rows of B: torque t_j = c_j / dS               force p_j = -sum_i (t_j . m_i) a_i / dA
@@ -109,7 +114,7 @@ fn inverse_norm_squared<S: Simd>(factorization: &Factorization<S>, legs: &LegGeo
     (torques * r).fused_mul_add(r, forces).legs().into_iter().sum()
 }
 
-/// The same by elimination with partial pivoting.
+/// The same norm by elimination with partial pivoting.
 #[cold]
 #[inline(never)]
 fn inverse_norm_squared_by_lu(level: Level, n: &Matrix6<f64>, radius: f64) -> f64 {

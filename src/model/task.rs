@@ -1,8 +1,8 @@
-//! Task coordinates `X = [alpha beta gamma x y z]` (paper, eq. 1) and the motion they stand for.
+//! Task coordinates `X = [alpha beta gamma x y z]` (paper, eq. 1) and the motion that they describe.
 //!
-//! `R = Rx(alpha) Ry(beta) Rz(gamma)`; `omega = E(alpha, beta) [alpha' beta' gamma']`. The columns of E
-//! are the three joint axes of the rotation, so E is always defined. Its inverse is not, at
-//! beta = +-90 deg: nothing in the loop needs it, angles are only read at its edges.
+//! `R = Rx(alpha) Ry(beta) Rz(gamma)`; `omega = E(alpha, beta) [alpha' beta' gamma']`. The columns of E are
+//! the three joint axes of the rotation, so E is always defined. Its inverse does not exist at beta = +-90
+//! deg, but the cyclic loop never needs it: angles are read only at the edges of the program.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -54,7 +54,7 @@ impl TaskState {
         let [alpha_accel, beta_accel, gamma_accel, ax, ay, az] = self.xdd.into();
         let [(sa, ca), (sb, cb), (sg, cg)] = [alpha, beta, gamma].map(libm::sincos);
         let (sa_sb, ca_sb) = (sa * sb, ca * sb);
-        // Columns of E, and the angular velocity of each.
+        // Columns of E, and the angular velocity of each column.
         let e1 = Vector3::x();
         let e2 = Vector3::new(0.0, ca, sa);
         let e3 = Vector3::new(sb, -sa * cb, ca * cb);
@@ -79,15 +79,15 @@ impl TaskState {
         }
     }
 
-    /// Whether every number is finite.
+    /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
-        // Zero times infinity is not a number: no branch per number.
+        // Zero times infinity or NaN is NaN: one comparison instead of a branch per number.
         (self.x * 0.0 + self.xd * 0.0 + self.xdd * 0.0).sum() == 0.0
     }
 }
 
-/// Task coordinates of a pose. Of the two triples of Bryan angles (and their full turns) that give the
-/// same R, the one nearest to `near`, so that a continuous motion has continuous angles.
+/// Task coordinates of a pose. Two triples of Bryan angles (plus full turns) give the same R; the triple
+/// nearest to `near` is returned, so that a continuous motion has continuous angles.
 ///
 /// ```
 /// use hexad::model::task::{TaskState, task_coordinates};
@@ -96,8 +96,8 @@ impl TaskState {
 /// assert!(back.iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-14));
 /// ```
 ///
-/// Conditioning: alpha and gamma lose `1 / cos(beta)`. At beta = +-90 deg only their sum or difference
-/// is determined; alpha is then taken from `near`.
+/// Conditioning: errors of alpha and gamma grow with `1 / cos(beta)`. At beta = +-90 deg only their sum or
+/// difference is determined; alpha is then taken from `near`.
 pub fn task_coordinates(pose: &Pose, near: &[f64; 6]) -> [f64; 6] {
     let r = &pose.rotation;
     let [near_alpha, near_beta, near_gamma, ..] = *near;

@@ -1,7 +1,8 @@
-//! Which leg is in which lane, and numbers per lane in memory.
+//! Triples: assignment of the legs to lanes, and values per lane in memory.
 //!
-//! Eight lanes hold two triples of legs, each with a lane of padding that repeats the triple's first leg, so
-//! that it never divides by zero; it is never read:
+//! Eight lanes hold two triples of legs. Each triple has a lane of padding, which repeats the first leg of
+//! the triple so that it never divides by zero. [`super::leg`] puts the platform's mass into the first lane
+//! of padding.
 //!
 //! ```text
 //! lane   0    1    2    3       4    5    6    7
@@ -13,27 +14,27 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::LEGS;
 
-/// One number per leg in memory, in the order of the lanes.
+/// One value per leg in memory, in lane order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 #[repr(align(64))]
 pub struct LegLanes(pub [f64; 8]);
 
 impl LegLanes {
-    /// With the first lane of padding set to `value`.
+    /// Copy with the first lane of padding set to `value`.
     pub(super) fn with_padding(&self, value: f64) -> Self {
         let [a, b, c, _, d, e, f, g] = self.0;
         Self([a, b, c, value, d, e, f, g])
     }
 
-    /// From memory.
+    /// Loads the lanes.
     #[inline(always)]
     pub(super) fn load<S: Simd>(&self, simd: S) -> f64x8<S> {
         f64x8::load_array(simd, self.0)
     }
 }
 
-/// To memory.
+/// Stores the lanes.
 impl<S: Simd> From<f64x8<S>> for LegLanes {
     #[inline(always)]
     fn from(lanes: f64x8<S>) -> Self {
@@ -41,15 +42,15 @@ impl<S: Simd> From<f64x8<S>> for LegLanes {
     }
 }
 
-/// Assignment of the six legs to lanes: two triples of legs, the first in lanes 0..2, the second in lanes 4..6.
+/// Assignment of the six legs to lanes: the first triple in lanes 0..2, the second in lanes 4..6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Triples {
-    /// LegLanes of each leg.
+    /// Lane of each leg.
     lanes: [usize; LEGS],
 }
 
 impl Triples {
-    /// The ten ways to split six legs in two, by the partners of the first leg.
+    /// The ten ways to split six legs in two triples, by the partners of the first leg.
     const ALL: [Self; 10] = [
         Self { lanes: [0, 1, 2, 4, 5, 6] },
         Self { lanes: [0, 1, 4, 2, 5, 6] },
@@ -63,7 +64,7 @@ impl Triples {
         Self { lanes: [0, 4, 5, 6, 1, 2] },
     ];
 
-    /// The split whose first triple spans the largest volume, given the directions of the legs.
+    /// Split whose first triple spans the largest volume, for given leg directions.
     pub fn best(directions: &[Vector3<f64>; LEGS]) -> Self {
         let volume = |triples: &Self| {
             let [x, y, z] = triples.pack_vectors(directions).map(|lane| lane.0);
@@ -75,7 +76,7 @@ impl Triples {
         all.max_by(|a, b| volume(a).total_cmp(&volume(b))).unwrap_or(Self::ALL[0])
     }
 
-    /// 1 or -1: whether the order of the lanes is an even permutation of the legs.
+    /// Parity of the lane order as a permutation of the legs: 1 if even, -1 if odd.
     pub(super) fn parity(&self) -> f64 {
         let pairs = self.lanes.iter().enumerate();
         let behind =
@@ -83,7 +84,7 @@ impl Triples {
         if behind.sum::<usize>() % 2 == 0 { 1.0 } else { -1.0 }
     }
 
-    /// One number per leg to lanes.
+    /// Converts one value per leg to lanes.
     #[inline(always)]
     pub fn pack(&self, legs: &[f64; LEGS]) -> LegLanes {
         let mut lane = [0.0; 8];
@@ -96,24 +97,24 @@ impl Triples {
         LegLanes([a, b, c, a, d, e, f, d])
     }
 
-    /// The same number for every leg, another for the first lane of padding, and 0 for the second.
+    /// Same value for all legs, `padding` in the first lane of padding, 0 in the second.
     pub(super) fn uniform(leg: f64, padding: f64) -> LegLanes {
         LegLanes([leg, leg, leg, padding, leg, leg, leg, 0.0])
     }
 
-    /// Lanes to one number per leg.
+    /// Converts lanes to one value per leg.
     #[inline(always)]
     pub fn unpack(&self, lane: &LegLanes) -> [f64; LEGS] {
-        // With the remainder the compiler leaves out the check of the index.
+        // The remainder lets the compiler omit the bounds check.
         self.lanes.map(|index| lane.0.get(index % 8).copied().unwrap_or_default())
     }
 
-    /// Six 3-vectors to three lanes: x, y, z.
+    /// Converts six 3-vectors to three lane arrays: x, y, z.
     pub fn pack_vectors(&self, legs: &[Vector3<f64>; LEGS]) -> [LegLanes; 3] {
         [self.pack(&legs.map(|v| v.x)), self.pack(&legs.map(|v| v.y)), self.pack(&legs.map(|v| v.z))]
     }
 
-    /// Three lanes back to six 3-vectors.
+    /// Converts three lane arrays to six 3-vectors.
     pub fn unpack_vectors(&self, [x, y, z]: &[LegLanes; 3]) -> [Vector3<f64>; LEGS] {
         let (x, y, z) = (self.unpack(x), self.unpack(y), self.unpack(z));
         let mut legs = [Vector3::zeros(); LEGS];

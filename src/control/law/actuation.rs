@@ -1,4 +1,4 @@
-//! Actuation: the forces of a cycle under control, from the reference and the estimated error.
+//! Actuation: forces of one cycle under control, from the reference and the estimated error.
 
 use crate::control::cycle::Cycle;
 use crate::control::law::error_tracker::ErrorTracker;
@@ -8,8 +8,8 @@ use crate::control::law::forces::forces;
 use crate::control::signals::diagnostic::Diagnostic;
 use crate::model::rigid::Motion;
 
-/// Evaluates the law at `begin_ns`, when the forces begin to act, for a desired motion in the middle of their hold. Records
-/// for the estimator what is sent after all limits.
+/// Evaluates the control law. The forces act from `begin_ns` on; `desired` is the reference in the middle of
+/// their hold. The acceleration that remains after all limits is recorded for the estimator.
 #[inline(always)]
 pub(in crate::control) fn actuate(
     cycle: &Cycle<'_>,

@@ -1,7 +1,8 @@
-//! Tracking error of the platform: as measured for the checks, as estimated for feedback.
+//! Tracking error of the platform: measured for the checks, estimated for feedback.
 //!
-//! The error is taken at the instant of the measurement, where both sides are known; the [`estimator`](super::estimator) predicts
-//! it to the instant at which the force acts. Without a new measurement the checks use the prediction.
+//! The error is taken at the instant of the measurement, where reference and platform are known. The
+//! [`estimator`](super::estimator) predicts it to the instant at which the force acts. Without a new
+//! measurement the checks use the prediction.
 
 use nalgebra::Vector6;
 
@@ -22,7 +23,8 @@ use crate::model::inverse_geometry::leg_lengths;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::rigid::{Motion, Pose, Twist};
 
-/// Error of the platform against the setpoint, without control; `None` unless the setpoint is valid and recent.
+/// Error of the platform against the setpoint, while not under control; `None` unless the setpoint is valid
+/// and recent.
 pub(in crate::control) fn setpoint_error(
     cycle: &Cycle<'_>,
     setpoint: &ValidatedSetpoint<'_>,
@@ -41,22 +43,22 @@ pub(in crate::control) struct ErrorTracker {
     sensors: FrozenSensors,
     drives: DriveResponse,
     disturbance: DisturbanceMonitor,
-    /// Force that was sent last \[N\], and the acceleration by feedback.
+    /// Force that was sent last \[N\], and its feedback acceleration.
     sent: [f64; LEGS],
     sent_acceleration: Vector6<f64>,
-    /// Measured; while there is no new measurement, predicted.
+    /// Measured error; without a new measurement, the predicted error.
     error: PoseError,
-    /// Measured minus estimated, after the last measurement has corrected the estimate.
+    /// Measured minus estimated error, after the last measurement has corrected the estimate.
     residual: Vector6<f64>,
-    /// What the last measurement and the prediction disagree in.
+    /// Fault of a sensor or drive at the last measurement, or an implausible innovation.
     sensor_diagnostic: Option<Diagnostic>,
-    /// What has changed on the platform.
+    /// Change of payload, impact or oscillation at the last measurement.
     disturbance_diagnostic: Option<Diagnostic>,
 }
 
 impl ErrorTracker {
-    /// Begins without an error at an instant after a measurement: the reference begins there with the motion that the platform
-    /// has then. Returns the error.
+    /// Starts without an error at an instant after a measurement: the reference starts there with the
+    /// platform's motion. Returns the error.
     pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> PoseError {
         self.estimator.start(&constants.estimator, measured_ns, begin_ns, &ErrorCoordinates::default());
         (self.sensors, self.drives, self.sensor_diagnostic) =
@@ -66,8 +68,8 @@ impl ErrorTracker {
         self.error
     }
 
-    /// Corrects the estimate by a measurement, if it is new. Returns the error, and the twist of the platform: the estimated one
-    /// where the driver sends no rates.
+    /// Corrects the estimate by a measurement, if it is new. Returns the error and the twist of the platform.
+    /// The twist is the estimated one if the driver sends no rates.
     pub fn update(
         &mut self,
         cycle: &Cycle<'_>,
@@ -109,7 +111,7 @@ impl ErrorTracker {
                 .err();
         }
         let mut twist = located.platform.twist;
-        // A measurement from before control began shows another motion.
+        // A measurement from before the start of control shows another motion.
         if located.measurement.rate.is_none() && interval_s >= 0.0 {
             let rate = &estimator.state().rate;
             error.twist = if acts_on_legs {
@@ -130,45 +132,47 @@ impl ErrorTracker {
         (self.error, twist)
     }
 
-    /// What the last measurement and the prediction disagree in, or which sensor is frozen.
+    /// Frozen sensor, implausible innovation or missing drive force at the last measurement.
     pub fn sensor_diagnostic(&self) -> Option<&Diagnostic> {
         self.sensor_diagnostic.as_ref()
     }
 
-    /// Whether a length repeats itself: its sensor may be frozen.
+    /// Whether a measured length repeats, so that its sensor may be frozen.
     pub fn may_be_frozen(&self) -> bool {
         self.sensors.repeat()
     }
 
-    /// What has changed on the platform, or that it oscillates.
+    /// Change of payload, impact or oscillation at the last measurement.
     pub fn disturbance_diagnostic(&self) -> Option<&Diagnostic> {
         self.disturbance_diagnostic.as_ref()
     }
 
-    /// The estimator, after the last measurement.
+    /// Estimator, as of the last measurement.
     pub fn estimator(&self) -> &Estimator {
         &self.estimator
     }
 
-    /// A predicted error with the value that was measured: where the legs are, by which forces act. The estimate follows it
-    /// with a lag, and forces for a pose that lags are a negative stiffness, which grows with the condition.
+    /// Predicted error, corrected by the last residual, because forces act along the true legs. The estimate
+    /// lags behind the legs, and forces for a lagging pose act as a negative stiffness, which grows with the
+    /// condition.
     pub fn corrected_to_last_measurement(&self, predicted: &ErrorEstimate) -> ErrorCoordinates {
         ErrorCoordinates { value: predicted.value + self.residual, rate: predicted.rate }
     }
 
-    /// Records the acceleration by forces that limits take away.
+    /// Records the acceleration that force limits removed.
     pub fn record_missing(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
         self.disturbance.record_missing(&constants.disturbance_bounds, acceleration);
     }
 
-    /// Records the acceleration that feedback sends, after all limits, with the force, and the instant from which on it acts.
+    /// Records force and feedback acceleration that are sent, after all limits, and the instant from which
+    /// they act.
     pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>, force: &[f64; LEGS]) {
         (self.sent, self.sent_acceleration) = (*force, *acceleration);
         self.estimator.record_sent(begin_ns, acceleration);
     }
 }
 
-/// Forces on the legs by an acceleration of feedback, each as if the others stayed as they are.
+/// Leg forces of a feedback acceleration, each as if the other forces were constant.
 fn feedback_forces(constants: &Constants, acceleration: &Vector6<f64>, pose: &Pose) -> [f64; LEGS] {
     let law = &constants.parameters.law;
     let of_legs = match law.mode.acts_on_legs() {
@@ -178,7 +182,8 @@ fn feedback_forces(constants: &Constants, acceleration: &Vector6<f64>, pose: &Po
     law.forces_of_leg_accelerations(&of_legs)
 }
 
-/// Whether each leg is where the prediction has it. Its innovation is `N^T nu`, at most `|nu_p| + r |nu_R|`.
+/// Checks each leg's innovation against its bound. The innovation of a leg is `N^T nu`, at most
+/// `|nu_p| + r |nu_R|`.
 fn check_innovation(
     constants: &Constants,
     innovation: &Vector6<f64>,
@@ -209,7 +214,7 @@ fn check_innovation(
     Err(Diagnostic::new(DiagnosticCode::MeasurementImplausible, largest, bound).at(leg))
 }
 
-/// The measured error against a desired motion: of the pose, and what feedback acts on.
+/// Measured error against a desired motion: pose error, and the errors that feedback acts on.
 fn measured(
     cycle: &Cycle<'_>,
     desired: &Motion,

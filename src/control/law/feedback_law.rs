@@ -1,25 +1,26 @@
-//! The control law: six accelerations from six errors, and the motion they command in each mode.
+//! Control law: six accelerations from six errors, and the motion that each mode commands.
 //!
 //! ```text
-//! a = Kp e + Kd e' + B^-1 d      e, e', d: error, its rate and the disturbance, estimated; B: input matrix, mostly 1
+//! a = Kp e + Kd e' + B^-1 d      e, e', d: estimated error, rate, disturbance; B: input matrix, mostly 1
 //! ```
 //!
 //! | mode | errors | force |
 //! | --- | --- | --- |
-//! | [`ComputedTorque`](ControlMode::ComputedTorque) | of the pose | inverse dynamics at the present pose and twist, with the acceleration `desired + a` |
-//! | [`FeedforwardJointPd`](ControlMode::FeedforwardJointPd) | of the legs | inverse dynamics of the desired motion + `m_i a_i` |
-//! | [`GravityJointPd`](ControlMode::GravityJointPd) | of the legs | weight at the desired pose + `m_i a_i` |
-//! | [`JointPd`](ControlMode::JointPd) | of the legs | `m_i a_i` |
+//! | [`ComputedTorque`](ControlMode::ComputedTorque) | pose | inverse dynamics at the predicted pose and the reference twist, acceleration `desired + a` |
+//! | [`FeedforwardJointPd`](ControlMode::FeedforwardJointPd) | legs | inverse dynamics of the desired motion + `m_i a_i` |
+//! | [`GravityJointPd`](ControlMode::GravityJointPd) | legs | weight at the desired pose + `m_i a_i` |
+//! | [`JointPd`](ControlMode::JointPd) | legs | `m_i a_i` |
 //!
-//! Errors of the pose: `e_p = C_d - C` and `e_R = log(R_d R^T)`, a rotation vector in base axes, never angles.
-//! Errors of the legs: desired lengths and rates, by inverse geometry, minus measured ones. No law on legs
-//! needs forward kinematics, weight included: it is taken at the desired pose, which has no noise. Supervision
-//! (following error, condition, stopping, parking) uses the measured pose in every mode. Legs have no angles:
-//! their gains are those of the position. `m_i`: see [`super::leg_masses`]; d: [`super::estimator`].
+//! Pose errors are `e_p = C_d - C` and `e_R = log(R_d R^T)`, a rotation vector in base axes, never angles.
+//! Leg errors are desired lengths and rates, by inverse geometry, minus measured ones. The laws on legs need
+//! no forward kinematics: they take the weight at the desired pose, which has no noise. Supervision
+//! (following error, condition, stopping, parking) uses the measured pose in every mode. Legs have no angles,
+//! so leg errors use the position gains. `m_i`: see [`super::leg_masses`]; d: see [`super::estimator`].
 //!
-//! The law combines two instants. Feedback acts on the error at the instant at which the force begins; the dynamics are evaluated
-//! in the middle of the hold, at the reference minus the error there. Both errors are predictions of the estimator, from the
-//! instant of the measurement, where both sides are known: quantities of different instants are never subtracted.
+//! The law combines two instants. Feedback acts on the error when the force begins. The dynamics are
+//! evaluated in the middle of the hold, at the reference minus the error there. The estimator predicts both
+//! errors from the instant of the measurement, where reference and platform are known. Quantities of
+//! different instants are never subtracted.
 
 use nalgebra::Vector6;
 
@@ -41,27 +42,28 @@ use crate::model::task::TaskState;
 /// Control law of one deployment: mode and gains.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
-    /// Errors that feedback acts on and terms of the dynamics that are added.
+    /// Control mode: errors that feedback acts on, and terms of the dynamics that are added.
     pub mode: ControlMode,
-    /// Of the position, and of the legs.
+    /// Gains of the position and of the legs.
     pub position: Gains,
     /// Gains of the orientation; not used in modes that act on the legs.
     pub orientation: Gains,
-    /// Whether the estimated disturbance is compensated. If not, a payload unknown to the model needs an error, and the
-    /// platform yields to people as the gains let it.
+    /// Whether the estimated disturbance is compensated. Without compensation a payload that the model lacks
+    /// causes a steady error, and a person can push the platform away as far as the gains permit.
     pub compensates_disturbance: bool,
-    /// Effective mass of each drive, and the loop gains that follow.
+    /// Effective mass of each drive, and the loop gains of the leg modes.
     pub leg_masses: LegMasses,
-    /// Largest disturbance of the estimator: \[rad/s^2\] and \[m/s^2\], or of each leg.
+    /// Largest disturbance that the estimator compensates: \[rad/s^2\] and \[m/s^2\], or \[m/s^2\] of each
+    /// leg.
     pub saturation: Vector6<f64>,
 }
 
-/// Largest disturbance over the acceleration limit: a payload or friction unknown to the model; more than that is a
-/// collision.
+/// Largest disturbance, relative to the acceleration limit: a payload or friction that the model lacks.
+/// A larger disturbance is a collision.
 const SATURATION_RATIO: f64 = 0.5;
 
 impl Law {
-    /// The law of a machine.
+    /// Builds the law of a machine.
     pub fn new(
         machine: &Machine,
         mode: ControlMode,
@@ -75,7 +77,7 @@ impl Law {
         let mut saturation = Vector6::repeat(linear);
         match mode {
             ControlMode::ComputedTorque => saturation.fixed_rows_mut::<3>(0).fill(angular),
-            // Here also the weight is unknown.
+            // The model of this mode lacks the weight as well.
             ControlMode::JointPd => {
                 let home = TaskState::at_rest(machine.home).motion();
                 let weight = InverseDynamics::new(machine).forces::<Gravity>(&home).unwrap_or_default();
@@ -87,8 +89,8 @@ impl Law {
         Self { mode, position, orientation, compensates_disturbance, leg_masses, saturation }
     }
 
-    /// Largest acceleration of a leg that a mode without inertia leaves to feedback: all of the reference's, and the largest
-    /// disturbance.
+    /// Largest acceleration of a leg that a mode without inertia leaves to feedback: the reference's largest
+    /// acceleration plus the largest disturbance.
     pub(in crate::control) fn acceleration_left_to_feedback(
         &self,
         limits: &Limits,
@@ -101,7 +103,7 @@ impl Law {
         limits.position.acceleration + arm * limits.orientation.acceleration + disturbance.amax()
     }
 
-    /// Kp and Kd of every deviation.
+    /// Kp and Kd of the six errors.
     pub(in crate::control) fn gains(&self) -> (Vector6<f64>, Vector6<f64>) {
         let Self { position, orientation, .. } = self;
         let first = if self.mode.acts_on_legs() { position } else { orientation };
@@ -109,7 +111,8 @@ impl Law {
         (all(first.stiffness, position.stiffness), all(first.damping, position.damping))
     }
 
-    /// `Kp e + Kd e' + B^-1 d` of an estimate at the instant at which the force begins.
+    /// Feedback acceleration `Kp e + Kd e' + B^-1 d`, from the estimate at the instant at which the force
+    /// begins.
     pub fn feedback_acceleration(
         &self,
         estimate: &ErrorEstimate,
@@ -123,9 +126,10 @@ impl Law {
         feedback + input_matrix.command(&estimate.disturbance)
     }
 
-    /// The motion whose forces the mode commands. Computed torque: the pose where the platform will be at the instant of `desired`
-    /// with an error, the acceleration with that of feedback, and the twist of the reference, as friction of estimated rates
-    /// would shake a platform at rest. A mode on legs: the desired motion.
+    /// Motion whose forces the mode commands. Computed torque: the predicted pose (reference minus predicted
+    /// error), the reference twist, and reference plus feedback acceleration. The twist is not the estimated
+    /// one, because friction forces of estimated rates would shake a platform at rest. Modes on legs: the
+    /// desired motion.
     pub(in crate::control) fn dynamics_motion(
         &self,
         desired: Motion,
@@ -146,7 +150,7 @@ impl Law {
         }
     }
 
-    /// Forces `m_i a_i` of the drives for accelerations of the legs.
+    /// Drive forces `m_i a_i` for leg accelerations.
     pub fn forces_of_leg_accelerations(&self, acceleration: &Vector6<f64>) -> [f64; LEGS] {
         acceleration.component_mul(&self.leg_masses.mass).into()
     }

@@ -1,12 +1,12 @@
-//! Bound of the total command: the acceleration of the reference and that of feedback.
+//! Bound on the total commanded acceleration: reference plus feedback.
 //!
 //! ```text
-//! computed torque:  |a_d + s a| <= (1 + feedback_scale) A      position and orientation each, largest s in [0, 1]
-//! modes on legs:    |s a_i| <= (1 + feedback_scale) (A + r Ar) + the largest disturbance
+//! computed torque:  |a_d + s a| <= (1 + feedback_scale) A      position, orientation; largest s in [0, 1]
+//! modes on legs:    |s a_i| <= (1 + feedback_scale) (A + r Ar) + largest disturbance of leg i
 //! ```
 //!
-//! The acceleration of feedback keeps its direction. A sensor that fails, a collision or a wrong payload then accelerates
-//! the platform no more than this; saturation that lasts is a fault.
+//! The feedback acceleration keeps its direction. The bound limits how fast a failed sensor, a collision or a
+//! wrong payload can accelerate the platform. Saturation that lasts is a fault.
 
 use nalgebra::{Vector3, Vector6};
 
@@ -18,14 +18,16 @@ use crate::model::rigid::Acceleration;
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 
-/// Longest saturation of feedback \[s\]: a brief impact, or a step at the start of control.
+/// Longest permitted saturation of feedback \[s\]: longer than a brief impact or a step at the start of
+/// control.
 const MAX_SATURATION_S: f64 = 0.1;
 
-/// Speed at which the time of saturation is forgotten, over that at which it counts: feedback that oscillates between its
-/// bounds, as about a sensor that is frozen, is saturated a twentieth of the time at least.
+/// Rate at which saturation time is forgotten, relative to the rate at which it counts. Feedback that
+/// oscillates between its bounds, for example because a sensor is frozen, is saturated at least a twentieth
+/// of the time.
 const FORGETTING_RATIO: f64 = 0.03;
 
-/// Bound of the feedback, and for how long it was reached lately.
+/// Bound on feedback, with the recent time in saturation.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct FeedbackLimiter {
@@ -33,7 +35,7 @@ pub(in crate::control) struct FeedbackLimiter {
 }
 
 impl FeedbackLimiter {
-    /// Whether the total of the time in saturation, as far as it is not forgotten, is within its bound.
+    /// Checks the time in saturation that is not yet forgotten against its bound.
     pub fn check_saturation_time(&self) -> Result<(), Diagnostic> {
         if self.saturated_s <= MAX_SATURATION_S {
             return Ok(());
@@ -41,7 +43,7 @@ impl FeedbackLimiter {
         Err(Diagnostic::new(DiagnosticCode::FeedbackSaturated, self.saturated_s, MAX_SATURATION_S))
     }
 
-    /// Limits the acceleration that feedback adds to that of the reference.
+    /// Limits the feedback acceleration that is added to the reference acceleration.
     pub fn limit(
         &mut self,
         cycle: &Cycle<'_>,
@@ -72,7 +74,7 @@ fn limit_pose(parameters: &Parameters, desired: &Acceleration, wanted: &Vector6<
     .vector()
 }
 
-/// Largest share s in \[0, 1\] with `|desired + s added| <= bound`, if `|desired|` is within the bound.
+/// Largest share s in \[0, 1\] with `|desired + s added| <= bound`, provided that `|desired| <= bound`.
 fn share_within(desired: &Vector3<f64>, added: &Vector3<f64>, bound: f64) -> f64 {
     if (desired + added).norm_squared() <= bound * bound {
         return 1.0;

@@ -1,4 +1,4 @@
-//! Limits of the forces: their magnitude by the actuators, and their rate of change.
+//! Force limits: magnitude and rate of change of the actuator forces.
 
 use nalgebra::Vector6;
 
@@ -11,12 +11,12 @@ use crate::model::fidelity::Gravity;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::rigid::{Motion, Pose, Wrench};
 
-/// Forces of a cycle within their limits.
+/// Forces of one cycle, after the limits.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control) struct LimitedForces {
-    /// \[N\]
+    /// Actuator forces \[N\].
     pub force: [f64; LEGS],
-    /// Wrench of these forces minus that of the commanded ones, about C; zero if they are not limited.
+    /// Wrench of the limited forces minus wrench of the commanded forces, about C; zero if no limit acts.
     pub wrench_error: Wrench,
     pub active_limits: LimitSet,
 }
@@ -25,14 +25,15 @@ pub(in crate::control) struct LimitedForces {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct ForceLimiter {
-    /// Of the last cycle under control.
+    /// Forces of the last cycle under control \[N\].
     last: [f64; LEGS],
-    /// Whether that one was limited.
+    /// Whether a limit changed them.
     is_limited: bool,
 }
 
 impl ForceLimiter {
-    /// Limits the forces for a motion, unless they cannot be computed. The rate is limited from the second cycle under control on.
+    /// Limits the forces of a motion. Fails if the weight cannot be computed.
+    /// The rate is limited from the second cycle under control on.
     pub fn limit(
         &mut self,
         cycle: &Cycle<'_>,
@@ -54,7 +55,7 @@ impl ForceLimiter {
         Ok(())
     }
 
-    /// Limits the change since the last cycle, by the same factor for every leg.
+    /// Limits the change of force since the last cycle. All legs are scaled by one factor.
     fn limit_rate(&self, constants: &Constants, force: &[f64; LEGS]) -> [f64; LEGS] {
         let parameters = &constants.parameters;
         let change = parameters.force_rate * parameters.period_ns as f64 * 1e-9;
@@ -62,15 +63,15 @@ impl ForceLimiter {
     }
 }
 
-// Out of line, as it is rare: the cycle stays short.
+// Rarely called, hence out of line: the cycle stays short.
 #[inline(never)]
 fn wrench_error(constants: &Constants, pose: &Pose, force: &[f64; LEGS], commanded: &[f64; LEGS]) -> Wrench {
     let difference = Vector6::from(*force) - Vector6::from(*commanded);
     Wrench::from_vector(&(leg_wrenches(constants.machine(), pose) * difference))
 }
 
-/// Forces beyond the limit keep the part that carries the weight and reduce all else by the same factor, so that the
-/// rest keeps its direction.
+/// Limits the magnitude. The share of the forces that carries the weight is kept; one factor reduces the
+/// rest, so that the rest keeps its direction.
 fn limit_magnitude(
     constants: &Constants,
     force: &[f64; LEGS],
@@ -84,7 +85,7 @@ fn limit_magnitude(
     Ok(scale_into_bounds(&weight.map(|value| value.max(-limit).min(limit)), force, |_| (-limit, limit)))
 }
 
-/// From `start`, which is within its bounds, as far toward `end` as all bounds allow.
+/// Moves from `start`, which is within its bounds, toward `end` as far as all bounds allow.
 fn scale_into_bounds(
     start: &[f64; LEGS],
     end: &[f64; LEGS],

@@ -1,4 +1,4 @@
-//! Forces of the drives for a commanded motion, by the terms of the dynamics that the control mode has.
+//! Drive forces of a commanded motion, by the terms of the dynamics that the control mode includes.
 
 use crate::control::constants::Constants;
 use crate::control::law::ControlMode;
@@ -10,7 +10,7 @@ use crate::model::rigid::Motion;
 
 use nalgebra::Vector6;
 
-/// Forces \[N\] for the motion that the law commands, and in a mode on legs for the acceleration of the legs.
+/// Forces \[N\] of the motion that the law commands. Modes on legs add the forces of the leg accelerations.
 pub(in crate::control) fn forces(
     constants: &Constants,
     motion: &Motion,

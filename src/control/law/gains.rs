@@ -1,7 +1,7 @@
-//! Gains from bandwidth and damping ratio.
+//! Feedback gains from bandwidth and damping ratio.
 //!
-//! Computed torque turns every axis into a double integrator `e'' = -Kd e' - Kp e`, with `Kp = wn^2`,
-//! `Kd = 2 zeta wn`. The bound that sampling sets to them is in [`crate::analysis::sampled_loop`].
+//! Computed torque makes each axis a double integrator with `e'' = -Kd e' - Kp e`, `Kp = wn^2`,
+//! `Kd = 2 zeta wn`. [`crate::analysis::sampled_loop`] gives the largest gains that sampling permits.
 
 /// Stiffness and damping of second-order error dynamics.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,7 +13,7 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// `Kp = wn^2`, `Kd = 2 zeta wn`, `wn = 2 pi bandwidth`.
+    /// Gains of a bandwidth: `Kp = wn^2`, `Kd = 2 zeta wn`, `wn = 2 pi bandwidth`.
     pub fn new(bandwidth_hz: f64, damping_ratio: f64) -> Self {
         let wn = core::f64::consts::TAU * bandwidth_hz;
         Self { stiffness: wn * wn, damping: 2.0 * damping_ratio * wn }

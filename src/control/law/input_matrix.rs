@@ -1,15 +1,17 @@
-//! Input matrix of the error dynamics at home: how the platform really accelerates where the law commands an acceleration.
+//! Input matrix of the error dynamics at home: true acceleration of the platform for a commanded
+//! acceleration.
 //!
 //! ```text
-//! e'' = d - B a        a: acceleration of the law, in the coordinates of the error
+//! e'' = d - B a        a: acceleration that the law commands, in error coordinates
 //! exact computed torque        B = 1
 //! reduced fidelity             B = M^-1 N G      G: leg forces of the fidelity for unit accelerations
 //! modes on legs                B = N^T M^-1 N diag(m)
 //! ```
 //!
-//! With it the estimator knows that a fidelity without the mass of the legs accelerates the platform too little, and that the
-//! forces of one leg move the others: else both were disturbances as fast as the loop. M and N are those at home; what changes
-//! with the pose the disturbance takes.
+//! Two causes make B differ from 1: a fidelity without leg masses accelerates the platform too little, and
+//! the force of one leg moves the other legs. Without B the estimator would treat both as disturbances that
+//! change as fast as the loop. M and N are taken at home; their change with the pose is part of the
+//! disturbance.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
@@ -34,7 +36,7 @@ pub struct InputMatrix {
 }
 
 impl InputMatrix {
-    /// At home. The identity where the machine has no mass matrix.
+    /// Evaluates the matrix at home. B is the identity if the mass matrix is singular.
     pub fn at_home(machine: &Machine, mode: ControlMode, leg_masses: &LegMasses, fidelity: Fidelity) -> Self {
         let home = machine.home_pose();
         let wrenches = leg_wrenches(machine, &home);
@@ -51,33 +53,33 @@ impl InputMatrix {
         Self { mobility, acts_on_legs, by_command }
     }
 
-    /// The acceleration of the platform for one of the law.
+    /// Acceleration of the platform for an acceleration that the law commands: `B a`.
     pub fn acceleration(&self, commanded: &Vector6<f64>) -> Vector6<f64> {
         self.by_command.map_or(*commanded, |[matrix, _]| matrix * commanded)
     }
 
-    /// Largest disturbance that a law with this bound of its acceleration can compensate, axis by axis.
+    /// Largest disturbance of each axis that a law with this acceleration bound can compensate.
     pub fn largest_compensable(&self, bound: &Vector6<f64>) -> Vector6<f64> {
         self.by_command.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
     }
 
-    /// The acceleration by a wrench beside that of the law, at a pose: the forces that limits took away. Near flat legs a force
-    /// moves the platform far less than at home, so N is that of the pose.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Acceleration by an additional wrench at a pose: the forces that limits removed.
+    /// N is taken at the pose, because near flat legs a force moves the platform far less than at home.
+    // Rarely called, hence out of line: the cycle stays short.
     #[inline(never)]
     pub fn acceleration_of(&self, machine: &Machine, pose: &Pose, wrench: &Wrench) -> Vector6<f64> {
         let acceleration = self.mobility * wrench.vector();
         if self.acts_on_legs { leg_wrenches(machine, pose).tr_mul(&acceleration) } else { acceleration }
     }
 
-    /// Acceleration by a unit force of each leg at a pose, a column for each, in the coordinates of the error.
+    /// Acceleration by a unit force of each leg at a pose, one column per leg, in error coordinates.
     pub fn acceleration_by_force(&self, machine: &Machine, pose: &Pose) -> Matrix6<f64> {
         let wrenches = leg_wrenches(machine, pose);
         let by_force = self.mobility * wrenches;
         if self.acts_on_legs { wrenches.tr_mul(&by_force) } else { by_force }
     }
 
-    /// The wrench about C that a disturbance, in the coordinates of the error, would need at home.
+    /// Matrix that takes a disturbance in error coordinates to the wrench about C that causes it at home.
     pub fn home_wrench_by_disturbance(&self, machine: &Machine) -> Matrix6<f64> {
         let inertia = self.mobility.try_inverse().unwrap_or_default();
         if !self.acts_on_legs {
@@ -87,7 +89,7 @@ impl InputMatrix {
         inertia * of_legs.try_inverse().unwrap_or_default()
     }
 
-    /// The acceleration that the law must command for one of the platform.
+    /// Acceleration that the law must command for an acceleration of the platform: `B^-1 a`.
     pub fn command(&self, acceleration: &Vector6<f64>) -> Vector6<f64> {
         self.by_command.map_or(*acceleration, |[_, inverse]| inverse * acceleration)
     }
@@ -97,7 +99,7 @@ fn with_inverse(matrix: Matrix6<f64>) -> Option<[Matrix6<f64>; 2]> {
     matrix.try_inverse().map(|inverse| [matrix, inverse])
 }
 
-/// Leg forces of a fidelity at home, a column for each unit acceleration; without gravity.
+/// Leg forces of a fidelity at home without gravity, one column per unit acceleration.
 fn unit_forces(machine: &Machine, fidelity: Fidelity) -> Matrix6<f64> {
     let weightless = InverseDynamics::new(&Machine { gravity: Vector3::zeros(), ..machine.clone() });
     let pose = machine.home_pose();

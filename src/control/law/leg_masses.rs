@@ -1,14 +1,14 @@
-//! Masses for control leg by leg.
+//! Effective leg masses, for control of each leg by itself.
 //!
 //! ```text
 //! L'' = P Gamma + ...        P = N^T M^-1 N, the mobility of the legs        m_i = 1 / P_ii
 //! ```
 //!
-//! `m_i` is the mass that drive i accelerates while the forces of the others stay as they are. With forces `-m_i (Kp e_i + Kd e_i')` the
-//! machine has six modes in which the legs move together: the loop gain of each is that of the law times an
-//! eigenvalue of `diag(m) P`. Their mean is 1, so the mean square of the six natural frequencies is the configured
-//! one; the softest and the stiffest show their spread, the cost of control leg by leg on a machine with coupled
-//! legs.
+//! `m_i` is the mass that drive i accelerates while the other forces are constant. Under the forces
+//! `-m_i (Kp e_i + Kd e_i')` the machine has six modes, in which the legs move together. The loop gain of
+//! each mode is the law's loop gain times an eigenvalue of `diag(m) P`. The eigenvalues have the mean 1, so
+//! the mean square of the six natural frequencies is the configured one. The spread from the softest to the
+//! stiffest mode is the cost of controlling each leg by itself on a machine with coupled legs.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -17,26 +17,26 @@ use nalgebra::{Matrix6, Vector6};
 use crate::model::machine::Machine;
 use crate::model::mass_matrix::MassMatrix;
 
-/// Effective mass of each drive at the home pose, and the loop gains of the softest and stiffest mode.
+/// Effective mass of each drive at the home pose, and loop gains of the softest and the stiffest mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LegMasses {
     /// `m_i` \[kg\].
     pub mass: Vector6<f64>,
-    /// Least loop gain of a mode, times that of the law.
+    /// Smallest loop gain of a mode, relative to the law's loop gain.
     pub softest: f64,
-    /// Greatest loop gain of a mode, times that of the law; it decides the stability of the loop.
+    /// Largest loop gain of a mode, relative to the law's loop gain; it decides the stability of the loop.
     pub stiffest: f64,
 }
 
 impl LegMasses {
-    /// At the home pose; NaN if the machine has no mass.
+    /// Evaluates the masses at home; NaN if the machine has no mass.
     pub fn at_home(machine: &Machine) -> Self {
         let home = machine.home_pose();
         let mobility = MassMatrix::new(machine).leg_mobility(&home).unwrap_or(Matrix6::repeat(f64::NAN));
         let mass = mobility.diagonal().map(f64::recip);
         let roots = Matrix6::from_diagonal(&mass.map(f64::sqrt));
         let coupled = roots * mobility * roots;
-        // The iteration for eigenvalues does not end if an element is not finite.
+        // The eigenvalue iteration does not end if an element is not finite.
         if !coupled.iter().all(|element| element.is_finite()) {
             return Self { mass, softest: f64::NAN, stiffest: f64::NAN };
         }

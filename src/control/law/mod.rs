@@ -1,12 +1,12 @@
-//! From the error to six forces.
+//! Control law: from the tracking error to the six actuator forces.
 //!
-//! | what | file |
+//! | stage | file |
 //! | --- | --- |
-//! | error against the reference, its estimate | `error_tracker`, [`estimator`] |
-//! | acceleration by feedback | `feedback_law`, with [`gains`], [`leg_masses`], [`input_matrix`] and `mode` |
+//! | tracking error against the reference, and its estimate | `error_tracker`, [`estimator`] |
+//! | feedback acceleration | `feedback_law`, with [`gains`], [`leg_masses`], [`input_matrix`] and `mode` |
 //! | bound on feedback | `feedback_limiter` |
-//! | forces, and their limits | `forces`, `force_limits` |
-//! | all of it in a cycle | `actuation` |
+//! | forces and their limits | `forces`, `force_limits` |
+//! | sequence of the stages in one cycle | `actuation` |
 
 pub(super) mod actuation;
 pub(super) mod error_tracker;

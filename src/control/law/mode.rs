@@ -1,21 +1,21 @@
-//! Control mode: on which errors feedback acts, and with which terms of the dynamics.
+//! Control mode: the errors that feedback acts on, and the terms of the dynamics that are added.
 
-/// Control mode: on which errors feedback acts, and with which terms of the dynamics.
+/// Control mode: the errors that feedback acts on, and the terms of the dynamics that are added.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ControlMode {
-    /// Inverse dynamics at the measured pose, with feedback on errors of the pose.
+    /// Inverse dynamics at the predicted pose; feedback on pose errors.
     #[default]
     ComputedTorque,
-    /// Inverse dynamics of the desired motion, with feedback on errors of the legs.
+    /// Inverse dynamics of the desired motion; feedback on leg errors.
     FeedforwardJointPd,
-    /// Weight at the desired pose, with feedback on errors of the legs.
+    /// Weight at the desired pose; feedback on leg errors.
     GravityJointPd,
-    /// Feedback on errors of the legs alone, without the dynamics.
+    /// Feedback on leg errors only, no dynamics.
     JointPd,
 }
 
 impl ControlMode {
-    /// Every mode, in descending order of the terms of the model it uses.
+    /// All modes, from the one that uses most terms of the model to the one that uses none.
     pub const ALL: [Self; 4] =
         [Self::ComputedTorque, Self::FeedforwardJointPd, Self::GravityJointPd, Self::JointPd];
 
@@ -29,12 +29,12 @@ impl ControlMode {
         }
     }
 
-    /// Whether its errors are those of the legs.
+    /// Whether feedback acts on leg errors.
     pub fn acts_on_legs(self) -> bool {
         self != Self::ComputedTorque
     }
 
-    /// Whether its forces include those that accelerate the platform along the reference.
+    /// Whether the forces include the inertia forces of the reference motion.
     pub fn includes_inertia(self) -> bool {
         matches!(self, Self::ComputedTorque | Self::FeedforwardJointPd)
     }

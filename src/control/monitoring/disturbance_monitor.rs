@@ -1,23 +1,24 @@
-//! Changes of what acts on the platform: a payload, an impact, an oscillation.
+//! Disturbance monitor: detects a payload change, an impact, an oscillation.
 //!
-//! The estimator compensates a disturbance whatever its cause. Three causes are faults all the same: a payload that comes or goes under
-//! control, a collision, and a loop that is near its limit of stability. With e the estimated error, d the estimated disturbance, M the
-//! inertia and a the acceleration of the reference:
+//! The estimator compensates a disturbance whatever its cause. Three causes are faults nevertheless: a
+//! payload change under control, a collision, and a loop near its limit of stability. With e the estimated
+//! error, d the estimated disturbance, M the inertia and a the acceleration of the reference:
 //!
 //! ```text
 //! payload       m = -(M d).g / (g.g - a.g)                            mass that the model lacks
 //!               | mean of m over 30 ms - mean of m over 1 s | <= bound
-//! impact        | d - mean of d over 150 ms | <= bound                unless the force of one leg explains it
-//!               beyond that for 20 ms it is no impact: a collision that goes on, or several drives without force
-//! oscillation   e turns back by more than a bound, four times in a row, each within a period of the loop
+//! impact        | d - mean of d over 150 ms | <= bound               unless the force of one leg explains it
+//!               above the bound for 20 ms: a lasting collision, or several drives without force
+//! oscillation   e reverses by more than a bound, four times in a row, each within a period of the loop
 //! ```
 //!
-//! The payload that is there when control begins is no fault. After an impact and with another payload the platform is still under
-//! control, and stops. Angles count by the radius of the platform.
+//! A payload that is present when control begins is no fault. After an impact or a payload change the
+//! platform is still under control, and it stops. Angles are weighted by the radius of the platform.
 //!
-//! Where the reference shakes, the error shakes as well, as masses are not known exactly; where `[limits]` allows a sudden
-//! disturbance, that shakes the platform, too. Both parts are allowed. Forces that limits took away are known only as well as the
-//! inertia at home is that of the pose: a payload and an impact are beyond the bound by more than those would accelerate.
+//! Two causes of swings are permitted and widen the bound. If the reference shakes, the error shakes as well,
+//! because masses are not known exactly. A sudden disturbance that `[limits]` permits shakes the platform.
+//! Forces that limits removed are known only as well as the inertia at home approximates the inertia at the
+//! pose. Their acceleration is therefore added to the bounds of payload and impact.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -32,75 +33,78 @@ use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Acceleration, Motion};
 
-/// Time constants of the payload now and of the usual one \[s\].
+/// Time constants of the present and the usual payload \[s\].
 const PAYLOAD_TIME_CONSTANT_S: f64 = 0.03;
 const USUAL_PAYLOAD_TIME_CONSTANT_S: f64 = 1.0;
-/// Time from the start of control in which every payload is usual, and swings decay \[s\].
+/// Time from the start of control in which any payload is usual, and in which swings decay \[s\].
 const START_S: f64 = 1.0;
-/// Default of `limits.payload_change_kg` over the mass of the platform, and over the mass that all drives can lift: friction that
-/// the model lacks looks like a payload.
+/// Default of `limits.payload_change_kg`, relative to the mass of the platform and to the mass that all
+/// drives can lift: friction that the model lacks looks like a payload.
 const PAYLOAD_RATIO: f64 = 0.1;
 const HIDDEN_LIFT_RATIO: f64 = 0.02;
-/// Time constant in which forces that limits took away are forgotten \[s\]: that of the usual payload.
+/// Time constant with which removed forces are forgotten \[s\]: the same as for the usual payload.
 const LIMITED_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
-/// Least weight in a motion over that at rest: a platform that falls has no weight to compare with.
+/// Smallest weight in a motion, relative to the weight at rest: a falling platform has no weight to compare
+/// with.
 const LEAST_WEIGHT_RATIO: f64 = 0.3;
 
-/// Default of `limits.disturbance_step_m_s2` over the limit of acceleration, of which 0.5 is compensated, and over the acceleration by
-/// the least force that a drive is watched for.
+/// Default of `limits.disturbance_step_m_s2`, relative to the acceleration limit, of which 0.5 is
+/// compensated, and relative to the acceleration by the smallest missing force of a drive.
 const IMPACT_RATIO: f64 = 0.4;
 const IMPACT_BY_FRICTION: f64 = 1.5;
 /// Longest impact \[s\].
 const MAX_IMPACT_S: f64 = 0.02;
 
-/// Change of the error from one turn to the next in a loop of 10 Hz \[m\].
+/// Change of the error between two reversals in a loop of 10 Hz \[m\].
 const SWING_M: f64 = 8e-5;
-/// Natural frequency of that loop squared \[1/s^2\], and the largest change for a slower loop \[m\].
+/// Square of the natural frequency of a 10 Hz loop \[1/s^2\], and largest change for a softer loop \[m\].
 const SWING_STIFFNESS: f64 = 3948.0;
 const MAX_SWING_M: f64 = 5e-3;
-/// The same in deviations of a reading.
+/// Change of the error between two reversals, in standard deviations of a reading.
 const SWING_DEVIATIONS: f64 = 10.0;
-/// Swings in a row that are an oscillation.
+/// Number of swings in a row that make an oscillation.
 const SWINGS: u32 = 4;
-/// Least ratio of a swing to the one before: less is the end of a disturbance.
+/// Smallest ratio of a swing to the previous one. A smaller ratio is the end of a disturbance.
 const LEAST_GROWTH: f64 = 0.9;
-/// Swing of the error, times Kp, over the disturbance by friction.
+/// Swing of the error times Kp, relative to the disturbance by friction.
 const SWING_BY_FRICTION: f64 = 0.3;
-/// Swing of the error over the acceleration of a reference that shakes, times Kp: a payload of a fifth and the delay of the drives
-/// make half of it at 7 to 10 Hz. Without inertia in the law the error is that of the reference.
+/// Swing of the error times Kp, relative to the acceleration of a shaking reference. A payload of 20 % and
+/// the delay of the drives cause half of it at 7 to 10 Hz (2026-11-23). Without inertia in the law the
+/// reference itself causes the error.
 const SHAKING_RATIO: f64 = 1.0;
 const SHAKING_RATIO_WITHOUT_INERTIA: f64 = 4.0;
-/// The same over a sudden disturbance that `[limits]` allows: a force that switches at 5 to 10 Hz makes 0.9.
+/// The same ratio for a sudden disturbance that `[limits]` permits. A force that switches at 5 to 10 Hz
+/// causes 0.9 (2026-11-23).
 const SWING_BY_STEP: f64 = 1.5;
-/// Speed at which a shake of the reference is forgotten, over that at which its slow part follows.
+/// Rate at which the reference's shaking is forgotten, relative to the rate at which its slow part follows.
 const FORGETTING_RATIO: f64 = 0.3;
 
-/// Bounds of the disturbance and of the error.
+/// Bounds on the disturbance and on the error.
 #[derive(Clone, Copy, Debug)]
 pub struct DisturbanceBounds {
-    /// Payload for a unit disturbance \[kg / (m/s^2)\].
+    /// Payload per unit disturbance \[kg / (m/s^2)\].
     payload_by_disturbance: Vector6<f64>,
-    /// The largest for a disturbance in any direction.
+    /// Largest payload per unit disturbance in any direction \[kg / (m/s^2)\].
     payload_by_norm: f64,
     /// Gravity over its square \[s^2/m\].
     gravity: Vector3<f64>,
-    /// Of a change of the payload \[kg\].
+    /// Bound on a payload change \[kg\].
     pub payload: f64,
-    /// Of a sudden disturbance \[m/s^2\].
+    /// Bound on a sudden disturbance \[m/s^2\].
     pub impact: f64,
-    /// Of a swing of the error \[m\].
+    /// Bound on a swing of the error \[m\].
     swing: f64,
-    /// Swing that an acceleration of the reference explains \[m / (m/s^2)\].
+    /// Swing of the error per acceleration of the reference \[m / (m/s^2)\].
     swing_by_acceleration: f64,
-    /// Longest time from a turn to the next \[s\].
+    /// Longest time between two reversals \[s\].
     longest_swing_s: f64,
-    /// Radius by which angles count \[m\], squared.
+    /// Square of the radius that weights angles \[m^2\].
     arm_squared: f64,
 }
 
 impl DisturbanceBounds {
-    /// Of a machine. `friction` is the least disturbance that is no friction of one drive \[m/s^2\]; `arm` is the radius by which
-    /// angles count \[m\].
+    /// Bounds of a machine. `friction` is the smallest disturbance that exceeds the friction of one drive
+    /// \[m/s^2\]; `arm` is the radius that weights angles \[m\].
     pub fn new(
         machine: &Machine,
         parameters: &Parameters,
@@ -144,7 +148,7 @@ impl DisturbanceBounds {
     }
 }
 
-/// Memory of the checks.
+/// State of the checks.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct DisturbanceMonitor {
@@ -152,35 +156,35 @@ pub(in crate::control) struct DisturbanceMonitor {
     payload: f64,
     usual_payload: f64,
     impact_s: f64,
-    /// Acceleration by forces that limits took away lately \[m/s^2\].
+    /// Acceleration by forces that limits removed recently \[m/s^2\].
     limited: f64,
     oscillation: Oscillation,
 }
 
-/// Swings of the error.
+/// Swings of the error between reversals.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Oscillation {
-    /// Error at the last turn, and the farthest from there since.
+    /// Error at the last reversal, and the error farthest from it since.
     turn: Vector6<f64>,
     farthest: Vector6<f64>,
     swing_squared: f64,
     last_swing_squared: f64,
     since_turn_s: f64,
     swings: u32,
-    /// Slow part of the acceleration of the reference, and the largest square of the rest lately.
+    /// Slow part of the reference acceleration, and the largest recent square of the rest.
     slow_acceleration: Vector6<f64>,
     shaking_squared: f64,
 }
 
 impl DisturbanceMonitor {
-    /// Records the acceleration by forces that limits took away.
+    /// Records the acceleration by forces that limits removed.
     pub fn record_missing(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
         self.limited = self.limited.max(bounds.norm_squared(acceleration).sqrt());
     }
 
-    /// Checks the estimate after a measurement, `dt` seconds after the last one. `sudden` is the square of the disturbance without its
-    /// mean; zero if the force of one leg explains it.
+    /// Checks the estimate after a measurement, `dt` seconds after the previous one. `sudden_squared` is the
+    /// square of the disturbance without its mean; 0 if the force of one leg explains it.
     pub fn check(
         &mut self,
         bounds: &DisturbanceBounds,
@@ -195,7 +199,7 @@ impl DisturbanceMonitor {
         let impact = self.check_impact(bounds, sudden_squared, dt);
         let oscillation =
             self.oscillation.check(bounds, &estimate.value, &reference.acceleration.vector(), dt);
-        // Control begins with an unknown payload, and rings.
+        // Control begins with an unknown payload, and the error rings.
         let oscillation = if self.since_start_s < START_S { Ok(()) } else { oscillation };
         oscillation?;
         impact?;
@@ -272,8 +276,8 @@ impl Oscillation {
         Ok(())
     }
 
-    /// Begins anew where the error is.
-    // Rare, like `count`: a branch to code elsewhere keeps the cycle short.
+    /// Restarts at the present error.
+    // Rarely called, like `count`: moving it out of the main path keeps the cycle short.
     #[cold]
     #[inline]
     fn restart(&mut self, error: &Vector6<f64>) {
@@ -281,7 +285,7 @@ impl Oscillation {
         (self.since_turn_s, self.swings, self.last_swing_squared) = (0.0, 0, 0.0);
     }
 
-    /// Counts a turn, if the motion of the reference does not explain it.
+    /// Counts a reversal, unless the motion of the reference explains it.
     #[cold]
     #[inline]
     fn count(

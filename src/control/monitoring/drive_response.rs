@@ -1,19 +1,21 @@
-//! Drives that do not respond: forces that are sent and do not act, without any report of the driver.
+//! Drive response: detects forces that are sent but do not act, without a report from the driver.
 //!
-//! The estimated disturbance is the acceleration that the model and the forces do not explain. If the force of one leg stops, it becomes
-//! within milliseconds the acceleration that this force should have made, whatever the platform does:
+//! The estimated disturbance is the acceleration that model and forces do not explain. If the force of one
+//! leg stops, the disturbance becomes, within milliseconds and in any motion, the acceleration that this
+//! force should have caused:
 //!
 //! ```text
 //! B = M^-1 N                       accelerations for unit forces of the legs; in modes on legs N^T M^-1 N
 //! f_i = b_i . d / (b_i . b_i)      force of leg i that explains the disturbance best
-//! cos = b_i . d / (|b_i| |d|)      how well
+//! cos = b_i . d / (|b_i| |d|)      quality of this explanation
 //! ```
 //!
-//! d is what has changed lately: a payload and friction change slowly, or are there when control begins. Angles count by the radius of the
-//! platform. A force is missing if `cos` is near 1 and f_i a good part of what was sent before, against noise, friction and payloads.
+//! d is the recent change of the disturbance. A payload and friction change slowly, or exist when control
+//! begins. Angles are weighted by the radius of the platform. A force is missing if `cos` is near 1 and `f_i`
+//! is a large share of the usual force, compared with noise, friction and payloads.
 //!
-//! It does not see a leg that carries little, as friction may be as large, nor several drives at once. That the drive of a leg pushes
-//! more than it should shows in the lengths.
+//! Not detected: a leg with a small load, because friction may be as large; several drives at once. A drive
+//! that pushes more than commanded shows in the leg lengths.
 
 use nalgebra::Vector6;
 
@@ -23,34 +25,36 @@ use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;
 use crate::model::rigid::Pose;
 
-/// Time constant of the disturbance that is usual \[s\]: several times that of the estimator.
+/// Time constant of the usual disturbance \[s\]: several times the estimator's.
 const USUAL_TIME_CONSTANT_S: f64 = 0.15;
-/// Time from the start of control in which every disturbance is usual \[s\]: the payload is not known before.
+/// Time from the start of control in which any disturbance is usual \[s\], because the payload is still
+/// unknown.
 const START_S: f64 = 0.25;
-/// Least missing force as a ratio of the force that was sent: twice the friction that a model leaves out.
+/// Smallest missing force, relative to the force that is usually sent.
 const LEAST_MISSING_RATIO: f64 = 0.4;
-/// Most, of the force that was sent: of a drive that pushes the wrong way, with reserve.
+/// Largest missing force, relative to the force that was sent: a drive that pushes the wrong way, with
+/// reserve.
 const MOST_MISSING_RATIO: f64 = 2.5;
-/// Least square of the cosine: 18 degrees. The accelerations of two legs differ by more.
+/// Smallest square of the cosine: 18 degrees. The accelerations by two legs differ by more.
 const LEAST_COSINE_SQUARED: f64 = 0.9;
-/// Time for which it is missing \[s\]: an impact is shorter, or passes through other directions.
+/// Time for which a force must be missing \[s\]. An impact is shorter, or passes through other directions.
 const LEAST_MISSING_S: f64 = 0.006;
 
-/// Memory of the check.
+/// State of the drive response check.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct DriveResponse {
     usual: Vector6<f64>,
-    /// Forces that are usually sent \[N\].
+    /// Forces that are usually sent, low-pass filtered \[N\].
     usual_force: Vector6<f64>,
     since_start_s: f64,
     missing_s: f64,
-    /// Square of the disturbance beyond the usual one, weighted; 0 where the force of one leg explains it.
+    /// Square of the weighted change of the disturbance; 0 if the force of one leg explains it.
     pub sudden_disturbance_squared: f64,
 }
 
 impl DriveResponse {
-    /// Checks the disturbance after a measurement, `dt` seconds after the last one.
+    /// Checks the disturbance after a measurement, `dt` seconds after the previous one.
     pub fn check(
         &mut self,
         constants: &Constants,
@@ -76,7 +80,7 @@ impl DriveResponse {
         self.check_legs(constants, &sudden, &sent, pose, dt)
     }
 
-    // Out of line, as it is rare: the cycle stays short.
+    // Rarely called, hence out of line: the cycle stays short.
     #[inline(never)]
     fn check_legs(
         &mut self,

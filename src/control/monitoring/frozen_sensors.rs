@@ -1,45 +1,51 @@
-//! Frozen sensors: readings that stay the same to the last bit while the reference moves.
+//! Frozen sensors: readings that repeat to the last bit while the reference moves.
 //!
-//! A sensor that is alive changes with every noise, and with every step of motion. Each of three readings in a row must differ, unless
-//! the reference of the leg has moved no further than a bound since the first of them. A frozen sensor makes a false error that
-//! grows with the reference and acts on the platform as long as nobody notices: the slower the motion, the longer.
+//! The reading of a working sensor changes with noise and with each step of motion. Three equal readings in a
+//! row are a fault if the leg's reference has moved further than a bound since the first of them. A frozen
+//! sensor causes a false error that grows with the reference. The error moves the platform until it is
+//! detected, and slower motion takes longer to detect.
 //!
-//! A sensor whose noise is at least its resolution does not repeat itself at rest either. One with less noise, or of unknown
-//! resolution, may: a leg that freezes at rest cannot be distinguished then, and the platform drifts away. An independent pose
-//! or a second encoder closes that.
+//! A sensor whose noise is at least its resolution does not repeat at rest either. A sensor with less noise,
+//! or of unknown resolution, may repeat at rest. If it freezes then, the failure cannot be detected and the
+//! platform drifts away. An independent pose or a second encoder detects it.
 
 use crate::control::law::estimator::ReadingErrors;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;
 
-/// Equal readings in a row from which on a sensor may be frozen: fewer happen by chance with coarse steps.
+/// Equal readings in a row from which a sensor may be frozen. Coarse steps repeat fewer by chance.
 const MIN_EQUAL_READINGS: u32 = 3;
-/// Motion of the reference that six equal lengths allow, and one in a loop of 10 Hz, beside a step of the sensor \[m\]. A tenth
-/// more than the most that friction left in ten hours of motion by chance: 32 and 56 um (`false_alarms`, 2026-11-26).
+/// Motion of the reference that equal readings of all six legs permit, and of one leg in a loop of 10 Hz, in
+/// addition to one step of the sensor \[m\]. The bounds are a tenth above the largest values that friction
+/// caused by chance in ten hours of motion: 32 and 56 um (`false_alarms`, 2026-11-26).
 const ALL_LEGS_BOUND_M: f64 = 35e-6;
 const ONE_LEG_BOUND_M: f64 = 62e-6;
-/// Natural frequency of that loop squared \[1/s^2\].
+/// Square of the natural frequency of a 10 Hz loop \[1/s^2\].
 const BOUND_STIFFNESS: f64 = 3948.0;
-/// Most for a loop with less.
+/// Largest bound for one leg in a softer loop \[m\].
 const MAX_ONE_LEG_BOUND_M: f64 = 1.5e-4;
-/// Friction that the model may lack, as a ratio of the largest force, with a third in reserve: a fifth of half a per cent, and
-/// stiction of a twentieth of a per cent. While a platform crawls, feedback pushes a leg whose sensor is frozen harder than this long
-/// before the reference has moved by the bounds above.
+/// Friction that the model may lack, relative to the largest force, with a reserve of a third: a fifth of
+/// 0.5 % friction, and stiction of 0.05 %. While a platform crawls, feedback pushes a leg with a frozen
+/// sensor harder than this long before the reference has moved by the bounds above.
 const STICTION_RATIO: f64 = 0.002;
-/// A force beyond that ends control only after readings were equal for so long \[s\]: a leg that is not frozen leaves its step sooner.
+/// Time of equal readings from which a larger force is a fault \[s\]. A leg that is not frozen leaves its
+/// step sooner.
 const LONG_S: f64 = 0.05;
-/// The reference has to have moved as well: by this length \[m\], and by so many steps of the sensor.
+/// Smallest motion of the reference for that fault: length \[m\], and steps of the sensor.
 const LEAST_MOTION_M: f64 = 5e-6;
 const LEAST_MOTION_STEPS: f64 = 10.0;
-/// Equal readings in a row of a sensor whose noise is one step, and of any with noise: by chance at most once in 1e12, with one
-/// step also if the noise is a third of the configured one.
+/// Equal readings in a row that noise permits: if it is one step, and at any noise of at least one step.
+/// Longer runs occur by chance at most once in 1e12. At one step this also holds if the noise is a third of
+/// the configured one.
 const MAX_EQUAL_AT_ONE_STEP: f64 = 100.0;
 const MAX_EQUAL_NOISY_READINGS: f64 = 12.0;
-/// The same in steps of a coarse sensor: in the same ten hours a payload and friction that are known to a fifth left 15.2.
+/// Bound on the motion in steps of a coarse sensor. In the same ten hours, with payload and friction known to
+/// 20 %, the largest motion was 15.2 steps.
 const BOUND_STEPS: f64 = 17.0;
 
 impl ReadingErrors {
-    /// Equal readings in a row that noise allows; `None` if its noise is less than a step, or the step is not known.
+    /// Equal readings in a row that noise permits; `None` if the noise is less than a step or the step is
+    /// unknown.
     fn most_equal(&self) -> Option<f64> {
         let steps = self.deviation / self.resolution;
         (self.resolution > 0.0 && steps >= 1.0)
@@ -47,20 +53,20 @@ impl ReadingErrors {
     }
 }
 
-/// What equal readings of one leg allow, beside noise.
+/// Bounds on equal readings of one leg, in addition to noise.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrozenLegBounds {
     /// Motion of the reference \[m\].
     pub motion: f64,
-    /// Change of the feedback's force on the leg \[N\], if they have been equal for long and the reference has moved at all: less
-    /// may be held by stiction.
+    /// Change of the feedback force on the leg \[N\], for a long run of equal readings while the reference
+    /// has moved. Stiction may balance a smaller change.
     pub force: f64,
-    /// Number of readings that is long.
+    /// Number of readings that make a run long.
     pub long: u32,
 }
 
 impl FrozenLegBounds {
-    /// Of a loop with the stiffness Kp \[1/s^2\].
+    /// Bounds of a loop with the stiffness Kp \[1/s^2\].
     pub fn new(stiffness: f64, max_force: f64, period_s: f64) -> Self {
         Self {
             motion: motion_bound(stiffness),
@@ -70,30 +76,30 @@ impl FrozenLegBounds {
     }
 }
 
-/// Motion of the reference that equal readings of one leg allow, in a loop with this stiffness Kp \[1/s^2\].
+/// Motion of the reference that equal readings of one leg permit, in a loop with the stiffness Kp \[1/s^2\].
 ///
-/// A reading that is false by `v t` accelerates the platform by `Kp v t`: when the reference has moved by B the platform is `Kp B^3 / (6 v^2)` off its path.
-/// That shall be the same for all loops. A leg that friction holds moves no less far before the force of feedback frees it, with
-/// less stiffness farther.
+/// A reading with the error `v t` accelerates the platform by `Kp v t`. When the reference has moved by B,
+/// the platform is `Kp B^3 / (6 v^2)` off its path. The bound makes this the same for all loops. If friction
+/// holds a leg, the reference also moves further in a softer loop before the feedback force frees the leg.
 fn motion_bound(stiffness: f64) -> f64 {
     (ONE_LEG_BOUND_M * libm::cbrt(BOUND_STIFFNESS / stiffness)).min(MAX_ONE_LEG_BOUND_M)
 }
 
-/// Readings that did not change, and where the reference was at the first of them.
+/// Runs of equal readings, and the reference at the first reading of each run.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct FrozenSensors {
     last: [f64; LEGS],
     equal_readings: [u32; LEGS],
-    /// Lengths of the reference at the first of the equal readings \[m\].
+    /// Reference lengths at the first of the equal readings \[m\].
     reference: [f64; LEGS],
-    /// Forces of the feedback on the legs then \[N\].
+    /// Feedback forces on the legs at the first of the equal readings \[N\].
     feedback: [f64; LEGS],
 }
 
 impl FrozenSensors {
-    /// Whether a new measurement is alive. `legs` are the lengths of the reference at its instant and the forces of the feedback, evaluated
-    /// only where a reading stayed the same.
+    /// Checks a new measurement. `legs` returns the reference lengths at its instant and the feedback forces;
+    /// it is called only if a reading has repeated.
     pub fn check(
         &mut self,
         length: &[f64; LEGS],
@@ -103,7 +109,7 @@ impl FrozenSensors {
     ) -> Result<(), Diagnostic> {
         let mut is_any_equal = false;
         for ((last, equal), length) in self.last.iter_mut().zip(&mut self.equal_readings).zip(length) {
-            // To the last bit, as a sensor that is frozen repeats itself.
+            // To the last bit, because a frozen sensor repeats its reading exactly.
             let is_equal = last.to_bits() == length.to_bits();
             *equal = if is_equal { equal.saturating_add(1) } else { 0 };
             *last = *length;
@@ -112,13 +118,13 @@ impl FrozenSensors {
         if is_any_equal { self.check_motion(&legs(), errors, one_leg) } else { Ok(()) }
     }
 
-    /// Whether any length has been the same for so many readings that its sensor may be frozen.
+    /// Whether any sensor has repeated its reading often enough to be frozen.
     pub fn repeat(&self) -> bool {
         self.equal_readings.iter().any(|equal| *equal + 1 >= MIN_EQUAL_READINGS)
     }
 
-    /// Whether the reference has not moved while readings stayed the same.
-    // Out of line, as most sensors have noise: the cycle stays short.
+    /// Checks the motion of the reference while readings repeated.
+    // Out of line, because most sensors have noise: the cycle stays short.
     #[inline(never)]
     fn check_motion(
         &mut self,
@@ -160,7 +166,7 @@ mod tests {
 
     const BOUNDS: FrozenLegBounds = FrozenLegBounds { motion: ONE_LEG_BOUND_M, force: 10.0, long: 50 };
 
-    /// Readings of a crawling leg that stays where it is while the feedback's force on it grows by so many newtons.
+    /// Readings of a crawling leg that does not move while the feedback force on it grows to `newtons`.
     fn is_frozen_at(newtons: f64, readings: u32) -> bool {
         let mut sensors = FrozenSensors::default();
         (0..readings).any(|k| {
@@ -178,7 +184,7 @@ mod tests {
         assert!(!is_frozen_at(20.0, 40), "not long");
     }
 
-    /// Micrometres of the reference at which frozen legs are noticed, in steps of 5 um.
+    /// Motion of the reference \[um\] at which frozen legs are detected, in steps of 5 um, and the leg.
     fn noticed_um(frozen: &[usize], step: f64) -> Option<(f64, usize)> {
         let mut sensors = FrozenSensors::default();
         for k in 0..100 {
@@ -218,7 +224,7 @@ mod tests {
         }
     }
 
-    /// Equal readings at rest until a sensor counts as frozen.
+    /// Number of equal readings at rest until the sensor is reported as frozen.
     fn repeated(noise: f64, step: f64) -> Option<u32> {
         let mut sensors = FrozenSensors::default();
         let readings = ReadingErrors { deviation: noise, resolution: step };

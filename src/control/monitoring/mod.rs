@@ -1,9 +1,9 @@
-//! Checks of the estimate under control: what sensors, drives and the load do that the model does not know.
+//! Checks of the estimate under control: failures of sensors and drives, and changes of the load.
 //!
-//! | what | file |
+//! | failure or change | file |
 //! | --- | --- |
-//! | sensors that repeat a length | `frozen_sensors` |
-//! | drives without force | `drive_response`, with `weighting` |
+//! | sensor that repeats a length | `frozen_sensors` |
+//! | drive without force | `drive_response`, with `weighting` |
 //! | payload, impact, oscillation | [`disturbance_monitor`] |
 
 pub mod disturbance_monitor;

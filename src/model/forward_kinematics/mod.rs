@@ -1,30 +1,30 @@
-//! Forward kinematics: the pose from six leg lengths, by Newton's method on SE(3).
+//! Forward kinematics: pose from six leg lengths, by Newton's method on SE(3).
 //!
 //! ```text
 //! residual r_i = L_i - L_i(pose)      J^-1 [dw; dv] = r      R <- turn(dw) R,   M <- M + dv
 //! ```
 //!
-//! M is the mean of the joints on the platform, so that the path to the solution does not depend on where C
-//! is; `turn` is Cayley's rotation, which differs from `exp` by a third power. Steps are added to the rotation,
-//! not to Bryan angles (which converges only linearly).
+//! M is the mean of the joints on the platform, so that the path to the solution does not depend on the
+//! choice of C. `turn` is Cayley's rotation, which differs from `exp` by a third-order term. Steps update the
+//! rotation itself. Updating Bryan angles would converge only linearly.
 //!
-//! A factorization costs more than an evaluation of the lengths, so it is used again (the chord method) where a
-//! second step of it comes as near as a new one would. With the error e and the first step q the next error is
-//! `e^2` with a new factorization, `e q` with the old one. Before the last step r is `(L_i^2 - |s_i|^2) / 2 L_i`, which
-//! has the same zero and needs no root and no division. The last factorization is at the solution and remains
-//! in the [`KinematicState`].
+//! A factorization costs more than an evaluation of the lengths. It is therefore used again (chord method) if
+//! a second step with it comes as near as a new factorization would. With the error e and the first step q,
+//! the next error is `e^2` with a new factorization and `e q` with the old one. Before the last step r is
+//! `(L_i^2 - |s_i|^2) / 2 L_i`, which has the same zero and needs neither root nor division. The last
+//! factorization is at the solution and remains in the [`KinematicState`].
 //!
-//! Lengths do not determine the pose: up to 40 real poses share them (assembly modes), and a small
-//! residual says nothing about being on the wrong one. Uniqueness comes from continuity: a step is only
-//! taken within Kantorovich's bound ([`Sensitivity::trusted_step`](super::sensitivity::Sensitivity)), where there is a solution nearby and only
-//! one. [`refine`] needs a start that near, and the loop moves less than that in a cycle. [`Tracker`] walks toward
-//! far lengths in such steps and cannot cross a singular pose. The pose it finds is the only one on the
-//! straight path of the lengths. A platform that took another path is in another assembly mode for one of 16,000
-//! random poses up to 60 degrees from home (`tests/stability`); where the path is unknown, `analysis::assembly_modes`
-//! searches for the other poses.
+//! Lengths do not determine the pose: up to 40 real poses share them (assembly modes), and a small residual
+//! does not exclude a wrong one. Uniqueness follows from continuity. A step is only taken within
+//! Kantorovich's bound ([`Sensitivity::trusted_step`](super::sensitivity::Sensitivity)), where exactly one
+//! solution is nearby. [`refine`] requires a start within this bound; the platform moves less than that in a
+//! cycle. [`Tracker`] moves toward distant lengths in such steps and cannot cross a singular pose. Its pose
+//! is the only one on the straight path of the lengths. A platform that took another path is in another
+//! assembly mode for one of 16,000 random poses up to 60 degrees from home (`tests/stability`). If the path
+//! is unknown, `analysis::assembly_modes` searches for the other poses.
 //!
-//! Conditioning: errors of the lengths are amplified by the condition of N. Toward a singular pose the
-//! trusted steps become shorter and end before it.
+//! Conditioning: the condition of N amplifies errors of the lengths. Trusted steps become shorter toward a
+//! singular pose and end before it.
 
 mod newton;
 mod tracker;
@@ -39,24 +39,25 @@ use super::kinematic_state::KinematicState;
 use super::machine::Machine;
 use newton::Newton;
 
-/// Most steps of one call of [`refine`]. From the edge of the trusted region six suffice to rounding, by Kantorovich.
+/// Largest number of steps in one call of [`refine`]. By Kantorovich's theorem, six steps reach rounding from
+/// the edge of the trusted region.
 pub const MAX_NEWTON_STEPS: u32 = 8;
 
-/// Condition beyond which a pose counts as singular: an encoder's error of 1 um is up to 1 cm at the platform, and
-/// a leg may push 10,000 times the load. Machines that are meant to work have 2 to 100.
+/// Condition above which a pose counts as singular: an encoder error of 1 um is up to 1 cm at the platform,
+/// and a leg force may be 10,000 times the load. Practical machines have 2 to 100.
 pub const MAX_CONDITION: f64 = 1e4;
 
 /// Outcome of forward kinematics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub enum Outcome {
-    /// The pose belongs to the lengths, and no other pose in the trusted region does.
+    /// The pose has these lengths, and no other pose in the trusted region has them.
     Solved,
-    /// The iterations were used up, or became longer.
+    /// The iterations were used up, or a step was longer than the previous one.
     NotConverged,
     /// The lengths are further away than one trusted step.
     LeftTrustedRegion,
-    /// The pose would be singular, beyond a singular one, or worse than [`MAX_CONDITION`].
+    /// The pose would be singular, beyond a singularity, or worse than [`MAX_CONDITION`].
     NearSingular,
 }
 
@@ -65,14 +66,14 @@ pub enum Outcome {
 pub struct NewtonReport {
     /// Whether the pose was found, and if not, why.
     pub outcome: Outcome,
-    /// Steps of Newton's method.
+    /// Number of Newton steps.
     pub iterations: u32,
-    /// Size of the first step over that of the largest trusted one.
+    /// Size of the first step, relative to the largest trusted step.
     pub step_ratio: f64,
 }
 
-/// Moves a kinematic state to the pose with these leg lengths \[m\], if that is one trusted step away; otherwise the
-/// state remains unchanged.
+/// Moves a kinematic state to the pose with these leg lengths \[m\], if that pose is within one trusted step.
+/// Otherwise the state is unchanged.
 ///
 /// ```
 /// use hexad::model::{forward_kinematics::{Outcome, refine}, inverse_geometry::leg_lengths, kinematic_state::KinematicState};

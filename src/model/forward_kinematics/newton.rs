@@ -15,14 +15,14 @@ use crate::model::machine::Joints;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::Sensitivity;
 
-/// A step this small (radian, or radius) is the last: the legs are where the pose is, to all practical digits, and
-/// the pose, which still takes it, is so to rounding.
+/// Step size (radian, or radius) below which the iteration ends. The legs then agree with the pose to all
+/// practical digits. The pose still takes this step, so it is exact to rounding.
 const CONVERGED_STEP: f64 = 1e-12;
 
-/// Errors of rounding that add up in a residual, about.
+/// Approximate number of rounding errors that add up in a residual.
 const ROUNDING_ERRORS_PER_RESIDUAL: f64 = 8.0;
 
-/// Newton's method toward some lengths.
+/// Newton's method toward given lengths.
 pub(super) struct Newton<'a, S: Simd> {
     simd: S,
     joints: &'a Joints,
@@ -30,14 +30,14 @@ pub(super) struct Newton<'a, S: Simd> {
     inverse_target: f64x8<S>,
 }
 
-/// The platform after some steps, in lanes.
+/// State of the platform after some steps, in lanes.
 #[derive(Clone, Copy)]
 struct Iterate<S: Simd> {
-    /// Joints on the platform from their mean M.
+    /// Vectors from the mean M of the platform joints to each platform joint.
     arm: Lanes3<f64x8<S>>,
-    /// From the joints on the base to M.
+    /// Vectors from the joints on the base to M.
     reach: Lanes3<f64x8<S>>,
-    /// R, a column per lane.
+    /// R, one column per lane.
     rotation: Lanes3<f64x4<S>>,
 }
 
@@ -56,7 +56,7 @@ impl<S: Simd> Iterate<S> {
         Self { arm, reach: center.doubled() - Lanes3::load(simd, &joints.base), rotation }
     }
 
-    /// One step further.
+    /// Iterate after one more step.
     #[inline(always)]
     fn moved(self, simd: S, step: &LaneTwist<S>) -> Self {
         let half = f64x4::splat(simd, 0.5);
@@ -69,7 +69,7 @@ impl<S: Simd> Iterate<S> {
         }
     }
 
-    /// R brought back to orthonormal columns by one step of Newton's iteration for the polar factor.
+    /// Pose of the iterate. One step of Newton's iteration for the polar factor makes R orthonormal.
     #[inline(always)]
     fn pose(&self, simd: S, joints: &Joints) -> Pose {
         let r = self.rotation;
@@ -82,7 +82,7 @@ impl<S: Simd> Iterate<S> {
         let r = (r * own).minus_scaled(to_next, next).minus_scaled(to_previous, previous);
         let ([a, b, c], [d, e, f], [g, h, i]) = (r.x.legs(), r.y.legs(), r.z.legs());
         let rotation = Matrix3::new(a, b, c, d, e, f, g, h, i);
-        // The first joint on the base leads back to its frame.
+        // The first base joint plus its reach gives M in the base frame.
         let first = self.reach + Lanes3::load(simd, &joints.base);
         let (first, _) = first.split();
         let center = first.first();
@@ -110,10 +110,11 @@ impl<'a, S: Simd> Newton<'a, S> {
         let mut at = Iterate::start(simd, joints, &kinematic_state.pose);
         let mut residual = target - legs.length;
         let mut report = NewtonReport { outcome: Outcome::NotConverged, iterations: 0, step_ratio: f64::NAN };
-        // Steps become shorter: Kantorovich halves them at least.
+        // Each step must be shorter than the previous one; by Kantorovich's theorem it is at most half as
+        // long.
         let mut longest = square(kinematic_state.sensitivity.trusted_step);
         loop {
-            // Size of the first step with this factorization.
+            // Square of the first step with this factorization.
             let mut first = 0.0;
             let s = loop {
                 if report.iterations == MAX_NEWTON_STEPS {
@@ -126,7 +127,7 @@ impl<'a, S: Simd> Newton<'a, S> {
                 let size = step.size_squared(linear_weight);
                 if report.iterations == 1 {
                     report.step_ratio = (size / longest).sqrt();
-                    // Also where it is not a number.
+                    // True for NaN as well.
                     if !(report.step_ratio <= 1.0) {
                         return NewtonReport { outcome: Outcome::LeftTrustedRegion, ..report };
                     }
@@ -134,8 +135,9 @@ impl<'a, S: Simd> Newton<'a, S> {
                     return report;
                 }
                 if size <= square(rounding) && report.iterations == 1 {
-                    // Already at the pose. Steps smaller than rounding in the legs would add up over the cycles. Longer ones are taken:
-                    // whether a step is just below a bound is a matter of rounding, and an instruction set must not decide what is left out.
+                    // Already at the pose. Steps below the rounding of the legs are not taken, because they
+                    // would add up over the cycles. All longer steps are taken, so that all instruction sets
+                    // take the same steps: rounding decides whether a step is just below a bound.
                     let is_regular = kinematic_state.sensitivity.condition <= MAX_CONDITION;
                     report.outcome = if is_regular { Outcome::Solved } else { Outcome::NearSingular };
                     return report;
@@ -160,14 +162,14 @@ impl<'a, S: Simd> Newton<'a, S> {
         }
     }
 
-    /// `(L^2 - |s|^2) / 2 L`
+    /// Length residual `(L^2 - |s|^2) / 2 L`.
     #[inline(always)]
     fn residual(&self, s: Lanes3<f64x8<S>>) -> f64x8<S> {
         self.target.fused_mul_sub(self.target, s.dot(s)) * self.inverse_target * f64x8::splat(self.simd, 0.5)
     }
 
-    /// Stores the last step, which brings the pose to the target lengths and changes the directions of the legs by rounding
-    /// only.
+    /// Stores the last step. It brings the pose to the target lengths and changes the leg directions only by
+    /// rounding.
     #[inline(always)]
     fn arrive(
         &self,
@@ -181,7 +183,7 @@ impl<'a, S: Simd> Newton<'a, S> {
         legs.length = target;
         legs.inverse_length = (residual * inverse_target).fused_mul_add(inverse_target, inverse_target);
         let sensitivity = Sensitivity::new(simd, joints, &legs, factorization);
-        // That K grows along the step could lead across, if anything could.
+        // Only growth of K along the step could lead across a singular pose.
         let same_side = sensitivity.determinant * kinematic_state.sensitivity.determinant > 0.0;
         if !(same_side && sensitivity.condition <= MAX_CONDITION) {
             return Outcome::NearSingular;
@@ -194,7 +196,7 @@ impl<'a, S: Simd> Newton<'a, S> {
     }
 }
 
-/// Size of a step by the rounding of differences of coordinates.
+/// Size of a step caused by rounding in differences of coordinates.
 #[inline(always)]
 fn rounding(joints: &Joints, start: &KinematicState) -> f64 {
     let size = start.pose.position.norm() / joints.radius;

@@ -1,4 +1,4 @@
-//! Forward kinematics of lengths that are more than one trusted step away: a straight path of the lengths in trusted steps.
+//! Tracker: forward kinematics for distant lengths, along a straight path of the lengths in trusted steps.
 
 use nalgebra::Vector6;
 
@@ -8,14 +8,15 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::rigid::Pose;
 
-/// Share of a trusted step taken toward lengths further away: below 1, so that rounding does not exceed it.
+/// Share of a trusted step that is taken toward distant lengths; below 1, so that rounding does not exceed
+/// the step.
 const TRUSTED_STEP_SHARE: f64 = 0.99;
 
-/// Bound on the steps of [`Tracker::find`]: one is some hundredths of the radius, and the steps toward a singular
-/// pose end after about fifty.
+/// Largest number of steps of [`Tracker::find`]. One step is a few hundredths of the radius. Toward a
+/// singular pose the steps end after about fifty.
 const MAX_TRACKING_STEPS: u32 = 2000;
 
-/// Follows measured leg lengths without leaving the assembly mode of its start.
+/// Tracker of measured leg lengths; it stays in the assembly mode of its start.
 ///
 /// ```
 /// use hexad::model::forward_kinematics::{Tracker, TrackingResult};
@@ -31,7 +32,7 @@ const MAX_TRACKING_STEPS: u32 = 2000;
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tracker {
-    /// Of the last converged step.
+    /// State after the last converged step.
     kinematic_state: KinematicState,
     outcome: Outcome,
 }
@@ -39,31 +40,32 @@ pub struct Tracker {
 /// Result of one step of a [`Tracker`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackingResult {
-    /// The pose belongs to the given lengths.
+    /// The pose has the given lengths.
     Found,
-    /// The lengths are further away than one step: the pose is between the one before and theirs.
+    /// The lengths are further away than one step: the pose is between the previous pose and theirs.
     Approaching,
-    /// There is no trusted step toward the lengths; the pose is the last good one. [`Tracker::outcome`] says why.
+    /// No trusted step leads toward the lengths; the pose is the last valid one. [`Tracker::outcome`] gives
+    /// the reason.
     NotConverged,
 }
 
 impl Tracker {
-    /// Starts at a pose.
+    /// Creates a tracker at a pose.
     pub fn new(machine: &Machine, pose: Pose) -> Self {
         Self { kinematic_state: KinematicState::new(machine, pose), outcome: Outcome::Solved }
     }
 
-    /// Starts anew at a kinematic state.
+    /// Restarts at a kinematic state.
     pub fn restart(&mut self, kinematic_state: &KinematicState) {
         (self.kinematic_state, self.outcome) = (*kinematic_state, Outcome::Solved);
     }
 
-    /// Pose of the last converged step.
+    /// Pose after the last converged step.
     pub fn pose(&self) -> &Pose {
         self.kinematic_state.pose()
     }
 
-    /// The same with its legs and factorization.
+    /// Pose after the last converged step, with its legs and factorization.
     pub fn kinematic_state(&self) -> &KinematicState {
         &self.kinematic_state
     }
@@ -73,7 +75,7 @@ impl Tracker {
         self.outcome
     }
 
-    /// Takes one trusted step toward the pose with these lengths; also returns the iterations.
+    /// Takes one trusted step toward the pose with these lengths. Also returns the number of iterations.
     pub fn advance(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (TrackingResult, u32) {
         let mut iterations = 0;
         let mut tracked = TrackingResult::Found;
@@ -94,7 +96,8 @@ impl Tracker {
         report
     }
 
-    /// Steps until the pose is found; also returns the iterations. Not for the cycle: the number of steps is not bounded by its time.
+    /// Takes steps until the pose is found. Also returns the number of iterations. Not for the cycle: the
+    /// steps may take longer than a cycle.
     pub fn find(&mut self, machine: &Machine, lengths: &[f64; LEGS]) -> (TrackingResult, u32) {
         let mut iterations = 0;
         for _ in 0..MAX_TRACKING_STEPS {

@@ -1,32 +1,34 @@
-//! Covariance of the estimate, the same for all axes, and the gains that follow from it.
+//! Error covariance of the estimate, the same for all axes, and the Kalman gains that follow from it.
 //!
-//! State of an axis in units of the noise of a reading and of the period: `[e, T w, T^2 d] / sigma`. Its disturbance changes
-//! as a random walk, d' is white noise of intensity q:
+//! State of one axis, in units of the noise of a reading and of the period: `[e, T w, T^2 d] / sigma`. The
+//! disturbance is a random walk: d' is white noise of intensity q.
 //!
 //! ```text
 //! P(t + eta T) = F P F^T + Q       F = [1 eta eta^2/2; 0 1 eta; 0 0 1]
 //! Q = (we T)^6 [eta^5/20 eta^4/8 eta^3/6; eta^4/8 eta^3/3 eta^2/2; eta^3/6 eta^2/2 eta]
 //! we = (q / (sigma^2 T))^(1/6)     bandwidth of the filter
-//! reading of e:  K = P h / (h^T P h + 1), P -= K h^T P       h = [1 0 0]; of T w with its own noise
+//! reading of e:  K = P h / (h^T P h + 1), P -= K h^T P       h = [1 0 0]; a reading of T w has its own noise
 //! ```
 //!
-//! Source: Kalman (1960); Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 6.2.3. One
-//! number decides the gains, `we T`. In these units the numbers are within a few powers of ten of 1, also at 20 kHz. The
-//! covariance follows the true intervals, so a sample that is lost, or came late, changes the gains as it should: with
-//! constant gains a source of which half of the samples are missing is unstable.
+//! Source: Kalman (1960); Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and
+//! Navigation", 6.2.3. One number, `we T`, decides the gains. In these units all numbers are within a few
+//! powers of ten of 1, also at 20 kHz. The covariance follows the true intervals, so lost or late samples
+//! change the gains correctly. With constant gains the estimate is unstable if half of a source's samples are
+//! missing.
 
-/// What the gains follow from.
+/// Noise model that determines the gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseModel {
-    /// Bandwidth `we` \[rad/s\].
+    /// Bandwidth of the filter, `we` \[rad/s\].
     pub bandwidth: f64,
-    /// Standard deviation of a reading of a rate over that of a length \[1/s\]; `None` if rates are not used.
+    /// Standard deviation of a rate reading over that of a length reading \[1/s\]; `None` if rates are not
+    /// used.
     pub rate_noise_ratio: Option<f64>,
-    /// The period of the loop \[s\].
+    /// Period of the loop \[s\].
     pub period_s: f64,
 }
 
-/// Covariance matrix of one axis, its upper triangle.
+/// Covariance matrix of one axis, upper triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Covariance {
@@ -38,16 +40,18 @@ pub struct Covariance {
     dd: f64,
 }
 
-/// Gains of a reading for e \[1\], w \[1/T\] and d \[1/T^2\], the latter two without their unit.
+/// Kalman gains of one reading: for e \[1\], w \[1/T\] and d \[1/T^2\]; w and d are stored without their
+/// units.
 pub type KalmanGains = [f64; 3];
 
-/// Relative change of a gain in an update below which the covariance counts as steady.
+/// Relative change of a gain per update below which the covariance is steady.
 const STEADY_CHANGE: f64 = 1e-13;
-/// Bound of the updates until then.
+/// Largest number of updates until the covariance is steady.
 const MAX_STEADY_UPDATES: u32 = 1_000_000;
 
 impl NoiseModel {
-    /// The covariance after a reading, when readings have come once a period for long, and the gains of the last.
+    /// Steady covariance after a reading, for one reading per period, and the gains of the last value and
+    /// rate reading.
     pub fn steady(&self) -> (Covariance, [KalmanGains; 2]) {
         let mut covariance = Covariance::default();
         let mut gains = [KalmanGains::default(); 2];
@@ -66,14 +70,14 @@ impl NoiseModel {
         (covariance, gains)
     }
 
-    /// Variance of a reading of a rate, in the units of the state.
+    /// Variance of a rate reading, in the units of the state.
     pub(in crate::control::law::estimator) fn rate_noise(&self) -> Option<f64> {
         self.rate_noise_ratio.map(|ratio| (ratio * self.period_s) * (ratio * self.period_s))
     }
 }
 
 impl Covariance {
-    /// Over so many periods without a reading.
+    /// Advances the covariance over a number of periods without a reading.
     pub fn advance(&mut self, model: &NoiseModel, periods: f64) {
         let Self { ee, ew, ed, ww, wd, dd } = *self;
         let (n, half) = (periods, 0.5 * periods * periods);
@@ -92,14 +96,14 @@ impl Covariance {
         };
     }
 
-    /// After a reading of e. Returns its gains.
+    /// Updates the covariance by a reading of e. Returns the gains.
     pub fn correct_value(&mut self) -> KalmanGains {
         let Self { ee, ew, ed, .. } = *self;
         let share = 1.0 / (ee + 1.0);
         self.correct([ee, ew, ed], share)
     }
 
-    /// After a reading of T w with this variance. Returns its gains.
+    /// Updates the covariance by a reading of T w with this variance. Returns the gains.
     pub fn correct_rate(&mut self, noise: f64) -> KalmanGains {
         let Self { ew, ww, wd, .. } = *self;
         let share = 1.0 / (ww + noise);
@@ -118,7 +122,7 @@ impl Covariance {
         gains
     }
 
-    /// Standard deviation of the difference between a reading of e and its prediction, over that of a reading.
+    /// Variance of the innovation of e, relative to the variance of a reading.
     pub fn innovation_variance(&self) -> f64 {
         self.ee + 1.0
     }
@@ -132,7 +136,8 @@ mod tests {
         NoiseModel { bandwidth: core::f64::consts::TAU * bandwidth_hz, rate_noise_ratio, period_s: 1e-3 }
     }
 
-    /// `K ~ [2 we T, 2 (we T)^2, (we T)^3]` for a slow filter: the poles of `s^3 + 2 we s^2 + 2 we^2 s + we^3`, Butterworth's.
+    /// A slow filter has `K ~ [2 we T, 2 (we T)^2, (we T)^3]`: the poles of Butterworth,
+    /// `s^3 + 2 we s^2 + 2 we^2 s + we^3`.
     #[test]
     fn a_slow_filter_has_the_poles_of_butterworth() {
         for hertz in [0.1, 0.3, 1.0] {
@@ -144,7 +149,7 @@ mod tests {
         }
     }
 
-    /// The figures of an independent solution of the Riccati equation.
+    /// Expected values: an independent solution of the Riccati equation.
     #[test]
     fn the_gains_are_those_of_the_riccati_equation() {
         for (hertz, expected) in [(30.0, [0.314, 0.0590, 0.00555]), (10.0, [0.118, 0.00742, 0.000233])] {
@@ -176,7 +181,7 @@ mod tests {
         }
     }
 
-    /// Two half periods without a reading are one.
+    /// Advancing by 0.3 and 0.7 of a period equals advancing by one period.
     #[test]
     fn pieces_of_a_period_are_the_period() {
         let model = model(30.0, None);

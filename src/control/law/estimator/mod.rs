@@ -1,24 +1,26 @@
-//! Estimator: error of the platform, its rate, and the disturbance, at any instant near now.
+//! Estimator: error of the platform, its rate, and the disturbance, at any instant near the present.
 //!
-//! It works in error coordinates, reference minus platform, of the pose or in modes on legs of their lengths. There the
-//! reference cancels. With u the acceleration of the platform by what feedback has *sent*, after all limits
-//! ([`input_matrix`](super::input_matrix)), and d the disturbance, the sum of all
-//! accelerations that the model does not contain:
+//! It works in error coordinates, reference minus platform, so that the reference cancels. The coordinates
+//! are the pose, or the leg lengths in modes on legs. u is the acceleration of the platform by the feedback
+//! that was *sent*, after all limits ([`input_matrix`](super::input_matrix)). The disturbance d is the sum of
+//! all accelerations that the model does not contain:
 //!
 //! ```text
-//! e' = w,  w' = d - u,  d' = 0                       prediction, between pieces of constant u
+//! e' = w,  w' = d - u,  d' = 0                       prediction, over intervals of constant u
 //! nu = e_measured - e;   [e w d] += K nu             correction by a measurement, at its instant
 //! ```
 //!
-//! K: see [`covariance`]. Rates are measured too if the driver sends them and `[measured] rate_noise_m_s` says how good they
-//! are. The error at the instant at which a force begins is the prediction from the last measurement to there, over all that
-//! was sent meanwhile. So a dead time of the drives that is known costs no stability, a lost sample is bridged, and noise of the
-//! sensors is filtered.
+//! K: see [`covariance`]. Rates correct the estimate as well, if the driver sends them and
+//! `[measured] rate_noise_m_s` is set. The error at the instant at which a force begins is predicted from the
+//! last measurement, with all accelerations sent since. A known dead time of the drives therefore costs no
+//! stability, the prediction bridges lost samples, and sensor noise is filtered.
 //!
-//! The disturbance takes what feedback would otherwise need an error for: a payload, friction, a force of the process. Where it
-//! is compensated it stays within [`Law::max_compensated`](super::Law), so that a long contact is forgotten at once. Source of the structure: Luenberger (1971), Smith (1957) for the dead time.
+//! The disturbance replaces the steady error that feedback would otherwise need against a payload, friction
+//! or a process force. If it is compensated, its estimate is bounded
+//! ([`EstimatorConstants::max_compensated`]), so that the end of a long contact has an effect at once.
+//! Sources: Luenberger (1971); Smith (1957) for the dead time.
 //!
-//! What it does not know: elastic legs, the lag of drives but as a dead time, and coloured noise.
+//! The model lacks elastic legs, drive lag other than a dead time, and coloured noise.
 
 pub mod covariance;
 mod sent_accelerations;
@@ -33,7 +35,7 @@ use crate::control::signals::errors::ErrorEstimate;
 use crate::control::signals::time::seconds_between;
 
 impl ErrorEstimate {
-    /// Corrects it by gains times differences of a reading from the prediction.
+    /// Adds gains times the innovation of a reading to the state.
     fn correct(
         &mut self,
         [by_e, by_w, by_d]: covariance::KalmanGains,
@@ -46,7 +48,7 @@ impl ErrorEstimate {
     }
 }
 
-/// Filter of six axes: the estimate at the instant of the last measurement, and how certain it is.
+/// Filter of six axes: estimate at the instant of the last measurement, and its covariance.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct Filter {
@@ -62,7 +64,7 @@ impl Filter {
         Self { state, time_ns, covariance: constants.covariance }
     }
 
-    /// Corrects a state, which is predicted for the instant of a measurement. Returns the innovation.
+    /// Corrects the state, already predicted to the instant of the measurement. Returns the innovation.
     pub fn correct(
         &mut self,
         constants: &EstimatorConstants,
@@ -85,7 +87,7 @@ impl Filter {
     }
 }
 
-/// Estimator of the error under control.
+/// Estimator of the tracking error under control.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimator {
@@ -93,38 +95,38 @@ pub struct Estimator {
     sent: SentAccelerations,
 }
 
-/// The constants of an estimator.
+/// Constants of an estimator.
 #[derive(Clone, Copy, Debug)]
 pub struct EstimatorConstants {
-    /// What the gains follow from.
+    /// Noise model that determines the gains.
     pub noise: NoiseModel,
-    /// At first.
+    /// Initial covariance: the steady one.
     pub covariance: Covariance,
-    /// Largest estimate of the disturbance of each axis: what is compensated at most. Without compensation it has no bound, or
-    /// the estimated error would be wrong by what is beyond.
+    /// Bound on the estimated disturbance of each axis: the largest that is compensated. Without compensation
+    /// there is no bound; a bound would make the estimated error wrong by the excess.
     pub max_compensated: Vector6<f64>,
-    /// Noise of a reading of a length, and its resolution \[m\].
+    /// Noise and resolution of a length reading \[m\].
     pub reading_errors: ReadingErrors,
     /// Largest plausible acceleration of the platform that the model does not contain \[m/s^2\].
     pub largest_disturbance: f64,
 }
 
-/// Errors of the readings of lengths.
+/// Errors of the length readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadingErrors {
-    /// Standard deviation \[m\].
+    /// Standard deviation of the noise \[m\].
     pub deviation: f64,
-    /// Resolution \[m\]; 0 if it is not known.
+    /// Resolution \[m\]; 0 if unknown.
     pub resolution: f64,
 }
 
-/// Innovations beyond the disturbance that are noise, over its standard deviation: once in years.
+/// Largest innovation by noise, in standard deviations; noise exceeds it once in years.
 const NOISE_DEVIATIONS: f64 = 10.0;
-/// Innovation of a leg that is plausible whatever its noise \[m\]: of friction, play and impacts.
+/// Smallest bound on the innovation of a leg, whatever its noise \[m\]: friction, play and impacts reach it.
 const MIN_INNOVATION_BOUND_M: f64 = 1e-4;
 
 impl EstimatorConstants {
-    /// Evaluates them.
+    /// Computes the constants; the initial covariance is the steady one of the noise model.
     pub fn new(
         noise: NoiseModel,
         reading_errors: ReadingErrors,
@@ -134,8 +136,8 @@ impl EstimatorConstants {
         Self { noise, covariance: noise.steady().0, max_compensated, reading_errors, largest_disturbance }
     }
 
-    /// Largest plausible innovation of a leg, `dt` after the last measurement \[m\]: noise, and the way of a disturbance that the
-    /// estimate does not know yet, `a (1 / we^2 + dt^2 / 2)`.
+    /// Largest plausible innovation of a leg, `dt` after the last measurement \[m\]: noise, plus the
+    /// displacement by a disturbance that the estimate does not yet contain, `a (1 / we^2 + dt^2 / 2)`.
     pub fn innovation_bound(&self, dt: f64) -> f64 {
         let lag = 1.0 / self.noise.bandwidth;
         MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.reading_errors.deviation)
@@ -144,9 +146,9 @@ impl EstimatorConstants {
 }
 
 impl Estimator {
-    /// Begins with an error at an instant, predicted from a measurement before it; nothing was sent, and the disturbance is
-    /// unknown: the payload may be another.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Starts with an error at `begin_ns`, predicted from an earlier measurement. No acceleration has been
+    /// sent. The disturbance starts at zero, because the payload may have changed.
+    // Rarely called, hence out of line: the cycle stays short.
     #[inline(never)]
     pub fn start(
         &mut self,
@@ -161,8 +163,8 @@ impl Estimator {
         self.sent.clear();
     }
 
-    /// Corrects the estimate by the measured error at an instant; rates where they are used. Returns the innovation: measured
-    /// minus predicted. A measurement that is not newer changes nothing.
+    /// Corrects the estimate by the measured error at an instant, and by its rate if rates are used. Returns
+    /// the innovation, measured minus predicted. A measurement that is not newer than the last has no effect.
     pub fn correct(
         &mut self,
         constants: &EstimatorConstants,
@@ -177,22 +179,22 @@ impl Estimator {
         Some(filter.correct(constants, time_ns, measured))
     }
 
-    /// Time since the last measurement \[s\].
+    /// Time from the last measurement to an instant \[s\].
     pub fn interval_s(&self, time_ns: u64) -> f64 {
         seconds_between(self.filter.time_ns, time_ns)
     }
 
-    /// The estimate at the instant of the last measurement.
+    /// Estimate at the instant of the last measurement.
     pub fn state(&self) -> &ErrorEstimate {
         &self.filter.state
     }
 
-    /// Moves the estimate from the instant of the last measurement to a later one.
+    /// Advances an estimate from the instant of the last measurement to a later one.
     pub fn predict(&self, state: &mut ErrorEstimate, instant_ns: u64) {
         self.sent.advance(state, self.filter.time_ns, instant_ns);
     }
 
-    /// Records the acceleration that feedback sends, after all limits, and the instant from which on it acts.
+    /// Records the feedback acceleration that is sent, after all limits, and the instant from which it acts.
     pub fn record_sent(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
         self.sent.record(begin_ns, acceleration);
     }

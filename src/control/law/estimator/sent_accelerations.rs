@@ -1,16 +1,17 @@
-//! The accelerations that feedback has sent lately, each until the next begins.
+//! Feedback accelerations that were sent recently. Each acts until the next one begins.
 
 use nalgebra::Vector6;
 
 use crate::control::signals::errors::ErrorEstimate;
 use crate::control::signals::time::seconds_between;
 
-/// Accelerations kept, a power of two: at 10 kHz those of 25 ms, the longest delay of the drives with the age of a measurement.
+/// Number of accelerations kept, a power of two. At 10 kHz they cover 25 ms, the longest delay of the drives
+/// plus age of a measurement.
 pub const CAPACITY: usize = 256;
 
 const ZERO: Vector6<f64> = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
-/// An acceleration and the instant from which on it acts.
+/// Acceleration, and the instant from which it acts.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct SentAcceleration {
@@ -18,13 +19,13 @@ struct SentAcceleration {
     acceleration: Vector6<f64>,
 }
 
-/// Ring of the last accelerations.
+/// Ring buffer of the last accelerations.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control::law::estimator) struct SentAccelerations {
     #[cfg_attr(feature = "daemon", serde(with = "serde_big_array::BigArray"))]
     ring: [SentAcceleration; CAPACITY],
-    /// Number ever recorded; the last has the index of this less one.
+    /// Number of accelerations ever recorded; the last one has index `count - 1`.
     count: usize,
 }
 
@@ -35,7 +36,7 @@ impl Default for SentAccelerations {
 }
 
 impl SentAccelerations {
-    /// Forgets all: until the next one acts there is none.
+    /// Removes all accelerations. None acts until the next one is recorded and begins.
     pub fn clear(&mut self) {
         self.count = 0;
     }
@@ -48,7 +49,7 @@ impl SentAccelerations {
         self.count += 1;
     }
 
-    /// The one recorded so many before the last.
+    /// Acceleration that was recorded `age` before the last one.
     fn recorded(&self, age: usize) -> Option<&SentAcceleration> {
         if age >= self.count.min(CAPACITY) {
             return None;
@@ -56,7 +57,8 @@ impl SentAccelerations {
         self.ring.get((self.count - 1 - age) % CAPACITY)
     }
 
-    /// Moves an error from an instant to a later one, under the accelerations that act between them.
+    /// Advances an error estimate from one instant to a later one, under the accelerations that act in
+    /// between.
     pub fn advance(&self, state: &mut ErrorEstimate, from_ns: u64, to_ns: u64) {
         let mut age = 0;
         while self.recorded(age).is_some_and(|sent| sent.begin_ns > from_ns) {
@@ -67,7 +69,7 @@ impl SentAccelerations {
             let next = age.checked_sub(1).and_then(|age| Some((age, self.recorded(age)?)));
             let end_ns = next.map_or(to_ns, |(_, next)| next.begin_ns.min(to_ns));
             if end_ns > now_ns {
-                // Before the first none acts.
+                // No acceleration acts before the first one begins.
                 let acceleration = acting.map_or(&ZERO, |sent| &sent.acceleration);
                 state.advance(seconds_between(now_ns, end_ns), acceleration);
                 now_ns = end_ns;

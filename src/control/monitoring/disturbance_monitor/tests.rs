@@ -1,4 +1,5 @@
-//! Errors that swing, payloads that change, impacts; and none of them.
+//! Errors that swing, payload changes and impacts are detected; a ringing error and a constant payload are
+//! not.
 
 use core::f64::consts::TAU;
 
@@ -17,7 +18,8 @@ const BOUNDS: DisturbanceBounds = DisturbanceBounds {
     arm_squared: 1.0,
 };
 
-/// The first fault of the estimate, the acceleration of the reference and the sudden disturbance of each instant, and when.
+/// First diagnostic and its time. `at` gives the estimate, the reference acceleration and the sudden
+/// disturbance.
 fn found(at: impl Fn(f64) -> (ErrorEstimate, f64, f64)) -> Option<(DiagnosticCode, f64)> {
     let mut monitor = DisturbanceMonitor::default();
     (0..4000).map(|cycle| 1e-3 * f64::from(cycle)).find_map(|t| {
@@ -45,16 +47,16 @@ fn an_error_that_swings_is_named() {
     for hertz in [7.0, 10.0, 30.0, 100.0] {
         let (code, after_s) = swinging(5e-5, hertz, 0.0).unwrap();
         assert_eq!(code, DiagnosticCode::Oscillation);
-        // A second after control began, or when it has swung for long enough.
+        // A second after control began, or four periods later.
         assert!(after_s < START_S + 4.0 / hertz, "{hertz} Hz: {after_s} s");
         assert_eq!(swinging(3.5e-5, hertz, 0.0), None, "{hertz} Hz");
     }
-    // Motions that are not followed exactly are slow, or the reference shakes as well.
+    // No fault: an inexactly followed slow motion, and a reference that shakes as well.
     assert_eq!(swinging(1e-3, 2.0, 0.0), None);
     assert_eq!(swinging(2e-4, 8.0, 4.0), None);
 }
 
-/// The end of a disturbance at 1.5 s: each swing is less than the one before by a ratio.
+/// End of a disturbance at 1.5 s: each swing is the previous one times `ratio`.
 #[test]
 fn an_error_that_rings_until_it_is_at_rest_is_none() {
     let ringing = |ratio: f64| {
