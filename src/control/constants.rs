@@ -62,10 +62,6 @@ impl Constants {
         let home = KinematicState::new(machine, machine.home_pose());
         let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
-        let at_home = home.sensitivity().condition;
-        let reference_condition = at_home + CONDITION_SHARE * (parameters.condition - at_home);
-        let sine_at_home = universal_sine(machine, home.pose());
-        let universal_sine = MIN_UNIVERSAL_SINE.min(MIN_UNIVERSAL_SINE_PER_HOME * sine_at_home);
         let NoiseModel { bandwidth, period_s, .. } = parameters.noise;
         let lengths_only = NoiseModel { bandwidth, period_s, rate_noise_ratio: None };
         let input_matrix = InputMatrix::at_home(
@@ -76,21 +72,13 @@ impl Constants {
         );
         let Law { saturation, compensates_disturbance, .. } = &parameters.law;
         let disturbance = input_matrix.largest_compensable(saturation);
-        let acts_on_legs = parameters.law.mode.acts_on_legs();
-        let least_missing = least_disturbance(
-            &input_matrix.acceleration_by_force(machine, home.pose()),
-            if acts_on_legs { 1.0 } else { arm },
-            machine.actuator.max_force,
-        );
+        let error_radius = if parameters.law.mode.acts_on_legs() { 1.0 } else { arm };
+        let by_force = input_matrix.acceleration_by_force(machine, home.pose());
+        let least_missing = least_disturbance(&by_force, error_radius, machine.actuator.max_force);
         let expects_forces = parameters.law.mode.includes_inertia();
         let unbounded = Vector6::repeat(f64::INFINITY);
-        let disturbance_bounds = DisturbanceBounds::new(
-            machine,
-            &parameters,
-            &input_matrix,
-            least_missing,
-            if acts_on_legs { 1.0 } else { arm },
-        );
+        let disturbance_bounds =
+            DisturbanceBounds::new(machine, &parameters, &input_matrix, least_missing, error_radius);
         Self {
             disturbance_bounds,
             dynamics: InverseDynamics::new(machine),
@@ -120,10 +108,10 @@ impl Constants {
                 f64::INFINITY,
             ),
             parameters,
-            home,
             arm,
-            reference_condition,
-            universal_sine,
+            reference_condition: reference_condition(&home, parameters.condition),
+            universal_sine: least_universal_sine(machine, &home),
+            home,
         }
     }
 
@@ -136,4 +124,15 @@ impl Constants {
     pub fn machine(&self) -> &Machine {
         self.dynamics.machine()
     }
+}
+
+/// Largest condition of the reference: a part of the way from that at home to the limit of the platform.
+fn reference_condition(home: &KinematicState, limit: f64) -> f64 {
+    let at_home = home.sensitivity().condition;
+    at_home + CONDITION_SHARE * (limit - at_home)
+}
+
+/// Least sine of the angle between a leg and the first axis of its universal joint that the reference keeps.
+fn least_universal_sine(machine: &Machine, home: &KinematicState) -> f64 {
+    MIN_UNIVERSAL_SINE.min(MIN_UNIVERSAL_SINE_PER_HOME * universal_sine(machine, home.pose()))
 }

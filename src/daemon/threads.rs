@@ -71,6 +71,10 @@ struct Flags {
 }
 
 /// Runs the threads until `stop`; the report, and the histograms as CSV.
+#[expect(
+    clippy::too_many_lines,
+    reason = "the one place in which all threads and the queues between them stand side by side"
+)]
 pub(super) fn run(
     loaded: Loaded,
     folders: &Folders,

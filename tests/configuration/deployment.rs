@@ -10,6 +10,7 @@ use super::{FRIED, violations};
 use crate::common::certificate::cases;
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn deployment_is_refused_beyond_what_the_rate_carries() {
     let refused = |text: &str, messages: &[&str]| {
         let found: Vec<_> = violations(&format!("{FRIED}{text}")).iter().map(Violation::to_string).collect();

@@ -27,6 +27,7 @@ fn request(name: &str, more: Value) -> String {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table")]
 fn every_line_has_its_answer() {
     let _turn = turns::beside_others();
     let Controlled { peer: _peer, daemon, plant, machine: _machine } =

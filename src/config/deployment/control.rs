@@ -125,24 +125,17 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
             (orientation_bandwidth_hz, with(orientation_damping_ratio), 1.0),
         ]
     };
+    let mut up_to = |key, default, most| section.number_or(key, default, Bound::UpTo(most));
     let control = Control {
         mode,
         position_bandwidth_hz,
         position_damping_ratio,
         orientation_bandwidth_hz,
         orientation_damping_ratio,
-        engage_position_m: section.number_or("engage_position_m", 0.002, Bound::UpTo(MAX_ENGAGE_M)),
-        engage_orientation_rad: section.number_or(
-            "engage_orientation_rad",
-            0.005,
-            Bound::UpTo(MAX_ENGAGE_RAD),
-        ),
-        following_position_m: section.number_or("following_position_m", 0.02, Bound::UpTo(MAX_FOLLOWING_M)),
-        following_orientation_rad: section.number_or(
-            "following_orientation_rad",
-            0.05,
-            Bound::UpTo(MAX_FOLLOWING_RAD),
-        ),
+        engage_position_m: up_to("engage_position_m", 0.002, MAX_ENGAGE_M),
+        engage_orientation_rad: up_to("engage_orientation_rad", 0.005, MAX_ENGAGE_RAD),
+        following_position_m: up_to("following_position_m", 0.02, MAX_FOLLOWING_M),
+        following_orientation_rad: up_to("following_orientation_rad", 0.05, MAX_FOLLOWING_RAD),
         following_velocity_m_s: section.number_or(
             "following_velocity_m_s",
             DEFAULT_VELOCITY_ERROR_RATIO * limits.reference.position.velocity,

@@ -76,6 +76,7 @@ fn approach(constants: &Constants, is_angle: bool) -> Approach {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "one quantity after the other, from first principles")]
 fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
     let mut samples = RandomVectors::new(71);
     let mut outside = 0;
