@@ -6,7 +6,7 @@
 //! Each step proposes a state a step later (`approach`) and verifies that the stop from there keeps every limit along its
 //! whole way (`verification`). If so, the state is taken, with its stop. Otherwise the reference follows the stop that was
 //! verified before, which needs no check. By induction every limit holds at all times, also if every setpoint is lost.
-//! The assumptions and the proof: `docs/safety.md`.
+//! The assumptions and the proof: `docs/architecture.md`, section "Proof of the verified stop".
 //!
 //! | folder | content |
 //! | --- | --- |

@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 use std::fs;
 
+use hexad::control::signals::diagnostic::DiagnosticCode;
+
 use super::failures::Failure;
 use super::{Cell, Situation};
 
@@ -16,7 +18,7 @@ impl Cell {
     fn text(&self) -> String {
         let farthest = format!("{:.3} mm", 1e3 * self.farthest);
         match self.noticed {
-            Some((code, time_s)) => format!("{} {:.0} ms, {farthest}", code.name(), 1e3 * time_s),
+            Some((code, time_s)) => format!("{}: {:.0} ms, {farthest}", code as u32, 1e3 * time_s),
             None => format!("{NOT_NOTICED}, {farthest}"),
         }
     }
@@ -29,7 +31,7 @@ impl Cell {
         let is_noticed = match self.noticed {
             None => noticed == NOT_NOTICED,
             Some((code, time_s)) => noticed
-                .strip_prefix(code.name())
+                .strip_prefix(&format!("{}:", code as u32))
                 .is_some_and(|rest| number(rest, "ms").is_some_and(|ms| is_near(1e-3 * ms, time_s, TIME_S))),
         };
         is_near(farthest, self.farthest, DISTANCE_M) && is_noticed
@@ -44,7 +46,7 @@ impl Cell {
     }
 }
 
-const NOT_NOTICED: &str = "not noticed";
+const NOT_NOTICED: &str = "not detected";
 /// With rates a length that counts backwards is noticed as rates that differ, which takes 15 ms longer.
 const FARTHER_M: f64 = 7e-4;
 
@@ -89,6 +91,12 @@ pub fn check(head: &str, all: &[Failure], rows: &[Row], is_right: fn(&Cell, &str
     let lines: Vec<Vec<&str>> = lines.map(Iterator::collect).collect();
     assert!(lines.iter().map(|texts| texts[0]).eq(all.iter().map(|(name, _)| *name)), "{FILE}: rows");
     let mut wrong = String::new();
+    let numbers = lines.iter().flat_map(|texts| &texts[1..]);
+    let numbers = numbers.filter_map(|text| text.split_once(':')?.0.parse::<u32>().ok());
+    for code in numbers.filter_map(DiagnosticCode::from_number) {
+        let legend = format!("| {} | {} |", code as u32, code.name());
+        assert!(document.contains(&legend), "{FILE}: no row {legend}");
+    }
     for ((name, _), cells) in rows {
         let texts = lines.iter().find(|texts| texts[0] == *name).unwrap();
         for (text, (cell, situation)) in texts[1..].iter().zip(cells.iter().zip(Situation::ALL)) {
