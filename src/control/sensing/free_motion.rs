@@ -6,7 +6,8 @@
 //! Therefore two measurements without force give the deceleration, and the motion is extrapolated with it:
 //!
 //! ```text
-//! speed(t) = |v| + d t, at least 0       d = (|v| - |v0|) / (t - t0), along the twist, as all legs come to rest at once
+//! speed(t) = |v| + d t, at least 0       d = (|v| - |v0|) / (t - t0)
+//! the twist keeps its direction, as all legs come to rest at once
 //! ```
 //!
 //! Control does not begin in these cases:

@@ -5,7 +5,8 @@
 //! least squares:
 //!
 //! ```text
-//! L_k = L_0 + L' t_k + scatter        deviation of L':  s / sqrt(sum (t_k - mean t)^2),  s^2 = sum scatter^2 / (n - 2)
+//! L_k = L_0 + L' t_k + scatter
+//! deviation of L':  s / sqrt(sum (t_k - mean t)^2),  s^2 = sum scatter^2 / (n - 2)
 //! the platform stands if  |speed of a joint by L'| + 5 deviations <= 1e-3 velocity limits
 //! ```
 //!
