@@ -11,7 +11,7 @@
 //! | 6 | acceleration | `limits.acceleration_*` | kept by the reference |
 //! | 7 | jerk | `limits.jerk_*` | kept by the reference |
 //! | 8 | following error | `control.following_*`, of pose and velocity | fault |
-//! | 9 | condition | `limits.condition` | the reference stops before it; beyond it the platform stops: fault |
+//! | 9 | condition | `limits.condition` | the reference stops before it; the platform beyond it: stop, fault |
 //!
 //! The reference keeps its limits for every setpoint. Under `on_violation = "stop"` a setpoint beyond a limit
 //! is rejected, unless the limit is jerk or condition. A setpoint that the reference falls behind by more
@@ -39,7 +39,7 @@ pub enum Limit {
     Acceleration = 6,
     /// Jerk of the platform, `limits.jerk_*` \[rad/s^3\], \[m/s^3\].
     Jerk = 7,
-    /// Following error while active, `control.following_*` \[rad\], \[m\].
+    /// Following error under control, `control.following_*` \[rad\], \[m\].
     Following = 8,
     /// Condition of the pose, `limits.condition`; without unit.
     Condition = 9,
