@@ -11,7 +11,7 @@
 //! | 6 | acceleration | `limits.acceleration_*` | kept by the reference |
 //! | 7 | jerk | `limits.jerk_*` | kept by the reference |
 //! | 8 | following error | `control.following_*`, of pose and velocity | fault |
-//! | 9 | condition | `limits.condition` | the reference stops before it; the platform beyond it stops: fault |
+//! | 9 | condition | `limits.condition` | the reference stops before it; platform beyond it: stop, fault |
 //!
 //! The reference keeps its limits for every setpoint. Under `on_violation = "stop"` a setpoint beyond a limit
 //! is rejected, unless the limit is jerk or condition. A setpoint that the reference falls behind by more

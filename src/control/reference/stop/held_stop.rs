@@ -10,7 +10,7 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control::reference) enum Phase {
-    /// No stop is needed: the platform does not move.
+    /// The platform does not move: no stop is planned.
     #[default]
     AtRest,
     /// The stop begins at the present motion.
@@ -52,7 +52,7 @@ impl HeldStop {
         if self.is_second_held { second } else { first }
     }
 
-    /// Whether the stop has ended or is not needed: the platform is at rest.
+    /// Whether the platform is at rest: no stop is needed, or the followed stop has ended.
     pub fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::AtRest => true,

@@ -13,12 +13,12 @@
 //! length  <= max(|v|, |v1|) |a|/J + length(v1)    d = 2 sqrt(v/J), length v sqrt(v/J)        below
 //! ```
 //!
-//! **Brake at once**, near a wall, where releasing the brake first would waste room. With `u = v/|v|` and `a
-//! = a_p u + c e`, `c >= 0`, the part across, along e, ends with zero velocity and zero acceleration:
+//! **Brake at once**, near a wall, where releasing the brake first would waste room. With `u = v/|v|` and
+//! `a = a_p u + c e`, `c >= 0`, the part across, along e, ends with zero velocity and zero acceleration:
 //!
 //! ```text
 //! across:  -Jc for (1 + sqrt 1/2) c/Jc, then +Jc for sqrt(1/2) c/Jc,  Jc = 0.8 J c/A;    speed <= c^2/2Jc
-//! along:   meanwhile brakes with A1 = sqrt(A^2 - c^2/2), Jp = sqrt(J^2 - Jc^2), the jerk into braking at most
+//! along:   meanwhile brakes with A1 = sqrt(A^2 - c^2/2), Jp = sqrt(J^2 - Jc^2), jerk into braking at most
 //!          j1 = min(Jp, (a_p + A1) Jc / ((1 - sqrt(1/2)) c));  afterwards with A and J
 //! ```
 //!
