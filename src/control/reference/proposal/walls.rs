@@ -12,7 +12,7 @@
 //! phi is the lesser of the braking curve of the approach, on a share of the limits, and `2 g / T`. Q is the
 //! present twist. T is the duration of the stop, which brakes along V. If a platform slides past fast, a leg
 //! that approaches its end slowly moves on for half of T at its rate. If rotation and translation cancel in a
-//! leg, the one that stops later remains.
+//! leg, the motion that stops later remains.
 //!
 //! The bound on V' is blended in. It holds fully once the wall removes `a^2/j` from V, the change of velocity
 //! while the acceleration builds up. Without blending, V' would jump whenever another wall becomes active,
@@ -55,7 +55,7 @@ const KEPT_RATIO: f64 = 5e-3;
 /// Six walls hold every direction; more contradict each other.
 const SWEEPS: usize = 8;
 const MAX_VISITS: usize = 24;
-/// One sweep in this many visits all walls, the others only the active ones.
+/// Period of the sweeps over all walls. The other sweeps cover only the active walls.
 const FULL_SWEEP: usize = 3;
 /// Visits to walls that take about as long as the examination of a knot.
 const VISITS_PER_WORK: usize = 24;
@@ -175,8 +175,9 @@ impl Walls {
         let (machine, limits) = (constants.machine(), &constants.parameters.limits);
         let x = task_coordinates(&motion.pose, &machine.home);
         let radius = self.radius;
-        // Rates of the Bryan angles: alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w /
-        // c^2. n is the last column of the rotation; c e2 is normal to n and e1.
+        // Rates of the Bryan angles:
+        // alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w / c^2.
+        // n is the last column of the rotation; c e2 is normal to n and e1.
         let [_, beta, ..] = x;
         let (e1, n) = (Vector3::x(), motion.pose.rotation.column(2).into_owned());
         let (s, c) = (n.x, (n.y * n.y + n.z * n.z).sqrt().copysign(libm::cos(beta)));
