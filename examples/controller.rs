@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             ..Input::default()
         });
         if output.state != state || now_ns % 500_000_000 == 0 {
-            let height_mm = 1e3 * (platform.state().pose.position.z - home[5]);
+            let height_mm = 1e3 * (platform.state().pose.position.z - home.b);
             println!(
                 "{t:.3} s: {}, {}; {height_mm:.3} mm",
                 output.state.name(),

@@ -1,4 +1,4 @@
-//! All that stays constant while a controller runs: the machine, the parameters, and what follows from both.
+//! Constants of a running controller: the machine, the parameters, and the values derived from both.
 
 use nalgebra::Vector6;
 
@@ -16,48 +16,50 @@ use crate::model::inverse_geometry::universal_sine;
 use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 
-/// Part of the way from the condition at home to its limit that the reference uses.
+/// Share of the range from the condition at home to its limit that the reference may use.
 const CONDITION_SHARE: f64 = 0.85;
-/// Least sine of the angle between a leg and the first axis of its universal joint, 6 degrees: fewer than any joint leaves.
-/// The moment of the leg's spin grows with the inverse of the third power; there it still changes by less than itself in a
-/// cycle of 10 ms.
+/// Least sine of the angle between a leg and the first axis of its universal joint: 6 degrees, less than any
+/// joint allows. The moment of the leg's spin grows with the inverse third power of the sine. At this angle
+/// the moment still changes by less than itself in a cycle of 10 ms.
 const MIN_UNIVERSAL_SINE: f64 = 0.1;
-/// The same as a ratio of that at home, for machines whose legs are as near to the axes there.
+/// Least sine as a ratio of the sine at home, for machines whose legs are that near to the axes at home.
 const MIN_UNIVERSAL_SINE_PER_HOME: f64 = 0.5;
 
-/// Machine model, parameters and home pose: constant while the controller runs.
+/// Machine model, parameters and home pose; constant while the controller runs.
 #[derive(Clone, Debug)]
 pub struct Constants {
     /// Inverse dynamics of the machine.
     pub dynamics: InverseDynamics,
-    /// Choices of the deployment.
+    /// Parameters, chosen by the deployment.
     pub parameters: Parameters,
-    /// At home.
+    /// Kinematic state at home.
     pub home: KinematicState,
     /// Largest distance of a joint on the platform from C \[m\].
     pub arm: f64,
-    /// Acceleration of the platform by what the law commands.
+    /// Matrix from the acceleration that the law commands to the acceleration of the platform.
     pub input_matrix: InputMatrix,
-    /// Of the estimator under control.
+    /// Constants of the estimator under control.
     pub estimator: EstimatorConstants,
-    /// Square of the least disturbance that may be a force that a drive does not deliver; infinite where the law leaves forces to feedback.
+    /// Square of the least disturbance that may come from a force that a drive does not deliver; infinite if
+    /// the law leaves forces to feedback.
     pub least_missing_acceleration_squared: f64,
     /// Changes of the disturbance that are no fault.
     pub disturbance_bounds: DisturbanceBounds,
-    /// What equal readings of one leg allow.
+    /// Bounds on equal readings of one leg.
     pub(super) frozen_leg: FrozenLegBounds,
-    /// Window in which lengths alone show rest \[s\].
+    /// Length of the window in which lengths alone show rest \[s\].
     pub(super) rest_window_s: f64,
-    /// Of the estimator of the rates of the legs.
+    /// Constants of the estimator of the leg rates.
     pub leg_rates: EstimatorConstants,
-    /// Largest condition of the reference: below that of the platform, for the following error.
+    /// Largest condition of the reference. It is below the platform's limit, to leave room for the following
+    /// error.
     pub reference_condition: f64,
-    /// Least sine of the angle between a leg and the first axis of its universal joint, of the reference.
+    /// Least sine of the angle between a leg and the first axis of its universal joint, for the reference.
     pub universal_sine: f64,
 }
 
 impl Constants {
-    /// Evaluates them.
+    /// Computes the constants of a machine with its parameters.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
         let home = KinematicState::new(machine, machine.home_pose());
         let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
@@ -115,7 +117,8 @@ impl Constants {
         }
     }
 
-    /// Length by which angles of the error become distances \[m\]; errors of legs have no angles.
+    /// Length that converts angles of the error to distances \[m\]; 1 for errors of legs, which have no
+    /// angles.
     pub(super) fn error_radius(&self) -> f64 {
         if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm }
     }

@@ -1,7 +1,8 @@
-//! One cycle of control: from the newest setpoint and measurement to six forces, or the diagnostic why there are none.
+//! One cycle of control: from the newest setpoint and measurement to six forces, or to the reason why there
+//! are none.
 //!
-//! [`Controller::step`] shows the stages in order. Each is a function of its arguments and of the memory of its own
-//! struct, and changes no other memory. A cycle does a bounded amount of work.
+//! [`Controller::step`] shows the stages in order. Each stage is a function of its arguments and of the
+//! memory of its own struct, and changes no other memory. The effort of a cycle is bounded.
 
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
@@ -31,32 +32,33 @@ use crate::model::LEGS;
 use crate::model::machine::Machine;
 use crate::model::rigid::{Motion, Wrench};
 
-/// Result of one cycle: forces, state, and the numbers that explain them.
+/// Result of one cycle: forces, state, and the values that explain them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
     /// State of the controller from this cycle on; it decides whether the forces are valid.
     pub state: State,
     /// Why the state is not active, or soon will not be; code `None` while engaging and active.
     pub diagnostic: Diagnostic,
-    /// The message of the last request carried out or refused.
+    /// Message of the last request that was carried out or refused.
     pub answered_message: MessageId,
     /// Why that request was refused; code `None` if it was not.
     pub request_diagnostic: Diagnostic,
     /// Forces \[N\]; zero unless the state has control.
     pub force: [f64; LEGS],
-    /// Wrench of the forces minus that of the commanded ones, about C: not zero where forces are limited.
+    /// Wrench of the forces minus the wrench of the commanded forces, about C; zero unless forces are
+    /// limited.
     pub wrench_error: Wrench,
-    /// The limits that this cycle has reached, or nearly.
+    /// Limits that this cycle has reached, or nearly.
     pub active_limits: LimitSet,
     /// Cycles under control without a new valid measurement, since start.
     pub missed_measurements: u64,
     /// Cycles under control without a new valid setpoint, since start.
     pub missed_setpoints: u64,
-    /// The measured state of the platform; `None` if the pose is unknown.
+    /// Measured state of the platform; `None` if the pose is unknown.
     pub platform: Option<PlatformState>,
     /// Reference minus measured under control; else setpoint minus measured, if both are known.
     pub error: Option<PoseError>,
-    /// The reference at the end of the hold of this cycle's force, under control.
+    /// Reference at the end of this cycle's hold of the force, under control.
     pub reference: Option<Motion>,
 }
 
@@ -67,7 +69,8 @@ pub struct Controller {
     memory: Memory,
 }
 
-/// All of a controller that changes from cycle to cycle: with it and the inputs what follows can be repeated.
+/// State of a controller that changes from cycle to cycle. With it and the inputs all later cycles can be
+/// repeated.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory {
@@ -87,7 +90,7 @@ pub struct Memory {
 }
 
 impl Controller {
-    /// Waits at the home pose for a first measurement.
+    /// Creates a controller that waits at the home pose for its first measurement.
     pub fn new(machine: &Machine, parameters: Parameters) -> Self {
         let constants = Constants::new(machine, parameters);
         let memory = Memory {
@@ -108,12 +111,12 @@ impl Controller {
         Self { constants, memory }
     }
 
-    /// What it remembers after the last cycle.
+    /// Memory after the last cycle.
     pub fn memory(&self) -> &Memory {
         &self.memory
     }
 
-    /// Goes on from a memory, which a controller of the same machine and parameters had.
+    /// Continues from a memory of a controller with the same machine and parameters.
     pub fn set_memory(&mut self, memory: Memory) {
         self.memory = memory;
     }
@@ -123,10 +126,12 @@ impl Controller {
         self.memory.supervisor.current.state
     }
 
-    /// Exchanges the constants for those of a controller of the same machine before its first cycle. Not under control.
+    /// Exchanges the constants with a new controller of the same machine, before its first cycle. Not allowed
+    /// under control.
     ///
-    /// What was proved or accepted by the old constants is forgotten; pose, state and statistics remain.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Results that were proved or accepted with the old constants are forgotten. Pose, state and statistics
+    /// remain.
+    // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     pub fn exchange_constants(&mut self, new: &mut Self) {
         core::mem::swap(&mut self.constants, &mut new.constants);
@@ -134,7 +139,7 @@ impl Controller {
         self.memory.setpoints.forget();
     }
 
-    /// One cycle. Depends on nothing but the state of the controller and `input`.
+    /// Runs one cycle. The output depends only on the state of the controller and on `input`.
     pub fn step(&mut self, input: &Input) -> Output {
         let Self { constants, memory } = self;
         let Memory { measurements, setpoints, localization, supervisor, reference, .. } = memory;
@@ -198,7 +203,7 @@ impl Controller {
 
         let mut output = Output::new(supervisor, &limited, error);
         output.active_limits = active_limits.union(reference.active_limits()).union(limited.active_limits);
-        // Written where they stay: the largest fields, and the count, which `located` holds borrowed until here.
+        // Written in place: the largest fields, and the count, whose struct `located` borrows until here.
         output.platform = located.as_ref().ok().map(|located| located.platform);
         (output.missed_measurements, output.missed_setpoints) = (measurements.missed, setpoints.missed);
         output.reference = output.state.has_control().then(|| *reference.motion());
@@ -207,7 +212,7 @@ impl Controller {
 }
 
 impl Output {
-    /// That of a state, without the motions of platform and reference, and without counts.
+    /// Output of a state, without the motions of platform and reference, and without counts.
     #[inline(always)]
     fn new(supervisor: &Supervisor, limited: &LimitedForces, error: Option<PoseError>) -> Self {
         let LimitedForces { force, wrench_error, active_limits } = *limited;
@@ -228,8 +233,8 @@ impl Output {
     }
 }
 
-/// Error of the platform: under control against the reference, else against the setpoint. Under control it gives the platform
-/// the estimated twist where the driver sends no rates.
+/// Error of the platform: from the reference under control, else from the setpoint. Under control it also
+/// sets the platform's twist to the estimate if the driver sends no rates.
 #[inline(always)]
 fn platform_error(
     cycle: &Cycle<'_>,
@@ -248,8 +253,8 @@ fn platform_error(
     Some(error)
 }
 
-/// Without control, places the reference where control would begin, and verifies a stop from there; why control does not begin
-/// if none keeps every limit.
+/// Without control, places the reference where control would begin, and verifies a stop from there. If no
+/// stop keeps every limit, returns the reason why control does not begin.
 #[inline(always)]
 pub(in crate::control) fn verify_start(
     cycle: &Cycle<'_>,
@@ -267,7 +272,8 @@ pub(in crate::control) fn verify_start(
     })
 }
 
-/// Moves the reference on to the end of the hold of this cycle's force. Returns the motion that the force shall give.
+/// Moves the reference to the end of this cycle's hold of the force. Returns the motion that the force must
+/// produce.
 #[inline(always)]
 fn advance(
     cycle: &Cycle<'_>,
@@ -278,8 +284,8 @@ fn advance(
     are_drives_ready: bool,
 ) -> Motion {
     let Parameters { period_ns, limits, .. } = &cycle.constants.parameters;
-    // Until the drives are ready the reference stays where it is, or comes to rest. So it does in the first cycle, in which
-    // its stop was verified: there is one examination in a cycle.
+    // Until the drives are ready the reference stays at its pose or comes to rest. The first cycle does the
+    // same, because its stop was verified in this cycle and a cycle has one examination.
     let is_waiting = !cycle.state.has_control() || next == State::Engaging && !are_drives_ready;
     let target = setpoint.target_in(cycle.constants, next).filter(|_| !is_waiting);
     reference.set_closing_scale(if next == State::Engaging { limits.autonomous_scale } else { 1.0 });

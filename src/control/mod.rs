@@ -1,7 +1,8 @@
-//! Control of the platform: from setpoints and measurements to six forces. No allocation, no I/O, no clock, no panic.
+//! Control of the platform: from setpoints and measurements to six forces. No allocation, no I/O, no clock,
+//! no panic.
 //!
-//! [`controller::Controller::step`] is a pure function of its state and its input: every run can be
-//! replayed bit for bit. Its stages in the order of a cycle:
+//! [`controller::Controller::step`] is a pure function of its state and its input: every run can be replayed
+//! bit for bit. Its stages in the order of a cycle:
 //!
 //! | stage | folder |
 //! | --- | --- |
@@ -13,8 +14,8 @@
 //! | reference | [`mod@reference`] |
 //! | control law, forces | [`law`] |
 //!
-//! What the stages pass to each other is in [`signals`], what a deployment chooses in [`parameters`], what follows from it in
-//! [`constants`]. The checks of all stages return a [`signals::diagnostic`].
+//! [`signals`] contains the types that the stages exchange, [`parameters`] the choices of a deployment,
+//! [`constants`] the values derived from them. The checks of all stages return a [`signals::diagnostic`].
 
 pub mod constants;
 pub mod controller;

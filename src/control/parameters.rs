@@ -1,4 +1,4 @@
-//! Parameters of a controller: what a deployment chooses.
+//! Parameters of a controller, chosen by a deployment.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -19,18 +19,18 @@ pub struct Parameters {
     pub period_ns: u64,
     /// Control law with its gains.
     pub law: Law,
-    /// What the gains of the estimator follow from.
+    /// Noise from which the gains of the estimator are computed.
     pub noise: NoiseModel,
-    /// Errors of the readings of lengths.
+    /// Errors of the measured lengths.
     pub reading_errors: ReadingErrors,
-    /// From the release to the instant at which its force begins to act \[ns\].
+    /// Time from the release to the instant at which its force begins to act \[ns\].
     pub force_delay_ns: u64,
-    /// Which terms of the dynamics are evaluated. Inertia must be one of them: the law commands an
+    /// Terms of the dynamics that are evaluated. Inertia must be one of them: the law commands an
     /// acceleration, and without inertia there would be no feedback.
     pub fidelity: Fidelity,
-    /// Of every reference.
+    /// Limits of every reference.
     pub limits: Limits,
-    /// Where setpoints may be; `None` is without bounds.
+    /// Range of the setpoints; `None` means no bounds.
     pub envelope: Option<Envelope>,
     /// Largest condition of the pose, see [`crate::model::sensitivity`].
     pub condition: f64,
@@ -40,15 +40,16 @@ pub struct Parameters {
     pub on_violation: ViolationPolicy,
     /// Acceleration that feedback may add to the limits, as a ratio of them.
     pub feedback_scale: f64,
-    /// Change of the payload under control that is no fault \[kg\]; `None`: the default of the machine.
+    /// Change of the payload under control that is no fault \[kg\]; `None` means the default of the machine.
     pub payload_change_kg: Option<f64>,
-    /// Sudden disturbance that is no impact \[m/s^2\]; `None` is the default, which follows from the limit of acceleration.
+    /// Sudden disturbance that is no impact \[m/s^2\]; `None` means the default, which follows from the
+    /// acceleration limit.
     pub disturbance_step: Option<f64>,
     /// Distance that the reference keeps from the ends of the stroke \[m\].
     pub stroke_margin: f64,
-    /// Largest velocity error while active \[m/s\].
+    /// Largest velocity error under control \[m/s\].
     pub following_velocity: f64,
-    /// Largest angular velocity error while active \[rad/s\].
+    /// Largest angular velocity error under control \[rad/s\].
     pub following_angular_velocity: f64,
     /// Goal of the stop of a platform that lost its setpoint.
     pub after_loss: AfterStop,
@@ -56,21 +57,21 @@ pub struct Parameters {
     pub engage_position: f64,
     /// Largest orientation error at which control may begin \[rad\].
     pub engage_orientation: f64,
-    /// Largest position error while active \[m\].
+    /// Largest position error under control \[m\].
     pub following_position: f64,
-    /// Largest orientation error while active \[rad\].
+    /// Largest orientation error under control \[rad\].
     pub following_orientation: f64,
-    /// Age from which on a setpoint counts as lost.
+    /// Age from which on a setpoint counts as lost \[ns\].
     pub setpoint_timeout_ns: u64,
-    /// Age from which on a measurement counts as lost.
+    /// Age from which on a measurement counts as lost \[ns\].
     pub measured_timeout_ns: u64,
     /// Longest wait for drives that are not ready when control begins \[ns\].
     pub ready_timeout_ns: u64,
-    /// Largest difference of a length from that of a pose measured by another sensor \[m\].
+    /// Largest difference between a measured length and the length at the pose of another sensor \[m\].
     pub pose_tolerance: f64,
-    /// Largest age of a measurement that arrives: the loop is stable if all are as old.
+    /// Largest age of a measurement on arrival \[ns\]: the loop is stable if all measurements are as old.
     pub max_age_at_arrival_ns: u64,
-    /// Longest time between two cycles of a daemon that runs, also without messages \[ns\].
+    /// Longest time between two cycles of a running daemon, also without messages \[ns\].
     pub longest_pause_ns: u64,
 }
 
@@ -80,8 +81,8 @@ impl Parameters {
         self.period_ns as f64 * 1e-9
     }
 
-    /// An error over the engage tolerance, the largest of its four parts. A velocity error is
-    /// divided by `wn = sqrt(Kp)`, so that it compares with a pose error.
+    /// Error as a ratio of the engage tolerance, the largest of its four parts. A velocity error is divided
+    /// by `wn = sqrt(Kp)`, so that it compares with a pose error.
     pub(super) fn tolerance_ratio(&self, error: &PoseError) -> f64 {
         let Self { law, engage_position, engage_orientation, .. } = self;
         let PoseError { pose, twist } = error;
@@ -99,13 +100,14 @@ impl Parameters {
     }
 }
 
-/// Reaction to a setpoint that the limits do not allow to follow, `[setpoint] on_violation`.
+/// Reaction to a setpoint that the limits do not allow to follow: `[setpoint] on_violation`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ViolationPolicy {
     /// The platform comes to rest, which is a fault. For trajectories that were checked before.
     #[default]
     Stop,
-    /// The platform follows as near as the limits allow, without a fault. For people, joysticks and simulators.
+    /// The platform follows as near as the limits allow, without a fault. For people, joysticks and
+    /// simulators.
     Limit,
 }
 

@@ -15,8 +15,8 @@ pub fn sentence(diagnostic: &Diagnostic) -> String {
     if code.comparison() != Comparison::Processes || *bound == 0.0 {
         return diagnostic.to_string();
     }
-    let [counts, ignored] = [value, bound].map(|number| named(*number as u32));
-    format!("{}: {counts} counts, {ignored} does not; {}", code.name(), code.remedy())
+    let [used, ignored] = [value, bound].map(|number| named(*number as u32));
+    format!("{}: {used} is used, {ignored} is ignored; {}", code.name(), code.remedy())
 }
 
 /// Number and command of a process.
@@ -39,11 +39,13 @@ mod tests {
         assert!(!name.is_empty());
         let two = Diagnostic::new(DiagnosticCode::TwoMeasuredSources, this.into(), f64::from(u32::MAX));
         let expected = format!(
-            "two sources of measurements: process {this} ({name}) counts, process {} (ended) does not; end one of them",
+            "two sources of measurements: process {this} ({name}) is used, process {} (ended) is ignored; end one of them",
             u32::MAX
         );
         assert_eq!(sentence(&two), expected);
-        assert!(two.to_string().contains(&format!(": process {this} counts, process {} does not", u32::MAX)));
+        assert!(
+            two.to_string().contains(&format!(": process {this} is used, process {} is ignored", u32::MAX))
+        );
         let other = Diagnostic::new(DiagnosticCode::SetpointTooFar, 2.0, 1.0);
         assert_eq!(sentence(&other), other.to_string());
     }

@@ -241,7 +241,7 @@ fn what_the_reference_is_held_back_from_says_so() {
 #[test]
 fn a_diagnostic_is_a_sentence_with_value_bound_and_remedy() {
     let near_singular = Diagnostic::new(DiagnosticCode::NearSingular, 143.21, 100.0).to_string();
-    assert!(near_singular.contains("condition 143.21 exceeds limits.condition 100;"), "{near_singular}");
+    assert!(near_singular.contains("condition 143.21 exceeds the bound by limits.condition, 100;"), "{near_singular}");
     let stroke = Diagnostic::new(DiagnosticCode::LengthOutOfStroke, 0.5, 1.076).at(2).to_string();
     assert!(stroke.contains("leg length 0.5 m of leg 3 is outside the stroke"), "{stroke}");
     assert!(stroke.contains(" 1.076 m; check the encoders"), "{stroke}");
@@ -250,7 +250,7 @@ fn a_diagnostic_is_a_sentence_with_value_bound_and_remedy() {
     let fast = Diagnostic::new(DiagnosticCode::SetpointTooFast, 4.0, 1.0).to_string();
     assert!(fast.contains("the setpoint is 4 times the limit in [limits]"), "{fast}");
     let lost = Diagnostic::new(DiagnosticCode::NearSingular, f64::INFINITY, 1e-7).to_string();
-    assert!(lost.contains("condition inf exceeds limits.condition 0.0000001;"), "{lost}");
+    assert!(lost.contains("condition inf exceeds the bound by limits.condition, 0.0000001;"), "{lost}");
     assert_eq!(
         Diagnostic::from(DiagnosticCode::NoMeasurement).to_string(),
         "no measurement; start the driver or the plant"

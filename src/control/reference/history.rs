@@ -1,10 +1,11 @@
-//! The reference of the last cycles: its motion at the instant of a measurement.
+//! History of the reference over the last cycles, for its motion at the instant of a measurement.
 
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-/// Segments kept, a power of two: at 1 kHz those of 128 ms, at 20 kHz of 6 ms. An older instant, as that of a measurement behind a
-/// longer delay of the drives, is extrapolated at constant acceleration: by 5 um in 4 ms at a jerk of 500 m/s^3.
+/// Number of segments kept, a power of two: 128 ms at 1 kHz, 6 ms at 20 kHz. The motion at an older instant,
+/// as of a measurement behind a longer delay of the drives, is extrapolated at constant acceleration. The
+/// error is 5 um in 4 ms at a jerk of 500 m/s^3.
 const SEGMENT_COUNT: usize = 128;
 
 /// Motion of the reference from one instant to the next, with constant jerk.
@@ -16,13 +17,13 @@ struct Segment {
     jerk: Acceleration,
 }
 
-/// Ring of the last segments.
+/// Ring buffer of the last segments.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct History {
     #[cfg_attr(feature = "daemon", serde(with = "serde_big_array::BigArray"))]
     segments: [Option<Segment>; SEGMENT_COUNT],
-    /// Number of segments ever recorded; the last has the index of this less one.
+    /// Number of segments ever recorded; the last one has the index `count - 1`.
     count: usize,
 }
 
@@ -33,12 +34,12 @@ impl Default for History {
 }
 
 impl History {
-    /// Forgets everything.
+    /// Forgets all segments.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Records the segment from `motion` at `begin_ns` to another acceleration `dt` seconds later.
+    /// Records the segment from `motion` at `begin_ns` to the acceleration `next`, `dt` seconds later.
     pub fn record(&mut self, begin_ns: u64, motion: &Motion, next: &Acceleration, dt: f64) {
         let jerk = Acceleration::from_vector(&((next.vector() - motion.acceleration.vector()) / dt));
         if let Some(slot) = self.segments.get_mut(self.count % SEGMENT_COUNT) {
@@ -47,13 +48,14 @@ impl History {
         self.count += 1;
     }
 
-    /// The motion at an instant, extrapolated before the first and after the last segment.
+    /// Motion at an instant, extrapolated before the first and after the last segment.
     pub fn motion_at(&self, instant_ns: u64) -> Option<Motion> {
         let kept = self.count.min(SEGMENT_COUNT);
         let recorded =
             |age: usize| self.segments.get((self.count - age) % SEGMENT_COUNT).and_then(Option::as_ref);
         let contains = |age| recorded(age).is_some_and(|segment| segment.begin_ns <= instant_ns);
-        // The newest that begins no later: most often one of the last, else by bisection.
+        // The newest segment that begins no later than the instant: most often one of the last, else found by
+        // bisection.
         let (mut newer, mut older) = (0, 1);
         while older < kept && !contains(older) {
             (newer, older) = (older, 2 * older);
@@ -74,7 +76,7 @@ impl History {
 impl Segment {
     fn motion_at(&self, instant_ns: u64) -> Motion {
         let t = seconds_between(self.begin_ns, instant_ns);
-        // Before the first segment the motion had no other jerk that would be known.
+        // The jerk before the first segment is unknown and taken as zero.
         let jerk = if t > 0.0 { self.jerk.vector() } else { Acceleration::default().vector() };
         let Motion { pose, twist, acceleration } = &self.motion;
         let (v, a) = (twist.vector(), acceleration.vector());

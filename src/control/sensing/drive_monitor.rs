@@ -1,7 +1,7 @@
-//! Status that a driver reports of its drives: whether they are enabled, their brakes open, and the forces that arrive.
+//! Supervision of the drives by the status that their driver reports: enabled, brakes open, actual forces.
 //!
-//! A driver reports what it has; what it does not report is not checked. After `engage` the platform is held where it stands until
-//! all drives are ready.
+//! Only what the driver reports is checked. After `engage` the platform is held at its pose until all drives
+//! are ready.
 
 use crate::control::cycle::Cycle;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
@@ -9,35 +9,37 @@ use crate::control::signals::inputs::Measurement;
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
 
-/// Time for which a drive that was ready may report that it is not \[s\]: one message may be wrong, and a brake that closes against
-/// its motor is noticed by the motion as well.
+/// Time for which a drive that was ready may report that it is not \[s\]. One message may be wrong. A brake
+/// that closes against its motor also shows in the motion.
 const MAX_UNREADY_S: f64 = 0.02;
 
-/// Time constant of commanded and actual forces \[s\]: several times the dead time of a drive, so that it does not count.
+/// Time constant of the filters of commanded and actual forces \[s\]: several times the dead time of a drive,
+/// so that the dead time does not count.
 const FORCE_TIME_CONSTANT_S: f64 = 0.03;
-/// Plausible difference between the two, as a ratio of the command and of the largest force: scale, offset and friction of a drive.
+/// Plausible difference between actual and commanded force: this ratio of the command plus the next ratio of
+/// the largest force. It allows for scale, offset and friction of a drive.
 const FORCE_DIFFERENCE_RATIO: f64 = 0.2;
 const FORCE_OFFSET_RATIO: f64 = 0.02;
-/// Time for which the difference may be larger \[s\]: after a step of the command the actual force is behind.
+/// Time for which the difference may be larger \[s\]: after a step of the command the actual force lags.
 const MAX_MISSING_S: f64 = 0.05;
 
-/// Supervision of the drives.
+/// Checks of the drives' status over time.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct DriveMonitor {
-    /// Force of the cycle before \[N\].
+    /// Forces sent in the previous cycle \[N\].
     sent: [f64; LEGS],
     commanded: [f64; LEGS],
     actual: [f64; LEGS],
     /// Time for which each force has been missing \[s\].
     missing_s: [f64; LEGS],
-    /// When all were ready last, or control began \[ns\].
+    /// Last instant at which all drives were ready, or the start of control \[ns\].
     ready_ns: u64,
-    /// Of the newest measurement \[ns\].
+    /// Time stamp of the newest measurement \[ns\].
     measured_ns: u64,
-    /// Whether all drives were ready since control began.
+    /// Whether all drives have been ready since control began.
     has_been_ready: bool,
-    /// Whether all are ready now, or nothing is reported.
+    /// Whether all drives are ready, or the driver does not report it.
     pub is_ready: bool,
 }
 
@@ -46,7 +48,8 @@ impl DriveMonitor {
     #[inline(never)]
     pub fn check(&mut self, cycle: &Cycle<'_>, measurement: Option<&Measurement>) -> Result<(), Diagnostic> {
         let Some(Measurement { drives, time_ns, .. }) = measurement else { return Ok(()) };
-        // A driver that is silent says nothing about the force that is sent meanwhile.
+        // The actual force during a gap in the messages is unknown: a gap counts as one time constant at
+        // most.
         let dt = seconds_between(self.measured_ns, *time_ns).clamp(0.0, FORCE_TIME_CONSTANT_S);
         self.measured_ns = *time_ns;
         let unready = drives.unready();
@@ -67,7 +70,7 @@ impl DriveMonitor {
         }
     }
 
-    /// Records the force that is sent in this cycle.
+    /// Records the forces that are sent in this cycle.
     pub fn record_sent(&mut self, force: &[f64; LEGS]) {
         self.sent = *force;
     }

@@ -1,7 +1,7 @@
-//! Comparison of a pose that another sensor measures with the leg lengths.
+//! Comparison of the measured leg lengths with a pose from another sensor.
 //!
-//! A wrong homing, a wrong scale or a slipped encoder moves the pose of forward kinematics, and with lengths alone nothing contradicts
-//! it. The lengths that the other pose has say which leg is wrong.
+//! A wrong homing, a wrong scale or a slipped encoder shifts the pose of forward kinematics. Lengths alone
+//! cannot reveal this error. The lengths at the external pose show which leg is wrong.
 
 use crate::control::cycle::Cycle;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
@@ -11,10 +11,11 @@ use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::task::TaskState;
 
-/// Time constant of the differences \[s\]: noise of a tracker fades, and slips and drifts are slower.
+/// Time constant of the filtered differences \[s\]: long enough to average the noise of a tracker; slips and
+/// drifts are slower.
 const TIME_CONSTANT_S: f64 = 0.03;
 
-/// Differences between measured lengths and those of the other pose.
+/// Filtered differences between the measured lengths and the lengths at the external pose.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct ExternalPose {
@@ -23,7 +24,8 @@ pub(in crate::control) struct ExternalPose {
 }
 
 impl ExternalPose {
-    /// Compares the two of a measurement, if it has both. One that was compared before changes nothing.
+    /// Compares lengths and external pose of a measurement that has both. A repeated measurement changes
+    /// nothing.
     #[inline(never)]
     pub fn check(&mut self, cycle: &Cycle<'_>, measurement: Option<&Measurement>) -> Result<(), Diagnostic> {
         let Some((measurement, x)) = measurement.and_then(|new| Some((new, new.pose?))) else {
@@ -32,7 +34,7 @@ impl ExternalPose {
         };
         let constants = cycle.constants;
         let dt = seconds_between(self.time_ns, measurement.time_ns).max(0.0);
-        // The first counts as it is.
+        // The first difference is taken unfiltered.
         let share = (dt / TIME_CONSTANT_S).min(1.0);
         self.time_ns = measurement.time_ns;
         let length = leg_lengths(constants.machine(), &TaskState::at_rest(x).motion().pose);
@@ -41,7 +43,7 @@ impl ExternalPose {
         let mut largest = (0.0, 0);
         for (leg, (difference, (measured, expected))) in pairs.enumerate() {
             *difference += (measured - expected - *difference) * share;
-            // Also what is no number.
+            // Also true for NaN.
             if !(difference.abs() <= largest.0) {
                 largest = (difference.abs(), leg);
             }

@@ -1,18 +1,22 @@
-//! Motion of a platform without force: its pose and twist at the instant at which the force of this cycle begins, and with it
-//! control.
+//! Motion of a platform without force: pose and twist at the instant at which this cycle's force, and with it
+//! control, would begin.
 //!
-//! A measurement is older than that, and meanwhile closing brakes have changed the twist: by 0.2 m/s within 20 ms at
-//! twice gravity. A reference that began with the measured twist would leave the platform at once. So two measurements
-//! without force give the deceleration, and the motion goes on with it:
+//! A measurement is older than that instant. In between, closing brakes change the twist: by 0.2 m/s within
+//! 20 ms at twice gravity. A reference that began with the measured twist would leave the platform at once.
+//! Therefore two measurements without force give the deceleration, and the motion is extrapolated with it:
 //!
 //! ```text
-//! speed(t) = |v| + d t, at least 0       d = (|v| - |v0|) / (t - t0), along the twist, as all legs come to rest at once
+//! speed(t) = |v| + d t, at least 0       d = (|v| - |v0|) / (t - t0)
+//! the twist keeps its direction, as all legs come to rest at once
 //! ```
 //!
-//! Until there are two, the motion of a platform that moves is unknown, and control does not begin. Where the driver sends no rates,
-//! it begins at rest only, which the lengths have to show ([`super::standstill`]). Nor does it begin where brakes take a
-//! large part of the velocity limit within a period: until the force acts, which may be some part of a period late, the platform would
-//! have another velocity than its reference. Such brakes soon have it at rest.
+//! Control does not begin in these cases:
+//!
+//! - The platform moves and has no two such measurements yet: its motion is unknown.
+//! - The driver sends no rates, and the lengths do not show rest ([`super::standstill`]).
+//! - Brakes take a large part of the velocity limit within a period. The force may act some part of a period
+//!   late, and the platform would then have another velocity than its reference. Such brakes soon stop the
+//!   platform.
 
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
@@ -24,11 +28,11 @@ use crate::control::signals::limits::largest_ratio;
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
-/// Largest change of the twist within a period with which control begins, over the limits of velocity: a force that acts a fifth of a
-/// period late makes 2 % of them.
+/// Largest change of the twist within a period at which control may begin, as a ratio of the velocity limits.
+/// A force that acts a fifth of a period late then causes an error of 2 % of them.
 const MAX_CHANGE_RATIO: f64 = 0.1;
 
-/// What a measurement without force has shown.
+/// State of the platform at a measurement without force.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Sample {
@@ -55,20 +59,20 @@ fn speed(constants: &Constants, twist: &Twist) -> f64 {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct FreeMotion {
-    /// The instant until which the last force was held \[ns\].
+    /// Instant until which the last force was held \[ns\].
     held_until_ns: u64,
-    /// Of the newest measurement \[ns\].
+    /// Time stamp of the newest measurement \[ns\].
     newest_ns: Option<u64>,
-    /// The last two, if both have rates.
+    /// The last two measurements; `None` without rates.
     before: Option<Sample>,
     last: Option<Sample>,
-    /// All lengths.
+    /// Test for rest by the lengths of all measurements.
     standstill: Standstill,
 }
 
 impl FreeMotion {
-    /// The motion at the instant at which the force of a cycle that begins without one would begin; why control does not begin if it
-    /// is unknown.
+    /// Motion at the instant at which this cycle's force would begin, in a cycle that begins without control.
+    /// If the motion is unknown, returns the reason why control does not begin.
     pub fn update(
         &mut self,
         cycle: &Cycle<'_>,
@@ -77,9 +81,9 @@ impl FreeMotion {
     ) -> Result<Motion, Diagnostic> {
         let Cycle { constants, release_ns, state } = *cycle;
         let begin_ns = release_ns.saturating_add(constants.parameters.force_delay_ns);
-        // Where the pose is unknown, what came before is another motion.
+        // Under control or with an unknown pose, earlier measurements belong to another motion.
         let Some(located) = located.filter(|_| !state.has_control()) else {
-            // The force of the cycle before is held until that of this one would begin, at most a period late.
+            // The previous force is held until this cycle's force would begin, at most a period late.
             let held_until_ns = begin_ns.saturating_add(constants.parameters.period_ns);
             let held_until_ns = if state.has_control() { held_until_ns } else { self.held_until_ns };
             *self = Self { held_until_ns, ..Self::default() };
@@ -100,7 +104,7 @@ impl FreeMotion {
         }
     }
 
-    /// Rest, if the lengths show it.
+    /// Motion at rest, if the lengths show rest.
     fn at_rest(
         &self,
         constants: &Constants,
@@ -138,14 +142,14 @@ impl FreeMotion {
             in_period.linear.norm() / limits.position.velocity,
             in_period.angular.norm() / limits.orientation.velocity,
         ]);
-        // Of a platform that will be at rest, the speed is known.
+        // If the platform will be at rest by then, its speed is known.
         if share > 0.0 && change_ratio > MAX_CHANGE_RATIO {
             return None;
         }
         Some(Motion {
             pose: last.pose.displaced(&scaled(0.5 * (1.0 + share) * moves_s)),
             twist: scaled(share),
-            // That of the brakes ends with them: the drives take over from none.
+            // The deceleration by the brakes ends when they open; the drives begin without acceleration.
             acceleration: Acceleration::default(),
         })
     }

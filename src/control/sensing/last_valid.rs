@@ -1,30 +1,33 @@
-//! Validation of the inputs: whether a measurement or a setpoint is plausible.
+//! Validation that measurements and setpoints have in common: the last valid input, time stamp, stroke.
 //!
-//! A rejected input changes nothing: the last valid one stays and its age keeps counting, so invalid data never
-//! restarts a watchdog. When the timeout is exceeded, the diagnostic is that of the rejection.
+//! A rejected input changes nothing: the last valid input stays and its age keeps growing. Invalid data thus
+//! never restarts a watchdog. After the timeout the diagnostic is the reason of the rejection.
 
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
 use crate::model::machine::Actuator;
 
-/// Tolerance at the ends of the stroke, as a ratio of the stroke: encoders have offsets, end stops have springs.
+/// Tolerance of a measured length at the ends of the stroke, as a ratio of the stroke: encoders have offsets,
+/// end stops have springs.
 const STROKE_TOLERANCE_RATIO: f64 = 0.02;
 
-/// The plausible change grows with the time since the last valid input, for at most this many intervals of the messages,
-/// so that a series of rejected inputs cannot widen it without limit. Two, as one message may get lost. The longest
-/// interval counts: after a pause of the loop the first message may be too old, and the next one shows the motion of the
-/// whole pause.
+/// Largest time over which a change is plausible after a rejection, in intervals of the messages. The
+/// plausible change grows with the time since the last valid input; without this bound a series of rejected
+/// inputs would widen it without limit. Two intervals, because one message may get lost. The longest interval
+/// counts: after a pause of the loop the first message may be too old, and the next one shows the motion of
+/// the whole pause.
 const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
 
-/// The last valid input, and why the one after it was rejected. `Valid` is what a valid input stands for.
+/// The last valid input, and why a later one was rejected. `Valid` is the form in which a valid input is
+/// stored.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct LastValid<Input, Valid> {
     pub valid: Option<Valid>,
-    /// The last input since then, and why it was rejected, or the first of several.
+    /// Last input if it was rejected, with the reason of its rejection or of the first since the valid one.
     rejected: Option<(Input, Diagnostic)>,
-    /// Release of the cycle that validated the last input.
+    /// Release of the cycle that validated the last input \[ns\].
     validated_ns: u64,
     /// Longest time between two inputs since the last valid one \[ns\].
     longest_interval_ns: u64,
@@ -37,13 +40,13 @@ impl<Input, Valid> Default for LastValid<Input, Valid> {
 }
 
 impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid> {
-    /// Whether an input is another than the last one, valid or not: each is validated once.
+    /// Whether an input differs from the last one, valid or rejected. Each input is validated once.
     pub fn is_new(&self, input: &Input) -> bool {
         let valid = || self.valid.as_ref().map(AsRef::as_ref);
         self.rejected.as_ref().map(|(rejected, _)| rejected).or_else(valid) != Some(input)
     }
 
-    /// Upper bound on the time used for the plausible change \[s\]; infinite if no input was rejected since the last
+    /// Longest time over which a change is plausible \[s\]; infinite if no input was rejected since the last
     /// valid one.
     pub fn plausibility_window_s(&self, now_ns: u64, period_ns: u64) -> f64 {
         if self.rejected.is_none() {
@@ -53,13 +56,13 @@ impl<Input: Copy + PartialEq, Valid: Copy + AsRef<Input>> LastValid<Input, Valid
         MAX_PLAUSIBLE_INTERVALS * (interval_ns as f64 * 1e-9)
     }
 
-    /// The longest time between two inputs since the last valid one, if the next is now \[ns\].
+    /// Longest time between two inputs since the last valid one, if the next one comes now \[ns\].
     fn interval_ns(&self, now_ns: u64) -> u64 {
         now_ns.saturating_sub(self.validated_ns).max(self.longest_interval_ns)
     }
 
-    /// Records an input with the result of its validation. With `keep_first` the first of several rejections stays:
-    /// later ones may be rejected merely because the last valid input is old.
+    /// Records an input with the result of its validation. With `keep_first` the first of several reasons
+    /// stays: later inputs may be rejected merely because the last valid one is old.
     pub fn record(
         &mut self,
         input: &Input,
@@ -97,7 +100,7 @@ pub(in crate::control) fn check_time_stamp(
     Err(Diagnostic::new(code, seconds_between(time_ns, now_ns), timeout_ns as f64 * 1e-9))
 }
 
-/// Whether all lengths are within the stroke and the tolerance of a measurement.
+/// Whether all lengths are within the stroke, widened by the tolerance of a measurement.
 pub(in crate::control) fn check_stroke_with_tolerance(
     actuator: &Actuator,
     code: DiagnosticCode,
@@ -106,7 +109,7 @@ pub(in crate::control) fn check_stroke_with_tolerance(
     check_stroke(actuator, STROKE_TOLERANCE_RATIO * actuator.stroke(), code, length)
 }
 
-/// Whether all lengths are within the stroke and `tolerance` \[m\].
+/// Whether all lengths are within the stroke, widened by `tolerance` \[m\].
 pub(in crate::control) fn check_stroke(
     actuator: &Actuator,
     tolerance: f64,

@@ -1,4 +1,5 @@
-//! Rates of the legs where the driver sends none: the estimator without a reference and without a model.
+//! Estimated leg rates for drivers that send none, by the estimator of the control law without reference and
+//! model.
 
 use nalgebra::Vector6;
 
@@ -8,10 +9,10 @@ use crate::control::signals::inputs::Measurement;
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
 
-/// Gap between two measurements \[s\] after which the estimate begins anew, at rest.
+/// Gap between two measurements \[s\] after which the estimate restarts at rest.
 const MAX_GAP_S: f64 = 0.1;
 
-/// Estimator of the rates of the legs. It takes the acceleration of a leg for constant.
+/// Estimator of the leg rates. It assumes that the acceleration of a leg is constant.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct LegRateEstimator {
@@ -19,7 +20,7 @@ pub(in crate::control) struct LegRateEstimator {
 }
 
 impl LegRateEstimator {
-    /// The rates at the instant of a measurement: as measured, or estimated.
+    /// Leg rates at the instant of a measurement, measured or estimated \[m/s\].
     pub fn rates(&mut self, constants: &EstimatorConstants, measurement: &Measurement) -> [f64; LEGS] {
         measurement.rate.unwrap_or_else(|| self.estimated(constants, measurement))
     }

@@ -1,8 +1,10 @@
-//! Pose and twist of the platform from a valid measurement, by forward kinematics along its motion since home.
+//! Pose and twist of the platform from a valid measurement, by forward kinematics that follows the motion
+//! since home.
 //!
-//! Other poses have the same leg lengths (assembly modes). Home is on the right side of every singularity, and the
-//! pose is followed from there without a gap. If the platform may have crossed a singularity, its assembly mode is
-//! uncertain: forces are disabled until an operator has inspected the platform and sent `clear`.
+//! Other poses have the same leg lengths (assembly modes). Home is on the right side of every singularity,
+//! and forward kinematics follows the pose from there without a gap. If the platform may have crossed a
+//! singularity, its assembly mode is uncertain: forces are disabled until an operator has inspected the
+//! platform and sent `clear`.
 
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
@@ -18,13 +20,14 @@ use crate::model::rigid::{Pose, Twist};
 use crate::model::sensitivity::Sensitivity;
 use nalgebra::Vector6;
 
-/// Most Newton steps per cycle under control. One step covers far more than a cycle's motion; after a gap in the
-/// measurements several may be needed.
+/// Most Newton steps per cycle under control. One step covers far more than a cycle's motion; after a gap in
+/// the measurements several may be needed.
 const MAX_NEWTON_STEPS_PER_CYCLE: u32 = 8;
 
-/// Above this condition (or `limits.condition`, if that is less) a change of pose longer than a trusted step, within which
-/// forward kinematics has one solution, may have crossed a singularity. Below it, the singularity is too far away to be
-/// crossed between two measurements.
+/// Condition above which the assembly mode may become uncertain, or `limits.condition` if that is less.
+/// There, a change of pose longer than a trusted step, within which forward kinematics has one solution, may
+/// have crossed a singularity. Below it the singularity is too far away to be crossed between two
+/// measurements.
 const MAX_CERTAIN_CONDITION: f64 = 300.0;
 
 /// Pose and twist of the platform at the instant of a measurement, and how near they are to a singularity.
@@ -34,13 +37,13 @@ pub struct PlatformState {
     pub pose: Pose,
     /// Measured omega \[rad/s\] and v \[m/s\], base axes.
     pub twist: Twist,
-    /// Of the pose, see [`crate::model::sensitivity`].
+    /// Condition of the pose, see [`crate::model::sensitivity`].
     pub condition: f64,
     /// Time to a singular pose if the motion continues \[s\]; infinite if it leads to none.
     pub time_to_singularity: f64,
 }
 
-/// A measurement with the state of the platform it stands for.
+/// A measurement with the state of the platform computed from it.
 pub(in crate::control) struct Located<'a> {
     pub measurement: &'a Measurement,
     /// Rates of the legs, measured or estimated \[m/s\].
@@ -48,11 +51,11 @@ pub(in crate::control) struct Located<'a> {
     pub platform: PlatformState,
 }
 
-/// Rate at which the determinant approaches zero, from one measurement to the next.
+/// Determinant at the last measurement, from which the time to a singularity is extrapolated.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct SingularityApproach {
-    /// Of the last measurement.
+    /// Time stamp of the last measurement \[ns\].
     time_ns: u64,
     determinant: f64,
     time_to_singularity: f64,
@@ -81,7 +84,8 @@ impl Localization {
         }
     }
 
-    /// The platform at the instant of a measurement, by a bounded number of steps of forward kinematics.
+    /// Locates the platform at the instant of a measurement, in a bounded number of steps of forward
+    /// kinematics.
     pub fn locate<'a>(
         &mut self,
         cycle: &Cycle<'_>,
@@ -131,7 +135,7 @@ impl Localization {
         })
     }
 
-    /// The twist of the platform that gives these rates of the legs; `None` at a singular pose.
+    /// Twist of the platform at given leg rates \[m/s\]; `None` at a singular pose.
     pub fn twist_of(&self, constants: &Constants, rate: &Vector6<f64>) -> Option<Twist> {
         self.tracker.kinematic_state().twist(constants.machine(), &(*rate).into())
     }
@@ -143,7 +147,7 @@ impl Localization {
         }
     }
 
-    /// Whether the pose is far enough from singular ones.
+    /// Whether the condition of the pose is within `bound`.
     pub fn check_condition(&self, bound: f64, active: &mut LimitSet) -> Result<(), Diagnostic> {
         let condition = self.tracker.kinematic_state().sensitivity().condition;
         if active.check(Limit::Condition, condition / bound) {
@@ -152,22 +156,22 @@ impl Localization {
         Err(self.near_singular(bound))
     }
 
-    /// Why a pose that is not singular is refused: its condition exceeds a bound.
+    /// Diagnostic of a pose that is not singular, but whose condition exceeds `bound`.
     pub fn near_singular(&self, bound: f64) -> Diagnostic {
         let condition = self.tracker.kinematic_state().sensitivity().condition;
         Diagnostic::new(DiagnosticCode::NearSingular, condition, bound)
     }
 
-    /// Starts again at home, the one pose of which the assembly mode is known.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Restarts at home, the only pose whose assembly mode is known.
+    // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     fn restart(&mut self, home: &KinematicState) {
         self.tracker.restart(home);
     }
 
-    /// Beyond a singularity are poses with the same lengths as before it, and forward kinematics cannot distinguish
-    /// them. Near one the assembly mode is uncertain if the change of pose is so long that the next measurement may
-    /// belong to the other branch.
+    /// Whether the platform may have crossed a singularity. Poses beyond one have the same lengths as poses
+    /// before it, and forward kinematics cannot distinguish them. Near one the assembly mode is uncertain if
+    /// the change of pose is so long that the next measurement may belong to the other branch.
     fn is_assembly_mode_uncertain(&self, constants: &Constants, start: &Pose) -> bool {
         let kinematic_state = self.tracker.kinematic_state();
         let Sensitivity { condition, trusted_step, .. } = *kinematic_state.sensitivity();
@@ -182,7 +186,8 @@ impl Localization {
         *self.assembly_mode_fault.insert(Diagnostic::new(DiagnosticCode::SingularPose, condition, bound))
     }
 
-    /// Diagnostic of lengths that the steps of one cycle do not reach. Its bound is the largest change of a leg reached.
+    /// Diagnostic of lengths that forward kinematics does not reach within a cycle. Its bound is the largest
+    /// change of a length that it reached.
     fn jump_diagnostic(
         &self,
         constants: &Constants,
@@ -195,7 +200,8 @@ impl Localization {
         Diagnostic::new(DiagnosticCode::MeasurementJumped, largest_change(measured), reached)
     }
 
-    /// By linear extrapolation of the determinant: near a singular pose it is linear in time.
+    /// Time to a singularity \[s\], by linear extrapolation of the determinant, which is linear in time near
+    /// a singular pose.
     fn time_to_singularity(&mut self, time_ns: u64, determinant: f64) -> f64 {
         let time_to_singularity = match self.approach {
             Some(last) if last.time_ns == time_ns => return last.time_to_singularity,

@@ -1,4 +1,4 @@
-//! Validation of measurements: stroke, change of lengths and rates, and rates that are those of the lengths.
+//! Validation of measurements: stroke, change of lengths and rates, consistency of rates with lengths.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -12,38 +12,41 @@ use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
 use crate::model::machine::Actuator;
 
-/// Plausible rate of a leg over its largest: an external force may move it faster.
+/// Plausible rate of a leg as a ratio of its largest rate. An external force may move the leg faster than its
+/// drive.
 const LEG_RATE_FACTOR: f64 = 1.5;
 
 /// Change of length that is always plausible, as a ratio of the stroke: noise.
 const LENGTH_NOISE_RATIO: f64 = 1e-3;
 
-/// Tolerance of lengths against integrated rates, as a ratio of the travel: rates are filtered, late, and not
-/// quite to scale. A wrong sign leaves twice the travel, a wrong unit a thousand times.
+/// Tolerance of lengths against integrated rates, as a ratio of the travel: rates are filtered, late and not
+/// quite to scale. A wrong sign gives twice the travel, a wrong unit a thousand times.
 const RESIDUAL_PER_TRAVEL: f64 = 0.3;
 
-/// The constant part of that tolerance, as a ratio of the stroke: noise and delay of the rates. Small, as with a
-/// wrong sign the error of the loop doubles within milliseconds.
+/// Constant part of that tolerance, as a ratio of the stroke: noise and delay of the rates. It is small
+/// because rates of the wrong sign double the error of the loop within milliseconds.
 const RESIDUAL_NOISE_RATIO: f64 = 3e-4;
 
-/// Time constant of residual and travel \[s\]: long against the delay of a filter, short against a motion.
+/// Time constant of residual and travel \[s\]: long compared with the delay of a filter, short compared with
+/// a motion.
 const RESIDUAL_TIME_CONSTANT_S: f64 = 0.03;
 
-/// Acceleration that no drive gives a leg \[m/s^2\], five times gravity: more is an impact. The bound is the larger of
-/// this and ten times the linear acceleration limit.
+/// Largest plausible acceleration of a leg \[m/s^2\], five times gravity. No drive gives more; more is an
+/// impact. The bound is the larger of this value and ten times the linear acceleration limit.
 const MAX_LEG_ACCELERATION_M_S2: f64 = 50.0;
 const ACCELERATION_LIMIT_FACTOR: f64 = 10.0;
 
 /// Change of a rate that is always plausible, as a ratio of the largest rate: noise.
 const RATE_NOISE_RATIO: f64 = 0.02;
 
-/// Lead of a stamp over the release that is plausible, as a ratio of the period: a measurement of the future has not been
-/// made. The estimator would take it for what it is not, by velocity times the lead.
+/// Plausible lead of a stamp over the release, as a ratio of the period. No measurement is made in the
+/// future; the estimator would misplace one by velocity times lead.
 const LEAD_RATIO: f64 = 0.1;
-/// The same at high rates \[ns\]: clocks of processors and of drives agree no better.
+/// Least bound on the lead, for high rates \[ns\]: clocks of processors and of drives agree no better.
 const MIN_LEAD_NS: u64 = 10_000;
 
-/// Difference between each leg's change of length and the integral of its rate, with the travel. Both decay.
+/// Residual and travel of each leg. The residual is the change of length minus the integral of the rate. Both
+/// decay.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct RateConsistency {
@@ -52,7 +55,7 @@ struct RateConsistency {
 }
 
 impl RateConsistency {
-    /// After the step from one measurement to the next, with the rates of both.
+    /// Residual and travel after the step from one measurement to the next, by the trapezoidal rule.
     fn updated(
         &self,
         now: &Measurement,
@@ -77,7 +80,8 @@ impl RateConsistency {
         next
     }
 
-    /// `step_error`: what the trapezoidal rule leaves over of a motion within the limits, from one measurement to the next.
+    /// Whether each residual is within its tolerance. `step_error` \[m\]: error of the trapezoidal rule from
+    /// one measurement to the next, for a motion within the limits.
     fn check(&self, actuator: &Actuator, step_error: f64) -> Result<(), Diagnostic> {
         for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
             let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * actuator.stroke() + step_error;
@@ -105,8 +109,8 @@ pub(in crate::control) struct MeasurementValidator {
 }
 
 impl MeasurementValidator {
-    /// The last valid measurement if it is recent. Under control, the one held before this cycle must also still be within
-    /// the timeout.
+    /// Returns the last valid measurement if it is recent. Under control the measurement that was valid
+    /// before this cycle must be recent, too.
     pub fn validate(
         &mut self,
         cycle: &Cycle<'_>,
@@ -125,8 +129,9 @@ impl MeasurementValidator {
         Ok(valid)
     }
 
-    /// After a pause of the loop the inputs may be fresh again, but meanwhile the drives had no force and the brakes
-    /// closed: control does not continue.
+    /// Whether the inputs continued without a gap under control. After a pause of the loop they may be fresh
+    /// again, but during the pause the drives had no force and the brakes closed. Control does not continue
+    /// then.
     fn check_input_continuity(&self, cycle: &Cycle<'_>) -> Result<(), Diagnostic> {
         let last = self.last.valid.as_ref().filter(|_| cycle.state.has_control());
         last.map_or(Ok(()), |last| self.check_age(cycle, last))
@@ -138,7 +143,7 @@ impl MeasurementValidator {
             .map_err(|lost| self.pause(cycle, measurement).unwrap_or_else(|| self.last.rejection_or(lost)))
     }
 
-    /// The pause of the loop that made a measurement too old, if that is why: not the driver is to blame.
+    /// Diagnostic of a pause of the loop, if the pause and not the driver made a measurement too old.
     fn pause(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Option<Diagnostic> {
         let Parameters { measured_timeout_ns, longest_pause_ns, .. } = cycle.constants.parameters;
         let before_ns = self.released_before_ns;
@@ -149,8 +154,8 @@ impl MeasurementValidator {
             .then(|| Diagnostic::new(DiagnosticCode::DaemonHeld, pause_s, longest_s))
     }
 
-    /// Validates a new measurement and records it. It must continue the last valid one if that is young or the
-    /// platform is under control.
+    /// Validates a new measurement and records it. It must continue the last valid one if that one is recent
+    /// or the platform is under control.
     fn accept(&mut self, cycle: &Cycle<'_>, new: &Measurement) -> Result<(), Diagnostic> {
         let (parameters, now_ns) = (&cycle.constants.parameters, cycle.release_ns);
         let timeout_ns = parameters.measured_timeout_ns;
@@ -171,7 +176,8 @@ impl MeasurementValidator {
     }
 }
 
-/// Whether the legs can be where a measurement says after `before`, and the rates are consistent up to it.
+/// Whether the legs can have moved from `before` to a measurement, and the rates are consistent with the
+/// lengths.
 fn check_measurement(
     cycle: &Cycle<'_>,
     now: &Measurement,
@@ -206,7 +212,7 @@ fn check_measurement(
     }
 }
 
-/// Whether measured rates change as actuators can, and are the derivatives of the lengths.
+/// Whether actuators can change the rates as measured, and the rates are the derivatives of the lengths.
 fn check_rates(
     cycle: &Cycle<'_>,
     [now, before]: [&Measurement; 2],
@@ -221,14 +227,14 @@ fn check_rates(
     let bound = acceleration * plausible_s + RATE_NOISE_RATIO * actuator.max_rate;
     check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
     let updated = consistency.updated(now, before, [rate, before_rate]);
-    // J dt^3 / 12 per step, over the steps of the time constant.
+    // J dt^3 / 12 per step, times the steps within the time constant.
     let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
     updated.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * plausible_s.powi(2) / 12.0)?;
     *consistency = updated;
     Ok(())
 }
 
-/// Whether a stamp is not of the future.
+/// Whether a stamp is not in the future.
 fn check_lead(time_ns: u64, now_ns: u64, period_ns: u64) -> Result<(), Diagnostic> {
     let bound_ns = MIN_LEAD_NS.max((LEAD_RATIO * period_ns as f64) as u64);
     if time_ns <= now_ns.saturating_add(bound_ns) {
@@ -238,8 +244,8 @@ fn check_lead(time_ns: u64, now_ns: u64, period_ns: u64) -> Result<(), Diagnosti
     Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, age_s, -1e-9 * bound_ns as f64))
 }
 
-/// Whether the loop stands measurements of this age. Without new ones the age of the last one may grow further, until the
-/// timeout: that is a gap, after which the loop is what it was.
+/// Whether the loop stays stable with measurements of this age. In a gap without new measurements the age of
+/// the last one may grow further, up to the timeout; after the gap the loop is the same as before.
 fn check_age_at_arrival(time_ns: u64, now_ns: u64, max_age_ns: u64) -> Result<(), Diagnostic> {
     if now_ns.saturating_sub(time_ns) <= max_age_ns {
         return Ok(());

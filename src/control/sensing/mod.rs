@@ -1,11 +1,11 @@
-//! From a measurement to pose and twist of the platform, in the order of the data.
+//! Computation of pose and twist of the platform from a measurement. The files in the order of the data:
 //!
-//! | what | file |
+//! | step | file |
 //! | --- | --- |
-//! | clock of the stamps | `stamp_clock` |
+//! | check the clock of the stamps | `stamp_clock` |
 //! | validate the measurement | `measurement`, with `last_valid` |
-//! | status of the drives, pose by another sensor | `drive_monitor`, `external_pose` |
-//! | rates of the legs | `leg_rates` |
+//! | check drives and external pose | `drive_monitor`, `external_pose` |
+//! | leg rates | `leg_rates` |
 //! | pose and twist | [`localization`] |
 //! | motion without force | `free_motion`, `standstill` |
 

@@ -1,27 +1,30 @@
-//! Comparison of the clock that stamps measurements with the daemon's, where the stamps release the cycles.
+//! Comparison of the clock that stamps measurements with the daemon's clock, if the stamps release the
+//! cycles.
 //!
-//! With external release every age is computed from stamps alone. Were they frozen or slow, nothing would ever be too old. So
-//! the offset between the two clocks is followed, no faster than clocks drift, and a stamp that is away from it is a fault.
+//! With external release every age is computed from stamps alone. If they were frozen or slow, no measurement
+//! would ever be too old. Therefore the offset between the two clocks is tracked, no faster than clocks
+//! drift. A stamp that deviates from the tracked offset is a fault.
 
 use crate::control::cycle::Cycle;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 
-/// Largest drift of the offset, as a ratio of the time: a hundred times that of two crystals; frozen and doubled stamps drift by
-/// the whole time.
+/// Largest drift of the offset, as a ratio of the time: a hundred times the drift of two crystals. Frozen and
+/// doubled stamps drift by the whole time.
 const MAX_DRIFT: f64 = 0.01;
 
-/// Offset between the clocks.
+/// Tracked offset between the clocks.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct StampClock {
-    /// Clock of the stamps less that of the daemon, as it was followed \[ns\].
+    /// Clock of the stamps minus the daemon's clock, as tracked \[ns\].
     offset_ns: i64,
     /// The daemon's clock at the last cycle \[ns\].
     clock_ns: u64,
 }
 
 impl StampClock {
-    /// Compares the offset of this cycle \[ns\]. Without control it is only followed: the one of the freshest message counts.
+    /// Compares the offset of this cycle \[ns\] with the tracked one. Without control it is only tracked: a
+    /// larger offset, which the freshest message has, is taken over at once.
     pub fn check(&mut self, cycle: &Cycle<'_>, offset_ns: i64) -> Result<(), Diagnostic> {
         let bound_ns = cycle.constants.parameters.measured_timeout_ns;
         let clock_ns = cycle.release_ns.wrapping_sub(offset_ns as u64);

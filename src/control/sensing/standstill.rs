@@ -1,16 +1,19 @@
-//! Rest of a platform by its lengths alone, for drivers that send no rates.
+//! Test for rest of the platform by its lengths alone, for drivers that send no rates.
 //!
-//! A filter of rates lags: of a platform that brakes it remembers a velocity that is gone. So without rates control begins at rest
-//! only, and rest is what straight lines through the lengths of a window show, by least squares:
+//! A filter of rates lags: when the platform brakes, it still shows a velocity that is gone. Without measured
+//! rates control therefore begins at rest only. The test fits straight lines to the lengths of a window, by
+//! least squares:
 //!
 //! ```text
-//! L_k = L_0 + L' t_k + scatter        deviation of L':  s / sqrt(sum (t_k - mean t)^2),  s^2 = sum scatter^2 / (n - 2)
+//! L_k = L_0 + L' t_k + scatter
+//! deviation of L':  s / sqrt(sum (t_k - mean t)^2),  s^2 = sum scatter^2 / (n - 2)
 //! the platform stands if  |speed of a joint by L'| + 5 deviations <= 1e-3 velocity limits
 //! ```
 //!
-//! What is no straight line (brakes, a fall, a step) makes the scatter large, and the deviation with it. The window is as long as the
-//! stated noise needs, and long enough for some times the usual noise: a platform at rest is known to stand after one window, or two
-//! where it came to rest within the first. While the lengths stay within the scatter of the last window, it stands.
+//! A motion that is no straight line (brakes, a fall, a step) makes the scatter large, and with it the
+//! deviation. The window is as long as the stated noise requires, and at least long enough for a few times
+//! the usual noise. A platform at rest is recognized after one window, or after two if it came to rest within
+//! the first. It counts as standing while the lengths stay within the scatter of the last window.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -20,47 +23,49 @@ use crate::control::signals::inputs::Measurement;
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
 
-/// Shortest window \[s\]. With it 2 um of noise at 1 kHz are 0.02 mm/s, and 10 um 0.12 mm/s.
+/// Shortest window \[s\]. In it, noise of 2 um at 1 kHz gives the rate a deviation of 0.02 mm/s, and noise of
+/// 10 um a deviation of 0.12 mm/s.
 const MIN_WINDOW_S: f64 = 0.045;
-/// Deviations of a rate that are certain, and the part of the largest speed at rest that they may be by the stated noise.
+/// Uncertainty of a rate, in standard deviations of the rate. With the stated noise the uncertainty may reach
+/// the next share of the largest speed at rest.
 const DEVIATIONS: f64 = 5.0;
 const NOISE_SHARE: f64 = 0.5;
 /// Least number of measurements in a window.
 const MIN_COUNT: u32 = 8;
-/// Change of a length that is beyond the scatter, in its standard deviations.
+/// Change of a length that exceeds the scatter, in standard deviations of the scatter.
 const SCATTER_DEVIATIONS: f64 = 10.0;
 
-/// Speed of a joint at which a platform without force counts as standing, as a ratio of the velocity limit: above the noise
-/// of rates, and below what feedback could not take up at once.
+/// Speed of a joint at which a platform without force counts as standing, as a ratio of the velocity limit.
+/// It is above the noise of rates, and small enough for feedback to take up at once.
 const STANDING_RATIO: f64 = 1e-3;
 
-/// Largest speed of a joint of a platform that stands \[m/s\].
+/// Largest speed of a joint at which the platform counts as standing \[m/s\].
 pub(in crate::control) fn standing_speed(parameters: &Parameters) -> f64 {
     STANDING_RATIO * parameters.limits.position.velocity
 }
 
-/// Window in which the rate is certain with the stated noise \[s\].
+/// Length of the window in which the rate is certain with the stated noise \[s\].
 ///
-/// With n = T / period, evenly spread, the deviation of the slope is `s sqrt(12 / n) / T`.
+/// With n = T / period measurements, evenly spread, the deviation of the slope is `s sqrt(12 / n) / T`.
 pub(in crate::control) fn window_s(parameters: &Parameters) -> f64 {
     let allowed = NOISE_SHARE * standing_speed(parameters) / DEVIATIONS;
     let needed = parameters.reading_errors.deviation * (12.0 * parameters.period_s()).sqrt() / allowed;
     libm::cbrt(needed * needed).max(MIN_WINDOW_S)
 }
 
-/// Rates of the legs over a window.
+/// Leg rates over a window.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct WindowRates {
-    /// \[m/s\]
+    /// Rate of each leg \[m/s\].
     pub rate: [f64; LEGS],
-    /// How wrong the rate of any leg may be \[m/s\].
+    /// Bound on the error of any leg's rate \[m/s\].
     pub uncertainty: f64,
-    /// Standard deviation of the lengths from their lines \[m\].
+    /// Largest standard deviation of the lengths from their lines \[m\].
     scatter: f64,
 }
 
-/// Sums over the measurements since the first, of time and lengths relative to it.
+/// Sums for the lines through the lengths; times and lengths are relative to the first measurement.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 struct Window {
@@ -93,7 +98,7 @@ impl Window {
         }
     }
 
-    /// The lines through the lengths; `None` of too few.
+    /// Slopes of the lines through the lengths; `None` if there are too few measurements.
     fn rates(&self) -> Option<WindowRates> {
         if self.count < MIN_COUNT {
             return None;
@@ -112,17 +117,17 @@ impl Window {
     }
 }
 
-/// Windows of the lengths without force.
+/// Test for rest by windows of the lengths without force.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct Standstill {
     window: Option<Window>,
-    /// Of the last whole window, while the lengths stay as it says.
+    /// Rates of the last whole window, while the lengths stay within its scatter.
     rates: Option<WindowRates>,
 }
 
 impl Standstill {
-    /// Adds a measurement, which is later than those before, to a window of this length.
+    /// Adds a measurement, later than all before, to a window of length `window_s`.
     pub fn add(&mut self, parameters: &Parameters, window_s: f64, measurement: &Measurement) {
         let Some(window) = &mut self.window else {
             self.window = Some(Window::new(measurement));
@@ -145,12 +150,12 @@ impl Standstill {
         }
     }
 
-    /// Rates of the last whole window, if the lengths stay as it says.
+    /// Rates of the last whole window, if the lengths stay within its scatter.
     pub fn rates(&self) -> Option<WindowRates> {
         self.rates
     }
 
-    /// The best that is known: also of a window that is not whole.
+    /// Rates of the last whole window, else of the present window, which is not whole.
     pub fn latest(&self) -> Option<WindowRates> {
         self.rates.or_else(|| self.window.and_then(|window| window.rates()))
     }

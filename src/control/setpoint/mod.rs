@@ -1,10 +1,10 @@
-//! From a setpoint to the target of the reference.
+//! Computation of the reference's target from a setpoint.
 //!
-//! | what | file |
+//! | step | file |
 //! | --- | --- |
-//! | motion of a setpoint, and its continuation | [`motion`] |
-//! | samples of poses without derivatives | [`pose_samples`] |
-//! | what the reference approaches | [`target`] |
+//! | motion of a setpoint and its continuation | [`motion`] |
+//! | motion through samples of poses without derivatives | [`pose_samples`] |
+//! | target of the reference | [`target`] |
 //! | validate the setpoint | [`validation`], `validated` |
 
 pub mod motion;

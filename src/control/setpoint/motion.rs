@@ -7,13 +7,13 @@ use crate::control::signals::inputs::{Setpoint, SetpointKind};
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-/// Longest interval of the messages over which their accelerations give a jerk \[s\].
+/// Longest interval between two setpoints from whose accelerations a jerk is computed \[s\].
 const MAX_JERK_INTERVAL_S: f64 = 0.025;
-/// Time for which a jerk lasts, over the interval of the messages, beside the time to the end of the force's hold: as two
-/// messages may be lost. After it the acceleration is constant.
+/// Time for which a jerk lasts, as a ratio of the interval between setpoints: two messages may be lost. The
+/// time to the end of the force's hold is added. Afterwards the acceleration is constant.
 const JERK_INTERVALS: f64 = 3.0;
 
-/// A setpoint with the motion of the platform it describes.
+/// A setpoint with the motion of the platform that it describes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct SetpointMotion {
@@ -21,13 +21,14 @@ pub struct SetpointMotion {
     pub setpoint: Setpoint,
     /// Pose, twist and acceleration of the platform at its time stamp, base axes.
     pub motion: Motion,
-    /// Jerk after it, by the change of acceleration since the setpoint before; zero after a gap \[rad/s^3\], \[m/s^3\].
+    /// Jerk after the setpoint, from the change of acceleration since the previous setpoint; zero after a gap
+    /// \[rad/s^3\], \[m/s^3\].
     jerk: Vector6<f64>,
     /// Time for which the jerk lasts \[s\].
     jerk_s: f64,
 }
 
-/// Continuation of a setpoint: displacement, twist and acceleration.
+/// Continuation of a setpoint: displacement, twist and acceleration some time later.
 pub(in crate::control) struct Continuation {
     pub displacement: Vector6<f64>,
     pub twist: Vector6<f64>,
@@ -41,7 +42,7 @@ impl AsRef<Setpoint> for SetpointMotion {
 }
 
 impl SetpointMotion {
-    /// Evaluates the motion of a setpoint. Poses alone have no derivatives.
+    /// Evaluates the motion of a setpoint. A setpoint of a pose alone has neither twist nor acceleration.
     pub fn new(setpoint: Setpoint) -> Self {
         let motion = setpoint.task.motion();
         let mut new = Self { setpoint, motion, jerk: Vector6::zeros(), jerk_s: 0.0 };
@@ -51,8 +52,8 @@ impl SetpointMotion {
         new
     }
 
-    /// Sets the jerk that leads on from the setpoint before. Accelerations alone, carried on to the instant of the force,
-    /// would lag by the time between: `jerk dt / Kp` of error.
+    /// Sets the jerk from the change of acceleration since the setpoint `before`. An acceleration that is
+    /// held until the instant of the force would lag by the time between; the error would be `jerk dt / Kp`.
     pub fn lead_on(&mut self, parameters: &Parameters, before: Option<&Self>) {
         let Some(before) = before.filter(|_| self.setpoint.kind == SetpointKind::Motion) else { return };
         let dt = seconds_between(before.setpoint.time_ns, self.setpoint.time_ns);
@@ -72,7 +73,7 @@ impl SetpointMotion {
         self.jerk_s = JERK_INTERVALS * dt + ahead_s;
     }
 
-    /// The motion `dt` seconds later, to first order in the angle between.
+    /// Continuation after `dt` seconds, to first order in the angle covered.
     pub(in crate::control) fn continued(&self, dt: f64) -> Continuation {
         let (v, a, j) = (self.motion.twist.vector(), self.motion.acceleration.vector(), &self.jerk);
         let t = dt.max(0.0).min(self.jerk_s);
@@ -85,12 +86,12 @@ impl SetpointMotion {
         }
     }
 
-    /// The motion at another instant, extrapolated no further than a setpoint may be.
+    /// Motion at another instant. The extrapolation is bounded, see `extrapolation_s`.
     pub(in crate::control) fn motion_at(&self, parameters: &Parameters, instant_ns: u64) -> Motion {
         if instant_ns == self.setpoint.time_ns {
             return self.motion;
         }
-        // Of the motion and not of X: rates of the angles are unbounded near gimbal lock.
+        // Extrapolates the motion and not X, because rates of the angles are unbounded near gimbal lock.
         let continued = self.continued(self.extrapolation_s(parameters, instant_ns));
         Motion {
             pose: self.motion.pose.extrapolated(&Twist::from_vector(&continued.displacement)),
@@ -99,7 +100,7 @@ impl SetpointMotion {
         }
     }
 
-    /// Time from its instant to another \[s\], no longer than a setpoint may be extrapolated.
+    /// Time from the setpoint to another instant \[s\], bounded by the longest extrapolation of a setpoint.
     pub(in crate::control) fn extrapolation_s(&self, parameters: &Parameters, instant_ns: u64) -> f64 {
         let longest = parameters.max_extrapolation_s();
         seconds_between(self.setpoint.time_ns, instant_ns).max(-longest).min(longest)

@@ -1,4 +1,4 @@
-//! Target of the reference in one cycle: where it shall go, and with which share of the limits.
+//! Target of the reference in one cycle: a motion or a pose, and the share of the limits for the way to it.
 
 use nalgebra::Vector6;
 
@@ -12,30 +12,30 @@ use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 /// Target of one cycle.
 #[derive(Clone, Copy, Debug)]
 pub enum Target<'a> {
-    /// The motion of a setpoint, which goes on between the messages.
+    /// Motion of a setpoint, which continues between the messages.
     Motion(&'a SetpointMotion),
     /// Samples of a motion.
     Samples(&'a PoseSamples),
-    /// A pose to move to and stand at, with a share of the limits of autonomous motions.
+    /// Pose to move to and stand at, with a share of the limits of autonomous motions.
     Pose(&'a Pose, f64),
 }
 
-/// A motion as seen from a pose.
+/// A motion relative to a pose.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control) struct RelativeMotion {
-    /// What leads from the pose to that of the motion \[rad\], \[m\].
+    /// Displacement from the pose to the pose of the motion \[rad\], \[m\].
     pub displacement: Vector6<f64>,
     pub twist: Twist,
     pub acceleration: Acceleration,
 }
 
-/// Least share of the limits of autonomous motions: with less the numbers of the approach lose their digits.
+/// Least share of the limits of autonomous motions: with less, the approach loses its numerical precision.
 const MIN_TARGET_SPEED: f64 = 0.01;
 
 impl<'a> Target<'a> {
-    /// The target that a valid setpoint stands for.
+    /// Target that a valid setpoint requests.
     pub fn of_setpoint(setpoint: &'a SetpointMotion, samples: &'a PoseSamples) -> Self {
-        // No `match`: a jump table inside the cycle is beyond the proof on its machine code.
+        // No `match`: the proof on the machine code of the cycle does not cover jump tables.
         if setpoint.setpoint.kind == SetpointKind::Pose {
             Self::Samples(samples)
         } else if setpoint.setpoint.kind == SetpointKind::Target {
@@ -45,7 +45,7 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// The motion of the target at an instant.
+    /// Motion of the target at an instant.
     pub(in crate::control) fn motion_at(&self, parameters: &Parameters, instant_ns: u64) -> Option<Motion> {
         match self {
             Self::Motion(setpoint) => Some(setpoint.motion_at(parameters, instant_ns)),
@@ -54,7 +54,8 @@ impl<'a> Target<'a> {
         }
     }
 
-    /// The motion at an instant as seen from a pose; a continuation is added to first order in its displacement.
+    /// Motion at an instant, relative to a pose. The continuation of a setpoint is added to first order in
+    /// its displacement.
     pub(in crate::control) fn relative_to(
         &self,
         pose: &Pose,
@@ -72,12 +73,12 @@ impl<'a> Target<'a> {
         Some(RelativeMotion { displacement: pose.displacement_to(&desired).vector(), twist, acceleration })
     }
 
-    /// Share of its limits with which the distance is closed: those of a pose are scaled already.
+    /// Share of the target's limits for closing the distance. The limits of a pose are scaled already.
     pub(in crate::control) fn closing_scale(&self, scale: f64) -> f64 {
         if let Self::Pose(..) = self { 1.0 } else { scale }
     }
 
-    /// The limits of the way to it.
+    /// Limits for the way to the target.
     pub(in crate::control) fn limits(&self, limits: &Limits) -> Limits {
         match self {
             Self::Motion(_) | Self::Samples(_) => *limits,
@@ -86,12 +87,12 @@ impl<'a> Target<'a> {
     }
 }
 
-/// Share of the limits that a setpoint's speed means; what is no share is all.
+/// Share of the limits for the speed of a setpoint; all of them if the speed is no share.
 pub(crate) fn share(target_speed: f64) -> f64 {
     if target_speed > 0.0 { target_speed.clamp(MIN_TARGET_SPEED, 1.0) } else { 1.0 }
 }
 
-/// A pose without motion.
+/// Motion of a platform that stands at a pose.
 pub(in crate::control) fn at_rest(pose: &Pose) -> Motion {
     Motion { pose: *pose, twist: Twist::default(), acceleration: Acceleration::default() }
 }

@@ -1,4 +1,4 @@
-//! The last valid setpoint, and what it means for a state.
+//! The last valid setpoint, and the target that follows from it in a state.
 
 use crate::control::constants::Constants;
 use crate::control::setpoint::motion::SetpointMotion;
@@ -7,19 +7,19 @@ use crate::control::signals::diagnostic::Diagnostic;
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
 
-/// The last valid setpoint, whether it may be followed, and the limits it is near to.
+/// The last valid setpoint, whether it may be followed, and the limits that it is near.
 pub(in crate::control) struct ValidatedSetpoint<'a> {
     pub valid: Option<&'a SetpointMotion>,
-    /// What the reference shall approach.
+    /// Target of the reference that the setpoint requests.
     pub target: Option<Target<'a>>,
-    /// Whether the valid setpoint is young enough.
+    /// Whether the valid setpoint is recent enough.
     pub status: Result<(), Diagnostic>,
-    /// Of the newest setpoint.
+    /// Limits that the newest setpoint is near.
     pub active_limits: LimitSet,
 }
 
 impl<'a> ValidatedSetpoint<'a> {
-    /// What the reference shall approach in a state; nothing where it follows its stop.
+    /// Target of the reference in a state; `None` if the reference follows its stop.
     #[inline(never)]
     pub fn target_in(&self, constants: &'a Constants, state: State) -> Option<Target<'a>> {
         match state {

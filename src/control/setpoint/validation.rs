@@ -1,13 +1,17 @@
 //! Validation of setpoints.
 //!
-//! The reference keeps its limits whatever is sent, so none of these checks is needed for them. Under
-//! `on_violation = "stop"` they find a trajectory that the machine cannot follow, and say why:
+//! The reference keeps its limits for every setpoint, without these checks. Under `on_violation = "stop"`
+//! they find a trajectory that the machine cannot follow, and report the reason:
 //!
-//! | check | of |
+//! | check | applies to |
 //! | --- | --- |
 //! | numbers, time stamp, kind | every setpoint |
-//! | velocity, acceleration, leg rates, stroke, envelope | a motion; of a target stroke and envelope; under "stop" |
-//! | deviation from the reference, or while engaging from the setpoint before, within the engage tolerance | a motion that is followed, under "stop" |
+//! | velocity, acceleration, leg rates | a motion, under "stop" |
+//! | stroke, envelope | a motion or a target, under "stop" |
+//! | deviation within the engage tolerance | a motion that is followed, under "stop" |
+//!
+//! The deviation is measured from the reference, and while engaging from the continuation of the previous
+//! setpoint.
 
 use crate::control::cycle::Cycle;
 use crate::control::parameters::{Parameters, ViolationPolicy};
@@ -30,7 +34,8 @@ use crate::model::rigid::Motion;
 /// Allowance for rounding, so that a range whose ends are equal can be satisfied \[rad\] or \[m\].
 const ENVELOPE_ROUNDING: f64 = 1e-9;
 
-/// Deviation from the continuation of the setpoint before that is a jump, over the engage tolerance.
+/// Deviation from the continuation of the previous setpoint that counts as a jump, as a ratio of the engage
+/// tolerance.
 const JUMP_RATIO: f64 = 0.5;
 
 /// First stage of the cycle: validates each new setpoint and keeps the last valid one.
@@ -39,7 +44,7 @@ const JUMP_RATIO: f64 = 0.5;
 pub(in crate::control) struct SetpointValidator {
     last: LastValid<Setpoint, SetpointMotion>,
     samples: PoseSamples,
-    /// Of the newest setpoint.
+    /// Limits that the newest setpoint is near.
     active_limits: LimitSet,
     /// Cycles under control without a new valid setpoint.
     pub missed: u64,
@@ -70,13 +75,13 @@ impl SetpointValidator {
         }
     }
 
-    /// Forgets every setpoint; the newest is then validated anew.
+    /// Forgets every setpoint. The newest is then validated again.
     pub fn forget(&mut self) {
         *self = Self { missed: self.missed, ..Self::default() };
     }
 
-    /// Whether the valid setpoint is young enough to be followed. One that holds without end stays valid while it is
-    /// followed.
+    /// Whether the valid setpoint is recent enough to be followed. A target has no end and stays valid while
+    /// it is followed.
     fn check_age(&self, cycle: &Cycle<'_>) -> Result<(), Diagnostic> {
         let Some(SetpointMotion { setpoint, motion, .. }) = &self.last.valid else {
             return Err(self.last.rejection_or(DiagnosticCode::NoSetpoint));
@@ -134,7 +139,8 @@ fn check_kind(parameters: &Parameters, setpoint: &Setpoint) -> Result<(), Diagno
     if !setpoint.task.is_finite() {
         return Err(DiagnosticCode::SetpointNotFinite.into());
     }
-    // Out of line, as is its table of kinds: inside `step` it is beyond the proof on the machine code.
+    // Out of line, like its table of kinds: the proof on the machine code of `step` does not cover such
+    // tables.
     let is_pose_allowed = parameters.on_violation == ViolationPolicy::Limit;
     let is_allowed = setpoint.kind == SetpointKind::Motion
         || setpoint.kind == SetpointKind::Target
@@ -142,13 +148,14 @@ fn check_kind(parameters: &Parameters, setpoint: &Setpoint) -> Result<(), Diagno
     if is_allowed { Ok(()) } else { Err(DiagnosticCode::SetpointKindInvalid.into()) }
 }
 
-/// Whether the time stamp is after that of the setpoint before.
+/// Whether the time stamp is later than the previous setpoint's.
 fn check_order(new: &SetpointMotion, before: Option<&SetpointMotion>) -> Result<(), Diagnostic> {
     let dt = before.map_or(1.0, |before| seconds_between(before.setpoint.time_ns, new.setpoint.time_ns));
     if dt > 0.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointStampInvalid, -dt, 0.0)) }
 }
 
-/// Whether a motion that is followed continues: from the reference, or while engaging from the setpoint before.
+/// Whether a motion that is followed continues: from the reference, or while engaging from the previous
+/// setpoint.
 fn check_continuation(
     cycle: &Cycle<'_>,
     new: &SetpointMotion,
@@ -164,8 +171,8 @@ fn check_continuation(
     if ratio <= 1.0 { Ok(()) } else { Err(Diagnostic::new(DiagnosticCode::SetpointJumped, ratio, 1.0)) }
 }
 
-/// Whether the reference is within the engage tolerance of a setpoint. If not, either the setpoint has jumped from the one
-/// before, or the limits kept the reference from following.
+/// Whether the reference is within the engage tolerance of a setpoint. If not, either the setpoint has jumped
+/// from the previous one, or the limits kept the reference from following.
 pub fn check_deviation(
     parameters: &Parameters,
     reference: &ReferenceGenerator,
@@ -181,13 +188,14 @@ pub fn check_deviation(
     Err(Diagnostic::new(code, ratio, 1.0))
 }
 
-/// Deviation of a setpoint from the continuation of the one before, over the engage tolerance.
+/// Deviation of a setpoint from the continuation of the previous one, as a ratio of the engage tolerance.
 fn jump_ratio(parameters: &Parameters, before: &SetpointMotion, setpoint: &SetpointMotion) -> f64 {
     let continued = before.motion_at(parameters, setpoint.setpoint.time_ns);
     parameters.tolerance_ratio(&PoseError::new(&setpoint.motion, &continued.pose, &continued.twist))
 }
 
-/// Checks that a setpoint keeps the limits at its instant. Adds those that it is near to, up to the check that failed.
+/// Whether a setpoint keeps the limits at its instant. Adds the limits that it is near, up to the check that
+/// fails.
 pub fn check_setpoint(
     machine: &Machine,
     parameters: &Parameters,

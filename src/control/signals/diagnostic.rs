@@ -1,6 +1,7 @@
-//! Diagnostics: why the platform is not under control, with the number that a check found and its bound.
+//! Diagnostics: the reason why the platform is not under control, with the value that a check found and its
+//! bound.
 //!
-//! The check that fails makes the [`Diagnostic`]; state machine, status message and command line pass it on
+//! The failing check creates the [`Diagnostic`]. State machine, status message and command line pass it on
 //! unchanged. Its `Display` is for people and is never called in the cycle.
 
 use core::fmt;
@@ -16,10 +17,10 @@ pub enum Reaction {
     Brake,
 }
 
-/// Meaning of the number of a diagnostic and source of its bound.
+/// Meaning of the value of a diagnostic, and source of its bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Comparison {
-    /// The code has no number.
+    /// The code has no value.
     None,
     /// A quantity with a unit, compared with a bound in the same unit.
     Absolute {
@@ -27,12 +28,12 @@ pub enum Comparison {
         quantity: &'static str,
         /// Unit of value and bound; empty for a number without unit.
         unit: &'static str,
-        /// "exceeds" if the bound is one-sided, "is outside" if it is one of two.
+        /// "exceeds" if there is one bound, "is outside" if there are two.
         relation: &'static str,
         /// Source of the bound: a key of the configuration, or words.
         bound: &'static str,
     },
-    /// Value and bound are the numbers of two processes: of the one that counts, and of the other.
+    /// Value and bound are the IDs of two processes: of the one whose messages are used, and of the other.
     Processes,
     /// A quantity as a multiple of its bound.
     Ratio {
@@ -58,10 +59,10 @@ const fn ratio(quantity: &'static str, bound: &'static str) -> Comparison {
 
 const NO_NUMBER: Comparison = Comparison::None;
 
-/// Remedy of a code that asks nothing of the operator.
+/// Remedy of a code that requires no action of the operator.
 const NO_REMEDY: &str = "nothing";
 
-/// Leg lengths and the stroke.
+/// Comparison of a leg length with the stroke.
 const STROKE: Comparison = absolute(
     "leg length",
     "m",
@@ -83,7 +84,8 @@ macro_rules! reaction {
 
 macro_rules! codes {
     ($($(#[$doc:meta])* $variant:ident = $number:literal, $reaction:ident, $comparison:expr, $name:literal, $remedy:literal;)*) => {
-        /// Number of a diagnostic: why the platform is not under control, or soon will not be. Below 100: no fault.
+        /// Code of a diagnostic: the reason why the platform is not under control, or soon will not be. A
+        /// code below 100 is no fault.
         ///
         /// | number | meaning | reaction | remedy |
         /// | --- | --- | --- | --- |
@@ -113,8 +115,8 @@ macro_rules! codes {
                 match self { $(Self::$variant => $comparison,)* }
             }
 
-            /// How the controller responds. A chain of comparisons and no `match`: the cycle calls this, and in a
-            /// jump table the unused numbers would be traps in its machine code.
+            /// How the controller responds. It is a chain of comparisons and no `match`, because the cycle
+            /// calls it: the unused numbers of a jump table would be traps in the machine code of the cycle.
             pub fn reaction(self) -> Reaction {
                 $(if self == Self::$variant {
                     return Reaction::$reaction;
@@ -147,16 +149,16 @@ codes! {
     OperatorRequest = 8, None, NO_NUMBER, "requested by the operator", "nothing";
     /// The request cannot be carried out in this state.
     InvalidInState = 9, None, NO_NUMBER, "not possible in this state", "see the table of states";
-    /// The platform moves so that it could not be brought to rest within every limit.
-    PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and its motion or a stop within every limit is not known", "wait until the platform stands";
-    /// Without setpoints the platform holds its pose, as `[setpoint] on_violation` is `limit`.
+    /// The platform moves, and no stop within every limit was verified for its motion.
+    PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and no stop within every limit was verified", "wait until the platform stands";
+    /// Without setpoints the platform holds its pose, because `[setpoint] on_violation` is `limit`.
     HoldingPose = 11, None, absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"), "no setpoints: the platform holds its pose", "start a setpoint source";
     /// Two processes publish measurements; control does not begin before one of them ends.
     TwoMeasuredSources = 12, None, Comparison::Processes, "two sources of measurements", "end one of them";
     /// Two processes publish setpoints; control does not begin before one of them ends.
     TwoSetpointSources = 13, None, Comparison::Processes, "two sources of setpoints", "end one of them";
-    /// The lengths do not show that the platform stands, and the driver sends no rates.
-    RestNotShown = 14, None, absolute("speed of a joint by the lengths", "m/s", "exceeds", "that of a platform that stands,"), "the lengths do not show that the platform stands", "wait until it stands; a start in motion needs measured rates; [measured] length_noise_m says how long the lengths are watched";
+    /// The driver sends no rates, and the lengths do not show that the platform stands.
+    RestNotShown = 14, None, absolute("joint speed by the lengths", "m/s", "exceeds", "the largest speed of a platform that stands,"), "the lengths do not show that the platform stands", "wait until it stands; a start in motion needs measured rates; [measured] length_noise_m sets for how long the lengths are watched";
     /// Setpoints stopped arriving while the setpoint was in motion.
     SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
     /// Measurements stopped arriving.
@@ -169,11 +171,11 @@ codes! {
     PoseNotFound = 104, Brake, NO_NUMBER, "pose not found from lengths", "compare the lengths with the machine file";
     /// The measured lengths changed by more than the actuators can move.
     MeasurementJumped = 105, Brake, absolute("change of length", "m", "exceeds", "the change plausible at actuator.max_rate_m_s,"), "measured lengths jumped", "check the encoders and the driver";
-    /// The pose is singular: no forces balance the load. Or the platform may have crossed a singularity: its assembly
-    /// mode is uncertain.
+    /// The pose is singular: no forces balance the load. Or the platform may have crossed a singularity: its
+    /// assembly mode is uncertain.
     SingularPose = 106, Brake, absolute("condition", "", "exceeds", "the bound beyond which the assembly mode is uncertain,"), "singular pose, or assembly mode uncertain", "move the platform by hand to the side of the home pose, then clear";
     /// A force was not finite.
-    ForceNotFinite = 107, Brake, NO_NUMBER, "force not finite", "report it: it is a fault of hexad";
+    ForceNotFinite = 107, Brake, NO_NUMBER, "force not finite", "report this bug of hexad";
     /// The platform deviated from its reference by more than `control.following_*`.
     FollowingError = 108, Brake, ratio("the following error", "the limit control.following_*"), "following error too large", "check for a collision, a payload, a drive without force";
     /// Cycles were missed, and `realtime.on_overrun` is `fault`.
@@ -182,8 +184,8 @@ codes! {
     EmergencyStop = 110, Brake, NO_NUMBER, "emergency stop", "clear when it is safe";
     /// A setpoint beyond the stroke of a leg, or too fast to come to rest within it.
     SetpointOutOfReach = 111, Stop, STROKE, "setpoint beyond the stroke of a leg, or without room to stop", "correct the trajectory";
-    /// A setpoint that does not continue the one before it: X, X' and X'' are inconsistent.
-    SetpointJumped = 112, Stop, ratio("the deviation from the continuation of the setpoint before", "the tolerance"), "setpoint jumped", "send X, X' and X'' of one smooth motion";
+    /// A setpoint that does not continue the previous one: X, X' and X'' are inconsistent.
+    SetpointJumped = 112, Stop, ratio("the deviation from the continuation of the previous setpoint", "the tolerance"), "setpoint jumped", "send X, X' and X'' of one smooth motion";
     /// A measured length beyond the stroke of the leg.
     LengthOutOfStroke = 113, Brake, STROKE, "measured length beyond the stroke", "check the encoders, compare with the machine file";
     /// A measured rate that is not the derivative of the lengths.
@@ -192,13 +194,13 @@ codes! {
     SetpointTooFast = 115, Stop, ratio("the setpoint", "the limit in [limits], or actuator.max_rate_m_s"), "setpoint beyond a limit of velocity, acceleration or jerk", "correct the trajectory, or [limits]";
     /// A setpoint outside of `[envelope]`.
     SetpointOutOfEnvelope = 116, Stop, absolute("coordinate", "rad or m", "is outside", "[envelope], whose bound is"), "setpoint outside of the envelope", "correct the trajectory, or [envelope]";
-    /// A setpoint whose time stamp is too old, in the future, or not after that of the setpoint before.
+    /// A setpoint whose time stamp is too old, in the future, or not later than the previous setpoint's.
     SetpointStampInvalid = 117, Stop, absolute("age", "s", "is outside", "the range of timeouts.setpoint_ms around now,"), "setpoint with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
-    /// A measurement whose time stamp is too old, in the future, or before that of the measurement before.
+    /// A measurement whose time stamp is too old, in the future, or earlier than the previous measurement's.
     MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range from a tenth of a period ahead to timeouts.measured_ms, whose bound is"), "measurement with an invalid time stamp", "stamp with the CLOCK_MONOTONIC instant of sampling";
-    /// The pose is so near a singular one that `limits.condition` is exceeded, or a setpoint could only be stopped
-    /// where it would be.
-    NearSingular = 119, Stop, absolute("condition", "", "exceeds", "limits.condition, or the part of it that a reference may use,"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
+    /// The pose is so near a singular one that its condition exceeds `limits.condition`, or the motion could
+    /// be stopped only at such a pose.
+    NearSingular = 119, Stop, absolute("condition", "", "exceeds", "the bound by limits.condition,"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
     /// The measured rates changed faster than actuators can.
     RateJumped = 120, Brake, absolute("change of rate", "m/s", "exceeds", "the plausible change,"), "measured rates jumped", "check for a collision; check the encoders and the driver";
     /// A setpoint of an unknown kind, or of poses alone under `on_violation = "stop"`.
@@ -206,39 +208,42 @@ codes! {
     /// The limits kept the reference from following the setpoint within the tolerance `control.engage_*`.
     SetpointBeyondLimits = 124, Stop, ratio("the distance of the reference from the setpoint", "the tolerance control.engage_*"), "setpoint beyond the limits of a motion that can be stopped", "correct the trajectory, or [limits], or set [setpoint] on_violation to limit";
     /// The readings of a leg stayed the same to the last bit while its reference moved.
-    SensorFrozen = 125, Brake, absolute("motion of the reference since the reading changed last", "m", "exceeds", "the bound for a sensor that is alive,"), "sensor frozen", "check the encoder of this leg and the driver";
-    /// The length of a leg is not where the model, the forces and the measurements before have it.
-    MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "what noise and disturbances explain,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
-    /// A measurement arrived that is so old that the loop would not be stable if all were.
-    MeasurementTooOld = 127, Brake, absolute("age", "s", "exceeds", "what the loop stands (hexad check),"), "measurement too old for the loop", "shorten the way from the sensors to the daemon, or lower the bandwidths";
-    /// The time stamps of the measurements, which release the cycles, do not advance as the daemon's clock does.
+    SensorFrozen = 125, Brake, absolute("motion of the reference since the reading changed last", "m", "exceeds", "the bound for a working sensor,"), "sensor frozen", "check the encoder of this leg and the driver";
+    /// The length of a leg differs from the prediction by the model, the forces and earlier measurements.
+    MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "the bound for noise and disturbances,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
+    /// A measurement was so old on arrival that the loop would be unstable if all were as old.
+    MeasurementTooOld = 127, Brake, absolute("age", "s", "exceeds", "the age at which the loop stays stable (hexad check),"), "measurement too old for the loop", "shorten the way from the sensors to the daemon, or lower the bandwidths";
+    /// The time stamps of the measurements, which release the cycles, do not advance with the daemon's clock.
     StampClockInvalid = 128, Brake, absolute("deviation of the clock of the stamps", "s", "is outside", "timeouts.measured_ms, ahead or behind:"), "time stamps do not advance with the clock", "stamp each measurement with the instant of sampling; check the clock of the drives";
-    /// A length is not that of the pose that another sensor measures.
-    ExternalPoseMismatch = 129, Brake, absolute("difference between the length and that of the external pose", "m", "exceeds", "measured.pose_tolerance_m"), "lengths not those of the external pose", "home this leg again; check its scale, the machine file and the external sensor";
-    /// A drive did not become ready after control began, or does not stay so.
-    DriveNotReady = 130, Brake, absolute("time without enabled drive and open brake", "s", "exceeds", "drive.ready_timeout_ms, or once it was ready 20 ms:"), "drive not ready", "enable the drive and check its brake";
+    /// A measured length differs from the length at the pose that another sensor measures.
+    ExternalPoseMismatch = 129, Brake, absolute("difference between the measured length and the length at the external pose", "m", "exceeds", "measured.pose_tolerance_m"), "lengths differ from the external pose", "home this leg again; check its scale, the machine file and the external sensor";
+    /// A drive did not become ready after control began, or did not stay ready.
+    DriveNotReady = 130, Brake, absolute("time without enabled drive and open brake", "s", "exceeds", "drive.ready_timeout_ms, or 20 ms once all drives were ready:"), "drive not ready", "enable the drive and check its brake";
     /// A drive reports a fault.
     DriveFault = 131, Brake, NO_NUMBER, "drive reports a fault", "see the display of the drive";
-    /// The actual force of a drive is not the commanded one, as the driver reports it or as the platform moves.
-    DriveForceMissing = 132, Brake, absolute("difference of the actual force from the commanded one", "N", "exceeds", "what noise and friction explain,"), "actual force not as commanded", "check the drive of this leg";
-    /// The daemon did not run for so long that its last measurement is too old: it was stopped, or the host took the processor.
-    DaemonHeld = 133, Brake, absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"), "daemon held", "find out what stopped the daemon or took its processor; hexad doctor";
+    /// The actual force of a drive differs from the command, by the driver's report or by the motion of the
+    /// platform.
+    DriveForceMissing = 132, Brake, absolute("difference between actual and commanded force", "N", "exceeds", "the bound for noise and friction,"), "actual force not as commanded", "check the drive of this leg";
+    /// The daemon did not run for so long that its last measurement is too old: it was stopped, or the host
+    /// took the processor.
+    DaemonHeld = 133, Brake, absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"), "daemon did not run", "find out what stopped the daemon or took its processor; hexad doctor";
     /// The platform oscillates about its reference.
-    Oscillation = 134, Brake, absolute("amplitude", "m", "exceeds", "what the motion explains,"), "the platform oscillates", "lower the bandwidths; check [drive] delay_us, the time stamps and the drives";
+    Oscillation = 134, Brake, absolute("amplitude", "m", "exceeds", "the amplitude that the motion explains,"), "the platform oscillates", "lower the bandwidths; check [drive] delay_us, the time stamps and the drives";
     /// The payload changed under control.
-    PayloadChanged = 135, Stop, absolute("change", "kg", "is outside", "limits.payload_change_kg:"), "payload changed", "look for what fell off or came on, then clear; limits.payload_change_kg";
+    PayloadChanged = 135, Stop, absolute("change", "kg", "is outside", "limits.payload_change_kg:"), "payload changed", "look for a payload that fell off or was added, then clear; limits.payload_change_kg";
     /// Something struck the platform.
     Impact = 136, Stop, absolute("sudden disturbance", "m/s^2", "exceeds", "limits.disturbance_step_m_s2"), "impact", "check for a collision, then clear; limits.disturbance_step_m_s2";
-    /// A disturbance as large as an impact that does not end.
-    DisturbanceLasting = 137, Brake, absolute("time", "s", "exceeds", "the longest of an impact,"), "sudden disturbance that lasts", "check for a collision; check all drives; limits.disturbance_step_m_s2";
+    /// A sudden disturbance as large as an impact does not end.
+    DisturbanceLasting = 137, Brake, absolute("duration", "s", "exceeds", "the longest duration of an impact,"), "sudden disturbance that lasts", "check for a collision; check all drives; limits.disturbance_step_m_s2";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
     VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
-    /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a sensor is wrong.
-    FeedbackSaturated = 123, Brake, absolute("time of saturation", "s", "exceeds", "the longest allowed,"), "feedback saturated", "check for a collision, a payload, a drive without force; limits.feedback_scale";
+    /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a
+    /// sensor is wrong.
+    FeedbackSaturated = 123, Brake, absolute("time of saturation", "s", "exceeds", "the longest time allowed,"), "feedback saturated", "check for a collision, a payload, a drive without force; limits.feedback_scale";
 }
 
 impl DiagnosticCode {
-    /// Whether it ends control for good, until cleared.
+    /// Whether the code is a fault: it ends control until it is cleared.
     pub fn is_fault(self) -> bool {
         self as u32 >= 100
     }
@@ -249,13 +254,14 @@ impl DiagnosticCode {
     }
 }
 
-/// Result of a check: what happened, the number that was found and its bound.
+/// Result of a check: what happened, the value that was found and its bound.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Diagnostic {
     /// Event that the check found, with its reaction and remedy.
     pub code: DiagnosticCode,
-    /// In the unit of [`DiagnosticCode::comparison`]; 0 if there is no number, as `bound`.
+    /// Value that the check found, in the unit of [`DiagnosticCode::comparison`]. It is 0, like `bound`, if
+    /// the code has no value.
     pub value: f64,
     /// Bound that `value` was compared with, in the same unit.
     pub bound: f64,
@@ -264,12 +270,12 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// With the number found and its bound.
+    /// Diagnostic with the value found and its bound.
     pub fn new(code: DiagnosticCode, value: f64, bound: f64) -> Self {
         Self { code, value, bound, index: 0 }
     }
 
-    /// Of a leg or an axis, counted from 0.
+    /// The diagnostic for a leg or an axis, counted from 0.
     pub fn at(self, index: usize) -> Self {
         Self { index: index as u32 + 1, ..self }
     }
@@ -281,7 +287,7 @@ impl From<DiagnosticCode> for Diagnostic {
     }
 }
 
-/// A sentence: what happened, the number with its unit and bound, leg or axis, and what to do.
+/// Sentence that says what happened, the value with its unit and bound, leg or axis, and what to do.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { code, value, bound, index } = self;
@@ -299,7 +305,7 @@ impl fmt::Display for Diagnostic {
             match code.comparison() {
                 Comparison::None => {}
                 Comparison::Processes => {
-                    write!(f, ": process {value} counts, process {bound} does not")?;
+                    write!(f, ": process {value} is used, process {bound} is ignored")?;
                 }
                 Comparison::Absolute { quantity, unit, relation, bound: source } => {
                     let space = if unit.is_empty() { "" } else { " " };

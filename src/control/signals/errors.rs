@@ -1,4 +1,5 @@
-//! Errors of the platform: of its pose, of what feedback acts on, and as estimated. All are desired minus true.
+//! Errors of the platform, desired minus true: of pose and twist, in the coordinates of feedback, and
+//! estimated.
 
 use nalgebra::Vector6;
 
@@ -30,7 +31,8 @@ impl PoseError {
     }
 }
 
-/// Error that feedback acts on, desired minus measured: of the pose, or in modes on legs of their lengths.
+/// Error that feedback acts on, desired minus measured: of the pose, or of the leg lengths in modes that act
+/// on legs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct ErrorCoordinates {
@@ -41,7 +43,7 @@ pub struct ErrorCoordinates {
 }
 
 impl ErrorCoordinates {
-    /// Of the legs.
+    /// Error of leg lengths and rates.
     pub fn of_legs(machine: &Machine, desired: &Motion, length: &[f64; LEGS], rate: &[f64; LEGS]) -> Self {
         let (desired, desired_rate) = leg_lengths_and_rates(machine, &desired.pose, &desired.twist);
         Self {
@@ -63,7 +65,7 @@ impl From<&ErrorCoordinates> for PoseError {
     }
 }
 
-/// Estimate of one instant.
+/// Estimate of error, rate and disturbance at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct ErrorEstimate {
@@ -71,26 +73,26 @@ pub struct ErrorEstimate {
     pub value: Vector6<f64>,
     /// w, its rate.
     pub rate: Vector6<f64>,
-    /// d, the acceleration that nothing in the model explains.
+    /// d, the acceleration that the model does not contain.
     pub disturbance: Vector6<f64>,
 }
 
 impl ErrorEstimate {
-    /// Moves it over `dt` seconds in which feedback accelerates the platform by u.
+    /// Advances the estimate by `dt` seconds, in which feedback accelerates the platform by u.
     pub fn advance(&mut self, dt: f64, u: &Vector6<f64>) {
         let acceleration = self.disturbance - u;
         self.value += (self.rate + acceleration * (0.5 * dt)) * dt;
         self.rate += acceleration * dt;
     }
 
-    /// It `dt` seconds later.
+    /// Estimate `dt` seconds later.
     pub fn after(&self, dt: f64, u: &Vector6<f64>) -> Self {
         let mut after = *self;
         after.advance(dt, u);
         after
     }
 
-    /// Without the disturbance.
+    /// Error and its rate, without the disturbance.
     pub fn error(&self) -> ErrorCoordinates {
         ErrorCoordinates { value: self.value, rate: self.rate }
     }

@@ -1,10 +1,11 @@
-//! What the controller is told in one cycle: setpoint, measurement, request, and which processes sent them.
+//! Inputs of the controller in one cycle: setpoint, measurement, request, and the processes that publish
+//! them.
 
 use crate::control::signals::state::OperatorRequest;
 use crate::model::LEGS;
 use crate::model::task::TaskState;
 
-/// Meaning of the numbers of a setpoint, as the messages carry it.
+/// Kind of a setpoint, with its number in the messages: which of its values hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 #[repr(u32)]
@@ -12,11 +13,12 @@ pub enum SetpointKind {
     /// X, X' and X'' of a motion at one instant.
     #[default]
     Motion = 0,
-    /// X of a motion at one instant, without derivatives; the messages may arrive more slowly than the cycles.
+    /// X of a motion at one instant, without derivatives; the messages may arrive more slowly than the
+    /// cycles.
     Pose = 1,
     /// X of a pose to move to and to stand at.
     Target = 2,
-    /// No kind has the number of the message: the setpoint is rejected.
+    /// The number in the message belongs to no kind: the setpoint is rejected.
     Unknown = 3,
 }
 
@@ -25,17 +27,17 @@ impl SetpointKind {
     pub const ALL: [Self; 3] = [Self::Motion, Self::Pose, Self::Target];
 }
 
-/// Task coordinates, with their derivatives, that the platform shall have at one instant.
+/// Task coordinates and their derivatives that a source requests for one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct Setpoint {
-    /// Which of the numbers hold, and for how long.
+    /// Which of the values hold, and for how long.
     pub kind: SetpointKind,
     /// Instant for which the setpoint holds, on the clock of the releases \[ns\].
     pub time_ns: u64,
     /// X, X', X'' at that instant.
     pub task: TaskState,
-    /// Share of the limits of autonomous motions with which a target is approached, up to 1; 0 is all of them.
+    /// Share of the limits of autonomous motions with which a target is approached, up to 1; 0 means 1.
     pub target_speed: f64,
 }
 
@@ -68,17 +70,17 @@ impl AsRef<Self> for Measurement {
     }
 }
 
-/// Drives as a driver reports them. The sets have a bit for each leg, the lowest for leg 1.
+/// Status of the drives, reported by the driver. A set has one bit per leg, the lowest for leg 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriveStatus {
-    /// Drives that are enabled; `None` if it is not reported.
+    /// Set of enabled drives; `None` if not reported.
     pub enabled: Option<u32>,
-    /// Brakes that are open.
+    /// Set of open brakes; `None` if not reported.
     pub brake_open: Option<u32>,
-    /// Drives with a fault.
+    /// Set of drives with a fault; `None` if not reported.
     pub fault: Option<u32>,
-    /// Forces that act \[N\].
+    /// Actual forces \[N\]; `None` if not reported.
     pub force: Option<[f64; LEGS]>,
 }
 
@@ -94,21 +96,22 @@ impl DriveStatus {
     }
 }
 
-/// Processes that publish an input: of the publisher that counts, and of another one that lives beside it. 0: none.
+/// IDs of the processes that publish an input: one whose messages are used, and one more that runs beside it;
+/// 0 for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Publishers {
-    /// Process whose messages count.
+    /// Process whose messages are used.
     pub counting: u32,
     /// Process whose messages are ignored.
     pub ignored: u32,
 }
 
-/// Inputs of one cycle: with the controller's own state they determine its output.
+/// Inputs of one cycle. Together with the state of the controller they determine its output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Input {
     /// The instant of release of this cycle, on the grid.
     pub release_ns: u64,
-    /// The clock of the releases less the daemon's \[ns\]: not zero where measurements release the cycles.
+    /// Clock of the releases minus the daemon's clock \[ns\]; zero unless measurements release the cycles.
     pub clock_offset_ns: i64,
     /// The newest setpoint; `None` if none ever arrived.
     pub setpoint: Option<Setpoint>,
@@ -120,6 +123,6 @@ pub struct Input {
     pub setpoint_publishers: Publishers,
     /// Processes that publish measurements.
     pub measured_publishers: Publishers,
-    /// Whether cycles were missed since the last one, and the deployment makes that a fault.
+    /// Whether cycles were missed since the last one, and the deployment treats that as a fault.
     pub overrun_is_fault: bool,
 }

@@ -2,21 +2,22 @@
 //!
 //! | bit | limit | bound | at the bound |
 //! | --- | --- | --- | --- |
-//! | 0 | force | `actuator.max_force_n` | the force keeps its gravity part and the rest is reduced by the same factor |
-//! | 1 | force rate | `limits.force_rate_n_s` | the change of force is reduced by the same factor on every leg |
-//! | 2 | stroke | `actuator.*_length_m` less `limits.stroke_margin_m` | the reference comes to rest before it |
+//! | 0 | force | `actuator.max_force_n` | the gravity part stays; one factor reduces the rest of all forces |
+//! | 1 | force rate | `limits.force_rate_n_s` | one factor reduces the changes of all forces |
+//! | 2 | stroke | `actuator.*_length_m` less `limits.stroke_margin_m` | the reference stops before it |
 //! | 3 | leg rate | `actuator.max_rate_m_s` | kept by the reference |
-//! | 4 | envelope | `[envelope]` | the reference comes to rest before it |
+//! | 4 | envelope | `[envelope]` | the reference stops before it |
 //! | 5 | velocity | `limits.velocity_*` | kept by the reference |
 //! | 6 | acceleration | `limits.acceleration_*` | kept by the reference |
 //! | 7 | jerk | `limits.jerk_*` | kept by the reference |
 //! | 8 | following error | `control.following_*`, of pose and velocity | fault |
-//! | 9 | condition | `limits.condition` | the reference comes to rest before it; where the platform is: stop, fault |
+//! | 9 | condition | `limits.condition` | the reference stops before it; platform beyond it: stop, fault |
 //!
-//! The reference keeps its limits whatever is sent. Under `on_violation = "stop"` a setpoint beyond one of them, but for
-//! jerk and condition, is rejected, and so is one that the reference falls behind by more than the engage tolerance. A
-//! rejected setpoint counts as none: the reference continues over one wrong message among valid ones, and ends in a stop
-//! after a stream of them. Under "limit" the reference follows as near as the limits allow.
+//! The reference keeps its limits for every setpoint. Under `on_violation = "stop"` a setpoint beyond a limit
+//! is rejected, unless the limit is jerk or condition. A setpoint that the reference falls behind by more
+//! than the engage tolerance is rejected, too. A rejected setpoint counts as not received: the reference
+//! continues over one wrong message among valid ones, and a stream of wrong messages ends in a stop. Under
+//! "limit" the reference follows as near as the limits allow.
 
 /// Limit by the number of its bit in a [`LimitSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +39,7 @@ pub enum Limit {
     Acceleration = 6,
     /// Jerk of the platform, `limits.jerk_*` \[rad/s^3\], \[m/s^3\].
     Jerk = 7,
-    /// Following error while active, `control.following_*` \[rad\], \[m\].
+    /// Following error under control, `control.following_*` \[rad\], \[m\].
     Following = 8,
     /// Condition of the pose, `limits.condition`; without unit.
     Condition = 9,
@@ -81,15 +82,15 @@ impl Limit {
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct LimitSet(pub u32);
 
-/// The largest of quantities over their bounds. No number if any is none: `f64::max` would take the number, and a check would
-/// pass.
+/// Largest of several ratios of a quantity to its bound. NaN if any ratio is NaN; `f64::max` would hide it
+/// and a check would pass.
 pub fn largest_ratio<const N: usize>(ratios: [f64; N]) -> f64 {
     let larger =
         |largest: f64, ratio: f64| if largest.is_nan() || ratio <= largest { largest } else { ratio };
     ratios.into_iter().fold(0.0, larger)
 }
 
-/// Part of a bound from which on its limit is in the set: the operator is warned before the bound is exceeded.
+/// Share of a bound above which its limit is in the set: the operator is warned before the bound is exceeded.
 const WARNING_RATIO: f64 = 0.9;
 
 impl LimitSet {
@@ -98,8 +99,8 @@ impl LimitSet {
         Self(self.0 | u32::from(is_active) << limit as u32)
     }
 
-    /// Adds a limit if `ratio`, a quantity over its bound, is nearly 1 or more. True if the bound is kept; NaN exceeds
-    /// it.
+    /// Adds a limit if `ratio`, a quantity over its bound, is nearly 1 or more. True if the bound is kept;
+    /// NaN exceeds it.
     pub fn check(&mut self, limit: Limit, ratio: f64) -> bool {
         *self = self.with(limit, ratio > WARNING_RATIO);
         ratio <= 1.0
@@ -128,7 +129,7 @@ pub struct Limits {
     pub position: DerivativeLimits,
     /// Limits of the orientation \[rad\], per second.
     pub orientation: DerivativeLimits,
-    /// Factor on the limits for the autonomous motions, onto the setpoint and home.
+    /// Factor on the limits for autonomous motions: onto the setpoint, and home.
     pub autonomous_scale: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What the stages of a cycle pass to each other: types that import no stage.
+//! Types that the stages of a cycle pass to each other. They import no stage.
 
 pub mod diagnostic;
 pub mod errors;

@@ -1,21 +1,23 @@
-//! States of the controller and requests of operators, by number, as the messages carry them.
+//! States of the controller and operator requests, with their numbers in the messages.
 //!
 //! | state | force | ends with |
 //! | --- | --- | --- |
-//! | off | not valid: brake | the pose is known: standby; after the request `off`: `clear`, `engage` or `park` |
+//! | off | not valid: brake | the pose is known: standby; after request `off`: `clear`, `engage` or `park` |
 //! | standby | not valid: brake | `engage`: engaging; `park`: stopping, then parking; the pose is lost: off |
-//! | engaging | controlled, from the measured motion onto the setpoint; without setpoints at rest, see below | on the setpoint: active; `stop`, `park`, a setpoint that ended, was lost or rejected: stopping |
-//! | active | controlled, on the setpoint | `stop`, `park`, a setpoint that ended, was lost or rejected: stopping; without setpoints, see below: engaging |
+//! | engaging | controlled, from the measured motion onto the setpoint | on the setpoint: active; as active |
+//! | active | controlled, on the setpoint | `stop`, `park`, setpoint ended, lost or rejected: stopping |
 //! | stopping | controlled, to rest along a verified stop | at rest: standby, parking or fault |
 //! | parking | controlled, to the home pose | at home: off; `stop`, a fault that stops: stopping |
 //! | fault | not valid: brake | `clear`: off, and on to standby |
 //!
-//! In every state `off` leads to off and `estop` to fault, within the cycle; only `clear` ends a fault. There is no
-//! gravity support without control: a driver brakes when it receives no valid force.
+//! In every state `estop` leads to fault, and in every state but fault `off` leads to off, within the cycle.
+//! Only `clear` ends a fault. Without control there is no gravity support: the driver closes the brakes when
+//! it receives no valid force.
 //!
-//! The platform may still move when control begins, by `engage` or `park`. Both are refused if no stop within every limit
-//! exists for its motion. Under `[setpoint] on_violation = "limit"` a platform without setpoints comes to rest and holds its
-//! pose in the state engaging, which is no fault; when setpoints arrive again, it moves onto them.
+//! The platform may still move when control begins, by `engage` or `park`. Both requests are refused if no
+//! stop within every limit exists for its motion. Under `[setpoint] on_violation = "limit"` a platform
+//! without setpoints comes to rest and holds its pose in the state engaging, which is no fault. When
+//! setpoints arrive again, it moves onto them.
 
 /// State of the controller, which decides whether forces are valid and which reference the platform follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -68,7 +70,8 @@ impl State {
     }
 }
 
-/// Operator request, one per message. Of several within one cycle the last in this order counts.
+/// Operator request, one per message. Of several requests within one cycle the last in this order takes
+/// effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u32)]
 pub enum Request {
@@ -90,7 +93,7 @@ impl Request {
     /// Every request, in ascending order of precedence.
     pub const ALL: [Self; 6] = [Self::Engage, Self::Clear, Self::Park, Self::Stop, Self::Off, Self::Estop];
 
-    /// Whether it may begin control of the platform.
+    /// Whether the request may begin control of the platform.
     pub fn can_begin_control(self) -> bool {
         matches!(self, Self::Engage | Self::Park)
     }
@@ -113,13 +116,13 @@ impl Request {
     }
 }
 
-/// Identity of a message: two of one topic differ in it.
+/// Identity of a message, unique within its topic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct MessageId {
     /// Start of the publisher, or of the request words of a daemon.
     pub epoch: u64,
-    /// Counts the messages of the epoch.
+    /// Number of the message within the epoch.
     pub sequence: u64,
 }
 
@@ -128,7 +131,7 @@ pub struct MessageId {
 pub struct OperatorRequest {
     /// Change of state that the operator requests.
     pub request: Request,
-    /// The message that brought it.
+    /// Identity of the message.
     pub message: MessageId,
 }
 

@@ -1,4 +1,5 @@
-//! Assessment of a cycle: whether the platform is located, may be engaged, and can follow its reference further.
+//! Assessment of a cycle: whether the platform is located, may be engaged, and can follow its reference
+//! further.
 
 use crate::control::cycle::Cycle;
 use crate::control::law::feedback_limiter::FeedbackLimiter;
@@ -14,35 +15,36 @@ use crate::control::signals::limits::{Limit, LimitSet, largest_ratio};
 use crate::control::signals::state::State;
 use crate::control::supervision::supervisor::Findings;
 
-/// Deviation of the reference from a target at which it counts as reached, over the engage tolerance: near enough to a
-/// setpoint in motion, and at home almost at rest.
+/// Deviation of the reference from its target at which the target counts as reached, as a ratio of the engage
+/// tolerance: near enough to a setpoint in motion, and at home almost at rest.
 const REACHED_RATIO: f64 = 0.05;
 const AT_HOME_RATIO: f64 = 0.005;
 
-/// Inputs of an assessment, beside the memory of the stages.
+/// Inputs of an assessment, besides the memory of the stages.
 pub(in crate::control) struct Evidence<'a> {
     pub input: &'a Input,
     pub setpoint: &'a ValidatedSetpoint<'a>,
     /// Whether the pose is known.
     pub localization: Result<(), Diagnostic>,
     pub error: Option<&'a PoseError>,
-    /// Whether the reference was placed, with a verified stop, where control would begin; without control.
+    /// Without control: whether the reference was placed where control would begin, with a verified stop.
     pub start: Result<(), Diagnostic>,
-    /// Whether drives and external sensors report nothing that contradicts.
+    /// Results of the checks of drives and external pose.
     pub reports: &'a [Result<(), Diagnostic>; 2],
-    /// Whether the drives are ready, or nothing else is reported.
+    /// Whether the drives are ready, or the driver does not report it.
     pub is_ready: bool,
     pub feedback: &'a FeedbackLimiter,
-    /// What the last measurement and the prediction disagree in, or which sensor is frozen.
+    /// Disagreement of the last measurement with its prediction, or a frozen sensor.
     pub sensor_diagnostic: Option<&'a Diagnostic>,
-    /// What has changed of payload and surroundings, or that the platform oscillates.
+    /// Change of the payload or the surroundings, or an oscillation of the platform.
     pub disturbance_diagnostic: Option<&'a Diagnostic>,
     /// Whether a length repeats itself: its sensor may be frozen.
     pub may_be_frozen: bool,
 }
 
-// Out of line, as is `target` in the controller: jump tables inside `step` are beyond the proof on the machine code.
-/// The findings that decide the next state, and the limits that the platform is near to.
+// Out of line, like `ValidatedSetpoint::target_in`: the proof on the machine code of `step` covers no jump
+// tables.
+/// Findings that decide the next state. Adds the limits that the platform is near to `active_limits`.
 #[inline(never)]
 pub(in crate::control) fn assess(
     cycle: &Cycle<'_>,
@@ -61,7 +63,7 @@ pub(in crate::control) fn assess(
         true => Ok(()),
         false => check_start(evidence),
     };
-    // Nothing depends on it while the setpoint is followed.
+    // Not needed while the setpoint is followed.
     let engagement = match cycle.state {
         State::Engaging | State::Active => Ok(()),
         _ => check_engagement(cycle, evidence, &conditioned, &start),
@@ -72,7 +74,7 @@ pub(in crate::control) fn assess(
     Findings { localization: *located, start, engagement, tracking, is_doubtful, has_ended }
 }
 
-// In the checks each result is looked at where it is, as copies of many that are in order take time.
+// The checks read each result in place, because copying many results without an error takes time.
 /// Whether the reference can be followed further.
 fn check_tracking(
     cycle: &Cycle<'_>,
@@ -120,7 +122,7 @@ fn check_reports(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
     *external_pose
 }
 
-/// Whether the motion of the state has come to its end.
+/// Whether the motion of the present state has ended.
 #[inline(never)]
 fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &ReferenceGenerator) -> bool {
     let parameters = &cycle.constants.parameters;
@@ -136,8 +138,8 @@ fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &Re
     }
 }
 
-/// Control may begin only if closing the loop does not itself move the platform: near the setpoint in pose and velocity.
-/// A pose to move to may be anywhere.
+/// Whether the platform is near the setpoint in pose and velocity. Otherwise closing the loop would itself
+/// move the platform. A target may be anywhere.
 fn check_engage_tolerance(
     parameters: &Parameters,
     setpoint: &ValidatedSetpoint<'_>,
@@ -152,13 +154,14 @@ fn check_engage_tolerance(
     Err(Diagnostic::new(DiagnosticCode::SetpointTooFar, ratio, 1.0))
 }
 
-/// Control begins only with one publisher of each input: nobody knows which of two is the true one.
+/// Whether an input has a single publisher. Control does not begin with two, because it is unknown which one
+/// is right.
 fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
     let Publishers { counting, ignored } = publishers;
     if ignored == 0 { Ok(()) } else { Err(Diagnostic::new(code, counting.into(), ignored.into())) }
 }
 
-/// Control may begin if the motion without force is known and a stop from it was verified.
+/// Whether the motion without force is known and a stop from it was verified.
 fn check_start(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
     check_publishers(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
     check_reports(evidence)?;

@@ -1,4 +1,4 @@
-//! Decisions: whether control may begin or must end, and the next state. Pure functions.
+//! Decisions of a cycle: whether control may begin or must end, and the next state. Pure functions.
 
 pub(super) mod assessment;
 pub mod supervisor;

@@ -1,10 +1,12 @@
 //! The state machine: the next state, as a pure and total function of requests and findings.
 //!
-//! Order of precedence: the emergency stop, a fault that brakes, `off`, a fault that stops, then what the
-//! state itself does. In states without force a fault is only reported: no force is to be disabled.
+//! Order of precedence: the emergency stop, a fault that brakes, `off`, a fault that stops, then the
+//! transitions of the state itself. In states without force a fault is only reported: there is no force to
+//! disable.
 //!
-//! Control begins in engaging, or by `park` in stopping: a platform that moves without force comes to rest before it goes
-//! home. A setpoint that is lost while the policy is to hold the pose leads to engaging and not to a stop.
+//! Control begins in engaging, or by `park` in stopping: a platform that moves without force comes to rest
+//! before it goes home. If the setpoint is lost and the policy is to hold the pose, engaging follows and not
+//! stopping.
 
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
 use crate::control::signals::inputs::Input;
@@ -17,9 +19,9 @@ use crate::control::signals::state::{MessageId, OperatorRequest, Request, State}
 pub struct SupervisorState {
     /// State of the controller; it decides whether forces are applied.
     pub state: State,
-    /// Why it is not active, or soon will not be.
+    /// Why the state is not active, or soon will not be.
     pub diagnostic: Diagnostic,
-    /// Used only while stopping.
+    /// Goal of the stop; used only while stopping.
     pub after: AfterStop,
 }
 
@@ -28,15 +30,16 @@ pub struct SupervisorState {
 pub struct Findings {
     /// Whether the pose is known, from valid measurements.
     pub localization: Result<(), Diagnostic>,
-    /// Whether a verified stop exists for the platform as it moves without force. `engagement` contains it.
+    /// Whether a verified stop exists for the motion of the platform without force. `engagement` includes
+    /// this finding.
     pub start: Result<(), Diagnostic>,
     /// Whether control may begin on the setpoint.
     pub engagement: Result<(), Diagnostic>,
-    /// Whether the reference can be followed further. A diagnostic that is no fault ends it by a stop.
+    /// Whether the reference can be followed further. A diagnostic that is no fault ends control by a stop.
     pub tracking: Result<(), Diagnostic>,
-    /// Whether a length repeats itself: a stop under control may then follow a frozen sensor.
+    /// Whether a length repeats itself: a stop under control might rely on a frozen sensor.
     pub is_doubtful: bool,
-    /// The reference of engaging, stopping or parking has come to its end.
+    /// Whether the motion of engaging, stopping or parking has ended.
     pub has_ended: bool,
 }
 
@@ -45,19 +48,19 @@ pub struct Findings {
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control) struct Supervisor {
     pub current: SupervisorState,
-    /// Message of the last request carried out or refused.
+    /// Message of the last request that was carried out or refused.
     pub answered_message: MessageId,
-    /// Why that one was refused; code `None` if it was not.
+    /// Why that request was refused; code `None` if it was not.
     pub request_diagnostic: Diagnostic,
 }
 
 impl Supervisor {
-    /// The request of an input if it was not answered before: each is carried out once.
+    /// Request of an input, if it was not answered before. Each request is carried out once.
     pub fn new_request(&self, input: &Input) -> Option<OperatorRequest> {
         input.request.filter(|request| request.message != self.answered_message)
     }
 
-    /// Decides the next state. Returns it.
+    /// Decides the next state and returns it.
     pub fn decide(
         &mut self,
         request: Option<OperatorRequest>,
@@ -72,14 +75,14 @@ impl Supervisor {
         current.state
     }
 
-    /// Enters the state fault: no valid force could be computed.
+    /// Enters the state fault, because no valid force could be computed.
     pub fn fail(&mut self, diagnostic: Diagnostic) {
         self.current = fault(diagnostic);
     }
 }
 
-/// The next state, and why a request was refused if it was. `after_loss` follows the stop of a platform that lost its
-/// setpoint.
+/// Returns the next state and, if a request was refused, the reason. `after_loss` is the goal of the stop
+/// after a loss of the setpoint.
 pub fn next(
     current: SupervisorState,
     request: Option<Request>,
@@ -90,7 +93,7 @@ pub fn next(
         return (fault(DiagnosticCode::EmergencyStop.into()), None);
     }
     if current.state.has_control() {
-        // Control needs the pose, whatever the reason it is unknown.
+        // Control ends without a known pose, whatever the reason.
         if let Err(diagnostic) = findings.localization {
             return (fault(diagnostic), None);
         }
@@ -99,7 +102,7 @@ pub fn next(
         {
             return (fault(diagnostic), None);
         }
-        // A payload or an impact that a frozen sensor has made looks like any other.
+        // The readings of a frozen sensor may look like a change of payload or an impact.
         let under_way = (current.state == State::Stopping).then_some(current.diagnostic);
         let change = findings.tracking.err().into_iter().chain(under_way).find(|cause| is_change(cause.code));
         if let Some(cause) = change.filter(|_| findings.is_doubtful) {
@@ -118,12 +121,12 @@ pub fn next(
     }
 }
 
-/// Whether readings alone have shown it, and its reaction is a stop under control.
+/// Whether readings alone have shown the event, and its reaction is a stop under control.
 fn is_change(code: DiagnosticCode) -> bool {
     matches!(code, DiagnosticCode::PayloadChanged | DiagnosticCode::Impact)
 }
 
-/// Off by request of an operator: it does not become standby by itself.
+/// The state off by request of an operator. It does not become standby by itself.
 const OFF_BY_REQUEST: SupervisorState =
     SupervisorState { state: State::Off, diagnostic: REQUESTED, after: AfterStop::Standby };
 
@@ -184,7 +187,7 @@ fn following(
     let (mut current, mut has_ended) = (current, findings.has_ended);
     if let Err(diagnostic) = findings.tracking {
         let after = match diagnostic.code {
-            // Holds its pose; from there it engages again.
+            // The platform holds its pose and engages again from there.
             DiagnosticCode::HoldingPose => {
                 (current, has_ended) =
                     (SupervisorState { state: State::Engaging, diagnostic, ..current }, false);
@@ -257,7 +260,7 @@ fn parking(
     (if findings.has_ended { OFF_BY_REQUEST } else { current }, None)
 }
 
-/// The diagnostic of a code with the number of this cycle, if the code still prevents control.
+/// Diagnostic of a code, with the value of this cycle if the code still prevents control.
 fn present(code: DiagnosticCode, findings: &Findings) -> Diagnostic {
     findings.engagement.err().filter(|found| found.code == code).unwrap_or(code.into())
 }
@@ -279,7 +282,7 @@ mod tests {
         has_ended: false,
     };
 
-    /// The current after one cycle.
+    /// State after one cycle without a request.
     fn after(current: SupervisorState, findings: &Findings) -> SupervisorState {
         next(current, None, findings, AfterStop::Fault).0
     }
@@ -321,7 +324,7 @@ mod tests {
         assert_eq!(current, stop(DiagnosticCode::SetpointTooFast.into(), AfterStop::Fault));
     }
 
-    /// The reason of a stop with the value of this cycle, if it still prevents control.
+    /// Standby shows the reason of the stop, with the value of this cycle if it still prevents control.
     #[test]
     fn standby_after_a_stop_shows_the_present_value_of_its_reason() {
         let ended = Findings { has_ended: true, ..IN_ORDER };
@@ -333,7 +336,8 @@ mod tests {
         }
     }
 
-    /// A stop under control for a change follows readings; with one that repeats itself the brakes close, at once or during the stop.
+    /// A stop under control after a change relies on readings. If a reading repeats itself, the brakes close,
+    /// at once or during the stop.
     #[test]
     fn a_change_that_a_frozen_sensor_may_have_made_closes_the_brakes() {
         let active = SupervisorState { state: State::Active, ..SupervisorState::default() };

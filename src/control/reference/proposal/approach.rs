@@ -1,7 +1,7 @@
-//! Approach of a vector to a moving target, of third order: the acceleration of the next instant.
+//! Third-order approach of a vector to a moving target: the acceleration of the next instant.
 //!
-//! A cascade of two braking curves, on the vectors themselves and not per axis. With the target `p_t, v_t, a_t` of the next
-//! instant, and P, Q the position and velocity that the present acceleration leads to:
+//! The approach is a cascade of two braking curves, on the vectors themselves and not per axis. The target of
+//! the next instant is `p_t, v_t, a_t`. The present acceleration leads to the position P and the velocity Q:
 //!
 //! ```text
 //! e   = p_t - P                       of the orientation log(R_t R^T): |e|' = e^ . (w_t - w) holds exactly
@@ -10,11 +10,12 @@
 //! v_d = v_t + e^ phi(|e|)             velocity wanted
 //! a_f = a_t + (phi/|e|)(v_t - Q) + (phi' - phi/|e|) e^ (e^ . (v_t - Q))       its derivative
 //! x   = v_d - Q
-//! a*  = a_f + 2 x / (tau2 (1 + sqrt(1 + 2 |x| / (0.7 J tau2^2))))             limited to A, its change to J h
+//! a*  = a_f + 2 x / (tau2 (1 + sqrt(1 + 2 |x| / (0.7 J tau2^2))))            limited to A, its change to J h
 //! ```
 //!
-//! d is the way from `a = 0`: the plain braking curve would overshoot where the limit of velocity hands over to it. Without
-//! limits `x' = -psi(x)` and `|e|' <= -phi + |x|`: a globally stable cascade, whose jerk is below 0.7 J.
+//! d is the stopping distance from `a = 0`. The plain braking curve would overshoot where the velocity limit
+//! hands over to it. Without limits `x' = -psi(x)` and `|e|' <= -phi + |x|`: the cascade is globally stable,
+//! and its jerk is below 0.7 J.
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
@@ -28,21 +29,23 @@ use crate::model::rigid::{Pose, Twist};
 
 /// Share of the acceleration limit that the outer curve brakes with; the rest is for corrections.
 const BRAKING_SHARE: f64 = 0.95;
-/// Share of the velocity limit that is wanted: the inner curve ends there without exceeding the limit.
+/// Share of the velocity limit that a wanted velocity may reach: the inner curve ends there without exceeding
+/// the limit.
 const VELOCITY_SHARE: f64 = 0.999;
 /// Share of the jerk limit that the inner curve uses.
 const INNER_JERK_SHARE: f64 = 0.7;
-/// Time constant of the outer curve, in times of the build-up `A / J`, and at least this many steps.
+/// Time constant of the outer curve, as a multiple of the build-up time `A / J`. It is at least the next
+/// number of steps.
 const OUTER_TIME_PER_RAMP: f64 = 0.4;
 const MIN_OUTER_STEPS: f64 = 4.0;
-/// Time constant of the inner curve over that of the outer one.
+/// Time constant of the inner curve, as a ratio of the outer one.
 const INNER_TIME_RATIO: f64 = 0.5;
-/// Steps of Newton's method on the braking curve from above; each leaves less than half of the error.
+/// Steps of Newton's method on the braking curve, from above. Each leaves less than half of the error.
 const NEWTON_STEPS: u32 = 4;
-/// Least root of a velocity: a step divides by it.
+/// Least square root of a velocity: a step divides by it.
 const SMALLEST_ROOT: f64 = 1e-150;
 
-/// Target of one vector at the next instant, relative to where the present acceleration leads.
+/// Target of one vector at the next instant, relative to the state that the present acceleration leads to.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct TargetOffset {
     /// `e`.
@@ -57,7 +60,7 @@ pub(in crate::control::reference) struct TargetOffset {
 pub(in crate::control::reference) struct WantedVelocity {
     pub velocity: Vector3<f64>,
     pub derivative: Vector3<f64>,
-    /// Whether the limit of velocity holds it back.
+    /// Whether the velocity limit reduced it.
     pub is_limited: bool,
 }
 
@@ -65,7 +68,7 @@ pub(in crate::control::reference) struct WantedVelocity {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct Approach {
     limits: DerivativeLimits,
-    /// Limits of the way to the target, without the target's own motion.
+    /// Limits for closing the distance to the target, without the target's own motion.
     closing: DerivativeLimits,
     step_s: f64,
     outer_s: f64,
@@ -79,7 +82,7 @@ impl Approach {
         Self { limits, closing: limits.scaled(closing_scale), step_s, outer_s }
     }
 
-    /// The velocities of two vectors that are wanted where the present motion leads with the velocities `ahead`.
+    /// Wanted velocities of two vectors. `ahead`: the velocities that the present accelerations lead to.
     pub fn wanted(
         approaches: Pair<&Self>,
         targets: Pair<&TargetOffset>,
@@ -124,12 +127,12 @@ impl Approach {
         }
     }
 
-    /// phi' at no distance \[1/s\].
+    /// phi' at distance zero \[1/s\].
     pub fn slowest_slope(&self) -> f64 {
         1.0 / self.outer_s
     }
 
-    /// What the velocity changes by while the acceleration builds up to its limit, `a^2/j` \[m/s\].
+    /// Change of the velocity while the acceleration builds up to its limit, `a^2/j` \[m/s\].
     pub fn build_up_velocity(&self) -> f64 {
         self.closing.acceleration * self.closing.acceleration / self.closing.jerk
     }
@@ -139,7 +142,7 @@ impl Approach {
         self.closing_velocity_of(distance, || closing_roots([self], [distance])[0])
     }
 
-    /// The same with the root of phi, which is needed below `a^2/j` only.
+    /// phi and phi' at a distance. `root` is the square root of phi, needed below `a^2/j` only.
     fn closing_velocity_of(&self, distance: f64, root: impl FnOnce() -> f64) -> (f64, f64) {
         let DerivativeLimits { velocity: limit, acceleration, jerk } = self.closing;
         let a = BRAKING_SHARE * acceleration;
@@ -155,8 +158,9 @@ impl Approach {
         if v > limit { (limit, 0.0) } else { (v, slope) }
     }
 
-    /// The accelerations of the next instant of two vectors for their wanted velocities, and whether the limits of acceleration
-    /// and jerk hold them back. `in_proportion`: both by the factor of the one that needs the smaller, which keeps the direction.
+    /// Accelerations of two vectors at the next instant for their wanted velocities, and the limits of
+    /// acceleration and jerk that reduced them. With `in_proportion` the smaller of the two factors scales
+    /// both, which keeps the direction.
     pub fn accelerations(
         approaches: Pair<&Self>,
         wanted: Pair<&WantedVelocity>,
@@ -186,8 +190,9 @@ impl Approach {
     }
 }
 
-/// Roots of phi below `a^2/j` of some vectors, side by side. Each step of one waits for the one before, so it is one division with
-/// short terms; those of the others are done meanwhile.
+/// Square roots of phi below `a^2/j` for several vectors, side by side. Each Newton step of a vector waits
+/// for the previous one. A step is therefore a single division of short terms, and the steps of the other
+/// vectors are computed meanwhile.
 fn closing_roots<const N: usize>(approaches: [&Approach; N], distances: [f64; N]) -> [f64; N] {
     let by_root_jerk = approaches.map(|approach| 1.0 / approach.closing.jerk.sqrt());
     let outer_s = approaches.map(|approach| approach.outer_s);
@@ -206,10 +211,12 @@ fn closing_roots<const N: usize>(approaches: [&Approach; N], distances: [f64; N]
     roots
 }
 
-/// Part of a leg's largest rate that is wanted: the velocity ends there without exceeding the limit.
+/// Share of a leg's largest rate that a wanted velocity may reach: the velocity ends there without exceeding
+/// the limit.
 const LEG_RATE_SHARE: f64 = 0.97;
 
-/// Reduces the wanted velocities of rotation and translation by one factor, so that no leg moves too fast. True if so.
+/// Reduces the wanted velocities of rotation and translation by one factor, so that no leg moves too fast.
+/// Returns whether they were reduced.
 pub(in crate::control::reference) fn limit_leg_rates(
     constants: &Constants,
     pose: &Pose,
@@ -235,7 +242,8 @@ pub(in crate::control::reference) fn limit_leg_rates(
     true
 }
 
-/// Two vectors shortened to at most `largest`, each by its own factor or both by the smaller, and whether one was longer.
+/// Shortens two vectors to at most `largest`, each by its own factor or both by the smaller one. Also returns
+/// whether one was longer.
 fn limited(
     vectors: Pair<Vector3<f64>>,
     largest: Pair<f64>,

@@ -1,24 +1,29 @@
 //! Walls: bounds that the wanted velocity approaches softly, so that a platform pressed against them slides.
 //!
-//! Each bound leaves a gap `g`: of a leg to the ends of its stroke, of a coordinate to the envelope. With its gradient G,
-//! `g' = -G V`. The wanted twist V and its derivative are changed least (rotations weighted by the radius of the joints) so that
+//! Each bound has a gap `g`: of a leg's length to an end of its stroke, or of a coordinate to the envelope.
+//! The gradient of the leg or coordinate is G, so that `g' = -G V`. The wanted twist V and its derivative are
+//! changed by the least amount (rotations weighted by the radius of the joints) such that
 //!
 //! ```text
-//! G V  <= phi(g)                    phi: the lesser of the braking curve of the approach, on a part of the limits, and 2 g / T
-//! G V' = -phi'(g) G Q - G' Q        Q: the present twist; where this bound is active
+//! G V  <= phi(g)
+//! G V' = -phi'(g) G Q - G' Q        where this bound is active
 //! ```
 //!
-//! T is the duration of the stop. It brakes along V: a leg that is approached slowly by a platform that slides past fast
-//! moves on for half of T at its rate. Where rotation and translation cancel in a leg, the one that stops later remains.
+//! phi is the lesser of the braking curve of the approach, on a share of the limits, and `2 g / T`. Q is the
+//! present twist. T is the duration of the stop, which brakes along V. If a platform slides past fast, a leg
+//! that approaches its end slowly moves on for half of T at its rate. If rotation and translation cancel in a
+//! leg, the motion that stops later remains.
 //!
-//! The more an active wall takes away from V, the more of its bound on V' holds: all of it from the velocity `a^2/j` on that the
-//! acceleration builds up in. Else V' would jump wherever another wall becomes active, and in a corner they would take turns.
+//! The bound on V' is blended in. It holds fully once the wall removes `a^2/j` from V, the change of velocity
+//! while the acceleration builds up. Without blending, V' would jump whenever another wall becomes active,
+//! and in a corner the walls would take turns.
 //!
-//! Both ends of a leg or of a coordinate are one wall with two ends. V is found by Hildreth's method (C. Hildreth, "A quadratic
-//! programming procedure", 1957), a few sweeps over all walls. The walls prove nothing: the verified stop keeps the bounds. Without
-//! them it would do so at the limits of jerk.
+//! Both ends of a leg or of a coordinate are one wall. V is found by Hildreth's method (C. Hildreth, "A
+//! quadratic programming procedure", 1957), in a few sweeps over all walls. The walls prove nothing: the
+//! verified stop keeps the bounds. Without walls it would keep them with a motion at the limits of jerk.
 //!
-//! Used under `on_violation = "limit"` only: a certified trajectory may go as near to a bound as it can be stopped.
+//! Walls are used under `on_violation = "limit"` only. A certified trajectory may go as near to a bound as it
+//! can be stopped.
 
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
@@ -40,36 +45,38 @@ use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::task_coordinates;
 
-/// Part of the limits with which a wall is approached: several walls and the motion along them take the rest.
+/// Share of the limits with which a wall is approached. Several walls and the motion along them take the
+/// rest.
 const CLOSING_SHARE: f64 = 0.6;
-/// Sweeps over the walls: two walls at 60 degrees converge to 1e-4. Fewer where many walls are active, as this many visits of
-/// them bound the longest cycle: six hold every direction, more contradict each other.
+/// Sweeps over the walls: 8 sweeps bring two walls at 60 degrees to within 1e-4 (2026-11-22). With many
+/// active walls there are fewer sweeps, because the next number of visits to walls bounds the longest cycle.
+/// Six walls hold every direction; more contradict each other.
 const SWEEPS: usize = 8;
 const MAX_VISITS: usize = 24;
-/// One sweep of so many is over all walls, the others over the active ones.
+/// Period of the sweeps over all walls. The other sweeps cover only the active walls.
 const FULL_SWEEP: usize = 3;
-/// Visits that take about as long as the examination of a knot.
+/// Visits to walls that take about as long as the examination of a knot.
 const VISITS_PER_WORK: usize = 24;
-/// Slowness of the return from a gap that is negative, over that of the approach.
+/// Time constant of the return from a negative gap, as a multiple of the approach's time constant.
 const RETURN_RATIO: f64 = 4.0;
 
-/// Of a gradient, in memory.
+/// Lanes of a gradient in memory.
 const LANES: usize = 8;
-/// Every leg and every coordinate.
+/// One wall for each leg and each coordinate.
 const WALL_COUNT: usize = 12;
 
-/// One end of a leg or of a coordinate.
+/// One end of a wall.
 #[derive(Clone, Copy, Debug, Default)]
 struct End {
     /// Largest closing rate \[m/s\].
     rate: f64,
-    /// Its derivative at the present rate, less the curvature \[m/s^2\].
+    /// Derivative of this bound at the present rate, minus the curvature \[m/s^2\].
     derivative: f64,
 }
 
 impl End {
-    /// `closing` and `curvature`: rate of the leg or coordinate towards this end, and its curvature; `per_way`: rate over the way of the
-    /// stop \[1/s\].
+    /// Creates an end from the rate `closing` towards it and the `curvature` of the leg or coordinate.
+    /// `per_way`: ratio of a rate to the stopping distance \[1/s\].
     fn new(approach: &Approach, gap: f64, closing: f64, curvature: f64, per_way: f64) -> Self {
         let (rate, slope) = if gap > 0.0 {
             let (rate, slope) = approach.closing_velocity(gap);
@@ -82,20 +89,20 @@ impl End {
     }
 }
 
-/// Both ends of a leg or of a coordinate, in coordinates in which rotations are multiplied by the radius of the joints.
+/// Wall of a leg or a coordinate, with both ends. Rotations are multiplied by the radius of the joints.
 #[derive(Clone, Copy, Debug, Default)]
 struct Wall {
-    /// Bit of the limit that it stands for.
+    /// Limit that the wall represents.
     limit: LimitSet,
-    /// Six numbers, and zeros.
+    /// Gradient: six numbers, padded with zeros.
     gradient: [f64; LANES],
-    /// Of the square of its norm.
+    /// Inverse square of the gradient's norm.
     inverse_square: f64,
-    /// Against the gradient, along it.
+    /// The end against the gradient, then the end along it.
     ends: [End; 2],
-    /// Positive where the end along the gradient is active, negative at the other.
+    /// Positive if the end along the gradient is active, negative if the other end is.
     multiplier: f64,
-    /// Part of the bound on the derivative that holds, per multiplier, up to all of it.
+    /// Weight of the bound on the derivative, per multiplier. The weight is at most 1.
     blend_rate: f64,
 }
 
@@ -105,12 +112,12 @@ pub(in crate::control::reference) struct Walls {
     walls: [Wall; WALL_COUNT],
     count: usize,
     radius: f64,
-    /// Visits of walls so far.
+    /// Visits to walls so far.
     visits: usize,
 }
 
 impl Walls {
-    /// Those around a motion, for the twist that it leads to a step later.
+    /// Walls around a motion. `led`: twist that the motion leads to a step later.
     pub fn new(
         constants: &Constants,
         bounds: &PoseBounds,
@@ -136,8 +143,8 @@ impl Walls {
             let (moment, direction) = (Vector3::new(mx, my, mz), Vector3::new(nx, ny, nz));
             let gradient = stacked(&(moment / radius), &direction);
             let next = length + rate * step_s;
-            // What the way of the stop departs from `rate T / 2`: it leads straight on, and one of rotation and translation ends
-            // sooner.
+            // Deviation of the stopping distance from `rate T / 2`: the stop leads straight on, and either
+            // rotation or translation ends sooner.
             let departure = 0.5 * curvature * half_s * half_s
                 + moment.dot(&led.angular) * (halves_s.angular - half_s)
                 + direction.dot(&led.linear) * (halves_s.linear - half_s);
@@ -166,8 +173,9 @@ impl Walls {
         let (machine, limits) = (constants.machine(), &constants.parameters.limits);
         let x = task_coordinates(&motion.pose, &machine.home);
         let radius = self.radius;
-        // Rates of the Bryan angles: alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w / c^2.
-        // Of the rotation, n is the last column, and c e2 is across it and e1.
+        // Rates of the Bryan angles:
+        // alpha' = (e1 - s n) . w / c^2, beta' = e2 . w, gamma' = (n - s e1) . w / c^2.
+        // n is the last column of the rotation; c e2 is normal to n and e1.
         let [_, beta, ..] = x;
         let (e1, n) = (Vector3::x(), motion.pose.rotation.column(2).into_owned());
         let (s, c) = (n.x, (n.y * n.y + n.z * n.z).sqrt().copysign(libm::cos(beta)));
@@ -216,13 +224,13 @@ impl Walls {
         }
     }
 
-    /// The effort so far, in knots of an examination.
+    /// Effort so far, in knots of an examination.
     pub fn effort(&self) -> u32 {
         (self.visits / VISITS_PER_WORK) as u32
     }
 
-    /// Changes the wanted velocities of rotation and translation least, so that no wall is approached too fast. Returns the
-    /// limits that required it.
+    /// Changes the wanted velocities of rotation and translation by the least amount such that no wall is
+    /// approached too fast. Returns the limits that required a change.
     pub fn project(
         &mut self,
         level: Level,
@@ -255,7 +263,7 @@ impl Walls {
                 }
                 let [against, along] = &wall.ends;
                 let gradient = f64x8::load_array(simd, wall.gradient);
-                // The closing rate without this wall, and what of it is beyond the ends.
+                // Closing rate without this wall, and the part of it beyond the ends.
                 let rate = dot(gradient, velocity) * wall.inverse_square + wall.multiplier;
                 let allowed =
                     rate.min(along.rate * wall.inverse_square).max(-against.rate * wall.inverse_square);
@@ -302,7 +310,7 @@ impl Walls {
     }
 }
 
-/// The sum of the products, in the same order on every processor.
+/// Sum of the products, in the same order on every processor.
 #[inline(always)]
 fn dot<S: Simd>(a: f64x8<S>, b: f64x8<S>) -> f64 {
     let (low, high) = (a * b).split();
@@ -315,7 +323,8 @@ fn padded(v: &Vector6<f64>) -> [f64; LANES] {
     [a, b, c, d, e, f, 0.0, 0.0]
 }
 
-/// Half of the durations of the stops of rotation and translation from a twist without acceleration, their ways over the velocities \[s\].
+/// Half of the durations of the stops of rotation and translation, from a twist with zero acceleration \[s\].
+/// This is the ratio of stopping distance to velocity.
 fn half_durations(limits: &Limits, twist: &Twist) -> Pair<f64> {
     let half = |velocity: &Vector3<f64>, limits| 0.5 * straight_extent(velocity.norm(), limits).duration;
     Pair { angular: half(&twist.angular, &limits.orientation), linear: half(&twist.linear, &limits.position) }

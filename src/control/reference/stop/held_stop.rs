@@ -1,30 +1,32 @@
-//! The stop that is held ready: verified in an earlier step, it may be followed from the present motion on.
+//! The stop that is held ready. An earlier step verified it; the reference may follow it from the present
+//! motion on.
 
 use crate::control::constants::Constants;
 use crate::control::reference::stop::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
 use crate::control::setpoint::target::at_rest;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-/// Where the stop begins.
+/// Start of the stop.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control::reference) enum Phase {
-    /// The platform does not move.
+    /// The platform does not move: no stop is planned.
     #[default]
     AtRest,
-    /// At the present motion.
+    /// The stop begins at the present motion.
     Verified(StopKind),
-    /// Before it: the stop is followed.
+    /// The stop began earlier: it is followed.
     Followed,
 }
 
-/// The stop that may be followed from the present motion on.
+/// Stop that may be followed from the present motion on.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control::reference) struct HeldStop {
     pub(in crate::control::reference) phase: Phase,
-    /// One is held, if it is brake_at_once or followed: the other kind is planned once it is needed. In the place of the other one the next is
-    /// planned: to copy a stop would take a third of the time of planning it.
+    /// Two slots. One holds the current stop if it brakes at once or is followed. The next candidate is
+    /// planned in the other slot, because copying a stop would take a third of the time of planning it. A
+    /// release-first stop is planned only when it is followed.
     stops: [PoseStop; 2],
     is_second_held: bool,
     state: PoseStopState,
@@ -32,13 +34,14 @@ pub(in crate::control::reference) struct HeldStop {
 }
 
 impl HeldStop {
-    /// The place for a brake_at_once stop that may become the held one.
+    /// Slot for planning a stop that brakes at once; it may become the held stop.
     pub fn spare(&mut self) -> &mut PoseStop {
         let [first, second] = &mut self.stops;
         if self.is_second_held { first } else { second }
     }
 
-    /// Holds the stop of a kind, verified from the present motion on; a brake_at_once one as it was planned in the place of the next.
+    /// Holds a stop of this kind, verified from the present motion on. A stop that brakes at once was planned
+    /// in the spare slot.
     pub fn adopt(&mut self, kind: StopKind) {
         self.is_second_held ^= kind == StopKind::BrakeAtOnce;
         self.phase = Phase::Verified(kind);
@@ -49,7 +52,7 @@ impl HeldStop {
         if self.is_second_held { second } else { first }
     }
 
-    /// Whether the platform is at rest at its end.
+    /// Whether the platform is at rest: no stop is needed, or the followed stop has ended.
     pub fn is_at_rest(&self) -> bool {
         match self.phase {
             Phase::AtRest => true,
@@ -58,8 +61,8 @@ impl HeldStop {
         }
     }
 
-    /// The motion a step later along the stop, which is followed from now on.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Motion after a step of `h` seconds along the stop, which is followed from now on.
+    // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     pub fn follow(&mut self, constants: &Constants, motion: &Motion, h: f64) -> Motion {
         match self.phase {

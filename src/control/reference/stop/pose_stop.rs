@@ -1,7 +1,8 @@
-//! Stop of position and orientation at once.
+//! Stop of position and orientation together.
 //!
-//! In base axes `v' = a` and `w' = al`: one stop of a vector serves both. Only attitude is not linear,
-//! `R <- exp(W) R` with `W = theta - dt^2/12 w0 x w1`, theta the integral of w (Magnus; the remainder is of order dt^5).
+//! In base axes `v' = a` and `w' = al`, so that the stop of a vector serves both. Only the attitude is not
+//! linear: `R <- exp(W) R` with `W = theta - dt^2/12 w0 x w1`, theta the integral of w (Magnus; the remainder
+//! is of order dt^5).
 
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::Vector3;
@@ -12,14 +13,14 @@ use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::control::signals::pair::Pair;
 use crate::model::rigid::{Motion, Pose, Twist};
 
-/// Stop that was verified.
+/// Kind of a stop, see [`super::vector_stop`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control::reference) enum StopKind {
-    /// See [`super::stop`].
+    /// Releases the acceleration, then brakes.
     #[default]
     ReleaseFirst,
-    /// See [`super::stop`].
+    /// Brakes at once.
     BrakeAtOnce,
 }
 
@@ -31,7 +32,7 @@ pub(in crate::control::reference) struct PoseStop {
     pub position: Stop,
 }
 
-/// Motion parameters of a stop at one instant, relative to its start.
+/// State of a stop at one instant, relative to its start.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub(in crate::control::reference) struct PoseStopState {
@@ -40,7 +41,7 @@ pub(in crate::control::reference) struct PoseStopState {
 }
 
 impl PoseStopState {
-    /// Where a stop from a motion begins.
+    /// State at the start of a stop from a motion.
     pub fn begin(Motion { twist, acceleration, .. }: &Motion) -> Self {
         let state = |velocity: &Vector3<f64>, acceleration: &Vector3<f64>| StopState {
             displacement: Vector3::zeros(),
@@ -55,7 +56,7 @@ impl PoseStopState {
 }
 
 impl PoseStop {
-    /// The stop of a kind from a motion.
+    /// Stop of a kind from a motion.
     #[cfg(test)]
     pub fn new(kind: StopKind, motion: &Motion, limits: &Limits) -> Self {
         let mut stop = Self::default();
@@ -63,7 +64,7 @@ impl PoseStop {
         stop
     }
 
-    /// Becomes the stop of a kind from a motion.
+    /// Plans the stop of a kind from a motion, in place.
     #[inline(never)]
     pub fn plan(&mut self, level: Level, kind: StopKind, motion: &Motion, limits: &Limits) {
         dispatch!(level, simd => self.plan_in_lanes(simd, kind, motion, limits));
@@ -74,7 +75,7 @@ impl PoseStop {
         let Motion { twist, acceleration, .. } = motion;
         let orientation = (&mut self.orientation, &twist.angular, &acceleration.angular, &limits.orientation);
         let position = (&mut self.position, &twist.linear, &acceleration.linear, &limits.position);
-        // One piece of code for both: the cycle stays short.
+        // One piece of code for both vectors: the code of the cycle stays short.
         for (stop, v, a, limits) in [orientation, position] {
             match kind {
                 StopKind::ReleaseFirst => stop.release_first(simd, v, a, limits),
@@ -93,13 +94,14 @@ impl PoseStop {
         self.orientation.duration.max(self.position.duration)
     }
 
-    /// The same in lanes.
+    /// State `t` seconds after the start, in SIMD lanes.
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, t: f64) -> PoseStopState {
         PoseStopState { orientation: self.orientation.at(simd, t), position: self.position.at(simd, t) }
     }
 
-    /// Bounds on how far the stop moves within half of `dt` after a state, or before it: around one of the knots `dt` apart.
+    /// Bounds on the distance that the stop covers within half of `dt` before or after a state: around a
+    /// knot, with knots `dt` apart.
     #[inline(always)]
     pub fn reach(&self, state: &PoseStopState, dt: f64, limits: &Limits) -> Reach {
         let half = 0.5 * dt;
@@ -113,7 +115,7 @@ impl PoseStop {
     }
 }
 
-/// Pose after the part of a stop from one state to the next, `dt` seconds later.
+/// Pose after the section of a stop between two states, `dt` seconds apart.
 pub(in crate::control::reference) fn advanced(
     pose: &Pose,
     from: &PoseStopState,
@@ -123,7 +125,7 @@ pub(in crate::control::reference) fn advanced(
     pose.displaced(&displacement(from, to, dt))
 }
 
-/// The same without bringing the rotation back to an orthonormal matrix: for the few knots of an examination.
+/// The same pose without orthonormalizing the rotation, for the few knots of an examination.
 #[inline(always)]
 pub(in crate::control::reference) fn advanced_to_knot(
     pose: &Pose,

@@ -1,28 +1,31 @@
-//! Stop of a vector: from any velocity and acceleration to rest, in closed form, within acceleration and jerk limits.
+//! Stop of a vector: from any velocity and acceleration to rest, in closed form, within acceleration and jerk
+//! limits.
 //!
-//! Position and orientation are each a triple integrator in base axes, `v' = a`, `a' = j`: one stop serves both.
-//! There are two stops. No end pose is given: it is where the stop ends.
+//! Position and orientation are each a triple integrator in base axes, `v' = a`, `a' = j`, so that the same
+//! stop serves both. There are two kinds of stop. The end pose is not given; it follows from the stop.
 //!
-//! **Release first**, in free space: `a` decreases to zero along itself within `|a| / J`, so `v` moves straight to
-//! `v1 = v + a |a| / 2J`; then `v1` decreases along itself. Only its extent is needed as a rule:
+//! **Release first**, in free space: `a` decreases to zero in its own direction within `|a| / J`, so that `v`
+//! changes straight to `v1 = v + a |a| / 2J`. Then `v1` decreases to zero in its own direction. Usually only
+//! the extent of this stop is needed:
 //!
 //! ```text
 //! duration = |a|/J + d(v1)                        d = v/A + A/J, length v^2/2A + v A/2J      v >= A^2/J
 //! length  <= max(|v|, |v1|) |a|/J + length(v1)    d = 2 sqrt(v/J), length v sqrt(v/J)        below
 //! ```
 //!
-//! **BrakeAtOnce**, near a wall, where releasing the brake first would waste room: with `u = v/|v|` and
-//! `a = a_p u + c e`, `c >= 0`, the part across (along e) ends with neither velocity nor acceleration:
+//! **Brake at once**, near a wall, where releasing the brake first would waste room. With `u = v/|v|` and
+//! `a = a_p u + c e`, `c >= 0`, the part across, along e, ends with zero velocity and zero acceleration:
 //!
 //! ```text
 //! across:  -Jc for (1 + sqrt 1/2) c/Jc, then +Jc for sqrt(1/2) c/Jc,  Jc = 0.8 J c/A;    speed <= c^2/2Jc
-//! along:   meanwhile brakes with A1 = sqrt(A^2 - c^2/2), Jp = sqrt(J^2 - Jc^2), the jerk into braking at most
+//! along:   meanwhile brakes with A1 = sqrt(A^2 - c^2/2), Jp = sqrt(J^2 - Jc^2), jerk into braking at most
 //!          j1 = min(Jp, (a_p + A1) Jc / ((1 - sqrt(1/2)) c));  afterwards with A and J
 //! ```
 //!
-//! `|a| <= A`: the path `(a_p, a_c)` starts in the disk of radius A. j1 lets it reach `-A1` only when `a_c <= c/sqrt 2`, which
-//! is in the disk too, on a straight line, and disks are convex. Later both parts stay below these corners. And
-//! `|j|^2 = Jp^2 + Jc^2 = J^2`. Cases: `v = 0` has `u` along `a`, so `c = 0`.
+//! The acceleration keeps `|a| <= A`. The path `(a_p, a_c)` starts in the disk of radius A. j1 lets it reach
+//! `-A1` only when `a_c <= c/sqrt 2`, which is in the disk, too. The path between is a straight line, and
+//! disks are convex. Later both parts stay below these corners. The jerk keeps `|j|^2 = Jp^2 + Jc^2 = J^2`.
+//! If `v = 0`, `u` is along `a`, so that `c = 0`.
 
 use core::f64::consts::FRAC_1_SQRT_2;
 
@@ -34,26 +37,26 @@ use nalgebra::Vector3;
 use crate::control::reference::proof::padding::{Padded, padded};
 use crate::control::signals::limits::DerivativeLimits;
 
-/// Jerk across as a ratio of `J c/A`. The larger, the sooner the part across ends, and the less is left along.
+/// Jerk across as a ratio of `J c/A`. A larger ratio ends the part across sooner and leaves less jerk along.
 const ACROSS_JERK_RATIO: f64 = 0.8;
 
-/// Ratios of the limits below which a velocity or an acceleration is zero.
+/// Velocity or acceleration that counts as zero, as a ratio of its limit.
 const NEGLIGIBLE_RATIO: f64 = 1e-9;
 
-/// Most pieces of a stop: five while there is a part across, three afterwards, and the rest.
+/// Most pieces of a stop: five while there is a part across, three afterwards, and one at rest.
 const MAX_PIECES: usize = 9;
 
 /// Largest velocity, duration and length of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::control::reference) struct StopExtent {
     pub peak_velocity: f64,
-    /// \[s\]
+    /// Duration \[s\].
     pub duration: f64,
     /// Bound on the distance from the start.
     pub length: f64,
 }
 
-/// Extent of the stop that releases the acceleration first.
+/// Extent of the release-first stop.
 pub(in crate::control::reference) fn release_first_extent(
     v: &Vector3<f64>,
     a: &Vector3<f64>,
@@ -70,7 +73,7 @@ pub(in crate::control::reference) fn release_first_extent(
     }
 }
 
-/// Extent of the stop from a velocity without acceleration.
+/// Extent of the stop from a speed with zero acceleration.
 pub(in crate::control::reference) fn straight_extent(
     v: f64,
     DerivativeLimits { acceleration, jerk, .. }: &DerivativeLimits,
@@ -114,7 +117,7 @@ impl Piece {
         }
     }
 
-    /// The state `dt` seconds after its begin.
+    /// State `dt` seconds after the start of the piece.
     #[inline(always)]
     fn after<S: Simd>(&self, simd: S, dt: f64) -> StopState {
         let (load, splat) = (|lanes| f64x4::load_array(simd, lanes), |number| f64x4::splat(simd, number));
@@ -138,16 +141,16 @@ impl Piece {
 pub(in crate::control::reference) struct Stop {
     pieces: [Piece; MAX_PIECES],
     count: usize,
-    /// When each piece begins \[s\]; infinite where there is none.
+    /// Start of each piece \[s\]; infinite if there is none.
     begins: [f64; MAX_PIECES],
     /// Bound on the velocity.
     pub peak_velocity: f64,
-    /// \[s\]
+    /// Duration \[s\].
     pub duration: f64,
 }
 
 impl Stop {
-    /// Becomes the stop that releases the acceleration first. In place, as a stop is large.
+    /// Plans the release-first stop, in place because a stop is large.
     #[inline(always)]
     pub fn release_first<S: Simd>(
         &mut self,
@@ -171,7 +174,7 @@ impl Stop {
         pieces.finish(v.norm().max(speed));
     }
 
-    /// Becomes the brake_at_once stop.
+    /// Plans the stop that brakes at once, in place.
     #[inline(always)]
     pub fn brake_at_once<S: Simd>(
         &mut self,
@@ -222,7 +225,7 @@ impl Stop {
     /// State `t` seconds after the start; at rest from the end on.
     #[inline(always)]
     pub fn at<S: Simd>(&self, simd: S, t: f64) -> StopState {
-        // All are compared, without a branch: most are called one after the other, at knots in different pieces.
+        // Compares all starts without a branch: successive calls are mostly for knots in different pieces.
         let begun = self.begins.iter().map(|begin| usize::from(*begin <= t)).sum::<usize>();
         let index = begun.saturating_sub(1);
         match (self.pieces.get(index), self.begins.get(index)) {
@@ -232,7 +235,7 @@ impl Stop {
     }
 }
 
-/// Pieces in the making, and the state at their end.
+/// Builder of the pieces of a stop, with the state at their end.
 struct Pieces<'a, S: Simd> {
     simd: S,
     stop: &'a mut Stop,
@@ -262,7 +265,8 @@ impl<'a, S: Simd> Pieces<'a, S> {
         }
     }
 
-    /// Appends the pieces of a plan along `u` and of one across along `e`, until the one across ends.
+    /// Appends the pieces of a plan along `u` combined with a plan across, along `e`, until the plan across
+    /// ends.
     #[inline(always)]
     fn push_both(&mut self, u: &Vector3<f64>, along: &Plan, e: &Vector3<f64>, across: &[(f64, f64); 2]) {
         let [(first, _), (second, _)] = *across;
@@ -277,7 +281,7 @@ impl<'a, S: Simd> Pieces<'a, S> {
         }
     }
 
-    /// Ends at rest.
+    /// Appends the rest at the end of the stop.
     #[inline(always)]
     fn finish(self, peak_velocity: f64) {
         let rest = StopState { displacement: self.end.displacement, ..StopState::default() };
@@ -293,7 +297,7 @@ impl<'a, S: Simd> Pieces<'a, S> {
 /// Durations and jerks of one component: ramp into braking, hold, release.
 type Plan = [(f64, f64); 3];
 
-/// Time left in the present part of a plan, and its jerk; none after the end.
+/// Time left in the present section of a plan, and its jerk; infinite and zero after the end.
 fn present(plan: &[(f64, f64)], t: f64) -> (f64, f64) {
     let mut end = 0.0;
     for (dt, jerk) in plan {
@@ -305,10 +309,11 @@ fn present(plan: &[(f64, f64)], t: f64) -> (f64, f64) {
     (f64::INFINITY, 0.0)
 }
 
-/// Stop of one component from (v, a) with the release jerk `jerk` and the acceleration `limit`. `ramp_jerk` is that of the
-/// ramp into braking, from the acceleration in the direction in which the component would come to move.
+/// Stop of one component from (v, a) with the release jerk `jerk` and the acceleration `limit`. `ramp_jerk`
+/// gives the jerk of the ramp into braking for an acceleration, positive in the direction in which the
+/// component would move on if released.
 fn brake(v: f64, a: f64, jerk: f64, limit: f64, ramp_jerk: impl Fn(f64) -> f64) -> Plan {
-    // Released now, the component would move on in the direction of `sign`.
+    // If released now, the component would move on in the direction of `sign`.
     let sign = if v + a * a.abs() / (2.0 * jerk) >= 0.0 { 1.0 } else { -1.0 };
     let (v, a) = (sign * v, sign * a);
     let ramp_jerk = ramp_jerk(a);

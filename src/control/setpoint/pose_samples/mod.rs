@@ -1,15 +1,18 @@
-//! Smooth motion through poses that a source sends without derivatives, more slowly and less regularly than the cycles.
+//! Smooth motion through poses that a source sends without derivatives, more slowly and less regularly than
+//! the cycles.
 //!
-//! The motion is a cubic between poses of the past (Hermite's, with slopes by finite differences over the neighbours), so
-//! that pose and twist are continuous. It lies behind the source by a delay that [`PoseSamples`] estimates from the
-//! poses: twice their interval plus the jitter of their arrival. Each cubic then has the poses on both sides of its ends.
-//! A sample that is lost or late is replaced by a short extrapolation; the correction afterwards may be a jump of a few
-//! millimetres, which the reference generator behind this module smooths and limits. This module limits nothing.
+//! The motion is a cubic between past poses (Hermite's, with slopes by finite differences over the
+//! neighbours), so that pose and twist are continuous. It lags the source by a delay that [`PoseSamples`]
+//! estimates from the poses: twice their interval plus the jitter of their arrival. With this delay each
+//! cubic has the poses on both sides of its ends. A short extrapolation replaces a sample that is lost or
+//! late. The correction afterwards may be a jump of a few millimetres, which the reference generator behind
+//! this module smooths and limits. This module limits nothing.
 //!
-//! Time stamps are taken as true: an error of a stamp is an error of the target, velocity times the error.
+//! Time stamps are taken as true: the error of a stamp, times velocity, is an error of the target.
 //!
-//! Rotations are interpolated as rotation vectors from the earlier pose. Angular velocities are correct to first order in
-//! the angle between two poses: 0.1 rad between them leaves less than a thousandth of the velocity.
+//! Rotations are interpolated as rotation vectors from the earlier pose. Angular velocities are correct to
+//! first order in the angle between two poses: at 0.1 rad their error is less than a thousandth of the
+//! velocity.
 
 mod timing;
 
@@ -17,19 +20,20 @@ use crate::control::setpoint::pose_samples::timing::{Delay, Timing};
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 
-/// Samples kept. With [`MIN_SPACING_S`] they reach back 0.12 s or more: beyond the delay, which is twice the distance of
-/// two samples plus jitter.
+/// Number of samples kept. With [`MIN_SPACING_S`] they cover at least 0.12 s, more than the delay, which is
+/// twice the distance of two samples plus jitter.
 const CAPACITY: usize = 16;
-/// Smallest distance of two samples \[s\]; closer ones are averaged. Slopes over shorter times amplify the errors of
-/// stamps and poses; at 60 Hz with a jitter of 10 ms nearly no sample is affected.
+/// Smallest distance of two samples \[s\]; closer ones are averaged. Slopes over shorter times amplify the
+/// errors of stamps and poses. At 60 Hz with a jitter of 10 ms this affects nearly no sample.
 const MIN_SPACING_S: f64 = 0.008;
-/// Distance of two samples \[s\] beyond which the source has stopped and begun anew: nothing is interpolated.
+/// Distance of two samples \[s\] beyond which the source has stopped and restarted: nothing is interpolated.
 const MAX_GAP_S: f64 = 0.25;
-/// Largest angle between samples for which series replace sine and cosine: they are right to 3e-11.
+/// Largest angle between samples for which series replace sine and cosine; their error is 3e-11.
 const MAX_SERIES_ANGLE_RAD: f64 = 0.5;
-/// Time after the newest sample, over the interval, for which the motion goes on with its twist: that of two lost samples.
+/// Time after the newest sample for which the motion continues with its twist, as a ratio of the interval:
+/// enough for two lost samples.
 const EXTRAPOLATION_INTERVALS: f64 = 1.5;
-/// Time after that, over the interval, in which it returns to the newest sample.
+/// Time after that in which the motion returns to the newest sample, as a ratio of the interval.
 const RETURN_INTERVALS: f64 = 4.0;
 
 /// A sample, or the average of samples close to each other.
@@ -45,14 +49,14 @@ struct Sample {
     pose: Pose,
     /// Slope at this sample by finite differences.
     slope: Twist,
-    /// Displacement from the sample before.
+    /// Displacement from the previous sample.
     step: Twist,
 }
 
-/// The newest poses of a source, as a motion behind them; see the module.
+/// The newest poses of a source, and the delayed motion through them; see the module.
 ///
 /// ```
-/// use hexad::control::reference::pose_samples::PoseSamples;
+/// use hexad::control::setpoint::pose_samples::PoseSamples;
 /// use hexad::model::rigid::Pose;
 /// use nalgebra::{Matrix3, Vector3};
 /// let mut samples = PoseSamples::default();
@@ -72,7 +76,7 @@ struct Sample {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
 pub struct PoseSamples {
-    /// A ring; [`Self::newest`] is the place of the newest sample.
+    /// Ring buffer; `newest` is the index of the newest sample.
     samples: [Option<Sample>; CAPACITY],
     newest: usize,
     timing: Timing,
@@ -80,8 +84,9 @@ pub struct PoseSamples {
 }
 
 impl PoseSamples {
-    /// Takes a pose that arrived at the instant `now_ns` and holds for `time_ns`, both on the clock of the releases.
-    /// Samples that are not newer than the newest one are dropped. The caller has checked stamp and pose.
+    /// Adds a pose that arrived at the instant `now_ns` and holds for `time_ns`, both on the clock of the
+    /// releases. Samples that are not newer than the newest one are dropped. The caller has checked stamp and
+    /// pose.
     pub fn push(&mut self, now_ns: u64, time_ns: u64, pose: &Pose) {
         let Some(last) = self.back(0).copied() else { return self.append(time_ns, pose) };
         if time_ns <= last.last_ns {
@@ -103,13 +108,14 @@ impl PoseSamples {
         self.update_slopes();
     }
 
-    /// Forgets the source.
+    /// Forgets the samples and the timing of the source.
     pub fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// The motion that the source requested for the instant minus the delay; its acceleration is zero. Behind the newest
-    /// sample it comes to rest there, before the oldest it rests. `None` without a sample.
+    /// Motion that the source requested for the instant minus the delay; its acceleration is zero. After the
+    /// newest sample the motion comes to rest at that sample; before the oldest it is at rest. `None` without
+    /// a sample.
     pub fn target(&self, instant_ns: u64) -> Option<Motion> {
         let delay_ns = (self.delay.at(instant_ns) * 1e9) as u64;
         let wanted_ns = instant_ns.saturating_sub(delay_ns);
@@ -123,12 +129,12 @@ impl PoseSamples {
         Some(Motion { pose, twist, acceleration: Acceleration::default() })
     }
 
-    /// Time by which the target lies behind the source \[s\].
+    /// Time by which the target lags the source \[s\].
     pub fn delay_s(&self, instant_ns: u64) -> f64 {
         self.delay.at(instant_ns)
     }
 
-    /// The sample that many before the newest.
+    /// The sample `count` places before the newest.
     fn back(&self, count: usize) -> Option<&Sample> {
         self.samples.get((self.newest + CAPACITY - count.min(CAPACITY)) % CAPACITY)?.as_ref()
     }
@@ -153,7 +159,7 @@ impl PoseSamples {
         }
     }
 
-    /// Adds a sample to the average that the newest one is.
+    /// Adds a sample to the newest one, which is an average.
     fn average(&mut self, time_ns: u64, pose: &Pose) {
         if let Some(newest) = self.back_mut(0) {
             newest.last_ns = time_ns;
@@ -166,8 +172,8 @@ impl PoseSamples {
         self.update_slopes();
     }
 
-    /// Slopes that depend on the newest sample: its own, from the chord to it; that of the one before, from the parabola
-    /// through three.
+    /// Updates the two slopes that depend on the newest sample: its own, from the chord to it, and the
+    /// previous one, from the parabola through three samples.
     fn update_slopes(&mut self) {
         let (Some(newest), Some(before)) = (self.back(0), self.back(1)) else { return };
         let step = before.pose.displacement_to(&newest.pose);
@@ -187,7 +193,7 @@ impl PoseSamples {
         }
     }
 
-    /// Behind the newest sample: on with its twist for the time of a lost sample, then back to it.
+    /// Pose and twist after the newest sample: first on with its twist, then back to it.
     fn after_newest(&self, newest: &Sample, wanted_ns: u64) -> (Pose, Twist) {
         let onward = EXTRAPOLATION_INTERVALS * self.timing.interval;
         let back = RETURN_INTERVALS * self.timing.interval;
@@ -203,7 +209,7 @@ impl PoseSamples {
         hermite(&turn, &newest.slope, &travel(-onward), &Twist::default(), back, elapsed - onward)
     }
 
-    /// Between two samples, or at rest at the oldest.
+    /// Pose and twist between two samples, or at rest at the oldest.
     fn between(&self, newest: &Sample, wanted_ns: u64) -> (Pose, Twist) {
         let mut later = newest;
         for count in 1..CAPACITY {
@@ -219,8 +225,8 @@ impl PoseSamples {
     }
 }
 
-/// Cubic from a pose with the twist `start` to the pose `step` away with the twist `end`, after the time `elapsed` of
-/// `duration`.
+/// Pose and twist on a cubic, `elapsed` seconds after its start. The cubic begins at the pose `from` with the
+/// twist `start`. After `duration` it ends, displaced by `step`, with the twist `end`.
 fn hermite(
     from: &Pose,
     start: &Twist,
@@ -229,7 +235,8 @@ fn hermite(
     duration: f64,
     elapsed: f64,
 ) -> (Pose, Twist) {
-    // The rotation vector's rate is the angular velocity minus half the product of rotation vector and angular velocity.
+    // The rotation vector's rate is the angular velocity minus half the product of rotation vector and
+    // angular velocity.
     let end_rate = Twist { angular: end.angular - step.angular.cross(&end.angular) * 0.5, ..*end };
     let (m0, m1, chord) = (start.vector(), end_rate.vector(), step.vector() / duration);
     let s = elapsed / duration;
@@ -240,14 +247,14 @@ fn hermite(
     (displaced(from, &displacement), Twist { angular, ..rate })
 }
 
-/// The pose after a displacement, as [`Pose::displaced`] finds it, in half of its instructions: no rounding accumulates
-/// here, and between samples angles are small.
+/// Pose after a displacement, like [`Pose::displaced`] with half of its instructions. No rounding accumulates
+/// here, and angles between samples are small.
 fn displaced(pose: &Pose, Twist { angular, linear }: &Twist) -> Pose {
     let t = angular.norm_squared();
     if t > MAX_SERIES_ANGLE_RAD * MAX_SERIES_ANGLE_RAD {
         return pose.displaced(&Twist { angular: *angular, linear: *linear });
     }
-    // sin(x) / x and (1 - cos(x)) / x^2 of x^2 = t.
+    // sin(x) / x and (1 - cos(x)) / x^2, where x^2 = t.
     let sine = 1.0 - t / 6.0 * (1.0 - t / 20.0 * (1.0 - t / 42.0 * (1.0 - t / 72.0)));
     let cosine = 0.5 * (1.0 - t / 12.0 * (1.0 - t / 30.0 * (1.0 - t / 56.0 * (1.0 - t / 90.0))));
     let mut rotation = pose.rotation;

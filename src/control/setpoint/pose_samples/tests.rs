@@ -7,7 +7,7 @@ use crate::model::rigid::exp;
 
 const MS: u64 = 1_000_000;
 
-/// A sine along one axis with an amplitude of 0.1 m, and one of 0.1 rad about a skew axis.
+/// Pose and twist of a sine: 0.1 m along one axis and 0.1 rad about a skew axis.
 fn sine(frequency_hz: f64, time_ns: u64) -> (Pose, Twist) {
     let omega = TAU * frequency_hz;
     let (sin, cos) = (omega * time_ns as f64 * 1e-9).sin_cos();
@@ -34,7 +34,7 @@ struct Source {
     rate_hz: u64,
     jitter_ms: f64,
     loss: f64,
-    /// Whether the jitter is in the instant of sampling (and its stamp), in the arrival alone, or in the stamp alone.
+    /// Location of the jitter: the instant of sampling with its stamp, the arrival alone, or the stamp alone.
     jitter_of: JitterOf,
 }
 
@@ -48,7 +48,7 @@ enum JitterOf {
 const SOURCE: Source =
     Source { frequency_hz: 1.0, rate_hz: 60, jitter_ms: 10.0, loss: 0.1, jitter_of: JitterOf::Sampling };
 
-/// Errors of the target against the motion before the delay, in cycles of 1 ms from the third second on.
+/// Errors of the target relative to the delayed motion, in cycles of 1 ms from the third second on.
 #[derive(Debug, Default)]
 struct Errors {
     rms_m: f64,
@@ -81,7 +81,7 @@ impl Source {
     }
 
     fn errors(&self) -> Errors {
-        // Stamps alone that are late by a random time are late by half the jitter in the mean.
+        // If stamps alone are late by a random time, they are late by half the jitter on average.
         let mean_stamp_error_ns = match self.jitter_of {
             JitterOf::Stamp => (0.5e6 * self.jitter_ms) as u64,
             _ => 0,
@@ -120,13 +120,13 @@ impl Source {
 
 #[test]
 fn sines_at_60_hz_with_jitter_and_losses_are_met_within_half_a_millimetre_after_45_ms() {
-    // Where the jitter is in the arrival alone, stamps wait for it, too.
+    // With jitter in the arrival alone, messages wait after their stamps: the delay is longer.
     for (jitter_of, delays) in [(JitterOf::Sampling, 0.043..0.046), (JitterOf::Arrival, 0.045..0.049)] {
         for (frequency_hz, bound_m) in [(0.3, 0.00002), (1.0, 0.0001), (2.3, 0.0005)] {
             let errors = Source { frequency_hz, jitter_of, ..SOURCE }.errors();
             assert!(delays.contains(&errors.delay_s), "{frequency_hz} Hz: {errors:?}");
             assert!(errors.rms_m < bound_m && errors.rms_rad < bound_m, "{frequency_hz} Hz: {errors:?}");
-            // The farthest after four lost samples in a row.
+            // The largest error follows four lost samples in a row.
             assert!(errors.max_m < 50.0 * bound_m, "{frequency_hz} Hz: {errors:?}");
             assert!(errors.rms_m_s < 0.025 * frequency_hz, "{frequency_hz} Hz: {errors:?}");
         }
@@ -135,8 +135,9 @@ fn sines_at_60_hz_with_jitter_and_losses_are_met_within_half_a_millimetre_after_
 
 #[test]
 fn errors_of_stamps_are_errors_of_the_target_times_velocity_and_no_more() {
-    // Evenly distributed over 10 ms: 2.9 ms RMS at 0.44 m/s RMS are 1.28 mm. At higher rates stamps lie within fractions
-    // of a millisecond of each other: slopes between such samples would have any size.
+    // Stamps evenly distributed over 10 ms err by 2.9 ms RMS. At 0.44 m/s RMS this is 1.28 mm. At higher
+    // rates stamps lie within fractions of a millisecond of each other: slopes between such samples could
+    // have any size.
     for rate_hz in [60, 100, 150, 200] {
         let errors = Source { rate_hz, jitter_of: JitterOf::Stamp, ..SOURCE }.errors();
         assert!(errors.rms_m < 0.00129 && errors.max_m < 0.006, "{rate_hz} Hz: {errors:?}");
@@ -157,7 +158,7 @@ fn the_delay_follows_rate_and_jitter() {
         );
         let errors = Source { rate_hz, jitter_ms: 0.0, loss: 0.0, ..SOURCE }.errors();
         assert!((errors.delay_s - regular).abs() < 0.0001 && errors.rms_m < 0.00005, "{rate_hz}: {errors:?}");
-        // Regular samples: pose and twist without steps, the twist that of the pose.
+        // Regular samples: pose and twist have no steps, and the twist is the derivative of the pose.
         assert!(errors.twist_m_s < 0.006, "{rate_hz}: {errors:?}");
     }
 }
@@ -178,7 +179,7 @@ fn a_change_of_rate_changes_the_delay_slowly_and_the_pose_without_a_step() {
             assert!((delay - delay_before).abs() < 0.1001e-3, "{now_ns}: {delay} after {delay_before}");
             // 0.2 m/s; late samples of the slower rate are extrapolated.
             assert!((x - x_before - 0.0002).abs() < 0.00003, "{now_ns}: {x} after {x_before}");
-            // The twist is that of the pose, change of the delay included.
+            // The twist is the derivative of the pose, including the change of the delay.
             let difference = (x - x_before) * 1e3 - 0.5 * (velocity + velocity_before);
             assert!(difference.abs() < 0.002, "{now_ns}: {difference}");
         }
@@ -227,11 +228,11 @@ fn between_two_samples_the_target_moves_straight_and_returns_to_the_second() {
     rests_at(&samples, 1039 * MS, 0.0);
     let middle = samples.target(end_ns - 10 * MS).unwrap();
     assert!((middle.pose.position.x - 0.005).abs() < 1e-9 && (middle.twist.linear.x - 0.5).abs() < 1e-9);
-    // On for one and a half intervals, then back in four.
+    // The motion continues for one and a half intervals, then returns in four.
     let onward = samples.target(end_ns + 30 * MS).unwrap();
     assert!((onward.pose.position.x - 0.025).abs() < 1e-9 && (onward.twist.linear.x - 0.5).abs() < 1e-9);
     rests_at(&samples, end_ns + 110 * MS, 0.010);
-    // Without a step of pose or twist anywhere.
+    // Pose and twist have no step anywhere.
     let mut last = samples.target(1000 * MS).unwrap();
     for instant_ns in (1041 * MS..1200 * MS).step_by(MS as usize) {
         let target = samples.target(instant_ns).unwrap();
@@ -254,7 +255,7 @@ fn samples_that_are_not_newer_are_dropped() {
         samples.push(785 * MS, stamp_ns, &at(7.0));
     }
     assert_eq!((samples.target(790 * MS), samples.delay_s(790 * MS)), before);
-    // Averaged samples, too, are as new as the last of them.
+    // An average, too, is as new as its last sample.
     samples.push(786 * MS, 786 * MS, &at(0.0393));
     let before = samples.target(820 * MS);
     for stamp_ns in [786 * MS, 785 * MS] {
@@ -272,7 +273,7 @@ fn a_source_that_stops_and_begins_elsewhere_is_held_and_then_taken_from_rest() {
     let (end, delay) = (0.005 * 59.0, samples.delay_s(59 * 16 * MS));
     let overshoot = (944..1200).map(|ms| samples.target(ms * MS).unwrap().pose.position.x - end);
     let overshoot = overshoot.fold(0.0, f64::max);
-    // 0.31 m/s for one and a half intervals are 7.5 mm.
+    // 0.31 m/s times one and a half intervals is 7.5 mm.
     assert!((0.0075..0.0105).contains(&overshoot), "{overshoot}");
     rests_at(&samples, 1100 * MS, end);
     rests_at(&samples, 5000 * MS, end);
@@ -303,8 +304,9 @@ fn half_turns_between_samples_and_extreme_stamps_give_finite_targets() {
 
 #[test]
 fn angular_velocity_is_continuous_where_the_axis_of_rotation_turns() {
-    // 3.1 rad/s about an axis that turns once per second: 0.1 rad between samples, and from one cubic to the next
-    // 0.015 rad/s, were the turn of the axis between two samples left out.
+    // Rotation at 3.1 rad/s about an axis that turns once per second: 0.1 rad between samples. Without the
+    // turn of the axis between two samples the angular velocity would jump by 0.015 rad/s from one cubic to
+    // the next.
     let cone = |time_ns: u64| {
         let (sin, cos) = (TAU * time_ns as f64 * 1e-9).sin_cos();
         Pose { rotation: exp(&(Vector3::new(cos, sin, 0.0) * 0.5)), position: Vector3::zeros() }

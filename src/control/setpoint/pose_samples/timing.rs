@@ -1,19 +1,23 @@
-//! Timing of a stream of samples, estimated from their stamps and arrivals, and the delay that follows from it.
+//! Timing of a stream of samples, estimated from stamps and arrivals, and the delay that follows from it.
 
 use crate::control::signals::time::seconds_between;
 
-/// Largest delay \[s\]: that of 15 Hz, half the slowest rate provided for. Slower sources are extrapolated.
+/// Largest delay \[s\]: the delay of a 15 Hz source, half the slowest rate provided for. Slower sources are
+/// extrapolated.
 const MAX_DELAY_S: f64 = 0.15;
-/// Largest change of the delay per time, which changes the twist of the target by as much.
+/// Largest change of the delay per time. It changes the twist of the target by the same ratio.
 const MAX_DELAY_RATE: f64 = 0.1;
-/// Time over which the delay goes to its estimate \[s\]: many samples, so that noise of the estimate is no motion.
+/// Time in which the delay moves to its estimate \[s\]: many samples, so that noise of the estimate causes no
+/// motion.
 const DELAY_RELAXATION_S: f64 = 0.5;
-/// Weight of the newest sample in the estimates of interval and jitter: an average over half a second at 60 Hz.
+/// Weight of the newest sample in the estimates of interval and jitter: an average over half a second at
+/// 60 Hz.
 const ESTIMATION_GAIN: f64 = 1.0 / 32.0;
-/// Largest deviation that the estimate of the jitter takes in, relative to the interval: lost samples are no jitter.
+/// Largest deviation that counts as jitter, as a ratio of the interval: lost samples are no jitter.
 const MAX_JITTER_RATIO: f64 = 0.5;
-/// Jitter over its mean deviation. That of intervals between evenly distributed stamps is a third of the jitter, that of
-/// evenly distributed arrivals a quarter; lost samples enlarge both, so that less than 3 is enough.
+/// Jitter as a multiple of its mean deviation. The mean deviation is a third of the jitter for intervals
+/// between evenly distributed stamps, and a quarter for evenly distributed arrivals. Lost samples enlarge
+/// both, so that less than 3 is enough.
 const JITTER_PER_DEVIATION: f64 = 2.25;
 
 /// Estimates of the stream's timing \[s\].
@@ -27,7 +31,7 @@ pub(in crate::control::setpoint::pose_samples) struct Timing {
     age: f64,
     /// Mean deviation of that age.
     deviation: f64,
-    /// The two intervals and ages before.
+    /// The previous two intervals and ages.
     before: [[f64; 2]; 2],
 }
 
@@ -40,14 +44,14 @@ impl Timing {
         let gain = 1.0 / self.count;
         let deviation = (age - self.age).abs().min(MAX_JITTER_RATIO * self.interval);
         self.deviation += gain * (deviation - self.deviation);
-        // Medians of three: single lost samples change no estimate, a new rate changes it at once.
+        // Medians of three: a single lost sample changes no estimate, and a new rate changes it at once.
         let [[interval_2, age_2], [interval_1, age_1]] = self.before;
         self.interval += gain * (median(interval_2, interval_1, interval) - self.interval);
         self.age += gain * (median(age_2, age_1, age) - self.age);
         self.before = [[interval_1, age_1], [interval, age]];
     }
 
-    /// Delay at which the samples around an instant, and the one after, have nearly always arrived.
+    /// Delay \[s\] at which the samples around an instant, and the one after, have nearly always arrived.
     pub fn delay(&self) -> f64 {
         (self.interval + self.age + JITTER_PER_DEVIATION * self.deviation).clamp(0.0, MAX_DELAY_S)
     }
@@ -75,7 +79,7 @@ impl Delay {
         if seconds_between(self.since_ns, instant_ns) < DELAY_RELAXATION_S { self.rate } else { 0.0 }
     }
 
-    /// From now on toward another delay.
+    /// Delay that moves from its present value toward `goal`.
     pub fn toward(&self, goal: f64, now_ns: u64) -> Self {
         let value = self.at(now_ns);
         let rate = ((goal - value) / DELAY_RELAXATION_S).clamp(-MAX_DELAY_RATE, MAX_DELAY_RATE);
@@ -102,7 +106,7 @@ mod tests {
             assert_eq!(delay.at(7 * MS), from);
             assert!((delay.at((7 + after_ms) * MS) - expected).abs() < 1e-12, "{delay:?}");
             assert!((delay.rate_at(8 * MS) * after_ms as f64 * 1e-3 - (expected - from)).abs() < 1e-12);
-            // It does not go beyond its goal without new samples.
+            // The delay does not pass its goal without new samples.
             assert!(
                 (delay.at(90_000 * MS) - to).abs() <= (from - to).abs() && delay.rate_at(90_000 * MS) == 0.0
             );

@@ -1,4 +1,4 @@
-//! Bound on the derivative of the wanted twist at a wall that is active.
+//! Bound on the derivative of the wanted twist at an active wall.
 
 use crate::control::reference::proposal::walls::{LANES, Wall};
 
@@ -7,7 +7,7 @@ pub(in crate::control::reference::proposal::walls) struct DerivativeBound<'a> {
     pub gradient: &'a [f64; LANES],
     /// `G V'` at the bound.
     wanted: f64,
-    /// The part of the bound that holds, over the square of the norm of the gradient; and the part that does not.
+    /// Weight of the bound over the square of the gradient's norm, and 1 minus the weight.
     blend_per_square: f64,
     unblended: f64,
     multiplier: f64,

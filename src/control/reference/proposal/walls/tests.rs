@@ -1,4 +1,5 @@
-//! Each wall against differences of lengths and coordinates, and the restricted velocities against their conditions.
+//! Tests of each wall against finite differences of lengths and coordinates, and of the restricted velocities
+//! against the conditions of an optimum.
 
 use nalgebra::Matrix3;
 
@@ -15,13 +16,13 @@ use crate::model::rigid::Pose;
 
 const STEP_S: f64 = 1e-3;
 
-/// One end of a wall, its gradient towards that end.
+/// One end of a wall, with the gradient towards that end.
 #[derive(Clone, Copy)]
 struct WallEnd {
     limit: LimitSet,
     gradient: Vector6<f64>,
     end: End,
-    /// Positive where it is active.
+    /// Positive if the end is active.
     multiplier: f64,
 }
 
@@ -118,7 +119,7 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
                 6..9 => turn_s,
                 _ => shift_s,
             };
-            // The way of the stop, less that of half of its duration at the present rate.
+            // Stopping distance minus the distance in half of the stop's duration at the present rate.
             let rest = |whole: Twist, s: f64| 0.5 * wall.gradient.dot(&whole.vector()) * (s - stop_s);
             let asynchronous = rest(Twist { angular: twist.angular * radius, ..Twist::default() }, turn_s)
                 + rest(Twist { linear: twist.linear, ..Twist::default() }, shift_s);
@@ -148,7 +149,7 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
                 outside += 1;
                 (gap * approach.slowest_slope() / 4.0, approach.slowest_slope() / 4.0)
             };
-            // To second order in the step.
+            // Equal to second order in the step.
             assert!((wall.end.rate - rate).abs() < 2e-4, "{k}: {} not {rate}, gap {gap}", wall.end.rate);
             let velocity = stacked(&(twist.angular * radius), &twist.linear);
             let derivative = -slope * wall.gradient.dot(&velocity) - curvature;
@@ -162,7 +163,8 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
     assert!(outside > 100, "{outside}");
 }
 
-/// A platform that approaches no wall too fast can stop before it: the brake_at_once stop, in fine steps.
+/// A platform that approaches no wall too fast can stop before it. The stop that brakes at once shows it, in
+/// fine steps.
 #[test]
 fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
     let mut samples = RandomVectors::new(74);
@@ -214,8 +216,8 @@ fn a_platform_that_approaches_no_wall_too_fast_can_stop() {
     assert!(nearest > 1000 && worst > 0.95 * WALL_RATIO, "{nearest}: {worst}");
 }
 
-/// The conditions of the nearest velocity: no wall is approached too fast, and the change is a sum of multiples of the
-/// gradients that are active, none of them negative.
+/// Conditions of the nearest velocity: no wall is approached too fast, and the change is a sum of the active
+/// gradients with positive multiples.
 #[test]
 fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
     let mut samples = RandomVectors::new(72);
@@ -245,7 +247,7 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
         }
         let change: Vector6<f64> = active.iter().map(|wall| wall.gradient * wall.multiplier).sum();
         assert!((before - change - after).norm() < 1e-9);
-        // The more walls are active, the more effort is left to others.
+        // The effort is bounded, and zero if no wall is active.
         most_work = most_work.max(walls.effort());
         assert!(walls.effort() <= 4 && (!active.is_empty() || walls.effort() == 0), "{}", walls.effort());
         let expected = active.iter().fold(LimitSet::default(), |set, wall| set.union(wall.limit));
@@ -259,7 +261,8 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
             [wall] => {
                 let rate = wall.gradient.dot(&after);
                 assert!(rate >= wall.end.rate - 1e-9 && (rate <= 0.0 || rate <= wall.end.rate + 1e-9));
-                // The bound on the derivative holds by a weight, from 0.6 a^2/j of the velocity that is taken away on wholly.
+                // The weight of the bound on the derivative grows with the velocity that is taken away, and
+                // is 1 from 0.6 a^2/j on.
                 let is_angle = ends[12..18].iter().any(|end| core::ptr::eq(end, *wall));
                 let limits = &scene.constants.parameters.limits;
                 let limits = if is_angle { limits.orientation } else { limits.position };
@@ -280,7 +283,7 @@ fn the_restricted_velocity_is_the_nearest_that_approaches_no_wall_too_fast() {
     );
 }
 
-/// Two walls at 60 degrees, as the faces of a wedge: 8 sweeps leave 1e-4 of the excess.
+/// Two walls at 60 degrees, like the faces of a wedge: 8 sweeps leave 1e-4 of the excess.
 #[test]
 fn two_walls_at_60_degrees_converge() {
     let mut samples = RandomVectors::new(73);

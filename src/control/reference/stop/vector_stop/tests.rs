@@ -12,7 +12,7 @@ const LIMITS: [DerivativeLimits; 5] = [
     DerivativeLimits { velocity: 0.01, acceleration: 1e-3, jerk: 1e-4 },
 ];
 
-/// A velocity and an acceleration within the limits: of any direction, often at the limits or aligned.
+/// A velocity and an acceleration within the limits: in any direction, often at the limits or aligned.
 fn start(samples: &mut RandomVectors, limits: &DerivativeLimits) -> [Vector3<f64>; 2] {
     let v = samples.vector(limits.velocity);
     let a = match samples.below(4) {
@@ -22,7 +22,7 @@ fn start(samples: &mut RandomVectors, limits: &DerivativeLimits) -> [Vector3<f64
     [v, a]
 }
 
-/// A stop that takes the place of a longer one.
+/// Stop that is planned in the memory of a longer one.
 fn planned(kind: StopKind, v: &Vector3<f64>, a: &Vector3<f64>, limits: &DerivativeLimits) -> Stop {
     let mut stop =
         Stop { count: 9, begins: [0.0; MAX_PIECES], peak_velocity: 9.0, duration: 9.0, ..Stop::default() };
@@ -97,7 +97,7 @@ fn the_extent_bounds_the_stop_that_releases_first() {
     assert!(largest_use > 0.99, "{largest_use}");
 }
 
-/// Ways from 1 m/s, in mm: bounds of any stop and of this one.
+/// Lengths of both stops from 1 m/s, in mm.
 #[test]
 fn a_stop_takes_little_more_than_the_shortest_way() {
     let [limits, ..] = LIMITS;
@@ -117,13 +117,13 @@ fn a_stop_takes_little_more_than_the_shortest_way() {
     }
 }
 
-/// The bound on the velocity is that of both parts, and no larger.
+/// The bound on the velocity combines the bounds of both parts and is no larger.
 #[test]
 fn the_peak_velocity_of_a_planar_stop_is_that_of_its_parts() {
     let [limits, ..] = LIMITS;
     let (v, a) = (Vector3::new(0.5, 0.0, 0.0), Vector3::new(0.0, 5.0, 0.0));
     let stop = planned(StopKind::BrakeAtOnce, &v, &a, &limits);
-    // Across `c^2 / 2 Jc` with `Jc = 0.8 J`.
+    // Bound across: `c^2 / 2 Jc` with `Jc = 0.8 J`.
     let across = 25.0 / (2.0 * 400.0);
     assert!((stop.peak_velocity - 0.5_f64.hypot(across)).abs() < 1e-12, "{}", stop.peak_velocity);
 }
