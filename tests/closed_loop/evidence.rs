@@ -241,7 +241,10 @@ fn what_the_reference_is_held_back_from_says_so() {
 #[test]
 fn a_diagnostic_is_a_sentence_with_value_bound_and_remedy() {
     let near_singular = Diagnostic::new(DiagnosticCode::NearSingular, 143.21, 100.0).to_string();
-    assert!(near_singular.contains("condition 143.21 exceeds the bound by limits.condition, 100;"), "{near_singular}");
+    assert!(
+        near_singular.contains("condition 143.21 exceeds the bound by limits.condition, 100;"),
+        "{near_singular}"
+    );
     let stroke = Diagnostic::new(DiagnosticCode::LengthOutOfStroke, 0.5, 1.076).at(2).to_string();
     assert!(stroke.contains("leg length 0.5 m of leg 3 is outside the stroke"), "{stroke}");
     assert!(stroke.contains(" 1.076 m; check the encoders"), "{stroke}");
