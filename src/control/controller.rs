@@ -4,6 +4,8 @@
 //! [`Controller::step`] shows the stages in order. Each stage is a function of its arguments and of the
 //! memory of its own struct, and changes no other memory. The effort of a cycle is bounded.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
 use crate::control::law::actuation::actuate;
@@ -71,8 +73,7 @@ pub struct Controller {
 
 /// State of a controller that changes from cycle to cycle. With it and the inputs all later cycles can be
 /// repeated.
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Memory {
     stamp_clock: StampClock,
     drives: DriveMonitor,

@@ -2,6 +2,7 @@
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
+use serde::{Deserialize, Serialize};
 
 use crate::control::law::Law;
 use crate::control::law::estimator::ReadingErrors;
@@ -112,8 +113,7 @@ pub enum ViolationPolicy {
 }
 
 /// Range of the setpoint: lowest and highest X.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Envelope {
     /// Lowest value of each coordinate of X \[rad\], \[m\].
     pub lowest: [f64; 6],

@@ -169,8 +169,7 @@ macro_rules! message {
         }
     ) => {
         $(#[doc = $doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
-        #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend, serde::Serialize, serde::Deserialize)]
         #[type_name($type_name)]
         #[repr(C)]
         pub struct $name {

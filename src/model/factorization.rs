@@ -20,6 +20,7 @@
 
 use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 use nalgebra::{Matrix6, Vector6};
+use serde::{Deserialize, Serialize};
 
 use super::LEGS;
 use super::inverse_geometry::LegGeometry;
@@ -65,8 +66,7 @@ pub(super) struct Factorization<'a, S: Simd> {
 }
 
 /// Stored [`Factorization`]: each [`LegLanes`] holds the lanes of two factors.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct StoredFactorization {
     /// m of A, and c.
     moment_adjugate: [LegLanes; 3],

@@ -5,6 +5,7 @@
 //! depends on the choice of C.
 
 use fearless_simd::{Simd, dispatch};
+use serde::{Deserialize, Serialize};
 
 use super::LEGS;
 use super::factorization::{Factorization, StoredFactorization};
@@ -25,8 +26,7 @@ use super::triples::LegLanes;
 /// assert!(pairs.all(|(a, b)| (a - b).abs() < 1e-14));
 /// assert!(home.sensitivity().condition < 100.0, "legs hold the platform in every direction");
 /// ```
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct KinematicState {
     pub(super) pose: Pose,
     pub(super) legs: StoredLegs,
@@ -35,8 +35,7 @@ pub struct KinematicState {
 }
 
 /// Geometry of the legs in memory.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct StoredLegs {
     arm: [LegLanes; 3],
     direction: [LegLanes; 3],

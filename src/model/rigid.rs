@@ -3,6 +3,7 @@
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 /// Pose of the platform: orientation and position in the base frame.
 ///
@@ -15,8 +16,7 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 /// let back = start.displacement_to(&start.displaced(&step));
 /// assert!((back.vector() - step.vector()).amax() < 1e-15);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// R, platform axes expressed in base axes.
     pub rotation: Matrix3<f64>,
@@ -33,8 +33,7 @@ pub struct Pose {
 /// let wrench = Wrench { torque: [2.0, 0.0, 0.0].into(), force: [0.0, 0.0, 5.0].into() };
 /// assert_eq!(wrench.vector().dot(&twist.vector()), 1.0);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Twist {
     /// omega, base axes \[rad/s\].
     pub angular: Vector3<f64>,
@@ -43,8 +42,7 @@ pub struct Twist {
 }
 
 /// Acceleration of the platform: the time derivative of its twist, part by part.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Acceleration {
     /// omega', base axes \[rad/s^2\].
     pub angular: Vector3<f64>,
@@ -53,8 +51,7 @@ pub struct Acceleration {
 }
 
 /// Wrench on the platform: torque about C, and force.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
     /// Torque about C, base axes \[N m\].
     pub torque: Vector3<f64>,
@@ -63,8 +60,7 @@ pub struct Wrench {
 }
 
 /// Motion of the platform at one instant: pose, twist and acceleration.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// R and C.
     pub pose: Pose,

@@ -12,6 +12,7 @@ use fearless_simd::{Level, Simd, f64x4, f64x8, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
 
 use super::factorization::{Factorization, wrench_columns};
 use super::inverse_geometry::LegGeometry;
@@ -28,8 +29,7 @@ pub const CONDITION_MEANING: &str = "6 is best; errors and forces grow with it";
 
 /// Sensitivity of a pose to errors of the leg lengths. All values are dimensionless: torques and angles refer
 /// to the radius.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sensitivity {
     /// Frobenius condition of N: at least the 2-norm condition and at most six times it; not finite at a
     /// singular pose.

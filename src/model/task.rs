@@ -7,6 +7,7 @@
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::{Matrix3, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 use super::rigid::{Acceleration, Motion, Pose, Twist};
 
@@ -21,8 +22,7 @@ use super::rigid::{Acceleration, Motion, Pose, Twist};
 /// let omega = state.motion().twist.angular;
 /// assert!((omega - nalgebra::Vector3::new(2.0 * 0.5_f64.sin(), 0.0, 2.0 * 0.5_f64.cos())).norm() < 1e-15);
 /// ```
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TaskState {
     /// X
     pub x: Vector6<f64>,

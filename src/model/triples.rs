@@ -11,12 +11,12 @@
 
 use fearless_simd::{Simd, SimdBase, f64x8};
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::LEGS;
 
 /// One value per leg in memory, in lane order.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[repr(align(64))]
 pub struct LegLanes(pub [f64; 8]);
 

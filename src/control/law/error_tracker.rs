@@ -5,6 +5,7 @@
 //! measurement the checks use the prediction.
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
@@ -36,8 +37,7 @@ pub(in crate::control) fn setpoint_error(
 }
 
 /// Error of the platform against the reference, under control.
-#[derive(Clone, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct ErrorTracker {
     estimator: Estimator,
     sensors: FrozenSensors,

@@ -10,6 +10,8 @@
 
 use nalgebra::{Vector3, Vector6};
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::cycle::Cycle;
 use crate::control::parameters::Parameters;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
@@ -28,8 +30,7 @@ const MAX_SATURATION_S: f64 = 0.1;
 const FORGETTING_RATIO: f64 = 0.03;
 
 /// Bound on feedback, with the recent time in saturation.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct FeedbackLimiter {
     saturated_s: f64,
 }

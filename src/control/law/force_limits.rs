@@ -1,6 +1,7 @@
 //! Force limits: magnitude and rate of change of the actuator forces.
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
@@ -22,8 +23,7 @@ pub(in crate::control) struct LimitedForces {
 }
 
 /// Last stage of the cycle: limits magnitude and rate of the forces.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct ForceLimiter {
     /// Forces of the last cycle under control \[N\].
     last: [f64; LEGS],

@@ -23,6 +23,7 @@
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::{Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 use crate::control::law::estimator::ReadingErrors;
 use crate::control::law::input_matrix::InputMatrix;
@@ -149,8 +150,7 @@ impl DisturbanceBounds {
 }
 
 /// State of the checks.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct DisturbanceMonitor {
     since_start_s: f64,
     payload: f64,
@@ -162,8 +162,7 @@ pub(in crate::control) struct DisturbanceMonitor {
 }
 
 /// Swings of the error between reversals.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Oscillation {
     /// Error at the last reversal, and the error farthest from it since.
     turn: Vector6<f64>,

@@ -18,6 +18,7 @@
 //! that pushes more than commanded shows in the leg lengths.
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::monitoring::weighting::{LEAST_FORCE_RATIO, weighted};
@@ -41,8 +42,7 @@ const LEAST_COSINE_SQUARED: f64 = 0.9;
 const LEAST_MISSING_S: f64 = 0.006;
 
 /// State of the drive response check.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct DriveResponse {
     usual: Vector6<f64>,
     /// Forces that are usually sent, low-pass filtered \[N\].

@@ -9,6 +9,8 @@
 //! or of unknown resolution, may repeat at rest. If it freezes then, the failure cannot be detected and the
 //! platform drifts away. An independent pose or a second encoder detects it.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::law::estimator::ReadingErrors;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;
@@ -86,8 +88,7 @@ fn motion_bound(stiffness: f64) -> f64 {
 }
 
 /// Runs of equal readings, and the reference at the first reading of each run.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct FrozenSensors {
     last: [f64; LEGS],
     equal_readings: [u32; LEGS],

@@ -1,5 +1,7 @@
 //! History of the reference over the last cycles, for its motion at the instant of a measurement.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
@@ -9,8 +11,7 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 const SEGMENT_COUNT: usize = 128;
 
 /// Motion of the reference from one instant to the next, with constant jerk.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Segment {
     begin_ns: u64,
     motion: Motion,
@@ -18,10 +19,9 @@ struct Segment {
 }
 
 /// Ring buffer of the last segments.
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct History {
-    #[cfg_attr(feature = "daemon", serde(with = "serde_big_array::BigArray"))]
+    #[serde(with = "serde_big_array::BigArray")]
     segments: [Option<Segment>; SEGMENT_COUNT],
     /// Number of segments ever recorded; the last one has the index `count - 1`.
     count: usize,

@@ -15,6 +15,8 @@
 //! | `proof` | whether a step, and the stop from its end, keep every limit |
 //! | `history` | the reference of the last cycles |
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::constants::Constants;
 use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::history::History;
@@ -81,8 +83,7 @@ const IN_PROPORTION_STEPS: u32 = 50;
 /// assert!(fastest > 0.0 && fastest <= parameters.limits.position.velocity);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ReferenceGenerator {
     /// At `time_ns`, the end of the last cycle's period.
     motion: Motion,

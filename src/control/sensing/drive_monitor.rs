@@ -3,6 +3,8 @@
 //! Only what the driver reports is checked. After `engage` the platform is held at its pose until all drives
 //! are ready.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::cycle::Cycle;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::Measurement;
@@ -24,8 +26,7 @@ const FORCE_OFFSET_RATIO: f64 = 0.02;
 const MAX_MISSING_S: f64 = 0.05;
 
 /// Checks of the drives' status over time.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct DriveMonitor {
     /// Forces sent in the previous cycle \[N\].
     sent: [f64; LEGS],

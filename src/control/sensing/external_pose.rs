@@ -3,6 +3,8 @@
 //! A wrong homing, a wrong scale or a slipped encoder shifts the pose of forward kinematics. Lengths alone
 //! cannot reveal this error. The lengths at the external pose show which leg is wrong.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::cycle::Cycle;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::Measurement;
@@ -16,8 +18,7 @@ use crate::model::task::TaskState;
 const TIME_CONSTANT_S: f64 = 0.03;
 
 /// Filtered differences between the measured lengths and the lengths at the external pose.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct ExternalPose {
     difference: [f64; LEGS],
     time_ns: u64,

@@ -18,6 +18,8 @@
 //!   late, and the platform would then have another velocity than its reference. Such brakes soon stop the
 //!   platform.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
 use crate::control::parameters::Parameters;
@@ -33,8 +35,7 @@ use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 const MAX_CHANGE_RATIO: f64 = 0.1;
 
 /// State of the platform at a measurement without force.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Sample {
     time_ns: u64,
     pose: Pose,
@@ -56,8 +57,7 @@ fn speed(constants: &Constants, twist: &Twist) -> f64 {
 }
 
 /// The last measurements without force.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct FreeMotion {
     /// Instant until which the last force was held \[ns\].
     held_until_ns: u64,

@@ -3,6 +3,8 @@
 //! A rejected input changes nothing: the last valid input stays and its age keeps growing. Invalid data thus
 //! never restarts a watchdog. After the timeout the diagnostic is the reason of the rejection.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::time::seconds_between;
 use crate::model::LEGS;
@@ -21,8 +23,7 @@ const MAX_PLAUSIBLE_INTERVALS: f64 = 2.0;
 
 /// The last valid input, and why a later one was rejected. `Valid` is the form in which a valid input is
 /// stored.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(in crate::control) struct LastValid<Input, Valid> {
     pub valid: Option<Valid>,
     /// Last input if it was rejected, with the reason of its rejection or of the first since the valid one.

@@ -2,6 +2,7 @@
 //! model.
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use crate::control::law::estimator::{EstimatorConstants, Filter};
 use crate::control::signals::errors::ErrorCoordinates;
@@ -13,8 +14,7 @@ use crate::model::LEGS;
 const MAX_GAP_S: f64 = 0.1;
 
 /// Estimator of the leg rates. It assumes that the acceleration of a leg is constant.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct LegRateEstimator {
     filter: Option<Filter>,
 }

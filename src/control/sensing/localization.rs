@@ -6,6 +6,8 @@
 //! singularity, its assembly mode is uncertain: forces are disabled until an operator has inspected the
 //! platform and sent `clear`.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::constants::Constants;
 use crate::control::cycle::Cycle;
 use crate::control::parameters::Parameters;
@@ -52,8 +54,7 @@ pub(in crate::control) struct Located<'a> {
 }
 
 /// Determinant at the last measurement, from which the time to a singularity is extrapolated.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct SingularityApproach {
     /// Time stamp of the last measurement \[ns\].
     time_ns: u64,
@@ -62,8 +63,7 @@ struct SingularityApproach {
 }
 
 /// Second stage of the cycle: follows the pose of the platform.
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(in crate::control) struct Localization {
     tracker: Tracker,
     /// Whether the pose was followed from home on without a gap.

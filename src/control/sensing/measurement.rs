@@ -2,6 +2,7 @@
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
+use serde::{Deserialize, Serialize};
 
 use crate::control::cycle::Cycle;
 use crate::control::parameters::Parameters;
@@ -47,8 +48,7 @@ const MIN_LEAD_NS: u64 = 10_000;
 
 /// Residual and travel of each leg. The residual is the change of length minus the integral of the rate. Both
 /// decay.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct RateConsistency {
     residual: [f64; LEGS],
     travel: [f64; LEGS],
@@ -95,8 +95,7 @@ impl RateConsistency {
 }
 
 /// First stage of the cycle: validates each new measurement and keeps the last valid one.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct MeasurementValidator {
     last: LastValid<Measurement, Measurement>,
     consistency: RateConsistency,

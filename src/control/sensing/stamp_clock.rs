@@ -5,6 +5,8 @@
 //! would ever be too old. Therefore the offset between the two clocks is tracked, no faster than clocks
 //! drift. A stamp that deviates from the tracked offset is a fault.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::cycle::Cycle;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 
@@ -13,8 +15,7 @@ use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 const MAX_DRIFT: f64 = 0.01;
 
 /// Tracked offset between the clocks.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct StampClock {
     /// Clock of the stamps minus the daemon's clock, as tracked \[ns\].
     offset_ns: i64,

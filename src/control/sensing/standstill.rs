@@ -17,6 +17,7 @@
 
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
+use serde::{Deserialize, Serialize};
 
 use crate::control::parameters::Parameters;
 use crate::control::signals::inputs::Measurement;
@@ -54,8 +55,7 @@ pub(in crate::control) fn window_s(parameters: &Parameters) -> f64 {
 }
 
 /// Leg rates over a window.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(in crate::control) struct WindowRates {
     /// Rate of each leg \[m/s\].
     pub rate: [f64; LEGS],
@@ -66,8 +66,7 @@ pub(in crate::control) struct WindowRates {
 }
 
 /// Sums for the lines through the lengths; times and lengths are relative to the first measurement.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Window {
     first_ns: u64,
     first: [f64; LEGS],
@@ -118,8 +117,7 @@ impl Window {
 }
 
 /// Test for rest by windows of the lengths without force.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct Standstill {
     window: Option<Window>,
     /// Rates of the last whole window, while the lengths stay within its scatter.

@@ -1,6 +1,7 @@
 //! Motion of the platform that a setpoint describes, and its continuation until the force acts.
 
 use nalgebra::{Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 use crate::control::parameters::Parameters;
 use crate::control::signals::inputs::{Setpoint, SetpointKind};
@@ -14,8 +15,7 @@ const MAX_JERK_INTERVAL_S: f64 = 0.025;
 const JERK_INTERVALS: f64 = 3.0;
 
 /// A setpoint with the motion of the platform that it describes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetpointMotion {
     /// The setpoint as received: time stamp and X, X', X''.
     pub setpoint: Setpoint,

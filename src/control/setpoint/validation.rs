@@ -13,6 +13,8 @@
 //! The deviation is measured from the reference, and while engaging from the continuation of the previous
 //! setpoint.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::cycle::Cycle;
 use crate::control::parameters::{Parameters, ViolationPolicy};
 use crate::control::reference::ReferenceGenerator;
@@ -39,8 +41,7 @@ const ENVELOPE_ROUNDING: f64 = 1e-9;
 const JUMP_RATIO: f64 = 0.5;
 
 /// First stage of the cycle: validates each new setpoint and keeps the last valid one.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct SetpointValidator {
     last: LastValid<Setpoint, SetpointMotion>,
     samples: PoseSamples,

@@ -5,6 +5,7 @@
 //! unchanged. Its `Display` is for people and is never called in the cycle.
 
 use core::fmt;
+use serde::{Deserialize, Serialize};
 
 /// How the controller responds to a fault while the platform is under control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,8 +92,7 @@ macro_rules! codes {
         /// | --- | --- | --- | --- |
         $(#[doc = concat!("| ", $number, " | ", $name, " | ", reaction!($reaction), " | ", $remedy, " |")])*
         #[allow(rustdoc::broken_intra_doc_links, reason = "remedies name sections of the configuration: [limits]")]
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-        #[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[repr(u32)]
         pub enum DiagnosticCode { $($(#[$doc])* $variant = $number,)* }
 
@@ -255,8 +255,7 @@ impl DiagnosticCode {
 }
 
 /// Result of a check: what happened, the value that was found and its bound.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Diagnostic {
     /// Event that the check found, with its reaction and remedy.
     pub code: DiagnosticCode,

@@ -2,6 +2,7 @@
 //! estimated.
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use crate::model::LEGS;
 use crate::model::inverse_geometry::leg_lengths_and_rates;
@@ -9,8 +10,7 @@ use crate::model::machine::Machine;
 use crate::model::rigid::{Motion, Pose, Twist};
 
 /// Tracking error of pose and twist, desired minus measured, base axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PoseError {
     /// `[e_R; e_p]` \[rad\], \[m\].
     pub pose: Twist,
@@ -33,8 +33,7 @@ impl PoseError {
 
 /// Error that feedback acts on, desired minus measured: of the pose, or of the leg lengths in modes that act
 /// on legs.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorCoordinates {
     /// Desired minus measured: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,
@@ -66,8 +65,7 @@ impl From<&ErrorCoordinates> for PoseError {
 }
 
 /// Estimate of error, rate and disturbance at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorEstimate {
     /// e, desired minus true: angles \[rad\] and position \[m\], or leg lengths \[m\].
     pub value: Vector6<f64>,

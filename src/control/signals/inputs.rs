@@ -1,13 +1,14 @@
 //! Inputs of the controller in one cycle: setpoint, measurement, request, and the processes that publish
 //! them.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::signals::state::OperatorRequest;
 use crate::model::LEGS;
 use crate::model::task::TaskState;
 
 /// Kind of a setpoint, with its number in the messages: which of its values hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum SetpointKind {
     /// X, X' and X'' of a motion at one instant.
@@ -28,8 +29,7 @@ impl SetpointKind {
 }
 
 /// Task coordinates and their derivatives that a source requests for one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Setpoint {
     /// Which of the values hold, and for how long.
     pub kind: SetpointKind,
@@ -49,8 +49,7 @@ impl Setpoint {
 }
 
 /// Lengths \[m\] and rates \[m/s\] of the legs at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// Instant of the measurement, on the clock of the releases \[ns\].
     pub time_ns: u64,
@@ -71,8 +70,7 @@ impl AsRef<Self> for Measurement {
 }
 
 /// Status of the drives, reported by the driver. A set has one bit per leg, the lowest for leg 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DriveStatus {
     /// Set of enabled drives; `None` if not reported.
     pub enabled: Option<u32>,

@@ -19,6 +19,8 @@
 //! continues over one wrong message among valid ones, and a stream of wrong messages ends in a stop. Under
 //! "limit" the reference follows as near as the limits allow.
 
+use serde::{Deserialize, Serialize};
+
 /// Limit by the number of its bit in a [`LimitSet`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -78,8 +80,7 @@ impl Limit {
 }
 
 /// Set of limits that a cycle has reached, or nearly.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LimitSet(pub u32);
 
 /// Largest of several ratios of a quantity to its bound. NaN if any ratio is NaN; `f64::max` would hide it

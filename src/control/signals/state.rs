@@ -19,9 +19,10 @@
 //! without setpoints comes to rest and holds its pose in the state engaging, which is no fault. When
 //! setpoints arrive again, it moves onto them.
 
+use serde::{Deserialize, Serialize};
+
 /// State of the controller, which decides whether forces are valid and which reference the platform follows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum State {
     /// No force: the pose is unknown, or an operator requested it.
@@ -117,8 +118,7 @@ impl Request {
 }
 
 /// Identity of a message, unique within its topic.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MessageId {
     /// Start of the publisher, or of the request words of a daemon.
     pub epoch: u64,
@@ -136,8 +136,7 @@ pub struct OperatorRequest {
 }
 
 /// Goal of a stop: the state that follows once the platform is at rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum AfterStop {
     /// Forces are disabled; brakes close.
     #[default]

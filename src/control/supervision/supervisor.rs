@@ -8,14 +8,15 @@
 //! before it goes home. If the setpoint is lost and the policy is to hold the pose, engaging follows and not
 //! stopping.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode, Reaction};
 use crate::control::signals::inputs::Input;
 use crate::control::signals::state::AfterStop;
 use crate::control::signals::state::{MessageId, OperatorRequest, Request, State};
 
 /// State of the controller, with its reason and the goal of a stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SupervisorState {
     /// State of the controller; it decides whether forces are applied.
     pub state: State,
@@ -44,8 +45,7 @@ pub struct Findings {
 }
 
 /// Third stage of the cycle: the state, and the answer to the last request.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct Supervisor {
     pub current: SupervisorState,
     /// Message of the last request that was carried out or refused.

@@ -31,6 +31,8 @@ mod tracker;
 
 use fearless_simd::dispatch;
 
+use serde::{Deserialize, Serialize};
+
 pub use tracker::{Tracker, TrackingResult};
 
 use super::LEGS;
@@ -48,8 +50,7 @@ pub const MAX_NEWTON_STEPS: u32 = 8;
 pub const MAX_CONDITION: f64 = 1e4;
 
 /// Outcome of forward kinematics.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Outcome {
     /// The pose has these lengths, and no other pose in the trusted region has them.
     Solved,

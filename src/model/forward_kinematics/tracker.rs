@@ -1,6 +1,7 @@
 //! Tracker: forward kinematics for distant lengths, along a straight path of the lengths in trusted steps.
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use super::{NewtonReport, Outcome, refine};
 use crate::model::LEGS;
@@ -29,8 +30,7 @@ const MAX_TRACKING_STEPS: u32 = 2000;
 /// assert_eq!(result, TrackingResult::Found);
 /// assert!((tracker.pose().position - pose.position).norm() < 1e-12);
 /// ```
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Tracker {
     /// State after the last converged step.
     kinematic_state: KinematicState,

@@ -16,6 +16,8 @@
 //! change the gains correctly. With constant gains the estimate is unstable if half of a source's samples are
 //! missing.
 
+use serde::{Deserialize, Serialize};
+
 /// Noise model that determines the gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseModel {
@@ -29,8 +31,7 @@ pub struct NoiseModel {
 }
 
 /// Covariance matrix of one axis, upper triangle.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Covariance {
     ee: f64,
     ew: f64,

@@ -26,6 +26,7 @@ pub mod covariance;
 mod sent_accelerations;
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use crate::control::law::estimator::covariance::{Covariance, NoiseModel};
 pub use crate::control::law::estimator::sent_accelerations::CAPACITY as SENT_ACCELERATIONS;
@@ -49,8 +50,7 @@ impl ErrorEstimate {
 }
 
 /// Filter of six axes: estimate at the instant of the last measurement, and its covariance.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct Filter {
     pub state: ErrorEstimate,
     pub time_ns: u64,
@@ -88,8 +88,7 @@ impl Filter {
 }
 
 /// Estimator of the tracking error under control.
-#[derive(Clone, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Estimator {
     filter: Filter,
     sent: SentAccelerations,

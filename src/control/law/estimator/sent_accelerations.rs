@@ -1,6 +1,7 @@
 //! Feedback accelerations that were sent recently. Each acts until the next one begins.
 
 use nalgebra::Vector6;
+use serde::{Deserialize, Serialize};
 
 use crate::control::signals::errors::ErrorEstimate;
 use crate::control::signals::time::seconds_between;
@@ -12,18 +13,16 @@ pub const CAPACITY: usize = 256;
 const ZERO: Vector6<f64> = Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
 
 /// Acceleration, and the instant from which it acts.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct SentAcceleration {
     begin_ns: u64,
     acceleration: Vector6<f64>,
 }
 
 /// Ring buffer of the last accelerations.
-#[derive(Clone, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(in crate::control::law::estimator) struct SentAccelerations {
-    #[cfg_attr(feature = "daemon", serde(with = "serde_big_array::BigArray"))]
+    #[serde(with = "serde_big_array::BigArray")]
     ring: [SentAcceleration; CAPACITY],
     /// Number of accelerations ever recorded; the last one has index `count - 1`.
     count: usize,

@@ -1,5 +1,7 @@
 //! Bounds of the pose that the reference keeps: the lengths of the legs and the envelope of X.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::tolerances::{END_STOP_RATIO, ROUNDING, START_RATIO};
@@ -10,8 +12,7 @@ use crate::model::task::task_coordinates;
 
 /// Bounds of the legs and of X. A platform that is beyond the nominal bounds when control begins may come back: its
 /// bounds are relaxed to where it is, and follow it until they are the nominal ones.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(in crate::control::reference) struct PoseBounds {
     /// \[m\]
     pub shortest: [f64; LEGS],

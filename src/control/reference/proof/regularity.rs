@@ -17,6 +17,7 @@
 //! All balls of a group are tried at once: a lane each, without a branch, so that the effort does not depend on which one covers.
 
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
+use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::reference::proof::refusal::Refusal;
@@ -84,8 +85,7 @@ impl Regularity {
 }
 
 /// Balls in lanes: a column holds the same number of each. One without legs covers nothing.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct BallGroup {
     /// Centre: position, and rotation column by column.
     position: [[f64; LANES]; 3],
@@ -204,8 +204,7 @@ pub(in crate::control::reference) struct RegularityQuery<'a> {
 }
 
 /// The balls found last.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct RegularBalls {
     groups: [BallGroup; GROUPS],
     /// Index of the group that covered the last pose.

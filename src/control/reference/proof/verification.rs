@@ -3,6 +3,8 @@
 //! In free space one pose is enough: every margin exceeds the length of the way, in any direction. Near a bound the stop is
 //! examined knot by knot, see [`super::examination`].
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::cubic_departure::curvature;
@@ -20,8 +22,7 @@ use crate::model::rigid::{Motion, Pose};
 use crate::model::task::task_coordinates;
 
 /// What verifications leave for the next one.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct Verifier {
     pub balls: RegularBalls,
 }

@@ -1,14 +1,15 @@
 //! The stop that is held ready. An earlier step verified it; the reference may follow it from the present
 //! motion on.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::constants::Constants;
 use crate::control::reference::stop::pose_stop::{PoseStop, PoseStopState, StopKind, advanced};
 use crate::control::setpoint::target::at_rest;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
 /// Start of the stop.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) enum Phase {
     /// The platform does not move: no stop is planned.
     #[default]
@@ -20,8 +21,7 @@ pub(in crate::control::reference) enum Phase {
 }
 
 /// Stop that may be followed from the present motion on.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct HeldStop {
     pub(in crate::control::reference) phase: Phase,
     /// Two slots. One holds the current stop if it brakes at once or is followed. The next candidate is

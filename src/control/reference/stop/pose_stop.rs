@@ -6,6 +6,7 @@
 
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::control::reference::proof::regularity::Reach;
 use crate::control::reference::stop::vector_stop::{Stop, StopState};
@@ -14,8 +15,7 @@ use crate::control::signals::pair::Pair;
 use crate::model::rigid::{Motion, Pose, Twist};
 
 /// Kind of a stop, see [`super::vector_stop`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(in crate::control::reference) enum StopKind {
     /// Releases the acceleration, then brakes.
     #[default]
@@ -25,16 +25,14 @@ pub(in crate::control::reference) enum StopKind {
 }
 
 /// Stop of orientation and position.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct PoseStop {
     pub orientation: Stop,
     pub position: Stop,
 }
 
 /// State of a stop at one instant, relative to its start.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct PoseStopState {
     pub orientation: StopState,
     pub position: StopState,

@@ -33,6 +33,7 @@ use fearless_simd::{Simd, f64x4, prelude::*};
 #[cfg(not(feature = "client"))]
 use nalgebra::ComplexField as _;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::control::reference::proof::padding::{Padded, padded};
 use crate::control::signals::limits::DerivativeLimits;
@@ -89,8 +90,7 @@ pub(in crate::control::reference) fn straight_extent(
 }
 
 /// Displacement, velocity and acceleration at one instant of a stop.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(in crate::control::reference) struct StopState {
     pub displacement: Vector3<f64>,
     pub velocity: Vector3<f64>,
@@ -98,8 +98,7 @@ pub(in crate::control::reference) struct StopState {
 }
 
 /// Piece of a stop with constant jerk, and the state in which it begins.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Piece {
     displacement: Padded,
     velocity: Padded,
@@ -136,8 +135,7 @@ impl Piece {
 }
 
 /// A stop as pieces of constant jerk.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct Stop {
     pieces: [Piece; MAX_PIECES],
     count: usize,

@@ -16,6 +16,8 @@
 
 mod timing;
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::setpoint::pose_samples::timing::{Delay, Timing};
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
@@ -37,8 +39,7 @@ const EXTRAPOLATION_INTERVALS: f64 = 1.5;
 const RETURN_INTERVALS: f64 = 4.0;
 
 /// A sample, or the average of samples close to each other.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Sample {
     time_ns: u64,
     /// Stamps of the first and the last of the averaged samples.
@@ -73,8 +74,7 @@ struct Sample {
 /// assert!((samples.delay_s(now_ns) - 0.040).abs() < 1e-9);
 /// assert!((target.pose.position.x - 0.5 * (59.0 * 0.020 - 0.040)).abs() < 1e-9);
 /// ```
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct PoseSamples {
     /// Ring buffer; `newest` is the index of the newest sample.
     samples: [Option<Sample>; CAPACITY],

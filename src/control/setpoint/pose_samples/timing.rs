@@ -1,5 +1,7 @@
 //! Timing of a stream of samples, estimated from stamps and arrivals, and the delay that follows from it.
 
+use serde::{Deserialize, Serialize};
+
 use crate::control::signals::time::seconds_between;
 
 /// Largest delay \[s\]: the delay of a 15 Hz source, half the slowest rate provided for. Slower sources are
@@ -21,8 +23,7 @@ const MAX_JITTER_RATIO: f64 = 0.5;
 const JITTER_PER_DEVIATION: f64 = 2.25;
 
 /// Estimates of the stream's timing \[s\].
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::setpoint::pose_samples) struct Timing {
     /// Number of intervals seen, up to the length of the average.
     pub count: f64,
@@ -58,8 +59,7 @@ impl Timing {
 }
 
 /// Delay of the target \[s\]; between two samples it changes at a constant rate.
-#[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "daemon", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::setpoint::pose_samples) struct Delay {
     since_ns: u64,
     value: f64,
