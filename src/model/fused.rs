@@ -19,6 +19,9 @@
 //! In the exceptional case `v` alone decides a tie that `w` should break. `v` is then changed by an eighth of
 //! itself in the direction of `w`.
 //!
+//! `libm::fma` has the same bits, but chooses its code through a function pointer at run time, which the proof
+//! on the machine code of the loop does not follow.
+//!
 //! Range: identical to the instruction if `a b` and `c` are zero or from 1e-280 to 1e280, and if the result
 //! is not finite. Outside this range the error is that of two roundings.
 
