@@ -27,9 +27,9 @@ use crate::control::reference::proposal::walls::Walls;
 use crate::control::reference::stop::constant_jerk::step_constant_jerk;
 use crate::control::reference::stop::held_stop::HeldStop;
 use crate::control::reference::stop::pose_stop::StopKind;
-use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::motion::{RelativeMotion, SetpointMotion};
 use crate::control::setpoint::target::Target;
-use crate::control::setpoint::target::{RelativeMotion, at_rest};
+use crate::control::setpoint::target::at_rest;
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::limits::{Limit, LimitSet};
 use crate::control::signals::pair::Pair;
@@ -188,7 +188,7 @@ impl ReferenceGenerator {
         let error = PoseError::new(motion, &self.motion.pose, &self.motion.twist);
         PoseError {
             pose: Twist::from_vector(&(error.pose.vector() + continued.displacement)),
-            twist: Twist::from_vector(&(continued.twist - self.motion.twist.vector())),
+            twist: Twist::from_vector(&(continued.twist.vector() - self.motion.twist.vector())),
         }
     }
 

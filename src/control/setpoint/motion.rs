@@ -28,11 +28,13 @@ pub struct SetpointMotion {
     jerk_s: f64,
 }
 
-/// Continuation of a setpoint: displacement, twist and acceleration some time later.
-pub(in crate::control) struct Continuation {
+/// A motion relative to a pose.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::control) struct RelativeMotion {
+    /// Displacement from the pose to the pose of the motion \[rad\], \[m\].
     pub displacement: Vector6<f64>,
-    pub twist: Vector6<f64>,
-    pub acceleration: Vector6<f64>,
+    pub twist: Twist,
+    pub acceleration: Acceleration,
 }
 
 impl AsRef<Setpoint> for SetpointMotion {
@@ -73,16 +75,16 @@ impl SetpointMotion {
         self.jerk_s = JERK_INTERVALS * dt + ahead_s;
     }
 
-    /// Continuation after `dt` seconds, to first order in the angle covered.
-    pub(in crate::control) fn continued(&self, dt: f64) -> Continuation {
+    /// Motion after `dt` seconds relative to the pose of the setpoint, to first order in the angle covered.
+    pub(in crate::control) fn continued(&self, dt: f64) -> RelativeMotion {
         let (v, a, j) = (self.motion.twist.vector(), self.motion.acceleration.vector(), &self.jerk);
         let t = dt.max(0.0).min(self.jerk_s);
         let rest = dt.max(0.0) - t;
         let by_jerk = t * (t * t / 6.0 + rest * (0.5 * t + 0.5 * rest));
-        Continuation {
+        RelativeMotion {
             displacement: (v + a * (0.5 * dt)) * dt + j * by_jerk,
-            twist: v + a * dt + j * (t * (0.5 * t + rest)),
-            acceleration: a + j * t,
+            twist: Twist::from_vector(&(v + a * dt + j * (t * (0.5 * t + rest)))),
+            acceleration: Acceleration::from_vector(&(a + j * t)),
         }
     }
 
@@ -95,8 +97,8 @@ impl SetpointMotion {
         let continued = self.continued(self.extrapolation_s(parameters, instant_ns));
         Motion {
             pose: self.motion.pose.extrapolated(&Twist::from_vector(&continued.displacement)),
-            twist: Twist::from_vector(&continued.twist),
-            acceleration: Acceleration::from_vector(&continued.acceleration),
+            twist: continued.twist,
+            acceleration: continued.acceleration,
         }
     }
 

@@ -1,9 +1,7 @@
 //! Target of the reference in one cycle: a motion or a pose, and the share of the limits for the way to it.
 
-use nalgebra::Vector6;
-
 use crate::control::parameters::Parameters;
-use crate::control::setpoint::motion::SetpointMotion;
+use crate::control::setpoint::motion::{RelativeMotion, SetpointMotion};
 use crate::control::setpoint::pose_samples::PoseSamples;
 use crate::control::signals::inputs::SetpointKind;
 use crate::control::signals::limits::Limits;
@@ -18,15 +16,6 @@ pub enum Target<'a> {
     Samples(&'a PoseSamples),
     /// Pose to move to and stand at, with a share of the limits of autonomous motions.
     Pose(&'a Pose, f64),
-}
-
-/// A motion relative to a pose.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::control) struct RelativeMotion {
-    /// Displacement from the pose to the pose of the motion \[rad\], \[m\].
-    pub displacement: Vector6<f64>,
-    pub twist: Twist,
-    pub acceleration: Acceleration,
 }
 
 /// Least share of the limits of autonomous motions: with less, the approach loses its numerical precision.
@@ -65,9 +54,7 @@ impl<'a> Target<'a> {
         if let Self::Motion(setpoint) = self {
             let continued = setpoint.continued(setpoint.extrapolation_s(parameters, instant_ns));
             let displacement = pose.displacement_to(&setpoint.motion.pose).vector() + continued.displacement;
-            let twist = Twist::from_vector(&continued.twist);
-            let acceleration = Acceleration::from_vector(&continued.acceleration);
-            return Some(RelativeMotion { displacement, twist, acceleration });
+            return Some(RelativeMotion { displacement, ..continued });
         }
         let Motion { pose: desired, twist, acceleration } = self.motion_at(parameters, instant_ns)?;
         Some(RelativeMotion { displacement: pose.displacement_to(&desired).vector(), twist, acceleration })

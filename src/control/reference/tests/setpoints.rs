@@ -66,7 +66,7 @@ fn the_jerk_of_a_setpoint_is_that_of_motions_without_a_gap() {
         let mut next = motion((5000 * MS).saturating_add_signed(dt_ms * 1_000_000), 0.05);
         next.lead_on(&parameters, Some(&before));
         let after = next.continued(1e-3);
-        let change = after.acceleration[3] - 0.05;
+        let change = after.acceleration.linear.x - 0.05;
         let jerk = if has_jerk { 0.05 / (dt_ms as f64 * 1e-3) } else { 0.0 };
         assert!((change - 1e-3 * jerk).abs() < 1e-9, "{dt_ms}: {change}");
     }
