@@ -25,6 +25,7 @@
 //! stop by another verified stop, or moves along it. By induction the reference keeps every limit at all
 //! times, whatever setpoints are sent or lost, and whatever the state of the controller. Assumptions and
 //! proof: `docs/architecture.md`, section "Proof of the verified stop".
+//!
 //! | folder | content |
 //! | --- | --- |
 //! | `proposal` | acceleration towards a moving target, and away from bounds |
