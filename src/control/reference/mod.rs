@@ -4,15 +4,16 @@
 //! cycle, a verified stop from this motion, bounds of the pose, and a history of the last cycles. A setpoint
 //! is only a target: the reference approaches it, but never copies it.
 //!
-//! **A step proposes a motion** (`proposal`). A cycle has steps of at most 1 ms, longer only after many
-//! missed cycles. The step computes the acceleration at its end, towards the target and away from bounds. The
-//! acceleration keeps its limit and changes with constant jerk. This gives the motion at the end of the step.
+//! **A step proposes a motion** (`proposal`). A cycle consists of steps of at most 1 ms, longer only after
+//! many missed cycles. Each step computes the acceleration at its end, towards the target and away from
+//! bounds. The acceleration keeps its limit and changes with constant jerk. This gives the motion at the end
+//! of the step.
 //!
 //! **The proposal is verified** (`proof`). The step, and a stop from its end, must keep every limit over
-//! their whole length. In free space the stop is a release-first stop: the acceleration decreases to zero,
-//! then the velocity. One pose is enough to verify it, because every margin exceeds the length of the stop.
-//! Near a bound the stop is a stop that brakes at once. It needs less room, and is examined at several
-//! instants, the knots. The effort is the compute budget of a step, counted in knots.
+//! their whole length. In free space this is a release-first stop: the acceleration decreases to zero, then
+//! the velocity. One pose is enough to verify it, because every margin exceeds the length of the stop. Near a
+//! bound it is a stop that brakes at once, which needs less room. It is examined at several instants, the
+//! knots. The effort is the compute budget of a step, counted in knots.
 //!
 //! **If the stop is proved**, the reference takes the proposed motion and holds the stop ready (`stop`).
 //!
@@ -202,7 +203,7 @@ impl ReferenceGenerator {
     }
 
     /// Motion of a setpoint minus the reference, at the end of the last cycle. The setpoint is extrapolated
-    /// to this instant, to first order in the time.
+    /// to this instant, to first order in the angle covered.
     pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> PoseError {
         let motion = &setpoint.motion;
         let continued = setpoint.continued(setpoint.extrapolation_s(parameters, self.time_ns));
@@ -288,8 +289,8 @@ impl ReferenceGenerator {
         let approach = |limits| Approach::new(limits, closing_scale, h);
         let (turning, shifting) = (approach(limits.orientation), approach(limits.position));
         let Motion { pose, twist, acceleration } = &self.motion;
-        // State that the present acceleration leads to. The offset is of first order in the displacement, and
-        // exact on the target.
+        // State that the present acceleration leads to. Its displacement enters the offset to first order,
+        // which is exact on the target.
         let (v, a) = (twist.vector(), acceleration.vector());
         let led = Twist::from_vector(&(v + a * h));
         let offset = desired.displacement - (v + a * (0.5 * h)) * h;

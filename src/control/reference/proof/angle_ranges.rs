@@ -8,10 +8,10 @@
 //! sin d >= margin and sin e >= margin                     =>  d, e >= margin     w < pi
 //! the same, or where cos d <= 0 or cos e <= 0 instead     =>  d, e >= margin     pi <= w <= 5
 //! ```
+//!
 //! This holds because `asin(margin) >= margin`. Full turns do not matter, because a range is cut off at 2.5
 //! rad from the start of the motion. An end that was cut off needs no margin. The test takes a few products
 //! for all ends together. Arc tangents would take 100 instructions each, at every knot of an examination.
-//! for all ends at once. Each arc tangent would take 100 instructions, at every knot of an examination.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -35,8 +35,7 @@ const LANES: usize = 8;
 /// Ranges of the angles, with one end in each lane.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct AngleRanges {
-    /// Sine and cosine of each end. The high ends have the opposite sign, because the distance to them has
-    /// it.
+    /// Sine and cosine of each end. Both have the opposite sign for a high end, because its distance has it.
     sine: [f64; LANES],
     cosine: [f64; LANES],
     /// Largest margin that is required from each end \[rad\].

@@ -42,7 +42,7 @@ mod tests {
 
     use super::*;
 
-    /// Each end of each coordinate holds for either position alone. A narrow range keeps a quarter of its
+    /// At each end of each coordinate either position alone decides. A narrow range keeps a quarter of its
     /// width.
     #[test]
     fn each_end_is_kept_by_both_positions() {

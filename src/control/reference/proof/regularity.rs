@@ -34,8 +34,8 @@ const LANES: usize = 4;
 /// Number of groups that are kept: enough for the balls along one stop.
 const GROUPS: usize = 3;
 
-/// Largest chord `|R - R0| / sqrt 2` for which the angle is bounded, and the bound of angle over chord: `2
-/// asin(1/2)`.
+/// Largest chord `|R - R0| / sqrt 2` for which the angle is bounded, and the ratio of the angle's bound to
+/// the chord: `2 asin(1/2)`.
 const MAX_CHORD: f64 = 1.0;
 const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
 

@@ -1,5 +1,5 @@
-//! Tests of the motion of a platform without force: which measurements count, and how its deceleration
-//! continues it.
+//! Tests of the motion of a platform without force: which measurements count, and how the motion continues
+//! with the measured deceleration.
 
 use crate::control::cycle::Cycle;
 use crate::control::reference::tests::*;
