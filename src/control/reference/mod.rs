@@ -1,19 +1,38 @@
-//! The reference generator: pose, twist and acceleration of the platform in every cycle, within every limit.
+//! Reference generator: moves the reference (pose, twist, acceleration) towards a target, within every limit.
 //!
-//! The reference owns its state and moves only by steps of constant jerk, or along a verified stop. Setpoints are targets:
-//! never copied, only approached. So the limits hold whatever is sent, and whatever the state of the controller.
+//! **The generator owns the reference.** [`ReferenceGenerator`] holds the motion at the end of the last
+//! cycle, a verified stop from this motion, bounds of the pose, and a history of the last cycles. A setpoint
+//! is only a target: the reference approaches it, but never copies it.
 //!
-//! Each step proposes a state a step later (`approach`) and verifies that the stop from there keeps every limit along its
-//! whole way (`verification`). If so, the state is taken, with its stop. Otherwise the reference follows the stop that was
-//! verified before, which needs no check. By induction every limit holds at all times, also if every setpoint is lost.
-//! The assumptions and the proof: `docs/architecture.md`, section "Proof of the verified stop".
+//! **A step proposes a motion** (`proposal`). A cycle consists of steps of at most 1 ms, longer only after
+//! many missed cycles. Each step computes the acceleration at its end, towards the target and away from
+//! bounds. The acceleration keeps its limit and changes with constant jerk. This gives the motion at the end
+//! of the step.
+//!
+//! **The proposal is verified** (`proof`). The step, and a stop from its end, must keep every limit over
+//! their whole length. In free space this is a release-first stop: the acceleration decreases to zero, then
+//! the velocity. One pose is enough to verify it, because every margin exceeds the length of the stop. Near a
+//! bound it is a stop that brakes at once, which needs less room. It is examined at several instants, the
+//! knots. The effort is the compute budget of a step, counted in knots.
+//!
+//! **If the stop is proved**, the reference takes the proposed motion and holds the stop ready (`stop`).
+//!
+//! **On refusal** the proposal is dropped. The refusal names the limit that would be exceeded, or the effort
+//! if it was spent before the proof was complete. The reference follows the held stop for one step. This
+//! needs no check, because an earlier step verified this stop. The next step proposes again. Without a target
+//! the reference follows the held stop, too.
+//!
+//! **So the limits always hold.** Control begins only with a verified stop. Every step either replaces this
+//! stop by another verified stop, or moves along it. By induction the reference keeps every limit at all
+//! times, whatever setpoints are sent or lost, and whatever the state of the controller. Assumptions and
+//! proof: `docs/architecture.md`, section "Proof of the verified stop".
 //!
 //! | folder | content |
 //! | --- | --- |
 //! | `proposal` | acceleration towards a moving target, and away from bounds |
-//! | `stop` | stop in closed form, and the one that is held ready |
 //! | `proof` | whether a step, and the stop from its end, keep every limit |
-//! | `history` | the reference of the last cycles |
+//! | `stop` | stops in closed form, and the stop that is held ready |
+//! | `history` | reference of the last cycles |
 
 use serde::{Deserialize, Serialize};
 
@@ -47,12 +66,14 @@ mod tests;
 
 pub use self::proof::refusal::Refusal;
 
-/// Longest step of the generator \[s\], so that slow loops give the same motion as fast ones.
+/// Longest step of the generator \[s\]: slow loops give the same motion as fast loops.
 const MAX_STEP_S: f64 = 1e-3;
-/// Most steps in a cycle: after missed cycles they are longer, which is as safe and less smooth.
+/// Largest number of steps in a cycle. After missed cycles the steps are longer, which is as safe and less
+/// smooth.
 const MAX_STEPS: f64 = 32.0;
-/// Steps after a refused one in which rotation and translation change in proportion, as they do at walls: limits of jerk that act on
-/// each of them alone turn the direction of the first steps, away from the target and perhaps against a bound.
+/// Steps after a refusal in which rotation and translation change in proportion, as they do at walls
+/// (2026-11-25). Separate limits of jerk would turn the direction of the first steps, away from the target
+/// and perhaps against a bound.
 const IN_PROPORTION_STEPS: u32 = 50;
 
 /// Reference generator.
@@ -85,25 +106,25 @@ const IN_PROPORTION_STEPS: u32 = 50;
 /// ```
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ReferenceGenerator {
-    /// At `time_ns`, the end of the last cycle's period.
+    /// Reference at `time_ns`, the end of the last cycle's period.
     motion: Motion,
     time_ns: u64,
-    /// Over the last cycle.
+    /// Mean acceleration over the last cycle.
     mean_acceleration: Acceleration,
     stop: HeldStop,
     bounds: PoseBounds,
     verifier: Verifier,
     history: History,
-    /// Share of the limits for closing the distance to a target.
+    /// Share of the limits with which the reference closes the distance to a target.
     closing_scale: f64,
-    /// What held the reference back in the last cycle.
+    /// Limits that restricted the reference in the last cycle.
     active_limits: LimitSet,
-    /// For so many steps rotation and translation still change in proportion, after one that was refused.
+    /// Steps after a refusal in which rotation and translation still change in proportion.
     in_proportion_steps: u32,
 }
 
 impl ReferenceGenerator {
-    /// At home, at rest.
+    /// Generator at home, at rest.
     pub fn new(constants: &Constants) -> Self {
         Self {
             motion: at_rest(constants.home.pose()),
@@ -119,9 +140,9 @@ impl ReferenceGenerator {
         }
     }
 
-    /// Places the reference at a motion, as that of a platform without force, and verifies a stop from there. If none was verified,
-    /// returns why: the reference must not begin there.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Places the reference at a motion, for example of a platform without force, and verifies a stop from
+    /// there. If the stop is refused, the reference must not begin there.
+    // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     pub fn verify_start(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Refusal> {
         self.motion = *motion;
@@ -132,45 +153,46 @@ impl ReferenceGenerator {
         verified.map(drop)
     }
 
-    /// Begins at an instant with the motion at which it was placed.
+    /// Begins at an instant, with the motion of the last [`Self::verify_start`].
     pub fn begin_at(&mut self, time_ns: u64) {
         (self.time_ns, self.in_proportion_steps) = (time_ns, 0);
         self.history.clear();
     }
 
-    /// Sets the share of the limits with which the distance to a target is closed.
+    /// Sets the share of the limits with which the reference closes the distance to a target.
     pub fn set_closing_scale(&mut self, scale: f64) {
         self.closing_scale = scale;
     }
 
-    /// The motion at the end of the last cycle.
+    /// Reference at the end of the last cycle.
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
 
-    /// The end of the last cycle's period, to which [`Self::motion`] belongs.
+    /// End of the last cycle's period, the instant of [`Self::motion`].
     pub fn time_ns(&self) -> u64 {
         self.time_ns
     }
 
-    /// What held the reference back in the last cycle.
+    /// Limits that restricted the reference in the last cycle.
     pub fn active_limits(&self) -> LimitSet {
         self.active_limits
     }
 
-    /// The reference at an instant of the last cycles.
+    /// Reference at an instant of the last cycles.
     pub fn motion_at(&self, instant_ns: u64) -> Motion {
         let start = || self.motion.after(seconds_between(self.time_ns, instant_ns));
         self.history.motion_at(instant_ns).unwrap_or_else(start)
     }
 
-    /// What a force that is held for the last cycle's period shall move: pose and twist at an instant in its middle, and the
-    /// mean acceleration, which leads to the velocity at its end.
+    /// Motion of the reference for a force that is held over the last cycle's period: pose and twist at an
+    /// instant in the middle of the period, and the mean acceleration, which leads to the velocity at the
+    /// end.
     pub fn motion_of_hold(&self, middle_ns: u64) -> Motion {
         Motion { acceleration: self.mean_acceleration, ..self.motion_at(middle_ns) }
     }
 
-    /// Whether the reference has come to rest along its stop.
+    /// Whether the reference is at rest at the end of its stop.
     pub fn is_at_rest(&self) -> bool {
         self.stop.is_at_rest()
     }
@@ -181,7 +203,8 @@ impl ReferenceGenerator {
         Some(PoseError::new(&desired, &self.motion.pose, &self.motion.twist))
     }
 
-    /// The motion of a setpoint minus the reference at the end of the last cycle, to first order in the time between.
+    /// Motion of a setpoint minus the reference, at the end of the last cycle. The setpoint is extrapolated
+    /// to this instant, to first order in the angle covered.
     pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> PoseError {
         let motion = &setpoint.motion;
         let continued = setpoint.continued(setpoint.extrapolation_s(parameters, self.time_ns));
@@ -192,7 +215,7 @@ impl ReferenceGenerator {
         }
     }
 
-    /// Moves the reference to an instant, towards a target; without one along the stop.
+    /// Moves the reference to an instant: towards a target, or along the held stop if there is no target.
     #[inline(never)]
     pub fn advance(&mut self, constants: &Constants, to_ns: u64, target: Option<&Target<'_>>) {
         let duration_s = seconds_between(self.time_ns, to_ns);
@@ -201,7 +224,7 @@ impl ReferenceGenerator {
             return;
         }
         let steps = (duration_s / MAX_STEP_S).clamp(1.0, MAX_STEPS);
-        // Rounded up, but for the rounding of a period.
+        // Rounds up. The subtraction prevents one more step through the rounding of a period.
         let steps = (steps - 1e-6) as u32 + 1;
         let step_ns = (to_ns - self.time_ns) / u64::from(steps.max(1));
         let begin = self.motion.twist.vector();
@@ -214,7 +237,7 @@ impl ReferenceGenerator {
         self.bounds.tighten(constants, &self.motion.pose);
     }
 
-    // Out of line: in the loop over the steps the limits would be kept in memory beside themselves.
+    // Out of line: inlined into the loop over the steps, it would keep a copy of the limits in memory.
     #[inline(never)]
     fn step(&mut self, constants: &Constants, end_ns: u64, target: Option<&Target<'_>>) {
         let (begin, begin_ns) = (self.motion, self.time_ns);
@@ -222,7 +245,7 @@ impl ReferenceGenerator {
         let desired = target.and_then(|target| {
             Some((target, target.relative_to(&begin.pose, &constants.parameters, end_ns)?))
         });
-        // Without a target nothing is refused.
+        // Without a target there is no proposal, and no refusal.
         let verified = desired.map(|(target, desired)| {
             let (Acceleration { angular, linear }, effort) =
                 self.proposed(constants, target, &desired, step_s);
@@ -254,7 +277,7 @@ impl ReferenceGenerator {
         self.time_ns = end_ns;
     }
 
-    /// Acceleration of the next instant, towards its desired motion, and the effort of the walls for it.
+    /// Acceleration at the end of the step, towards the desired motion, and the effort that the walls took.
     fn proposed(
         &mut self,
         constants: &Constants,
@@ -267,7 +290,8 @@ impl ReferenceGenerator {
         let approach = |limits| Approach::new(limits, closing_scale, h);
         let (turning, shifting) = (approach(limits.orientation), approach(limits.position));
         let Motion { pose, twist, acceleration } = &self.motion;
-        // Where the present acceleration leads: to first order in its displacement, which is exact on the target.
+        // State that the present acceleration leads to. Its displacement enters the offset to first order,
+        // which is exact on the target.
         let (v, a) = (twist.vector(), acceleration.vector());
         let led = Twist::from_vector(&(v + a * h));
         let offset = desired.displacement - (v + a * (0.5 * h)) * h;

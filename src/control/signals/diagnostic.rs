@@ -138,9 +138,15 @@ codes! {
     /// Forward kinematics approaches the measured lengths, a bounded step per cycle.
     FindingPose = 3, None, NO_NUMBER, "finding the pose", "wait";
     /// The setpoint differs from the platform by more than `control.engage_*`, in pose or in velocity.
-    SetpointTooFar = 4, None, ratio("the difference between setpoint and platform", "the tolerance control.engage_*"), "setpoint too far from the platform", "start the setpoints where the platform stands";
+    SetpointTooFar = 4, None,
+        ratio("the difference between setpoint and platform", "the tolerance control.engage_*"),
+        "setpoint too far from the platform",
+        "start the setpoints where the platform stands";
     /// The setpoint source ended while its setpoint was at rest.
-    SetpointEnded = 5, None, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint source ended at rest", "start a setpoint source, then engage";
+    SetpointEnded = 5, None,
+        absolute("age", "s", "exceeds", "timeouts.setpoint_ms"),
+        "setpoint source ended at rest",
+        "start a setpoint source, then engage";
     /// The daemon is ending.
     DaemonEnding = 6, None, NO_NUMBER, "daemon stopping", "nothing";
     /// Control may begin; the controller waits for the request `engage`.
@@ -150,96 +156,248 @@ codes! {
     /// The request cannot be carried out in this state.
     InvalidInState = 9, None, NO_NUMBER, "not possible in this state", "see the table of states";
     /// The platform moves, and no stop within every limit was verified for its motion.
-    PlatformMoving = 10, None, NO_NUMBER, "the platform moves, and no stop within every limit was verified", "wait until the platform stands";
+    PlatformMoving = 10, None,
+        NO_NUMBER,
+        "the platform moves, and no stop within every limit was verified",
+        "wait until the platform stands";
     /// Without setpoints the platform holds its pose, because `[setpoint] on_violation` is `limit`.
-    HoldingPose = 11, None, absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"), "no setpoints: the platform holds its pose", "start a setpoint source";
+    HoldingPose = 11, None,
+        absolute("age of the setpoint", "s", "exceeds", "timeouts.setpoint_ms"),
+        "no setpoints: the platform holds its pose",
+        "start a setpoint source";
     /// Two processes publish measurements; control does not begin before one of them ends.
     TwoMeasuredSources = 12, None, Comparison::Processes, "two sources of measurements", "end one of them";
     /// Two processes publish setpoints; control does not begin before one of them ends.
     TwoSetpointSources = 13, None, Comparison::Processes, "two sources of setpoints", "end one of them";
     /// The driver sends no rates, and the lengths do not show that the platform stands.
-    RestNotShown = 14, None, absolute("joint speed by the lengths", "m/s", "exceeds", "the largest speed of a platform that stands,"), "the lengths do not show that the platform stands", "wait until it stands; a start in motion needs measured rates; [measured] length_noise_m sets for how long the lengths are watched";
+    RestNotShown = 14, None,
+        absolute(
+            "joint speed by the lengths",
+            "m/s",
+            "exceeds",
+            "the largest speed of a platform that stands,",
+        ),
+        "the lengths do not show that the platform stands",
+        "wait until it stands; a start in motion needs measured rates; [measured] length_noise_m sets for \
+        how long the lengths are watched";
     /// Setpoints stopped arriving while the setpoint was in motion.
-    SetpointLost = 100, Stop, absolute("age", "s", "exceeds", "timeouts.setpoint_ms"), "setpoint lost in motion", "find out why its source ended";
+    SetpointLost = 100, Stop,
+        absolute("age", "s", "exceeds", "timeouts.setpoint_ms"),
+        "setpoint lost in motion",
+        "find out why its source ended";
     /// Measurements stopped arriving.
-    MeasurementLost = 101, Brake, absolute("age", "s", "exceeds", "timeouts.measured_ms"), "measurement lost", "find out why the driver ended";
+    MeasurementLost = 101, Brake,
+        absolute("age", "s", "exceeds", "timeouts.measured_ms"),
+        "measurement lost",
+        "find out why the driver ended";
     /// A setpoint contained a number that is not finite.
     SetpointNotFinite = 102, Stop, NO_NUMBER, "setpoint not finite", "correct the setpoint source";
     /// A measurement contained a number that is not finite.
-    MeasurementNotFinite = 103, Brake, NO_NUMBER, "measurement not finite", "check the encoders and the driver";
+    MeasurementNotFinite = 103, Brake,
+        NO_NUMBER,
+        "measurement not finite",
+        "check the encoders and the driver";
     /// Forward kinematics did not converge on the measured lengths.
-    PoseNotFound = 104, Brake, NO_NUMBER, "pose not found from lengths", "compare the lengths with the machine file";
+    PoseNotFound = 104, Brake,
+        NO_NUMBER,
+        "pose not found from lengths",
+        "compare the lengths with the machine file";
     /// The measured lengths changed by more than the actuators can move.
-    MeasurementJumped = 105, Brake, absolute("change of length", "m", "exceeds", "the change plausible at actuator.max_rate_m_s,"), "measured lengths jumped", "check the encoders and the driver";
+    MeasurementJumped = 105, Brake,
+        absolute("change of length", "m", "exceeds", "the change plausible at actuator.max_rate_m_s,"),
+        "measured lengths jumped",
+        "check the encoders and the driver";
     /// The pose is singular: no forces balance the load. Or the platform may have crossed a singularity: its
     /// assembly mode is uncertain.
-    SingularPose = 106, Brake, absolute("condition", "", "exceeds", "the bound beyond which the assembly mode is uncertain,"), "singular pose, or assembly mode uncertain", "move the platform by hand to the side of the home pose, then clear";
+    SingularPose = 106, Brake,
+        absolute("condition", "", "exceeds", "the bound beyond which the assembly mode is uncertain,"),
+        "singular pose, or assembly mode uncertain",
+        "move the platform by hand to the side of the home pose, then clear";
     /// A force was not finite.
     ForceNotFinite = 107, Brake, NO_NUMBER, "force not finite", "report this bug of hexad";
     /// The platform deviated from its reference by more than `control.following_*`.
-    FollowingError = 108, Brake, ratio("the following error", "the limit control.following_*"), "following error too large", "check for a collision, a payload, a drive without force";
+    FollowingError = 108, Brake,
+        ratio("the following error", "the limit control.following_*"),
+        "following error too large",
+        "check for a collision, a payload, a drive without force";
     /// Cycles were missed, and `realtime.on_overrun` is `fault`.
-    DeadlineMissed = 109, Stop, NO_NUMBER, "deadline missed", "see the worst cycles in the status; hexad doctor";
+    DeadlineMissed = 109, Stop,
+        NO_NUMBER,
+        "deadline missed",
+        "see the worst cycles in the status; hexad doctor";
     /// An operator's emergency stop.
     EmergencyStop = 110, Brake, NO_NUMBER, "emergency stop", "clear when it is safe";
     /// A setpoint beyond the stroke of a leg, or too fast to come to rest within it.
-    SetpointOutOfReach = 111, Stop, STROKE, "setpoint beyond the stroke of a leg, or without room to stop", "correct the trajectory";
+    SetpointOutOfReach = 111, Stop,
+        STROKE,
+        "setpoint beyond the stroke of a leg, or without room to stop",
+        "correct the trajectory";
     /// A setpoint that does not continue the previous one: X, X' and X'' are inconsistent.
-    SetpointJumped = 112, Stop, ratio("the deviation from the continuation of the previous setpoint", "the tolerance"), "setpoint jumped", "send X, X' and X'' of one smooth motion";
+    SetpointJumped = 112, Stop,
+        ratio("the deviation from the continuation of the previous setpoint", "the tolerance"),
+        "setpoint jumped",
+        "send X, X' and X'' of one smooth motion";
     /// A measured length beyond the stroke of the leg.
-    LengthOutOfStroke = 113, Brake, STROKE, "measured length beyond the stroke", "check the encoders, compare with the machine file";
+    LengthOutOfStroke = 113, Brake,
+        STROKE,
+        "measured length beyond the stroke",
+        "check the encoders, compare with the machine file";
     /// A measured rate that is not the derivative of the lengths.
-    RateInconsistent = 114, Brake, absolute("difference between length and integrated rate", "m", "exceeds", "the tolerance"), "measured rate inconsistent with the lengths", "check the units and signs of the driver";
+    RateInconsistent = 114, Brake,
+        absolute("difference between length and integrated rate", "m", "exceeds", "the tolerance"),
+        "measured rate inconsistent with the lengths",
+        "check the units and signs of the driver";
     /// A setpoint faster than `[limits]` or the legs allow.
-    SetpointTooFast = 115, Stop, ratio("the setpoint", "the limit in [limits], or actuator.max_rate_m_s"), "setpoint beyond a limit of velocity, acceleration or jerk", "correct the trajectory, or [limits]";
+    SetpointTooFast = 115, Stop,
+        ratio("the setpoint", "the limit in [limits], or actuator.max_rate_m_s"),
+        "setpoint beyond a limit of velocity, acceleration or jerk",
+        "correct the trajectory, or [limits]";
     /// A setpoint outside of `[envelope]`.
-    SetpointOutOfEnvelope = 116, Stop, absolute("coordinate", "rad or m", "is outside", "[envelope], whose bound is"), "setpoint outside of the envelope", "correct the trajectory, or [envelope]";
+    SetpointOutOfEnvelope = 116, Stop,
+        absolute("coordinate", "rad or m", "is outside", "[envelope], whose bound is"),
+        "setpoint outside of the envelope",
+        "correct the trajectory, or [envelope]";
     /// A setpoint whose time stamp is too old, in the future, or not later than the previous setpoint's.
-    SetpointStampInvalid = 117, Stop, absolute("age", "s", "is outside", "the range of timeouts.setpoint_ms around now,"), "setpoint with an invalid time stamp", "stamp with CLOCK_MONOTONIC";
+    SetpointStampInvalid = 117, Stop,
+        absolute("age", "s", "is outside", "the range of timeouts.setpoint_ms around now,"),
+        "setpoint with an invalid time stamp",
+        "stamp with CLOCK_MONOTONIC";
     /// A measurement whose time stamp is too old, in the future, or earlier than the previous measurement's.
-    MeasurementStampInvalid = 118, Brake, absolute("age", "s", "is outside", "the range from a tenth of a period ahead to timeouts.measured_ms, whose bound is"), "measurement with an invalid time stamp", "stamp with the CLOCK_MONOTONIC instant of sampling";
+    MeasurementStampInvalid = 118, Brake,
+        absolute(
+            "age",
+            "s",
+            "is outside",
+            "the range from a tenth of a period ahead to timeouts.measured_ms, whose bound is",
+        ),
+        "measurement with an invalid time stamp",
+        "stamp with the CLOCK_MONOTONIC instant of sampling";
     /// The pose is so near a singular one that its condition exceeds `limits.condition`, or the motion could
     /// be stopped only at such a pose.
-    NearSingular = 119, Stop, absolute("condition", "", "exceeds", "the bound by limits.condition,"), "near a singular pose, or without room to stop before one", "keep away from this pose; hexad check";
+    NearSingular = 119, Stop,
+        absolute("condition", "", "exceeds", "the bound by limits.condition,"),
+        "near a singular pose, or without room to stop before one",
+        "keep away from this pose; hexad check";
     /// The measured rates changed faster than actuators can.
-    RateJumped = 120, Brake, absolute("change of rate", "m/s", "exceeds", "the plausible change,"), "measured rates jumped", "check for a collision; check the encoders and the driver";
+    RateJumped = 120, Brake,
+        absolute("change of rate", "m/s", "exceeds", "the plausible change,"),
+        "measured rates jumped",
+        "check for a collision; check the encoders and the driver";
     /// A setpoint of an unknown kind, or of poses alone under `on_violation = "stop"`.
-    SetpointKindInvalid = 121, Stop, absolute("kind", "", "exceeds", "the largest that [setpoint] on_violation allows,"), "kind of the setpoint not allowed", "send X, X' and X'', or set [setpoint] on_violation to limit";
+    SetpointKindInvalid = 121, Stop,
+        absolute("kind", "", "exceeds", "the largest that [setpoint] on_violation allows,"),
+        "kind of the setpoint not allowed",
+        "send X, X' and X'', or set [setpoint] on_violation to limit";
     /// The limits kept the reference from following the setpoint within the tolerance `control.engage_*`.
-    SetpointBeyondLimits = 124, Stop, ratio("the distance of the reference from the setpoint", "the tolerance control.engage_*"), "setpoint beyond the limits of a motion that can be stopped", "correct the trajectory, or [limits], or set [setpoint] on_violation to limit";
+    SetpointBeyondLimits = 124, Stop,
+        ratio("the distance of the reference from the setpoint", "the tolerance control.engage_*"),
+        "setpoint beyond the limits of a motion that can be stopped",
+        "correct the trajectory, or [limits], or set [setpoint] on_violation to limit";
     /// The readings of a leg stayed the same to the last bit while its reference moved.
-    SensorFrozen = 125, Brake, absolute("motion of the reference since the reading changed last", "m", "exceeds", "the bound for a working sensor,"), "sensor frozen", "check the encoder of this leg and the driver";
+    SensorFrozen = 125, Brake,
+        absolute(
+            "motion of the reference since the reading changed last",
+            "m",
+            "exceeds",
+            "the bound for a working sensor,",
+        ),
+        "sensor frozen",
+        "check the encoder of this leg and the driver";
     /// The length of a leg differs from the prediction by the model, the forces and earlier measurements.
-    MeasurementImplausible = 126, Brake, absolute("difference between measured and predicted length", "m", "exceeds", "the bound for noise and disturbances,"), "measured length not as predicted", "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
+    MeasurementImplausible = 126, Brake,
+        absolute(
+            "difference between measured and predicted length",
+            "m",
+            "exceeds",
+            "the bound for noise and disturbances,",
+        ),
+        "measured length not as predicted",
+        "check the encoder and the drive of this leg; check for a collision; [measured] length_noise_m";
     /// A measurement was so old on arrival that the loop would be unstable if all were as old.
-    MeasurementTooOld = 127, Brake, absolute("age", "s", "exceeds", "the age at which the loop stays stable (hexad check),"), "measurement too old for the loop", "shorten the way from the sensors to the daemon, or lower the bandwidths";
+    MeasurementTooOld = 127, Brake,
+        absolute("age", "s", "exceeds", "the age at which the loop stays stable (hexad check),"),
+        "measurement too old for the loop",
+        "shorten the way from the sensors to the daemon, or lower the bandwidths";
     /// The time stamps of the measurements, which release the cycles, do not advance with the daemon's clock.
-    StampClockInvalid = 128, Brake, absolute("deviation of the clock of the stamps", "s", "is outside", "timeouts.measured_ms, ahead or behind:"), "time stamps do not advance with the clock", "stamp each measurement with the instant of sampling; check the clock of the drives";
+    StampClockInvalid = 128, Brake,
+        absolute(
+            "deviation of the clock of the stamps",
+            "s",
+            "is outside",
+            "timeouts.measured_ms, ahead or behind:",
+        ),
+        "time stamps do not advance with the clock",
+        "stamp each measurement with the instant of sampling; check the clock of the drives";
     /// A measured length differs from the length at the pose that another sensor measures.
-    ExternalPoseMismatch = 129, Brake, absolute("difference between the measured length and the length at the external pose", "m", "exceeds", "measured.pose_tolerance_m"), "lengths differ from the external pose", "home this leg again; check its scale, the machine file and the external sensor";
+    ExternalPoseMismatch = 129, Brake,
+        absolute(
+            "difference between the measured length and the length at the external pose",
+            "m",
+            "exceeds",
+            "measured.pose_tolerance_m",
+        ),
+        "lengths differ from the external pose",
+        "home this leg again; check its scale, the machine file and the external sensor";
     /// A drive did not become ready after control began, or did not stay ready.
-    DriveNotReady = 130, Brake, absolute("time without enabled drive and open brake", "s", "exceeds", "drive.ready_timeout_ms, or 20 ms once all drives were ready:"), "drive not ready", "enable the drive and check its brake";
+    DriveNotReady = 130, Brake,
+        absolute(
+            "time without enabled drive and open brake",
+            "s",
+            "exceeds",
+            "drive.ready_timeout_ms, or 20 ms once all drives were ready:",
+        ),
+        "drive not ready",
+        "enable the drive and check its brake";
     /// A drive reports a fault.
     DriveFault = 131, Brake, NO_NUMBER, "drive reports a fault", "see the display of the drive";
     /// The actual force of a drive differs from the command, by the driver's report or by the motion of the
     /// platform.
-    DriveForceMissing = 132, Brake, absolute("difference between actual and commanded force", "N", "exceeds", "the bound for noise and friction,"), "actual force not as commanded", "check the drive of this leg";
+    DriveForceMissing = 132, Brake,
+        absolute(
+            "difference between actual and commanded force",
+            "N",
+            "exceeds",
+            "the bound for noise and friction,",
+        ),
+        "actual force not as commanded",
+        "check the drive of this leg";
     /// The daemon did not run for so long that its last measurement is too old: it was stopped, or the host
     /// took the processor.
-    DaemonHeld = 133, Brake, absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"), "daemon did not run", "find out what stopped the daemon or took its processor; hexad doctor";
+    DaemonHeld = 133, Brake,
+        absolute("time without a cycle", "s", "exceeds", "timeouts.measured_ms"),
+        "daemon did not run",
+        "find out what stopped the daemon or took its processor; hexad doctor";
     /// The platform oscillates about its reference.
-    Oscillation = 134, Brake, absolute("amplitude", "m", "exceeds", "the amplitude that the motion explains,"), "the platform oscillates", "lower the bandwidths; check [drive] delay_us, the time stamps and the drives";
+    Oscillation = 134, Brake,
+        absolute("amplitude", "m", "exceeds", "the amplitude that the motion explains,"),
+        "the platform oscillates",
+        "lower the bandwidths; check [drive] delay_us, the time stamps and the drives";
     /// The payload changed under control.
-    PayloadChanged = 135, Stop, absolute("change", "kg", "is outside", "limits.payload_change_kg:"), "payload changed", "look for a payload that fell off or was added, then clear; limits.payload_change_kg";
+    PayloadChanged = 135, Stop,
+        absolute("change", "kg", "is outside", "limits.payload_change_kg:"),
+        "payload changed",
+        "look for a payload that fell off or was added, then clear; limits.payload_change_kg";
     /// Something struck the platform.
-    Impact = 136, Stop, absolute("sudden disturbance", "m/s^2", "exceeds", "limits.disturbance_step_m_s2"), "impact", "check for a collision, then clear; limits.disturbance_step_m_s2";
+    Impact = 136, Stop,
+        absolute("sudden disturbance", "m/s^2", "exceeds", "limits.disturbance_step_m_s2"),
+        "impact",
+        "check for a collision, then clear; limits.disturbance_step_m_s2";
     /// A sudden disturbance as large as an impact does not end.
-    DisturbanceLasting = 137, Brake, absolute("duration", "s", "exceeds", "the longest duration of an impact,"), "sudden disturbance that lasts", "check for a collision; check all drives; limits.disturbance_step_m_s2";
+    DisturbanceLasting = 137, Brake,
+        absolute("duration", "s", "exceeds", "the longest duration of an impact,"),
+        "sudden disturbance that lasts",
+        "check for a collision; check all drives; limits.disturbance_step_m_s2";
     /// The velocity of the platform deviated from its reference by more than `control.following_velocity_*`.
-    VelocityError = 122, Brake, ratio("the velocity error", "the limit control.following_velocity_*"), "velocity error too large", "check for a collision, a payload, a drive without force";
+    VelocityError = 122, Brake,
+        ratio("the velocity error", "the limit control.following_velocity_*"),
+        "velocity error too large",
+        "check for a collision, a payload, a drive without force";
     /// Feedback was limited by `limits.feedback_scale` for too long: the platform does not follow, or a
     /// sensor is wrong.
-    FeedbackSaturated = 123, Brake, absolute("time of saturation", "s", "exceeds", "the longest time allowed,"), "feedback saturated", "check for a collision, a payload, a drive without force; limits.feedback_scale";
+    FeedbackSaturated = 123, Brake,
+        absolute("time of saturation", "s", "exceeds", "the longest time allowed,"),
+        "feedback saturated",
+        "check for a collision, a payload, a drive without force; limits.feedback_scale";
 }
 
 impl DiagnosticCode {

@@ -1,16 +1,17 @@
-//! Whether the Bryan angles of a rotation keep a distance from the ends of their ranges, without the angles.
+//! Whether the Bryan angles of a rotation keep a margin from the ends of their ranges, without computing the
+//! angles.
 //!
-//! The matrix holds sine and cosine of each angle times `c = cos(beta)`. With the angles d and e from both ends of a range of
-//! the width w, up to full turns:
+//! The rotation matrix holds `sin(beta)`, and sine and cosine of alpha and gamma times `c = cos(beta)`. A
+//! range has the width w. The angle is d above its low end and e below its high end, up to full turns:
 //!
 //! ```text
-//! sin d >= slack and sin e >= slack                       =>  d, e >= slack      w < pi
-//! the same, or where cos d <= 0 or cos e <= 0 instead     =>  d, e >= slack      pi <= w <= 5
+//! sin d >= margin and sin e >= margin                     =>  d, e >= margin     w < pi
+//! the same, or where cos d <= 0 or cos e <= 0 instead     =>  d, e >= margin     pi <= w <= 5
 //! ```
 //!
-//! as `asin(slack) >= slack`. A range ends at most 2.5 rad from where a motion begins, without slack there, so that full turns do
-//! not matter. That is a few products for all ends at once, where each arc tangent takes 100 instructions: an examination asks at
-//! every knot.
+//! This holds because `asin(margin) >= margin`. Full turns do not matter, because a range is cut off at 2.5
+//! rad from the start of the motion. An end that was cut off needs no margin. The test takes a few products
+//! for all ends together. Arc tangents would take 100 instructions each, at every knot of an examination.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -22,34 +23,35 @@ use nalgebra::Matrix3;
 use crate::control::parameters::Envelope;
 use crate::control::reference::stop::vector_stop::Stop;
 
-/// Largest margin as a ratio of the width of a range.
+/// Largest margin, as a ratio of the width of a range.
 pub(in crate::control::reference) const MAX_MARGIN_RATIO: f64 = 0.25;
 
 /// Largest change of an angle along a motion \[rad\].
 const MAX_CHANGE: f64 = 2.5;
 
-/// Low ends of the three ranges and a zero, high ends and a zero.
+/// Number of lanes: low ends of the three ranges and a zero, then high ends and a zero.
 const LANES: usize = 8;
 
-/// Ranges of the angles, an end in each lane.
+/// Ranges of the angles, with one end in each lane.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct AngleRanges {
-    /// Sine and cosine of each end; of the high ones with the opposite sign, as their distance has.
+    /// Sine and cosine of each end. Both have the opposite sign for a high end, because its distance has it.
     sine: [f64; LANES],
     cosine: [f64; LANES],
-    /// Largest margin that is kept from each \[rad\].
+    /// Largest margin that is required from each end \[rad\].
     max_margin: [f64; LANES],
-    /// Sign of the distance where the range is wide, else 0; and the cosine of a distance that is large then, else none.
+    /// For a wide range, the sign of the distance, and the largest cosine of a distance that is always
+    /// enough. For a narrow range, 0 and minus infinity.
     wide_sign: [f64; LANES],
     far_cosine: [f64; LANES],
-    /// Sign of `cos(beta)`: of the two triples of angles that give the same rotation.
+    /// Sign of `cos(beta)`. It selects one of the two triples of angles that give the same rotation.
     cos_beta_sign: f64,
     /// Whether no range ends before it begins.
     is_nonempty: bool,
 }
 
 impl AngleRanges {
-    /// Those of an envelope, for a motion from X.
+    /// Ranges of an envelope, for a motion that starts at X.
     pub fn new(Envelope { lowest, highest }: &Envelope, x: &[f64; 6]) -> Self {
         let [_, beta, ..] = *x;
         let zeros = [0.0; LANES];
@@ -76,7 +78,7 @@ impl AngleRanges {
         ranges
     }
 
-    /// Those, if they lack room for some rotation of a stop from X.
+    /// Ranges of an envelope, for a stop from X. `None` if they have room for every rotation of the stop.
     pub fn without_room(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<Self> {
         let Envelope { lowest, highest } = envelope;
         let [_, beta, ..] = x;
@@ -104,7 +106,8 @@ impl AngleRanges {
         }
     }
 
-    /// Whether each angle of a rotation has a distance from the ends of its range \[rad\], or a part of it that is narrower.
+    /// Whether each angle of a rotation keeps a margin \[rad\] from the ends of its range. The margin is at
+    /// most [`MAX_MARGIN_RATIO`] of the width.
     #[inline(always)]
     pub fn contain<S: Simd>(&self, simd: S, r: &Matrix3<f64>, margin: f64) -> bool {
         let c = cosine_of_beta(r);
@@ -113,7 +116,7 @@ impl AngleRanges {
             lanes.combine(lanes)
         };
         let load = |lanes: &[f64; LANES]| f64x8::load_array(simd, *lanes);
-        // Of the angles, those of alpha and gamma times c.
+        // Sine and cosine of alpha and gamma are multiplied by c.
         let sine = both([-r.m23 * self.cos_beta_sign, r.m13, -r.m12 * self.cos_beta_sign, 0.0]);
         let cosine =
             both([r.m33 * self.cos_beta_sign, c * self.cos_beta_sign, r.m11 * self.cos_beta_sign, 0.0]);
@@ -141,7 +144,7 @@ mod tests {
     use crate::model::machine::at_most_256_bits;
     use crate::model::task::{TaskState, task_coordinates};
 
-    /// Ranges around random angles, narrow and wide, on both sides of 90 degrees.
+    /// The ranges are around random angles, narrow and wide, on both sides of 90 degrees.
     #[test]
     fn a_rotation_is_inside_exactly_where_its_angles_are() {
         let mut samples = RandomVectors::new(1);
@@ -165,7 +168,7 @@ mod tests {
             let slack = if k % 5 == 0 { 0.0 } else { 0.01 * samples.uniform() };
             let pose = TaskState::at_rest(x).motion().pose;
             let angles = task_coordinates(&pose, &home);
-            // By which the worst angle is inside, beyond the slack that a range allows.
+            // Distance by which the worst angle is inside, less the margin that its range requires.
             let room = |slack: f64| {
                 let axes = angles.iter().zip(envelope.lowest.iter().zip(&envelope.highest)).take(3);
                 axes.map(|(x, (low, high))| {
@@ -174,7 +177,7 @@ mod tests {
                 .fold(f64::INFINITY, f64::min)
             };
             let mut start = angles;
-            // On the same side of 90 degrees.
+            // The start is on the same side of 90 degrees.
             for (x, size) in start.iter_mut().zip([0.5, 0.05, 0.5]) {
                 *x += size * (2.0 * samples.uniform() - 1.0);
             }

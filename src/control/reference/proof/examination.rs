@@ -1,17 +1,19 @@
-//! Examination of a stop near a bound, at instants of its way: its [knots](super::knots).
+//! Examination of a stop near a bound, at instants along the stop: its [knots](super::knots).
 //!
-//! Between two knots lengths, their rates and the coordinates of C depart little from a cubic, and that is within the hull of its Bezier
-//! points, which are examined too (see [`super::cubic_departure`]). Angles leave their chords by at most `|angle''| dt^2 / 8`, dt the longer
-//! interval adjacent a knot, and so does every quantity in the step that leads to the motion:
+//! Between two knots, leg lengths, their rates and the coordinates of C depart little from a cubic. The cubic
+//! is within the hull of its Bezier points, so these points are examined, too (see
+//! [`super::cubic_departure`]). Angles depart from their chords by at most `|angle''| dt^2 / 8`, where dt is
+//! the longer interval at the knot. So does every quantity in the step that leads to the stop, with its own
+//! second derivative:
 //!
 //! ```text
-//! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2     s, c = |sin|, cos of beta; of the Bryan angles
-//! |x'''|    <= J (2 |u| + |e|)                      u, e the directions of v, a; of a coordinate of C
+//! |angle''| <= Ar / c + w^2 (1 + c + 3 s) / c^2     Bryan angles; s, c = |sin|, cos of beta
+//! |x'''|    <= J (2 |u| + |e|)                      coordinates of C; u, e the directions of v, a
 //! ```
 //!
-//! The attitude at the knots is that of the stop that would be followed.
-//! Between knots a length may exceed its bound by 2.5e-5 of the stroke, an angle by as much at the outermost joint.
-//! An axis of the envelope narrower than four times the bound between knots is examined at the knots only.
+//! The attitude at the knots is the attitude of the stop that would be followed. Between knots a length may
+//! exceed its bound by 2.5e-5 of the stroke, and an angle by as much at the outermost joint. If an axis of
+//! the envelope is narrower than four times its margin between knots, it is proved at the knots only.
 
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use nalgebra::Vector3;
@@ -39,13 +41,15 @@ use crate::model::rigid::{Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
 use crate::model::triples::LegLanes;
 
-/// Departure of a length from its cubic that decides the number of knots \[m\].
+/// Departure of a length from its cubic that determines the number of knots \[m\].
 const LENGTH_DEPARTURE_M: f64 = 2e-5;
-/// Departure of a leg's rate from that of its cubic that does so, over the largest rate.
+/// Departure of a leg's rate from its cubic that determines the number of knots, as a ratio of the largest
+/// rate.
 const RATE_DEPARTURE_RATIO: f64 = 0.01;
-/// Work that a step may do, in knots: those of the longest stop, and the regularity of four poses, of fewer where walls took
-/// their part. It bounds the longest cycle. The balls that were found remain for the next one. With three a reference that presses against its
-/// condition is refused in turns, and the platform jerks.
+/// Largest effort of a step, in knots: the longest stop, and the regularity of four poses, or of fewer if
+/// walls took their part. It bounds the longest cycle. Balls that were found remain for the next step. With
+/// three poses, a reference that presses against its limit of the condition is accepted and refused in turn,
+/// and the platform jerks (2026-11-23).
 pub(in crate::control::reference) const MAX_EFFORT: u32 = MAX_INTERVALS + 4 * REGULARITY_EFFORT;
 
 /// Lengths and rates of the legs, in lanes.
@@ -57,25 +61,27 @@ pub(in crate::control::reference) struct StopExamination<'a> {
     bounds: &'a PoseBounds,
     stop: &'a PoseStop,
     knots: Knots,
-    /// Largest third derivative of a length, and largest departures within the step that leads to the motion: of a length \[m\],
-    /// of a rate \[m/s\], and of a coordinate of C \[m\].
+    /// Bound on the third derivative of a length, and largest departures within the step that leads to the
+    /// stop: of a length \[m\], of a rate \[m/s\], and of a coordinate of C \[m\].
     length_jerk: f64,
     step_departure: [f64; 3],
     step_s: f64,
-    /// Directions in which C may depart, per coordinate.
+    /// `2 |u| + |e|` for each coordinate of C.
     directions: Vector3<f64>,
-    /// Whether rates could exceed their limit; the ranges of the envelope, those of the angles if they could leave it.
+    /// Whether rates could exceed their limit; ranges of the envelope for positions, and for angles if these
+    /// could leave it.
     needs_rates: bool,
     positions: Option<PositionRanges>,
     angles: Option<AngleRanges>,
-    /// The pose from which the step leads. Where rounding left it beyond a bound, a stop may be as far beyond: or the
-    /// reference could not return.
+    /// Pose at the start of the step, and how far its lengths exceed their bounds \[m\]. If rounding put the
+    /// start slightly beyond a bound, the stop may be equally far beyond. Otherwise the reference could not
+    /// return.
     from: Option<&'a Pose>,
     length_excess: f64,
-    /// Its regularity, and the envelope with room for it, once they are needed.
+    /// Regularity of `from`, and the envelope extended to contain it; computed when they are first needed.
     start_regularity: Option<Regularity>,
     relaxed: Option<(Envelope, AngleRanges)>,
-    /// What is left of the effort.
+    /// Remaining effort, in knots.
     effort: u32,
     /// Bounds of the lengths, in lanes.
     shortest: LegLanes,
@@ -108,7 +114,7 @@ impl<'a> StopExamination<'a> {
         let actuator = &constants.machine().actuator;
         let needs_rates = v + constants.arm * w > actuator.max_rate;
         let length_jerk = length_jerk(constants, v, w);
-        // As many that the departures of lengths, and of rates where these matter, are small enough.
+        // Enough knots that the departures of lengths are small, and of rates if these matter.
         let duration = stop.duration();
         let (square, cube) = (duration * duration, duration * duration * duration);
         let length_share = CUBIC_DEPARTURE * length_jerk * cube / LENGTH_DEPARTURE_M;
@@ -117,7 +123,8 @@ impl<'a> StopExamination<'a> {
             if needs_rates { CUBIC_RATE_DEPARTURE * length_jerk * square / max_departure } else { 0.0 };
         let knots = Knots::new(duration, rate_share, length_share);
         let chord = step.duration * step.duration / 8.0;
-        // Along the velocity and, across it, along the rest of the present acceleration.
+        // The jerk is along the velocity u and, across it, along the remaining part of the acceleration's
+        // direction e.
         let Motion { twist, acceleration, .. } = motion;
         let u = twist.linear.try_normalize(0.0).unwrap_or_default();
         let e = acceleration.linear.try_normalize(0.0).unwrap_or_default();
@@ -147,7 +154,7 @@ impl<'a> StopExamination<'a> {
         })
     }
 
-    /// Examines every knot, in one piece of code for each instruction set.
+    /// Examines every knot. The code exists once for each instruction set.
     #[inline(never)]
     pub fn check_knots(&mut self, balls: &mut RegularBalls, start: &Motion) -> Result<(), Refusal> {
         dispatch!(self.constants.machine().level, simd => self.check_knots_in_lanes(simd, balls, start))
@@ -182,7 +189,8 @@ impl<'a> StopExamination<'a> {
         }
     }
 
-    /// Checks a knot, and the Bezier points in the intervals `adjacent` it, before and after. Returns its lengths and rates.
+    /// Checks a knot, and the Bezier points in the intervals before and after it. Returns lengths and rates
+    /// at the knot.
     #[inline(always)]
     fn check<S: Simd>(
         &mut self,
@@ -217,7 +225,7 @@ impl<'a> StopExamination<'a> {
         Ok(legs)
     }
 
-    /// Whether the rates at a knot and between it and the one before keep their limit.
+    /// Whether the rates at a knot, and between it and the previous knot, keep their limit.
     #[inline(always)]
     fn are_rates_kept<S: Simd>(
         &self,
@@ -236,7 +244,7 @@ impl<'a> StopExamination<'a> {
         rate.abs().max(between.abs()).simd_le(limit).all_true()
     }
 
-    /// Whether the poses around a knot are regular and keep the limit of the condition.
+    /// Whether the knot and the poses around it are regular enough.
     #[inline(always)]
     fn check_condition<S: Simd>(
         &mut self,
@@ -260,8 +268,8 @@ impl<'a> StopExamination<'a> {
         Err(Limit::Condition.into())
     }
 
-    /// Whether a pose is as regular as the reference must be, or no less so than the start of the step.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Whether a regularity keeps the reference's bounds, or is no worse than at the start of the step.
+    // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> Result<bool, Refusal> {
         let Self { constants, from: Some(from), .. } = *self else { return Ok(false) };
@@ -273,7 +281,7 @@ impl<'a> StopExamination<'a> {
         Ok(at_knot.or_less(&start).is_kept_by(regularity))
     }
 
-    /// Whether a knot, and the Bezier points adjacent it, are within the envelope.
+    /// Whether a knot, and the Bezier points before and after it, are within the envelope.
     #[inline(always)]
     fn is_in_envelope<S: Simd>(
         &self,
@@ -295,7 +303,7 @@ impl<'a> StopExamination<'a> {
                 .is_none_or(|angles| angles.contain(simd, &pose.rotation, self.angle_margin(pose, state, dt)))
     }
 
-    /// Departure of the angles from their chords around a knot \[rad\].
+    /// Departure of the angles from their chords around a knot, less the allowance between knots \[rad\].
     #[inline(always)]
     fn angle_margin(&self, pose: &Pose, state: &PoseStopState, dt: f64) -> f64 {
         if !(self.stop.orientation.duration > 0.0) {
@@ -311,8 +319,8 @@ impl<'a> StopExamination<'a> {
         (curvature * dt * dt / 8.0 - room).max(0.0)
     }
 
-    /// Whether the start of the step is beyond the envelope, and a pose no farther beyond it.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Whether the start of the step is beyond the envelope, and a pose is no farther beyond it.
+    // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     fn is_nearer_than_start(&mut self, pose: &Pose) -> bool {
         let (Some(from), Some(envelope)) = (self.from, &self.bounds.envelope) else { return false };
@@ -330,7 +338,7 @@ impl<'a> StopExamination<'a> {
     }
 }
 
-/// An envelope with room for X.
+/// Envelope extended to contain X.
 fn relaxed(envelope: &Envelope, x: &[f64; 6]) -> Envelope {
     let mut relaxed = *envelope;
     relaxed.lowest.iter_mut().zip(x).for_each(|(low, x)| *low = low.min(*x));

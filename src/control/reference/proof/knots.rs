@@ -1,5 +1,5 @@
-//! Instants at which a stop is examined: nearer to each other at its ends, where the platform is fastest, and nearest to where it comes
-//! to rest.
+//! Knots: the instants at which a stop is examined. The intervals are shorter at both ends of the stop. At
+//! the start the platform is fastest, at the end it comes to rest.
 //!
 //! ```text
 //! t_k = T (u + g u (1 - u) (2 u - 1))      u = k / n, k = 0 .. n      T: duration of the stop
@@ -8,7 +8,8 @@
 /// Bounds on the number n of intervals.
 const MIN_INTERVALS: u32 = 3;
 pub(in crate::control::reference) const MAX_INTERVALS: u32 = 8;
-/// g: at the ends intervals are shorter by up to this part, in the middle longer by half of it.
+/// g. The intervals are shorter by up to this ratio at the ends, and longer by up to half of it in the
+/// middle.
 const GRADING: f64 = 0.5;
 
 /// Knots of a stop.
@@ -19,7 +20,8 @@ pub(in crate::control::reference) struct Knots {
 }
 
 impl Knots {
-    /// As many intervals that their number is at least the root of `square` and the cube root of `cube`, if so many may be.
+    /// Chooses the number n of intervals: at least the square root of `square` and the cube root of `cube`,
+    /// but at most [`MAX_INTERVALS`].
     pub fn new(duration: f64, square: f64, cube: f64) -> Self {
         let are_too_few = |n: &u32| f64::from(n * n * n) < cube || f64::from(n * n) < square;
         let intervals = MIN_INTERVALS + (MIN_INTERVALS..MAX_INTERVALS).filter(are_too_few).count() as u32;
@@ -34,7 +36,7 @@ impl Knots {
     }
 }
 
-/// Durations of the intervals beside a knot \[s\]; 0 where there is none.
+/// Durations of the intervals before and after a knot \[s\]; 0 where there is none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control::reference) struct AdjacentIntervals {
     pub before_s: f64,
@@ -42,7 +44,7 @@ pub(in crate::control::reference) struct AdjacentIntervals {
 }
 
 impl AdjacentIntervals {
-    /// The longer one.
+    /// Duration of the longer interval \[s\].
     #[inline(always)]
     pub fn longest(&self) -> f64 {
         self.before_s.max(self.after_s)

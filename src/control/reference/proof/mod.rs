@@ -1,18 +1,18 @@
-//! Proof that a stop keeps every limit along its whole way.
+//! Proof that a step, and the stop from its end, keep every limit over their whole length.
 //!
 //! | file | content |
 //! | --- | --- |
-//! | `verification` | free space, where one pose is enough |
+//! | `verification` | a stop in free space, proved with one pose; entry to the proof |
 //! | `examination` | a stop near a bound, knot by knot |
-//! | `step` | the step that leads to the stop |
+//! | `step` | step that leads to the stop |
 //! | `knots` | instants at which a stop is examined |
-//! | `cubic_departure` | how far a quantity may depart between two knots |
+//! | `cubic_departure` | how far a quantity may depart from a cubic between two knots |
 //! | `angle_ranges`, `position_ranges` | whether a pose is within the envelope |
-//! | `pose_bounds` | lengths of the legs and envelope |
+//! | `pose_bounds` | bounds of the leg lengths, and the envelope |
 //! | `regularity` | balls of poses proved regular, for the limit of the condition |
 //! | `refusal` | why a step is refused |
 //! | `tolerances` | allowances for rounding and between knots |
-//! | `padding` | vectors of three in four lanes |
+//! | `padding` | vectors of three numbers in four lanes |
 
 pub(super) mod angle_ranges;
 pub(super) mod cubic_departure;

@@ -1,4 +1,4 @@
-//! Bounds of the pose that the reference keeps: the lengths of the legs and the envelope of X.
+//! Bounds of the pose that the reference keeps: leg lengths, and the envelope of X.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,20 +10,20 @@ use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::Pose;
 use crate::model::task::task_coordinates;
 
-/// Bounds of the legs and of X. A platform that is beyond the nominal bounds when control begins may come back: its
-/// bounds are relaxed to where it is, and follow it until they are the nominal ones.
+/// Bounds of the leg lengths and of X. If the platform is beyond the nominal bounds when control begins, they
+/// are relaxed to its pose, so that it may return. They follow the reference back to the nominal bounds.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(in crate::control::reference) struct PoseBounds {
-    /// \[m\]
+    /// Least leg lengths \[m\].
     pub shortest: [f64; LEGS],
-    /// \[m\]
+    /// Largest leg lengths \[m\].
     pub longest: [f64; LEGS],
     pub envelope: Option<Envelope>,
     is_relaxed: bool,
 }
 
 impl PoseBounds {
-    /// The nominal bounds: the stroke less the margin, and the configured envelope.
+    /// Nominal bounds: the stroke less the stroke margin at both ends, and the configured envelope.
     pub fn nominal(constants: &Constants) -> Self {
         let (actuator, parameters) = (&constants.machine().actuator, &constants.parameters);
         Self {
@@ -37,7 +37,7 @@ impl PoseBounds {
         }
     }
 
-    /// The nominal bounds, relaxed where a pose exceeds them.
+    /// Nominal bounds, relaxed where a pose exceeds them.
     pub fn around(constants: &Constants, pose: &Pose) -> Self {
         let mut bounds = Self::nominal(constants);
         let actuator = &constants.machine().actuator;
@@ -62,7 +62,7 @@ impl PoseBounds {
         bounds
     }
 
-    /// By how much the worst leg exceeds its bound at a pose; 0 if none does \[m\].
+    /// Distance by which the worst leg exceeds its bound at a pose; 0 if none does \[m\].
     pub fn length_excess(&self, constants: &Constants, pose: &Pose) -> f64 {
         let lengths = leg_lengths(constants.machine(), pose);
         let ends = self.shortest.iter().zip(&self.longest);
@@ -71,7 +71,7 @@ impl PoseBounds {
         excesses.fold(0.0, f64::max)
     }
 
-    /// Lets relaxed bounds follow a pose, never away from the nominal ones.
+    /// Moves relaxed bounds inward to a pose, at most to the nominal bounds, and never outward.
     pub fn tighten(&mut self, constants: &Constants, pose: &Pose) {
         if !self.is_relaxed {
             return;
@@ -90,8 +90,9 @@ impl PoseBounds {
     }
 }
 
-/// Moves a bound to `room` beyond `value` if the value exceeds it, outward in the direction of `room`, but no farther than an end; to
-/// the value itself where that is beyond the end. True if it exceeds it.
+/// Relaxes a bound if a value exceeds it: to `room` beyond the value, but no farther than `end`, or to the
+/// value itself if it is beyond `end`. The sign of `room` is the outward direction. Returns whether the value
+/// exceeds the bound.
 fn relax(bound: &mut f64, value: f64, room: f64, end: f64) -> bool {
     let is_beyond = (value - *bound) * room > 0.0;
     if is_beyond {

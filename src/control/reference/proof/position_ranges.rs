@@ -1,4 +1,5 @@
-//! Whether coordinates of C keep a distance from the ends of their ranges, a coordinate in each lane.
+//! Whether the coordinates of C keep a margin from the ends of their ranges, with one coordinate in each
+//! lane.
 
 use fearless_simd::{Simd, f64x4, prelude::*};
 use nalgebra::Vector3;
@@ -7,24 +8,25 @@ use crate::control::parameters::Envelope;
 use crate::control::reference::proof::angle_ranges::MAX_MARGIN_RATIO;
 use crate::control::reference::proof::padding::{Padded, padded};
 
-/// Ranges of the coordinates of C \[m\], and one of zeros, which contains the zero of a padded vector.
+/// Ranges of the coordinates of C \[m\]. The fourth range is zero and contains the zero of a padded vector.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct PositionRanges {
     lowest: Padded,
     highest: Padded,
-    /// Largest margin that is kept from each end.
+    /// Largest margin that is required from each end.
     max_margin: Padded,
 }
 
 impl PositionRanges {
-    /// Those of an envelope.
+    /// Ranges of an envelope.
     pub fn new(Envelope { lowest: [.., x0, y0, z0], highest: [.., x1, y1, z1] }: &Envelope) -> Self {
         let (low, high) = (Vector3::new(*x0, *y0, *z0), Vector3::new(*x1, *y1, *z1));
         let max_margin = (high - low) * MAX_MARGIN_RATIO;
         Self { lowest: padded(&low), highest: padded(&high), max_margin: padded(&max_margin) }
     }
 
-    /// Whether each coordinate of both positions has a distance from the ends of its range, or a part of it that is narrower.
+    /// Whether each coordinate of both positions keeps a margin from the ends of its range. The margin is at
+    /// most [`MAX_MARGIN_RATIO`] of the width.
     #[inline(always)]
     pub fn contain<S: Simd>(&self, simd: S, positions: [&Vector3<f64>; 2], margin: &Vector3<f64>) -> bool {
         let load = |lanes: Padded| f64x4::load_array(simd, lanes);
@@ -40,7 +42,8 @@ mod tests {
 
     use super::*;
 
-    /// Of each coordinate, at both ends, either position alone decides; and a narrow range keeps a quarter of its width.
+    /// At each end of each coordinate either position alone decides. A narrow range keeps a quarter of its
+    /// width.
     #[test]
     fn each_end_is_kept_by_both_positions() {
         let envelope =

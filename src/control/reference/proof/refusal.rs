@@ -1,13 +1,14 @@
-//! Why a step of the reference is refused.
+//! Refusal of a step of the reference.
 
 use crate::control::signals::limits::Limit;
 
-/// Why no stop from the end of a step was proved.
+/// Reason why no stop from the end of a step was proved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
-    /// The stop does not keep this limit.
+    /// The step or the stop does not keep this limit.
     Limit(Limit),
-    /// The effort of a cycle was spent before the proof was complete. The next cycle goes on with the balls that were found.
+    /// The effort of the step was spent before the proof was complete. The next step continues with the balls
+    /// that were found.
     Effort,
 }
 

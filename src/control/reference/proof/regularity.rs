@@ -1,20 +1,23 @@
-//! Balls of poses in which no pose is singular and none has a condition beyond the limit, and no leg comes near the first
-//! axis of its universal joint: in line with it the joint has lost a freedom, and the leg's spin is unbounded.
+//! Balls of poses that are proved regular: no pose is singular, no condition exceeds the limit, and no leg
+//! comes near the first axis of its universal joint. In line with this axis the joint loses a degree of
+//! freedom, and the leg's spin is unbounded.
 //!
-//! With N the wrenches of the legs at the centre of a ball, `F = |N|`, `B = |N^-1|` (Frobenius norms, torques about the mean
-//! of the joints and divided by the radius r), a pose displaced by at most d and turned by at most t, the arms `a` of the
-//! joints from C and `a'` from their mean:
+//! At the centre of a ball, N holds the wrenches of the legs, with torques about the mean of the joints and
+//! divided by the radius r. `F = |N|` and `B = |N^-1|` are Frobenius norms, L is the length of the shortest
+//! leg. The joints have the arms `a` from C and `a'` from their mean. A pose of the ball is displaced by at
+//! most d and turned by at most t:
 //!
 //! ```text
 //! s = d + a t                           displacement of a joint
-//! q = s / sqrt(L (L - s))               change of a leg's direction, L the shortest leg at the centre
+//! q = s / sqrt(L (L - s))               change of a leg's direction
 //! |N - N0| <= D = sqrt(6 q^2 + 6 (t + q)^2)                      as the mean of (a'/r)^2 is 1
 //! condition <= min(F + D, sqrt 12) B / (1 - B D)                 where B D < 1
-//! sine of the angle between a leg and that axis >= that at the centre - q
+//! sine of the angle between a leg and that axis >= sine at the centre - q
 //! ```
 //!
-//! The same bounds as those of a cell in the search for the workspace. A ball found once holds for many cycles.
-//! All balls of a group are tried at once: a lane each, without a branch, so that the effort does not depend on which one covers.
+//! The search for the workspace bounds its cells in the same way. A ball holds for many cycles once it is
+//! found. All balls of a group are tried at once, one in each lane and without a branch. So the effort does
+//! not depend on the ball that covers the pose.
 
 use fearless_simd::{Simd, dispatch, f64x4, prelude::*};
 use serde::{Deserialize, Serialize};
@@ -27,50 +30,53 @@ use crate::model::conditioning::Conditioning;
 use crate::model::rigid::Pose;
 use crate::model::sensitivity::{MAX_WRENCH_NORM, Sensitivity};
 
-/// Balls side by side: one in each lane.
+/// Balls in a group, one in each lane.
 const LANES: usize = 4;
-/// Of the balls that are kept: those along one stop.
+/// Number of groups that are kept: enough for the balls along one stop.
 const GROUPS: usize = 3;
 
-/// Largest `|R - R0| / sqrt 2` for which an angle is bounded, and its ratio to the angle's bound: `2 asin(1/2)`.
+/// Largest chord `|R - R0| / sqrt 2` for which the angle is bounded, and the ratio of the angle's bound to
+/// the chord: `2 asin(1/2)`.
 const MAX_CHORD: f64 = 1.0;
 const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
 
-/// Work for the regularity of a pose, in knots of an [examination](super::examination), and more where its factorization has pivots.
+/// Effort for the regularity of a pose, in knots of an [examination](super::examination), and the additional
+/// effort if its factorization has pivots.
 pub(in crate::control::reference) const REGULARITY_EFFORT: u32 = 1;
 const PIVOTING_WORK: u32 = 2;
 
-/// Least part of the sine of the reference that is allowed between knots, whatever the limits of the condition.
+/// Least sine between knots as a ratio of the reference's least sine, whatever the limits of the condition.
 const LEAST_SINE_SHARE: f64 = 0.5;
 
-/// How regular a pose is, or must be at least.
+/// Regularity of a pose, or bounds on it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct Regularity {
-    /// Condition, at most.
+    /// Condition; as a bound, the largest.
     condition: f64,
-    /// Sine of the angle between a leg and the first axis of its universal joint, at least.
+    /// Sine of the angle between a leg and the first axis of its universal joint; as a bound, the least.
     universal_sine: f64,
 }
 
 impl Regularity {
-    /// Regularity of a pose, if the effort suffices.
+    /// Regularity of a pose. It is refused if the effort does not suffice.
     pub fn at(constants: &Constants, pose: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         Ball::new(constants, pose, effort).map(|ball| ball.regularity)
     }
 
-    /// What the reference must keep.
+    /// Bounds that the reference must keep.
     pub fn of_reference(constants: &Constants) -> Self {
         Self { condition: constants.reference_condition, universal_sine: constants.universal_sine }
     }
 
-    /// What the poses between knots must keep: the condition of the platform, and a sine that is less in the same ratio.
+    /// Bounds that poses between knots must keep: the platform's limit of the condition, and a sine that is
+    /// smaller in the same ratio.
     pub fn around_reference(constants: &Constants) -> Self {
         let condition = constants.parameters.condition;
         let share = (constants.reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0);
         Self { condition, universal_sine: constants.universal_sine * share }
     }
 
-    /// The looser bounds of both.
+    /// The looser of both bounds, for each quantity.
     pub fn or_less(&self, other: &Self) -> Self {
         Self {
             condition: self.condition.max(other.condition),
@@ -78,13 +84,14 @@ impl Regularity {
         }
     }
 
-    /// Whether another keeps both bounds.
+    /// Whether another regularity keeps both bounds.
     pub fn is_kept_by(&self, other: &Self) -> bool {
         other.condition <= self.condition && other.universal_sine >= self.universal_sine
     }
 }
 
-/// Balls in lanes: a column holds the same number of each. One without legs covers nothing.
+/// Balls in SIMD lanes: each column holds one quantity of all balls. An unused lane has a leg length of 0 and
+/// covers nothing.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct BallGroup {
     /// Centre: position, and rotation column by column.
@@ -94,7 +101,7 @@ struct BallGroup {
     norm: [f64; LANES],
     inverse_norm: [f64; LANES],
     shortest: [f64; LANES],
-    /// Least sine of the angle between a leg and the first axis of its universal joint.
+    /// Least sine of the angle between a leg and the first axis of its universal joint, at the centre.
     universal_sine: [f64; LANES],
 }
 
@@ -114,7 +121,7 @@ impl BallGroup {
         put(&mut self.universal_sine, ball.regularity.universal_sine);
     }
 
-    /// How far a pose is from each centre.
+    /// Distances of a pose from each centre.
     #[inline(always)]
     fn displacements<S: Simd>(&self, simd: S, pose: &Pose) -> Displacements<S> {
         let squared = |columns: &[[f64; LANES]], numbers: &[f64]| {
@@ -130,7 +137,7 @@ impl BallGroup {
         Displacements { shift, turn, chord }
     }
 
-    /// Whether every pose within a reach of a displaced one is as regular as required, by any ball.
+    /// Whether some ball proves that every pose within a reach of a displaced pose is as regular as required.
     #[inline(always)]
     fn covers<S: Simd>(
         &self,
@@ -161,24 +168,26 @@ impl BallGroup {
     }
 }
 
-/// Bounds on how far a pose is from each centre: shift \[m\] and turn \[rad\], and the chord of the turn.
+/// Bounds on the distance of a pose from each centre: shift \[m\] and turn \[rad\], and the chord of the
+/// turn.
 struct Displacements<S: Simd> {
     shift: f64x4<S>,
     turn: f64x4<S>,
     chord: f64x4<S>,
 }
 
-/// A ball without its centre.
+/// Ball without its centre.
 struct Ball {
     norm: f64,
     inverse_norm: f64,
     shortest: f64,
-    /// Of the centre.
+    /// Regularity of the centre.
     regularity: Regularity,
 }
 
 impl Ball {
-    /// The ball around a pose, if the effort suffices; pivots are known only afterwards.
+    /// Ball around a pose, refused if the effort does not suffice. Only the factorization shows whether
+    /// pivots are needed: their effort is subtracted afterwards.
     fn new(constants: &Constants, center: &Pose, effort: &mut u32) -> Result<Self, Refusal> {
         *effort = effort.checked_sub(REGULARITY_EFFORT).ok_or(Refusal::Effort)?;
         let Conditioning { sensitivity, shortest, universal_sine, is_pivoted } =
@@ -192,10 +201,10 @@ impl Ball {
     }
 }
 
-/// Poses around one: within a shift \[m\] and a turn \[rad\].
+/// Distances around a pose: shift \[m\] and turn \[rad\].
 pub(in crate::control::reference) type Reach = Pair<f64>;
 
-/// Poses around one, and how regular they shall be.
+/// Poses around one pose, and the regularity that is required of them.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::control::reference) struct RegularityQuery<'a> {
     pub pose: &'a Pose,
@@ -203,23 +212,24 @@ pub(in crate::control::reference) struct RegularityQuery<'a> {
     pub required: Regularity,
 }
 
-/// The balls found last.
+/// The balls that were found last.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct RegularBalls {
     groups: [BallGroup; GROUPS],
     /// Index of the group that covered the last pose.
     recent: usize,
-    /// Number of balls that were kept, modulo those that can be: the next one takes the place of the oldest.
+    /// Number of balls that were kept, modulo the capacity. The next ball replaces the oldest.
     kept: usize,
 }
 
 impl RegularBalls {
-    /// Whether the surroundings are regular, by effort that may be done. `false` is no proof of the contrary.
+    /// Whether all poses of a query are proved regular: by the balls that are kept, or by a new one if the
+    /// effort suffices. `false` is no proof of the contrary.
     pub fn prove(&mut self, constants: &Constants, around: &RegularityQuery<'_>, effort: &mut u32) -> bool {
         self.prove_from_kept(constants, around) || self.prove_from_new(constants, around, effort).is_ok()
     }
 
-    /// The same by the balls that are kept.
+    /// Whether the balls that are kept prove all poses of a query.
     fn prove_from_kept(&mut self, constants: &Constants, around: &RegularityQuery<'_>) -> bool {
         let RegularityQuery { pose, reach, required } = around;
         dispatch!(constants.machine().level, simd => {
@@ -236,15 +246,17 @@ impl RegularBalls {
         })
     }
 
-    /// The groups: next to a pose there is another of the same way, so the last one that covered is tried first.
+    /// Indices of the groups. The group that covered the last pose comes first, because the next pose is
+    /// usually near.
     #[inline(always)]
     fn recent_first(&self) -> impl Iterator<Item = usize> + use<> {
         let recent = self.recent;
         (0..GROUPS).map(move |k| (recent + k) % GROUPS)
     }
 
-    /// Whether the balls that are kept prove a knot, as regular as the reference must be, and the poses around it, as regular as they
-    /// must be: less so, else a reference at its own limit could not leave it.
+    /// Whether the balls that are kept prove a knot and the poses around it. The knot must keep the
+    /// reference's bounds; poses around it need only the platform's looser bounds. Otherwise a reference at
+    /// its limit could never move away.
     #[inline(always)]
     pub fn prove_knot_from_kept<S: Simd>(
         &mut self,
@@ -261,7 +273,7 @@ impl RegularBalls {
             let displacements = group.displacements(simd, pose);
             let covers = |reach, required| group.covers(simd, constants, &displacements, reach, required);
             are_surroundings_covered = are_surroundings_covered || covers(reach, &around);
-            // Where they are not, the knot becomes the centre of a new ball.
+            // Without covered surroundings the knot becomes the centre of a new ball.
             if are_surroundings_covered && covers(Reach::default(), &at_knot) {
                 self.recent = index;
                 return true;
@@ -270,8 +282,8 @@ impl RegularBalls {
         false
     }
 
-    /// Covers the surroundings by a new ball. Returns the regularity of the pose.
-    // Out of line, as it is rare: the cycle stays short.
+    /// Covers the poses of a query by a new ball. Returns the regularity of the pose at its centre.
+    // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
     pub fn prove_from_new(
         &mut self,
@@ -284,8 +296,8 @@ impl RegularBalls {
         let index = self.kept / LANES;
         let group = self.groups.get_mut(index).ok_or(Refusal::Effort)?;
         group.set(self.kept % LANES, pose, &ball);
-        // By any ball of the group, which is as good. A new one that is too small for its reach may prove a knot: it stays until
-        // the next one.
+        // Another ball of the group may cover the poses as well. A new ball that is too small for the reach
+        // may still prove a knot: it stays until the next new ball.
         let is_covered = dispatch!(constants.machine().level, simd => {
             let displacements = group.displacements(simd, pose);
             group.covers(simd, constants, &displacements, *reach, required)

@@ -1,23 +1,23 @@
-//! The step that leads to a motion.
+//! Step of the reference that leads to a motion.
 
 use crate::control::signals::pair::Pair;
 use crate::model::rigid::Pose;
 
-/// The step of constant jerk that leads to the motion from which a stop is verified.
+/// Step of constant jerk. The stop that is verified begins at its end.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::control::reference) struct Step<'a> {
-    /// The pose from which it leads; `None` if the motion is the first.
+    /// Pose at the start of the step; `None` for the first motion.
     pub from: Option<&'a Pose>,
-    /// \[s\]
+    /// Duration \[s\].
     pub duration: f64,
-    /// Norms of the change of the acceleration \[rad/s^2\], \[m/s^2\].
+    /// Norms of the change of acceleration over the step \[rad/s^2\], \[m/s^2\].
     pub acceleration_change: Pair<f64>,
-    /// Work that it took to propose it, in knots of an examination.
+    /// Effort that the proposal took, in knots of an examination.
     pub effort: u32,
 }
 
 impl Step<'_> {
-    /// Largest velocities within the step beyond those at its ends.
+    /// Bounds on how far the velocities within the step exceed the velocities at its ends.
     pub fn velocity_overshoot(&self) -> Pair<f64> {
         self.acceleration_change.map(|change| change * self.duration / 8.0)
     }

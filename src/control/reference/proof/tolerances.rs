@@ -1,16 +1,20 @@
-//! Tolerances of the proof: what must be equal or ordered stands side by side.
+//! Tolerances of the proof. They are in one file because some must be equal or ordered.
 
-/// Part of the stroke by which a length may exceed its bound between two knots. Departures are bounded for the worst direction:
-/// without this room a platform at the bound could not leave it.
+/// Distance by which a length may exceed its bound between two knots, as a part of the stroke. Departures are
+/// bounded for the worst direction. Without this allowance a platform at the bound could not leave it.
 pub(in crate::control::reference) const BETWEEN_KNOTS_RATIO: f64 = 2.5e-5;
-/// Part of the stroke beyond a pose outside the nominal bounds in which control may begin: above the noise of lengths.
+/// Distance of relaxed bounds beyond a pose that is outside the nominal bounds when control begins, as a part
+/// of the stroke. It is above the noise of lengths.
 pub(in crate::control::reference) const START_RATIO: f64 = BETWEEN_KNOTS_RATIO;
-/// Distance of relaxed bounds from the end stops, as a part of the stroke: one room between knots, and one for the following error.
-/// A platform nearer to an end stop may return; one that moves towards it may not begin.
+/// Distance of relaxed bounds from the end stops, as a part of the stroke: the allowance between knots, and
+/// as much for the following error. A platform nearer to an end stop may return. Control may not begin while
+/// the platform moves towards it.
 pub(in crate::control::reference) const END_STOP_RATIO: f64 = BETWEEN_KNOTS_RATIO + START_RATIO;
-/// Part of the stroke that walls keep from a bound, so that the examination finds room between knots.
+/// Distance that walls keep from a bound, as a part of the stroke: it gives the examination room between
+/// knots.
 pub(in crate::control::reference) const WALL_RATIO: f64 = 5e-3;
-/// Relative allowance for rounding of a velocity; absolute, in \[rad\] or \[m\], for a range whose ends are equal.
+/// Allowance for rounding: relative for a velocity, absolute in \[rad\] or \[m\] for a range whose ends are
+/// equal.
 pub(in crate::control::reference) const ROUNDING: f64 = 1e-9;
 /// Allowance for the rounding of an angle \[rad\].
 pub(in crate::control::reference) const ANGLE_ROUNDING: f64 = 1e-15;

@@ -1,7 +1,7 @@
-//! Verified stop: whether the stop from a state keeps every limit along its whole way.
+//! Verified stop: whether a step, and the stop from its end, keep every limit over their whole length.
 //!
-//! In free space one pose is enough: every margin exceeds the length of the way, in any direction. Near a bound the stop is
-//! examined knot by knot, see [`super::examination`].
+//! In free space one pose is enough, because every margin exceeds the length of the stop in any direction.
+//! Near a bound the stop is examined knot by knot, see [`super::examination`].
 
 use serde::{Deserialize, Serialize};
 
@@ -21,15 +21,15 @@ use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::{Motion, Pose};
 use crate::model::task::task_coordinates;
 
-/// What verifications leave for the next one.
+/// Verifier of stops. It keeps the balls that were found for the next verification.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::reference) struct Verifier {
     pub balls: RegularBalls,
 }
 
 impl Verifier {
-    /// Verifies a step and the stop from the motion at its end. Returns which stop, or why none was proved.
-    /// The stop that brakes at once is planned in place of `brake_at_once`.
+    /// Verifies a step, and the stop from the motion at its end. Returns the kind of the stop, or why none
+    /// was proved. A stop that brakes at once is planned in `brake_at_once`.
     pub fn verify(
         &mut self,
         constants: &Constants,

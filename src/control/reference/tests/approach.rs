@@ -1,4 +1,4 @@
-//! The braking curves against their equations, derivatives against differences.
+//! Tests of the braking curves against their equations, and of derivatives against differences.
 
 use crate::control::reference::proposal::approach::{
     Approach, TargetOffset, WantedVelocity, limit_leg_rates,
@@ -10,13 +10,13 @@ use crate::model::rigid::Twist;
 
 const P: DerivativeLimits = LIMITS.position;
 
-/// `tau1` and `a` of the module's equations.
+/// `tau1` and `a` of the equations in [`crate::control::reference::proposal::approach`].
 fn constants_of(scale: f64, step_s: f64) -> (f64, f64) {
     let outer_s = (0.4 * P.acceleration / P.jerk).max(4.0 * step_s);
     (outer_s, 0.95 * scale * P.acceleration)
 }
 
-/// `d(v)`, the way on which a velocity can be stopped.
+/// `d(v)`: stopping distance from a velocity.
 fn braking_way(v: f64, scale: f64, step_s: f64) -> f64 {
     let ((outer_s, a), jerk) = (constants_of(scale, step_s), scale * P.jerk);
     if v >= a * a / jerk {
@@ -50,7 +50,7 @@ fn the_closing_velocity_is_the_inverse_of_the_braking_way() {
     }
 }
 
-/// Also on the sphere of the limit of velocity, where it can only turn.
+/// Also on the sphere of the velocity limit, where the velocity can only turn.
 #[test]
 fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
     let mut samples = RandomVectors::new(51);
@@ -63,7 +63,7 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
         let at = |dt: f64| {
             let offset = offset + (velocity - ahead) * dt + acceleration * (0.5 * dt * dt);
             let target = TargetOffset { offset, velocity: velocity + acceleration * dt, acceleration };
-            // Whatever is beside it.
+            // The target of the other vector does not matter.
             let beside = TargetOffset { offset: 3.0 * offset, ..target };
             let both = Pair { angular: &ahead, linear: &ahead };
             let approaches = Pair { angular: &approach, linear: &other };
@@ -93,7 +93,7 @@ fn the_derivative_of_the_wanted_velocity_is_that_of_its_differences() {
     assert!((100..1500).contains(&limited), "{limited}");
 }
 
-/// The curve of the last equation, limited in magnitude and in its change.
+/// The acceleration follows the curve of the last equation. Its magnitude and its change are limited.
 #[test]
 fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
     let mut samples = RandomVectors::new(52);
@@ -137,7 +137,8 @@ fn the_acceleration_follows_the_inner_curve_and_keeps_both_limits() {
     assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
 }
 
-/// From rest without acceleration, where both are limited: the first change has the direction of both aims.
+/// Both vectors start at rest without acceleration, and their changes are limited. The first change has the
+/// direction of both wanted accelerations.
 #[test]
 fn accelerations_in_proportion_keep_their_direction() {
     let mut samples = RandomVectors::new(54);

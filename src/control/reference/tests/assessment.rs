@@ -1,4 +1,4 @@
-//! Assessment of a cycle: each finding alone decides.
+//! Tests of the assessment of a cycle: each finding alone decides.
 
 use crate::control::controller::verify_start;
 use crate::control::cycle::Cycle;
@@ -20,7 +20,7 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::TaskState;
 use nalgebra::Vector6;
 
-/// What an assessment is made from; in order by default.
+/// Inputs of an assessment. By default there is no finding.
 struct Scene {
     input: Input,
     status: Result<(), Diagnostic>,
@@ -53,7 +53,7 @@ impl Default for Scene {
     }
 }
 
-/// A diagnostic that no check of an assessment finds itself.
+/// Diagnostic that no check of an assessment creates itself.
 const FOUND: Diagnostic =
     Diagnostic { code: DiagnosticCode::SetpointEnded, value: 3.0, bound: 2.0, index: 4 };
 
@@ -108,14 +108,14 @@ impl Scene {
         self.assess(state).tracking.err().map(|found| found.code)
     }
 
-    /// Of the start and of the engagement, on standby.
+    /// Codes of the start and of the engagement, on standby.
     fn beginning(&self) -> [Option<DiagnosticCode>; 2] {
         let Findings { start, engagement, .. } = self.assess(State::Standby);
         [start, engagement].map(|result| result.err().map(|found| found.code))
     }
 }
 
-/// An error along one axis of its four parts.
+/// Error along one axis, in one of its four parts.
 fn error(part: usize, size: f64) -> PoseError {
     let mut error = PoseError::default();
     let PoseError { pose, twist } = &mut error;
@@ -136,7 +136,7 @@ fn each_finding_alone_ends_the_tracking() {
         }
         assert_eq!(Scene { sensor_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
         assert_eq!(Scene { disturbance_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
-        // A stop for a change hides no reason to brake.
+        // A stop for a disturbance hides no reason to brake.
         let impact = Some(DiagnosticCode::Impact.into());
         let following = Some(DiagnosticCode::FollowingError);
         let far = Some(error(0, 0.06));
@@ -147,7 +147,7 @@ fn each_finding_alone_ends_the_tracking() {
         let input = Input { overrun_is_fault: true, ..Input::default() };
         let late = Some(DiagnosticCode::DeadlineMissed);
         assert_eq!(Scene { input, ..Scene::default() }.tracking(state), late);
-        // A setpoint matters where it is followed.
+        // A setpoint matters only in states that follow it.
         let is_followed = matches!(state, State::Engaging | State::Active);
         let lost = Scene { status: Err(FOUND), ..Scene::default() };
         assert_eq!(lost.tracking(state), found.filter(|_| is_followed));
@@ -187,11 +187,11 @@ fn each_finding_alone_prevents_control() {
     let input = Input { measured_publishers: two, ..Input::default() };
     let code = DiagnosticCode::TwoMeasuredSources;
     assert_eq!(Scene { input, ..Scene::default() }.beginning(), both(code));
-    // What a drive reports comes before what is said of the setpoint.
+    // The report of a drive has precedence over the status of the setpoint.
     let reports = [Err(DiagnosticCode::MeasurementLost.into()), Ok(())];
     let scene = Scene { reports, status: Err(FOUND), ..Scene::default() };
     assert_eq!(scene.beginning(), both(DiagnosticCode::MeasurementLost));
-    // The first reason is that of the engagement.
+    // The engagement reports the first reason.
     assert_eq!(Scene { input, status: Err(FOUND), ..Scene::default() }.beginning(), both(code));
     let input = Input { setpoint_publishers: two, ..Input::default() };
     let code = DiagnosticCode::TwoSetpointSources;

@@ -1,4 +1,5 @@
-//! Quantities whose extremes lie between the knots of an examined stop, or within the step before it.
+//! Tests of quantities whose extremes lie between the knots of an examined stop, or within the step before
+//! it.
 
 use crate::control::reference::tests::verification::{PlayedStep, Scene};
 use crate::control::reference::tests::*;
@@ -6,10 +7,11 @@ use crate::model::inverse_geometry::leg_motion;
 use crate::model::rigid::{Acceleration, Motion, Pose, Twist};
 use crate::model::task::task_coordinates;
 
-/// What a length may exceed its bound by between knots, over the stroke; and an angle at the outermost joint.
+/// Distance by which a length may exceed its bound between knots, as a part of the stroke. An angle may
+/// exceed its bound by as much at the outermost joint.
 const ROOM_RATIO: f64 = 2.6e-5;
 
-/// Standing at home with limits of acceleration and jerk times factors, every bound wide.
+/// Platform at rest at home, with scaled limits of acceleration and jerk. Every bound is wide.
 pub(super) fn scene(samples: &mut RandomVectors, acceleration: f64, jerk: f64) -> Scene {
     let mut scene = Scene::new(samples);
     let limits = &mut scene.constants.parameters.limits;
@@ -31,7 +33,8 @@ pub(super) fn scene(samples: &mut RandomVectors, acceleration: f64, jerk: f64) -
     scene
 }
 
-/// A coordinate that turns back early in a long stop: a small velocity against the acceleration, a large one across.
+/// A coordinate turns back early in a long stop: its velocity is small and against the acceleration, the
+/// velocity across is large.
 #[test]
 fn coordinates_that_turn_back_between_knots_keep_the_envelope() {
     let mut samples = RandomVectors::new(81);
@@ -49,13 +52,13 @@ fn coordinates_that_turn_back_between_knots_keep_the_envelope() {
         let acceleration = along * -part.acceleration;
         let Motion { twist, acceleration: a, pose } = &mut scene.motion;
         if axis < 3 {
-            // Steep: angles change faster than the attitude turns.
+            // The platform is tilted, so that angles change faster than the attitude turns.
             pose.rotation = exp(&(Vector3::y() * samples.uniform()));
             (twist.angular, a.angular) = (velocity, acceleration);
         } else {
             (twist.linear, a.linear) = (velocity, acceleration);
         }
-        // From within: where the start of a step is beyond a bound, the stop may be as far beyond.
+        // The step starts within the bound: if it started beyond, the stop could be as far beyond.
         let way = along * -0.01;
         let way = if axis < 3 { [way, Vector3::zeros()] } else { [Vector3::zeros(), way] };
         scene.step.from = Some(scene.motion.pose.displaced(&Twist { angular: way[0], linear: way[1] }));
@@ -70,7 +73,7 @@ fn coordinates_that_turn_back_between_knots_keep_the_envelope() {
     assert!(largest.iter().all(|excess| *excess > -1e-3), "{largest:?}");
 }
 
-/// An angle that turns back although the attitude does not: the axis of rotation leads around it.
+/// An angle turns back although the attitude does not, because the axis of rotation leads around it.
 #[test]
 fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
     let mut samples = RandomVectors::new(87);
@@ -93,7 +96,7 @@ fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
             Some(scene.motion.pose.displaced(&Twist { angular: gradient * -0.01, linear: Vector3::zeros() }));
         let set = |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().highest[axis] = bound;
         let Some((extremes, bound)) = scene.tightened(10.0, -9.0, set) else { continue };
-        // Not through gimbal lock, where the angles jump.
+        // Stops through gimbal lock are left out, because the angles jump there.
         if extremes.highest[1].max(-extremes.lowest[1]) > 1.2 {
             continue;
         }
@@ -105,7 +108,7 @@ fn angles_that_turn_back_by_their_geometry_keep_the_envelope() {
     assert!(count > 50, "{count}");
 }
 
-/// A leg that turns back between two knots: its velocity is along it, against its acceleration.
+/// A leg turns back between two knots: the velocity is along the leg, against the acceleration.
 #[test]
 fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {
     let mut samples = RandomVectors::new(82);
@@ -145,7 +148,8 @@ fn lengths_and_rates_that_turn_back_between_knots_keep_their_bounds() {
     assert!(largest[0] > -1e-4 && largest[1] > -0.02, "{largest:?}");
 }
 
-/// A step that ends where it began, and turns in its middle: speeds, lengths and coordinates are larger there.
+/// A step ends where it began and turns back in its middle. Speeds, lengths and coordinates are largest
+/// within the step.
 #[test]
 fn the_middle_of_a_long_step_keeps_every_bound() {
     let mut samples = RandomVectors::new(83);
@@ -163,7 +167,7 @@ fn the_middle_of_a_long_step_keeps_every_bound() {
         }
         scene.constants.parameters.limits.position.velocity = 10.0;
         scene.constants.parameters.limits.orientation.velocity = 10.0;
-        // Backward from the end.
+        // Backward from the end of the step.
         let middle = pose.displaced(&Twist {
             angular: twist.angular * (-0.25 * duration),
             linear: twist.linear * (-0.25 * duration),
@@ -179,7 +183,8 @@ fn the_middle_of_a_long_step_keeps_every_bound() {
             assert!(excess <= ROOM_RATIO * machine.actuator.stroke(), "{part} {duration} {leg}: {excess}");
             scene.bounds.longest[leg] = 100.0;
         }
-        // Of the angles only for steps no longer than the time between knots.
+        // Angles are left out: their bound holds only for steps that are no longer than the time between
+        // knots.
         if part == 1 {
             let set =
                 |scene: &mut Scene, bound| scene.bounds.envelope.as_mut().unwrap().highest[axis] = bound;
@@ -189,7 +194,8 @@ fn the_middle_of_a_long_step_keeps_every_bound() {
     }
 }
 
-/// The speed in the middle of a step exceeds that at both ends by an eighth of the change of acceleration times the step.
+/// The speed in the middle of a step exceeds the speed at both ends by an eighth of the change of
+/// acceleration times the step.
 #[test]
 fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
     let mut samples = RandomVectors::new(84);
@@ -197,7 +203,7 @@ fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
         let mut scene = scene(&mut samples, 1.0, 1.0);
         scene.is_free = is_free;
         if !is_free {
-            // No room in any direction: examined.
+            // There is no room in any direction, so the stop is examined.
             scene.bounds.envelope.as_mut().unwrap().lowest =
                 task_coordinates(&scene.motion.pose, &scene.constants.machine().home).map(|x| x - 1e-3);
         }
@@ -227,7 +233,7 @@ fn the_speed_in_the_middle_of_a_step_is_within_a_limit_that_is_just_accepted() {
     }
 }
 
-/// A leg whose rate is largest in the middle of a long step: its acceleration changes sign there.
+/// The rate of a leg is largest in the middle of a long step, where the acceleration changes sign.
 #[test]
 fn the_rate_in_the_middle_of_a_long_step_is_within_a_limit_that_is_just_accepted() {
     let mut samples = RandomVectors::new(95);
@@ -238,7 +244,7 @@ fn the_rate_in_the_middle_of_a_long_step_is_within_a_limit_that_is_just_accepted
         let Motion { pose, twist, acceleration } = &mut scene.motion;
         (twist.linear, acceleration.linear, scene.step.jerk.linear) = (v, a, jerk);
         scene.step.duration = h;
-        // Backward from the end.
+        // Backward from the end of the step.
         let t = -0.5 * h;
         let middle = Motion {
             pose: Pose { position: pose.position + (v + (a + jerk * (t / 3.0)) * (t / 2.0)) * t, ..*pose },
@@ -252,7 +258,7 @@ fn the_rate_in_the_middle_of_a_long_step_is_within_a_limit_that_is_just_accepted
     }
 }
 
-/// At knots the condition keeps the limit of the reference, whatever that of the platform.
+/// At knots the condition keeps the limit of the reference, whatever the limit of the platform.
 #[test]
 fn the_condition_at_knots_keeps_the_limit_of_the_reference() {
     let mut samples = RandomVectors::new(86);
@@ -265,7 +271,7 @@ fn the_condition_at_knots_keeps_the_limit_of_the_reference() {
             KinematicState::new(scene.constants.machine(), scene.motion.pose).sensitivity().condition;
         let Some((extremes, bound)) = scene.tightened(1e4, 1.0, set) else { continue };
         let worst = 1.0 / extremes.inverse_condition;
-        // Where the step began beyond the limit it may go as far.
+        // If the step began beyond the limit, the stop may go as far.
         let allowed = bound.max(before) * if scene.is_free { 1.0 + 1e-9 } else { 1.01 };
         assert!(worst > 0.0 && worst <= allowed, "{worst} {bound}");
         count[usize::from(scene.is_free)] += 1;

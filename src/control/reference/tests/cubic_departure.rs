@@ -1,4 +1,4 @@
-//! The bounds on derivatives of lengths, term by term, and on what happens between two knots.
+//! Tests of the bounds on derivatives of lengths, term by term, and on the departure between two knots.
 
 use crate::control::reference::proof::cubic_departure::{
     CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk,
@@ -8,7 +8,8 @@ use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::leg_motion;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-/// The largest second derivative of a length, for one limit or velocity at a time: each term is needed.
+/// The largest second derivative of a length is close to its bound, for one limit or velocity at a time: each
+/// term is needed.
 #[test]
 fn no_length_is_curved_more_than_its_bound() {
     let mut samples = RandomVectors::new(85);
@@ -34,8 +35,8 @@ fn no_length_is_curved_more_than_its_bound() {
     assert!(used.iter().all(|used| (0.4..=1.0).contains(used)), "{used:?}");
 }
 
-/// From the cubic with its values and rates at 0 and 1, a function whose third derivative is 1 or -1 departs by no more, and by almost
-/// as much.
+/// The third derivative of a function is 1 or -1. The function departs from the cubic with its values and
+/// rates at 0 and 1 by no more than the bound, and by almost as much.
 #[test]
 fn a_function_departs_from_its_cubic_by_no_more_than_its_bound() {
     let mut samples = RandomVectors::new(89);
@@ -43,7 +44,7 @@ fn a_function_departs_from_its_cubic_by_no_more_than_its_bound() {
     for _ in 0..200_000 {
         let mut switches = [0.0, samples.uniform(), samples.uniform(), 1.0];
         switches.sort_by(f64::total_cmp);
-        // The integral of `(t - s)^2 / 2` times the third derivative at s, and its rate.
+        // The integral of `(t - s)^2 / 2` times the third derivative at s, and the rate of this integral.
         let f = |t: f64| {
             let parts = switches.windows(2).zip([1.0, -1.0, 1.0]);
             parts.fold([0.0; 2], |[value, rate], (ends, jerk)| {
@@ -61,7 +62,8 @@ fn a_function_departs_from_its_cubic_by_no_more_than_its_bound() {
     assert!(largest.iter().all(|largest| (0.94..=1.0).contains(largest)), "{largest:?}");
 }
 
-/// The largest third derivative of a length, for one limit or velocity, or two that go together, at a time: each term is needed.
+/// The largest third derivative of a length is close to its bound, for one limit or velocity at a time, or
+/// two that belong together: each term is needed.
 #[test]
 fn no_length_has_a_third_derivative_beyond_its_bound() {
     const H: f64 = 1e-4;
@@ -69,7 +71,7 @@ fn no_length_has_a_third_derivative_beyond_its_bound() {
     let mut used = [0.0_f64; 5];
     for k in 0..10_000 {
         let (term, mut scene) = (k % 5, scene(&mut samples, 1.0, 1.0));
-        // Jerk, turning, shifting, both and acceleration, turning and acceleration.
+        // Jerk; turning; shifting; shifting and acceleration; turning and acceleration.
         let [jerk, acceleration, v, w] = [
             [1.0, 1e-6, 0.0, 0.0],
             [1e-6, 1e-6, 0.0, 2.0],
@@ -108,7 +110,7 @@ fn no_length_has_a_third_derivative_beyond_its_bound() {
             };
             leg_motion(scene.constants.machine(), &motion).accel
         };
-        // The nearest of the legs decides.
+        // The shortest leg decides.
         let mut machine = scene.constants.machine().clone();
         machine.actuator.min_length = leg_lengths(&machine, &pose).into_iter().fold(f64::INFINITY, f64::min);
         let constants = Constants::new(&machine, scene.constants.parameters);

@@ -1,5 +1,5 @@
-//! The bound of the feedback, against its definition: the largest share within the bound, and the time of saturation. And the last
-//! check of its forces.
+//! Tests of the bound on feedback against its definition: largest share within the bound, time of saturation.
+//! Then the last check of the forces.
 
 use nalgebra::Vector6;
 
@@ -71,7 +71,7 @@ fn feedback_on_legs_is_scaled_by_the_leg_that_exceeds_its_bound_most() {
     }
 }
 
-/// A tenth of a second, with cycles that are not saturated forgiven at 3 % of the speed.
+/// Saturation may last a tenth of a second. Cycles without saturation reduce its time at 3 % of the speed.
 #[test]
 fn saturation_that_lasts_is_a_fault() {
     let constants = constants(ControlMode::ComputedTorque);
@@ -83,17 +83,18 @@ fn saturation_that_lasts_is_a_fault() {
             bound.check_saturation_time().is_err()
         })
     };
-    // The period is 1 ms: the first cycle beyond 100 ms, or for the rounding of sums the one before.
+    // The period is 1 ms: the fault comes in the first cycle beyond 100 ms, or in the one before by the
+    // rounding of sums.
     assert!(matches!(run(&|_| true, 1000), Some(99 | 100)), "{:?}", run(&|_| true, 1000));
     assert_eq!(run(&|k| k < 95, 1000), None);
-    // 90 ms, then 200 ms of which 6 ms are forgotten, then 16 ms at least until the fault.
+    // 90 ms of saturation, 200 ms that reduce the time by 6 ms, then at least 16 ms until the fault.
     let found = run(&|k| !(90..290).contains(&k), 1000);
     assert!(matches!(found, Some(305..=307)), "{found:?}");
-    // One cycle in 20 is more than is forgotten, one in 50 is less.
+    // One saturated cycle in 20 adds more than is forgotten, one in 50 adds less.
     assert!(run(&|k| k % 20 == 0, 20_000).is_some() && run(&|k| k % 50 == 0, 20_000).is_none());
 }
 
-/// In every mode, for every leg and kind of number.
+/// Every mode, every leg, every kind of number that is not finite.
 #[test]
 fn a_force_that_is_not_finite_is_refused() {
     for mode in ControlMode::ALL {

@@ -1,4 +1,5 @@
-//! Motion of a platform without force: what of its measurements counts, and how its deceleration leads on.
+//! Tests of the motion of a platform without force: which measurements count, and how the motion continues
+//! with the measured deceleration.
 
 use crate::control::cycle::Cycle;
 use crate::control::reference::tests::*;
@@ -17,7 +18,7 @@ fn constants() -> Constants {
     Constants::new(&machine, Parameters { force_delay_ns: 2 * MS, ..parameters(&machine) })
 }
 
-/// The motion found in a cycle at `release_ns`, from a measurement of a speed along x, if there is one.
+/// Motion found in a cycle at `release_ns`. The measurement, if there is one, has a speed along x.
 fn update(
     free: &mut FreeMotion,
     constants: &Constants,
@@ -39,7 +40,7 @@ fn update(
 fn two_measurements_without_force_give_the_deceleration() {
     let constants = constants();
     let home = at_rest(constants.home.pose());
-    // From 1 m/s by 20 m/s^2; the force begins 2 ms after the release.
+    // From 1 m/s, decelerating by 20 m/s^2. The force begins 2 ms after the release.
     for (age_ms, is_at_rest) in [(1, false), (4, false), (60, true)] {
         let mut free = FreeMotion::default();
         assert!(update(&mut free, &constants, (10 * MS, State::Standby), Some((10 * MS, 1.0))).is_none());
@@ -53,7 +54,8 @@ fn two_measurements_without_force_give_the_deceleration() {
     }
 }
 
-/// From 0.5 m/s, in periods of 1 ms: a tenth of the velocity limit in each, or a little more.
+/// From 0.5 m/s, the velocity changes by a tenth of its limit in each period of 1 ms: just below it or just
+/// above it.
 #[test]
 fn control_begins_after_hard_brakes_and_not_under_them() {
     let mut constants = constants();
@@ -65,7 +67,7 @@ fn control_begins_after_hard_brakes_and_not_under_them() {
         };
         assert!(at(0, 0.5).is_none());
         assert_eq!(at(1, 0.5 - 1e-3 * deceleration).is_some(), is_known, "{deceleration}");
-        // At rest before the force begins 2 ms later.
+        // The platform comes to rest before the force begins 2 ms later.
         assert!(at(4, 0.5 - 4e-3 * deceleration).is_some_and(|motion| motion.twist.linear.norm() < 1e-12));
         assert!(at(10, 0.0).is_some());
     }
@@ -75,14 +77,14 @@ fn control_begins_after_hard_brakes_and_not_under_them() {
 fn a_measurement_counts_once_and_only_if_no_force_acted_when_it_was_taken() {
     let constants = constants();
     let standby = |ms: u64| (ms * MS, State::Standby);
-    // The same measurement again is no second one; nor is an older one.
+    // A repeated measurement is not a second one, and neither is an older one.
     let mut free = FreeMotion::default();
     for again_ms in [10, 10, 9] {
         let found = update(&mut free, &constants, standby(12), Some((again_ms * MS, 1.0)));
         assert!(found.is_none(), "{again_ms}");
     }
     assert!(update(&mut free, &constants, standby(12), Some((11 * MS, 0.9))).is_some());
-    // A gap begins anew.
+    // After a gap two measurements are needed again.
     assert!(update(&mut free, &constants, standby(13), None).is_none());
     assert!(update(&mut free, &constants, standby(14), Some((14 * MS, 0.9))).is_none());
     // The force of the last cycle under control is held until 3 ms after its release.
@@ -93,10 +95,10 @@ fn a_measurement_counts_once_and_only_if_no_force_acted_when_it_was_taken() {
     }
     assert!(update(&mut free, &constants, standby(23), Some((23 * MS, 0.9))).is_none(), "the first");
     assert!(update(&mut free, &constants, standby(24), Some((24 * MS, 0.8))).is_some(), "the second");
-    // Control forgets what came before it.
+    // Control discards the measurements before it.
     assert!(update(&mut free, &constants, (25 * MS, State::Active), Some((25 * MS, 0.8))).is_none());
     assert!(update(&mut free, &constants, standby(30), Some((30 * MS, 0.8))).is_none());
-    // A platform that stands needs one.
+    // A platform at rest needs one measurement.
     let mut free = FreeMotion::default();
     let standing = 1e-3 * LIMITS.position.velocity;
     assert!(update(&mut free, &constants, standby(1), Some((MS, 0.99 * standing))).is_some());
@@ -104,7 +106,7 @@ fn a_measurement_counts_once_and_only_if_no_force_acted_when_it_was_taken() {
     assert!(update(&mut free, &constants, standby(1), Some((MS, 1.01 * standing))).is_none());
 }
 
-/// Lengths without rates: what is found after each millisecond of lengths that have moved from home by so much.
+/// Results of measurements without rates, one per millisecond. Each leg is longer than at home by `away(ms)`.
 fn by_lengths(away: impl Fn(u64) -> f64, milliseconds: u64) -> Vec<Result<Motion, Diagnostic>> {
     let constants = constants();
     let localization = Localization::new(&constants);
@@ -113,7 +115,7 @@ fn by_lengths(away: impl Fn(u64) -> f64, milliseconds: u64) -> Vec<Result<Motion
     let of = |ms: u64| {
         let length = home.map(|length| length + away(ms));
         let measurement = Measurement { time_ns: ms * MS, length, ..Measurement::default() };
-        // The filter of rates says what is of no use.
+        // The twist from the filter of rates must not be used.
         let twist = Twist { linear: Vector3::x(), ..Twist::default() };
         let pose = *constants.home.pose();
         let platform = PlatformState { pose, twist, condition: 2.0, time_to_singularity: f64::INFINITY };
@@ -129,13 +131,13 @@ fn without_rates_control_begins_at_rest_only() {
     let first = |found: &[Result<Motion, Diagnostic>]| found.iter().position(Result::is_ok);
     // In whole windows of 45 ms.
     assert_eq!(first(&by_lengths(|_| 0.0, 200)), Some(45));
-    // Brakes of 10 m/s^2 from 0.3 m/s, at rest after 30 ms.
+    // Brakes decelerate by 10 m/s^2 from 0.3 m/s; the platform comes to rest after 30 ms.
     let braking = |ms: u64| {
         let t = ms.min(30) as f64 * 1e-3;
         (0.3 - 5.0 * t) * t
     };
     assert_eq!(first(&by_lengths(braking, 200)), Some(90));
-    // A motion that is slow, and one that begins once more: seen by the next measurement that is beyond the scatter.
+    // A slow motion, and a motion that begins again. The next measurement beyond the scatter shows it.
     let slow = by_lengths(|ms| 5e-6 * ms as f64, 200);
     assert_eq!(first(&slow), None);
     let Err(found) = slow[150] else { panic!("it moves") };
@@ -146,7 +148,7 @@ fn without_rates_control_begins_at_rest_only() {
     assert!(again[98].is_ok() && again[99..].iter().all(Result::is_err));
 }
 
-/// Noise of 2 um, which the machine file does not state.
+/// The lengths have noise of 2 um, which the machine file does not state.
 #[test]
 fn a_platform_at_rest_with_noise_is_accepted_in_time() {
     let mut samples = RandomVectors::new(37);

@@ -1,4 +1,4 @@
-//! The generator as a whole: what it does in one step, and where it leads.
+//! Tests of the generator as a whole: its motion in one step, and where it leads.
 
 use fearless_simd::Level;
 
@@ -25,7 +25,7 @@ pub(super) fn constants(change: impl FnOnce(&mut Machine, &mut Parameters)) -> C
     Constants::new(&machine, parameters)
 }
 
-/// A setpoint at rest at an offset from home, with the time stamp 0.
+/// Setpoint at rest at an offset from home, with the time stamp 0.
 pub(super) fn standing(constants: &Constants, offset: [f64; 6]) -> SetpointMotion {
     let home = constants.machine().home;
     let x = core::array::from_fn::<f64, 6, _>(|axis| home[axis] + offset[axis]);
@@ -39,7 +39,7 @@ pub(super) fn started(constants: &Constants, motion: &Motion) -> ReferenceGenera
     reference
 }
 
-/// Steps of 1 ms towards a setpoint; the largest speeds of translation and rotation.
+/// Moves in steps of 1 ms towards a target. Returns the largest speeds of translation and rotation.
 pub(super) fn run(
     constants: &Constants,
     reference: &mut ReferenceGenerator,
@@ -59,13 +59,13 @@ pub(super) fn x(constants: &Constants, reference: &ReferenceGenerator) -> [f64; 
     task_coordinates(&reference.motion().pose, &constants.machine().home)
 }
 
-/// In steps of 1 ms, and no more than 32 of them.
+/// A cycle consists of steps of 1 ms, and of at most 32 steps.
 #[test]
 fn a_long_cycle_moves_as_several_short_ones() {
     let constants = constants(|_, _| ());
     let setpoint = standing(&constants, [0.1, -0.1, 0.05, 0.1, 0.1, -0.1]);
     let target = Target::Motion(&setpoint);
-    // Steps of any length, each one.
+    // Steps of a given length, one at a time.
     let after_steps = |step_ns: u64, count: u64| {
         let mut reference = started(&constants, &at_rest(constants.home.pose()));
         for k in 1..=count {
@@ -93,7 +93,7 @@ fn a_long_cycle_moves_as_several_short_ones() {
     assert_eq!(reference.motion_of_hold(MS), before.motion_of_hold(MS));
 }
 
-/// The largest rate of a leg is 97 % of its limit while the platform moves far.
+/// The largest rate of a leg is 97 % of its limit during a long motion.
 #[test]
 fn the_reference_cruises_at_the_limit_of_leg_rates() {
     let constants = constants(|machine, _| machine.actuator.max_rate = 0.4);
@@ -116,7 +116,7 @@ fn the_reference_cruises_at_the_limit_of_leg_rates() {
     assert!(left < 1e-6, "{left}");
 }
 
-/// A start forgets the reference before it.
+/// A start discards the earlier reference.
 #[test]
 fn a_start_clears_the_history() {
     let constants = constants(|_, _| ());
@@ -129,7 +129,7 @@ fn a_start_clears_the_history() {
     assert_eq!(reference.motion_at(49 * MS).pose, aside.motion.pose);
 }
 
-/// 0.3 of the limits: of a pose by itself, of a setpoint where the closing scale says so.
+/// A pose is approached with 0.3 of the limits, a setpoint with the closing scale.
 #[test]
 fn the_way_to_a_target_takes_its_share_of_the_limits() {
     let constants = constants(|_, _| ());
@@ -167,7 +167,7 @@ fn each_kind_of_setpoint_has_its_target() {
     }
 }
 
-/// A sine whose setpoints are of now or 3 ms old, in both kinds of coordinates: 3 um and 20 um.
+/// Setpoints of a sine, new or 3 ms old, in an angle and in a position. The errors are 3 um and 20 um.
 #[test]
 fn old_setpoints_of_a_sine_are_followed_as_their_extrapolation() {
     let constants = constants(|_, _| ());
@@ -205,7 +205,7 @@ fn old_setpoints_of_a_sine_are_followed_as_their_extrapolation() {
     }
 }
 
-/// At most a timeout and a period, before and after its instant.
+/// The extrapolation ends a timeout and a period before and after the setpoint's instant.
 #[test]
 fn a_setpoint_is_extrapolated_no_further_than_its_timeout() {
     let constants = constants(|_, _| ());
@@ -218,7 +218,8 @@ fn a_setpoint_is_extrapolated_no_further_than_its_timeout() {
     }
 }
 
-/// For 50 steps, which another refusal begins anew. A cycle without a target, as before the drives are ready, is none.
+/// Lasts 50 steps. Another refusal begins the count again. A cycle without a target, as before the drives are
+/// ready, is no refusal.
 #[test]
 fn rotation_and_translation_change_in_proportion_after_a_refusal() {
     let constants = constants(|_, _| {});
@@ -239,7 +240,7 @@ fn rotation_and_translation_change_in_proportion_after_a_refusal() {
     assert_eq!(steps[54..57], [1, 0, 0]);
 }
 
-/// What held the reference back in a cycle, of either component.
+/// The limits that restricted the reference in a cycle, in rotation or in translation.
 #[test]
 fn the_limits_that_hold_the_reference_back_are_reported() {
     let constants = constants(|_, _| ());
@@ -255,7 +256,7 @@ fn the_limits_that_hold_the_reference_back_are_reported() {
                 }
             }
         }
-        // At once; A / J = 40 ms.
+        // The jerk is limited at once. The acceleration builds up in A / J = 40 ms.
         let [jerk, acceleration, velocity] = first;
         assert_eq!(jerk, Some(0), "{offset:?}");
         assert!(acceleration.is_some() && velocity.is_some(), "{offset:?} {first:?}");
@@ -263,7 +264,8 @@ fn the_limits_that_hold_the_reference_back_are_reported() {
     }
 }
 
-/// Along its stop, without a target, the reference ends at rest where the stop does, and says so there only.
+/// Without a target the reference follows its stop. It comes to rest where the stop ends, and reports rest
+/// only there.
 #[test]
 fn without_a_target_the_reference_ends_where_its_stop_does() {
     let constants = constants(|_, _| ());
@@ -286,7 +288,7 @@ fn without_a_target_the_reference_ends_where_its_stop_does() {
         }
     }
     assert_eq!(at_rest_after, Some((stop.duration() * 1e3).ceil() as u64));
-    // One that never began is at rest, and stays where it is.
+    // A reference that never began is at rest and stays where it is.
     let mut reference = ReferenceGenerator::new(&constants);
     assert!(reference.is_at_rest());
     reference.advance(&constants, MS, None);

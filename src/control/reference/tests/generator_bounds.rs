@@ -1,4 +1,4 @@
-//! The generator at its bounds: where it may begin, what it refuses, and that it comes back.
+//! Tests of the generator at its bounds: where it may begin, what it refuses, and how it returns.
 
 use fearless_simd::Level;
 
@@ -14,7 +14,7 @@ use crate::control::signals::limits::Limit;
 use crate::model::rigid::{Motion, Twist};
 use crate::model::task::task_coordinates;
 
-/// A platform that is beyond the envelope when control begins comes back, and does not go there again.
+/// A platform is beyond the envelope when control begins. It returns, and does not leave the envelope again.
 #[test]
 fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
     let constants = constants(|_, parameters| {
@@ -30,12 +30,12 @@ fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
     assert_eq!(reference.verify_start(&constants, &at_rest(&beyond.motion.pose)), Ok(()));
     run(&constants, &mut reference, &Target::Motion(&beyond), 200);
     assert!((x(&constants, &reference)[3] - 0.12).abs() < 1e-4);
-    // At some millimetres per second, as the bounds follow closely.
+    // The platform returns at some millimetres per second, because the bounds follow it closely.
     run(&constants, &mut reference, &Target::Motion(&home), 10_000);
     assert!(x(&constants, &reference)[3].abs() < 1e-6, "{:?}", x(&constants, &reference));
     run(&constants, &mut reference, &Target::Motion(&beyond), 2000);
     assert!((0.09..=0.1 + 2e-9).contains(&x(&constants, &reference)[3]), "{:?}", x(&constants, &reference));
-    // Also where control begins anew within the envelope before the bounds have followed the platform back.
+    // Control begins again within the envelope, before the bounds have followed the platform back.
     let mut reference = started(&constants, &at_rest(&beyond.motion.pose));
     reference.verify_start(&constants, &home.motion).ok();
     reference.begin_at(0);
@@ -76,8 +76,8 @@ fn a_start_is_refused_with_the_limit_that_no_stop_keeps() {
     );
 }
 
-/// A platform that brakes have carried beyond the margin: at rest it may begin and comes back, from a step of the room of its bounds
-/// off the end stop it may not begin with a motion that ends at the stop.
+/// Brakes have carried the platform beyond the margin. At rest control may begin, and the platform returns.
+/// In motion control may not begin if the motion would end at the end stop.
 #[test]
 fn a_start_beside_an_end_stop_never_leads_into_it() {
     let mut samples = RandomVectors::new(31);
@@ -87,7 +87,7 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
         let mut machine = free.machine().clone();
         let stroke = machine.actuator.stroke();
         let pose = pose(&mut samples, &free);
-        // The end stop is as near to the longest leg as a start has room, or nearer.
+        // The end stop is up to 4e-4 of the stroke from the longest leg, often nearer.
         let longest = leg_lengths(&machine, &pose).into_iter().fold(0.0, f64::max);
         let gap = 4e-4 * stroke * samples.uniform() * samples.uniform();
         machine.actuator.max_length = longest + gap;
@@ -116,7 +116,7 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
     assert!(refused > 300 && begun > 200, "{refused} {begun}");
 }
 
-/// Both ends of the step keep the limit of velocity, its middle exceeds it by `J h^2 / 8`.
+/// Both ends of the step keep the velocity limit. The middle exceeds it by `J h^2 / 8`.
 #[test]
 fn a_step_that_exceeds_the_velocity_between_its_ends_is_refused() {
     for part in 0..2 {
@@ -144,7 +144,7 @@ fn a_step_that_exceeds_the_velocity_between_its_ends_is_refused() {
     }
 }
 
-/// Where rounding has left the reference a little beyond a bound it may return, and not go farther.
+/// Rounding has left the reference slightly beyond a bound. It may return, but may not go farther.
 #[test]
 fn a_reference_beyond_a_bound_by_rounding_only_returns() {
     let home = [0.0, 0.0, 0.0, 0.0, 0.0, 1.5];
@@ -186,7 +186,8 @@ fn a_reference_beyond_a_bound_by_rounding_only_returns() {
     }
 }
 
-/// Under "limit" the walls keep 0.5 % of the stroke from a bound, under "stop" a trajectory may go as near as it can stop.
+/// Under "limit" the walls keep 0.5 % of the stroke from a bound. Under "stop" a trajectory may go as near as
+/// it can be stopped.
 #[test]
 fn walls_keep_their_distance_under_limit_only() {
     for policy in [ViolationPolicy::Stop, ViolationPolicy::Limit] {
@@ -215,7 +216,7 @@ fn walls_keep_their_distance_under_limit_only() {
     }
 }
 
-/// The stop that is held from the start, and followed, is the one that was verified.
+/// The reference holds, and follows, the stop that was verified at the start.
 #[test]
 fn a_start_holds_the_stop_that_was_verified() {
     for (half, expected) in [(1.0, StopKind::ReleaseFirst), (0.05, StopKind::BrakeAtOnce)] {
@@ -239,7 +240,7 @@ fn a_start_holds_the_stop_that_was_verified() {
     }
 }
 
-/// An axis of the envelope without width does not hold the others.
+/// An axis of the envelope without width does not prevent motion along the others.
 #[test]
 fn the_platform_moves_beside_locked_axes() {
     let constants = constants(|_, parameters| {

@@ -1,4 +1,5 @@
-//! Regularity at the knots of a stop near a bound: of the pose itself, of the poses around it, and the effort for it.
+//! Tests of the regularity at the knots of a stop near a bound: at the pose itself, at the poses around it,
+//! and the effort.
 
 use fearless_simd::{Level, dispatch};
 
@@ -15,8 +16,8 @@ use crate::control::signals::limits::Limit;
 use crate::model::inverse_geometry::universal_sine;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-/// Between knots a leg may come half as near to the first axis of its universal joint, at a knot it may not: but for the return
-/// of a reference that is there already.
+/// Between knots the sine of the angle between a leg and the first axis of its universal joint may be half as
+/// large, at a knot it may not. A reference that is there already may return.
 #[test]
 fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
     let mut samples = RandomVectors::new(91);
@@ -42,7 +43,7 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
     }
 }
 
-/// A ball that covers only a knot, or only the poses around it, which may be less regular, leaves a knot to examine.
+/// A knot needs balls that cover both the knot and the poses around it, which may be less regular.
 #[test]
 fn a_knot_is_covered_with_the_poses_around_it() {
     let mut samples = RandomVectors::new(92);
@@ -53,7 +54,7 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| dispatch!(machine.level, simd => balls.prove_knot_from_kept(simd, constants, &pose, Pair { angular: 0.0, linear: reach }));
         let mut balls = RegularBalls::default();
         assert!(!covered(&mut balls, &constants, 0.0));
-        // Too small for its reach, it is kept all the same for the knot itself.
+        // A ball that is too small for the reach is kept for the knot itself.
         assert!(!is_covered(&mut balls, &constants, &pose, Pair { angular: 0.0, linear: 10.0 }));
         assert!(covered(&mut balls, &constants, 0.0) && !covered(&mut balls, &constants, 10.0));
         constants.reference_condition = 1.0;
@@ -61,7 +62,8 @@ fn a_knot_is_covered_with_the_poses_around_it() {
     }
 }
 
-/// A stop that needs more balls than a cycle may compute is refused, and accepted in a later cycle with those that were kept.
+/// A stop that needs more balls than the effort allows is refused. In a later cycle it is accepted, with the
+/// balls that were kept.
 #[test]
 fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
     let mut samples = RandomVectors::new(93);
@@ -87,7 +89,7 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
     assert!(later > 4, "{later}");
 }
 
-/// What the walls took of the effort of a step is missing for its verification.
+/// The verification has only the effort that the walls left.
 #[test]
 fn a_step_without_effort_left_is_refused() {
     let mut samples = RandomVectors::new(95);
@@ -110,7 +112,8 @@ fn a_step_without_effort_left_is_refused() {
     }
 }
 
-/// No pose of a stop is farther from a state than the reach around it, and where the velocity is small some are almost as far.
+/// No pose of a stop is farther from a state than the reach around it. Where the velocity is small, some
+/// poses are almost as far.
 #[test]
 fn a_stop_moves_no_farther_than_its_reach() {
     let mut samples = RandomVectors::new(94);

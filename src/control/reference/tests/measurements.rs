@@ -1,4 +1,4 @@
-//! Validation of measurements: each check alone, next to its bound.
+//! Tests of the validation of measurements: each check alone, next to its bound.
 
 use crate::control::cycle::Cycle;
 use crate::control::reference::tests::*;
@@ -16,7 +16,7 @@ fn constants() -> Constants {
     Constants::new(&machine, Parameters { max_age_at_arrival_ns: 5 * MS, ..parameters(&machine) })
 }
 
-/// Validators in a state, and the lengths at home.
+/// Validator in a state, and the leg lengths at home.
 struct Bench {
     constants: Constants,
     state: State,
@@ -31,7 +31,7 @@ impl Bench {
         Self { constants, state, validator: MeasurementValidator::default(), home }
     }
 
-    /// At home at the first cycle, with rates of every leg.
+    /// Bench after a first cycle at home, with the same rate for every leg.
     fn begun(state: State, rate: Option<f64>) -> Self {
         let mut bench = Self::new(state);
         let first = Measurement { rate: rate.map(|rate| [rate; LEGS]), ..bench.at(0, 0.0) };
@@ -39,13 +39,13 @@ impl Bench {
         bench
     }
 
-    /// Every leg longer than at home.
+    /// Measurement in which every leg is longer than at home.
     fn at(&self, after_ns: u64, longer: f64) -> Measurement {
         let length = self.home.map(|length| length + longer);
         Measurement { time_ns: START_NS + after_ns, length, ..Measurement::default() }
     }
 
-    /// The time stamp of the valid measurement in a cycle.
+    /// Time stamp of the valid measurement in a cycle.
     fn validate(&mut self, after_ns: u64, newest: Option<&Measurement>) -> Result<u64, Diagnostic> {
         let cycle = Cycle { constants: &self.constants, release_ns: START_NS + after_ns, state: self.state };
         self.validator.validate(&cycle, newest).map(|valid| valid.time_ns)
@@ -55,7 +55,7 @@ impl Bench {
         self.validate(after_ns, Some(new)) == Ok(new.time_ns)
     }
 
-    /// The code with which the first message of all is refused.
+    /// Code with which the very first message is rejected.
     fn first(new: impl FnOnce(&Self) -> Measurement) -> Option<DiagnosticCode> {
         let mut bench = Self::new(State::Standby);
         let new = new(&bench);
@@ -91,7 +91,8 @@ fn the_first_measurement_is_finite_within_the_stroke_and_recent() {
             }
         }
     }
-    // A tenth of the period ahead; five milliseconds old; beyond the timeout the stamp is not from this clock.
+    // Accepted up to a tenth of the period ahead and up to 5 ms old. Beyond the timeout the stamp is not from
+    // this clock.
     let stamped = |offset_ns: i64| {
         Bench::first(|bench| Measurement {
             time_ns: START_NS.saturating_add_signed(offset_ns),
@@ -119,7 +120,7 @@ fn lengths_change_no_faster_than_a_drive_under_an_external_force() {
                 let mut bench = Bench::begun(state, None);
                 let new = bench.at(MS, sign * share * bound);
                 assert_eq!(bench.accepts(MS, &new), is_accepted, "{state:?} {sign} {share}");
-                // It is as if nothing had arrived.
+                // A rejected measurement counts as missing.
                 let missed = u64::from(state == State::Active && !is_accepted);
                 assert_eq!(bench.validator.missed, missed);
                 // The same message is not validated twice.
@@ -128,13 +129,13 @@ fn lengths_change_no_faster_than_a_drive_under_an_external_force() {
             }
         }
     }
-    // Time does not go back.
+    // A measurement earlier than the previous one is rejected.
     let mut bench = Bench::begun(State::Active, None);
     let before = Measurement { time_ns: START_NS - 1, ..bench.at(0, 0.0) };
     assert!(!bench.accepts(MS, &before));
 }
 
-/// While measurements are rejected the plausible change grows for two cycles only.
+/// While measurements are rejected, the plausible change grows for two cycles only.
 #[test]
 fn rejected_measurements_do_not_widen_the_plausible_change() {
     for is_rate in [false, true] {
@@ -145,7 +146,7 @@ fn rejected_measurements_do_not_widen_the_plausible_change() {
                 far.rate = is_rate.then_some([0.0; LEGS]);
                 assert!(!is_disturbed || !bench.accepts(k * MS, &far));
             }
-            // As far as two cycles allow, and as five do.
+            // A change that five cycles allow, and one that two cycles allow.
             let change = |s: f64| if is_rate { 60.0 * s } else { 1.5 * s };
             for (seconds, is_accepted) in [(4.5e-3, !is_disturbed), (1.9e-3, true)] {
                 let mut new =
@@ -158,8 +159,8 @@ fn rejected_measurements_do_not_widen_the_plausible_change() {
     }
 }
 
-/// After a pause within the timeout the measurement that waited is too old; the next one shows how far the legs moved
-/// meanwhile.
+/// After a pause within the timeout, the measurement that waited is too old. The next measurement shows how
+/// far the legs moved meanwhile.
 #[test]
 fn a_measurement_that_waited_while_the_loop_paused_does_not_refuse_those_after_it() {
     for (rate, is_accepted) in [(1.0, true), (2.0, false)] {
@@ -181,7 +182,7 @@ fn rates_change_no_faster_than_a_drive_accelerates_and_are_those_of_the_lengths(
             let new = Measurement { rate: Some([rate; LEGS]), ..bench.at(MS, 0.5 * rate * 1e-3) };
             assert_eq!(bench.accepts(MS, &new), is_accepted, "{sign} {share}");
         }
-        // Lengths that stand while rates move; lengths that move as the rates say.
+        // Lengths that do not move despite their rates, then lengths that move at their rates.
         for is_consistent in [false, true] {
             let rate = sign * 0.05;
             let mut bench = Bench::begun(State::Active, Some(rate));
@@ -195,7 +196,8 @@ fn rates_change_no_faster_than_a_drive_accelerates_and_are_those_of_the_lengths(
     }
 }
 
-/// Without control a measurement need not continue one beyond the timeout: under control, nothing else does.
+/// Without control a measurement after the timeout need not continue the previous one. Under control it is
+/// rejected.
 #[test]
 fn a_gap_ends_control_and_without_control_the_pose_may_be_another() {
     let mut bench = Bench::begun(State::Standby, None);
@@ -204,7 +206,7 @@ fn a_gap_ends_control_and_without_control_the_pose_may_be_another() {
     let mut bench = Bench::begun(State::Standby, None);
     let elsewhere = bench.at(11 * MS, 0.3);
     assert!(bench.accepts(11 * MS, &elsewhere));
-    // A measurement that is fresh again does not continue control after a gap.
+    // After a gap, a fresh measurement does not continue control.
     let mut bench = Bench::begun(State::Active, None);
     let fresh = bench.at(11 * MS, 0.0);
     assert!(!bench.accepts(11 * MS, &fresh));

@@ -1,4 +1,5 @@
-//! Proofs of the reference generator against dense searches for a counterexample, next to what is just accepted.
+//! Tests of the reference generator: dense searches for a counterexample, next to motions that are just
+//! accepted.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -44,7 +45,7 @@ const LIMITS: Limits = Limits {
     autonomous_scale: 0.3,
 };
 
-/// A machine of about two metres with pairs of joints, some of them scattered.
+/// Machine of about two metres with pairs of joints, more or less scattered.
 pub(super) fn machine(samples: &mut RandomVectors) -> Machine {
     let scatter = 0.1 * samples.uniform();
     let mut ring = |radius: f64, offset: f64, spread: f64| {
@@ -130,7 +131,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
     }
 }
 
-/// A pose around home whose legs are within the stroke and whose condition is below that of the limit.
+/// Pose around home. The legs are within the stroke, and the condition is below the reference's limit.
 pub(super) fn pose(samples: &mut RandomVectors, constants: &Constants) -> Pose {
     let Pose { rotation, position } = *constants.home.pose();
     loop {
@@ -146,7 +147,7 @@ pub(super) fn pose(samples: &mut RandomVectors, constants: &Constants) -> Pose {
     }
 }
 
-/// The last value at which a test holds, between one at which it does and one at which it does not.
+/// Last value at which a test holds, between `holds` and `fails`.
 fn bisected(mut holds: f64, mut fails: f64, mut test: impl FnMut(f64) -> bool) -> f64 {
     for _ in 0..40 {
         let middle = 0.5 * (holds + fails);
@@ -155,7 +156,8 @@ fn bisected(mut holds: f64, mut fails: f64, mut test: impl FnMut(f64) -> bool) -
     holds
 }
 
-/// Whether balls, and new ones as far as needed, prove the poses within a reach of one, within the condition of the reference.
+/// Whether balls prove all poses within a reach of a pose, with the reference's bounds. New balls are added
+/// as needed.
 fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: Pair<f64>) -> bool {
     let around = RegularityQuery { pose, reach, required: Regularity::of_reference(constants) };
     balls.prove(constants, &around, &mut u32::MAX.clone())

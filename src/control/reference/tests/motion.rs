@@ -1,4 +1,5 @@
-//! The reference between the ends of its steps: against an integration of its own acceleration in short steps.
+//! Tests of the reference between the ends of its steps, against an integration of its acceleration in short
+//! steps.
 
 use nalgebra::Vector6;
 
@@ -19,14 +20,15 @@ use crate::model::task::TaskState;
 
 const MS: u64 = 1_000_000;
 
-/// A motion around home in every coordinate.
+/// Motion around home in every coordinate.
 fn moving(samples: &mut RandomVectors, constants: &Constants) -> Motion {
     let twist = Twist { angular: samples.vector(0.4), linear: samples.vector(0.4) };
     let acceleration = Acceleration { angular: samples.vector(3.0), linear: samples.vector(3.0) };
     Motion { twist, acceleration, ..at_rest(&pose(samples, constants)) }
 }
 
-/// Motion `dt` seconds after another with constant jerk, the attitude in short steps by the angular velocity in their middle.
+/// Motion `dt` seconds later at constant jerk. The attitude is integrated in short steps, by the angular
+/// velocity in the middle of each.
 fn integrated(motion: &Motion, jerk: &Vector6<f64>, dt: f64) -> Motion {
     let (v, a) = (motion.twist.vector(), motion.acceleration.vector());
     let twist = |t: f64| Twist::from_vector(&(v + a * t + jerk * (0.5 * t * t)));
@@ -65,7 +67,7 @@ fn the_history_returns_the_motion_of_each_instant() {
         recorded.push((motion, jerk));
         motion = integrated(&motion, &jerk, 1e-3);
     }
-    // Of the newest 128 segments: their begins, within, and after the last.
+    // In each of the newest 128 segments: at its start, within it, and just before its end.
     #[allow(clippy::needless_range_loop, reason = "the index is the cycle")]
     for k in 572..700_usize {
         let (motion, jerk) = &recorded[k];
@@ -79,14 +81,15 @@ fn the_history_returns_the_motion_of_each_instant() {
     let (last, jerk) = recorded[699];
     let after = history.motion_at(1699 * MS + 1_500_000).unwrap();
     assert_near(&after, &integrated(&last, &jerk, 1.5e-3), [1e-7, 1e-12, 1e-9]);
-    // Before the oldest: with its acceleration.
+    // Before the oldest segment: with its acceleration.
     let before = history.motion_at(1571 * MS).unwrap();
     assert_near(&before, &integrated(&recorded[572].0, &Vector6::zeros(), -1e-3), [1e-7, 1e-12, 1e-9]);
     history.clear();
     assert!(history.motion_at(1699 * MS).is_none());
 }
 
-/// `deviation_of` against the deviation from the motion that is extrapolated on its own: the rest is of second order.
+/// `deviation_of` against the deviation from the separately extrapolated motion: the remainder is of second
+/// order.
 #[test]
 fn the_deviation_of_a_setpoint_is_right_to_first_order() {
     let mut samples = RandomVectors::new(32);
@@ -108,7 +111,7 @@ fn the_deviation_of_a_setpoint_is_right_to_first_order() {
             let desired = integrated(&setpoint.motion, &Vector6::zeros(), dt);
             let deviation = reference.deviation_of(&constants.parameters, &setpoint);
             let expected = motion.pose.displacement_to(&desired.pose).vector();
-            // The rest: half of the product of the two turns.
+            // Remainder: half of the product of the two rotations.
             let rest = offset.angular.norm() * 0.5 * dt + 0.5 * dt * dt * dt + 1e-9;
             assert!((deviation.pose.vector() - expected).norm() <= rest, "{dt}");
             let twist = desired.twist.vector() - motion.twist.vector();
@@ -117,7 +120,7 @@ fn the_deviation_of_a_setpoint_is_right_to_first_order() {
     }
 }
 
-/// A step of the generator, and a stop that it follows, against the integration of what it did.
+/// A step of the generator, and a stop that it follows, against the integration of its own acceleration.
 #[test]
 fn steps_and_stops_move_the_pose_as_their_twist_says() {
     let mut samples = RandomVectors::new(33);
@@ -139,7 +142,7 @@ fn steps_and_stops_move_the_pose_as_their_twist_says() {
             let next = reference.motion();
             let jerk = (next.acceleration.vector() - expected.acceleration.vector()) / 1e-3;
             let moved = integrated(&expected, &jerk, 1e-3);
-            // A stop may change its jerk within a step.
+            // A stop may change its jerk within a step; such steps are left out.
             if (next.twist.vector() - moved.twist.vector()).norm() < 1e-12 {
                 assert_near(next, &moved, [1e-9, 1e-12, 1e-9]);
                 steps += 1;
@@ -170,7 +173,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
     let [shortest, longest] = [machine.actuator.min_length + 0.1, machine.actuator.max_length - 0.1];
     assert_eq!((nominal.shortest, nominal.longest), ([shortest; LEGS], [longest; LEGS]));
     let room = 2.5e-5 * machine.actuator.stroke();
-    // Two rooms before the end stops.
+    // Relaxed bounds keep two rooms from the end stops.
     let (low, high) = (machine.actuator.min_length + 2.0 * room, machine.actuator.max_length - 2.0 * room);
     let stops = [low, f64::NEG_INFINITY, -high, f64::NEG_INFINITY];
     let ends = |bounds: &PoseBounds| {
@@ -212,7 +215,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
     }
 }
 
-/// A leg that stands half a room from its end stop may come back and has no room towards it.
+/// A leg half a room from its end stop may return, and has no room towards the end stop.
 #[test]
 fn relaxed_bounds_keep_their_distance_from_the_end_stops() {
     let free = generator::constants(|_, parameters| parameters.stroke_margin = 0.01);
@@ -235,7 +238,7 @@ fn relaxed_bounds_keep_their_distance_from_the_end_stops() {
     }
 }
 
-/// With the axis of rotation turning meanwhile: to fourth order in the step.
+/// The axis of rotation turns during the step. The attitude is right to fourth order in the step.
 #[test]
 fn a_long_step_turns_as_its_angular_velocity_says() {
     let mut samples = RandomVectors::new(35);
@@ -251,7 +254,7 @@ fn a_long_step_turns_as_its_angular_velocity_says() {
     }
 }
 
-/// A part of a stop also: the sign of the commutator shows.
+/// The same for a part of a stop: a wrong sign of the commutator would show.
 #[test]
 fn a_part_of_a_stop_turns_as_its_angular_velocity_says() {
     let mut samples = RandomVectors::new(36);
@@ -260,7 +263,7 @@ fn a_part_of_a_stop_turns_as_its_angular_velocity_says() {
     for _ in 0..200 {
         let motion = moving(&mut samples, &constants);
         let stop = PoseStop::new(StopKind::ReleaseFirst, &motion, &LIMITS);
-        // Less than the time in which the acceleration is released: the jerk is constant.
+        // Shorter than the release of the acceleration, so that the jerk is constant.
         let h = 0.9 * 0.01_f64.min(motion.acceleration.angular.norm() / LIMITS.orientation.jerk);
         let found =
             advanced(&motion.pose, &stop.state_at(Level::new(), 0.0), &stop.state_at(Level::new(), h), h);

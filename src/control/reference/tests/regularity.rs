@@ -1,4 +1,5 @@
-//! Balls of poses: hill climbing for a pose beyond the limit of the condition, or beyond a singular pose.
+//! Tests of the balls of poses: hill climbing for a pose beyond the limit of the condition, or beyond a
+//! singular pose.
 
 use nalgebra::Vector6;
 
@@ -6,7 +7,7 @@ use crate::control::reference::proof::regularity::RegularBalls;
 use crate::control::reference::tests::*;
 use crate::model::rigid::Twist;
 
-/// The pose of a ball at six numbers: rotation and shift as parts of the largest.
+/// Pose of a ball for six numbers: rotation and shift as ratios of the largest ones.
 pub(super) fn within(
     center: &Pose,
     Pair { angular: turn, linear: shift }: Pair<f64>,
@@ -19,14 +20,14 @@ pub(super) fn within(
     Pose { rotation: exp(&(part(0) * turn)) * center.rotation, position: center.position + part(3) * shift }
 }
 
-/// Inverse of the condition with the sign of the determinant: 0 at a singular pose.
+/// Inverse condition with the sign of the determinant: 0 at a singular pose.
 fn inverse_condition(constants: &Constants, pose: &Pose) -> f64 {
     let state = KinematicState::new(constants.machine(), *pose);
     let sensitivity = state.sensitivity();
     (sensitivity.determinant * constants.home.sensitivity().determinant).signum() / sensitivity.condition
 }
 
-/// The smallest inverse condition that a climb finds in a ball.
+/// Smallest inverse condition that hill climbing finds in a ball.
 fn worst(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: Pair<f64>) -> f64 {
     let mut worst = f64::INFINITY;
     for _ in 0..3 {
@@ -60,7 +61,7 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
             constants.reference_condition = at * (1.0 + 10.0_f64.powf(3.0 * samples.uniform() - 2.0));
             let [linear, angular] =
                 [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
-            // The ball that is asked about is beside the one that is kept.
+            // The poses of the query are beside the ball that is kept.
             let mut balls = RegularBalls::default();
             if !is_covered(&mut balls, &constants, &near, Pair::default()) {
                 continue;
@@ -82,7 +83,7 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
     assert!(accepted > 150 && closest > 0.8, "{accepted} balls, {closest}");
 }
 
-/// The bounds of the module's documentation, evaluated from matrices.
+/// The bounds of the module's documentation, evaluated with matrices.
 #[test]
 fn a_ball_ends_where_its_equations_say() {
     use crate::model::inverse_jacobian::scaled_wrenches;
@@ -107,7 +108,8 @@ fn a_ball_ends_where_its_equations_say() {
             let [linear, angular] = [samples.uniform(), samples.uniform()];
             let ratio = Pair { angular, linear };
             let reach = |size: f64| ratio.map(|ratio| ratio * size);
-            // Beside the centre of a ball that is kept: by this ball or by a new one.
+            // The poses of the query are beside the centre of a kept ball. This ball covers them, or a new
+            // one.
             let mut balls = RegularBalls::default();
             assert!(is_covered(&mut balls, &constants, &center, Pair::default()));
             let offset = Twist { angular: samples.vector(0.05), linear: samples.vector(0.05) };

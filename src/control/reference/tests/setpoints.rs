@@ -1,4 +1,5 @@
-//! Setpoints between their validation and the reference: one that is not valid is no target, and a gap gives no jerk.
+//! Tests of setpoints between validation and reference: an invalid setpoint is no target, and a gap gives no
+//! jerk.
 
 use crate::control::cycle::Cycle;
 use crate::control::law::error_tracker::setpoint_error;
@@ -51,7 +52,7 @@ fn a_setpoint_that_is_not_valid_is_neither_approached_nor_compared_with() {
     }
 }
 
-/// Of accelerations at most 25 ms apart, in the order of their stamps.
+/// The accelerations are at most 25 ms apart, in the order of their stamps.
 #[test]
 fn the_jerk_of_a_setpoint_is_that_of_motions_without_a_gap() {
     let machine = machine(&mut RandomVectors::new(73));

@@ -1,4 +1,5 @@
-//! Errors under control: a measurement that leaves the prediction ends the trust, one that is not new changes no error.
+//! Tests of the errors under control: a measurement far from the prediction is not trusted, and a measurement
+//! that is not new changes no error.
 
 use nalgebra::Vector6;
 
@@ -17,7 +18,8 @@ use crate::model::rigid::Twist;
 
 const MS: u64 = 1_000_000;
 
-/// Updates of a tracker that began at 0: the error, for each a time stamp \[ms\] and a displacement from home.
+/// Error after updates of a tracker that began at 0. Each update has a time stamp \[ms\] and a displacement
+/// from home.
 fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, Twist)]) -> PoseError {
     let home = *constants.home.pose();
     let mut reference = ReferenceGenerator::new(constants);
@@ -54,7 +56,8 @@ fn a_leg_that_leaves_the_prediction_ends_the_trust() {
         unit.fixed_rows_mut::<3>(3).copy_from(&direction);
         let of_legs = leg_wrenches(&machine, constants.home.pose()).tr_mul(&unit).abs();
         let largest = of_legs.max();
-        // The last two: the platform is farther away than the bound, then also its farthest leg.
+        // In the second case the platform is beyond the bound, but no leg is. In the third case the farthest
+        // leg is, too.
         for (distance, is_trusted) in [(0.99, true), (0.97 / largest, true), (1.03 / largest, false)] {
             let mut tracker = ErrorTracker::default();
             let displacement = Twist { linear: direction * (distance * bound), ..Twist::default() };

@@ -1,4 +1,5 @@
-//! Balls of poses: hill climbing for a leg that is nearer to the axis of its universal joint than the ball's limit.
+//! Tests of the balls of poses: hill climbing for a leg that is nearer to the axis of its universal joint
+//! than the ball's limit.
 
 use nalgebra::Vector6;
 
@@ -7,7 +8,7 @@ use crate::control::reference::tests::regularity::within;
 use crate::control::reference::tests::*;
 use crate::model::inverse_geometry::universal_sine;
 
-/// The least sine that a climb finds in a ball.
+/// Smallest sine that hill climbing finds in a ball.
 fn least(samples: &mut RandomVectors, constants: &Constants, center: &Pose, reach: Pair<f64>) -> f64 {
     let sine = |numbers: &Vector6<f64>| universal_sine(constants.machine(), &within(center, reach, numbers));
     let mut best = Vector6::from_fn(|_, _| 2.0 * samples.uniform() - 1.0);

@@ -1,4 +1,5 @@
-//! Verified stops: each is played finely next to the bound with which it was just accepted.
+//! Tests of verified stops: each stop is played in fine steps, next to the bound with which it was just
+//! accepted.
 
 use fearless_simd::Level;
 
@@ -14,12 +15,13 @@ use crate::model::inverse_geometry::leg_lengths_and_rates;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 use crate::model::task::task_coordinates;
 
-/// Time between the poses that are examined \[s\].
+/// Time between the poses that are played \[s\].
 const PLAY_STEP_S: f64 = 2e-4;
-/// What a length may exceed its bound by between knots, over the stroke; and an angle at the outermost joint.
+/// Distance by which a length may exceed its bound between knots, as a part of the stroke. An angle may
+/// exceed its bound by as much at the outermost joint.
 const ROOM_RATIO: f64 = 2.6e-5;
 
-/// Largest values along a stop.
+/// Extreme values along a stop.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extremes {
     pub shortest: [f64; LEGS],
@@ -30,7 +32,7 @@ pub(super) struct Extremes {
     /// Smallest inverse condition, with the sign of the determinant.
     pub inverse_condition: f64,
     pub speeds: [f64; 2],
-    /// Speeds where the step begins.
+    /// Speeds at the start of the step.
     begin: [f64; 2],
 }
 
@@ -55,7 +57,8 @@ impl Extremes {
     }
 }
 
-/// Plays a step backward and a stop forward, the attitude by the angular velocity in the middle of short steps.
+/// Plays a step backward and a stop forward. The attitude is integrated in short steps, by the angular
+/// velocity in the middle of each.
 fn play(constants: &Constants, motion: &Motion, step: &PlayedStep, kind: StopKind) -> Extremes {
     let infinite = [f64::INFINITY; 6];
     let mut extremes = Extremes {
@@ -102,7 +105,7 @@ fn play(constants: &Constants, motion: &Motion, step: &PlayedStep, kind: StopKin
     extremes
 }
 
-/// The step before the motion.
+/// Step before the motion.
 pub(super) struct PlayedStep {
     pub from: Option<Pose>,
     pub duration: f64,
@@ -117,7 +120,7 @@ impl PlayedStep {
     }
 }
 
-/// A motion within the limits, often with a part of them only.
+/// Motion within the limits, often within a fraction of them.
 fn motion(samples: &mut RandomVectors, constants: &Constants) -> (Motion, PlayedStep) {
     let Limits { position, orientation, .. } = constants.parameters.limits;
     let part = 10.0_f64.powf(-samples.uniform());
@@ -140,7 +143,7 @@ fn motion(samples: &mut RandomVectors, constants: &Constants) -> (Motion, Played
     (Motion { twist, acceleration, ..at_rest(&pose) }, step)
 }
 
-/// A scene: bounds so wide that any stop is accepted, but for one that is bisected.
+/// Scene in which every bound is so wide that any stop is accepted. A test bisects one bound.
 pub(super) struct Scene {
     pub constants: Constants,
     pub bounds: PoseBounds,
@@ -157,7 +160,7 @@ impl Scene {
         let mut parameters = parameters(&machine);
         parameters.envelope = Some(Envelope { lowest: [-10.0; 6], highest: [10.0; 6] });
         if samples.below(2) == 0 {
-            // Long stops, whose knots are far apart.
+            // Long stops have knots far apart.
             for limits in [&mut parameters.limits.position, &mut parameters.limits.orientation] {
                 limits.acceleration *= 0.2;
                 limits.jerk *= 0.1;
@@ -179,7 +182,7 @@ impl Scene {
         self.constants.reference_condition = condition;
     }
 
-    /// In one of the cycles that share the effort of a long stop.
+    /// Verifies the stop, in up to three cycles that share its effort.
     pub fn verify(&self) -> Result<StopKind, Refusal> {
         let (mut verifier, mut brake_at_once) = (Verifier::default(), PoseStop::default());
         let mut verify = || {
@@ -201,8 +204,8 @@ impl Scene {
         play(&self.constants, &self.motion, &self.step, kind)
     }
 
-    /// Moves a bound from one at which the stop is accepted towards one at which it is not, and back to the last at which
-    /// it is; the extremes of the stop there, and the bound.
+    /// Bisects a bound between `wide`, where the stop is accepted, and `narrow`, where it is not. Returns the
+    /// extremes of the stop at the last accepted bound, and this bound.
     pub fn tightened(
         &mut self,
         wide: f64,
@@ -220,7 +223,7 @@ impl Scene {
     }
 }
 
-/// Largest and mean use of a bound.
+/// Use of a bound: the largest, the number of all, and the number near the bound.
 #[derive(Debug, Default)]
 struct Uses {
     largest: f64,
@@ -229,7 +232,8 @@ struct Uses {
 }
 
 impl Uses {
-    /// `excess` is the distance beyond the bound, `near` how far short of it is near.
+    /// Adds the use with a distance `excess` beyond the bound. It is near if it is less than `near` short of
+    /// the bound.
     fn add(&mut self, excess: f64, near: f64) {
         self.largest = if self.count == 0 { excess } else { self.largest.max(excess) };
         self.count += 1;
@@ -278,7 +282,7 @@ fn coordinates_stay_within_an_envelope_that_is_just_accepted() {
     let mut uses = [Uses::default(), Uses::default()];
     for k in 0..900 {
         let mut scene = Scene::new(&mut samples);
-        // Steep angles, where their rates are larger.
+        // Steep angles, whose rates are larger.
         if samples.below(2) == 0 {
             let tilt = Vector3::y() * (1.0 * samples.uniform());
             scene.motion.pose.rotation = exp(&tilt);
@@ -332,7 +336,7 @@ fn velocities_stay_within_limits_that_are_just_accepted() {
                 limits.velocity = bound;
             };
             let Some((extremes, bound)) = scene.tightened(100.0, 0.0, set) else { continue };
-            // Else the motion before exceeded the limit, which was not accepted.
+            // A motion beyond the limit before the step would not have been accepted.
             if extremes.begin[part] > bound {
                 continue;
             }

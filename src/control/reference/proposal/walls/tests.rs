@@ -26,7 +26,7 @@ struct WallEnd {
     multiplier: f64,
 }
 
-/// Both ends of each wall, the one along the gradient first.
+/// Both ends of each wall; the end along the gradient comes first.
 fn ends(walls: &Walls) -> Vec<WallEnd> {
     let of = |wall: &Wall, sign: f64, end: End| WallEnd {
         limit: wall.limit,
