@@ -8,7 +8,7 @@ use crate::control::law::estimator::covariance::NoiseModel;
 use crate::control::law::input_matrix::InputMatrix;
 use crate::control::monitoring::disturbance_monitor::DisturbanceBounds;
 use crate::control::monitoring::frozen_sensors::FrozenLegBounds;
-use crate::control::monitoring::weighting::least_disturbance;
+use crate::control::monitoring::weighting::least_missing_force_acceleration;
 use crate::control::parameters::Parameters;
 use crate::control::sensing::standstill::window_s;
 use crate::model::active_forces::InverseDynamics;
@@ -50,7 +50,7 @@ pub struct Constants {
     /// Length of the window in which lengths alone show rest \[s\].
     pub(super) rest_window_s: f64,
     /// Constants of the estimator of the leg rates.
-    pub leg_rates: EstimatorConstants,
+    pub leg_rate_estimator: EstimatorConstants,
     /// Largest condition of the reference. It is below the platform's limit, to leave room for the following
     /// error.
     pub reference_condition: f64,
@@ -76,7 +76,8 @@ impl Constants {
         let disturbance = input_matrix.largest_compensable(saturation);
         let error_radius = if parameters.law.mode.acts_on_legs() { 1.0 } else { arm };
         let by_force = input_matrix.acceleration_by_force(machine, home.pose());
-        let least_missing = least_disturbance(&by_force, error_radius, machine.actuator.max_force);
+        let least_missing =
+            least_missing_force_acceleration(&by_force, error_radius, machine.actuator.max_force);
         let expects_forces = parameters.law.mode.includes_inertia();
         let unbounded = Vector6::repeat(f64::INFINITY);
         let disturbance_bounds =
@@ -103,7 +104,7 @@ impl Constants {
                     + parameters.law.acceleration_left_to_feedback(&parameters.limits, arm, &disturbance),
             ),
             rest_window_s: window_s(&parameters),
-            leg_rates: EstimatorConstants::new(
+            leg_rate_estimator: EstimatorConstants::new(
                 lengths_only,
                 parameters.reading_errors,
                 unbounded,

@@ -134,7 +134,7 @@ impl Controller {
     /// remain.
     // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
-    pub fn exchange_constants(&mut self, new: &mut Self) {
+    pub fn exchange_configuration(&mut self, new: &mut Self) {
         core::mem::swap(&mut self.constants, &mut new.constants);
         core::mem::swap(&mut self.memory.reference, &mut new.memory.reference);
         self.memory.setpoints.forget();
@@ -156,7 +156,7 @@ impl Controller {
 
         // Locate the platform.
         let mut located = measurement.and_then(|measurement| {
-            let rate = leg_rates.rates(&constants.leg_rates, measurement);
+            let rate = leg_rates.rates(&constants.leg_rate_estimator, measurement);
             localization.locate(&cycle, measurement, rate)
         });
         let free_motion = free_motion.update(&cycle, localization, located.as_ref().ok());
@@ -174,7 +174,7 @@ impl Controller {
             reports: &reports,
             is_ready: drives.is_ready,
             feedback: &memory.feedback,
-            sensor_diagnostic: errors.sensor_diagnostic(),
+            measurement_diagnostic: errors.measurement_diagnostic(),
             disturbance_diagnostic: errors.disturbance_diagnostic(),
             may_be_frozen: errors.may_be_frozen(),
         };

@@ -73,7 +73,7 @@ pub struct Parameters {
     /// Largest age of a measurement on arrival \[ns\]: the loop is stable if all measurements are as old.
     pub max_age_at_arrival_ns: u64,
     /// Longest time between two cycles of a running daemon, also without messages \[ns\].
-    pub longest_pause_ns: u64,
+    pub longest_cycle_gap_ns: u64,
 }
 
 impl Parameters {

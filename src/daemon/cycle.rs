@@ -42,7 +42,7 @@ pub struct RequestIntake {
     message: MessageId,
     /// Longest time between two cycles \[ns\] behind which a request of the topic may begin control: it may have been received
     /// before. 0 without a bound, in simulated time.
-    longest_pause_ns: u64,
+    longest_cycle_gap_ns: u64,
     /// When the last cycle woke.
     woke_ns: u64,
 }
@@ -50,8 +50,8 @@ pub struct RequestIntake {
 impl RequestIntake {
     /// Of a real-time thread whose cycles follow each other in real time, or in simulated time.
     pub fn new(is_simulated: bool) -> Self {
-        let longest_pause_ns = if is_simulated { 0 } else { MAX_REQUEST_AGE_NS };
-        Self { longest_pause_ns, ..Self::default() }
+        let longest_cycle_gap_ns = if is_simulated { 0 } else { MAX_REQUEST_AGE_NS };
+        Self { longest_cycle_gap_ns, ..Self::default() }
     }
 
     /// The request of a cycle that wakes at `now_ns`. Of two new ones that of higher precedence counts, of two equal
@@ -69,7 +69,7 @@ impl RequestIntake {
             self.message = request.message;
         }
         let pause_ns = now_ns.saturating_sub(core::mem::replace(&mut self.woke_ns, now_ns));
-        let was_held = self.longest_pause_ns > 0 && pause_ns > self.longest_pause_ns;
+        let was_held = self.longest_cycle_gap_ns > 0 && pause_ns > self.longest_cycle_gap_ns;
         let from_topic = from_topic.filter(|topic| !(was_held && topic.request.can_begin_control()));
         let from_word = if word == self.word { None } else { of_word(word, now_ns) };
         match (from_topic, from_word) {

@@ -159,9 +159,9 @@ impl<'o> Log<'o> {
         let codes = [DiagnosticCode::TwoMeasuredSources, DiagnosticCode::TwoSetpointSources];
         for ((before, now), code) in self.publishers.iter_mut().zip(now).zip(codes) {
             // Once for each pair, also if one of them is silent now and then.
-            if now.ignored != 0 && now != *before {
+            if now.ignored_pid != 0 && now != *before {
                 *before = now;
-                let two = Diagnostic::new(code, now.counting.into(), now.ignored.into());
+                let two = Diagnostic::new(code, now.used_pid.into(), now.ignored_pid.into());
                 warn!(cycle = record.cycle, number = code as u32, "{}", sentence(&two));
             }
         }

@@ -57,7 +57,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
         ready_timeout_ns: nanoseconds(deployment.drive.ready_timeout_s),
         pose_tolerance: deployment.noise.pose_tolerance_m,
         max_age_at_arrival_ns: nanoseconds(longest_age_s(deployment)),
-        longest_pause_ns: nanoseconds(longest_pause_s(deployment)),
+        longest_cycle_gap_ns: nanoseconds(longest_pause_s(deployment)),
         limits: limits.reference,
         force_rate: limits.force_rate_n_s,
         condition: limits.condition,

@@ -163,10 +163,10 @@ impl CycleMessage {
     fn set_input(&mut self, input: &Input) {
         (self.release_ns, self.deadline_missed) = (input.release_ns, u32::from(input.overrun_is_fault));
         self.clock_offset_ns = input.clock_offset_ns.cast_unsigned();
-        let Publishers { counting, ignored } = input.setpoint_publishers;
-        (self.setpoint_process, self.setpoint_process_ignored) = (counting, ignored);
-        let Publishers { counting, ignored } = input.measured_publishers;
-        (self.measured_process, self.measured_process_ignored) = (counting, ignored);
+        let Publishers { used_pid, ignored_pid } = input.setpoint_publishers;
+        (self.setpoint_process, self.setpoint_process_ignored) = (used_pid, ignored_pid);
+        let Publishers { used_pid, ignored_pid } = input.measured_publishers;
+        (self.measured_process, self.measured_process_ignored) = (used_pid, ignored_pid);
         if let Some(Setpoint { kind, time_ns, task, target_speed }) = input.setpoint {
             self.setpoint_target_speed = target_speed;
             (self.has_setpoint, self.setpoint_kind, self.setpoint_time_ns) = (1, kind as u32, time_ns);
@@ -264,12 +264,12 @@ impl CycleMessage {
             measurement: (self.has_measurement == 1).then_some(measurement),
             request,
             setpoint_publishers: Publishers {
-                counting: self.setpoint_process,
-                ignored: self.setpoint_process_ignored,
+                used_pid: self.setpoint_process,
+                ignored_pid: self.setpoint_process_ignored,
             },
             measured_publishers: Publishers {
-                counting: self.measured_process,
-                ignored: self.measured_process_ignored,
+                used_pid: self.measured_process,
+                ignored_pid: self.measured_process_ignored,
             },
             overrun_is_fault: self.deadline_missed == 1,
         })

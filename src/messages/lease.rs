@@ -110,9 +110,9 @@ impl<Id: Copy> Lease<Id> {
 
     /// Processes of the publisher that counts and of another that lives beside it.
     pub fn publishers(&self, now_ns: u64, is_listed: impl Fn(Id) -> bool) -> Publishers {
-        let counting = self.holding().map_or(0, |known| known.process_id);
+        let used_pid = self.holding().map_or(0, |known| known.process_id);
         let mut others = self.others(now_ns).filter(|known| is_listed(known.id));
-        Publishers { counting, ignored: others.next().map_or(0, |known| known.process_id) }
+        Publishers { used_pid, ignored_pid: others.next().map_or(0, |known| known.process_id) }
     }
 
     fn place(&self, epoch: Option<u64>) -> Option<usize> {
@@ -172,9 +172,9 @@ mod tests {
         }
 
         fn publishers(&self, now_ns: u64) -> [u32; 2] {
-            let Publishers { counting, ignored } =
+            let Publishers { used_pid, ignored_pid } =
                 self.lease.publishers(now_ns, |id| !self.left.contains(&id));
-            [counting, ignored]
+            [used_pid, ignored_pid]
         }
     }
 

@@ -38,8 +38,8 @@ pub fn row(input: &Input, before: &Row) -> Row {
     } = *input;
     let mut writer = Writer { row: *before, next: 1, flags: u64::from(overrun_is_fault), flag: 1 };
     writer.words([release_ns, clock_offset_ns.cast_unsigned()]);
-    for Publishers { counting, ignored } in [setpoint_publishers, measured_publishers] {
-        writer.words([counting, ignored].map(u64::from));
+    for Publishers { used_pid, ignored_pid } in [setpoint_publishers, measured_publishers] {
+        writer.words([used_pid, ignored_pid].map(u64::from));
     }
     writer.optional(setpoint.map(setpoint_words));
     let Measurement { time_ns, length, rate, pose, drives } = measurement.unwrap_or_default();
@@ -72,8 +72,8 @@ pub fn input(row: &Row) -> Input {
     let mut reader = Reader { row, next: 1, flag: 1 };
     let [release_ns, clock_offset_ns] = reader.words();
     let [setpoint_publishers, measured_publishers] = [(); 2].map(|()| {
-        let [counting, ignored] = reader.words().map(|process: u64| process as u32);
-        Publishers { counting, ignored }
+        let [used_pid, ignored_pid] = reader.words().map(|process: u64| process as u32);
+        Publishers { used_pid, ignored_pid }
     });
     let setpoint = reader.optional().map(|words| setpoint(&words));
     let measurement = reader.optional().map(|[time_ns, length @ ..]: [u64; 7]| (time_ns, length));

@@ -23,7 +23,7 @@ pub fn other_driver(config: &Config, bus: &Bus) -> Result<Option<String>, PortEr
     let began = Instant::now();
     while began.elapsed() < listening_time {
         if measured.receive_latest(false).is_some() {
-            return Ok(Some(named(measured.publishers().counting)));
+            return Ok(Some(named(measured.publishers().used_pid)));
         }
         thread::sleep(POLL_INTERVAL);
     }

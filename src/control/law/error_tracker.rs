@@ -51,7 +51,7 @@ pub(in crate::control) struct ErrorTracker {
     /// Measured minus estimated error, after the last measurement has corrected the estimate.
     residual: Vector6<f64>,
     /// Fault of a sensor or drive at the last measurement, or an implausible innovation.
-    sensor_diagnostic: Option<Diagnostic>,
+    measurement_diagnostic: Option<Diagnostic>,
     /// Change of payload, impact or oscillation at the last measurement.
     disturbance_diagnostic: Option<Diagnostic>,
 }
@@ -61,7 +61,7 @@ impl ErrorTracker {
     /// platform's motion. Returns the error.
     pub fn start(&mut self, constants: &Constants, measured_ns: u64, begin_ns: u64) -> PoseError {
         self.estimator.start(&constants.estimator, measured_ns, begin_ns, &ErrorCoordinates::default());
-        (self.sensors, self.drives, self.sensor_diagnostic) =
+        (self.sensors, self.drives, self.measurement_diagnostic) =
             (FrozenSensors::default(), DriveResponse::default(), None);
         (self.disturbance, self.disturbance_diagnostic) = (DisturbanceMonitor::default(), None);
         (self.error, self.residual) = (PoseError::default(), Vector6::zeros());
@@ -99,7 +99,7 @@ impl ErrorTracker {
                 check_innovation(constants, &innovation, interval_s, located)?;
                 drives.check(constants, disturbance_now, sent, &located.platform.pose, interval_s)
             };
-            self.sensor_diagnostic = check().err();
+            self.measurement_diagnostic = check().err();
             self.disturbance_diagnostic = disturbance
                 .check(
                     &constants.disturbance_bounds,
@@ -133,13 +133,13 @@ impl ErrorTracker {
     }
 
     /// Frozen sensor, implausible innovation or missing drive force at the last measurement.
-    pub fn sensor_diagnostic(&self) -> Option<&Diagnostic> {
-        self.sensor_diagnostic.as_ref()
+    pub fn measurement_diagnostic(&self) -> Option<&Diagnostic> {
+        self.measurement_diagnostic.as_ref()
     }
 
     /// Whether a measured length repeats, so that its sensor may be frozen.
     pub fn may_be_frozen(&self) -> bool {
-        self.sensors.repeat()
+        self.sensors.may_be_frozen()
     }
 
     /// Change of payload, impact or oscillation at the last measurement.

@@ -53,7 +53,7 @@ impl FeedbackLimiter {
     ) -> Vector6<f64> {
         let parameters = &cycle.constants.parameters;
         let limited = match parameters.law.mode.acts_on_legs() {
-            true => limit_legs(cycle, wanted),
+            true => scale_leg_accelerations(cycle, wanted),
             false => limit_pose(parameters, desired, wanted),
         };
         let rate = if limited != *wanted { 1.0 } else { -FORGETTING_RATIO };
@@ -85,7 +85,7 @@ fn share_within(desired: &Vector3<f64>, added: &Vector3<f64>, bound: f64) -> f64
     (room / (mixed + (mixed * mixed + square * room).sqrt())).clamp(0.0, 1.0)
 }
 
-fn limit_legs(cycle: &Cycle<'_>, wanted: &Vector6<f64>) -> Vector6<f64> {
+fn scale_leg_accelerations(cycle: &Cycle<'_>, wanted: &Vector6<f64>) -> Vector6<f64> {
     let Parameters { limits, feedback_scale, law, .. } = &cycle.constants.parameters;
     let limit = limits.position.acceleration + cycle.constants.arm * limits.orientation.acceleration;
     let bounds = law.saturation.map(|saturation| (1.0 + feedback_scale) * limit + saturation);

@@ -47,7 +47,7 @@ const HIDDEN_LIFT_RATIO: f64 = 0.02;
 const LIMITED_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
 /// Smallest weight in a motion, relative to the weight at rest: a falling platform has no weight to compare
 /// with.
-const LEAST_WEIGHT_RATIO: f64 = 0.3;
+const LEAST_APPARENT_GRAVITY_RATIO: f64 = 0.3;
 
 /// Default of `limits.disturbance_step_m_s2`, relative to the acceleration limit, of which 0.5 is
 /// compensated, and relative to the acceleration by the smallest missing force of a drive.
@@ -76,7 +76,7 @@ const SHAKING_RATIO: f64 = 1.0;
 const SHAKING_RATIO_WITHOUT_INERTIA: f64 = 4.0;
 /// The same ratio for a sudden disturbance that `[limits]` permits. A force that switches at 5 to 10 Hz
 /// causes 0.9 (2026-11-23).
-const SWING_BY_STEP: f64 = 1.5;
+const MAX_SWING_BY_DISTURBANCE_STEP: f64 = 1.5;
 /// Rate at which the reference's shaking is forgotten, relative to the rate at which its slow part follows.
 const FORGETTING_RATIO: f64 = 0.3;
 
@@ -126,7 +126,7 @@ impl DisturbanceBounds {
         let softest = law.position.stiffness.min(law.orientation.stiffness);
         let softness = (SWING_STIFFNESS / softest).max(1.0);
         let swing = (SWING_M * softness * softness).min(MAX_SWING_M);
-        let by_step = SWING_BY_STEP * disturbance_step.unwrap_or(0.0) / softest;
+        let by_step = MAX_SWING_BY_DISTURBANCE_STEP * disturbance_step.unwrap_or(0.0) / softest;
         let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
         let payload_by_disturbance = -input_matrix.home_wrench_by_disturbance(machine).tr_mul(&along_gravity);
         let by_angles = payload_by_disturbance.fixed_rows::<3>(0).norm() / arm;
@@ -212,7 +212,7 @@ impl DisturbanceMonitor {
         acceleration: &Acceleration,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let weight_ratio = (1.0 - acceleration.linear.dot(&bounds.gravity)).max(LEAST_WEIGHT_RATIO);
+        let weight_ratio = (1.0 - acceleration.linear.dot(&bounds.gravity)).max(LEAST_APPARENT_GRAVITY_RATIO);
         let payload = bounds.payload_by_disturbance.dot(disturbance) / weight_ratio;
         self.payload += (payload - self.payload) * (dt / PAYLOAD_TIME_CONSTANT_S).min(1.0);
         let change = self.payload - self.usual_payload;

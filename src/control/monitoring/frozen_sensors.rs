@@ -120,7 +120,7 @@ impl FrozenSensors {
     }
 
     /// Whether any sensor has repeated its reading often enough to be frozen.
-    pub fn repeat(&self) -> bool {
+    pub fn may_be_frozen(&self) -> bool {
         self.equal_readings.iter().any(|equal| *equal + 1 >= MIN_EQUAL_READINGS)
     }
 

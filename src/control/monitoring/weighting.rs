@@ -7,7 +7,11 @@ use nalgebra::{Matrix6, Vector6};
 pub(in crate::control) const LEAST_FORCE_RATIO: f64 = 0.06;
 
 /// Smallest disturbance that may be a missing force, weighted by [`weighted`]; evaluated at home.
-pub(in crate::control) fn least_disturbance(by_force: &Matrix6<f64>, arm: f64, max_force: f64) -> f64 {
+pub(in crate::control) fn least_missing_force_acceleration(
+    by_force: &Matrix6<f64>,
+    arm: f64,
+    max_force: f64,
+) -> f64 {
     let columns = by_force.column_iter().map(|column| weighted(&column.into(), arm).norm());
     // At other poses a force may accelerate the platform less, hence the factor one half.
     0.5 * LEAST_FORCE_RATIO * max_force * columns.fold(f64::INFINITY, f64::min)

@@ -207,7 +207,7 @@ impl ReferenceGenerator {
     /// to this instant, to first order in the angle covered.
     pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> PoseError {
         let motion = &setpoint.motion;
-        let continued = setpoint.continued(setpoint.extrapolation_s(parameters, self.time_ns));
+        let continued = setpoint.continued(setpoint.bounded_extrapolation_s(parameters, self.time_ns));
         let error = PoseError::new(motion, &self.motion.pose, &self.motion.twist);
         PoseError {
             pose: Twist::from_vector(&(error.pose.vector() + continued.displacement)),

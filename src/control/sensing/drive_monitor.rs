@@ -17,7 +17,7 @@ const MAX_UNREADY_S: f64 = 0.02;
 
 /// Time constant of the filters of commanded and actual forces \[s\]: several times the dead time of a drive,
 /// so that the dead time does not count.
-const FORCE_TIME_CONSTANT_S: f64 = 0.03;
+const FORCE_FILTER_TIME_CONSTANT_S: f64 = 0.03;
 /// Plausible difference between actual and commanded force: this ratio of the command plus the next ratio of
 /// the largest force. It allows for scale, offset and friction of a drive.
 const FORCE_DIFFERENCE_RATIO: f64 = 0.2;
@@ -51,7 +51,7 @@ impl DriveMonitor {
         let Some(Measurement { drives, time_ns, .. }) = measurement else { return Ok(()) };
         // The actual force during a gap in the messages is unknown: a gap counts as one time constant at
         // most.
-        let dt = seconds_between(self.measured_ns, *time_ns).clamp(0.0, FORCE_TIME_CONSTANT_S);
+        let dt = seconds_between(self.measured_ns, *time_ns).clamp(0.0, FORCE_FILTER_TIME_CONSTANT_S);
         self.measured_ns = *time_ns;
         let unready = drives.unready();
         self.is_ready = unready.is_none();
@@ -91,7 +91,7 @@ impl DriveMonitor {
     }
 
     fn check_force(&mut self, max_force: f64, force: &[f64; LEGS], dt: f64) -> Result<(), Diagnostic> {
-        let share = dt / FORCE_TIME_CONSTANT_S;
+        let share = dt / FORCE_FILTER_TIME_CONSTANT_S;
         let filtered = self.commanded.iter_mut().zip(&mut self.actual).zip(&mut self.missing_s);
         for (leg, (((commanded, actual), missing_s), (sent, force))) in
             filtered.zip(self.sent.iter().zip(force)).enumerate()

@@ -22,7 +22,7 @@ const LENGTH_NOISE_RATIO: f64 = 1e-3;
 
 /// Tolerance of lengths against integrated rates, as a ratio of the travel: rates are filtered, late and not
 /// quite to scale. A wrong sign gives twice the travel, a wrong unit a thousand times.
-const RESIDUAL_PER_TRAVEL: f64 = 0.3;
+const RATE_INTEGRAL_TOLERANCE_PER_TRAVEL: f64 = 0.3;
 
 /// Constant part of that tolerance, as a ratio of the stroke: noise and delay of the rates. It is small
 /// because rates of the wrong sign double the error of the loop within milliseconds.
@@ -84,7 +84,9 @@ impl RateConsistency {
     /// one measurement to the next, for a motion within the limits.
     fn check(&self, actuator: &Actuator, step_error: f64) -> Result<(), Diagnostic> {
         for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
-            let bound = RESIDUAL_PER_TRAVEL * travel + RESIDUAL_NOISE_RATIO * actuator.stroke() + step_error;
+            let bound = RATE_INTEGRAL_TOLERANCE_PER_TRAVEL * travel
+                + RESIDUAL_NOISE_RATIO * actuator.stroke()
+                + step_error;
             if residual.abs() > bound {
                 let code = DiagnosticCode::RateInconsistent;
                 return Err(Diagnostic::new(code, residual.abs(), bound).at(leg));
@@ -144,12 +146,12 @@ impl MeasurementValidator {
 
     /// Diagnostic of a pause of the loop, if the pause and not the driver made a measurement too old.
     fn pause(&self, cycle: &Cycle<'_>, measurement: &Measurement) -> Option<Diagnostic> {
-        let Parameters { measured_timeout_ns, longest_pause_ns, .. } = cycle.constants.parameters;
+        let Parameters { measured_timeout_ns, longest_cycle_gap_ns, .. } = cycle.constants.parameters;
         let before_ns = self.released_before_ns;
         let pause_ns = self.released_ns.saturating_sub(before_ns);
         let was_recent = before_ns > 0 && before_ns.abs_diff(measurement.time_ns) <= measured_timeout_ns;
-        let [pause_s, longest_s] = [pause_ns, longest_pause_ns].map(|time_ns| time_ns as f64 * 1e-9);
-        (was_recent && pause_ns > longest_pause_ns)
+        let [pause_s, longest_s] = [pause_ns, longest_cycle_gap_ns].map(|time_ns| time_ns as f64 * 1e-9);
+        (was_recent && pause_ns > longest_cycle_gap_ns)
             .then(|| Diagnostic::new(DiagnosticCode::DaemonHeld, pause_s, longest_s))
     }
 

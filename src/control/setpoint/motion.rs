@@ -88,13 +88,13 @@ impl SetpointMotion {
         }
     }
 
-    /// Motion at another instant. The extrapolation is bounded, see `extrapolation_s`.
+    /// Motion at another instant. The extrapolation is bounded, see `bounded_extrapolation_s`.
     pub(in crate::control) fn motion_at(&self, parameters: &Parameters, instant_ns: u64) -> Motion {
         if instant_ns == self.setpoint.time_ns {
             return self.motion;
         }
         // Extrapolates the motion and not X, because rates of the angles are unbounded near gimbal lock.
-        let continued = self.continued(self.extrapolation_s(parameters, instant_ns));
+        let continued = self.continued(self.bounded_extrapolation_s(parameters, instant_ns));
         Motion {
             pose: self.motion.pose.extrapolated(&Twist::from_vector(&continued.displacement)),
             twist: continued.twist,
@@ -103,7 +103,11 @@ impl SetpointMotion {
     }
 
     /// Time from the setpoint to another instant \[s\], bounded by the longest extrapolation of a setpoint.
-    pub(in crate::control) fn extrapolation_s(&self, parameters: &Parameters, instant_ns: u64) -> f64 {
+    pub(in crate::control) fn bounded_extrapolation_s(
+        &self,
+        parameters: &Parameters,
+        instant_ns: u64,
+    ) -> f64 {
         let longest = parameters.max_extrapolation_s();
         seconds_between(self.setpoint.time_ns, instant_ns).max(-longest).min(longest)
     }

@@ -52,7 +52,7 @@ impl<'a> Target<'a> {
         instant_ns: u64,
     ) -> Option<RelativeMotion> {
         if let Self::Motion(setpoint) = self {
-            let continued = setpoint.continued(setpoint.extrapolation_s(parameters, instant_ns));
+            let continued = setpoint.continued(setpoint.bounded_extrapolation_s(parameters, instant_ns));
             let displacement = pose.displacement_to(&setpoint.motion.pose).vector() + continued.displacement;
             return Some(RelativeMotion { displacement, ..continued });
         }

@@ -99,9 +99,9 @@ impl DriveStatus {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Publishers {
     /// Process whose messages are used.
-    pub counting: u32,
+    pub used_pid: u32,
     /// Process whose messages are ignored.
-    pub ignored: u32,
+    pub ignored_pid: u32,
 }
 
 /// Inputs of one cycle. Together with the state of the controller they determine its output.

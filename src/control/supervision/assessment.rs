@@ -35,7 +35,7 @@ pub(in crate::control) struct Evidence<'a> {
     pub is_ready: bool,
     pub feedback: &'a FeedbackLimiter,
     /// Disagreement of the last measurement with its prediction, or a frozen sensor.
-    pub sensor_diagnostic: Option<&'a Diagnostic>,
+    pub measurement_diagnostic: Option<&'a Diagnostic>,
     /// Change of the payload or the surroundings, or an oscillation of the platform.
     pub disturbance_diagnostic: Option<&'a Diagnostic>,
     /// Whether a length repeats itself: its sensor may be frozen.
@@ -84,7 +84,7 @@ fn check_tracking(
 ) -> Result<(), Diagnostic> {
     let Evidence { input, setpoint, error, feedback, .. } = evidence;
     check_reports(evidence)?;
-    if let Some(diagnostic) = evidence.sensor_diagnostic {
+    if let Some(diagnostic) = evidence.measurement_diagnostic {
         return Err(*diagnostic);
     }
     check_following_error(&cycle.constants.parameters, *error, active_limits)?;
@@ -157,8 +157,8 @@ fn check_engage_tolerance(
 /// Whether an input has a single publisher. Control does not begin with two, because it is unknown which one
 /// is right.
 fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), Diagnostic> {
-    let Publishers { counting, ignored } = publishers;
-    if ignored == 0 { Ok(()) } else { Err(Diagnostic::new(code, counting.into(), ignored.into())) }
+    let Publishers { used_pid, ignored_pid } = publishers;
+    if ignored_pid == 0 { Ok(()) } else { Err(Diagnostic::new(code, used_pid.into(), ignored_pid.into())) }
 }
 
 /// Whether the motion without force is known and a stop from it was verified.

@@ -193,7 +193,7 @@ fn process_report(process_id: u32, publishers: Publishers) -> ProcessReport {
         process_id,
         command: command(process_id),
         user: user.unwrap_or_default(),
-        is_ignored: process_id == publishers.ignored,
+        is_ignored: process_id == publishers.ignored_pid,
     }
 }
 

@@ -23,7 +23,7 @@ impl Replica {
 
     /// Exchanges the constants, as the real-time thread does.
     pub fn reconfigure(&mut self, mut new: Controller) {
-        self.controller.exchange_constants(&mut new);
+        self.controller.exchange_configuration(&mut new);
     }
 
     /// Number of the cycle that follows.

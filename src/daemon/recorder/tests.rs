@@ -150,7 +150,7 @@ fn both_sides_of_a_reload_are_repeated_and_each_has_its_configuration() {
     let (before, after) = (loaded(""), Arc::new(loaded("position_bandwidth_hz = 3.0")));
     let (report, files) = files_of(&before, |controller, memories, queue| {
         run_cycles(controller, memories, queue, 1..=1500, |_| false, |_| ());
-        controller.exchange_constants(&mut after.controller.clone());
+        controller.exchange_configuration(&mut after.controller.clone());
         queue.send(Recorded::Configuration(after)).unwrap();
         run_cycles(controller, memories, queue, 1501..=3000, |_| false, |_| ());
     });

@@ -98,7 +98,7 @@ impl<'q, 'o> Handover<'q, 'o> {
         } else if woke_ns.saturating_sub(offer.offered_ns) > MAX_REQUEST_AGE_NS {
             Answer::TooOld
         } else {
-            controller.exchange_constants(&mut offer.controller);
+            controller.exchange_configuration(&mut offer.controller);
             self.timeouts.set(offer.timeouts);
             Answer::Taken(self.cycle)
         };

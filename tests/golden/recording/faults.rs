@@ -142,14 +142,14 @@ fn stamps(recorder: &mut Recorder) {
         let jitter_ns = (3e5 * m.random.uniform()) as i64;
         let offset_ns = -3_600_000_000_000 + (m.input.release_ns / 100_000) as i64 - jitter_ns;
         m.input.clock_offset_ns = offset_ns;
-        m.input.setpoint_publishers.counting = 4711;
-        m.input.measured_publishers.counting = 4712;
+        m.input.setpoint_publishers.used_pid = 4711;
+        m.input.measured_publishers.used_pid = 4712;
     };
-    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored = 4713);
+    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored_pid = 4713);
     recorder.ask(Request::Engage);
-    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored = 4713);
+    recorder.run_with(30, |m| m.input.setpoint_publishers.ignored_pid = 4713);
     recorder.ask(Request::Engage);
-    recorder.run_with(30, |m| m.input.measured_publishers.ignored = 4714);
+    recorder.run_with(30, |m| m.input.measured_publishers.ignored_pid = 4714);
     recorder.engage();
     recorder.go(MOVES, 0.5);
     recorder.run(150);
@@ -170,7 +170,7 @@ fn stamps(recorder: &mut Recorder) {
     recorder.run(100);
     // Two sources once control has begun.
     recorder.run_with(100, |m| {
-        (m.input.setpoint_publishers.ignored, m.input.measured_publishers.ignored) = (4715, 4716);
+        (m.input.setpoint_publishers.ignored_pid, m.input.measured_publishers.ignored_pid) = (4715, 4716);
     });
     recorder.pause(40);
     recorder.run(20);

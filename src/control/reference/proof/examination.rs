@@ -50,7 +50,7 @@ const RATE_DEPARTURE_RATIO: f64 = 0.01;
 /// walls took their part. It bounds the longest cycle. Balls that were found remain for the next step. With
 /// three poses, a reference that presses against its limit of the condition is accepted and refused in turn,
 /// and the platform jerks (2026-11-23).
-pub(in crate::control::reference) const MAX_EFFORT: u32 = MAX_INTERVALS + 4 * REGULARITY_EFFORT;
+pub(in crate::control::reference) const MAX_STEP_EFFORT: u32 = MAX_INTERVALS + 4 * REGULARITY_EFFORT;
 
 /// Lengths and rates of the legs, in lanes.
 type Legs<S> = (f64x8<S>, f64x8<S>);
@@ -278,7 +278,7 @@ impl<'a> StopExamination<'a> {
             None => *self.start_regularity.insert(Regularity::at(constants, from, &mut self.effort)?),
         };
         let at_knot = Regularity::of_reference(constants);
-        Ok(at_knot.or_less(&start).is_kept_by(regularity))
+        Ok(at_knot.looser_of(&start).is_kept_by(regularity))
     }
 
     /// Whether a knot, and the Bezier points before and after it, are within the envelope.

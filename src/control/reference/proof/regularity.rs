@@ -77,7 +77,7 @@ impl Regularity {
     }
 
     /// The looser of both bounds, for each quantity.
-    pub fn or_less(&self, other: &Self) -> Self {
+    pub fn looser_of(&self, other: &Self) -> Self {
         Self {
             condition: self.condition.max(other.condition),
             universal_sine: self.universal_sine.min(other.universal_sine),

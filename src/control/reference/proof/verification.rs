@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::cubic_departure::curvature;
-use crate::control::reference::proof::examination::{MAX_EFFORT, StopExamination};
+use crate::control::reference::proof::examination::{MAX_STEP_EFFORT, StopExamination};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::refusal::Refusal;
 use crate::control::reference::proof::regularity::{RegularBalls, Regularity, RegularityQuery};
@@ -49,7 +49,7 @@ impl Verifier {
             reach: Pair { angular: turn.length, linear: shift.length },
             required: Regularity::of_reference(constants),
         };
-        let mut effort = MAX_EFFORT.saturating_sub(step.effort);
+        let mut effort = MAX_STEP_EFFORT.saturating_sub(step.effort);
         let is_free = shift.peak_velocity + overshoot.linear <= position.velocity
             && turn.peak_velocity + overshoot.angular <= orientation.velocity
             && shift.peak_velocity + constants.arm * turn.peak_velocity

@@ -132,8 +132,8 @@ impl Approach {
         1.0 / self.outer_s
     }
 
-    /// Change of the velocity while the acceleration builds up to its limit, `a^2/j` \[m/s\].
-    pub fn build_up_velocity(&self) -> f64 {
+    /// Change of the velocity while the acceleration builds up to its limit and ends again, `a^2/j` \[m/s\].
+    pub fn two_ramp_velocity(&self) -> f64 {
         self.closing.acceleration * self.closing.acceleration / self.closing.jerk
     }
 

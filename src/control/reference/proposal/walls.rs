@@ -15,7 +15,7 @@
 //! leg, the motion that stops later remains.
 //!
 //! The bound on V' is blended in. It holds fully once the wall removes `a^2/j` from V, the change of velocity
-//! while the acceleration builds up. Without blending, V' would jump whenever another wall becomes active,
+//! while the acceleration builds up and ends again. Without blending, V' would jump whenever another wall becomes active,
 //! and in a corner the walls would take turns.
 //!
 //! Both ends of a leg or of a coordinate are one wall. V is found by Hildreth's method (C. Hildreth, "A
@@ -217,7 +217,7 @@ impl Walls {
                 inverse_square: 1.0 / square.max(f64::MIN_POSITIVE),
                 gradient: padded(&gradient),
                 ends,
-                blend_rate: square / approach.build_up_velocity(),
+                blend_rate: square / approach.two_ramp_velocity(),
                 ..Wall::default()
             };
             self.count += 1;

@@ -27,7 +27,7 @@ struct Scene {
     kind: SetpointKind,
     error: Option<PoseError>,
     feedback: FeedbackLimiter,
-    sensor_diagnostic: Option<Diagnostic>,
+    measurement_diagnostic: Option<Diagnostic>,
     disturbance_diagnostic: Option<Diagnostic>,
     reports: [Result<(), Diagnostic>; 2],
     is_ready: bool,
@@ -43,7 +43,7 @@ impl Default for Scene {
             kind: SetpointKind::Motion,
             error: Some(PoseError::default()),
             feedback: FeedbackLimiter::default(),
-            sensor_diagnostic: None,
+            measurement_diagnostic: None,
             disturbance_diagnostic: None,
             reports: [Ok(()); 2],
             is_ready: true,
@@ -94,7 +94,7 @@ impl Scene {
             localization: located.map(drop),
             error: self.error.as_ref(),
             feedback: &self.feedback,
-            sensor_diagnostic: self.sensor_diagnostic.as_ref(),
+            measurement_diagnostic: self.measurement_diagnostic.as_ref(),
             disturbance_diagnostic: self.disturbance_diagnostic.as_ref(),
             reports: &self.reports,
             is_ready: self.is_ready,
@@ -134,7 +134,7 @@ fn each_finding_alone_ends_the_tracking() {
         for reports in [[Err(FOUND), Ok(())], [Ok(()), Err(FOUND)]] {
             assert_eq!(Scene { reports, ..Scene::default() }.tracking(state), found);
         }
-        assert_eq!(Scene { sensor_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
+        assert_eq!(Scene { measurement_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
         assert_eq!(Scene { disturbance_diagnostic: Some(FOUND), ..Scene::default() }.tracking(state), found);
         // A stop for a disturbance hides no reason to brake.
         let impact = Some(DiagnosticCode::Impact.into());
@@ -175,7 +175,10 @@ fn each_finding_alone_ends_the_tracking() {
         assert_eq!(Scene { feedback, ..Scene::default() }.tracking(state), saturated);
     }
     // Without control nothing is tracked.
-    assert_eq!(Scene { sensor_diagnostic: Some(FOUND), ..Scene::default() }.tracking(State::Standby), None);
+    assert_eq!(
+        Scene { measurement_diagnostic: Some(FOUND), ..Scene::default() }.tracking(State::Standby),
+        None
+    );
 }
 
 #[test]
@@ -183,7 +186,7 @@ fn each_finding_alone_prevents_control() {
     assert_eq!(Scene::default().beginning(), [None; 2]);
     let both = |code: DiagnosticCode| [Some(code); 2];
     assert_eq!(Scene { reports: [Ok(()), Err(FOUND)], ..Scene::default() }.beginning(), both(FOUND.code));
-    let two = Publishers { counting: 7, ignored: 8 };
+    let two = Publishers { used_pid: 7, ignored_pid: 8 };
     let input = Input { measured_publishers: two, ..Input::default() };
     let code = DiagnosticCode::TwoMeasuredSources;
     assert_eq!(Scene { input, ..Scene::default() }.beginning(), both(code));

@@ -213,7 +213,7 @@ fn a_setpoint_is_extrapolated_no_further_than_its_timeout() {
     setpoint.setpoint.time_ns = 1000 * MS;
     for (dt_ms, expected) in [(0, 0.0), (20, 0.02), (-20, -0.02), (500, 0.021), (-500, -0.021)] {
         let instant_ns = (1000 * MS).wrapping_add_signed(dt_ms * 1_000_000);
-        let found = setpoint.extrapolation_s(&constants.parameters, instant_ns);
+        let found = setpoint.bounded_extrapolation_s(&constants.parameters, instant_ns);
         assert!((found - expected).abs() < 1e-12, "{dt_ms}: {found}");
     }
 }

@@ -4,7 +4,7 @@
 use fearless_simd::{Level, dispatch};
 
 use crate::control::reference::Refusal;
-use crate::control::reference::proof::examination::MAX_EFFORT;
+use crate::control::reference::proof::examination::MAX_STEP_EFFORT;
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::regularity::RegularBalls;
 use crate::control::reference::proof::{step::Step, verification::Verifier};
@@ -107,8 +107,8 @@ fn a_step_without_effort_left_is_refused() {
                 &mut PoseStop::default(),
             )
         };
-        assert_eq!(verified(MAX_EFFORT - 1), Ok(StopKind::ReleaseFirst));
-        assert_eq!(verified(MAX_EFFORT), Err(Refusal::Effort));
+        assert_eq!(verified(MAX_STEP_EFFORT - 1), Ok(StopKind::ReleaseFirst));
+        assert_eq!(verified(MAX_STEP_EFFORT), Err(Refusal::Effort));
     }
 }
 

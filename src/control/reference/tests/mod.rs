@@ -127,7 +127,7 @@ pub(super) fn parameters(machine: &Machine) -> Parameters {
         max_age_at_arrival_ns: 10_000_000,
         ready_timeout_ns: 500_000_000,
         pose_tolerance: 5e-4,
-        longest_pause_ns: 10_000_000,
+        longest_cycle_gap_ns: 10_000_000,
     }
 }
 
