@@ -28,3 +28,5 @@ pub mod sensing;
 pub mod setpoint;
 pub mod signals;
 pub mod supervision;
+#[cfg(test)]
+mod tests;

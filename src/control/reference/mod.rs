@@ -58,8 +58,6 @@ use crate::model::rigid::{Acceleration, Motion, Twist};
 mod history;
 mod proof;
 mod proposal;
-#[cfg(test)]
-mod random_vectors;
 mod stop;
 #[cfg(test)]
 mod tests;

@@ -140,7 +140,7 @@ mod tests {
     use fearless_simd::{Level, dispatch};
 
     use super::*;
-    use crate::control::reference::random_vectors::RandomVectors;
+    use crate::control::tests::random_vectors::RandomVectors;
     use crate::model::machine::at_most_256_bits;
     use crate::model::task::{TaskState, task_coordinates};
 

@@ -6,11 +6,11 @@ use nalgebra::Matrix3;
 use fearless_simd::Level;
 
 use crate::control::reference::proposal::walls::*;
-use crate::control::reference::random_vectors::RandomVectors;
 use crate::control::reference::stop::pose_stop::{PoseStop, StopKind, advanced};
-use crate::control::reference::tests::{machine, parameters, pose};
 use crate::control::setpoint::target::at_rest;
 use crate::control::signals::limits::DerivativeLimits;
+use crate::control::tests::random_vectors::RandomVectors;
+use crate::control::tests::{machine, parameters, pose};
 use crate::model::inverse_geometry::leg_lengths;
 use crate::model::rigid::Pose;
 

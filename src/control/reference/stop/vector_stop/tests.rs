@@ -1,8 +1,8 @@
 use fearless_simd::{Level, dispatch};
 
-use crate::control::reference::random_vectors::RandomVectors;
 use crate::control::reference::stop::pose_stop::StopKind;
 use crate::control::reference::stop::vector_stop::*;
+use crate::control::tests::random_vectors::RandomVectors;
 
 const LIMITS: [DerivativeLimits; 5] = [
     DerivativeLimits { velocity: 1.0, acceleration: 5.0, jerk: 500.0 },

@@ -1,11 +1,11 @@
 //! Tests of the validation of measurements: each check alone, next to its bound.
 
 use crate::control::cycle::Cycle;
-use crate::control::reference::tests::*;
 use crate::control::sensing::measurement::MeasurementValidator;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::Measurement;
 use crate::control::signals::state::State;
+use crate::control::tests::*;
 
 const MS: u64 = 1_000_000;
 /// Release of the first cycle.

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::model::random::Random;
 
 /// Sequence of random vectors.
-pub(super) struct RandomVectors(Random);
+pub(in crate::control) struct RandomVectors(Random);
 
 impl RandomVectors {
     pub fn new(seed: u64) -> Self {

@@ -6,9 +6,9 @@ use nalgebra::Vector6;
 use crate::control::cycle::Cycle;
 use crate::control::law::feedback_limiter::FeedbackLimiter;
 use crate::control::law::forces::forces;
-use crate::control::reference::tests::*;
 use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::state::State;
+use crate::control::tests::*;
 use crate::model::rigid::{Acceleration, Motion};
 use crate::model::task::TaskState;
 

@@ -6,13 +6,13 @@ use nalgebra::Vector6;
 use crate::control::cycle::Cycle;
 use crate::control::law::error_tracker::ErrorTracker;
 use crate::control::reference::ReferenceGenerator;
-use crate::control::reference::tests::*;
 use crate::control::sensing::localization::{Localization, Located, PlatformState};
 use crate::control::setpoint::target::at_rest;
 use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::Measurement;
 use crate::control::signals::state::State;
+use crate::control::tests::*;
 use crate::model::inverse_jacobian::leg_wrenches;
 use crate::model::rigid::Twist;
 

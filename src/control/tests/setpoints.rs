@@ -3,7 +3,6 @@
 
 use crate::control::cycle::Cycle;
 use crate::control::law::error_tracker::setpoint_error;
-use crate::control::reference::tests::*;
 use crate::control::sensing::localization::{Located, PlatformState};
 use crate::control::setpoint::motion::SetpointMotion;
 use crate::control::setpoint::pose_samples::PoseSamples;
@@ -14,6 +13,7 @@ use crate::control::signals::errors::PoseError;
 use crate::control::signals::inputs::{Measurement, Setpoint};
 use crate::control::signals::limits::LimitSet;
 use crate::control::signals::state::State;
+use crate::control::tests::*;
 use crate::model::rigid::Twist;
 use crate::model::task::TaskState;
 

@@ -2,13 +2,13 @@
 //! with the measured deceleration.
 
 use crate::control::cycle::Cycle;
-use crate::control::reference::tests::*;
 use crate::control::sensing::free_motion::FreeMotion;
 use crate::control::sensing::localization::{Localization, Located, PlatformState};
 use crate::control::setpoint::target::at_rest;
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::control::signals::inputs::Measurement;
 use crate::control::signals::state::State;
+use crate::control::tests::*;
 use crate::model::rigid::{Motion, Twist};
 
 const MS: u64 = 1_000_000;
