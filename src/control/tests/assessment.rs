@@ -245,3 +245,20 @@ fn engaging_ends_on_the_setpoint_once_the_drives_are_ready() {
         assert_eq!(Scene { is_ready, ..Scene::default() }.assess(state).has_ended, has_ended, "{state:?}");
     }
 }
+
+/// A platform at rest near a singular pose is no platform that moves.
+#[test]
+fn a_start_near_a_singular_pose_is_refused_as_such() {
+    let machine = machine(&mut RandomVectors::new(61));
+    let mut constants = Constants::new(&machine, parameters(&machine));
+    constants.reference_condition = 1.0;
+    let (pose, condition) = (*constants.home.pose(), constants.home.sensitivity().condition);
+    let cycle = Cycle { constants: &constants, release_ns: 0, state: State::Standby };
+    let (measurement, twist) = (Measurement::default(), Twist::default());
+    let platform = PlatformState { pose, twist, condition, time_to_singularity: f64::INFINITY };
+    let located = Ok(Located { measurement: &measurement, rate: [0.0; LEGS], platform });
+    let mut reference = ReferenceGenerator::new(&constants);
+    let motion = Motion { pose, twist, acceleration: Acceleration::default() };
+    let start = verify_start(&cycle, &Localization::new(&constants), &mut reference, &located, Ok(motion));
+    assert_eq!(start, Err(Diagnostic::new(DiagnosticCode::NearSingular, condition, 1.0)));
+}
