@@ -25,6 +25,8 @@
 //! Without features the crate consists of these four and is `no_std`. `client` adds the needs of a driver,
 //! `daemon` (the default) everything else.
 //!
+//! The smallest complete use, without a daemon: `examples/controller.rs`.
+//!
 //! # Notation, frames, units
 //!
 //! | symbol | in code | meaning |
