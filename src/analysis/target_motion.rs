@@ -192,8 +192,8 @@ fn nearest(bounds: &[WorkspaceBound], limit: Limit) -> Option<WorkspaceBound> {
     of_limit.min_by(|a, b| ratio(a).total_cmp(&ratio(b))).copied()
 }
 
-/// Moves the reference from rest at a pose to a target, with a share of the limits of autonomous motions, until it is there. `observe` sees the generator after each cycle,
-/// with the motion at the beginning of the cycle.
+/// Moves the reference from rest at a pose to a target and returns the motion. `speed` is a share of the limits of
+/// autonomous motions. `observe` receives the generator after each cycle, and the motion at the beginning of the cycle.
 pub fn target_motion(
     constants: &Constants,
     from: &Pose,

@@ -42,8 +42,9 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Size of the difference, as a ratio of the largest number of the field if that is above 1. A time to a singularity counts by its inverse: of a platform that
-    /// moves along it is what rounding has left, divided into a determinant.
+    /// Size of the difference, as a ratio of the largest number of the field if that is above 1. A time to a
+    /// singularity counts by its inverse: while a platform moves along the singularity, the time is a determinant over
+    /// a rate that is rounding only.
     pub fn size(&self) -> f64 {
         let is_time = self.field == TIME_TO_SINGULARITY;
         let [recorded, replayed, scale] = [self.recorded, self.replayed, self.scale]

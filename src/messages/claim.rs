@@ -1,7 +1,7 @@
 //! Claim of a machine: the lock that makes one daemon the only one, and the record by which commands find it.
 //!
-//! The lock is in the owner's private folder, so that no other user can hold it and every process of the user finds it. The record beside the control socket may be
-//! read by everybody who may use the socket; it counts while its process lives.
+//! The lock is in the owner's private folder: no other user can hold it, and every process of the user finds it. The
+//! record is beside the control socket. Everybody who may use the socket may read it; it is valid while its process lives.
 
 use std::fs::{self, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
 use std::io::{self, Read, Write};

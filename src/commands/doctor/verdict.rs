@@ -4,7 +4,14 @@
 //! | --- | --- |
 //! | good | 99.9 % of wake-ups within a fifth of the period, all within half, and no fact is bad |
 //! | marginal | neither |
-//! | impossible | 1 % of wake-ups beyond half of the period, or more than 1 % of releases missed, or one wake-up later than a measurement may be old, or the daemon would not start |
+//! | impossible | at least one reason of the list below |
+//!
+//! A rate is impossible if
+//!
+//! - 1 % of wake-ups are later than half of the period,
+//! - more than 1 % of releases are missed,
+//! - one wake-up is later than a measurement may be old, or
+//! - the daemon would not start.
 
 use serde::{Deserialize, Serialize};
 

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::layout::{LegLayout, Numbers, Shapes, home, legs, link_inertia, quaternion, realizable};
 use crate::config::Config;
-use crate::model::machine::{Link, Machine};
+use crate::model::machine::{Actuator, Link, Machine};
 use crate::model::rigid::Pose;
 
 /// Time step of MuJoCo \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
@@ -94,7 +94,6 @@ fn law((name, link): (&str, &Link)) -> String {
 
 fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
     let LegLayout { number: i, base, rotation, first_axis, length, .. } = leg;
-    let actuator = &machine.actuator;
     let to = shapes.link_length;
     format!(
         r#"    <body name="cylinder_{i}" pos="{base}" quat="{orientation}">
@@ -104,7 +103,7 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
       <geom type="sphere" size="{ball:?}" material="joint"/>
       <geom type="cylinder" fromto="0 0 0 0 0 {to:?}" size="{cylinder_radius:?}" material="cylinder"/>
       <body name="rod_{i}" pos="0 0 {length:?}">
-        <joint name="prismatic_{i}" type="slide" axis="0 0 1" ref="{length:?}" range="{shortest:?} {longest:?}" armature="{reflected:?}" damping="{viscous:?}" frictionloss="{coulomb:?}"/>
+        {prismatic}
         {rod}
         <geom type="cylinder" fromto="0 0 0 0 0 {back:?}" size="{rod_radius:?}" material="rod"/>
         <site name="ball_rod_{i}" size="{ball:?}" material="joint"/>
@@ -121,11 +120,20 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
         cylinder_radius = shapes.cylinder_radius,
         rod_radius = shapes.rod_radius,
         back = -to,
-        shortest = actuator.min_length,
-        longest = actuator.max_length,
-        reflected = actuator.reflected_mass,
-        viscous = actuator.viscous_friction,
-        coulomb = actuator.coulomb_friction,
+        prismatic = prismatic_joint(leg, &machine.actuator),
+    )
+}
+
+/// Prismatic joint of a leg, with the friction and the reflected mass of its drive.
+fn prismatic_joint(leg: &LegLayout, actuator: &Actuator) -> String {
+    let LegLayout { number: i, length, .. } = leg;
+    let [shortest, longest] = [actuator.min_length, actuator.max_length];
+    let [reflected, viscous, coulomb] =
+        [actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction];
+    format!(
+        "<joint name=\"prismatic_{i}\" type=\"slide\" axis=\"0 0 1\" ref=\"{length:?}\" \
+         range=\"{shortest:?} {longest:?}\" armature=\"{reflected:?}\" \
+         damping=\"{viscous:?}\" frictionloss=\"{coulomb:?}\"/>"
     )
 }
 

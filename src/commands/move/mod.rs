@@ -107,7 +107,11 @@ pub enum SetpointError {
     Port(#[from] PortError),
     #[error(transparent)]
     Table(#[from] TableError),
-    #[error("{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}", name = .motion.name(), share = percent(MIN_AMPLITUDE_SHARE))]
+    #[error(
+        "{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}",
+        name = .motion.name(),
+        share = percent(MIN_AMPLITUDE_SHARE)
+    )]
     TooSmall { motion: BuiltInMotion, seconds: f64, refusal: SetpointRefusal },
 }
 
