@@ -1,7 +1,7 @@
 //! Motion of the reference to a target, in advance: the daemon's own reference generator, cycle by cycle.
 //!
-//! Position and orientation go straight to the target, each in its own time. Where that way leaves the workspace the
-//! motion is refused: which way around is right, only people know. It does not look at forces.
+//! Position and orientation go straight to the target, each in its own time. A path that leaves the workspace is
+//! refused: the operator must choose another path. Forces are not checked.
 
 use core::fmt;
 

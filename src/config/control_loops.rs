@@ -57,12 +57,12 @@ fn loops_of(
     each.into_iter().map(with).collect()
 }
 
-/// Masses of the platform over that of the model with which the loop must stand the age of its measurements. Less than
-/// [`STABLE_MASSES`]: a driver so slow is rare, and so is a model so wrong.
+/// Masses of the platform, as ratios of the modelled mass, for which the loop must be stable at the longest age of its
+/// measurements. The range is narrower than [`STABLE_MASSES`]: so slow a driver and so wrong a model are both rare.
 const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
 
-/// Largest constant age of the measurements with which all loops are stable, and the estimator knows what was sent since \[s\].
-/// No less than the age that the measurements have in any case.
+/// Largest constant age of the measurements with which all loops are stable and the estimator still has the
+/// accelerations sent since \[s\]. At least the age that the measurements have in any case.
 pub fn longest_age_s(deployment: &Deployment) -> f64 {
     let recorded = SENT_ACCELERATIONS as f64 - 1.0;
     let recorded_s = recorded * deployment.realtime.period_s() - deployment.drive.total_delay_s();
@@ -79,7 +79,8 @@ fn stable_age_s(realtime: &Realtime, control: &Control, drive: &Drive, limits: &
     delays.fold(f64::INFINITY, f64::min) * realtime.period_s() - drive.total_delay_s()
 }
 
-/// The age \[s\], or the largest with which all loops are stable if that is less. A rejected value leaves it open.
+/// The age \[s\], or the largest age with which all loops are stable if that is less. A loop with a rejected value is
+/// left out.
 pub(super) fn bounded_age_s(
     age_s: f64,
     realtime: &Realtime,

@@ -20,11 +20,11 @@ use crate::model::machine::Machine;
 const DEFAULT_BANDWIDTH_HZ: f64 = 10.0;
 /// Usual damping ratios; a ratio beyond them is a mistake.
 const DAMPING_RATIO_BOUND: Bound = Bound::Within(0.1, 10.0);
-/// Masses of the platform over that of the model with which the default bandwidths and the estimator are stable; less is
-/// warned of. A payload that is not configured should stay well within them.
+/// Masses of the platform, as ratios of the modelled mass, for which the default bandwidths and the estimator are
+/// stable; a narrower range causes a warning. A payload that is not configured should stay well within them.
 pub const STABLE_MASSES: [f64; 2] = [0.7, 1.5];
-/// Bandwidth of the estimator over the lesser bandwidth of the loops, at most: with the delay of the drives configured, and
-/// without. What is faster only amplifies noise, and a delay that is not known would make it unstable.
+/// Largest bandwidth of the estimator over the lesser bandwidth of the loops: with the delay of the drives configured, and
+/// without. A faster estimator only amplifies noise, and an unknown delay would make it unstable.
 const ESTIMATOR_RATIO: f64 = 3.0;
 const ESTIMATOR_RATIO_DELAY_UNKNOWN: f64 = 1.05;
 /// Steps in which an estimator is slowed down until the loops have their gain margin, each a fifth.
@@ -178,8 +178,9 @@ impl Plant<'_> {
         SampledLoop { compensates_disturbance, ..sampled }
     }
 
-    /// Bandwidth of the estimator \[Hz\]: what noise and disturbances ask for, no more than the delay lets it be, and slower where a
-    /// loop would not be stable with [`STABLE_MASSES`], or as fast as a loop where only that is stable.
+    /// Bandwidth of the estimator \[Hz\]: the optimum for noise and disturbances, bounded by the ratio that the delay
+    /// allows. It is slower if a loop would not be stable with [`STABLE_MASSES`], and as fast as a loop if only that is
+    /// stable.
     fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> f64 {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();

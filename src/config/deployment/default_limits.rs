@@ -1,4 +1,4 @@
-//! Defaults of `[limits]`: motions that a standing person tolerates, or less where the drives cannot give them at home.
+//! Defaults of `[limits]`: motions that a standing person tolerates, or less if the drives cannot give them at home.
 
 use core::fmt;
 

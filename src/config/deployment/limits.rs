@@ -17,8 +17,8 @@ const FORCE_RISE_S: f64 = 0.01;
 /// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
 /// a load needs leg forces of up to a hundred times its size.
 const DEFAULT_CONDITION: f64 = 100.0;
-/// Largest exponent of the growth of a displacement under held forces, until a force computed from it acts. With it a loop with the
-/// default gains of a slow rate stands 0.7 of the modelled mass, as without growth.
+/// Largest exponent of the growth of a displacement under constant forces, until a force computed from it acts. With this
+/// exponent a loop with the default gains of a slow rate is stable with 0.7 of the modelled mass, as without growth.
 const MAX_GROWTH_EXPONENT: f64 = 0.2;
 /// Part of the bound on the change of an acceleration within a hold that motions reach: in the worst direction at the largest velocity
 /// no stop from the worst pose would be verified. Found, not proved: the worst of searches of 2e8 cycles was 0.17, and this is half

@@ -29,7 +29,7 @@ mod realtime;
 
 /// Least default of a timeout in periods: one late message does not mean that its sender is lost.
 const MIN_DEFAULT_TIMEOUT_PERIODS: f64 = 4.0;
-/// Default of `measured_ms`, if the loop stands it; and its least default in periods: longer than one.
+/// Default of `measured_ms`, if the loop is stable with it; and its least default in periods: longer than one.
 const MAX_DEFAULT_MEASURED_MS: f64 = 20.0;
 const MIN_MEASURED_PERIODS: f64 = 1.5;
 /// Longest timeout \[ms\]. After a second without messages the pose of the platform is unknown.
@@ -130,7 +130,7 @@ fn timeouts(
     };
     let mut measured_ms = default_timeout_ms(MAX_DEFAULT_MEASURED_MS, rate_hz);
     if !section.has("measured_ms") {
-        // Without measurements the platform is controlled for no longer than the loop stands.
+        // Without measurements control continues only up to the age at which the loop is stable.
         let stable_ms = stable_ms(measured_ms).max(MIN_MEASURED_PERIODS * 1e3 / rate_hz);
         measured_ms = if stable_ms < measured_ms { rounded_down(stable_ms) } else { measured_ms };
     }

@@ -99,7 +99,7 @@ impl Realtime {
         }
     }
 
-    /// Part of that delay that the estimator knows, in periods: the age of the measurement, by its stamp.
+    /// Part of that delay over which the estimator predicts, in periods: the age of the measurement, by its stamp.
     fn known_delay(&self) -> f64 {
         self.longest_delay() - 1.0
     }
