@@ -46,7 +46,7 @@ impl Wait {
 pub struct EngageArguments {
     #[command(flatten)]
     request: RequestArguments,
-    /// Wait for measurements and for a setpoint where the platform stands, instead of being refused
+    /// Wait for measurements and for a setpoint at the pose of the platform, instead of being refused
     #[arg(long)]
     wait: bool,
 }

@@ -84,7 +84,7 @@ impl LatchLink {
 }
 
 impl EmergencyLatch {
-    /// Latch in a folder, as the daemon before has left it. An error if that cannot be known or changed.
+    /// Latch in a folder, in the state that the last daemon left. An error if the file cannot be read or written.
     pub fn open(folder: &Path) -> Result<Self, FileError> {
         let path = folder.join(FILE);
         if !folder.is_dir() {

@@ -73,7 +73,7 @@ struct Flags {
 /// Runs the threads until `stop`; the report, and the histograms as CSV.
 #[expect(
     clippy::too_many_lines,
-    reason = "the one place in which all threads and the queues between them stand side by side"
+    reason = "all threads and the queues between them are in one function, to be read together"
 )]
 pub(super) fn run(
     loaded: Loaded,

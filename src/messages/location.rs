@@ -258,7 +258,7 @@ pub(super) fn renew_prefix() -> Result<(), PortError> {
         .map_err(failed())
 }
 
-/// Whether a process takes part, or one about which nothing is known.
+/// Whether a process takes part. A process whose state cannot be read counts.
 fn has_participants(config: &Config) -> bool {
     let mut found = false;
     let listed = Node::<ipc::Service>::list(config, |node| {

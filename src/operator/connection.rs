@@ -75,7 +75,8 @@ impl Connection {
         process_id.filter(|process_id| *process_id > 0)
     }
 
-    /// The process that listens, and no other that has its number later; `None` if the kernel does not tell (before Linux 6.5).
+    /// Descriptor of the process that listens; it never refers to a later process with the same number. `None` if the
+    /// kernel does not provide it (before Linux 6.5).
     pub fn process(&self) -> Option<OwnedFd> {
         getsockopt(&self.stream, PeerPidfd).ok()
     }

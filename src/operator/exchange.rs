@@ -11,7 +11,7 @@ use super::{OperatorError, Order};
 const ANSWER_GRACE: Duration = Duration::from_secs(2);
 
 impl Order {
-    /// The line that asks for it.
+    /// Request line of the order.
     pub(super) fn line(&self) -> RequestLine {
         RequestLine {
             wait: true,

@@ -36,10 +36,10 @@ pub enum OperatorError {
     /// No machine runs at all.
     #[error("no daemon runs on this host")]
     NoMachine,
-    /// Which machine is meant is not known.
+    /// The machine is ambiguous.
     #[error("several machines run: {0}; name one, or give --all")]
     Several(String),
-    /// A daemon runs that this user may not ask.
+    /// A daemon runs, but this user may not send it requests.
     #[error("this user may not send requests for {machine} ({socket}): {allowed}")]
     Forbidden {
         /// Name of the machine.
@@ -69,7 +69,7 @@ pub enum OperatorError {
     /// Its state was not reached in its time \[s\].
     #[error("{request} was not completed within {1} s: {reason}", request = .0.name(), reason = .2)]
     TimedOut(Request, f64, String),
-    /// Whether it was carried out is not known.
+    /// It is unknown whether the request was carried out.
     #[error("{request} is not confirmed: {reason}", request = .0.name(), reason = .1)]
     NotConfirmed(Request, String),
     /// The daemon was held, and it may be old.
@@ -81,7 +81,7 @@ pub enum OperatorError {
     /// The daemon refuses its machine file.
     #[error("reload was refused, nothing has changed:\n{0}")]
     ReloadRefused(String),
-    /// Whether the machine file was taken over is not known.
+    /// It is unknown whether the machine file was reloaded.
     #[error("reload is not confirmed: {0}")]
     ReloadNotConfirmed(String),
     /// The last seconds were not written.

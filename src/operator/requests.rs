@@ -87,7 +87,7 @@ pub fn reload(machine: &str, timeout: Duration) -> Result<String, OperatorError>
     }
 }
 
-/// The answer of the first daemon that counts, by `ask`, which sends a request over a connection.
+/// The answer of the first daemon that counts. `ask` sends a request over a connection.
 pub fn ask_first(
     machine: &str,
     mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,

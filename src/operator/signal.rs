@@ -26,7 +26,7 @@ use crate::messages::{Bus, StatusMessage, Subscriber};
 /// Longest wait for an emergency stop to be confirmed; a `stop` takes its time, the command's own limit.
 const CONFIRMATION_LIMIT: Duration = Duration::from_secs(2);
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
-/// Longest wait for one answer of the socket: it is asked again.
+/// Longest wait for one answer of the socket. After it the request is sent again.
 const SOCKET_LIMIT: Duration = Duration::from_millis(100);
 
 /// Signal that posts a request.

@@ -1,8 +1,8 @@
-//! What a daemon answers to `status`, in the units of the messages.
+//! Answer of a daemon to `status`, in the units of the messages.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// State of the daemon and of everything it knows, in SI units and radians.
+/// State of the daemon, its machine and its topics, in SI units and radians.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatusReport {
     /// Version, commit and build profile of the daemon.

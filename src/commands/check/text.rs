@@ -71,7 +71,7 @@ impl CheckReport {
         )
     }
 
-    /// Writes within which bounds start-up and the loop know the pose.
+    /// Writes the bounds within which the pose is unique, from cycle to cycle and at start-up.
     fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,

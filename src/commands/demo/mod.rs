@@ -311,8 +311,8 @@ fn read(path: Option<&Path>) -> Result<(String, String), ConfigError> {
 
 /// The configuration under another name and rate. The text has been parsed before.
 ///
-/// A desktop takes the processor away for tens of milliseconds now and then. That is no fault of the loop,
-/// so where the file sets no timeouts those of a demonstration are longer than those of a deployment, and than its loop stands.
+/// A desktop sometimes preempts a process for tens of milliseconds. That is no fault of the loop. If the file sets no
+/// timeouts, the demonstration uses longer ones than a deployment, longer even than the age at which its loop is stable.
 fn adapted(text: &str, name: &str, rate_hz: Option<f64>) -> String {
     let mut table: toml::Table = toml::from_str(text).unwrap_or_default();
     table.insert("name".into(), name.into());

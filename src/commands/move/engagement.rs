@@ -46,7 +46,7 @@ impl Engagement {
         }
     }
 
-    /// Sends the request while the setpoints stand where the platform stands; an error if it was refused.
+    /// Sends the request while the setpoints hold the pose of the platform. An error if it was refused.
     pub fn request(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
         match self {
             Self::None => Ok(()),

@@ -54,7 +54,7 @@ pub struct MoveArguments {
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
-    /// Also request control, once, as soon as the setpoints stand where the platform stands
+    /// Also request control, once, as soon as the setpoints hold the pose of the platform
     #[arg(long)]
     engage: bool,
     /// Longest to wait for control [s]

@@ -240,7 +240,7 @@ impl<'a> Playback<'a> {
                     self.engagement.request(now_ns, status)?;
                 }
                 self.log_reason(
-                    "the setpoints stand where the platform stands: waiting for control (hexad engage)",
+                    "the setpoints hold the pose of the platform: waiting for control (hexad engage)",
                 );
                 motion(task)
             }

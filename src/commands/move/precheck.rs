@@ -25,8 +25,8 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 
-/// Share of each limit that a built-in motion may use; the rest is reserve, as the instant between two setpoints at
-/// which a cycle begins is not known in advance.
+/// Share of each limit that a built-in motion may use. The rest is a reserve, because a cycle may begin at any instant
+/// between two setpoints.
 const USABLE_SHARE: f64 = 0.95;
 
 /// Cycles between two updates of the progress bar: about a millisecond.
@@ -118,7 +118,7 @@ impl<'a> Precheck<'a> {
     }
 }
 
-/// SetpointRefusal of a setpoint: its time, the reason, and the limits that it exceeds.
+/// Refusal of a setpoint: its time, the reason, and the limits that it exceeds.
 #[derive(Clone, Copy, Debug)]
 pub struct SetpointRefusal {
     /// Time since the start of the trajectory \[s\].

@@ -1,9 +1,9 @@
-//! A recording as a file that a page can hold: the smallest and the largest value of every signal in equal stretches of
-//! time, in several levels.
+//! Reduction of a recording to the size of a page: the smallest and the largest value of every signal in equal
+//! intervals, in several levels.
 //!
-//! A level has the whole recording, or a window of it. Its sample stands for `step` cycles; two samples are the extremes of
-//! the `2 step` cycles they cover, in the order in which they occurred, so no peak is lost and a line through the samples
-//! stays within the signal. With `step = 1` every cycle is a sample.
+//! A level covers the whole recording, or a window of it. A sample covers `step` cycles. Two samples are the extremes of
+//! their `2 step` cycles, in the order in which they occurred, so no peak is lost and a line through the samples stays
+//! within the signal. With `step = 1` every cycle is a sample.
 
 use super::signals::{COLUMNS, Row};
 

@@ -11,7 +11,7 @@ use crate::output::text_table::paragraph;
 const WIDTH: usize = 80;
 /// Lines that a diagnostic may take.
 const DIAGNOSTIC_LINES: usize = 2;
-/// Digits of a hash that are shown: enough to tell two files apart.
+/// Digits of a hash that are shown, enough to distinguish two files.
 const SHA1_DIGITS: usize = 10;
 /// Characters of a bar.
 const BAR: usize = 26;

@@ -1,6 +1,6 @@
 //! `hexad view`: the page of a recording, live, for browsers on this host.
 //!
-//! It subscribes to the topics as any client does and sends nothing: the daemon does not know of it.
+//! It subscribes to the topics as any client does and sends nothing to the daemon.
 
 use std::io;
 use std::sync::{Mutex, PoisonError};

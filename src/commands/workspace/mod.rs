@@ -207,7 +207,7 @@ fn has_extent(limits: &EnvelopeBounds) -> bool {
     limits.pose_min.iter().chain(&limits.pose_max).any(|x| *x != 0.0)
 }
 
-/// WorkspaceLimit in words, with the limit of the condition.
+/// Text of a workspace limit, with the largest condition number.
 #[derive(Debug)]
 pub struct ObstacleText {
     obstacle: WorkspaceLimit,

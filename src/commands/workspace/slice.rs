@@ -108,7 +108,7 @@ impl Slice {
         x
     }
 
-    /// PoseQuality of a pose by its indices along both axes.
+    /// Quality of a pose by its indices along both axes; `None` outside the slice.
     pub fn at(&self, [right, up]: [usize; 2]) -> Option<&PoseQuality> {
         if right < self.count { self.qualities.get(up * self.count + right) } else { None }
     }

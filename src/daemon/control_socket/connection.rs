@@ -234,7 +234,7 @@ mod tests {
         assert!(connection.is_done(LINE_LIMIT_NS + 1), "silent from the beginning");
         client.write_all(b"one\n").unwrap();
         assert_eq!(connection.receive(10), Received::Line("one\n".into()));
-        assert!(!connection.is_done(100 * LINE_LIMIT_NS), "it may ask again later");
+        assert!(!connection.is_done(100 * LINE_LIMIT_NS), "a client may send another request later");
         client.write_all(b"ha").unwrap();
         assert_eq!(connection.receive(20), Received::Nothing);
         assert!(connection.is_done(LINE_LIMIT_NS + 21));

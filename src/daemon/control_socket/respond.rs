@@ -1,4 +1,4 @@
-//! What a line of a client asks for: answered at once, or begun.
+//! Requests of clients, one per line: each is answered at once, or begun and answered later.
 
 use core::sync::atomic::Ordering;
 

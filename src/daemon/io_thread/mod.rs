@@ -2,8 +2,8 @@
 //!
 //! It reads the newest messages a lead before the release and publishes when the output of the cycle appears; with
 //! external release it waits for measured messages and signals the real-time thread; in lock-step it waits for all
-//! participants. When a peer connects or disappears, the port calls here allocate and block for a moment; the real-time
-//! thread continues with data of known age.
+//! participants. When a peer connects or disappears, the port calls here allocate and block for a moment. The real-time
+//! thread then continues with older data, whose age it has from the time stamps.
 
 use crate::control::signals::state::MessageId;
 use core::sync::atomic::{AtomicBool, Ordering};

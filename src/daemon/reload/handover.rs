@@ -1,8 +1,9 @@
 //! Handover of new constants to the real-time thread, which neither allocates nor waits for it.
 //!
-//! One [`Offer`] is allocated at the start and circulates as a reference: the reload thread fills it, the real-time thread
-//! exchanges its constants for those in it, in a cycle without control, and the log thread returns it. So the old constants are
-//! dropped by the reload thread, and the log thread knows the first cycle with the new ones before it receives that cycle.
+//! One [`Offer`] is allocated at the start and circulates as a reference. The reload thread fills it. In a cycle without
+//! control, the real-time thread exchanges its constants for the offered ones. The log thread returns the offer. So the
+//! reload thread drops the old constants, and the log thread receives the number of the first cycle with the new
+//! constants before it receives that cycle.
 //!
 //! ```text
 //! reload thread --offers--> real-time thread --answers--> log thread --returned--> reload thread

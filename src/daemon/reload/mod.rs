@@ -91,7 +91,7 @@ pub type Requester = Option<u64>;
 
 /// What became of a request.
 pub struct Reloaded {
-    /// Who asked for it.
+    /// Origin of the request.
     pub requester: Requester,
     /// The configuration in force from now on; `None` if it has not changed.
     pub loaded: Option<Arc<Loaded>>,

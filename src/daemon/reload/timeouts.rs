@@ -21,7 +21,7 @@ impl From<&Timeouts> for TimeoutsNs {
     }
 }
 
-/// The timeouts that are in force. They change only while no force is valid, so each number stands for itself.
+/// Timeouts in force. They change only while no force is valid, so a reader may load the two numbers separately.
 #[derive(Debug)]
 pub struct MessageTimeouts {
     setpoint_ns: AtomicU64,
