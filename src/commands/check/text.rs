@@ -1,4 +1,4 @@
-//! The result of `hexad check` as text.
+//! Text of the result of `hexad check`.
 
 use core::f64::consts::LN_2;
 use core::fmt;

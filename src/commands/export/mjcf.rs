@@ -9,7 +9,8 @@ use crate::model::rigid::Pose;
 
 /// Time step of MuJoCo \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
 const STEP_S: f64 = 1e-4;
-/// The stiffest constraints of that step: MuJoCo holds time constants to two steps and impedances to 0.9999.
+/// Time constant of the stiffest constraints with that step. MuJoCo limits time constants to two steps and
+/// impedances to 0.9999.
 const CONSTRAINT_TIME_CONSTANT_S: f64 = 2.0 * STEP_S;
 const CONSTRAINT_IMPEDANCE: f64 = 0.9999;
 
@@ -171,7 +172,7 @@ fn platform_body(machine: &Machine, legs: &[LegLayout], shapes: &Shapes) -> Stri
     )
 }
 
-/// Meshes, colours, and what the viewer's free camera looks at.
+/// Meshes, colours, and the centre of the viewer's free camera.
 fn looks(shapes: &Shapes) -> String {
     let mesh = |name: &str, corners: &[Vector3<f64>]| {
         let coordinates: Vec<f64> = corners.iter().flatten().copied().collect();
@@ -203,13 +204,13 @@ fn looks(shapes: &Shapes) -> String {
     )
 }
 
-/// The base, a light from above, and a camera for which up is up, wherever gravity points.
+/// The base, a light from above, and a camera that is upright for any direction of gravity.
 fn scenery(machine: &Machine, shapes: &Shapes) -> String {
     let up = (-machine.gravity).try_normalize(f64::MIN_POSITIVE).unwrap_or(Vector3::z());
-    // Any direction that is not up: the axis that is least so.
+    // Any direction that is not up: the base axis that deviates most from it.
     let aside = Vector3::ith(up.iamin(), 1.0);
     let right = aside.cross(&up).normalize();
-    // From the front right, a little above; as far away as all of it fits the picture.
+    // From the front right, a little above. The distance is chosen to show the whole machine.
     let away = (right * 0.5 + right.cross(&up) + up * 0.4).normalize();
     let image_right = up.cross(&away).normalize();
     let image_up = away.cross(&image_right);
