@@ -9,13 +9,13 @@ use crate::model::rigid::Pose;
 
 /// Time step of MuJoCo \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
 const STEP_S: f64 = 1e-4;
-/// Time constant of the stiffest constraints with that step. MuJoCo limits time constants to two steps and
-/// impedances to 0.9999.
+/// Time constant of the stiffest constraints with that step. MuJoCo requires time constants of at least two steps
+/// and impedances of at most 0.9999.
 const CONSTRAINT_TIME_CONSTANT_S: f64 = 2.0 * STEP_S;
 const CONSTRAINT_IMPEDANCE: f64 = 0.9999;
 
 const HEADER_COMMENT: &str = "  Written by `hexad export`. SI units and radians. The world is the base frame of the configuration.
-  Legs i = 1 to 6. At reset the machine stands at home, without brakes: without forces it falls.
+  Legs i = 1 to 6. At reset the machine is at home, without brakes: without forces it falls.
   body platform        origin and axes of the platform; joint platform_free: its position and quaternion w x y z in the
                        world; their rates: velocity of the origin in the world, angular velocity in the platform
   body cylinder_i      origin: joint centre on the base; z: along the leg to the platform; x: second universal axis

@@ -223,7 +223,7 @@ impl<'a> Playback<'a> {
             let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
             return Err(MoveError::Ended(status.state().unwrap_or_default(), diagnostic));
         }
-        warn!("the daemon gave up control or is gone: starting over from where the platform stands");
+        warn!("the daemon gave up control or is gone: starting again from the present pose");
         self.phase = Phase::Waiting;
         Ok(())
     }
@@ -288,7 +288,7 @@ impl<'a> Playback<'a> {
             }
             Some(status) => {
                 let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
-                format!("the pose of the platform is not known: {diagnostic}")
+                format!("the pose of the platform is unknown: {diagnostic}")
             }
         };
         self.engagement.check_time(&reason)?;

@@ -60,7 +60,7 @@ pub enum TargetError {
     OtherSource(String),
     #[error("the platform is not under control (state {0}: {1}); --engage takes control")]
     NotInControl(String, String),
-    #[error("the pose of the platform is not known: {0}")]
+    #[error("the pose of the platform is unknown: {0}")]
     UnknownPose(String),
     #[error("the daemon does not follow this target, but another setpoint: does another source run?")]
     NotFollowed,

@@ -217,7 +217,7 @@ mod tests {
         };
         std::thread::scope(|threads| {
             let serving = threads.spawn(|| server.serve(&stop, |_, _| None));
-            // They stay while the page is asked for, and after it.
+            // They stay connected during the request for the page, and after it.
             let _slow: Vec<_> = (0..3 * MAX_UNREAD).map(|_| connect()).collect();
             let mut stream = connect();
             stream.write_all(b"ET / HTTP/1.1\r\n\r\n").unwrap();
