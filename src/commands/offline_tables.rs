@@ -31,7 +31,7 @@ impl CommandError for UnsolvedRows {
 impl CommandError for TableError {}
 
 impl UnsolvedRows {
-    /// Counter at zero. `problem` says what an unsolved row has not got.
+    /// Counter at zero. `problem` says what is missing in an unsolved row.
     pub fn new(problem: &'static str) -> Self {
         Self { problem, ..Self::default() }
     }

@@ -10,17 +10,17 @@ use crate::control::law::estimator::SENT_ACCELERATIONS;
 /// Control loop with the longest delay that the daemon may have.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlLoop {
-    /// Name for people: `position`, `orientation` or `legs`.
+    /// Name in messages: `position`, `orientation` or `legs`.
     pub name: &'static str,
     /// Natural frequency of the error dynamics \[Hz\].
     pub bandwidth_hz: f64,
     /// Cycles per second \[Hz\].
     pub rate_hz: f64,
-    /// The loop without units, with its longest delay in periods; its margins decide stability.
+    /// The loop in dimensionless form, with its longest delay in periods. Its margins decide stability.
     pub sampled: SampledLoop,
 }
 
-/// The loops of position and orientation, or that of the stiffest mode of the legs.
+/// The loops of position and orientation, or the loop of the stiffest mode of the legs.
 pub fn loops(deployment: &Deployment) -> Vec<ControlLoop> {
     loops_of(&deployment.realtime, &deployment.control, &deployment.drive, &deployment.limits)
 }
@@ -31,7 +31,7 @@ fn loops_of(
     drive: &Drive,
     limits: &DeploymentLimits,
 ) -> Vec<ControlLoop> {
-    // Modes on legs take the forces at the desired pose.
+    // Modes on legs compute the forces at the desired pose.
     let held_pole = if control.mode.acts_on_legs() { 0.0 } else { limits.held_pole };
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
@@ -104,7 +104,7 @@ fn is_finite(sampled: &SampledLoop) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 
-/// `timeouts.measured_ms` that is beyond the age with which the loops are stable, as its value and that age \[ms\].
+/// `timeouts.measured_ms` beyond the age with which the loops are stable: its value and that age \[ms\].
 pub fn unstable_timeout_ms(deployment: &Deployment) -> Option<(f64, f64)> {
     let Deployment { realtime, control, drive, limits, timeouts, .. } = deployment;
     let age_s = bounded_age_s(timeouts.measured_s, realtime, control, drive, limits);
@@ -117,7 +117,7 @@ impl ControlLoop {
         self.sampled.largest_wn_t() * self.rate_hz / TAU
     }
 
-    /// Error where the loop is not stable because of the pole of the platform under held forces.
+    /// Error if the loop is unstable because of the pole of the platform under constant forces.
     pub fn beyond_held_pole(&self) -> Option<String> {
         let Self { name, rate_hz, sampled, .. } = self;
         let with = |held_pole| SampledLoop { held_pole, ..*sampled }.is_stable();
@@ -133,7 +133,7 @@ impl ControlLoop {
         ))
     }
 
-    /// Warning where a mass that is plausible would make the loop unstable.
+    /// Warning if a plausible mass would make the loop unstable.
     pub fn warning(&self) -> Option<String> {
         let Self { name, sampled, .. } = self;
         let delay = sampled.delay;
@@ -153,7 +153,7 @@ impl ControlLoop {
     }
 }
 
-/// The loop, its margin with its delay, and the delay at which it would be unstable.
+/// Displays the loop, its margin with its delay, and the delay at which it becomes unstable.
 impl fmt::Display for ControlLoop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, bandwidth_hz, rate_hz, sampled } = self;

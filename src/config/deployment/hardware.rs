@@ -19,13 +19,13 @@ const MAX_DELAY_US: f64 = 15_000.0;
 /// Section `[measured]`: errors of the sensors, as standard deviations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorNoise {
-    /// Of a length.
+    /// Standard deviation of a length.
     pub length_m: f64,
     /// Resolution of a length; 0 if unknown.
     pub length_step_m: f64,
     /// Largest difference between a length and the length at a pose from another sensor; no standard deviation.
     pub pose_tolerance_m: f64,
-    /// Of a rate; `None` if the rates that the driver sends are only checked.
+    /// Standard deviation of a rate; `None` if the driver's rates are only checked.
     pub rate_m_s: Option<f64>,
 }
 
