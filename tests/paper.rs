@@ -22,18 +22,46 @@
 //!
 //! # Errata
 //!
-//! Size: mean / RMS / maximum of the error of a force as a share of the largest force of its row, on the
-//! states of `tests/data`. The tests hold these figures to 2 %, from above and from below.
+//! 1. (25), (27), (39). Printed: `v_B = R_b [L', L gamma', -L beta']` with beta', gamma' rates of the Euler
+//!    angles of (2). Right: last component `-L beta' cos(gamma)`; or read beta', gamma' as angular velocity about
+//!    the leg's y and z axes, throughout. The error of `v_B` itself is up to 1.4e-1 (fried2008) and 1.6 (tsai2000).
+//! 2. (43), (45), last term. Printed: wrong units. Right: `+ R_b L'~ L~ R_b^T / L^2`, acting on the leg's angular
+//!    velocity: `-(L'/L) omega`.
+//! 3. (74)-(82), H_1. Printed: no component along the leg. Right: the universal joint makes the leg spin:
+//!    `sin(gamma) beta'` about its axis. No effect without axial inertia (tsai2000); more than threefold for each
+//!    halving of the angle to the first axis.
+//! 4. (88), (93). Printed: g with the sign opposite to (74)-(81). Right: `v' - g` for platform and legs alike.
+//! 5. (90), (91). Printed: inertia about the centre of mass beside first moments about C. Right:
+//!    `I_C = I_G - m c~ c~`. No effect for a centred platform (fried2008).
+//! 6. (92), centrifugal term. Printed: its sign is in doubt. Right: `+ m omega x (omega x CG)`. No effect for a
+//!    centred platform.
+//! 7. Table 1, (74)-(82). Printed: a rod whose transverse inertia depends on its length, as if it were rigid. Right:
+//!    with such a body `dI/dt omega` and, along the leg, `-1/2 dI/dL omega^2` as well. With constant inertias power
+//!    balances.
 //!
-//! | | equation | printed | right | size of the effect |
+//! Size: error of a force as a share of the largest force of its row, on the states of `tests/data`. The tests hold
+//! these figures to 2 %, from above and from below.
+//!
+//! | erratum | machine | mean | RMS | maximum |
 //! | --- | --- | --- | --- | --- |
-//! | 1 | (25), (27), (39) | `v_B = R_b [L', L gamma', -L beta']` with beta', gamma' rates of the Euler angles of (2) | last component `-L beta' cos(gamma)`; or read beta', gamma' as angular velocity about the leg's y and z axes, throughout | fried2008 1.0e-2 / 1.2e-2 / 3.7e-2, tsai2000 2.6e-2 / 4.2e-2 / 3.9e-1; of `v_B` itself up to 1.4e-1 and 1.6 |
-//! | 2 | (43), (45), last term | wrong units | `+ R_b L'~ L~ R_b^T / L^2`, acting on the leg's angular velocity: `-(L'/L) omega` | fried2008: L for L^2 2.3e-3 / 3.4e-3 / 1.7e-2 in metres, 14 / 20 / 97 in millimetres; opposite sign 2.3e-2 / 3.3e-2 / 1.6e-1 |
-//! | 3 | (74)-(82), H_1 | no component along the leg | the universal joint makes the leg spin: `sin(gamma) beta'` about its axis | scattered 9.9e-4 / 1.8e-3 / 1.3e-2, motion_base 1.1e-4 / 1.7e-4 / 1.1e-3, fried2008 2.9e-5 / 3.5e-5 / 1.2e-4, telescope 2.3e-8 / 3.1e-8 / 9.0e-8; none without axial inertia (tsai2000); more than threefold for each halving of the angle to the first axis |
-//! | 4 | (88), (93) | g with the sign opposite to (74)-(81) | `v' - g` for platform and legs alike | telescope 1.8 / 1.8 / 2.0, fried2008 1.9e-1 / 2.2e-1 / 1.2 |
-//! | 5 | (90), (91) | inertia about the centre of mass beside first moments about C | `I_C = I_G - m c~ c~` | motion_base 2.6e-2 / 3.2e-2 / 1.2e-1, scattered 2.3e-2 / 3.0e-2 / 1.1e-1, tabletop 1.9e-3 / 2.7e-3 / 1.7e-2; none for a centred platform (fried2008) |
-//! | 6 | (92), centrifugal term | its sign is in doubt | `+ m omega x (omega x CG)` | opposite sign: motion_base 1.2e-2 / 1.6e-2 / 7.2e-2, scattered 7.9e-3 / 1.2e-2 / 6.6e-2; none for a centred platform |
-//! | 7 | Table 1, (74)-(82) | a rod whose transverse inertia depends on its length, as if it were rigid | with such a body `dI/dt omega` and, along the leg, `-1/2 dI/dL omega^2` as well | fried2008: power off by 3.8e-4 / 5.0e-4 / 2.1e-3 of the legs' power; the terms are 8.4e-4 / 1.2e-3 / 6.8e-3 of the force. Constant inertias: power balances |
+//! | 1 | fried2008 | 1.0e-2 | 1.2e-2 | 3.7e-2 |
+//! | 1 | tsai2000 | 2.6e-2 | 4.2e-2 | 3.9e-1 |
+//! | 2, L for L^2, in metres | fried2008 | 2.3e-3 | 3.4e-3 | 1.7e-2 |
+//! | 2, L for L^2, in millimetres | fried2008 | 14 | 20 | 97 |
+//! | 2, opposite sign | fried2008 | 2.3e-2 | 3.3e-2 | 1.6e-1 |
+//! | 3 | scattered | 9.9e-4 | 1.8e-3 | 1.3e-2 |
+//! | 3 | motion_base | 1.1e-4 | 1.7e-4 | 1.1e-3 |
+//! | 3 | fried2008 | 2.9e-5 | 3.5e-5 | 1.2e-4 |
+//! | 3 | telescope | 2.3e-8 | 3.1e-8 | 9.0e-8 |
+//! | 4 | telescope | 1.8 | 1.8 | 2.0 |
+//! | 4 | fried2008 | 1.9e-1 | 2.2e-1 | 1.2 |
+//! | 5 | motion_base | 2.6e-2 | 3.2e-2 | 1.2e-1 |
+//! | 5 | scattered | 2.3e-2 | 3.0e-2 | 1.1e-1 |
+//! | 5 | tabletop | 1.9e-3 | 2.7e-3 | 1.7e-2 |
+//! | 6, opposite sign | motion_base | 1.2e-2 | 1.6e-2 | 7.2e-2 |
+//! | 6, opposite sign | scattered | 7.9e-3 | 1.2e-2 | 6.6e-2 |
+//! | 7, error of power as a share of the legs' power | fried2008 | 3.8e-4 | 5.0e-4 | 2.1e-3 |
+//! | 7, the terms as a share of the force | fried2008 | 8.4e-4 | 1.2e-3 | 6.8e-3 |
 //!
 //! What is not known here: the exact print of the last term of (43), (45) beyond that its units are wrong, so
 //! item 2 measures the two nearest powers of L and the opposite sign; and the printed sign in (92), so item 6

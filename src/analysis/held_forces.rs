@@ -1,18 +1,18 @@
-//! How fast the platform leaves a pose while the forces that hold it there stay as they are.
+//! Pole of the platform under constant forces: how fast it leaves a pose at which they balance.
 //!
-//! The drives hold a force for a period, and it was computed from a measurement that is older still. Meanwhile the legs turn, and
-//! their forces with them. With W the wrench of legs and loads at rest, and f the forces that balance it at a pose,
+//! The drives hold a force for a period, and the measurement behind it is older still. Meanwhile the legs turn, and
+//! their forces turn with them. With W the wrench of legs and loads at rest, and f the forces that balance at a pose,
 //!
 //! ```text
 //! W(X, f) = N(X) f - load(X)      W(X0, f) = 0      A = M^-1 dW/dX at X0      pole = max Re sqrt(eigenvalues of A)
 //! ```
 //!
-//! A displacement grows as `exp(pole t)` until a force computed from it acts. A platform on legs is an inverted pendulum, so the
-//! pole is rarely 0; near singular poses the forces are large, and so is it. The loop stands it while the delay is short against
-//! `1 / pole`: see [`sampled_loop`](super::sampled_loop).
+//! A displacement grows as `exp(pole t)` until a force computed from it acts. A platform on legs is an inverted
+//! pendulum, so the pole is rarely 0; near singular poses the forces are large, and so is the pole. The loop is stable
+//! while the delay is short against `1 / pole`: see [`sampled_loop`](super::sampled_loop).
 //!
-//! dW/dX by central differences with steps of `STEP`, to about 1e-8 of the largest. Valid at regular poses. Forces that accelerate the platform are
-//! not included: they do not last.
+//! dW/dX is computed by central differences with steps of `STEP`, to about 1e-8 of the largest element. Valid at
+//! regular poses. Forces that accelerate the platform are not included, because they do not last.
 
 use nalgebra::{Matrix6, Schur, Vector6};
 

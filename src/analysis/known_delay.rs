@@ -1,17 +1,19 @@
-//! Longest delay of a sampled loop of which the estimator knows, as it knows the age of a measurement by its time stamp.
+//! Longest known delay with which a sampled loop is stable. A delay is known if the estimator predicts over it, such as
+//! the age of a measurement, given by its time stamp.
 
 use super::sampled_loop::SampledLoop;
 
-/// Longest known delay that is computed with the true period, in periods, and the resolution: the cost grows with the third power.
+/// Longest known delay that is computed with the true period, and the resolution, in periods. The cost grows with the
+/// third power of the delay.
 const KNOWN_DELAY_PERIODS: f64 = 16.0;
 const KNOWN_DELAY_STEP: f64 = 0.01;
-/// Longest period in the search for the longest known delay, in true ones: more than a second at 20 kHz.
+/// Longest period in the search for the longest known delay, in true periods: more than a second at 20 kHz.
 const MAX_COARSE_PERIODS: f64 = 1024.0;
 
 impl SampledLoop {
-    /// The longest stable delay, in periods, of which the estimator knows all but what it does not know of the present one, as it
-    /// knows the age of a measurement by its stamp; with each of these masses over that of the model. More than
-    /// `KNOWN_DELAY_PERIODS` are those of a loop with longer periods, which stands less.
+    /// The longest known delay, in periods, with which the loop is stable for each of `masses`, as ratios of the
+    /// modelled mass. The unknown part of the delay stays as it is. A delay beyond `KNOWN_DELAY_PERIODS` is computed
+    /// for a loop with longer periods; the true loop is stable with a longer one.
     pub fn longest_known_delay(&self, masses: &[f64]) -> f64 {
         let mut periods = 1.0;
         loop {
@@ -23,8 +25,8 @@ impl SampledLoop {
         }
     }
 
-    /// Whether a delay, in periods, of which the estimator knows as much is stable with each of these masses; of a loop with longer
-    /// periods where it is long. Much faster than [`SampledLoop::longest_known_delay`].
+    /// Whether the loop is stable with a known delay, in periods, for each of `masses`. A long delay is computed for a
+    /// loop with longer periods. Much faster than [`SampledLoop::longest_known_delay`].
     pub fn is_stable_with_known_delay(&self, delay: f64, masses: &[f64]) -> bool {
         let mut periods = 1.0;
         while delay / periods > KNOWN_DELAY_PERIODS {
@@ -33,7 +35,7 @@ impl SampledLoop {
         self.is_stable_with_coarse(periods, delay / periods, masses)
     }
 
-    /// Whether a loop with so many times the period is stable with a known delay in periods of that loop.
+    /// Whether a loop with `periods` times the true period is stable with a known delay, in its own periods.
     fn is_stable_with_coarse(&self, periods: f64, known_delay: f64, masses: &[f64]) -> bool {
         let unknown = (self.delay - self.known_delay) / periods;
         let rate_noise = self.rate_noise.map(|noise| noise * periods);
@@ -43,7 +45,7 @@ impl SampledLoop {
         masses.iter().all(|mass| late.is_stable_with_gain(1.0 / mass))
     }
 
-    /// The same of a loop with so many times the period, in periods of that loop.
+    /// The longest known delay of a loop with `periods` times the true period, in its own periods.
     fn coarse_known_delay(&self, periods: f64, masses: &[f64]) -> f64 {
         let with = |known_delay: f64| self.is_stable_with_coarse(periods, known_delay, masses);
         if with(KNOWN_DELAY_PERIODS) {

@@ -1,10 +1,19 @@
 //! Properties of a machine, a motion or a control loop, computed before the platform moves.
 //!
-//! [`envelope`] and [`reachable_envelope`] define the motions of a task, [`fidelity_error`] and [`fidelity_choice`] the
-//! terms of the model that they need; [`drive_capability`], [`pose_quality`], [`region_shape`], [`clearance`], [`region_search`] and [`region_proof`]
-//! the workspace, [`leg_crossing`] legs in each other's way,
-//! [`assembly_modes`] the other poses with the same leg lengths, [`held_forces`] how fast the platform leaves a pose whose forces are held, [`sampled_loop`] the margins of a sampled loop;
-//! [`target_motion`] the reference's way to a target, [`pose_spline`] the derivatives of a motion given by poses; [`batch`] evaluates many motions on all processors. May allocate; not for the cycle.
+//! | subject | module |
+//! | --- | --- |
+//! | motions of a task | [`envelope`], [`reachable_envelope`] |
+//! | terms of the model that they need | [`fidelity_error`], [`fidelity_choice`] |
+//! | workspace | [`drive_capability`], [`pose_quality`], [`region_shape`], [`clearance`], [`region_search`], [`region_proof`] |
+//! | collisions between legs | [`leg_crossing`] |
+//! | other poses with the same leg lengths | [`assembly_modes`] |
+//! | how fast the platform leaves a pose under constant forces | [`held_forces`] |
+//! | margins of a sampled loop | [`sampled_loop`] |
+//! | path of the reference to a target | [`target_motion`] |
+//! | derivatives of a motion given by poses | [`pose_spline`] |
+//! | many motions, on all processors | [`batch`] |
+//!
+//! These functions may allocate, so the cycle does not call them.
 
 pub mod assembly_modes;
 pub mod batch;

@@ -2,7 +2,7 @@
 //!
 //! Cells are queued by the size at which the family reaches them. The nearest are taken; one that is proved clear is done,
 //! another is cut in two. At any time every region smaller than the nearest queued cell is proved clear, and the nearest
-//! violation found is an upper bound. The search returns both; nothing is known about sizes in between.
+//! violation found is an upper bound. The search returns both; sizes in between are undecided.
 //!
 //! Method: best-first branch and bound, Land and Doig (1960). It ends at a gap of 1 % or after [`MAX_CELLS`] cells.
 

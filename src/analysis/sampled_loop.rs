@@ -2,16 +2,16 @@
 //!
 //! Computed torque leaves of every axis, linear or angular, a double integrator of the error,
 //! `e'' = -u / m`, with m the mass of the platform over that of the model. At instant k T a measurement gives e. The
-//! [`estimator`](crate::control::law::estimator) corrects its estimate by it, predicts it over the delay that it knows, and the law
-//! commands
+//! [`estimator`](crate::control::law::estimator) corrects its estimate by it and predicts the estimate over the known delay. The
+//! law commands
 //!
 //! ```text
 //! u_k = Kp ep_k + Kd wp_k + d_k        ep, wp, d: estimate at the instant at which the force begins
 //! ```
 //!
 //! The drives hold it for a period from `k T + delay` on. The delay is the sum of the age of the measurement, computing, sending
-//! and dead time; the estimator knows the age, by the time stamp, and the configured delay of the drives. Neither the reference
-//! nor its instant appears: the error compares both at the same instant.
+//! and dead time. Its known part is the age, given by the time stamp, and the configured delay of the drives. Neither the
+//! reference nor its instant appears: the error compares both at the same instant.
 //!
 //! One period takes `z = [e, T e', estimate of e, T w, T^2 d, u_k-1, u_k-2, ...]` to `A z + b n`, n the noise of the reading. The
 //! loop is stable exactly while the spectral radius of A is below 1. It is conditionally stable: the platform may be too
@@ -56,7 +56,7 @@ pub struct SampledLoop {
     pub rate_noise: Option<f64>,
     /// Whether the estimated disturbance is compensated.
     pub compensates_disturbance: bool,
-    /// Part of the delay that the estimator knows, in periods.
+    /// Part of the delay over which the estimator predicts, in periods.
     pub known_delay: f64,
     /// Delay from the measurement to its force, in periods.
     pub delay: f64,
@@ -214,7 +214,7 @@ impl SampledLoop {
         libm::exp(logarithm)
     }
 
-    /// The loop of a mode in which feedback has so many times its gain, and the estimator knows it.
+    /// The loop of a mode in which feedback has `gain` times its gain, and the estimator's model includes that gain.
     pub fn with_feedback_gain(self, gain: f64) -> Self {
         let root = gain.sqrt();
         Self {
@@ -298,8 +298,7 @@ impl SampledLoop {
         }
     }
 
-    /// The longest stable delay, in periods, of which the estimator knows as much as of the present one; no longer than
-    /// [`MAX_DELAY_PERIODS`].
+    /// The longest stable delay, in periods, at most [`MAX_DELAY_PERIODS`]. Its known part stays as it is.
     pub fn longest_delay(&self) -> f64 {
         let with = |delay| Self { delay, ..*self }.is_stable();
         let longest = MAX_DELAY_PERIODS as f64;

@@ -1,7 +1,7 @@
 //! Motion of the reference to a target, in advance: the daemon's own reference generator, cycle by cycle.
 //!
-//! Position and orientation go straight to the target, each in its own time. Where that way leaves the workspace the
-//! motion is refused: which way around is right, only people know. It does not look at forces.
+//! Position and orientation go straight to the target, each in its own time. A path that leaves the workspace is
+//! refused: the operator must choose another path. Forces are not checked.
 
 use core::fmt;
 
@@ -192,8 +192,8 @@ fn nearest(bounds: &[WorkspaceBound], limit: Limit) -> Option<WorkspaceBound> {
     of_limit.min_by(|a, b| ratio(a).total_cmp(&ratio(b))).copied()
 }
 
-/// Moves the reference from rest at a pose to a target, with a share of the limits of autonomous motions, until it is there. `observe` sees the generator after each cycle,
-/// with the motion at the beginning of the cycle.
+/// Moves the reference from rest at a pose to a target and returns the motion. `speed` is a share of the limits of
+/// autonomous motions. `observe` receives the generator after each cycle, and the motion at the beginning of the cycle.
 pub fn target_motion(
     constants: &Constants,
     from: &Pose,

@@ -11,11 +11,11 @@ use crate::output::files::FileError;
 use crate::output::svg::ChartError;
 use crate::recording::RecordingError;
 
-/// Exit code of a command that a signal ended before it had finished, as shells have it for SIGINT.
+/// Exit code of a command that a signal has interrupted, as shells use it for SIGINT.
 pub const INTERRUPTED: u8 = 130;
 
-/// Error that ends a command, with the exit code of the process: 1 if the command ran and failed, 2 if it could not
-/// begin, and cannot without a correction.
+/// Error that ends a command, with the exit code of the process. 1: the command ran and failed. 2: it could
+/// not begin, and cannot without a correction.
 #[derive(Debug)]
 pub struct Failure {
     pub exit_code: u8,
@@ -31,7 +31,7 @@ impl Failure {
 
 /// Error that can end a command.
 pub trait CommandError: Error {
-    /// Whether the command had begun its work.
+    /// Whether the command had begun.
     fn has_begun(&self) -> bool {
         false
     }
@@ -56,7 +56,7 @@ impl<E: CommandError> From<E> for Failure {
 impl CommandError for ConfigError {}
 
 impl CommandError for DaemonError {
-    /// What the system refuses now, and another daemon, may be different at the next attempt: a service manager repeats it.
+    /// A refusal of the system, or another daemon, may not persist. A service manager then tries again.
     fn has_begun(&self) -> bool {
         let is_configured =
             |error: &SocketError| matches!(error, SocketError::NoGroup(..) | SocketError::NotMember(..));

@@ -1,4 +1,4 @@
-//! `hexad faults`: the numbers of states, faults and limits in words, from the place that defines them.
+//! `hexad faults`: names and texts of states, faults and limits by number, from their definition.
 
 use core::fmt;
 

@@ -1,4 +1,4 @@
-//! `hexad forward-kinematics`: poses, and twists where there are rates, of the leg lengths in a file.
+//! `hexad forward-kinematics`: poses from the leg lengths in a file, and twists if it has rates.
 
 use clap::{Args, ValueEnum};
 use indicatif::ProgressIterator;
@@ -46,7 +46,7 @@ impl ForwardKinematicsArguments {
     }
 }
 
-/// Poses for a table with the columns of lengths, twists where it has rates, and whether all rows have a pose.
+/// Poses for a table of lengths, twists if it has rates, and whether all rows have a pose.
 pub fn forward_kinematics(
     machine: &Machine,
     start: StartPose,
@@ -67,7 +67,7 @@ pub fn forward_kinematics(
         if start == StartPose::Home {
             (tracker, near) = (home, machine.home);
         }
-        // A row without solution leaves the start of the next one where it was.
+        // After a row without a solution the start of the next row does not change.
         let mut walker = tracker;
         let (tracked, iterations) = walker.find(machine, &six(row, 1));
         let converged = tracked == TrackingResult::Found;

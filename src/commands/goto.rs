@@ -1,7 +1,7 @@
-//! `hexad goto`: moves the platform to a pose, at which it stands under control afterwards.
+//! `hexad goto`: moves the platform to a pose and holds it there under control.
 //!
-//! Before anything moves the reference generator takes the whole way offline: a target or a way outside of the workspace
-//! is refused with leg, value and bound, and `--dry-run` prints what it would do.
+//! Before the platform moves, the reference generator computes the whole motion offline. A target or a path outside the
+//! workspace is refused with leg, value and bound. `--dry-run` only prints the motion.
 
 use core::fmt;
 use std::time::{Duration, Instant};
@@ -22,7 +22,7 @@ use crate::output::files::print;
 use crate::output::numbers::{AXES, axis_unit, fixed, percent, significant};
 use crate::realtime::stop_request::Stop;
 
-/// Time for the way, as a multiple of what was computed, and beyond that \[s\].
+/// Longest time of the motion, as a multiple of the computed time, and an addition \[s\].
 const LONGEST_SHARE: f64 = 1.5;
 const LONGEST_EXTRA_S: f64 = 5.0;
 
@@ -35,7 +35,7 @@ pub struct GotoArguments {
     /// Add the coordinates to those of the present pose
     #[arg(long)]
     relative: bool,
-    /// What is not given is that of the home pose
+    /// Take the coordinates that are not given from the home pose
     #[arg(long, conflicts_with = "relative")]
     home: bool,
     /// Share of the limits of autonomous motions, for example 50%
@@ -85,7 +85,7 @@ impl GotoArguments {
         Ok(drive(source, &constants, [from, to], motion.duration_s, &stop)?)
     }
 
-    /// X at which the way begins, and where that is from.
+    /// X at the beginning of the motion, and its origin as text.
     fn start(&self, config: &Config) -> Result<([f64; 6], &'static str), TargetError> {
         match status(&config.name) {
             Ok(answer) => reference_x(config, &answer)
@@ -97,8 +97,8 @@ impl GotoArguments {
     }
 }
 
-/// Publishes the target until the reference is there; after a signal until the platform stands where it can. Control begins
-/// where the platform is.
+/// Publishes the target until the reference has reached it; after a signal, until the platform is at rest.
+/// Control begins at the pose of the platform.
 fn drive(
     mut source: TargetSource,
     constants: &Constants,
@@ -129,7 +129,7 @@ fn drive(
         if elapsed_s > longest_s {
             return Err(TargetError::TimedOut(longest_s));
         }
-        // A status from before would have the platform elsewhere.
+        // An older status would have another pose.
         if source.status().newest.0 < since {
             continue;
         }
@@ -149,12 +149,12 @@ fn reached(source: &TargetSource, since: Instant) -> Result<(), TargetError> {
         heading(),
         row("pose", &pose)
     );
-    // The platform has moved: a closed standard output is no reason to fail.
+    // The platform has moved, so a closed standard output is not a failure.
     let _ = print(text);
     Ok(())
 }
 
-/// Share of a speed, as a number or in per cent.
+/// Speed as a share, given as a number or in per cent.
 fn speed(text: &str) -> Result<f64, String> {
     match text.strip_suffix('%') {
         Some(percent) => number_within(percent.trim(), 1.0..=100.0, " %").map(|percent| percent / 100.0),
@@ -162,7 +162,7 @@ fn speed(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What the reference will do.
+/// Planned motion of the reference.
 struct Plan<'a> {
     constants: &'a Constants,
     from: &'a [f64; 6],
@@ -214,14 +214,14 @@ impl fmt::Display for Plan<'_> {
     }
 }
 
-/// A line with X in the units of people.
+/// Line with X in millimetres and degrees.
 fn row(name: &str, x: &[f64; 6]) -> String {
     let numbers: String =
         x.iter().enumerate().map(|(k, x)| format!("{:>11}", fixed(x * axis_unit(k).0, 3))).collect();
     format!("{name:10}{numbers}\n")
 }
 
-/// The names of X above [`row`].
+/// Heading with the names of X, above [`row`].
 fn heading() -> String {
     let names: String = AXES
         .iter()

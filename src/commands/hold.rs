@@ -1,4 +1,4 @@
-//! `hexad hold`: keeps the platform under control where it is, until Ctrl-C; then it stops properly.
+//! `hexad hold`: keeps the platform under control at its pose until Ctrl-C, then stops it.
 
 use std::time::Duration;
 
@@ -15,7 +15,7 @@ use crate::operator::stops::stop_machine;
 use crate::output::files::print;
 use crate::realtime::stop_request::Stop;
 
-/// Longest to wait for the stop at the end.
+/// Longest wait for the stop at the end.
 const STOP_LIMIT: Duration = Duration::from_secs(30);
 
 #[derive(Debug, Args)]
@@ -46,11 +46,11 @@ impl HoldArguments {
                 print("the platform stands under control; Ctrl-C ends it with a stop\n")?;
             }
         }
-        // Its own wait must not end with the signal that has brought it here.
+        // The wait for this stop must not end by the signal that has caused it.
         let order = Order { request: Request::Stop, is_patient: false, timeout: STOP_LIMIT };
         let outcome = stop_machine(&config.name, &order, &|| false);
         if !has_control {
-            // Without control there is nothing to stop, unless it was taken just now.
+            // Without control there is nothing to stop, unless control was taken just now.
             return Err(TargetError::InterruptedEarly.into());
         }
         Ok(print(format_args!("{}\n", outcome?))?)

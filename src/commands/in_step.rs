@@ -1,4 +1,5 @@
-//! Requests in step with setpoints, over the topic `command`: in simulated time a request then belongs to an instant.
+//! Requests in step with setpoints, over the topic `command`. In simulated time such a request belongs to an
+//! instant.
 //!
 //! Operators use the control socket ([`crate::operator`]).
 
@@ -11,7 +12,7 @@ pub struct Operator {
     commands: Publisher<CommandMessage>,
     statuses: Subscriber<StatusMessage>,
     is_simulated: bool,
-    /// Of the newest status \[ns\]: in simulated time, that is now.
+    /// Time of the newest status \[ns\]; in simulated time, the present.
     status_ns: u64,
 }
 
@@ -22,7 +23,7 @@ impl Operator {
         Ok(Self { commands, statuses, is_simulated: bus.is_simulated(), status_ns: 0 })
     }
 
-    /// Sends a request, without waiting for its outcome.
+    /// Sends a request without waiting for its result.
     pub fn send(&mut self, request: Request) -> Result<(), PortError> {
         let now_ns = if self.is_simulated { self.status_ns } else { monotonic_ns() };
         self.commands.publish(now_ns, request.into())

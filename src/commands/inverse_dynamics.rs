@@ -43,8 +43,8 @@ fn fidelity_by_name() -> impl TypedValueParser<Value = Fidelity> {
     })
 }
 
-/// Forces, lengths and their derivatives for a table with the columns of a trajectory, and whether all rows have
-/// forces. At a singular pose the forces are NaN.
+/// Forces, lengths and their derivatives for a table with the columns of a trajectory, and whether all rows
+/// have forces. At a singular pose the forces are NaN.
 pub fn inverse_dynamics(
     machine: &Machine,
     fidelity: Fidelity,

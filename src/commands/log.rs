@@ -1,4 +1,4 @@
-//! Log of the process: to the journal with fields where standard error is the journal, else as text; or as JSON.
+//! Log of the process: to the journal with fields if standard error is the journal, else as text, or as JSON.
 
 use std::fs::metadata;
 use std::io::IsTerminal;
@@ -16,18 +16,19 @@ use tracing_subscriber::registry::LookupSpan;
 use tracing_subscriber::util::SubscriberInitExt;
 use tracing_subscriber::{Layer, fmt, registry};
 
-/// Identifier of the journal's entries, whatever started the process.
+/// Identifier of the journal's entries, independent of the program that started the process.
 const IDENTIFIER: &str = "hexad";
-/// Beginning of the names of the fields: `HEXAD_STATE`, `HEXAD_CODE`, `HEXAD_VALUE`, `HEXAD_BOUND`, `HEXAD_CYCLE`.
+/// Prefix of the names of the fields: `HEXAD_STATE`, `HEXAD_CODE`, `HEXAD_VALUE`, `HEXAD_BOUND`,
+/// `HEXAD_CYCLE`.
 const FIELD_PREFIX: &str = "HEXAD";
 
-/// Fields that the text of a message contains in words.
+/// Fields that the text of a message already contains.
 const FIELDS_IN_TEXT: [&str; 3] = ["state", "value", "bound"];
 
 /// Environment variable of [`LogFormat`], which child processes inherit.
 pub const FORMAT_VARIABLE: &str = "HEXAD_LOG_FORMAT";
 
-/// Environment variables with the filter, the first that is set counts.
+/// Environment variables with the filter. The first that is set counts.
 pub const FILTER_VARIABLES: [&str; 2] = ["HEXAD_LOG", "RUST_LOG"];
 
 /// Format of the log on standard error.
@@ -58,7 +59,7 @@ pub fn install(format: LogFormat) {
                 .with_field_prefix(Some(FIELD_PREFIX.into()))
                 .with_priority_mappings(priorities())
         });
-    // The journal stamps its entries itself.
+    // The journal adds its own time stamps.
     match journal {
         Some(journal) => registry().with(filter).with(journal).init(),
         None if is_json => {
@@ -92,7 +93,7 @@ pub fn format_name() -> &'static str {
     }
 }
 
-/// Reports why the process ends.
+/// Logs the reason why the process ends.
 pub fn report_failure(message: &str) {
     let is_structured = is_journal() || FORMAT.get() == Some(&LogFormat::Json);
     if is_structured && tracing::enabled!(Level::ERROR) {

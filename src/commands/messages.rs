@@ -1,4 +1,5 @@
-//! `hexad messages`: declarations of all messages in another language, from the one list of their fields.
+//! `hexad messages`: declarations of all messages in another language, generated from the one list of their
+//! fields.
 
 use core::fmt::{self, Write as _};
 
@@ -38,7 +39,7 @@ pub enum Language {
     Json,
 }
 
-/// Declarations of all messages; displays as the text of a file.
+/// Declarations of all messages. Displays as the text of a file.
 pub struct Declarations(pub Language);
 
 impl fmt::Display for Declarations {
@@ -51,7 +52,7 @@ impl fmt::Display for Declarations {
     }
 }
 
-/// All structs, each after those that it contains.
+/// All structs, each after the structs that it contains.
 fn structs() -> Vec<&'static Layout> {
     fn add(found: &mut Vec<&'static Layout>, layout: &'static Layout) {
         for field in layout.fields {
@@ -68,7 +69,7 @@ fn structs() -> Vec<&'static Layout> {
     found
 }
 
-/// Prefix, names and numbers of the constants that fields contain.
+/// Prefix, names and numbers of the constants that fields may have.
 fn constants() -> Vec<(&'static str, String, u32)> {
     let states = State::ALL.into_iter().map(|state| ("STATE", format!("{state:?}"), state as u32));
     let requests = Request::ALL.into_iter().map(|it| ("REQUEST", format!("{it:?}"), it as u32));

@@ -1,8 +1,8 @@
 //! The command line: one file or folder for each command.
 //!
-//! Exit codes: 0 done; 1 the command ran and failed (a fault, a row without solution; for the daemon also what it lacks now and
-//! may have later: memory, a socket, a machine that another controls); 2 it could not begin (bad command line,
-//! configuration, input or environment); 130 a signal ended it before it had finished.
+//! Exit codes: 0 done; 1 the command ran and failed (a fault, a row without solution; for the daemon also a
+//! shortage that may end: memory, a socket, a machine controlled by another daemon); 2 it could not begin
+//! (bad command line, configuration, input or environment); 130 a signal ended it before it had finished.
 
 use clap::{Parser, Subcommand};
 
@@ -88,7 +88,7 @@ enum CommandArguments {
     Plant(MachineFile),
     /// Play a motion or a trajectory as a setpoint source
     Move(MoveArguments),
-    /// Move the platform to a pose, at which it stands under control
+    /// Move the platform to a pose and hold it there under control
     Goto(GotoArguments),
     /// Keep the platform under control where it is, until Ctrl-C; then stop
     Hold(HoldArguments),

@@ -11,8 +11,8 @@ use crate::output::csv_table::{
 };
 use crate::output::files::name_of;
 
-/// Error for rows without a solution. The output is complete and marks them; the error makes sure that nobody misses
-/// them.
+/// Error for rows without a solution. The output is complete and marks them; the error makes the failure
+/// visible.
 #[derive(Debug, Default, thiserror::Error)]
 #[error("{count} of {rows} rows {problem}, the first at t = {first:?}")]
 pub struct UnsolvedRows {
@@ -31,7 +31,7 @@ impl CommandError for UnsolvedRows {
 impl CommandError for TableError {}
 
 impl UnsolvedRows {
-    /// Count of zero; `problem` says what an unsolved row lacks.
+    /// Counter at zero. `problem` says what is missing in an unsolved row.
     pub fn new(problem: &'static str) -> Self {
         Self { problem, ..Self::default() }
     }
@@ -45,23 +45,24 @@ impl UnsolvedRows {
         }
     }
 
-    /// Itself as an error, if any row is unsolved.
+    /// The count as an error, if any row is unsolved.
     pub fn into_result(self) -> Result<(), Self> {
         if self.count == 0 { Ok(()) } else { Err(self) }
     }
 }
 
-/// Least time from one row of a trajectory to the next \[s\], far below the period of any loop. Between
-/// rows that are nearer, X'' has no digits.
+/// Least time between two rows of a trajectory \[s\], far below the period of any loop. Between closer rows,
+/// X'' has no significant digits.
 const MIN_STEP_S: f64 = 1e-6;
 
-/// Reads a table of t, X, X', X''. Without X' and X'' they are those of the spline through the poses.
+/// Reads a table of t, X, X', X''. If X' and X'' are missing, they are computed from the spline through the
+/// poses.
 pub fn read_trajectory(path: &Path) -> Result<NumberTable, TableError> {
     let table = NumberTable::read(path, &pose_columns(), &derivative_columns())?;
     with_derivatives(table, name_of(path))
 }
 
-/// The table with X' and X'', also if it has only poses.
+/// Adds X' and X'' to a table that has only poses.
 pub fn with_derivatives(table: NumberTable, path: &Path) -> Result<NumberTable, TableError> {
     let width = trajectory_columns().len();
     if table.rows().iter().all(|row| row.len() == width) {
@@ -87,7 +88,7 @@ pub fn with_derivatives(table: NumberTable, path: &Path) -> Result<NumberTable, 
     Ok(table.with_rows(rows))
 }
 
-/// Adds an error for each row whose time is not after that of the row before.
+/// Adds an error for each row whose time is not later than the previous one.
 pub fn check_times(table: &NumberTable, errors: &mut TableErrors) {
     let rows = || table.rows().iter().map(|row| time(row)).zip(table.lines());
     for ((before, _), (after, line)) in rows().zip(rows().skip(1)) {

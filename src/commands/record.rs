@@ -43,7 +43,7 @@ impl RecordArguments {
     }
 }
 
-/// Lets the daemon of a machine write its last seconds to a file; returns what it has written, in words.
+/// Requests the recording of the last seconds into a file. Returns the daemon's answer as text.
 fn record(machine: &str, last_s: f64, file: &File) -> Result<String, OperatorError> {
     let line = RequestLine { last_s: Some(last_s), ..RequestLine::new("record") };
     let answer = ask_first(machine, |connection: &mut Connection| {

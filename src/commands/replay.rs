@@ -1,4 +1,4 @@
-//! `hexad replay`: computes the cycles of a recording again, and compares.
+//! `hexad replay`: computes the cycles of a recording again and compares the outputs.
 
 use core::fmt::Write as _;
 use core::ops::RangeInclusive;
@@ -18,7 +18,7 @@ use crate::recording::copy::copy;
 use crate::recording::reader::{Recording, Summary};
 use crate::recording::{Item, RunInfo};
 
-/// Most ranges of cycles that are listed.
+/// Largest number of ranges of cycles that are listed.
 const MAX_RANGES: usize = 10;
 
 #[derive(Debug, Args)]
@@ -50,7 +50,7 @@ fn part(text: &str) -> Result<Part, String> {
     }
 }
 
-/// The replay is not the recording.
+/// Error if the replay differs from the recording.
 #[derive(Debug, thiserror::Error)]
 enum ReplayError {
     #[error(
@@ -106,12 +106,12 @@ fn recorded_version(info: &RunInfo) -> String {
     format!("{} (commit {})", info.version, info.commit)
 }
 
-/// What the daemon would run on.
+/// Instruction set that the daemon would use.
 fn processor() -> Level {
     at_most_256_bits(Level::new())
 }
 
-/// Range of `log_time` \[ns\] of a part, from where a replay can begin.
+/// Range of `log_time` \[ns\] of a part, extended to the point where a replay can begin.
 fn times_of(recording: &Recording, part: &RangeInclusive<f64>) -> Result<RangeInclusive<u64>, Failure> {
     let Summary { first, info, .. } = recording.summary()?;
     let (mut begin, mut end, mut repeatable, mut length_s) = (None, None, None, 0.0);

@@ -1,6 +1,6 @@
-//! `hexad engage | stop | park | clear | off | estop | reload`: an operator's request and its outcome.
+//! `hexad engage | stop | park | clear | off | estop | reload`: an operator's request and its result.
 //!
-//! A command that ends with 0 has reached its state, for every machine that it was meant for.
+//! Exit code 0 means that every addressed machine has reached the state of the request.
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, channel};
@@ -46,7 +46,7 @@ impl Wait {
 pub struct EngageArguments {
     #[command(flatten)]
     request: RequestArguments,
-    /// Wait for measurements and for a setpoint where the platform stands, instead of being refused
+    /// Wait for measurements and for a setpoint at the pose of the platform, instead of being refused
     #[arg(long)]
     wait: bool,
 }
@@ -70,7 +70,7 @@ impl EngageArguments {
 }
 
 impl RequestArguments {
-    /// Sends a request that does not stop.
+    /// Sends a request other than a stop.
     pub fn execute(&self, request: Request) -> Result<(), Failure> {
         self.send(request, false)
     }
@@ -83,7 +83,7 @@ impl RequestArguments {
         Ok(print(format_args!("{state}\n"))?)
     }
 
-    /// Lets the daemon read its machine file again, and prints what has changed.
+    /// Requests a reload, and prints the changes.
     pub fn reload(&self) -> Result<(), Failure> {
         let changed = requests::reload(&machine_name(self.machine.path())?, self.wait.limit())?;
         Ok(print(format_args!("{changed}\n"))?)
@@ -91,7 +91,8 @@ impl RequestArguments {
 }
 
 impl StopArguments {
-    /// Stops the machine that is named, else all for an emergency stop, and the only one for another.
+    /// Stops the named machine. Without a name, `--all` or an emergency stop stops all machines; any other stop
+    /// needs a single running machine.
     pub fn execute(&self, request: Request) -> Result<(), Failure> {
         let interrupted = Stop::on_signals()?;
         let name = self.machine.path().map(machine_name).transpose()?;
@@ -106,8 +107,8 @@ impl StopArguments {
     }
 }
 
-/// Prints the states, with the names of the machines if all were meant. The failure is the first: of the machines that this user may
-/// stop, if there are any.
+/// Prints the states, with the names of the machines if all were addressed. The error is the first one, of
+/// the machines that this user may stop if there are any.
 fn report(stopped: Vec<Stopped>, with_names: bool) -> Result<(), Failure> {
     let may_any = stopped.iter().any(|it| it.result.as_ref().err().is_none_or(is_answer));
     let mut failures = vec![];
@@ -131,14 +132,14 @@ fn is_answer(error: &OperatorError) -> bool {
     !matches!(error, OperatorError::Forbidden { .. } | OperatorError::NotTrusted { .. })
 }
 
-/// Name of the machine of a file; an argument that is no file and may be a name is one.
+/// Name of the machine of a file. An argument that is not a file but a valid name is the name.
 pub fn machine_name(argument: &Path) -> Result<String, ConfigError> {
     let text = argument.to_string_lossy();
     let is_name = !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
     if is_name && !argument.exists() { Ok(text.into_owned()) } else { name_in(argument) }
 }
 
-/// Carries out a request in a thread: setpoints must not wait. What it waits for is logged.
+/// Sends a request in a separate thread, so that setpoints do not wait. Logs what the request waits for.
 pub fn carry_out_in_background(
     machine: &str,
     order: Order,
@@ -149,7 +150,7 @@ pub fn carry_out_in_background(
     spawn(move || {
         let waits = |reason: &str| info!("{} waits: {reason}", order.request.name());
         let outcome = carry_out(&machine, &order, &|| stop.is_requested(), waits);
-        // Nobody receives it when the command has ended.
+        // The receiver is gone when the command has ended.
         let _ = send.send(outcome.map(drop));
     });
     result

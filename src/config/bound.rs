@@ -6,7 +6,7 @@ use toml::de::DeValue;
 
 use crate::output::numbers::{MAX_MAGNITUDE, MIN_POSITIVE_VALUE};
 
-/// Bound of a number. All but one admit finite numbers only.
+/// Bound of a number. Only one admits infinity.
 #[derive(Clone, Copy)]
 pub(super) enum Bound {
     Finite,

@@ -9,8 +9,9 @@ use toml::de::{DeTable, DeValue};
 use super::bound::number;
 use crate::output::excerpt::excerpt;
 
-/// Sections that a running daemon takes over. All others need a restart: geometry, masses and actuators are the machine's,
-/// `realtime` belongs to the threads, `operator` to the control socket, and the name is that of the topics.
+/// Sections that a running daemon can reload. All others need a restart: geometry, masses and actuators
+/// belong to the machine, `realtime` to the threads, `operator` to the control socket, and the name to the
+/// topics.
 const RELOADABLE: [&str; 7] = ["control", "drive", "envelope", "limits", "measured", "setpoint", "timeouts"];
 
 /// Sections that the daemon does not read.
@@ -21,14 +22,14 @@ const FOREIGN: [&str; 1] = ["plant"];
 pub struct Change {
     /// Full name of the key; legs count from 1.
     pub key: String,
-    /// Values as written; `None` where the file has none and the default holds.
+    /// Value as written; `None` if the file has none and the default is used.
     pub old: Option<String>,
-    /// The same in the other file.
+    /// Value in the other file.
     pub new: Option<String>,
 }
 
 impl Change {
-    /// Whether a running daemon can take it over.
+    /// Whether a running daemon can reload it.
     pub fn is_reloadable(&self) -> bool {
         RELOADABLE.contains(&self.section())
     }
@@ -45,8 +46,8 @@ impl fmt::Display for Change {
     }
 }
 
-/// The keys of two valid files that differ and that the daemon reads: in the order of the old file, then those that only the new
-/// one has. Spelling (`1`, `1.0`, spaces, comments) is no difference.
+/// Keys that the daemon reads and whose values differ between two valid files. Order: as in the old file,
+/// then the keys that only the new file has. Spelling (`1`, `1.0`, spaces, comments) makes no difference.
 pub fn changes(old: &str, new: &str) -> Vec<Change> {
     let [old, new] = [old, new].map(Leaf::all);
     let value_in = |leaves: &[Leaf], key: &str| leaves.iter().find(|leaf| leaf.key == key).cloned();
@@ -66,9 +67,9 @@ pub fn changes(old: &str, new: &str) -> Vec<Change> {
 #[derive(Clone)]
 struct Leaf {
     key: String,
-    /// As written.
+    /// Value as written.
     shown: String,
-    /// The same for every spelling of the value.
+    /// Value in a form that does not depend on spelling.
     meaning: String,
 }
 

@@ -10,17 +10,17 @@ use crate::control::law::estimator::SENT_ACCELERATIONS;
 /// Control loop with the longest delay that the daemon may have.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlLoop {
-    /// Name for people: `position`, `orientation` or `legs`.
+    /// Name in messages: `position`, `orientation` or `legs`.
     pub name: &'static str,
     /// Natural frequency of the error dynamics \[Hz\].
     pub bandwidth_hz: f64,
     /// Cycles per second \[Hz\].
     pub rate_hz: f64,
-    /// The loop without units, with its longest delay in periods; its margins decide stability.
+    /// The loop in dimensionless form, with its longest delay in periods. Its margins decide stability.
     pub sampled: SampledLoop,
 }
 
-/// The loops of position and orientation, or that of the stiffest mode of the legs.
+/// The loops of position and orientation, or the loop of the stiffest mode of the legs.
 pub fn loops(deployment: &Deployment) -> Vec<ControlLoop> {
     loops_of(&deployment.realtime, &deployment.control, &deployment.drive, &deployment.limits)
 }
@@ -31,7 +31,7 @@ fn loops_of(
     drive: &Drive,
     limits: &DeploymentLimits,
 ) -> Vec<ControlLoop> {
-    // Modes on legs take the forces at the desired pose.
+    // Modes on legs compute the forces at the desired pose.
     let held_pole = if control.mode.acts_on_legs() { 0.0 } else { limits.held_pole };
     let [position, orientation] = [
         (control.position_bandwidth_hz, control.position_damping_ratio),
@@ -57,12 +57,12 @@ fn loops_of(
     each.into_iter().map(with).collect()
 }
 
-/// Masses of the platform over that of the model with which the loop must stand the age of its measurements. Less than
-/// [`STABLE_MASSES`]: a driver so slow is rare, and so is a model so wrong.
+/// Masses of the platform, as ratios of the modelled mass, for which the loop must be stable at the longest age of its
+/// measurements. The range is narrower than [`STABLE_MASSES`]: so slow a driver and so wrong a model are both rare.
 const MASSES_AT_LONGEST_AGE: [f64; 2] = [0.9, 1.1];
 
-/// Largest constant age of the measurements with which all loops are stable, and the estimator knows what was sent since \[s\].
-/// No less than the age that the measurements have in any case.
+/// Largest constant age of the measurements with which all loops are stable and the estimator still has the
+/// accelerations sent since \[s\]. At least the age that the measurements have in any case.
 pub fn longest_age_s(deployment: &Deployment) -> f64 {
     let recorded = SENT_ACCELERATIONS as f64 - 1.0;
     let recorded_s = recorded * deployment.realtime.period_s() - deployment.drive.total_delay_s();
@@ -79,7 +79,8 @@ fn stable_age_s(realtime: &Realtime, control: &Control, drive: &Drive, limits: &
     delays.fold(f64::INFINITY, f64::min) * realtime.period_s() - drive.total_delay_s()
 }
 
-/// The age \[s\], or the largest with which all loops are stable if that is less. A rejected value leaves it open.
+/// The age \[s\], or the largest age with which all loops are stable if that is less. A loop with a rejected value is
+/// left out.
 pub(super) fn bounded_age_s(
     age_s: f64,
     realtime: &Realtime,
@@ -103,7 +104,7 @@ fn is_finite(sampled: &SampledLoop) -> bool {
     values.iter().all(|value| value.is_finite())
 }
 
-/// `timeouts.measured_ms` that is beyond the age with which the loops are stable, as its value and that age \[ms\].
+/// `timeouts.measured_ms` beyond the age with which the loops are stable: its value and that age \[ms\].
 pub fn unstable_timeout_ms(deployment: &Deployment) -> Option<(f64, f64)> {
     let Deployment { realtime, control, drive, limits, timeouts, .. } = deployment;
     let age_s = bounded_age_s(timeouts.measured_s, realtime, control, drive, limits);
@@ -116,7 +117,7 @@ impl ControlLoop {
         self.sampled.largest_wn_t() * self.rate_hz / TAU
     }
 
-    /// Error where the loop is not stable because of the pole of the platform under held forces.
+    /// Error if the loop is unstable because of the pole of the platform under constant forces.
     pub fn beyond_held_pole(&self) -> Option<String> {
         let Self { name, rate_hz, sampled, .. } = self;
         let with = |held_pole| SampledLoop { held_pole, ..*sampled }.is_stable();
@@ -132,7 +133,7 @@ impl ControlLoop {
         ))
     }
 
-    /// Warning where a mass that is plausible would make the loop unstable.
+    /// Warning if a plausible mass would make the loop unstable.
     pub fn warning(&self) -> Option<String> {
         let Self { name, sampled, .. } = self;
         let delay = sampled.delay;
@@ -152,7 +153,7 @@ impl ControlLoop {
     }
 }
 
-/// The loop, its margin with its delay, and the delay at which it would be unstable.
+/// Displays the loop, its margin with its delay, and the delay at which it becomes unstable.
 impl fmt::Display for ControlLoop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, bandwidth_hz, rate_hz, sampled } = self;

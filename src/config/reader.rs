@@ -1,8 +1,8 @@
-//! SectionReader of the keys of a section, which logs every violation.
+//! Reader of the keys of a section. It logs every violation.
 //!
-//! A method whose key is missing, of the wrong type or out of bounds logs a violation and returns NaN (or the default,
-//! where the type has no NaN). So a caller never stops at the first error: it goes on with NaN, and a check that
-//! compares several values must be written so that NaN passes, because the cause has been logged already.
+//! A key may be missing, of the wrong type or out of bounds. Its method then logs a violation and returns NaN, or the
+//! default if the type has no NaN. So a caller never stops at the first error; it continues with NaN. A check that
+//! compares several values must pass NaN, because the cause has been logged already.
 
 use core::cell::RefCell;
 use core::fmt;
@@ -19,12 +19,12 @@ pub(super) struct ViolationLog<'t> {
     text: &'t str,
     /// Offsets of the ends of its lines.
     ends: Vec<usize>,
-    /// Whether lines were blanked: a key that is missing may be on one of them, so no key counts as missing.
+    /// Whether lines were blanked. A missing key may be on one of them, so no key counts as missing.
     incomplete: bool,
     violations: RefCell<Vec<Violation>>,
 }
 
-/// SectionReader of one section.
+/// Reader of one section.
 pub(super) struct SectionReader<'t> {
     log: &'t ViolationLog<'t>,
     /// Name of the section, empty at the root.
@@ -32,14 +32,14 @@ pub(super) struct SectionReader<'t> {
     line: usize,
     /// The section; `None` if it is missing, which is a violation only for keys without a default.
     table: Option<&'t DeTable<'t>>,
-    /// Whether the value is no table, which has been logged: its keys do not count as missing.
+    /// Whether the value is not a table. This has been logged, so its keys do not count as missing.
     is_malformed: bool,
     /// Known keys, and their defaults as shown in error texts. All others are violations.
     known: Vec<(&'static str, Option<String>)>,
 }
 
 impl<'t> ViolationLog<'t> {
-    /// Log for a text whose syntax errors are known.
+    /// Log for a text, beginning with its syntax errors.
     pub fn new(text: &'t str, syntax_errors: Vec<Violation>) -> Self {
         let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(i, _)| i).collect();
         let incomplete = !syntax_errors.is_empty();
@@ -77,7 +77,7 @@ impl<'t> ViolationLog<'t> {
 }
 
 impl<'t> SectionReader<'t> {
-    /// SectionReader of the top level of a file.
+    /// Reader of the top level of a file.
     pub fn root(log: &'t ViolationLog<'t>, table: &'t DeTable<'t>) -> Self {
         Self { log, path: String::new(), line: 1, table: Some(table), is_malformed: false, known: Vec::new() }
     }
@@ -168,14 +168,14 @@ impl<'t> SectionReader<'t> {
         self.value(key).is_some_and(|value| value.get_ref().is_table())
     }
 
-    /// SectionReader of a subsection.
+    /// Reader of a subsection.
     pub fn section(&mut self, key: &'static str) -> Self {
         let found = self.find(key, None);
         self.child(self.key(key), found)
     }
 
-    /// Readers of `count` sections with the same header. Returns as many as there are, but no more than violations can be
-    /// shown.
+    /// Readers of `count` sections with the same header. Returns one per section found, at most as many as violations
+    /// can be shown.
     pub fn rows(&mut self, key: &'static str, count: usize) -> Vec<Self> {
         let bound = format!("{count} sections headed [[{key}]]");
         let Some(value) = self.required(key, &bound) else { return Vec::new() };
@@ -209,7 +209,7 @@ impl<'t> SectionReader<'t> {
         self.add(self.line, self.path.clone(), Some(value.into()), bound.into());
     }
 
-    /// Logs a violation for each unknown key. To be called when all known keys have been read.
+    /// Logs a violation for each unknown key. Call it after all known keys have been read.
     pub fn finish(self) {
         let known: Vec<&str> = self.known.iter().map(|(key, _)| *key).collect();
         for (key, value) in self.table.into_iter().flatten() {

@@ -30,33 +30,34 @@ impl CyclicInput for Input {
     }
 }
 
-/// Epoch of a request over the control socket or by a signal; no publisher begins then. Its sequence is the request word.
+/// Epoch of a request from the control socket or a signal; no publisher has it. The sequence of the request
+/// is the request word.
 pub const WORD_EPOCH: u64 = u64::MAX;
 
-/// Request of each cycle: from the request word or from the command topic, each once.
+/// Intake of requests: from the request word or from the command topic, each once.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RequestIntake {
-    /// The last word that was seen.
+    /// The last word processed.
     word: u64,
-    /// The last message of the command topic that was seen.
+    /// The last message of the command topic processed.
     message: MessageId,
-    /// Longest time between two cycles \[ns\] behind which a request of the topic may begin control: it may have been received
-    /// before. 0 without a bound, in simulated time.
+    /// Longest pause between two cycles after which a request of the topic may begin control \[ns\]. After a
+    /// longer one, the request may be from before the pause. 0: no bound, in simulated time.
     longest_cycle_gap_ns: u64,
-    /// When the last cycle woke.
+    /// Wake-up of the last cycle \[ns\].
     woke_ns: u64,
 }
 
 impl RequestIntake {
-    /// Of a real-time thread whose cycles follow each other in real time, or in simulated time.
+    /// Intake of a real-time thread, in real or simulated time.
     pub fn new(is_simulated: bool) -> Self {
         let longest_cycle_gap_ns = if is_simulated { 0 } else { MAX_REQUEST_AGE_NS };
         Self { longest_cycle_gap_ns, ..Self::default() }
     }
 
-    /// The request of a cycle that wakes at `now_ns`. Of two new ones that of higher precedence counts, of two equal
-    /// ones the word. The other is lost if it may begin control or comes from the topic; a stop in the word counts in the
-    /// next cycle.
+    /// The request of a cycle that wakes at `now_ns`. Of two new requests, the one of higher precedence is
+    /// returned; of two equal ones, the word. The other is lost if it may begin control or comes from the
+    /// topic. A stop in the word is returned in the next cycle.
     #[inline(never)]
     pub fn next(
         &mut self,
@@ -96,7 +97,7 @@ pub fn of_word(word: u64, now_ns: u64) -> Option<OperatorRequest> {
         .then_some(OperatorRequest { request, message: MessageId { epoch: WORD_EPOCH, sequence: word } })
 }
 
-/// A cycle as a recording holds it.
+/// Message of a cycle, as in a recording.
 pub fn message(record: &CycleRecord) -> CycleMessage {
     let CycleRecord { cycle, due_ns, wakeup_ns, compute_ns, io_late, ref input, ref output } = *record;
     let io_late = u32::from(io_late);
@@ -142,7 +143,7 @@ mod tests {
         let off = word(Request::Off, 0);
         assert_eq!(chosen(&mut intake, engage, off), Some(Request::Off));
         assert_eq!(chosen(&mut intake, engage, off), None, "an old engage must not follow an off");
-        // One that comes in the same cycle is lost.
+        // A request of the same cycle is lost.
         let estop = word(Request::Estop, 0);
         assert_eq!(chosen(&mut intake, topic(Request::Engage, 2), estop), Some(Request::Estop));
         assert_eq!(chosen(&mut intake, topic(Request::Engage, 2), estop), None);

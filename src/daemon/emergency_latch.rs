@@ -1,8 +1,9 @@
-//! Emergency stop that outlives the daemon: a file in the state directory, in force from the stop until `clear`.
+//! Latch of the emergency stop: a file in the state directory, set from the stop until `clear`. It outlives
+//! the daemon.
 //!
-//! The file is there from the start, and only its content changes, in place: no new file, no new name, no room that a full
-//! disk could lack. A thread of its own writes it as soon as the I/O thread has published the stop; neither the log nor the
-//! recorder can hold it up.
+//! The file exists from the start, and only its content changes, in place. So the latch needs no new file and
+//! no free space on the disk. A separate thread writes it as soon as the I/O thread has published the stop;
+//! neither the log nor the recorder can delay it.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::fs::{File, metadata, read};
@@ -24,11 +25,12 @@ use crate::realtime::triple_buffer::{Reader, Writer, triple_buffer};
 
 /// Name of the file in the state directory.
 const FILE: &str = "emergency-stop";
-/// Its contents, of one length. Any other content, which an interrupted write may leave, is an emergency stop, too.
+/// Contents of the file, both of one length. Any other content, which an interrupted write may leave, counts
+/// as an emergency stop.
 const IN_FORCE: &[u8] = b"emergency stop: in force until an operator sends `clear`\n";
 const CLEARED: &[u8] = b"emergency stop: cleared                                 \n";
 
-/// How often its thread looks whether the daemon ends; a change wakes it at once \[ns\].
+/// Interval at which the thread checks whether the daemon ends \[ns\]. A change of state wakes it at once.
 const STOP_POLL_INTERVAL_NS: u64 = 20_000_000;
 
 /// Latch of the emergency stop.
@@ -48,21 +50,21 @@ pub struct Change {
     due_ns: u64,
 }
 
-/// From the I/O thread to the thread of the latch.
+/// I/O thread's end of the link to the thread of the latch.
 pub struct LatchLink {
     changes: Writer<Change>,
     event: Arc<Event>,
-    /// The last that was sent.
+    /// The last state that was sent, with its diagnostic.
     last: (State, DiagnosticCode),
 }
 
-/// The other end of a [`LatchLink`].
+/// Latch's end of the link, see [`LatchLink`].
 pub struct LatchChanges {
     changes: Reader<Change>,
     event: Arc<Event>,
 }
 
-/// Both ends of the link.
+/// Creates both ends of the link.
 pub fn latch_link() -> (LatchLink, LatchChanges) {
     let (writer, reader) = triple_buffer(Change::default());
     let event = Arc::new(Event::default());
@@ -71,10 +73,10 @@ pub fn latch_link() -> (LatchLink, LatchChanges) {
 }
 
 impl LatchLink {
-    /// Wakes the thread of the latch if the state or its reason has changed.
+    /// Wakes the thread of the latch if state or diagnostic has changed.
     pub fn send(&mut self, output: &Output, due_ns: u64) {
         let (state, code) = (output.state, output.diagnostic.code);
-        // The output behind the last cycle is no state of the controller: an emergency stop outlives it.
+        // The output after the last cycle is not a state of the controller, and must not release the latch.
         if (state, code) != self.last && code != DiagnosticCode::DaemonEnding {
             self.last = (state, code);
             self.changes.write(Change { state, code, due_ns });
@@ -84,7 +86,7 @@ impl LatchLink {
 }
 
 impl EmergencyLatch {
-    /// Latch in a folder, as the daemon before has left it. An error if that cannot be known or changed.
+    /// Latch in a folder, in the state that the last daemon left. An error if the file cannot be read or written.
     pub fn open(folder: &Path) -> Result<Self, FileError> {
         let path = folder.join(FILE);
         if !folder.is_dir() {
@@ -100,15 +102,15 @@ impl EmergencyLatch {
         Ok(Self { path, file, is_set })
     }
 
-    /// Whether an emergency stop has not been cleared.
+    /// Whether an emergency stop is in force.
     pub fn is_set(&self) -> bool {
         self.is_set
     }
 
-    /// Follows the controller until `stop`, and until the last change.
+    /// Follows the states of the controller until `stop`, including the last change.
     pub fn run(mut self, mut link: LatchChanges, stop: &AtomicBool) {
         loop {
-            // Before the wait: what was sent before the stop is followed.
+            // Read before the wait, so that changes sent before the stop are processed.
             let is_ending = stop.load(Ordering::Relaxed);
             let until_ns = monotonic_ns() + STOP_POLL_INTERVAL_NS;
             if link.event.wait(&mut link.changes, &mut Monotonic, until_ns, stop) {
@@ -119,7 +121,7 @@ impl EmergencyLatch {
         }
     }
 
-    /// An emergency stop sets the latch, the end of the fault releases it.
+    /// Sets the latch at an emergency stop, and releases it when the fault ends.
     fn follow(&mut self, change: Change) {
         let Change { state, code, due_ns } = change;
         let is_stopped = state == State::Fault && (self.is_set || code == DiagnosticCode::EmergencyStop);
@@ -144,7 +146,8 @@ impl EmergencyLatch {
         }
     }
 
-    /// Replaces the content durably; makes the file anew if somebody has removed it, or put another folder in place of its own.
+    /// Replaces the content durably. Creates the file again if somebody has removed it or replaced its
+    /// folder.
     fn store(&mut self, content: &[u8]) -> Result<(), FileError> {
         let written = self.file.write_all_at(content, 0).and_then(|()| self.file.sync_data());
         let own = written.and_then(|()| self.file.metadata()).map_err(FileError::on(&self.path))?;
@@ -156,7 +159,7 @@ impl EmergencyLatch {
     }
 }
 
-/// The file with a content, durably.
+/// Creates the file with a content, durably.
 fn create(path: &Path, content: &[u8]) -> Result<File, FileError> {
     write_whole(path, content)?;
     File::options().write(true).open(path).map_err(FileError::on(path))
@@ -182,7 +185,7 @@ mod tests {
         Output { state, diagnostic: code.into(), ..Output::default() }
     }
 
-    /// What the next daemon finds.
+    /// Whether the next daemon finds the latch set.
     fn is_kept(folder: &TempDir) -> bool {
         EmergencyLatch::open(folder.path()).unwrap().is_set()
     }

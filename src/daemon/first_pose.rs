@@ -1,8 +1,8 @@
-//! Search for other poses near the first one that have the same leg lengths: only a person at the platform can
-//! see which of them it is in.
+//! Search for other poses near the first measured pose that have the same leg lengths. Only a person at the
+//! platform can see which pose it is in.
 //!
-//! The search is made once, in a thread of its own, on one processor and for some tenths of a second. It covers the
-//! neighbourhood that `hexad check` covers around the home pose, here around the pose that was measured.
+//! The search runs once, in its own thread, on one processor, for some tenths of a second. It covers the same
+//! neighbourhood around the measured pose as `hexad check` around home.
 
 use super::cycle::CycleRecord;
 use super::threads::STACK_BYTES;
@@ -22,7 +22,7 @@ use crate::model::task::task_coordinates;
 pub struct FirstPose(Option<Machine>);
 
 impl FirstPose {
-    /// For a machine.
+    /// Search for a machine.
     pub fn of(machine: &Machine) -> Self {
         Self(Some(machine.clone()))
     }

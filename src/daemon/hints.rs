@@ -1,10 +1,10 @@
-//! Hints why a cycle was slow, read from the kernel outside the real-time thread.
+//! Hints why a cycle was slow: counts of the kernel, read outside the real-time thread.
 
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
 
-/// `sysconf(_SC_CLK_TCK)`: 100 on every Linux that matters.
+/// Duration of a tick \[ms\], from `sysconf(_SC_CLK_TCK)`: 100 per second on every Linux in use.
 const TICK_MS: u64 = 10;
 
 /// Fields of `/proc/[pid]/stat`, counted from the state, which follows the name in parentheses.
@@ -15,10 +15,10 @@ const PROCESSOR: usize = 36;
 /// Field of a processor's line in `/proc/stat`, counted from its name.
 const STEAL: usize = 8;
 
-/// Holds the processors' lines of `/proc/stat` of a host with 128 of them.
+/// Size for the processors' lines of `/proc/stat` on a host with 128 processors.
 const BUFFER_BYTES: usize = 16 * 1024;
 
-/// The kernel's files about one thread, open, so that reading them allocates nothing.
+/// Open files of the kernel about one thread. Reading them allocates nothing.
 #[derive(Debug)]
 pub struct ThreadFiles {
     stat: File,
@@ -26,7 +26,7 @@ pub struct ThreadFiles {
     processors: File,
 }
 
-/// Counts since the thread began; the steal is that of the processor it last ran on.
+/// Counts since the thread began. `steal` belongs to the processor on which the thread last ran.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Hints {
     pub involuntary_switches: u64,
@@ -35,7 +35,7 @@ pub struct Hints {
 }
 
 impl ThreadFiles {
-    /// Of the calling thread.
+    /// Opens the files of the calling thread.
     pub fn of_this_thread() -> io::Result<Self> {
         let open = |path| File::open(path);
         Ok(Self {
@@ -45,14 +45,14 @@ impl ThreadFiles {
         })
     }
 
-    /// The present counts. What cannot be read counts as zero.
+    /// Reads the present counts. A count that cannot be read is zero.
     pub fn read(&self) -> Hints {
         let mut buffer = [0; BUFFER_BYTES];
         let status = text(&self.status, &mut buffer);
         let involuntary_switches =
             status.lines().find_map(|line| line.strip_prefix("nonvoluntary_ctxt_switches:"));
         let involuntary_switches = number(involuntary_switches);
-        // The name may hold anything, even parentheses.
+        // The name may contain any character, even parentheses.
         let stat = text(&self.stat, &mut buffer).rsplit(')').next().unwrap_or_default();
         let field = |index| number(stat.split_whitespace().nth(index));
         let (page_faults, processor) = (field(MINOR_FAULTS) + field(MAJOR_FAULTS), field(PROCESSOR));
@@ -62,7 +62,7 @@ impl ThreadFiles {
 }
 
 impl Hints {
-    /// Increase since `earlier`; zero where a count is smaller, as the steal of another processor may be.
+    /// Increase since `earlier`. Zero for a count that decreased, as the steal of another processor may do.
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
             involuntary_switches: self.involuntary_switches.saturating_sub(earlier.involuntary_switches),
@@ -103,8 +103,8 @@ mod tests {
 
     #[test]
     fn page_faults_of_this_thread_are_seen() {
-        // Larger than what the allocator keeps for later: it comes fresh from the kernel, and not one page of it is
-        // there. Of the largest usual pages, 2 MB, it has 32.
+        // Larger than any block that the allocator reuses, so the kernel maps fresh memory without pages. It
+        // has 32 of the largest usual pages, 2 MB.
         let touch = || drop(black_box(vec![1_u8; 64 << 20]));
         let files = ThreadFiles::of_this_thread().unwrap();
         touch();

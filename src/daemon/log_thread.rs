@@ -1,5 +1,5 @@
-//! The log thread: turns the records of the other two threads into statistics, log lines, and hands each cycle to
-//! the recorder.
+//! The log thread. It turns the records of the real-time thread and the I/O thread into statistics and log
+//! lines, and passes each cycle to the recorder.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -28,27 +28,27 @@ use crate::messages::Statistics;
 use crate::realtime::triple_buffer::Writer;
 use crate::realtime::usage::ThreadUsage;
 
-/// How often the queues are emptied: well before they are full at the highest rate.
+/// Interval at which the queues are emptied. They are not nearly full after it, even at the highest rate.
 const PERIOD: Duration = Duration::from_millis(20);
 
 /// Length of a window of the statistics.
 const WINDOW: Duration = Duration::from_secs(1);
 
-/// Faults kept for the report; more would not help to find their cause.
+/// Largest number of faults in the report; more would not help to find their cause.
 const MAX_FAULTS: usize = 1000;
 
 /// Links of the log thread to the other threads.
 pub struct LogLinks<'a, 'o> {
     pub records: Consumer<'a, CycleRecord>,
-    /// Release to force sent \[ns\], from the I/O thread.
+    /// Delays from release to force sent \[ns\], from the I/O thread.
     pub delays: Consumer<'a, u64>,
-    /// For the status message.
+    /// Statistics for the status message.
     pub statistics: Writer<Statistics>,
-    /// Of the real-time thread, once it has begun.
+    /// Kernel files of the real-time thread, once it has begun.
     pub files: &'a OnceLock<ThreadFiles>,
-    /// To the recorder. When it is full, cycles are lost.
+    /// Queue to the recorder. If it is full, cycles are lost.
     pub recorder: SyncSender<Recorded>,
-    /// Offers that the real-time thread has answered; back to the reload thread.
+    /// Offers that the real-time thread has answered. They return to the reload thread.
     pub answers: Consumer<'a, &'o mut Offer>,
     pub returned: Sender<&'o mut Offer>,
     pub first_pose: FirstPose,
@@ -86,19 +86,19 @@ pub fn run(mut links: LogLinks<'_, '_>, stop: &AtomicBool) -> LogReport {
     }
 }
 
-/// What the log thread has collected so far.
+/// State of the log thread.
 #[derive(Default)]
 struct Log<'o> {
     collector: Collector,
     report: LogReport,
-    /// Of the last cycle.
+    /// State and diagnostic of the last cycle.
     state: (State, DiagnosticCode),
-    /// The last two at once, of the measurements and of the setpoints.
+    /// The last two simultaneous publishers, of measurements and of setpoints.
     publishers: [Publishers; 2],
     hints: Hints,
-    /// An answered offer whose first cycle has not arrived yet.
+    /// Answered offer whose first cycle has not arrived yet.
     offer: Option<&'o mut Offer>,
-    /// Configuration of the cycles that follow, while the recorder has no room for it.
+    /// Configuration of the next cycles, while the recorder has no room for it.
     unrecorded: Option<Arc<Loaded>>,
 }
 
@@ -129,19 +129,21 @@ impl<'o> Log<'o> {
         }
     }
 
-    /// Returns an offer before the first cycle with its constants: the recorder needs them before that cycle.
+    /// Returns an offer before the first cycle with its constants, because the recorder needs them before
+    /// that cycle.
     fn return_offer(&mut self, links: &mut LogLinks<'_, 'o>, cycle: u64) {
-        // Answered before the record of its cycle was written.
+        // The answer is written before the record of its cycle.
         self.offer = self.offer.take().or_else(|| links.answers.dequeue());
         let Some(offer) = self.offer.take_if(|offer| offer.is_due(cycle)) else { return };
         if let Answer::Taken(_) = offer.answer {
             self.unrecorded = Some(offer.loaded.clone());
         }
-        // Nobody receives it when the daemon ends.
+        // The receiver is gone when the daemon ends.
         let _ = links.returned.send(offer);
     }
 
-    /// Hands a cycle to the recorder, and before it its configuration if that is new. Where there is no room both are missing.
+    /// Passes a cycle to the recorder, after its configuration if that is new. If the queue is full, both are
+    /// lost.
     fn record(&mut self, recorder: &SyncSender<Recorded>, record: &CycleRecord) {
         if let Some(loaded) = &self.unrecorded {
             if recorder.try_send(Recorded::Configuration(loaded.clone())).is_err() {
@@ -152,13 +154,13 @@ impl<'o> Log<'o> {
         let _ = recorder.try_send(Recorded::Cycle(message(record)));
     }
 
-    /// Also under control, where a second publisher changes nothing.
+    /// Logs a second publisher, also under control, where it has no effect.
     fn log_publishers(&mut self, record: &CycleRecord) {
         let Input { measured_publishers, setpoint_publishers, .. } = record.input;
         let now = [measured_publishers, setpoint_publishers];
         let codes = [DiagnosticCode::TwoMeasuredSources, DiagnosticCode::TwoSetpointSources];
         for ((before, now), code) in self.publishers.iter_mut().zip(now).zip(codes) {
-            // Once for each pair, also if one of them is silent now and then.
+            // Once for each pair, even if one of them is silent at times.
             if now.ignored_pid != 0 && now != *before {
                 *before = now;
                 let two = Diagnostic::new(code, now.used_pid.into(), now.ignored_pid.into());

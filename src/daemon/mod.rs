@@ -1,8 +1,9 @@
 //! `hexad run`: the daemon.
 //!
-//! Start: configuration, ports, threads, real-time set-up; only then the first release. Stop, in this order: the platform
-//! comes to rest, the real-time thread ends its cycle and writes an output without valid forces, the I/O thread publishes
-//! it, the log thread empties its queues, the recorder completes its files, the report is written.
+//! Start: configuration, ports, threads, real-time set-up, then the first release. End, in this order: the
+//! platform comes to rest; the real-time thread ends its cycle and writes an output without valid forces; the
+//! I/O thread publishes it; the log thread empties its queues; the recorder completes its files; the report
+//! is written.
 
 use std::io;
 use std::path::PathBuf;
@@ -48,10 +49,10 @@ pub mod time_histogram;
 
 pub use self::parameters::{nanoseconds, parameters, timing};
 
-/// Name of the real-time thread, by which a running daemon is found.
+/// Name of the real-time thread. Other programs find a running daemon by it.
 pub const REALTIME_THREAD: &str = "hexad-rt";
 
-/// Why the daemon did not run.
+/// Reason why the daemon did not run.
 #[derive(Debug, thiserror::Error)]
 pub enum DaemonError {
     /// The machine cannot be run with this configuration.
@@ -63,7 +64,7 @@ pub enum DaemonError {
     /// The control socket could not be opened.
     #[error(transparent)]
     Socket(#[from] SocketError),
-    /// The signals by which a request may come could not be installed.
+    /// The signals for requests could not be installed.
     #[error("cannot handle SIGUSR1 and SIGUSR2: {0}")]
     Signals(io::Error),
     /// The operating system refused to start a thread.
@@ -72,7 +73,7 @@ pub enum DaemonError {
     /// The kernel refused steps of the real-time set-up, and the deployment requires them all.
     #[error("realtime.require_realtime is set, and there is {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     NotRealtime(Vec<Shortfall>),
-    /// Its limit of open files is too low.
+    /// The limit of open files is too low.
     #[error(transparent)]
     Files(Shortfall),
     /// The named thread panicked or ended before it was stopped.
@@ -83,20 +84,20 @@ pub enum DaemonError {
     Report(#[from] FileError),
 }
 
-/// Files that the daemon writes, each if there is a path.
+/// Files that the daemon writes; `None` for those that it does not.
 #[derive(Clone, Debug, Default)]
 pub struct Files {
-    /// JSON, at the end.
+    /// Report as JSON, at the end.
     pub report: Option<PathBuf>,
-    /// How often each time occurred, as CSV, at the end.
+    /// Histograms of the times as CSV, at the end.
     pub histogram: Option<PathBuf>,
-    /// Recordings.
+    /// Folders of the recordings.
     pub folders: Folders,
-    /// Folder in which an emergency stop outlives the daemon.
+    /// Folder of the emergency latch, which outlives the daemon.
     pub state: Option<PathBuf>,
 }
 
-/// Files that the daemon may need open at once: all connections and what comes with them, shared memory, recordings.
+/// Largest number of open files: all connections and the files that they pass, shared memory, recordings.
 const OPEN_FILES: u64 = 512;
 
 /// Target of the log of warnings about the configuration.
@@ -109,11 +110,11 @@ pub fn run(config: &Config, files: &Files, stop: &Stop) -> Result<Report, Daemon
     }
     open_files::permit(OPEN_FILES).map_err(DaemonError::Files)?;
     let mut claim = Claim::take(&config.name)?;
-    // It lives as long as the process: signals may come until its end.
+    // Leaked, because signals may arrive until the process ends.
     let word: &'static RequestWord = Box::leak(Box::default());
     let requests = [RequestSignal::User1, RequestSignal::User2].map(|signal| signal.request() as u32);
     post_on_signals(word, requests).map_err(DaemonError::Signals)?;
-    // Not before the signals: who finds it may send them.
+    // After the signals: a client that finds the socket may send them.
     let socket = location::open(&config.name, &config.deployment.operator)?;
     info!("control socket: {}", socket.path.display());
     claim.record(&socket.path, &config.deployment.realtime.processors())?;

@@ -1,4 +1,4 @@
-//! Deployment to parameters of the controller and of the cyclic loop.
+//! Parameters of the controller and of the cyclic loop, from the deployment.
 
 use core::f64::consts::TAU;
 
@@ -16,7 +16,7 @@ use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
 use crate::realtime::cyclic::{ReleaseMode, Timing};
 
-/// Parameters of the controller; `fidelity` is the one that the deployment's choice resolves to.
+/// Parameters of the controller. `fidelity` is the result of the deployment's choice.
 pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity) -> Parameters {
     let Deployment { control, timeouts, limits, .. } = deployment;
     let envelope = deployment.envelope.map(|limits| {
@@ -73,14 +73,16 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
     }
 }
 
-/// Longest time between two cycles of a daemon that was not held \[s\]. Released by messages it runs a cycle each timeout without
-/// one; the second that is late is not the driver's.
+/// Longest time between two cycles of a daemon that was not held \[s\]. With external release the daemon runs
+/// a cycle after each timeout without a message. One late cycle may be caused by the driver; a pause of two
+/// timeouts is not.
 fn longest_pause_s(deployment: &Deployment) -> f64 {
     let timeout_s = deployment.timeouts.measured_s;
     if deployment.realtime.release == ReleaseMode::External { 2.0 * timeout_s } else { timeout_s }
 }
 
-/// Release of the cyclic loop. The grid is half a period away from the multiples of the period, at which plants measure.
+/// Timing of the cyclic loop. Releases are half a period away from multiples of the period, at which plants
+/// measure.
 pub fn timing(deployment: &Deployment) -> Timing {
     let Deployment { realtime, timeouts, .. } = deployment;
     let period_ns = nanoseconds(realtime.period_s());
@@ -95,7 +97,7 @@ pub fn timing(deployment: &Deployment) -> Timing {
     }
 }
 
-/// Seconds to nanoseconds, for durations that the configuration has bounded.
+/// Converts seconds to nanoseconds, for durations within the bounds of the configuration.
 pub fn nanoseconds(seconds: f64) -> u64 {
     (seconds * 1e9).round() as u64
 }

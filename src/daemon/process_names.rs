@@ -9,7 +9,7 @@ pub fn command(process_id: u32) -> String {
     fs::read_to_string(format!("/proc/{process_id}/comm")).unwrap_or_default().trim_end().into()
 }
 
-/// The sentence of a diagnostic. Processes are named by command and number.
+/// Sentence of a diagnostic, with processes named by command and number.
 pub fn sentence(diagnostic: &Diagnostic) -> String {
     let Diagnostic { code, value, bound, .. } = diagnostic;
     if code.comparison() != Comparison::Processes || *bound == 0.0 {

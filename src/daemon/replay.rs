@@ -1,4 +1,4 @@
-//! Computes the cycles of a recording again and compares every output.
+//! Replay: computes the cycles of a recording again and compares every output.
 
 use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
@@ -15,13 +15,14 @@ use crate::realtime::setup::denormals;
 use crate::recording::reader::{Recording, Summary};
 use crate::recording::{Item, RecordingError, RunInfo, memory_from};
 
-/// Relative rounding of a determinant of six rows: a few roundings of each of its factors.
+/// Relative rounding of a determinant of six rows: a few roundings per factor.
 const DETERMINANT_ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Field that is a quotient of a rate that may be zero.
+/// Field with a quotient whose divisor, a rate, may be zero.
 const TIME_TO_SINGULARITY: &str = "time_to_singularity_s";
 
-/// Largest difference between two instruction sets that round in other places, for what is no difference over a cycle.
+/// Largest difference between two instruction sets with different rounding, for fields that are not divided
+/// by the period.
 const TOLERANCE: f64 = 1e-12;
 
 /// One number of an output that a replay computes differently.
@@ -29,21 +30,22 @@ const TOLERANCE: f64 = 1e-12;
 pub struct Difference {
     /// Number of the cycle.
     pub cycle: u64,
-    /// When it was due, since the first cycle of the recording \[s\].
+    /// Release of the cycle, since the first cycle of the recording \[s\].
     pub time_s: f64,
-    /// Field of the message of the cycle.
+    /// Field of the cycle message.
     pub field: String,
     /// Number in the recording.
     pub recorded: f64,
     /// Number of the replay.
     pub replayed: f64,
-    /// Largest number of the field in the recording: of all six legs, of a matrix.
+    /// Largest number of the field in the recording, over all six legs or a whole matrix.
     pub scale: f64,
 }
 
 impl Difference {
-    /// Size of the difference, as a ratio of the largest number of the field if that is above 1. A time to a singularity counts by its inverse: of a platform that
-    /// moves along it is what rounding has left, divided into a determinant.
+    /// Size of the difference, as a ratio of the largest number of the field if that is above 1. A time to a
+    /// singularity counts by its inverse: while a platform moves along the singularity, the time is a determinant over
+    /// a rate that is rounding only.
     pub fn size(&self) -> f64 {
         let is_time = self.field == TIME_TO_SINGULARITY;
         let [recorded, replayed, scale] = [self.recorded, self.replayed, self.scale]
@@ -52,10 +54,11 @@ impl Difference {
         if difference.is_nan() { f64::INFINITY } else { difference }
     }
 
-    /// Largest size that an instruction set which rounds in other places explains, at a period \[s\].
+    /// Largest difference that another rounding of another instruction set explains, at a period h \[s\].
     ///
-    /// The reference moves from pose to pose: of a pose with the relative rounding e, its velocity has e / h, and its
-    /// acceleration e / h^2, which the forces contain. The time to a singularity is that of a determinant, by its change over h.
+    /// The reference moves from pose to pose. If a pose has the relative rounding e, its velocity has e / h,
+    /// and its acceleration e / h^2, which is part of the forces. The time to a singularity is a determinant
+    /// over its change in h.
     pub fn tolerance(&self, period_s: f64) -> f64 {
         let rounding = match array(&self.field) {
             "reference_twist" | "error_rate" => f64::EPSILON / period_s,
@@ -72,9 +75,10 @@ impl Difference {
 pub struct Replay {
     /// Cycles computed again.
     pub compared: u64,
-    /// Cycles for which the memory of the controller is unknown: before the first that is recorded, and behind gaps until the next.
+    /// Cycles for which the memory of the controller is unknown: before the first recorded memory, and after
+    /// each gap until the next memory.
     pub unknown: Vec<RangeInclusive<u64>>,
-    /// Cycles of which an output differs.
+    /// Number of cycles with a different output.
     pub different: u64,
     /// The first difference.
     pub first: Option<Difference>,
@@ -82,8 +86,8 @@ pub struct Replay {
     pub largest: BTreeMap<String, Difference>,
 }
 
-/// The instruction set on which the lanes repeat the bits of a recorded one: itself, or any that rounds as often
-/// (`model::fused`). Without one, that of the processor.
+/// Instruction set whose lanes repeat the bits of the recorded one: the recorded set, or any with the same
+/// rounding (`model::fused`). The processor's own set if there is none.
 pub fn repeating_level(recorded: &str, level: Level) -> Level {
     #[cfg(target_arch = "x86_64")]
     {
@@ -102,26 +106,26 @@ pub fn repeating_level(recorded: &str, level: Level) -> Level {
     }
 }
 
-/// Configuration of a recording, on what repeats its bits on a processor that has `level`.
+/// Configuration of a recording, on the instruction set that repeats its bits on a processor with `level`.
 pub fn recorded_config(info: &RunInfo, level: Level) -> Result<Config, ConfigError> {
     let level = repeating_level(&info.instruction_set, level);
     Config::parse_on(level, &info.configuration, "configuration of the recording")
 }
 
-/// Controller as it was recorded.
+/// Controller with the recorded configuration.
 pub fn recorded_controller(info: &RunInfo, config: &Config) -> Controller {
     let recorded = Fidelity::ALL.into_iter().find(|fidelity| fidelity.name() == info.fidelity);
     let fidelity = recorded.unwrap_or_else(|| fidelity::fidelity(config));
     Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
 }
 
-/// Controller of another configuration.
+/// Controller with another configuration.
 pub fn other_controller(config: &Config) -> Controller {
     let fidelity = fidelity::fidelity(config);
     Controller::new(&config.machine, parameters(&config.machine, &config.deployment, fidelity))
 }
 
-/// Computes the cycles of a recording again with a controller before its first cycle.
+/// Computes the cycles of a recording again. `controller` is in the state before its first cycle.
 pub fn replay(recording: &Recording, controller: Controller) -> Result<(Summary, Replay), RecordingError> {
     denormals::flush();
     let columns = CycleMessage::LAYOUT.columns("");
@@ -135,11 +139,11 @@ pub fn replay(recording: &Recording, controller: Controller) -> Result<(Summary,
 
 struct Replayer {
     controller: Controller,
-    /// The cycle that the controller can compute; `None` if its memory is unknown.
+    /// Number of the cycle that the controller can compute next; `None` if its memory is unknown.
     next_cycle: Option<u64>,
     begin_ns: Option<u64>,
     columns: Vec<String>,
-    /// First column of the array to which each column belongs.
+    /// For each column, the first column of its array.
     arrays: Vec<Option<usize>>,
     replay: Replay,
 }
@@ -148,7 +152,7 @@ impl Replayer {
     fn add(&mut self, item: &Item) {
         match item {
             Item::Cycle(cycle) => self.step(cycle),
-            // A controller that is in step goes on: what it remembers is compared by what it computes.
+            // A controller without a gap continues with its own memory. Its outputs show any difference.
             Item::Memory { cycle, bytes } if self.next_cycle != Some(*cycle) => {
                 if let Some(memory) = memory_from(bytes) {
                     self.controller.set_memory(memory);
@@ -195,7 +199,7 @@ fn array(column: &str) -> &str {
 }
 
 impl Replay {
-    /// Whether another instruction set explains all differences, at a period \[s\].
+    /// Whether the rounding of another instruction set explains all differences, at a period \[s\].
     pub fn is_rounding(&self, period_s: f64) -> bool {
         self.largest.values().all(|it| it.size() <= it.tolerance(period_s))
     }
@@ -240,7 +244,8 @@ mod tests {
             let largest = BTreeMap::from([(difference.field.clone(), difference)]);
             Replay { largest, ..Replay::default() }.is_rounding(1e-3)
         };
-        // Of a pose nearly nothing, of a velocity 2e-13 more, of an acceleration and of forces 2e-10 at 1 kHz.
+        // For 1 kHz: hardly any difference of a pose, 2e-13 of a velocity, 2e-10 of an acceleration and of
+        // forces.
         for (field, tolerated, refused) in [
             ("position_m_2", 9e-13, 2e-12),
             ("reference_twist_1", 1.1e-12, 2e-12),

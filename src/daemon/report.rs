@@ -1,4 +1,4 @@
-//! The report of a run: what `--report` writes as JSON.
+//! Report of a run, which `--report` writes as JSON.
 
 use std::path::Path;
 
@@ -36,17 +36,17 @@ pub struct Report {
     pub measured_age_ns: Times,
     /// Release to the force message sent.
     pub end_to_end_ns: Times,
-    /// The worst first.
+    /// The worst cycles, the worst first.
     pub worst_cycles: Vec<WorstCycle>,
     /// Tracking error over the cycles in state `active`.
     pub tracking: Tracking,
     /// Resources of the real-time thread from the first release to the end of the last cycle.
     pub rt_thread: ThreadUsage,
-    /// It allocates only while a peer connects or disappears.
+    /// Resources of the I/O thread. It allocates only while a peer connects or disappears.
     pub io_thread: ThreadUsage,
-    /// It allocates only to log a change of state.
+    /// Resources of the log thread. It allocates only to log a change of state.
     pub log_thread: ThreadUsage,
-    /// Of the recorder, which keeps the last seconds also without a folder.
+    /// Numbers of the recorder, which keeps the last seconds even without a folder.
     #[serde(default)]
     pub recording: RecorderReport,
     /// The first faults of the run, in the order of their cycles.
@@ -62,7 +62,7 @@ pub struct DeadlineMisses {
     pub overrun: u64,
     /// Release instants for which no cycle was run.
     pub skipped: u64,
-    /// Cycles run at once because their release had passed; not misses of their own.
+    /// Cycles run at once because their release had passed; not counted as misses.
     pub caught_up: u64,
 }
 
@@ -91,7 +91,7 @@ pub struct Fault {
 }
 
 impl Report {
-    /// Combines the reports of the three threads; logs a warning for each loss of data.
+    /// Combines the reports of the three threads. Logs a warning for each loss of data.
     pub(super) fn new(config: &Config, cyclic: &LoopReport, io: &IoReport, log: LogReport) -> Self {
         warn_of_losses(cyclic, io);
         let counters = &cyclic.counters;

@@ -1,14 +1,14 @@
-//! Snapshot of the daemon for the control thread: what the I/O thread has after each cycle.
+//! Snapshot of the daemon for the control thread, written by the I/O thread after each cycle.
 
 use crate::control::signals::diagnostic::Diagnostic;
 use crate::control::signals::inputs::{Measurement, Publishers, Setpoint};
 use crate::messages::{Rejection, StatusMessage};
 use crate::model::LEGS;
 
-/// Newest cycle as the I/O thread published it, with its inputs.
+/// Newest published cycle, with its inputs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Snapshot {
-    /// Status of the cycle; its header is empty.
+    /// Status of the cycle, without header.
     pub status: StatusMessage,
     /// Forces \[N\]; zero unless the state has control.
     pub force: [f64; LEGS],
@@ -22,11 +22,11 @@ pub struct Snapshot {
     pub setpoint_publishers: Publishers,
     /// Processes that publish measurements.
     pub measured_publishers: Publishers,
-    /// Why messages were rejected whatever they contain, of setpoints and of measurements.
+    /// Reasons why messages were rejected independently of their content, of setpoints and of measurements.
     pub setpoint_rejection: Option<Rejection>,
     pub measured_rejection: Option<Rejection>,
     /// The last request word that was carried out or refused; 0 if none ever was.
     pub answered: u64,
-    /// Why that one was refused; code `None` if it was not.
+    /// Reason why that request was refused; code `None` if it was carried out.
     pub refusal: Diagnostic,
 }

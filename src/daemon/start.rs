@@ -1,7 +1,8 @@
-//! Real-time set-up of the daemon: each thread prepares itself, the main thread what the process shares.
+//! Real-time set-up of the daemon. Each thread prepares itself; the main thread prepares what the process
+//! shares.
 //!
-//! A step that the system refuses is logged with its reason and remedy. With `realtime.require_realtime` the daemon then
-//! does not start, and its error lists all of them.
+//! A step that the kernel refuses is logged with reason and remedy. With `realtime.require_realtime` the
+//! daemon then does not start, and its error lists all refused steps.
 
 use std::sync::mpsc;
 
@@ -19,14 +20,14 @@ use crate::realtime::setup::deadline::Reservation;
 use crate::realtime::setup::idle::PmQosRequest;
 use crate::realtime::setup::{Shortfall, deadline, denormals, idle, memory, scheduling};
 
-/// Cycles computed before the first release, so that code and data are in memory and in the cache.
+/// Cycles computed before the first release, to load code and data into memory and cache.
 const WARM_UP_CYCLES: u32 = 1000;
 
-/// Result of preparing a thread: the shortfalls it found, or why it cannot run.
+/// Result of preparing a thread: its shortfalls, or the reason why it cannot run.
 pub(super) type Ready = Result<Vec<Shortfall>, DaemonError>;
 
-/// Collects and logs the shortfalls of threads and process, and starts the loop if they are acceptable. Idle states of the
-/// processors are limited for as long as the result lives.
+/// Collects and logs the shortfalls of threads and process, and starts the loop if they are acceptable. While
+/// the result exists, idle states of the processors are limited.
 pub(super) fn start(
     realtime: &Realtime,
     ready: &mpsc::Receiver<Ready>,
@@ -42,7 +43,7 @@ pub(super) fn start(
             .map_err(|shortfall| shortfalls.push(shortfall))
             .ok();
         if realtime.lock_memory {
-            // Last, when all memory is there to be locked.
+            // Last, when all memory has been allocated.
             shortfalls.extend(memory::lock_all().err());
         }
     }
@@ -56,30 +57,31 @@ pub(super) fn start(
     Ok(pm_qos)
 }
 
-/// Prepares the calling thread for I/O: it allocates while a peer connects.
+/// Prepares the calling thread for I/O. This thread allocates while a peer connects.
 pub(super) fn prepare_io(realtime: &Realtime) -> Vec<Shortfall> {
     memory::prefault_heap();
     let scheduled = scheduling::fifo_priority(realtime.io_priority);
     prepare(realtime.io_cpu, scheduled)
 }
 
-/// FIFO priority of the thread of requests: above ordinary processes and all that writes files, so that an emergency stop waits
-/// for neither.
+/// FIFO priority of the control thread: above ordinary processes and above all threads that write files, so
+/// that they do not delay an emergency stop.
 pub(super) const REQUESTS_PRIORITY: i32 = 2;
 
-/// FIFO priority of log and recorder: above ordinary processes, below everything else in real time.
+/// FIFO priority of log and recorder: above ordinary processes, below all other real-time threads.
 pub(super) const RECORDS_PRIORITY: i32 = 1;
 
-/// Prepares the calling thread to answer requests or to keep up with the loop on a busy host, where it may: without it
-/// requests wait and cycles are missing in the recording, and nothing else. It never has the priority of the loop.
+/// Prepares the calling thread to answer requests or to follow the loop on a busy host, if permitted. Without
+/// this priority requests are delayed and cycles are missing in the recording; nothing else is affected. The
+/// priority is always below the loop's.
 pub(super) fn prepare_support(realtime: &Realtime, priority: i32) {
     if !realtime.is_simulated() && realtime.priority.min(realtime.io_priority) > priority {
         let _ = scheduling::fifo_priority(priority);
     }
 }
 
-/// Prepares the calling thread for the loop. The warm-up comes before SCHED_DEADLINE, whose budget it would
-/// use up.
+/// Prepares the calling thread for the loop. The warm-up runs before SCHED_DEADLINE, because it would use up
+/// the budget.
 pub(crate) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<Shortfall> {
     denormals::flush();
     warm_up();
@@ -90,8 +92,8 @@ pub(crate) fn prepare_loop(realtime: &Realtime, warm_up: impl FnOnce()) -> Vec<S
     prepare(realtime.cpu, scheduled)
 }
 
-/// Prepares the calling thread for the loop in simulated time: the same numbers at ordinary priority, because a thread that
-/// waits for other processes must not keep the processor from them.
+/// Prepares the calling thread for the loop in simulated time: the same set-up at ordinary priority, because
+/// a thread that waits for other processes must not block them.
 pub(super) fn prepare_simulated(warm_up: impl FnOnce()) -> Vec<Shortfall> {
     denormals::flush();
     warm_up();
@@ -107,15 +109,15 @@ fn prepare(cpu: Option<usize>, scheduled: Result<(), Shortfall>) -> Vec<Shortfal
 
 /// Reservation of `realtime.scheduler = "deadline"`.
 ///
-/// With `release = "external"` the period is the one that the drives are expected to have. Messages that
-/// come sooner begin a new one with the full budget, unless the share of the last is used up; cycles of
-/// drives so fast that they need more than their share are held, and that is counted.
+/// With `release = "external"` the period is the expected period of the drives. An early message begins a new
+/// period with the full budget, unless the share of the last period is used up. If drives are so fast that
+/// they need more than this share, their cycles are throttled, and this is counted.
 pub fn reservation(realtime: &Realtime) -> Reservation {
     let spin_s = if realtime.release == ReleaseMode::Hybrid { realtime.max_lead_s } else { 0.0 };
     Reservation::new(nanoseconds(realtime.period_s()), nanoseconds(spin_s))
 }
 
-/// Runs a controller whose outputs are discarded, at rest at home.
+/// Runs a controller at rest at home and discards its outputs.
 pub(super) fn warm_up(mut controller: Controller, machine: &Machine) {
     let task = TaskState::at_rest(machine.home);
     let length = leg_lengths(machine, &task.motion().pose);

@@ -1,12 +1,12 @@
-//! The daemon's statistics: histograms per second and since start, and the worst cycles with hints.
-//! Nothing here allocates once it is made.
+//! Statistics of the daemon: histograms per second and since start, and the worst cycles with hints. Only
+//! construction allocates.
 
 use super::cycle::{CycleRecord, measured_age_ns};
 use super::hints::Hints;
 use super::time_histogram::TimeHistogram;
 use crate::messages::{LoopTimes, Statistics, WORST_CYCLES, WorstCycle};
 
-/// The histograms of one span.
+/// Histograms of one interval.
 #[derive(Debug, Default)]
 struct Span {
     wakeup: TimeHistogram,

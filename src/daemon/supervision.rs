@@ -1,6 +1,7 @@
-//! Supervision of the threads by the main thread, for a service manager: its watchdog is fed only while the loop runs.
+//! Supervision of the threads by the main thread. The watchdog of the service manager is fed only while the
+//! loop runs.
 //!
-//! Without a service manager only the log remains: a thread that hangs is named.
+//! Without a service manager a hanging thread is only logged, with its name.
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
@@ -18,16 +19,16 @@ use crate::messages::Remains;
 use crate::messages::location::{SEGMENTS_DELETED, are_segments_deleted};
 use crate::realtime::stop_request::Hangups;
 
-/// Time between two looks at the progress of the threads: many within the time-out of any watchdog.
+/// Interval between two checks of progress, much shorter than the timeout of any watchdog.
 pub const SUPERVISION_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Time between two looks for what killed participants have left: longer than one needs to join or to leave.
+/// Interval between two searches for remains of killed participants, longer than joining or leaving takes.
 const CLEANING_INTERVAL: Duration = Duration::from_secs(2);
 
-/// A thread without progress for this long is reported: longer than a host takes a processor away.
+/// Time without progress after which a thread is reported, longer than a host usually preempts a thread.
 const REPORTED_AFTER: Duration = Duration::from_secs(1);
 
-/// Progress of the threads, each written by that thread alone.
+/// Progress of the threads. Each thread writes only its own fields.
 #[derive(Debug, Default)]
 pub struct Progress {
     cycles: AtomicU64,
@@ -37,18 +38,18 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A cycle of the real-time thread.
+    /// Counts a cycle of the real-time thread.
     pub fn count_cycle(&self) {
-        // One writer: no need for an operation that locks the bus.
+        // There is one writer, so no operation that locks the bus is needed.
         self.cycles.store(self.cycles.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
     }
 
-    /// A round of the I/O thread.
+    /// Counts a round of the I/O thread.
     pub fn count_io_round(&self) {
         self.io_rounds.store(self.io_rounds.load(Ordering::Relaxed).wrapping_add(1), Ordering::Relaxed);
     }
 
-    /// Output of the last cycle.
+    /// Stores the state and diagnostic of the last cycle.
     pub fn set_output(&self, output: &Output) {
         self.state.store(output.state as u32, Ordering::Relaxed);
         self.code.store(output.diagnostic.code as u32, Ordering::Relaxed);
@@ -64,10 +65,10 @@ impl Progress {
 /// A thread under supervision.
 struct Supervised {
     name: &'static str,
-    /// In simulated time a thread may wait for ever.
+    /// False in simulated time, in which a thread may wait for ever.
     has_to_progress: bool,
     counted: u64,
-    /// The last look that saw progress.
+    /// Instant of the last check that found progress.
     seen: Instant,
     is_reported: bool,
 }
@@ -105,13 +106,13 @@ pub struct Supervision<'a> {
     rate_hz: f64,
     reported: Option<(State, DiagnosticCode)>,
     looked: Instant,
-    /// SIGHUP reloads the machine file.
+    /// Counter of SIGHUP, which reloads the machine file.
     hangups: Option<Hangups>,
     request_reload: &'a Sender<Requester>,
-    /// What killed participants leave; `None` where it cannot be found.
+    /// Search for remains of killed participants; `None` if it is impossible.
     remains: Option<Remains>,
     cleaned: Instant,
-    /// Whether it was reported that the shared memory is gone.
+    /// Whether the loss of the shared memory was reported.
     are_deleted: bool,
 }
 
@@ -124,7 +125,7 @@ impl<'a> Supervision<'a> {
         request_reload: &'a Sender<Requester>,
     ) -> Self {
         let is_service = std::env::var_os("NOTIFY_SOCKET").is_some();
-        // A terminal that is closed ends the daemon; a service manager has other means.
+        // SIGHUP from a closed terminal ends the daemon; a service manager ends it by other signals.
         let hangups = is_service.then(Hangups::count).and_then(Result::ok);
         let _ = sd_notify::notify(&[NotifyState::Ready]);
         let threads = [REALTIME_THREAD, "hexad-io"].map(|name| Supervised::new(name, !is_simulated));
@@ -145,7 +146,7 @@ impl<'a> Supervision<'a> {
         }
     }
 
-    /// Looks at the progress, feeds the watchdog and reports a new state.
+    /// Checks progress, feeds the watchdog and reports a new state.
     pub fn step(&mut self) {
         if self.looked.elapsed() < SUPERVISION_INTERVAL {
             return;
@@ -160,7 +161,7 @@ impl<'a> Supervision<'a> {
             let _ = sd_notify::notify(&[NotifyState::Status(&text(status, self.rate_hz))]);
         }
         if self.hangups.as_mut().is_some_and(Hangups::has_new) {
-            // Nobody serves it when the daemon ends.
+            // The receiver is gone when the daemon ends.
             let _ = self.request_reload.send(None);
         }
         if let Some(remains) = self.remains.as_mut().filter(|_| self.cleaned.elapsed() >= CLEANING_INTERVAL) {
@@ -174,7 +175,7 @@ impl<'a> Supervision<'a> {
         }
     }
 
-    /// Whether every thread has progressed since this was true last.
+    /// Whether every thread has progressed since this last returned true.
     fn have_all_progressed(&mut self) -> bool {
         let counts = [&self.progress.cycles, &self.progress.io_rounds];
         for ((thread, count), seen) in self.threads.iter_mut().zip(counts).zip(&mut self.has_progressed) {
@@ -193,7 +194,7 @@ impl<'a> Supervision<'a> {
     }
 }
 
-/// Status for people.
+/// Status text for the service manager.
 fn text((state, code): (State, DiagnosticCode), rate_hz: f64) -> String {
     if state.has_control() && code == DiagnosticCode::None {
         return format!("{} at {rate_hz} Hz", state.name());

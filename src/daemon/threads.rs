@@ -48,11 +48,13 @@ use crate::realtime::setup::memory;
 use crate::realtime::stop_request::Stop;
 use crate::realtime::triple_buffer::triple_buffer;
 
-/// Stack of each thread: twice what they use, and small because locked memory holds all of it. The recorder uses most: 495 KB where
-/// the crate is one unit of code, 555 KB where it is several (2026-11-25). Unoptimized code keeps every intermediate value there.
+/// Stack of each thread: twice the size used, and small because all of it is locked. The recorder uses most:
+/// 495 KB if the crate is one codegen unit, 555 KB with several (2026-11-25). Unoptimized code keeps every
+/// intermediate value on the stack.
 pub(super) const STACK_BYTES: usize = if cfg!(debug_assertions) { 8 << 20 } else { 1 << 20 };
 
-/// Longest wait for the platform to come to rest before the daemon ends: below the stop timeout of a service manager.
+/// Longest wait for the platform to come to rest before the daemon ends, below the stop timeout of a service
+/// manager.
 const MAX_STOP_TIME: Duration = Duration::from_secs(10);
 const REST_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
@@ -64,16 +66,16 @@ struct Flags {
     stop_control: AtomicBool,
     stop_log: AtomicBool,
     stop_latch: AtomicBool,
-    /// The daemon is to end: the platform comes to rest.
+    /// Set when the daemon is to end. The platform then comes to rest.
     is_ending: AtomicBool,
-    /// The daemon is to end and the platform is not under control.
+    /// Set when the daemon is to end and the platform is not under control.
     may_end: AtomicBool,
 }
 
-/// Runs the threads until `stop`; the report, and the histograms as CSV.
+/// Runs the threads until `stop`. Returns the report, and the histograms as CSV.
 #[expect(
     clippy::too_many_lines,
-    reason = "the one place in which all threads and the queues between them stand side by side"
+    reason = "all threads and the queues between them are in one function, to be read together"
 )]
 pub(super) fn run(
     loaded: Loaded,
@@ -156,7 +158,7 @@ pub(super) fn run(
     let reload_links =
         ReloadLinks { requests: reload_requests, results: reload_results, offers: offer_producer, returned };
     scope(|threads| {
-        // Also when a thread cannot be started the others must end.
+        // Ends the other threads also if a thread cannot be started.
         let _stop_all = StopOnDrop(flags);
         let realtime = &config.deployment.realtime;
         let run_control = || {
@@ -214,15 +216,15 @@ fn report(
 struct RealtimeLinks<'a, 'o> {
     exchange: RealtimeSide,
     records: Producer<'a, CycleRecord>,
-    /// To the recorder.
+    /// Copies of the controller's memory, to the recorder.
     memories: MemoryProducer<'a>,
-    /// Requests of operators.
+    /// Request word of the control thread and of signals.
     word: &'static RequestWord,
-    /// New constants.
+    /// Offers of new constants.
     handover: Handover<'a, 'o>,
-    /// To the main thread.
+    /// Progress, for the main thread.
     progress: &'a Progress,
-    /// Receives the kernel's files about this thread.
+    /// Set by this thread: its files of the kernel.
     files: &'a OnceLock<ThreadFiles>,
     ready: Sender<Ready>,
     go_ahead: Receiver<()>,
@@ -240,9 +242,9 @@ fn run_realtime(
     let shortfalls =
         if realtime.is_simulated() { prepare_simulated(warm_up) } else { prepare_loop(realtime, warm_up) };
     let _ = links.ready.send(Ok(shortfalls));
-    // Without them the worst cycles carry no hints.
+    // If this fails, the worst cycles have no hints.
     let _ = ThreadFiles::of_this_thread().map(|found| links.files.set(found));
-    // No cycle begins before the main thread has accepted what all threads lack.
+    // No cycle begins before the main thread has accepted the shortfalls of all threads.
     links.go_ahead.recv().ok()?;
     let (word, progress, mut intake) =
         (links.word, links.progress, RequestIntake::new(realtime.is_simulated()));
@@ -263,11 +265,11 @@ fn run_realtime(
 fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &AtomicBool) -> Option<IoReport> {
     let Config { machine, deployment, .. } = config;
     let realtime = &deployment.realtime;
-    // Ports belong to the thread that opens them.
+    // Ports belong to the thread that opens them, so they are opened here.
     let ports = config.join().and_then(|bus| Ports::open(&bus, links.timeouts.get()));
     let (ports, opened) = ports.map_or_else(|error| (None, Err(error)), |ports| (Some(ports), Ok(())));
     let shortfalls = opened.map(|()| if realtime.is_simulated() { vec![] } else { prepare_io(realtime) });
-    // There is no receiver only if the other thread failed first.
+    // There is no receiver only if another thread failed first.
     let _ = ready.send(shortfalls.map_err(DaemonError::from));
     let settings = IoSettings {
         timing: timing(deployment),
@@ -277,7 +279,7 @@ fn run_io(config: &Config, links: IoLinks<'_>, ready: &Sender<Ready>, stop: &Ato
     Some(io_thread::run(&settings, ports?, links, stop))
 }
 
-/// Waits for `stop`, and then until the platform is at rest.
+/// Supervises the threads until `stop`, and then until the platform is at rest.
 fn supervise(
     config: &Config,
     flags: &Flags,
@@ -307,7 +309,7 @@ fn supervise(
     }
 }
 
-/// Ends the threads one after the other, so that each receives what the one before it wrote last.
+/// Ends the threads one after another, so that each receives the last output of the thread before it.
 fn join(
     flags: &Flags,
     event: &Arc<Event>,
@@ -347,7 +349,7 @@ fn spawn<'scope, T: Send + 'scope>(
     body: impl FnOnce() -> T + Send + 'scope,
 ) -> io::Result<ScopedJoinHandle<'scope, T>> {
     let body = || {
-        // The main thread waits for them.
+        // Signals of the process go to the main thread, which waits for them.
         block_signals();
         body()
     };

@@ -4,10 +4,10 @@ use hdrhistogram::Histogram;
 
 use crate::messages::Times;
 
-/// Times above this are counted as this \[ns\].
+/// Longest time of the histogram \[ns\]. Longer times are counted as this one.
 const LONGEST_NS: u64 = 60_000_000_000;
 
-/// Three digits from 1 ns to a minute.
+/// Histogram with three digits from 1 ns to a minute.
 #[derive(Debug)]
 pub struct TimeHistogram(Option<Histogram<u64>>);
 
@@ -19,20 +19,20 @@ impl TimeHistogram {
         }
     }
 
-    /// Forgets everything.
+    /// Removes all times.
     pub fn clear(&mut self) {
         if let Some(histogram) = &mut self.0 {
             histogram.reset();
         }
     }
 
-    /// Every time recorded \[ns\], to three digits, and how often.
+    /// Recorded times \[ns\], to three digits, each with its count.
     pub fn counts(&self) -> impl Iterator<Item = (u64, u64)> {
         let steps = self.0.iter().flat_map(Histogram::iter_recorded);
         steps.map(|step| (step.value_iterated_to(), step.count_at_value()))
     }
 
-    /// The distribution of everything recorded.
+    /// Distribution of all recorded times.
     pub fn times(&self) -> Times {
         let Some(histogram) = self.0.as_ref().filter(|histogram| !histogram.is_empty()) else {
             return Times::default();
@@ -54,7 +54,7 @@ impl TimeHistogram {
 
 impl Default for TimeHistogram {
     fn default() -> Self {
-        // Fails only for bounds that make no sense, and these are constants.
+        // Fails only for invalid bounds, and these are constant.
         Self(Histogram::new_with_bounds(1, LONGEST_NS, 3).ok())
     }
 }

@@ -16,13 +16,14 @@ use super::location::{Location, SEGMENTS_DELETED};
 use super::reservation::refusal;
 use super::{LeasedSubscriber, Message, Publisher, Subscriber};
 
-/// Daemon, plant, recorder, monitors.
+/// Largest number of subscribers: daemon, plant, recorder, monitors.
 const MAX_SUBSCRIBERS: usize = 16;
 const MAX_NODES: usize = 32;
-/// Messages that a slow subscriber (a recorder) may fall behind: 256 are 12.8 ms at 20 kHz, 0.25 s at 1 kHz.
+/// Number of messages by which a slow subscriber (a recorder) may lag: 256 are 12.8 ms at 20 kHz, 0.25 s at 1
+/// kHz.
 pub(super) const BUFFER: usize = 256;
 
-/// Failure of a call to iceoryx2: what was attempted, and its own words.
+/// Failure of a call to iceoryx2: the attempt, and the error of iceoryx2.
 #[derive(Debug, thiserror::Error)]
 #[error("shared memory: {what}: {cause}")]
 pub struct PortError {
@@ -40,7 +41,7 @@ pub(super) fn port_error<E: core::fmt::Debug>(what: String) -> impl FnOnce(E) ->
     move |cause| PortError { what, cause: refusal().unwrap_or_else(|| with_cure(&format!("{cause:?}"))) }
 }
 
-/// Words of iceoryx2 that do not say what to do, and what to do.
+/// Errors of iceoryx2 that give no remedy, each with its remedy.
 const CURES: [(&str, &str); 7] = [
     ("SystemInFlux", SEGMENTS_DELETED),
     ("ServiceInCorruptedState", OTHER_VERSION),
@@ -60,7 +61,7 @@ const CURES: [(&str, &str); 7] = [
 const OTHER_VERSION: &str = "another participant has another version of iceoryx2: every participant needs iceoryx2 0.9.3 exactly \
                              (pip install iceoryx2==0.9.3); end all participants, then start them again";
 
-/// The words of an error, after what to do about it.
+/// The text of an error, after its remedy.
 fn with_cure(words: &str) -> String {
     let cure = CURES.iter().find(|(name, _)| words.contains(name));
     cure.map_or_else(|| words.into(), |(_, cure)| format!("{cure} ({words})"))
@@ -75,8 +76,8 @@ pub struct Bus {
 }
 
 impl Bus {
-    /// Joins the topics `hexad/<machine>/...`, whose times are CLOCK_MONOTONIC. `machine` is the configured name; the
-    /// epoch of everything published is now.
+    /// Joins the topics `hexad/<machine>/...`, whose times are CLOCK_MONOTONIC. `machine` is the configured
+    /// name. The epoch of all publishers is now.
     pub fn join(machine: &str) -> Result<Self, PortError> {
         Self::join_topics(machine, false)
     }
@@ -88,7 +89,7 @@ impl Bus {
     }
 
     fn join_topics(machine: &str, is_simulated: bool) -> Result<Self, PortError> {
-        // Its warnings (dead nodes cleaned up) are routine here.
+        // Its warnings (cleaned-up dead nodes) are routine here.
         set_log_level(LogLevel::Error);
         let location = Location::open()?;
         let created = NodeBuilder::new()
@@ -124,18 +125,19 @@ impl Bus {
         Ok(Subscriber::new(service, port, self.is_simulated))
     }
 
-    /// A subscriber to `T` for which one publisher counts until it has left, or was silent for so long \[ns\].
+    /// A subscriber to `T` with a lease: one publisher counts until it has left, or was silent for a time
+    /// \[ns\].
     pub fn leased_subscriber<T: Message>(
         &self,
         depth: usize,
         timeout_ns: u64,
     ) -> Result<LeasedSubscriber<T>, PortError> {
-        // In simulated time nobody is silent for long.
+        // In simulated time a pause is no silence.
         let timeout_ns = if self.is_simulated { u64::MAX } else { timeout_ns };
         Ok(LeasedSubscriber::new(self.subscriber(depth)?, timeout_ns))
     }
 
-    /// Observer of the publishers of `T`, which takes none of the topic's ports.
+    /// Observer of the publishers of `T`. It uses none of the topic's ports.
     pub fn topic<T: Message>(&self) -> Result<TopicObserver<T>, PortError> {
         Ok(TopicObserver(self.service::<T>()?))
     }
@@ -162,7 +164,8 @@ impl Bus {
 pub struct TopicObserver<T: Message>(PortFactory<ipc::Service, T, ()>);
 
 impl<T: Message> TopicObserver<T> {
-    /// Process numbers of the publishers, the latest last. A killed one is there until a participant notices its end.
+    /// Process IDs of the publishers, the latest last. A killed publisher is listed until a participant
+    /// notices its end.
     pub fn publisher_process_ids(&self) -> Vec<u32> {
         let mut found = vec![];
         self.0.dynamic_config().list_publishers(|details| {

@@ -1,7 +1,7 @@
 //! Claim of a machine: the lock that makes one daemon the only one, and the record by which commands find it.
 //!
-//! The lock is in the owner's private folder, so that no other user can hold it and every process of the user finds it. The record beside the control socket may be
-//! read by everybody who may use the socket; it counts while its process lives.
+//! The lock is in the owner's private folder: no other user can hold it, and every process of the user finds it. The
+//! record is beside the control socket. Everybody who may use the socket may read it; it is valid while its process lives.
 
 use std::fs::{self, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
 use std::io::{self, Read, Write};
@@ -23,12 +23,13 @@ const MAX_RECORD_BYTES: u64 = 512;
 /// Everybody may read the record; only the owner may write.
 const RECORD_MODE: u32 = 0o644;
 
-/// Place of the start time in `/proc/PID/stat`, counted from the state behind the name of the process.
+/// Index of the start time in `/proc/PID/stat`, counted from the state after the name of the process.
 const START_TIME_PLACE: usize = 19;
 
-/// Claim of this process to control a machine, until it is dropped or the process dies, however it dies.
+/// Claim of this process to control a machine, until it is dropped or the process dies.
 ///
-/// Topics alone would let a second daemon take over, and leave the first one's forces ignored for good.
+/// Without it, a second daemon could take over the topics, and the first one's forces would be ignored for
+/// good.
 #[derive(Debug)]
 pub struct Claim {
     _locks: Vec<File>,
@@ -40,9 +41,9 @@ pub struct Claim {
 pub struct RunningDaemon {
     /// Name of the machine.
     pub machine: String,
-    /// Number of the process.
+    /// Process ID.
     pub process_id: u32,
-    /// Its start in clock ticks since boot.
+    /// Start of the process, in clock ticks since boot.
     pub start_time: u64,
     /// User of the process.
     pub user_id: u32,
@@ -53,8 +54,9 @@ pub struct RunningDaemon {
 }
 
 impl Claim {
-    /// Claims a machine; an error if another daemon of this user, of the service or of root controls it. Those of other
-    /// users do not count: they reach no participant of this one, and could block it for good.
+    /// Claims a machine. An error if another daemon of this user, of the service or of root controls it.
+    /// Daemons of other users do not count: they reach no participant of this user, and could block the
+    /// machine for good.
     pub fn take(machine: &str) -> Result<Self, PortError> {
         open_user_folder()?;
         let (mut folders, system_user) = (user_folders(), system_user());
@@ -72,8 +74,9 @@ impl Claim {
         Ok(Self { _locks: locks, record: None })
     }
 
-    /// Records this process beside its control socket, with the processors to which its threads are bound. An error if
-    /// the daemon of another machine is bound to one of them; as with [`Self::take`], those of other users do not count.
+    /// Records this process beside its control socket, with the processors to which its threads are bound. An
+    /// error if the daemon of another machine is bound to one of them. As with [`Self::take`], daemons of
+    /// other users do not count.
     pub fn record(&mut self, socket: &Path, processors: &[usize]) -> Result<(), PortError> {
         let path = record_path(socket);
         let process_id = std::process::id();
@@ -81,7 +84,8 @@ impl Claim {
             .and_then(|start_time| write_record(&path, &record_text(process_id, start_time, processors)));
         written.map_err(port_error(format!("cannot write {}", path.display())))?;
         self.record = Some(path);
-        // After the own record is there: of two daemons that start together at least one finds the other.
+        // After its own record is written, so that of two daemons that start together at least one finds the
+        // other.
         let users = [Some(user_id()), Some(0), system_user()];
         let others = all_running_daemons().into_iter().filter(|other| other.process_id != process_id);
         let shared = others.filter(|other| users.contains(&Some(other.user_id))).find_map(|other| {
@@ -107,7 +111,7 @@ fn record_text(process_id: u32, start_time: u64, processors: &[usize]) -> String
 impl Drop for Claim {
     fn drop(&mut self) {
         if let Some(path) = &self.record {
-            // Fails only if somebody has removed it.
+            // Fails only if somebody has removed the file.
             let _ = fs::remove_file(path);
         }
     }
@@ -128,7 +132,7 @@ fn lock(folder: &Path, machine: &str) -> Result<File, PortError> {
     }
 }
 
-/// A lock that root makes in another user's folder is that user's.
+/// A lock that root makes in another user's folder belongs to that user.
 fn open_lock(folder: &Path, path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     let made = options.read(true).write(true).create_new(true).mode(PRIVATE_FILE).open(path);
@@ -149,7 +153,7 @@ fn record_path(socket: &Path) -> PathBuf {
     socket.with_extension(RECORD_EXTENSION)
 }
 
-/// Writes under a temporary name: a record appears as a whole.
+/// Writes under a temporary name and renames the file, so that a record appears as a whole.
 fn write_record(path: &Path, text: &str) -> io::Result<()> {
     let temporary = path.with_extension(format!("daemon-{}", std::process::id()));
     let _ = fs::remove_file(&temporary);
@@ -188,8 +192,8 @@ fn entries(folder: impl AsRef<Path>) -> impl Iterator<Item = PathBuf> {
     fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
-/// The daemon of a record, if its process lives, and if folder, file and process are of one user, or file and process of
-/// root.
+/// The daemon of a record. Its process must live, and folder, file and process must belong to one user, or
+/// file and process to root.
 pub fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let folder_owner = symlink_metadata(folder).ok().filter(fs::Metadata::is_dir)?.uid();
     let path = folder.join(format!("{machine}.{RECORD_EXTENSION}"));
@@ -201,7 +205,7 @@ pub fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     let mut lines = text.lines();
     let process_id = lines.next()?.parse().ok()?;
     let recorded_start: u64 = lines.next()?.parse().ok()?;
-    // Empty where no thread is bound.
+    // Empty if no thread is bound.
     let list = lines.next().unwrap_or_default();
     let processors = list.split(',').filter_map(|number| number.parse().ok()).collect();
     let socket = path.with_extension("sock");
@@ -213,16 +217,17 @@ pub fn running_daemon(folder: &Path, machine: &str) -> Option<RunningDaemon> {
     (is_alive && is_of_one_user).then_some(found)
 }
 
-/// Start of a process in clock ticks since boot: with its number it names the process for good.
+/// Start of a process in clock ticks since boot. Together with the process ID it identifies the process for
+/// good.
 pub fn start_time(process_id: u32) -> io::Result<u64> {
     let text = fs::read_to_string(format!("/proc/{process_id}/stat"))?;
-    // The name may contain anything, also spaces and brackets.
+    // The name may contain any character, even spaces and parentheses.
     let fields = text.rsplit_once(')').map_or("", |(_, fields)| fields);
     let start = fields.split_whitespace().nth(START_TIME_PLACE).and_then(|field| field.parse().ok());
     start.ok_or_else(|| io::Error::other("no start time"))
 }
 
-/// Effective user of a process. The owner of its folder in `/proc` is root where it may not be traced.
+/// Effective user of a process. `/proc` shows root as the owner if the process may not be traced.
 fn process_user(process_id: u32) -> Option<u32> {
     let text = fs::read_to_string(format!("/proc/{process_id}/status")).ok()?;
     let line = text.lines().find_map(|line| line.strip_prefix("Uid:"))?;

@@ -17,7 +17,8 @@ message! {
     }
 }
 
-/// A request that may begin control and is older than this is not carried out: its sender has long stopped waiting \[ns\].
+/// Largest age of a request that may begin control \[ns\]. The sender of an older one has long stopped
+/// waiting.
 pub const MAX_REQUEST_AGE_NS: u64 = 1_000_000_000;
 
 impl From<Request> for CommandMessage {

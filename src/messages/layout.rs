@@ -159,8 +159,9 @@ impl<T: FieldType, const N: usize> FieldType for [T; N] {
 
 /// Declares a `#[repr(C)]` struct: its fields with type, unit and meaning.
 ///
-/// `on "topic" schema 1` makes it a [`Message`](super::Message), whose first field is the header; `publishers` is the most
-/// of them at once, where it is not the usual number; `sealed by` names the field for the checksum of the fields before it. A struct with gaps between its fields does not compile.
+/// `on "topic" schema 1` makes it a [`Message`](super::Message), whose first field is the header. `publishers` is the
+/// largest number of simultaneous publishers, if it differs from the default. `sealed by` names the field with the
+/// checksum of the fields before it. A struct with gaps between its fields does not compile.
 macro_rules! message {
     (
         $(#[doc = $doc:literal])*

@@ -1,13 +1,14 @@
-//! Lease of a topic: of several publishers that live one counts, and it counts until it has left.
+//! Lease of a topic: one of several living publishers counts, and it counts until it has left.
 //!
-//! A publisher lives while its messages arrive and iceoryx2 lists it. Under control only one that began after the last message
-//! of the one before may follow it: what was published beside it all the time never takes over by itself. Without control
-//! whichever lives counts, the one that began last first.
+//! A publisher lives while its messages arrive and iceoryx2 lists it. Under control, only a publisher that
+//! began after the last message of the previous one can succeed it. So one that published beside it all the
+//! time never takes over by itself. Without control any living publisher can count; the one that began last
+//! is preferred.
 
 use super::Message;
 use crate::control::signals::inputs::Publishers;
 
-/// Publishers that are remembered: as many as a topic has at once.
+/// Number of remembered publishers: the largest number of simultaneous publishers of a topic.
 pub(super) const PUBLISHERS: usize = 4;
 
 /// Publisher of a topic, by its messages.
@@ -17,7 +18,7 @@ struct Known<Id> {
     epoch: u64,
     sequence: u64,
     process_id: u32,
-    /// When its last message was received \[ns\].
+    /// Instant at which its last message was received \[ns\].
     seen_ns: u64,
 }
 
@@ -31,17 +32,17 @@ pub(super) struct Lease<Id> {
     timeout_ns: u64,
 }
 
-/// What a message is to its publisher.
+/// Relation of a message to the earlier ones of its publisher.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Arrival {
-    /// So many messages after the last one; the place of the publisher.
+    /// The number of messages since the last one, and the place of the publisher.
     New { place: usize, after: u64 },
-    /// Received before.
+    /// The message was received before.
     Repeated,
 }
 
 impl<Id: Copy> Lease<Id> {
-    /// Nobody counts yet.
+    /// Lease without a publisher.
     pub fn new(timeout_ns: u64) -> Self {
         Self { known: [None; PUBLISHERS], holder: None, timeout_ns }
     }
@@ -51,7 +52,7 @@ impl<Id: Copy> Lease<Id> {
         self.timeout_ns = timeout_ns;
     }
 
-    /// Records a message that was received now. `process_id` finds the process of a publisher that is new.
+    /// Records a message received now. `process_id` finds the process of a new publisher.
     pub fn record(
         &mut self,
         message: &impl Message,
@@ -77,7 +78,7 @@ impl<Id: Copy> Lease<Id> {
         Arrival::New { place, after: 1 }
     }
 
-    /// A free place, or that of the publisher that was silent for longest and does not count.
+    /// A free place, or the place of the publisher that was silent for longest and does not count.
     fn place_to_forget(&self) -> usize {
         let rank = |known: &Option<Known<Id>>| {
             known
@@ -88,7 +89,7 @@ impl<Id: Copy> Lease<Id> {
         places.min_by_key(|(_, known)| rank(known)).map_or(0, |(place, _)| place)
     }
 
-    /// Decides which publisher counts; returns its place.
+    /// Decides which publisher counts. Returns its place.
     pub fn decide(
         &mut self,
         now_ns: u64,
@@ -108,7 +109,7 @@ impl<Id: Copy> Lease<Id> {
         self.place(self.holder)
     }
 
-    /// Processes of the publisher that counts and of another that lives beside it.
+    /// Processes of the publisher that counts, and of another living one.
     pub fn publishers(&self, now_ns: u64, is_listed: impl Fn(Id) -> bool) -> Publishers {
         let used_pid = self.holding().map_or(0, |known| known.process_id);
         let mut others = self.others(now_ns).filter(|known| is_listed(known.id));

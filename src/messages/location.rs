@@ -1,8 +1,9 @@
-//! Location of the shared memory: one private folder per user, and a prefix that no other user can foresee.
+//! Location of the shared memory: a private folder per user, and a prefix that other users cannot predict.
 //!
-//! The folder holds iceoryx2's book-keeping, the locks of the machines and the prefix of the segments in `/dev/shm`. Other
-//! users can neither make it nor write in it. It follows from the user alone and from no environment variable: all processes of
-//! a user must find the same locks and the same shared memory, however they were started.
+//! The folder contains the files of iceoryx2, the locks of the machines and the prefix of the segments in
+//! `/dev/shm`. Other users can neither make it nor write in it. It depends on the user only and on no
+//! environment variable, because all processes of a user must find the same locks and the same shared memory,
+//! however they were started.
 
 use std::fs::{self, DirBuilder, File, OpenOptions, Permissions, TryLockError, metadata, symlink_metadata};
 use std::io::{self, ErrorKind, Read, Write};
@@ -16,20 +17,20 @@ use iceoryx2::prelude::*;
 
 use super::bus::{PortError, port_error};
 
-/// Folder of the service, which its package makes at boot and gives to its user.
+/// Folder of the service. Its package creates the folder at boot and gives it to the service's user.
 pub const SYSTEM_FOLDER: &str = "/run/hexad";
-/// Root's own folder where it has no runtime folder; only root may make it.
+/// Root's own folder if root does not own the service's. Only root may make it.
 pub const ROOT_FOLDER: &str = "/run/hexad-root";
-/// Where other users' folders are, and the beginning of their names. Not the runtime folder of a login, which comes and goes with
-/// its sessions.
+/// Parent of other users' folders, and prefix of their names. The runtime folder of a login is not used,
+/// because it disappears with its sessions.
 const TEMPORARY: &str = "/tmp";
 const TEMPORARY_NAME: &str = "hexad-";
 
-/// Folder of iceoryx2's book-keeping.
+/// Folder for the files of iceoryx2.
 const BOOKS: &str = "iceoryx2";
 /// File with the prefix.
 const PREFIX_FILE: &str = "prefix";
-/// Random bytes of a prefix: more than anybody can try.
+/// Random bytes of a prefix, too many to try.
 const PREFIX_BYTES: usize = 8;
 /// Longest prefix that is read \[bytes\].
 const MAX_PREFIX_BYTES: u64 = 64;
@@ -38,21 +39,23 @@ pub(super) const SEGMENTS: &str = "/dev/shm";
 /// A port that cannot be opened must not block the I/O thread for the default second.
 const CREATION_TIMEOUT: Duration = Duration::from_millis(5);
 
-/// Only the owner may open it: also who may only read could lock it for good.
+/// Only the owner may open the file. A user who may read it could lock it for good.
 pub(super) const PRIVATE_FILE: u32 = 0o600;
-/// Others may enter it and see which machines run; permissions of the control sockets say who may use them.
+/// Others may enter the folder and see which machines run. The permissions of the control sockets decide who
+/// may use them.
 const USER_FOLDER: u32 = 0o755;
 const PRIVATE_FOLDER: u32 = 0o700;
-/// Permissions with which others could write in a folder.
+/// Permissions that let others write in a folder.
 pub const OTHERS_WRITE: u32 = 0o022;
 
 /// User of this process.
 pub fn user_id() -> u32 {
-    // Root where /proc is not mounted: its folder then has another owner, which is an error.
+    // If /proc is not mounted this is root. Then the folder has another owner, which is an error.
     metadata("/proc/self").map_or(0, |found| found.uid())
 }
 
-/// Folder of this user: the service's own if that belongs to this user, root's, else the first of [`user_folders`].
+/// Folder of this user: the service's if it belongs to this user, root's for root, else the first of
+/// [`user_folders`].
 pub fn user_folder() -> PathBuf {
     match (metadata(SYSTEM_FOLDER), user_id()) {
         (Ok(found), user_id) if found.is_dir() && found.uid() == user_id => SYSTEM_FOLDER.into(),
@@ -61,7 +64,8 @@ pub fn user_folder() -> PathBuf {
     }
 }
 
-/// All folders of this user: several where another user has made, and later removed, one that was to be this user's.
+/// All folders of this user. There are several if another user has made, and later removed, a folder with
+/// this user's name.
 pub fn user_folders() -> Vec<PathBuf> {
     let first = user_folder();
     let others = own_folders(user_id()).into_iter().filter(|folder| *folder != first);
@@ -79,7 +83,7 @@ pub fn system_user() -> Option<u32> {
     metadata(SYSTEM_FOLDER).ok().filter(fs::Metadata::is_dir).map(|found| found.uid())
 }
 
-/// The folder of a user, or the one to take where so many are not the user's.
+/// Folder of a user, or the next name after `others` folders that belong to other users.
 fn temporary(user_id: u32, others: u32) -> PathBuf {
     let end = if others == 0 { String::new() } else { format!("-{others}") };
     Path::new(TEMPORARY).join(format!("{TEMPORARY_NAME}{user_id}{end}"))
@@ -100,14 +104,14 @@ fn temporary_folders(beginning: &str) -> Vec<PathBuf> {
     found
 }
 
-/// Makes the folder of this user if it is missing, whatever other users have made.
+/// Makes the folder of this user if it is missing, whatever folders other users have made.
 pub fn open_user_folder() -> Result<PathBuf, PortError> {
     let mut folder = user_folder();
     for others in 1.. {
         let is_temporary = folder.parent() == Some(Path::new(TEMPORARY));
         match make_own(&folder, USER_FOLDER) {
             Ok(()) => break,
-            // Another user's: nobody can take all names.
+            // The folder of another user. Nobody can take all names.
             Err(_) if is_temporary && symlink_metadata(&folder).is_ok() => {
                 folder = temporary(user_id(), others)
             }
@@ -120,7 +124,7 @@ pub fn open_user_folder() -> Result<PathBuf, PortError> {
 fn make_own(folder: &Path, mode: u32) -> io::Result<()> {
     match DirBuilder::new().mode(mode).create(folder) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(error),
-        // Whatever the mask of this process.
+        // Independent of the umask of this process.
         Ok(()) => fs::set_permissions(folder, Permissions::from_mode(mode))?,
         Err(_) => {}
     }
@@ -135,23 +139,23 @@ fn is_own(folder: &Path) -> bool {
         .is_ok_and(|found| found.is_dir() && found.uid() == user_id() && found.mode() & OTHERS_WRITE == 0)
 }
 
-/// Opens a file of this user alone, following no link.
+/// Opens a file that belongs to this user alone. Follows no link.
 pub(super) fn open_private(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false).mode(PRIVATE_FILE);
     options.custom_flags(libc::O_NOFOLLOW).open(path)
 }
 
-/// Location of this user's shared memory, held until a node is created there.
+/// Location of this user's shared memory, kept until a node is created there.
 pub(super) struct Location {
-    /// For iceoryx2.
+    /// Configuration of iceoryx2.
     pub config: Config,
-    /// Held shared: meanwhile no daemon replaces the prefix.
+    /// Lock of the prefix file, shared. While it is held no daemon replaces the prefix.
     _prefix: File,
 }
 
 impl Location {
-    /// Location of this user; makes it if it is missing.
+    /// Location of this user. Makes it if it is missing.
     pub(super) fn open() -> Result<Self, PortError> {
         let folder = open_user_folder()?;
         let path = folder.join(PREFIX_FILE);
@@ -162,7 +166,7 @@ impl Location {
         Ok(Self { config: config(&books, &text)?, _prefix: prefix })
     }
 
-    /// Why nothing can be created here, in the words of the system; `None` if something can.
+    /// Reason why nothing can be created here, as an error of the system; `None` if something can.
     pub(super) fn obstacle(&self) -> Option<String> {
         let root = self.config.global.root_path().to_string();
         let name = format!("{}probe-{}", self.config.global.prefix, std::process::id());
@@ -180,14 +184,15 @@ pub const SEGMENTS_DELETED: &str = "the files of the shared memory in /dev/shm w
     join. systemd-logind does that when the last session of a user who is no system user ends (RemoveIPC=yes). Stop all participants of this \
     user, set RemoveIPC=no in /etc/systemd/logind.conf, or run them as a system user, then start them again";
 
-/// Whether this user's shared memory is gone from `/dev/shm`. Meant for participants: while one runs it has some.
+/// Whether this user's shared memory is gone from `/dev/shm`. For participants: while one runs, some must
+/// exist.
 pub fn are_segments_deleted() -> bool {
     let prefix = fs::read_to_string(user_folder().join(PREFIX_FILE)).unwrap_or_default();
     let mut entries = fs::read_dir(SEGMENTS).into_iter().flatten().flatten();
     !prefix.is_empty() && !entries.any(|entry| entry.file_name().to_string_lossy().starts_with(&prefix))
 }
 
-/// Opens the file of the prefix, locked shared, and reads it. The first participant chooses the prefix.
+/// Opens the file of the prefix with a shared lock, and reads it. The first participant chooses the prefix.
 fn open_prefix(path: &Path) -> io::Result<(File, String)> {
     let mut file = open_private(path)?;
     loop {
@@ -197,7 +202,7 @@ fn open_prefix(path: &Path) -> io::Result<(File, String)> {
             return Ok((file, text));
         }
         file.lock()?;
-        // Another may have chosen meanwhile.
+        // Another process may have chosen meanwhile.
         if read_prefix(&file)?.is_empty() {
             file.write_all(new_prefix()?.as_bytes())?;
         }
@@ -228,8 +233,8 @@ fn config(books: &Path, prefix: &str) -> Result<Config, PortError> {
     Ok(config)
 }
 
-/// Chooses another prefix and removes what the old one has left, unless a participant of this user lives: another user may
-/// have seen the old one in `/dev/shm` and made files of names that are to come.
+/// Chooses another prefix and removes the segments of the old one, unless a participant of this user lives.
+/// Another user may have seen the old prefix in `/dev/shm` and made files with future names.
 pub(super) fn renew_prefix() -> Result<(), PortError> {
     let folder = open_user_folder()?;
     let path = folder.join(PREFIX_FILE);
@@ -258,7 +263,7 @@ pub(super) fn renew_prefix() -> Result<(), PortError> {
         .map_err(failed())
 }
 
-/// Whether a process takes part, or one about which nothing is known.
+/// Whether a process takes part. A process whose state cannot be read counts.
 fn has_participants(config: &Config) -> bool {
     let mut found = false;
     let listed = Node::<ipc::Service>::list(config, |node| {
@@ -272,7 +277,7 @@ fn has_participants(config: &Config) -> bool {
 fn remove_segments(prefix: &str) {
     let entries = fs::read_dir(SEGMENTS).into_iter().flatten().flatten();
     for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(prefix)) {
-        // Of another user: it can stay, as nobody uses the prefix any more.
+        // A segment of another user can stay, because nobody uses the prefix any more.
         let _ = fs::remove_file(entry.path());
     }
 }
@@ -317,7 +322,7 @@ mod tests {
             std::os::unix::fs::chown(&folder, Some(1), None).unwrap();
             folder
         } else {
-            // Root's, and only root may write in it.
+            // Root owns the folder, and only root may write in it.
             "/usr".into()
         };
         assert_eq!(metadata(&foreign).unwrap().mode() & OTHERS_WRITE, 0);

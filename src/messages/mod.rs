@@ -14,11 +14,19 @@
 //! | iceoryx2 | 0.9.3 exactly, publish-subscribe, IPC service, no user header |
 //! | topic | `hexad/<name>/<last part>`: `setpoint`, `measured`, `command`, `force`, `status` |
 //! | type name | `hexad_<last part>` |
-//! | settings | open or create with `max_publishers` 4, of `command` 16, `max_subscribers` 16, `max_nodes` 32, `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0: the first participant sets them for all |
-//! | location | in the folder of the user: root path `iceoryx2` in it, prefix the content of the file `prefix` in it; create the node while holding `flock` on that file |
-//! | folder of the user | `/run/hexad` if it belongs to the user; else `/run/hexad-root` for root and `/tmp/hexad-<user ID>` for others, or, where that is not the user's, the first of `/tmp/hexad-<user ID>-*` that is; mode 0755, `iceoryx2` in it 0700 |
+//! | opening a service | open or create: the first participant sets the settings for all |
+//! | settings, ports | `max_publishers` 4, of `command` 16; `max_subscribers` 16; `max_nodes` 32 |
+//! | settings, buffers | `subscriber_max_buffer_size` 256, safe overflow, `history_size` 0 |
 //! | user | all participants of a machine run as one user |
+//! | root path | `iceoryx2` in the folder of the user, mode 0700 |
+//! | prefix | content of the file `prefix` in the folder of the user; hold `flock` on it while creating the node |
 //! | signals | the daemon's node installs no handlers (`SignalHandlingMode::Disabled`) |
+//!
+//! The folder of the user has mode 0755. It is the first of these that belongs to the user:
+//!
+//! 1. `/run/hexad`
+//! 2. `/run/hexad-root` for root, `/tmp/hexad-<user ID>` for others
+//! 3. the first of `/tmp/hexad-<user ID>-*`
 //!
 //! A publisher fills in the header and numbers its messages from 1. A subscriber accepts a message of its schema that is
 //! intact and follows all before in the order of (epoch, sequence): the last message of a publisher that died may still

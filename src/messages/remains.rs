@@ -52,7 +52,7 @@ impl Remains {
     /// Everything that belongs to no living node; `None` if the nodes cannot be listed.
     fn without_owner(&self) -> Option<BTreeSet<PathBuf>> {
         let (mut nodes, mut ports) = (BTreeSet::new(), BTreeSet::new());
-        // Before the folders are read: of a node that joins meanwhile the next call knows that it lives.
+        // List the nodes before reading the folders. A node that joins in between is listed in the next call.
         let listed = Node::<ipc::Service>::list(&self.config, |node| {
             match node {
                 NodeState::Alive(view) => nodes.insert(view.id().value()),

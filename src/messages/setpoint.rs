@@ -11,7 +11,7 @@ message! {
     SetpointMessage = "hexad_setpoint" on "setpoint" schema 7 {
         /// Schema version, publisher, sequence number and time stamp.
         header: super::Header,
-        /// 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and stand at.
+        /// 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and hold.
         kind: u64,
         /// X.
         x: [f64; 6] ["rad, m"],

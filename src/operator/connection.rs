@@ -1,4 +1,4 @@
-//! A connection to a daemon.
+//! Connection to a daemon.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::{AsRawFd, OwnedFd};
@@ -12,10 +12,10 @@ use nix::sys::socket::{self, AddressFamily, SockFlag, SockType, UnixAddr, UnixCr
 
 use super::protocol::{AnswerLine, RequestLine};
 
-/// Longest sleep in a read, so that signals are noticed.
+/// Longest blocking read, so that signals are noticed.
 const READ_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Longest answer \[bytes\]: many times that to `status`.
+/// Longest answer \[bytes\]: many times the answer to `status`.
 const MAX_ANSWER_BYTES: usize = 1 << 16;
 
 /// Result of an attempt to connect.
@@ -24,13 +24,13 @@ pub enum Attempt {
     Connected(Connection),
     /// The permissions do not allow it.
     Forbidden,
-    /// Nobody listens.
+    /// No process listens.
     Absent,
-    /// Whoever listens accepts nobody now.
+    /// The listening process accepts no more connections now.
     Full,
 }
 
-/// Connects, without ever waiting.
+/// Connects without waiting.
 pub(super) fn connect(path: &Path) -> io::Result<Attempt> {
     let flags = SockFlag::SOCK_NONBLOCK | SockFlag::SOCK_CLOEXEC;
     let file = socket::socket(AddressFamily::Unix, SockType::Stream, flags, None)?;
@@ -59,7 +59,7 @@ impl Connection {
         Ok(Self { stream, peer, buffer: Vec::new() })
     }
 
-    /// The stream, for what goes beside the lines.
+    /// The stream, for files passed beside the lines.
     pub fn stream(&self) -> &UnixStream {
         &self.stream
     }
@@ -69,13 +69,14 @@ impl Connection {
         self.peer.map(|peer| peer.uid())
     }
 
-    /// Number of the process that listens; `None` where it is not seen from here.
+    /// Process ID of the process that listens; `None` if it is not visible from here.
     pub fn process_id(&self) -> Option<u32> {
         let process_id = self.peer.and_then(|peer| u32::try_from(peer.pid()).ok());
         process_id.filter(|process_id| *process_id > 0)
     }
 
-    /// The process that listens, and no other that has its number later; `None` if the kernel does not tell (before Linux 6.5).
+    /// Descriptor of the process that listens; it never refers to a later process with the same number. `None` if the
+    /// kernel does not provide it (before Linux 6.5).
     pub fn process(&self) -> Option<OwnedFd> {
         getsockopt(&self.stream, PeerPidfd).ok()
     }
@@ -86,7 +87,7 @@ impl Connection {
         self.stream.write_all(text.as_bytes())
     }
 
-    /// The next line of the daemon; `None` if none came until an instant or until `stop`.
+    /// The next line of the daemon; `None` if none arrived until an instant or until `stop`.
     pub fn receive(&mut self, until: Instant, stop: impl Fn() -> bool) -> io::Result<Option<AnswerLine>> {
         loop {
             if let Some(end) = self.buffer.iter().position(|byte| *byte == b'\n') {

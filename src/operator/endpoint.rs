@@ -1,7 +1,8 @@
-//! Where daemons of this host listen, of whatever user, and whether they count.
+//! Endpoints of the daemons of this host, of any user, and whether they are trusted.
 //!
-//! Any user can make a folder, a socket and a record that look like a daemon's. A daemon is trusted by descriptors alone: trusted users
-//! own folder, socket and listening process, and no other user may write in the folder.
+//! Any user can make a folder, a socket and a record that look like a daemon's. Therefore trust depends on
+//! open descriptors only: trusted users own folder, socket and listening process, and no other user may write
+//! in the folder.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -15,27 +16,27 @@ use super::users::{group_name, is_trusted, user_name};
 use crate::messages::claim::{RunningDaemon, running_daemon};
 use crate::messages::location::{OTHERS_WRITE, SYSTEM_FOLDER, daemon_folders, user_id};
 
-/// Extensions of the socket for requests, and of that for reading alone.
+/// Extensions of the socket for requests and of the read-only socket.
 const SOCKET_EXTENSION: &str = "sock";
 const READING_EXTENSION: &str = "read";
 
-/// Most endpoints of users that are not trusted, of all that another user may have made.
+/// Largest number of endpoints of users that are not trusted. Another user may have made any number.
 const MAX_OTHERS: usize = 32;
 
-/// Place where a daemon listens, or has.
+/// Place where a daemon listens, or has listened.
 #[derive(Clone, Debug)]
 pub struct Endpoint {
     /// Name of the machine.
     pub machine: String,
-    /// Path of the socket, for people.
+    /// Path of the socket, for messages.
     pub socket: PathBuf,
-    /// Owner of the socket, of the folder if there is none.
+    /// Owner of the socket; of the folder if there is no socket.
     pub owner: u32,
     /// Whether folder and socket are trusted.
     pub is_trusted: bool,
-    /// The daemon that has recorded itself there, if its process is seen from here.
+    /// The daemon recorded there, if its process is visible from here.
     pub daemon: Option<RunningDaemon>,
-    /// The folder, which no longer follows its path.
+    /// The opened folder. It does not change with its path.
     folder: Arc<File>,
 }
 
@@ -62,17 +63,17 @@ impl Endpoint {
         self.socket.starts_with(SYSTEM_FOLDER)
     }
 
-    /// Whether it is of this user.
+    /// Whether it belongs to this user.
     pub fn is_own(&self) -> bool {
         self.owner == user_id()
     }
 
-    /// Connects, without ever waiting.
+    /// Connects without waiting.
     pub fn connect(&self) -> io::Result<Attempt> {
         connect(&socket_path(&by_descriptor(&self.folder), &self.machine))
     }
 
-    /// The same to read the status: also where this user may send no requests.
+    /// Connects to read the status, even if this user may send no requests.
     pub fn connect_to_read(&self) -> io::Result<Attempt> {
         match self.connect()? {
             Attempt::Forbidden => {
@@ -85,12 +86,12 @@ impl Endpoint {
         }
     }
 
-    /// Whether the daemon at the other end counts.
+    /// Whether the daemon at the other end is trusted.
     pub fn counts(&self, connection: &Connection) -> bool {
         self.is_trusted && connection.user_id().is_some_and(is_trusted)
     }
 
-    /// Users that may connect, in words.
+    /// Text of the users that may connect.
     pub fn allowed(&self) -> String {
         let group = fs::metadata(&self.socket).ok().filter(|found| found.mode() & 0o020 != 0);
         let owner = (self.owner != 0).then(|| format!("user {}", user_name(self.owner)));
@@ -105,18 +106,18 @@ pub fn socket_path(folder: &Path, machine: &str) -> PathBuf {
     folder.join(format!("{machine}.{SOCKET_EXTENSION}"))
 }
 
-/// Path of the socket for reading of a machine in a folder.
+/// Path of the read-only socket of a machine in a folder.
 pub fn reading_path(folder: &Path, machine: &str) -> PathBuf {
     folder.join(format!("{machine}.{READING_EXTENSION}"))
 }
 
-/// Path of an opened folder, whatever happens to its name.
+/// Path of an opened folder, even if it was renamed.
 fn by_descriptor(folder: &File) -> PathBuf {
     format!("/proc/self/fd/{}", folder.as_raw_fd()).into()
 }
 
-/// Endpoints of a machine, or of all machines of this host: of the service first, then of this user, of root, and of others, whose
-/// answers do not count.
+/// Endpoints of a machine, or of all machines of this host. Order: of the service, of this user, of root, of
+/// others, whose answers do not count.
 pub fn endpoints(machine: Option<&str>) -> Vec<Endpoint> {
     let mut found: Vec<_> =
         daemon_folders().iter().flat_map(|folder| endpoints_in(folder, machine)).collect();

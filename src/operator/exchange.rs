@@ -11,7 +11,7 @@ use super::{OperatorError, Order};
 const ANSWER_GRACE: Duration = Duration::from_secs(2);
 
 impl Order {
-    /// The line that asks for it.
+    /// Request line of the order.
     pub(super) fn line(&self) -> RequestLine {
         RequestLine {
             wait: true,
@@ -22,7 +22,7 @@ impl Order {
         }
     }
 
-    /// What an answer to it means: the name of the state that it led to, or why it did not.
+    /// Evaluates an answer: the name of the resulting state, or the reason why the request failed.
     pub(super) fn conclude(&self, answer: AnswerLine) -> Result<String, OperatorError> {
         let (request, text) = (self.request, answer.text);
         match answer.result {
@@ -41,8 +41,8 @@ impl Order {
     }
 }
 
-/// Sends a line and reads until its answer; `None` if none came: the first line until an instant, the answer in `timeout` and a little
-/// more. `waits` receives why the daemon waits.
+/// Sends a line and reads until its answer; `None` if none arrived. The first line must arrive before
+/// `until`, the answer within `timeout` and a short grace. `waits` receives the reasons why the daemon waits.
 pub(super) fn converse(
     connection: &mut Connection,
     line: &RequestLine,

@@ -1,8 +1,9 @@
-//! Operators' requests to the daemons of this host: commands, libhexad and panels send them from here.
+//! Operators' requests to the daemons of this host. Commands, libhexad and panels use this module.
 //!
-//! A request goes over the control socket, as a line of [`protocol`], and the daemon's answer comes back. What stops is sent first and
-//! judged afterwards ([`stops`]); everything else goes to one daemon that counts ([`requests`]). Whose answers count says
-//! [`endpoint`]. A stop whose socket does not answer goes by signal ([`signal`]).
+//! A request is a line of [`protocol`] over the control socket, and the daemon's answer comes back. A stop is
+//! sent to all daemons of a machine first and evaluated afterwards ([`stops`]). Every other request goes to
+//! one daemon that counts ([`requests`]). [`endpoint`] defines whose answers count. If the socket does not
+//! answer, a stop is sent by signal ([`signal`]).
 
 use std::time::Duration;
 
@@ -24,29 +25,29 @@ pub mod users;
 /// Time between two attempts.
 const RETRY_INTERVAL: Duration = Duration::from_millis(2);
 
-/// Attempts of a request whose connection the daemon has closed, as it does when too many clients connect.
+/// Attempts of a request whose connection the daemon closes, which it does if too many clients connect.
 const ATTEMPTS: u32 = 5;
 
-/// Why a request was not carried out.
+/// Reason why a request was not carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum OperatorError {
-    /// Nobody listens, and no process is recorded.
+    /// No process listens, and none is recorded.
     #[error("no daemon runs for {0}: none listens in /run/hexad or in a folder of a user")]
     NoDaemon(String),
     /// No machine runs at all.
     #[error("no daemon runs on this host")]
     NoMachine,
-    /// Which machine is meant is not known.
+    /// The machine is ambiguous.
     #[error("several machines run: {0}; name one, or give --all")]
     Several(String),
-    /// A daemon runs that this user may not ask.
+    /// A daemon runs, but this user may not send it requests.
     #[error("this user may not send requests for {machine} ({socket}): {allowed}")]
     Forbidden {
         /// Name of the machine.
         machine: String,
         /// Path of the control socket.
         socket: String,
-        /// Who may, in words.
+        /// Users who may, as text.
         allowed: String,
     },
     /// Only daemons run whose answers do not count.
@@ -63,16 +64,16 @@ pub enum OperatorError {
     /// The daemon refuses it.
     #[error("{request} was refused: {reason}", request = .0.name(), reason = .1)]
     Refused(Request, String),
-    /// It was accepted, and control went elsewhere.
+    /// It was accepted, but control ended otherwise.
     #[error("{request} was not completed: {reason}", request = .0.name(), reason = .1)]
     NotCompleted(Request, String),
-    /// Its state was not reached in its time \[s\].
+    /// Its state was not reached within its time \[s\].
     #[error("{request} was not completed within {1} s: {reason}", request = .0.name(), reason = .2)]
     TimedOut(Request, f64, String),
-    /// Whether it was carried out is not known.
+    /// It is unknown whether the request was carried out.
     #[error("{request} is not confirmed: {reason}", request = .0.name(), reason = .1)]
     NotConfirmed(Request, String),
-    /// The daemon was held, and it may be old.
+    /// The daemon was held, and the request may be from before.
     #[error("{request} was not carried out: {reason}", request = .0.name(), reason = .1)]
     Stale(Request, String),
     /// The daemon does not answer.
@@ -81,7 +82,7 @@ pub enum OperatorError {
     /// The daemon refuses its machine file.
     #[error("reload was refused, nothing has changed:\n{0}")]
     ReloadRefused(String),
-    /// Whether the machine file was taken over is not known.
+    /// It is unknown whether the machine file was reloaded.
     #[error("reload is not confirmed: {0}")]
     ReloadNotConfirmed(String),
     /// The last seconds were not written.
@@ -102,7 +103,7 @@ impl OperatorError {
     }
 }
 
-/// A daemon that does not count, and what it said.
+/// A daemon that does not count, and its answer.
 #[derive(Clone, Debug, thiserror::Error)]
 #[error("the daemon of user {owner} at {socket} does not count ({said})")]
 pub struct Stranger {
@@ -123,13 +124,13 @@ impl Stranger {
     }
 }
 
-/// A request that is to be carried out.
+/// A request with its options.
 #[derive(Clone, Copy, Debug)]
 pub struct Order {
-    /// What is requested.
+    /// The request.
     pub request: Request,
-    /// Whether to wait for measurements and setpoint where they are missing, instead of being refused.
+    /// Whether to wait for missing measurements and setpoints instead of being refused.
     pub is_patient: bool,
-    /// Longest wait for the outcome.
+    /// Longest wait for the result.
     pub timeout: Duration,
 }

@@ -5,15 +5,15 @@ use serde::{Deserialize, Serialize};
 use super::status_report::StatusReport;
 use crate::control::signals::state::{Request, State};
 
-/// Whether a request ends control or force; it is never withdrawn.
+/// Whether a request ends control or force. Such a request is never withdrawn.
 pub fn is_stop(request: Request) -> bool {
     matches!(request, Request::Stop | Request::Off | Request::Estop)
 }
 
-/// Version of the protocol. It changes only if a client of an older one would misunderstand.
+/// Version of the protocol. It is raised only if an older client would misinterpret it.
 pub const VERSION: u32 = 1;
 
-/// Longest time that `wait` waits where the request names none \[s\].
+/// Longest waiting time if the request gives none \[s\].
 const DEFAULT_WITHIN_S: f64 = 30.0;
 
 /// Line of a client.
@@ -24,10 +24,10 @@ pub struct RequestLine {
     pub version: u32,
     /// `engage`, `stop`, `park`, `clear`, `off`, `estop`, `reload`, `status` or `record`.
     pub request: String,
-    /// Whether the answer comes only when the request is completed: its state reached, or another.
+    /// Whether the answer comes only when the request has ended: its state is reached, or cannot be.
     #[serde(default)]
     pub wait: bool,
-    /// Whether a refusal whose reason may disappear by itself (no measurement, no setpoint) is waited out.
+    /// Whether to wait after a refusal whose reason may disappear by itself (no measurement, no setpoint).
     #[serde(default)]
     pub until_ready: bool,
     /// Whether lines with result `accepted` and `waiting` come before the answer.
@@ -36,7 +36,7 @@ pub struct RequestLine {
     /// Longest time to wait \[s\].
     #[serde(default = "default_within_s")]
     pub within_s: f64,
-    /// Length of a recording \[s\]; `None` for all that is kept.
+    /// Length of a recording \[s\]; `None` for all cycles that are kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub last_s: Option<f64>,
 }
@@ -46,7 +46,7 @@ fn default_within_s() -> f64 {
 }
 
 impl RequestLine {
-    /// A request that is answered at once.
+    /// A request with an immediate answer.
     pub fn new(request: &str) -> Self {
         let (wait, until_ready, progress) = (false, false, false);
         Self {
@@ -72,7 +72,7 @@ impl RequestLine {
         Ok(line)
     }
 
-    /// The request to the controller; `None` if it is another one, or unknown.
+    /// The request to the controller; `None` if it is not for the controller, or unknown.
     pub fn controller_request(&self) -> Option<Request> {
         Request::ALL.into_iter().find(|request| request.name() == self.request)
     }
@@ -83,19 +83,19 @@ impl RequestLine {
     }
 }
 
-/// What became of a request.
+/// Result of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RequestResult {
     /// The controller has accepted it. The answer, or progress if the request waits.
     Accepted,
-    /// Progress: why it waits.
+    /// Progress: the reason why it waits.
     Waiting,
-    /// Its state is reached, or the status is here.
+    /// Its state is reached, or the status is in the answer.
     Done,
     /// The controller has refused it.
     Refused,
-    /// It was accepted, and control went elsewhere.
+    /// It was accepted, but control ended otherwise.
     Failed,
     /// It was not completed in its time.
     TimedOut,
@@ -103,14 +103,14 @@ pub enum RequestResult {
     Superseded,
     /// The control loop has run no cycle. A stop remains posted, everything else is withdrawn.
     Unanswered,
-    /// The daemon was held and a request that may begin control may have been sent before: send it again.
+    /// The daemon was held, and a request that may begin control may be from before: send it again.
     Stale,
     /// The line was not understood.
     Invalid,
 }
 
 impl RequestResult {
-    /// What became of it, for people.
+    /// Text of the result.
     pub fn words(self) -> &'static str {
         match self {
             Self::Accepted => "accepted",
@@ -134,9 +134,9 @@ pub struct DiagnosticReport {
     pub code: u32,
     /// Name of the code.
     pub name: String,
-    /// In the unit of the code; `None` if it is not a finite number.
+    /// Value in the unit of the code; `None` if it is not finite.
     pub value: Option<f64>,
-    /// What the value is compared with.
+    /// Bound of the value.
     pub bound: Option<f64>,
     /// Leg or axis, from 1; 0 if it concerns neither.
     pub index: u32,
@@ -149,13 +149,13 @@ pub struct DiagnosticReport {
 pub struct AnswerLine {
     /// Version of the protocol.
     pub version: u32,
-    /// What became of the request.
+    /// Result of the request.
     pub result: RequestResult,
     /// The request; empty if the line was not understood.
     pub request: String,
     /// Name of the present state.
     pub state: String,
-    /// Of the refusal, else of the state.
+    /// Diagnostic of the refusal, else of the state.
     pub diagnostic: DiagnosticReport,
     /// The answer as a sentence.
     pub text: String,
@@ -176,7 +176,7 @@ impl AnswerLine {
         Self::named(result, request.name(), state, diagnostic, text)
     }
 
-    /// Answer to a request that is not the controller's.
+    /// Answer to a request that is not for the controller.
     pub fn named(
         result: RequestResult,
         request: &str,
@@ -201,7 +201,7 @@ impl AnswerLine {
         }
     }
 
-    /// The line with its end; of finite numbers only, so it cannot fail.
+    /// The line with its end. It has only finite numbers, so it cannot fail.
     pub fn to_line(&self) -> String {
         serde_json::to_string(self).unwrap_or_default() + "\n"
     }

@@ -1,4 +1,4 @@
-//! Requests to one daemon: the first that counts, of the service, of this user, of root.
+//! Requests to one daemon: the first that counts, in the order service, this user, root.
 
 use std::io;
 use std::thread::sleep;
@@ -17,8 +17,9 @@ const FIRST_LINE_LIMIT: Duration = Duration::from_secs(3);
 /// Longest wait of a patient request for a daemon that is about to start.
 const DAEMON_START_LIMIT: Duration = Duration::from_secs(2);
 
-/// Sends a request that does not stop, and waits for its outcome: the name of the state that it led to. `waits` receives why it waits,
-/// each reason once. A patient request also waits for a daemon that is about to start.
+/// Sends a request other than a stop, and waits for its result: the name of the resulting state. `waits`
+/// receives the reasons for waiting, each once. A patient request also waits for a daemon that is about to
+/// start.
 pub fn carry_out(
     machine: &str,
     order: &Order,
@@ -30,7 +31,7 @@ pub fn carry_out(
         let outcome = attempt(machine, order, interrupted, &mut waits);
         let limit = match &outcome {
             Err(OperatorError::NoDaemon(_)) if order.is_patient => DAEMON_START_LIMIT.min(order.timeout),
-            // Only what this command has just sent itself is not old.
+            // Repeats only while this command's own request is not too old.
             Err(OperatorError::Stale(..)) => Duration::from_nanos(MAX_REQUEST_AGE_NS),
             _ => return outcome,
         };
@@ -72,7 +73,7 @@ pub fn status_of(endpoint: &Endpoint) -> Result<AnswerLine, OperatorError> {
     })
 }
 
-/// Lets the daemon of a machine read its machine file again; returns what has changed, in words.
+/// Requests a reload of the machine file. Returns the changes as text.
 pub fn reload(machine: &str, timeout: Duration) -> Result<String, OperatorError> {
     let line = RequestLine { progress: true, ..RequestLine::new("reload") };
     let answer = ask_first(machine, |connection| {
@@ -87,7 +88,7 @@ pub fn reload(machine: &str, timeout: Duration) -> Result<String, OperatorError>
     }
 }
 
-/// The answer of the first daemon that counts, by `ask`, which sends a request over a connection.
+/// The answer of the first daemon that counts. `ask` sends a request over a connection.
 pub fn ask_first(
     machine: &str,
     mut ask: impl FnMut(&mut Connection) -> io::Result<Option<AnswerLine>>,
@@ -103,7 +104,7 @@ fn first_answer(
     for endpoint in endpoints(Some(machine)) {
         match ask(&endpoint) {
             Err(OperatorError::NoDaemon(_)) => {}
-            // Another one may admit this user, or count.
+            // Another daemon may admit this user, or count.
             Err(error @ (OperatorError::Forbidden { .. } | OperatorError::NotTrusted { .. })) => {
                 if matches!(failure, OperatorError::NoDaemon(_)) {
                     failure = error;
@@ -132,7 +133,7 @@ fn ask_at(
                     reason = "is it stopped, or its log blocked?".into();
                     break;
                 }
-                // Closed, as it does where too many connect.
+                // The daemon has closed it, as it does if too many clients connect.
                 Err(error) => reason = error.to_string(),
             },
             Ok(Attempt::Full) => sleep(RETRY_INTERVAL),

@@ -1,9 +1,11 @@
-//! Stopping by signal, where the control socket does not answer: SIGUSR1 is `estop`, SIGUSR2 `stop`.
+//! Stops by signal, used if the control socket does not answer: SIGUSR1 is `estop`, SIGUSR2 is `stop`.
 //!
-//! There is no signal for `off`; it becomes an emergency stop, which disables the forces just as fast and lasts until
-//! `clear`. Confirmed is what the daemon reports itself afterwards: over the socket, or by its status messages.
+//! There is no signal for `off`. It is sent as an emergency stop, which disables the forces equally fast and
+//! lasts until `clear`. A stop is confirmed if the daemon then reports its state: over the socket, or by its
+//! status messages.
 //!
-//! The signal goes to a process and not to its number, which another one may have by now: who handles no SIGUSR1 dies of it.
+//! The signal is sent to a process descriptor, not to a process ID, which may belong to another process by
+//! now. A process without a handler for SIGUSR1 would be killed.
 
 #![allow(unsafe_code, reason = "the system calls have no safe interface; each block carries its argument")]
 
@@ -23,10 +25,10 @@ use crate::messages::claim::start_time;
 use crate::messages::clock::monotonic_ns;
 use crate::messages::{Bus, StatusMessage, Subscriber};
 
-/// Longest wait for an emergency stop to be confirmed; a `stop` takes its time, the command's own limit.
+/// Longest wait for the confirmation of an emergency stop. For a `stop` it is the limit of the command.
 const CONFIRMATION_LIMIT: Duration = Duration::from_secs(2);
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
-/// Longest wait for one answer of the socket: it is asked again.
+/// Longest wait for one answer of the socket. After it the request is sent again.
 const SOCKET_LIMIT: Duration = Duration::from_millis(100);
 
 /// Signal that posts a request.
@@ -44,7 +46,7 @@ impl RequestSignal {
         if request == Request::Stop { Self::User2 } else { Self::User1 }
     }
 
-    /// Request that it posts in a daemon.
+    /// Request that the signal posts in a daemon.
     pub fn request(self) -> Request {
         match self {
             Self::User1 => Request::Estop,
@@ -52,7 +54,7 @@ impl RequestSignal {
         }
     }
 
-    /// Name for people and for `kill -s`.
+    /// Name for messages and for `kill -s`.
     pub fn name(self) -> &'static str {
         match self {
             Self::User1 => "USR1",
@@ -60,7 +62,7 @@ impl RequestSignal {
         }
     }
 
-    /// Number of the system.
+    /// Signal number.
     pub fn number(self) -> c_int {
         match self {
             Self::User1 => libc::SIGUSR1,
@@ -69,21 +71,21 @@ impl RequestSignal {
     }
 }
 
-/// A process, also when its number has become another's.
+/// A process by descriptor, which remains correct if its process ID is used again.
 pub(super) struct Process {
     pub id: u32,
     descriptor: OwnedFd,
 }
 
 impl Process {
-    /// The daemon of an endpoint: who listens there, else who has recorded itself there.
+    /// The daemon of an endpoint: the process that listens there, else the recorded one.
     pub fn of(endpoint: &Endpoint, connection: Option<&Connection>) -> Option<Self> {
         let listening =
             connection.and_then(|it| Some(Self { id: it.process_id()?, descriptor: it.process()? }));
         listening.or_else(|| {
             let recorded = endpoint.daemon.as_ref()?;
             let opened = Self { id: recorded.process_id, descriptor: open(recorded.process_id).ok()? };
-            // After it is opened: from now on it is this one.
+            // Checked after it is opened: from now on the descriptor refers to this process.
             (start_time(opened.id).ok()? == recorded.start_time).then_some(opened)
         })
     }
@@ -112,9 +114,9 @@ fn open(process_id: u32) -> io::Result<OwnedFd> {
     opened.map(|opened| unsafe { OwnedFd::from_raw_fd(opened) }).ok_or_else(io::Error::last_os_error)
 }
 
-/// What a daemon has reported after a signal.
+/// Result of a signal.
 pub(super) enum Signalled {
-    /// A state that the request leads to, and the way that led to it.
+    /// A state that the request leads to, and the way of confirmation.
     Confirmed {
         state: String,
         way: String,
@@ -122,11 +124,12 @@ pub(super) enum Signalled {
     Unconfirmed(String),
 }
 
-/// Sends a signal to the daemon and waits until the daemon reports that it is carried out.
+/// Sends a signal to the daemon, and waits until the daemon reports the result.
 pub(super) fn send(request: Request, endpoint: &Endpoint, process: &Process, timeout: Duration) -> Signalled {
     let (signal, socket) = (RequestSignal::of(request), endpoint.socket.display());
     let carried_out = signal.request();
-    // Before the signal. Another user's messages are not seen, but the socket may still answer.
+    // Joined before the signal is sent. Another user's messages are not visible, but the socket may still
+    // answer.
     let join = || Bus::join(&endpoint.machine).and_then(|bus| bus.subscriber::<StatusMessage>(8)).ok();
     let mut statuses = endpoint.is_own().then(join).flatten();
     let sent_ns = monotonic_ns();

@@ -1,8 +1,8 @@
-//! What a daemon answers to `status`, in the units of the messages.
+//! Answer of a daemon to `status`, in the units of the messages.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// State of the daemon and of everything it knows, in SI units and radians.
+/// State of the daemon, its machine and its topics, in SI units and radians.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatusReport {
     /// Version, commit and build profile of the daemon.
@@ -12,15 +12,15 @@ pub struct StatusReport {
     pub machine: String,
     /// Process of the daemon.
     pub process_id: u32,
-    /// What is wrong with the daemon's surroundings, with the remedy.
+    /// Problems of the host, each with its remedy.
     #[serde(default)]
     pub warnings: Vec<String>,
     /// The configuration in force.
     #[serde(default)]
     pub configuration: ConfigurationReport,
-    /// Time since the cycle that this describes \[s\]; `None` before the first.
+    /// Age of the described cycle \[s\]; `None` before the first.
     pub age_s: Option<f64>,
-    /// Names of the limits that the cycle has reached, or nearly.
+    /// Names of the limits that the cycle has reached or nearly reached.
     pub active_limits: Vec<String>,
     /// Rate and missed deadlines.
     pub timing: TimingReport,
@@ -92,7 +92,7 @@ pub struct LegReport {
     pub force_n: f64,
 }
 
-/// JSON has no number that is none.
+/// JSON has no NaN.
 fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Option::deserialize(deserializer).map(|number| number.unwrap_or(f64::NAN))
 }
@@ -106,7 +106,7 @@ pub struct SourceReport {
     pub age_s: Option<f64>,
     /// Processes that publish now.
     pub processes: Vec<ProcessReport>,
-    /// Why messages were rejected whatever they contain, with the remedy.
+    /// Reasons why messages were rejected independently of their content, with the remedy.
     #[serde(default)]
     pub rejected: Option<String>,
 }
@@ -116,11 +116,11 @@ pub struct SourceReport {
 pub struct ProcessReport {
     /// Number of the process.
     pub process_id: u32,
-    /// Its command, empty if it has ended.
+    /// Command of the process, empty if it has ended.
     pub command: String,
-    /// Its user, empty if it has ended.
+    /// User of the process, empty if it has ended.
     pub user: String,
-    /// Its messages arrive, and those of another process count.
+    /// Whether its messages are ignored, because those of another process count.
     #[serde(default)]
     pub is_ignored: bool,
 }

@@ -1,8 +1,9 @@
-//! Requests that stop: sent to every daemon that may be meant, and judged afterwards.
+//! Stop requests. They are sent to every possible daemon, and evaluated afterwards.
 //!
-//! A stop goes to all sockets of a machine at the same time, each with its own timeout, whoever listens there: that of the service is
-//! stopped even if another user's answers first. Success is the answer of a daemon that counts: of the service if it runs, else of this
-//! user, else of root. What others say is a remark.
+//! A stop goes to all sockets of a machine at the same time, each with its own timeout, independent of the
+//! listening process. So the service is stopped even if another user's daemon answers first. The result is
+//! the answer of a daemon that counts: of the service if it runs, else of this user, else of root. Answers of
+//! others become remarks.
 
 use std::thread::{self, ScopedJoinHandle, sleep};
 use std::time::{Duration, Instant};
@@ -14,44 +15,44 @@ use super::signal::{self, Process, Signalled};
 use super::users::user_name;
 use super::{ATTEMPTS, OperatorError, Order, RETRY_INTERVAL, Stranger};
 
-/// Longest wait for a connection and the first line of the daemon; then the stop goes by signal.
+/// Longest wait for a connection and the first line of the daemon. After it the stop is sent by signal.
 const FIRST_LINE_LIMIT: Duration = Duration::from_millis(500);
 
-/// Which machines are to stop.
+/// Machines to stop.
 #[derive(Clone, Copy, Debug)]
 pub enum Target<'a> {
-    /// The one of this name.
+    /// The machine of this name.
     Named(&'a str),
-    /// The only one that runs.
+    /// The only running machine.
     Only,
-    /// All of this host.
+    /// All machines of this host.
     All,
 }
 
-/// What became of a stop of one machine.
+/// Result of a stop of one machine.
 #[derive(Debug)]
 pub struct Stopped {
     /// Name of the machine.
     pub machine: String,
-    /// Name of the state that it led to, by the daemon that counts most.
+    /// Name of the resulting state, from the daemon of highest trust.
     pub result: Result<String, OperatorError>,
-    /// How it was confirmed, if not over the socket, and what other daemons of the machine said.
+    /// The way of confirmation, if not over the socket, and the answers of other daemons of the machine.
     pub remarks: Vec<String>,
 }
 
-/// What became of it at one endpoint.
+/// Result at one endpoint.
 enum Verdict {
-    /// Nobody listens.
+    /// No process listens.
     Absent,
     Forbidden,
-    /// It does not count.
+    /// The daemon does not count.
     NotTrusted(Stranger),
     Ended(Result<String, OperatorError>),
-    /// The same by signal, and how it was confirmed.
+    /// Done by signal, and the way of confirmation.
     BySignal(String, String),
 }
 
-/// Stops machines, and returns what became of it, by name. `interrupted` ends the wait, not the request.
+/// Stops machines. Returns the results by name. `interrupted` ends the wait, not the request.
 pub fn stop(
     target: Target<'_>,
     order: &Order,
@@ -80,7 +81,7 @@ pub fn stop(
     }
 }
 
-/// Stops the machine of a name: name of the state that it led to.
+/// Stops a machine by name. Returns the name of the resulting state.
 pub fn stop_machine(
     machine: &str,
     order: &Order,
@@ -95,7 +96,8 @@ fn verdicts(endpoints: &[Endpoint], order: &Order, interrupted: &(dyn Fn() -> bo
     thread::scope(|scope| {
         let begin = |endpoint| {
             let here = move || stop_at(endpoint, order, interrupted);
-            // Where the system has no more threads it is done in this one, after those that have one are under way.
+            // If the system has no more threads, the request is sent in this one, after the threads have
+            // begun.
             thread::Builder::new().spawn_scoped(scope, here).map_err(|_| here)
         };
         let begun: Vec<_> = endpoints.iter().map(begin).collect();
@@ -128,7 +130,8 @@ fn only_machine(endpoints: &[Endpoint]) -> Result<String, OperatorError> {
     }
 }
 
-/// Sends a stop to whoever listens at an endpoint; by signal if a daemon that counts does not answer.
+/// Sends a stop to the process that listens at an endpoint. Uses a signal if a daemon that counts does not
+/// answer.
 fn stop_at(endpoint: &Endpoint, order: &Order, interrupted: &(dyn Fn() -> bool + Sync)) -> Verdict {
     let until = Instant::now() + FIRST_LINE_LIMIT;
     let (mut last, mut closed) = (None, 0);
@@ -152,7 +155,7 @@ fn stop_at(endpoint: &Endpoint, order: &Order, interrupted: &(dyn Fn() -> bool +
                 last = Some(connection);
                 break;
             }
-            // Closed, as it does where too many connect.
+            // The daemon has closed it, as it does if too many clients connect.
             Err(_) => (last, closed) = (Some(connection), closed + 1),
         }
     }
@@ -185,7 +188,8 @@ fn not_trusted(endpoint: &Endpoint, order: &Order, connection: &mut Connection, 
     Verdict::NotTrusted(Stranger::at(endpoint, connection, &said))
 }
 
-/// What became of the stop of a machine, by the verdicts of its endpoints in their order; `None` if nobody listens.
+/// Result of the stop of a machine, from the verdicts of its endpoints in their order; `None` if no process
+/// listens.
 fn judge(machine: String, order: &Order, verdicts: Vec<(&Endpoint, Verdict)>) -> Option<Stopped> {
     let (mut decisive, mut lesser, mut remarks) = (None, None, vec![]);
     for (endpoint, verdict) in verdicts {
@@ -219,7 +223,7 @@ fn judge(machine: String, order: &Order, verdicts: Vec<(&Endpoint, Verdict)>) ->
         ));
     }
     if decisive.is_none() {
-        // The failure says it.
+        // The error already says it.
         remarks.clear();
     }
     let result = decisive.or(lesser.map(Err))?;

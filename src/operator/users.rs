@@ -1,11 +1,11 @@
-//! Users of daemons: whose answers count, and their names.
+//! Users of daemons: their names, and whether their answers count.
 
 use nix::unistd::{Gid, Group, Uid, User};
 
 use crate::messages::location::{system_user, user_id};
 
-/// Whether the answer of a daemon of this user counts: of root, of the service's user, or of this user. Any other user can write a
-/// program that answers like a daemon.
+/// Whether the answer of a daemon of this user counts: it must be root, the service's user, or this user. Any
+/// other user can write a program that answers like a daemon.
 pub fn is_trusted(owner: u32) -> bool {
     [Some(0), system_user(), Some(user_id())].contains(&Some(owner))
 }

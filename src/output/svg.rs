@@ -9,7 +9,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::io;
 use std::path::Path;
 
-/// Drawing units per pixel. The backend knows whole units only, and whole pixels would draw stairs.
+/// Drawing units per pixel. The backend draws in whole units; with whole pixels lines would have steps.
 pub const UNIT: i32 = 10;
 /// Width of every picture \[drawing units\], as all the lengths below.
 pub const WIDTH: i32 = 900 * UNIT;
@@ -146,8 +146,8 @@ pub fn draw_title(area: &Area, title: &str, size: i32) -> Result<(), DrawError> 
     Ok(())
 }
 
-/// Positions of the entries of a legend in lines across the picture, each the middle of the left edge of its sample;
-/// and the height of them all. The label stands `SAMPLE + MARGIN` to the right of that point.
+/// Positions of the entries of a legend in lines across the picture, and the height of all lines. A position is the
+/// middle of the left edge of the entry's sample. The label begins `SAMPLE + MARGIN` to the right of it.
 pub fn legend_rows<'a>(labels: impl Iterator<Item = &'a str>) -> (Vec<(i32, i32)>, i32) {
     let (mut left, mut y) = (2 * MARGIN, LEGEND_LINE / 2);
     let mut positions = vec![];

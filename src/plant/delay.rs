@@ -14,7 +14,7 @@ const MAX_QUEUED_COMMANDS: usize = 1024;
 /// Queue of commands as long as the dead time.
 #[derive(Clone, Debug, Default)]
 pub struct DeadTime {
-    /// Oldest first, with the time each stood or has yet to act \[ns\].
+    /// Commands, oldest first, each with the time for which it has yet to act \[ns\].
     line: Deque<(DriveCommand, u64), MAX_QUEUED_COMMANDS>,
 }
 
@@ -47,7 +47,7 @@ impl DeadTime {
         }
     }
 
-    /// A command that still stands makes its piece longer; so does a change that finds no room.
+    /// Appends a command. An unchanged command extends the last piece; so does a new one if the queue is full.
     fn push(&mut self, command: DriveCommand, duration_ns: u64) {
         let full = self.line.is_full();
         match self.line.back_mut() {

@@ -2,8 +2,8 @@
 //!
 //! Brakes are open exactly while a valid force is applied. Without one they close: every leg rate falls to
 //! zero in a straight line, all at the same instant, the fastest at the configured deceleration; the
-//! platform follows the legs, whatever its weight. Then it stands. A leg that reaches its end of stroke
-//! closes the brakes until the plant is started anew: on hardware an operator would inspect it first.
+//! platform follows the legs, whatever its weight. Then it is at rest. A leg that reaches its end of stroke
+//! closes the brakes until the plant is started again: on hardware an operator would inspect it first.
 //!
 //! Where legs are elastic a brake holds rod and drive alike: the deflection remains until the brake
 //! opens. A drive whose brake closes exerts no force.
@@ -39,9 +39,9 @@ pub enum Brakes {
         /// \[s\]
         duration: f64,
     },
-    /// The legs stand.
+    /// The legs are at rest.
     Closed,
-    /// The legs stand because one reached an end of its stroke.
+    /// The legs are at rest because one reached an end of its stroke.
     EndStop {
         /// Counted from 0.
         leg: usize,

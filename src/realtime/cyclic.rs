@@ -61,7 +61,7 @@ pub enum ReleaseMode {
     Hybrid,
     /// A measured message, signalled by the I/O thread.
     External,
-    /// A measured message and the setpoint of its instant, in simulated time, which stands still without messages.
+    /// A measured message and the setpoint of its instant, in simulated time, which does not advance without messages.
     Lockstep,
 }
 

@@ -14,7 +14,7 @@ pub fn wake(number: &AtomicU32) {
 /// Sleeps until [`wake`] or until `instant_ns` on CLOCK_MONOTONIC, and not at all unless `number` is `expected`.
 /// May end early, for a signal: the caller has to check its condition again.
 ///
-/// A function of its own, so that `tests/no_panic` can tell this system call from others.
+/// A separate function, so that `tests/no_panic` can distinguish this system call from others.
 #[inline(never)]
 pub fn wait(number: &AtomicU32, expected: u32, instant_ns: u64) {
     let instant = timespec(instant_ns);

@@ -5,7 +5,8 @@
 //!
 //! Nothing in it can panic either, which is proved, not measured: `tests/no_panic` follows every call and
 //! jump from the loop through the machine code of the release build, for every instruction set, and finds only
-//! time, arithmetic and the sleep. Where a package kept a check that the compiler could not remove, the code here is of another form: [`triple_buffer`], [`event`], the record queue of [`cyclic`].
+//! time, arithmetic and the sleep. [`triple_buffer`], [`event`] and the record queue of [`cyclic`] replace packages with
+//! checks that the compiler could not remove.
 #![allow(unsafe_code, reason = "system calls and the allocator; each block carries its argument")]
 
 pub mod allocation;

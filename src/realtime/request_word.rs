@@ -19,7 +19,7 @@ const TIME_MASK: u64 = (1 << TIME_BITS) - 1;
 #[derive(Debug, Default)]
 pub struct RequestWord {
     word: AtomicU64,
-    /// The last word that the real-time thread is known to have seen.
+    /// The last word that the real-time thread has certainly loaded.
     seen: AtomicU64,
     ticket: AtomicU8,
 }

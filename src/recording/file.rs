@@ -121,7 +121,7 @@ impl RecordingFile {
         self.write(self.channels.memory, due_ns, message.finish())
     }
 
-    /// Writes frames and joints of a cycle, as far as they are known.
+    /// Writes the frames of a cycle with a platform pose, and the joints of a cycle with a measurement.
     pub fn write_scene(&mut self, scene: &Scene, cycle: &CycleMessage) -> Result<(), RecordingError> {
         let time_ns = self.time_ns(cycle.due_ns);
         if let Some(platform) = cycle.output().and_then(|output| output.platform) {

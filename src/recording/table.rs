@@ -41,7 +41,7 @@ struct Columns {
 }
 
 impl Columns {
-    /// Leaves out what is the same in every cycle, not known per cycle, or twice in the messages.
+    /// Leaves out fields that are constant, not available per cycle, or contained twice in the messages.
     fn new() -> Self {
         let input = ["header", "reserved", "pose_valid", "x", "twist"];
         Self {

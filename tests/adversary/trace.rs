@@ -44,7 +44,9 @@ pub fn print(observed: &Observed, input: &Input, output: &Output, before: &mut E
         code => format!("{code:?} {:.3}", output.diagnostic.value),
     };
     println!(
-        "{:.5} {} {code} | true v {v:.4} omega {omega:.4} condition {condition:.1} sine {sine:.3} {} | force {force:.0} error {away:.1e} {away_rate:.1e} | reference {} | setpoint age {:.2?} ms, measured {:.2?} ms | limits {:?} {:?} | {}",
+        "{:.5} {} {code} | true v {v:.4} omega {omega:.4} condition {condition:.1} sine {sine:.3} {} \
+         | force {force:.0} error {away:.1e} {away_rate:.1e} | reference {} \
+         | setpoint age {:.2?} ms, measured {:.2?} ms | limits {:?} {:?} | {}",
         observed.time_s(),
         output.state.name(),
         if observed.simulator.brakes() == Brakes::Open { "" } else { "brakes" },

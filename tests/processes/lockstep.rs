@@ -183,12 +183,12 @@ fn in_lock_step_operators_are_heard_and_the_daemon_ends_at_rest() {
     let plant = Hexad::start::<&str>(&machine, "plant", &[]);
     let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "200"]);
     // Before that it checks the whole motion, and the daemon would engage onto home, where it has no setpoint yet.
-    source.says("the setpoints stand where the platform stands");
+    source.says("the setpoints hold the pose of the platform");
     operator::engage(&machine);
     operator::does(&machine, "stop", &[], &["standby"]);
     player_ended(source);
     let source = Hexad::start(&machine, "move", &["--motion", "sines", "--seconds", "200"]);
-    source.says("the setpoints stand where the platform stands");
+    source.says("the setpoints hold the pose of the platform");
     operator::engage(&machine);
     let ended = daemon.stops_on("TERM", HANG);
     assert!(!ended.stderr.contains("did not come to rest"), "{}", ended.stderr);

@@ -92,7 +92,7 @@ fn processes_that_wait_for_others_stop_as_well() {
     let daemon = start_daemon(&machine);
     daemon.says("off: no measurement");
     let setpoints = start_setpoints(&machine);
-    setpoints.says("waiting: the pose of the platform is not known: no measurement");
+    setpoints.says("waiting: the pose of the platform is unknown: no measurement");
     setpoints.interrupted_on("INT", SOON);
     daemon.stops_on("TERM", SOON);
     let report = fs::read_to_string(machine.path("report.json")).expect("the report");

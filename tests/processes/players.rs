@@ -38,7 +38,7 @@ fn a_move_takes_control_after_whatever_was_before_or_says_why_not() {
     let short = ["move", "--engage", "--motion", "sines", "--within", "1", "--config", &file];
     let Ended { status, stderr, .. } = run(&machine, &short);
     assert_eq!(status.code(), Some(1), "{stderr}");
-    let words = "hexad: not engaged within 1 s: the pose of the platform is not known: no measurement";
+    let words = "hexad: not engaged within 1 s: the pose of the platform is unknown: no measurement";
     assert!(stderr.contains(words), "{stderr}");
     let plant = start_plant(&machine);
     daemon.says("standby: no setpoint");
@@ -116,7 +116,7 @@ fn a_move_without_a_daemon_says_what_it_waits_for() {
     let setpoints = crate::support::trio::start_setpoints(&machine);
     setpoints.says("waiting: no status of a daemon");
     let daemon = start_daemon(&machine);
-    setpoints.says("waiting: the pose of the platform is not known: no measurement");
+    setpoints.says("waiting: the pose of the platform is unknown: no measurement");
     let plant = start_plant(&machine);
     setpoints.says("waiting for control (hexad engage)");
     setpoints.interrupted_on("INT", HANG);

@@ -190,7 +190,8 @@ fn certificate_a_goto_keeps_every_limit_and_is_almost_as_fast_as_possible() {
         let outcome = pairs.reduce(Outcome::default, Outcome::merge);
         let Outcome { reached, outside, ways, for_nothing, slowest, compared, leg_rate, largest } = outcome;
         println!(
-            "{name}: {reached} reached, {outside} targets and {ways} ways outside, {for_nothing} for nothing; {compared} compared, slowest {slowest:.3}, {leg_rate} by leg rate"
+            "{name}: {reached} reached, {outside} targets and {ways} ways outside, {for_nothing} for nothing; \
+             {compared} compared, slowest {slowest:.3}, {leg_rate} by leg rate"
         );
         println!("  {:.4?}", largest.0);
         for (quantity, bound) in super::limits::BOUNDS {

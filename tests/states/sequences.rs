@@ -67,7 +67,10 @@ fn stretch() -> impl Strategy<Value = Stretch> {
     let wrong = prop_oneof![
         12 => Just(Nothing),
         4 => Just(OtherSource),
-        8 => prop::sample::select(vec![NoSetpoint, NoMeasurement, NanSetpoint, NanMeasurement, OldSetpoint, OldMeasurement, FarSetpoint, FarMeasurement, DeadlineMissed, Held]),
+        8 => prop::sample::select(vec![
+            NoSetpoint, NoMeasurement, NanSetpoint, NanMeasurement, OldSetpoint, OldMeasurement,
+            FarSetpoint, FarMeasurement, DeadlineMissed, Held,
+        ]),
     ];
     (request, wrong, prop_oneof![1..4_u32, 1..150_u32]).prop_map(|(request, wrong, cycles)| Stretch {
         request,

@@ -108,7 +108,7 @@ static_assert(offsetof(struct hexad_header, time_ns) == 24, "time_ns");
 /* Desired motion of the platform: X = alpha, beta, gamma, x, y, z and its derivatives. */
 struct hexad_setpoint {
     struct hexad_header header; /* Schema version, publisher, sequence number and time stamp. */
-    uint64_t kind; /* 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and stand at. */
+    uint64_t kind; /* 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and hold. */
     double x[6]; /* X. [rad, m] */
     double x_rate[6]; /* X'. [rad/s, m/s] */
     double x_accel[6]; /* X''. [rad/s^2, m/s^2] */

@@ -24,13 +24,15 @@ use crate::output::text_table::{Left, Right, text_table};
 
 mod report;
 
-/// Motions that are timed: enough to be different ones, few enough to stay in the cache.
+/// Number of timed motions: enough to vary, few enough for the cache.
 const TIMED_MOTIONS: usize = 256;
 
-/// Batches timed per fidelity, one fidelity after the other, so that a disturbance of the computer affects all.
+/// Batches timed per fidelity. The fidelities alternate, so that a disturbance of the computer affects all of
+/// them.
 const TIMING_ROUNDS: usize = 101;
 
-/// Least share of time that a fidelity with more terms must save to be recommended instead; less is noise.
+/// Least share of time that a fidelity with more terms must save to be recommended. A smaller difference is
+/// noise.
 const MIN_TIME_SAVED: f64 = 0.1;
 
 #[derive(Debug, clap::Args)]
@@ -68,7 +70,7 @@ pub enum AdviseError {
 
 impl CommandError for AdviseError {}
 
-/// Evaluates the configured envelope, or a trajectory.
+/// Evaluates the configured envelope or a trajectory.
 fn advise(config: &Config, trajectory: Option<&Path>) -> Result<AdviceReport, AdviseError> {
     let model = InverseDynamics::new(&config.machine);
     let (scene, comparison, motions) = match trajectory {
@@ -97,7 +99,7 @@ fn advise(config: &Config, trajectory: Option<&Path>) -> Result<AdviceReport, Ad
     })
 }
 
-/// The fastest fidelity within the tolerance that a control loop can use.
+/// The fastest fidelity within the tolerance that is available in a control loop.
 fn choice(comparison: &FidelityComparison, times: &[f64; FIDELITY_COUNT], tolerance: f64) -> Fidelity {
     let time = |fidelity: Fidelity| {
         let times = Fidelity::ALL.into_iter().zip(times);

@@ -9,7 +9,7 @@ use crate::model::fidelity::Fidelity;
 use crate::output::numbers::{percent, plain_percent, significant};
 use crate::output::text_table::{Left, Right, text_table};
 
-/// Schema of the JSON, raised when a field changes its meaning or goes.
+/// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 pub const SCHEMA: u32 = 1;
 
 /// Result of `hexad advise`.
@@ -19,11 +19,11 @@ pub struct AdviceReport {
     pub machine: String,
     /// The set of motions, in lines of text.
     pub scene: String,
-    /// Motions that were evaluated, and those passed over.
+    /// Numbers of evaluated motions, and of skipped ones.
     pub evaluated: u64,
     pub outside_stroke: u64,
     pub singular: u64,
-    /// Largest force of a leg over all motions, and over those inside.
+    /// Largest force of a leg over all motions, and over the motions inside.
     pub peak_force_n: f64,
     pub peak_inside_n: f64,
     /// `actuator.max_force_n`.
@@ -55,7 +55,7 @@ fn by_name<S: serde::Serializer>(fidelity: &Fidelity, serializer: S) -> Result<S
 }
 
 impl FidelityRow {
-    /// Row of a fidelity; `peak` is that of the motions inside.
+    /// Row of a fidelity. `peak` is the largest force of the motions inside.
     pub fn new(error: &FidelityError, time_ns: f64, peak: f64, is_within_tolerance: bool) -> Self {
         let ratio = |error: f64| if error == 0.0 { 0.0 } else { error / peak };
         Self {

@@ -1,6 +1,6 @@
 //! Drawing of a machine at its home pose: from above, from the side, in perspective, and the strokes of its legs.
 //!
-//! Legs cross each other, and so do the outlines through the joints, where the joints are not in the order of the legs.
+//! Legs, and outlines through the joints, cross each other if the joints are not in the order of the legs.
 
 use nalgebra::{Vector2, Vector3};
 use plotters::prelude::*;
@@ -18,23 +18,23 @@ use crate::output::svg::{
 };
 
 const CELL_HEIGHT: i32 = 390 * UNIT;
-/// About as many ticks on an axis.
+/// Approximate number of ticks on an axis.
 const TICKS: f64 = 6.0;
 /// Empty border around a machine as a share of its extent.
 const BORDER: f64 = 0.06;
 /// Half the size of a joint with its number, and the size of the number \[pixels\].
 const RADIUS: i32 = 7 * UNIT;
 const NUMBER_SIZE: i32 = 11;
-/// Of the perspective view: distance of the eye from the machine in extents of the machine, and its direction: to the
-/// right, to the back, up.
+/// Perspective view: distance of the eye from the machine, in extents of the machine, and its direction: to
+/// the right, to the back, up.
 const EYE_DISTANCE: f64 = 3.0;
 const EYE: [f64; 3] = [0.45, -0.75, 0.5];
-/// Axes in the corner of that view.
+/// Length of the axes in the corner of the perspective view.
 const AXES_LENGTH: f64 = (26 * UNIT) as f64;
 
 /// Point of an area \[drawing units\].
 type Pixel = Vector2<f64>;
-/// Six joints.
+/// Centres of six joints.
 type JointCentres = [Vector3<f64>; LEGS];
 
 /// Writes the drawing as one SVG file, complete or not at all.
@@ -54,7 +54,7 @@ pub fn write_svg(path: &Path, name: &str, machine: &Machine) -> Result<(), Chart
     })
 }
 
-/// JointCentres on the base and on the platform at home, in base axes \[m\].
+/// Joint centres on the base and on the platform at home, in base axes \[m\].
 fn joints(machine: &Machine) -> [JointCentres; 2] {
     let pose = TaskState::at_rest(machine.home).motion().pose;
     let joints = &machine.joints;
@@ -62,7 +62,8 @@ fn joints(machine: &Machine) -> [JointCentres; 2] {
     [base, platform.map(|joint| pose.position + pose.rotation * joint)]
 }
 
-/// Right-handed axes along those of the base: two horizontal ones and the one against gravity; without gravity z is up.
+/// Right-handed axes along axes of the base: two horizontal ones, and one against gravity. Without gravity z
+/// is up.
 fn axes(gravity: &Vector3<f64>) -> [Vector3<f64>; 3] {
     let vertical = if gravity.norm() > 0.0 { gravity.iamax() } else { 2 };
     let unit = |axis: usize| Vector3::ith(axis % 3, 1.0);
@@ -75,9 +76,9 @@ struct View {
     title: &'static str,
     /// Right-handed axes of the page, the third towards the eye, in base axes.
     page: [Vector3<f64>; 3],
-    /// Point at which a length is seen as it is.
+    /// Point at which lengths are drawn to scale.
     center: Vector3<f64>,
-    /// From the center \[m\]; infinite for a parallel projection.
+    /// Distance of the eye from the center \[m\]; infinite for a parallel projection.
     eye_distance: f64,
 }
 
@@ -213,7 +214,8 @@ fn draw_outline(area: &Area, joints: &[Pixel; LEGS], opacity: f64) -> Result<(),
     area.draw(&PathElement::new(corners, rgb(GRID).stroke_width(12)))
 }
 
-/// Draws the joints with the numbers of their legs. Where joints would hide each other, they move along their legs.
+/// Draws the joints with the numbers of their legs. Joints that would hide each other are moved along their
+/// legs.
 fn draw_joints(area: &Area, base: &[Pixel; LEGS], platform: &[Pixel; LEGS]) -> Result<(), DrawError> {
     let mut drawn: Vec<Pixel> = vec![];
     for (ends, others, is_base) in [(base, platform, true), (platform, base, false)] {

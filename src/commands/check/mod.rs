@@ -1,5 +1,5 @@
-//! `hexad check`: whether a machine can be run with its file, and the machine at home in numbers that an engineer can compare with
-//! the drawing.
+//! `hexad check`: whether a machine can be run with its file, and numbers of the machine at home that an
+//! engineer can compare with the drawing.
 
 use std::path::PathBuf;
 
@@ -29,7 +29,7 @@ impl CheckArguments {
         let config = self.machine.load()?;
         let examination = config.examine();
         let report = CheckReport::new(&config, &examination);
-        // First the figures: they are of use where no file can be written.
+        // The numbers first: they are useful even if no file can be written.
         if self.json {
             print_json(&report)?
         } else {

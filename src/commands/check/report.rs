@@ -1,4 +1,4 @@
-//! What `hexad check` finds: one struct for the text and for `--json`.
+//! Result of `hexad check`: one struct for the text and for `--json`.
 
 use serde::Serialize;
 
@@ -16,7 +16,7 @@ use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::kinematic_state::KinematicState;
 use crate::model::task::TaskState;
 
-/// Schema of the JSON, raised when a field changes its meaning or goes.
+/// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;
 
 /// Findings, and the machine at home, at rest. Numbers that do not exist are null in JSON.
@@ -34,26 +34,26 @@ pub struct CheckReport {
     /// `limits.condition`.
     pub condition_limit: f64,
     pub rate_hz: f64,
-    /// Largest motion from one measurement to the next for which the pose is certain.
+    /// Largest motion between two measurements for which the pose is certain.
     pub certain_step_m: f64,
     pub certain_step_rad: f64,
     /// Other poses with the same lengths, and the nearest.
     pub other_poses: usize,
     pub nearest_pose: Option<OtherPose>,
-    /// Limits of the file's defaults that are less than usual, as the drives cannot give more.
+    /// Default limits that are less than usual, because the drives cannot give more.
     pub derived_limits: Vec<DerivedLimit>,
     pub control_mode: &'static str,
     pub estimator_hz: f64,
     pub compensates_disturbances: bool,
-    /// Changes of what acts on the platform that are no fault; null if any is allowed.
+    /// Largest changes of payload and disturbance that are no fault; null if any is allowed.
     pub payload_change_kg: f64,
     pub disturbance_step_m_s2: f64,
-    /// Slowest and fastest mode of legs that are controlled each by itself.
+    /// Slowest and fastest mode of legs with separate control.
     pub leg_modes_hz: Option<[f64; 2]>,
     pub loops: Vec<LoopMargins>,
     /// Largest age of measurements with which the loops are stable.
     pub stable_age_s: f64,
-    /// Largest pole of the platform under held forces within `condition_limit`.
+    /// Largest pole of the platform under constant forces within `condition_limit`.
     pub held_pole_per_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The result of `hexad check` as text.
+//! Text of the result of `hexad check`.
 
 use core::f64::consts::LN_2;
 use core::fmt;
@@ -71,7 +71,7 @@ impl CheckReport {
         )
     }
 
-    /// Writes within which bounds start-up and the loop know the pose.
+    /// Writes the bounds within which the pose is unique, from cycle to cycle and at start-up.
     fn fmt_modes(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,

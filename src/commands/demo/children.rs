@@ -1,4 +1,4 @@
-//! Child processes of a demonstration, which end with it at the latest.
+//! Child processes of a demonstration. They end with it at the latest.
 
 use core::time::Duration;
 use std::ffi::OsStr;
@@ -11,10 +11,10 @@ use crate::commands::log::{FILTER_VARIABLES, FORMAT_VARIABLE, format_name};
 use crate::daemon::CONFIGURATION_LOG;
 use crate::realtime::process::terminate;
 
-/// Environment variable with the process number of the parent: a child stops when that process dies.
+/// Environment variable with the process ID of the parent. A child stops when that process dies.
 pub const PARENT_VARIABLE: &str = "HEXAD_PARENT";
 
-/// Time for a process to stop in order before it is killed.
+/// Time in which a process must stop before it is killed.
 const STOP_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Running child process, killed when dropped.
@@ -31,7 +31,8 @@ impl ChildProcess {
     ) -> io::Result<Self> {
         let mut command = Command::new(env::current_exe()?);
         if FILTER_VARIABLES.iter().all(|name| env::var_os(name).is_none()) {
-            // Those about the configuration are of the copy; the demonstration itself shows those of the file.
+            // Warnings about the configuration concern a copy. The demonstration itself shows those of the
+            // original file.
             command.env("HEXAD_LOG", format!("warn,{CONFIGURATION_LOG}=error"));
         }
         let child = command
@@ -49,7 +50,7 @@ impl ChildProcess {
         self.child.try_wait()
     }
 
-    /// Stops the process in order and waits for its end; kills it if it does not end in time.
+    /// Stops the process and waits for its end. Kills it if it does not end in time.
     pub fn stop(mut self) -> io::Result<ExitStatus> {
         if self.exit_status()?.is_none() {
             terminate(self.child.id());
@@ -69,7 +70,7 @@ impl ChildProcess {
 
 impl Drop for ChildProcess {
     fn drop(&mut self) {
-        // Both fail only if the process has ended already.
+        // Both calls fail only if the process has ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -34,7 +34,7 @@ mod pictures;
 mod recording;
 mod summary;
 
-/// Interval between two polls of the topics, in which they fill by a fraction at 20 kHz.
+/// Interval between two polls of the topics. At 20 kHz they fill only by a fraction in it.
 const POLL_INTERVAL: Duration = Duration::from_millis(3);
 
 /// Timeouts of a demonstration \[ms\]: four times the longest pause seen on a busy virtual machine.
@@ -123,7 +123,7 @@ fn run(demo: &DemoArguments, stop: &Stop) -> Result<(), DemoError> {
     let stage = Stage::new(demo)?;
     fs::create_dir_all(&demo.charts).map_err(FileError::on(&demo.charts))?;
     let performed = stage.perform(demo, stop);
-    // A demonstration that failed is worth a look, too.
+    // The page of a failed demonstration is useful, too.
     let page = stage.write_page(&demo.charts);
     let recording = performed.inspect_err(|_| {
         if let Ok(page) = &page {
@@ -173,11 +173,11 @@ struct Stage {
 }
 
 impl Stage {
-    /// Copies the configurations under a name of their own, so that a demonstration never meets a daemon
-    /// in service, nor another demonstration.
+    /// Copies the configurations under a unique name, so that a demonstration never meets a daemon in
+    /// service, nor another demonstration.
     fn new(demo: &DemoArguments) -> Result<Self, DemoError> {
         let (text, place) = read(demo.machine.path())?;
-        // Error texts about the user's files show the names of those files.
+        // Parsed first under its own name, which errors then show.
         let original = Config::parse(&text, &place)?;
         for warning in original.examine().into_result(&original)? {
             warn!("{warning}");
@@ -229,8 +229,8 @@ impl Stage {
         let mut processes = vec![plant, daemon, setpoints];
         let operator = Operator::new(&bus)?;
         let watched = watch(&mut processes, &mut recorder, operator, demo.seconds, stop);
-        // In reverse order of their start: the setpoint source has ended, the daemon publishes that no force is
-        // valid, the plant brakes.
+        // In reverse order of their start: the setpoint source has ended, the daemon publishes that no force
+        // is valid, the plant brakes.
         for process in processes.drain(..).rev() {
             let name = process.name;
             let status = process.stop()?;
@@ -242,8 +242,8 @@ impl Stage {
         watched.map(|()| recorder.finish())
     }
 
-    /// Gives the recording its name, in place of that of the demonstration before, and writes its page; returns the path of
-    /// the page.
+    /// Gives the recording its final name, replacing that of the last demonstration, and writes its page.
+    /// Returns the path of the page.
     fn write_page(&self, folder: &Path) -> Result<PathBuf, DemoError> {
         let (recording, page) = (folder.join(RECORDING), folder.join(PAGE));
         let name = format!("{}.", self.config.name);
@@ -262,7 +262,7 @@ impl Drop for Stage {
     }
 }
 
-/// Engages, and records until the setpoint source, the last of the processes, has ended well.
+/// Engages, and records until the setpoint source, the last of the processes, has ended without error.
 fn watch(
     processes: &mut [ChildProcess],
     recorder: &mut TopicRecorder,
@@ -311,8 +311,8 @@ fn read(path: Option<&Path>) -> Result<(String, String), ConfigError> {
 
 /// The configuration under another name and rate. The text has been parsed before.
 ///
-/// A desktop takes the processor away for tens of milliseconds now and then. That is no fault of the loop,
-/// so where the file sets no timeouts those of a demonstration are longer than those of a deployment, and than its loop stands.
+/// A desktop sometimes preempts a process for tens of milliseconds. That is no fault of the loop. If the file sets no
+/// timeouts, the demonstration uses longer ones than a deployment, longer even than the age at which its loop is stable.
 fn adapted(text: &str, name: &str, rate_hz: Option<f64>) -> String {
     let mut table: toml::Table = toml::from_str(text).unwrap_or_default();
     table.insert("name".into(), name.into());

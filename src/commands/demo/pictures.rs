@@ -17,7 +17,7 @@ use crate::output::svg::ChartError;
 /// Values of six coordinates over time.
 type Lines = [Vec<(f64, f64)>; LEGS];
 
-/// Writes every picture into a folder; returns their names.
+/// Writes every picture into a folder. Returns the names of the files.
 pub fn write_all(
     folder: &Path,
     name: &str,
@@ -73,7 +73,7 @@ pub fn write_all(
     Ok(written)
 }
 
-/// Writes the forces with the difference of applied and commanded ones, and the tracking error.
+/// Writes the forces with the difference between applied and commanded forces, and the tracking error.
 fn write_forces_and_errors(
     Signals { commanded, measured, force_difference, tracking }: &Signals,
     write: &mut impl FnMut(&'static str, &str, &[Panel]) -> Result<(), ChartError>,
@@ -116,10 +116,10 @@ fn panel<'a>(
 ) -> Panel<'a> {
     let count = which.len();
     let curves = || names.iter().zip(measured.iter().zip(commanded));
-    // Colours count from the first curve of the panel, so that an axis has one colour in all panels.
+    // Colours count from the first curve of the panel, so an axis has the same colour in all panels.
     let rows = || curves().skip(which.start).take(count).enumerate();
     let solid = rows().map(|(k, (name, (lines, _)))| line(name, lines, LineStyle::Solid, k));
-    // One word in the legend for all dashed lines.
+    // One entry of the legend for all dashed lines.
     let dashed = rows().map(|(k, (_, (_, lines)))| {
         line(if k + 1 == count { "commanded" } else { "" }, lines, LineStyle::Dashed, k)
     });
@@ -135,13 +135,13 @@ fn line<'a>(label: &'a str, points: &'a [(f64, f64)], style: LineStyle, color: u
 struct Signals {
     commanded: Curves,
     measured: Curves,
-    /// Applied minus commanded, at the instants of the applied ones \[N\].
+    /// Applied minus commanded force, at the instants of the applied force \[N\].
     force_difference: Lines,
     /// Norms: position \[um\], orientation \[urad\].
     tracking: [Vec<(f64, f64)>; 2],
 }
 
-/// One side, commanded or measured. Angles in degrees.
+/// Curves of the commanded or the measured values. Angles in degrees.
 #[derive(Default)]
 struct Curves {
     x: Lines,
@@ -174,7 +174,7 @@ impl Signals {
             push(&mut commanded.accel, t, legs.accel);
             push(&mut commanded.force, t, model.forces::<Exact>(&motion).unwrap_or([f64::NAN; LEGS]));
         }
-        // Before the first setpoint there is nothing to compare with.
+        // Before the first setpoint there are no commanded values.
         let in_range = recording.measured.iter().filter(|message| message.header.time_ns >= start_ns);
         for message in in_range.clone() {
             let t = seconds(message.header.time_ns);
@@ -183,7 +183,7 @@ impl Signals {
             push(&mut measured.length, t, message.length_m);
             push(&mut measured.rate, t, message.length_rate_m_s);
         }
-        // Nobody measures accelerations: differences of the rates, over two samples.
+        // Accelerations are not measured. They are differences of the rates, over two samples.
         for (before, after) in in_range.clone().zip(in_range.skip(2)) {
             let (t0, t1) = (seconds(before.header.time_ns), seconds(after.header.time_ns));
             let difference = |a: [f64; 6], b: [f64; 6]| -> [f64; 6] {
@@ -219,7 +219,7 @@ fn push(lines: &mut Lines, t: f64, values: [f64; 6]) {
     }
 }
 
-/// The angular half in degrees.
+/// Converts the angular half to degrees.
 fn degrees([a, b, c, x, y, z]: [f64; 6]) -> [f64; 6] {
     [a.to_degrees(), b.to_degrees(), c.to_degrees(), x, y, z]
 }

@@ -8,7 +8,7 @@ use crate::messages::{ForceMessage, MeasuredMessage, SetpointMessage};
 use crate::model::rigid::{Motion, Pose};
 use crate::model::task::TaskState;
 
-/// Messages kept between two polls: all that the topic can hold.
+/// Messages kept between two polls: the full capacity of the topic.
 const TOPIC_DEPTH: usize = usize::MAX;
 
 /// Subscriber to setpoints, measurements and forces, which keeps every message.
@@ -45,7 +45,7 @@ impl TopicRecorder {
         self.recording.forces.extend(core::iter::from_fn(|| self.forces.receive()));
     }
 
-    /// The recording, with the messages that have arrived last.
+    /// The recording, including the last messages.
     pub fn finish(mut self) -> Recording {
         self.poll();
         self.recording
@@ -58,7 +58,7 @@ impl Recording {
         self.setpoints.first().map_or(0, |message| message.header.time_ns)
     }
 
-    /// Measurements with the desired motion at their instant, while setpoints cover it.
+    /// Measurements with the desired motion at their instant, as far as setpoints cover it.
     pub fn pairs(&self) -> impl Iterator<Item = (&MeasuredMessage, TaskState)> {
         with_desired(&self.setpoints, &self.measured, |message| message.header.time_ns)
     }
@@ -84,7 +84,7 @@ impl Recording {
     }
 }
 
-/// Messages with the desired motion at an instant of each, while setpoints cover it.
+/// Messages with the desired motion at an instant of each, as far as setpoints cover it.
 fn with_desired<'a, T>(
     setpoints: &'a [SetpointMessage],
     messages: &'a [T],
@@ -98,7 +98,7 @@ fn with_desired<'a, T>(
         }
         let setpoint = setpoints.get(newest)?;
         let age_s = seconds_between(setpoint.header.time_ns, time_ns);
-        // A source that paused longer than this was not a source at that instant.
+        // After a longer pause the source counts as absent at that instant.
         (0.0..0.1).contains(&age_s).then(|| (message, Setpoint::from(setpoint).task.after(age_s)))
     })
 }

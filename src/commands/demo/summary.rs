@@ -6,7 +6,7 @@ use crate::daemon::report::Report;
 use crate::messages::{Times, WorstCycle};
 use crate::output::text_table::{Left, Right, text_table};
 
-/// Tracking, timing and faults of a run; displays as text.
+/// Tracking, timing and faults of a run. Displays as text.
 pub struct Summary<'a> {
     pub title: &'a str,
     pub report: &'a Report,
@@ -76,7 +76,7 @@ impl Summary<'_> {
     }
 }
 
-/// A slow cycle, and the events around it that may have made it slow.
+/// A slow cycle, and the events around it that may have delayed it.
 fn described(worst: &WorstCycle) -> String {
     let WorstCycle {
         cycle, wakeup_ns, compute_ns, io_late, involuntary_switches, page_faults, steal_ms, ..

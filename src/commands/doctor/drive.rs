@@ -15,12 +15,13 @@ use crate::output::files::{print, print_json, write_json};
 use crate::recording::Item;
 use crate::recording::reader::Recording;
 
-/// Twice the standard deviation up to which a delay is determined, as a ratio of it and \[s\]: half a millisecond more or less costs the loop
+/// Largest double standard deviation of a determined delay, as a ratio of the delay and \[s\]. Half a
+/// millisecond more or less hardly affects the loop.
 /// next to nothing.
 const MAX_UNCERTAINTY_RATIO: f64 = 0.1;
 const MAX_UNCERTAINTY_S: f64 = 5e-4;
 
-/// Why there is no delay.
+/// Reason why no delay is determined.
 #[derive(Debug, thiserror::Error)]
 enum DriveError {
     #[error(
@@ -52,7 +53,7 @@ struct Report {
     duration_s: f64,
 }
 
-/// Measures the delay, and prints it or writes it as JSON.
+/// Measures the delay, and prints it as text or writes it as JSON.
 pub fn run(recordings: &[PathBuf], json: bool, report: Option<&PathBuf>) -> Result<(), Failure> {
     let (mut stretches, mut config): (_, Option<Config>) = (vec![], None);
     for path in recordings {
@@ -121,7 +122,7 @@ fn text(config: &Config, DriveDelay { mean, legs, duration_s }: &DriveDelay) -> 
     text
 }
 
-/// Collects cycles under control.
+/// Reader that collects cycles under control.
 #[derive(Default)]
 struct StretchReader {
     stretches: Vec<RecordedStretch>,

@@ -1,22 +1,22 @@
-//! Files in which the kernel describes the host, read under a root that a test can replace.
+//! Kernel files that describe the host, read under a root that a test can replace.
 
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Root of the file system that describes a host: `/proc`, `/sys`, `/boot`.
+/// Root of the files that describe a host: `/proc`, `/sys`, `/boot`.
 #[derive(Clone, Debug)]
 pub struct HostFiles {
     root: PathBuf,
 }
 
 impl HostFiles {
-    /// Files of the host under this root; `/` is this host.
+    /// Files of the host under a root; `/` is this host.
     pub fn under(root: &Path) -> Self {
         Self { root: root.into() }
     }
 
-    /// Text of a file without the blanks around it, or the reason why it cannot be read.
+    /// Text of a file without surrounding blanks, or the reason why it cannot be read.
     pub fn text(&self, path: &str) -> Result<String, String> {
         match fs::read_to_string(self.root.join(path)) {
             Ok(text) => Ok(text.trim().into()),
@@ -31,7 +31,7 @@ impl HostFiles {
         text.parse().map_err(|_| format!("/{path} is {text:?} and no number"))
     }
 
-    /// Names in a folder that are numbers: processes, threads, interrupts. Empty if it cannot be read.
+    /// Numeric names in a folder: processes, threads, interrupts. Empty if it cannot be read.
     pub fn numbered(&self, folder: &str) -> Vec<u32> {
         let entries = fs::read_dir(self.root.join(folder)).into_iter().flatten().flatten();
         let mut numbers: Vec<_> =

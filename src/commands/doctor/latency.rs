@@ -1,6 +1,7 @@
-//! Wake-up latency of a thread that is set up and waits like the daemon's real-time thread, at several rates.
+//! Wake-up latency, at several rates, of a thread that is set up and waits like the daemon's real-time
+//! thread.
 //!
-//! Nothing is computed between two wake-ups, and no I/O thread runs beside it: this is the latency that the
+//! Between two wake-ups the thread computes nothing, and no I/O thread runs. So this is the latency that the
 //! host adds to any loop.
 
 use core::time::Duration;
@@ -25,20 +26,20 @@ use crate::realtime::stop_request::Stop;
 use crate::realtime::usage::ThreadUsage;
 use crate::realtime::waiter::Waiter;
 
-/// Rates measured beside the configured one, from slow drives to fast ones.
+/// Rates measured in addition to the configured one, for slow and fast drives.
 const RATES_HZ: [f64; 5] = [250.0, 1000.0, 4000.0, 10_000.0, 20_000.0];
 
-/// Duration of the configured rate and release mode, as a multiple of the duration of every other.
+/// Duration for the configured rate and release mode, as a multiple of the duration for each other one.
 const CONFIGURED_WEIGHT: f64 = 4.0;
 
 /// Interval between two updates of the progress bar.
 const BAR_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Unit of `/proc/stat`: `USER_HZ` is 100 on every Linux that matters \[ms\].
+/// Unit of `/proc/stat` \[ms\]: `USER_HZ` is 100 on every Linux in use.
 const TICK_MS: u64 = 10;
 
-/// Release mode that the doctor measures for a configured one: without the drives it cannot measure a release by their
-/// messages, and measures the sleep instead.
+/// Release mode that the doctor measures for a configured one. Without the drives it cannot measure a release
+/// by their messages, so it measures the sleep instead.
 pub fn measured_mode(configured: ReleaseMode) -> ReleaseMode {
     if configured == ReleaseMode::Hybrid { ReleaseMode::Hybrid } else { ReleaseMode::Sleep }
 }
@@ -48,16 +49,17 @@ pub fn measured_mode(configured: ReleaseMode) -> ReleaseMode {
 pub struct Latency {
     pub rate_hz: f64,
     pub release: ReleaseMode,
-    /// Time from a release to the thread running.
+    /// Time from a release until the thread runs.
     pub wakeup_ns: Times,
-    /// Delay above which a wake-up counts as late.
+    /// Delay beyond which a wake-up counts as late.
     pub late_wakeup_ns: u64,
     pub late_wakeups: u64,
-    /// Releases that had passed when the thread woke for the one before them.
+    /// Releases that had passed when the thread woke for the previous one.
     pub missed: u64,
     /// Final spin before a release; 0 for sleep.
     pub lead_ns: u64,
-    /// Time that the host of a virtual machine took meanwhile, of the thread's processor or of all.
+    /// Time that the host of a virtual machine took during the measurement, from the thread's processor or
+    /// from all.
     pub stolen_ms: Option<u64>,
     pub thread: ThreadUsage,
 }
@@ -77,12 +79,12 @@ impl Latency {
 /// A rate and release mode to measure.
 #[derive(Clone, Debug)]
 struct Plan {
-    /// The configured deployment with this rate and release mode.
+    /// The configured deployment, with this rate and release mode.
     deployment: Deployment,
     seconds: f64,
 }
 
-/// Measures all rates within `seconds`; `None` if stopped before the end.
+/// Measures all rates within `seconds`. `None` if stopped before the end.
 pub fn measure_all(
     host: &HostFiles,
     deployment: &Deployment,
@@ -128,7 +130,7 @@ fn plans(deployment: &Deployment, seconds: f64) -> Vec<Plan> {
     rates.into_iter().flat_map(plan).collect()
 }
 
-/// The configured section at another rate, with the durations that half a period bounds.
+/// The configured section at another rate. Durations that are bounded by half a period are adapted.
 fn at(configured: &Realtime, rate_hz: f64) -> Realtime {
     let half_s = 0.5 / rate_hz;
     Realtime {
@@ -139,7 +141,7 @@ fn at(configured: &Realtime, rate_hz: f64) -> Realtime {
     }
 }
 
-/// Measures on a thread of its own and calls `update_bar` meanwhile.
+/// Measures in a separate thread, and calls `update_bar` meanwhile.
 fn measure(plan: &Plan, update_bar: impl Fn(), stop: &Stop) -> io::Result<Latency> {
     scope(|threads| {
         let (done, result) = channel();
@@ -160,7 +162,7 @@ fn measure(plan: &Plan, update_bar: impl Fn(), stop: &Stop) -> io::Result<Latenc
 fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
     let Plan { deployment, seconds } = plan;
     let mut histogram = TimeHistogram::default();
-    // Its shortfalls have been printed before: every thread of this process has the same.
+    // Its shortfalls were printed before, because all threads of this process have the same.
     prepare_loop(&deployment.realtime, || {
         histogram.record(monotonic_ns());
         histogram.clear();
@@ -178,7 +180,7 @@ fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
         histogram.record(wakeup_ns);
         late_wakeups += u64::from(wakeup_ns > late_wakeup_ns);
         let next_ns = grid.next_after(woke_ns);
-        // A pause over the end does not count beyond it.
+        // A pause beyond the end counts only up to the end.
         missed += (next_ns.min(end_ns) - release_ns).div_ceil(period_ns) - 1;
         release_ns = next_ns;
     }
@@ -195,7 +197,7 @@ fn measure_here(plan: &Plan, stop: &Stop) -> Latency {
     }
 }
 
-/// Processor time that the host of a virtual machine took since boot; `None` where the kernel does not count it.
+/// Processor time that the host of a virtual machine took since boot; `None` if the kernel does not count it.
 fn stolen_ms(host: &HostFiles, cpu: Option<usize>) -> Option<u64> {
     let name = cpu.map_or_else(|| "cpu".into(), |cpu| format!("cpu{cpu}"));
     let stat = host.text("proc/stat").ok()?;

@@ -1,9 +1,9 @@
-//! `hexad doctor`: what this host offers to a hard real-time loop, how late it wakes a thread, and which
-//! rates that allows.
+//! `hexad doctor`: facts about this host for a hard real-time loop, its wake-up latency, and the rates that
+//! it allows.
 //!
 //! `hexad doctor --drive` measures the delay of the drives in recordings of a motion.
 //!
-//! The doctor requests rights as the daemon does, and measures a thread that is set up and waits like the daemon's.
+//! The doctor requests the daemon's rights, and measures a thread that is set up and waits like the daemon's.
 
 use std::path::{Path, PathBuf};
 use std::{io, thread};
@@ -40,7 +40,7 @@ mod running;
 mod text;
 pub mod verdict;
 
-/// Schema of the JSON, raised when a field changes its meaning or goes.
+/// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 const SCHEMA: u32 = 1;
 
 #[derive(Debug, Args)]
@@ -76,7 +76,7 @@ impl DoctorArguments {
     }
 }
 
-/// Error that prevents a diagnosis, or a diagnosis that the configured rate is impossible.
+/// Error that prevents a diagnosis, or the diagnosis that the configured rate is impossible.
 #[derive(Debug, thiserror::Error)]
 pub enum DoctorError {
     #[error(transparent)]
@@ -113,7 +113,7 @@ pub struct Diagnosis {
     #[serde(default)]
     pub schema: u32,
     pub name: String,
-    /// Configured rate, and the release mode that was measured for it.
+    /// Configured rate, and the release mode measured for it.
     pub rate_hz: f64,
     pub release: ReleaseMode,
     /// CPU of the real-time thread; `None` if the scheduler decides.
@@ -169,7 +169,7 @@ fn run(doctor: &DoctorArguments, stop: &Stop) -> Result<(), DoctorError> {
     }
 }
 
-/// Prints the rates, or all as JSON, and writes the report.
+/// Prints the rates as text, or the whole diagnosis as JSON, and writes the report.
 fn show(doctor: &DoctorArguments, style: &TextStyle, diagnosis: &Diagnosis) -> Result<(), FileError> {
     if doctor.json {
         print_json(diagnosis)?;
@@ -181,7 +181,7 @@ fn show(doctor: &DoctorArguments, style: &TextStyle, diagnosis: &Diagnosis) -> R
     if doctor.json { Ok(()) } else { print(format_args!("report  {}\n", path.display())) }
 }
 
-/// The configured section, with the CPU of the command line if there is one.
+/// The configured section, with the CPU of the command line if given.
 fn with_cpu(
     configured: &Realtime,
     cpu: Option<usize>,
@@ -197,8 +197,8 @@ fn with_cpu(
     }
 }
 
-/// Requests all rights that the daemon requests, those of a thread on a thread that then ends. Granted rights of the
-/// process last until it ends, or the result is dropped.
+/// Requests all rights that the daemon requests. The rights of a thread are requested on a separate thread, which then
+/// ends. Rights of the process last until it ends, or until the result is dropped.
 fn request_rights(realtime: &Realtime) -> Result<(RefusedRights, Option<PmQosRequest>), DoctorError> {
     let thread = thread::scope(|threads| {
         let thread = thread::Builder::new().spawn_scoped(threads, || prepare_loop(realtime, || ()))?;
@@ -212,7 +212,7 @@ fn request_rights(realtime: &Realtime) -> Result<(RefusedRights, Option<PmQosReq
     Ok((RefusedRights { thread, idle_bound: refused_bound, locked_memory }, idle_bound))
 }
 
-/// Reason for which the daemon would not start.
+/// Reason why the daemon would not start.
 fn refusal(realtime: &Realtime, refused: &RefusedRights) -> Option<String> {
     let refused: Vec<_> = refused.all().map(|shortfall| shortfall.what.as_str()).collect();
     (realtime.require_realtime && !refused.is_empty()).then(|| {

@@ -1,10 +1,10 @@
-//! Controllers that already run on this host, which a measurement would delay.
+//! Controllers that run on this host, which a measurement would delay.
 
 use super::files::HostFiles;
 use crate::daemon::REALTIME_THREAD;
 use crate::realtime::setup::cpus::Cpus;
 
-/// Processes with a real-time thread of the daemon that may run on this processor, or on any if none is chosen.
+/// Processes with a real-time thread of the daemon that may run on a processor, or on any if `cpu` is `None`.
 pub fn controllers(host: &HostFiles, cpu: Option<usize>) -> Vec<u32> {
     let controls = |process: &u32| {
         host.numbered(&format!("proc/{process}/task")).iter().any(|thread| {
@@ -18,7 +18,7 @@ pub fn controllers(host: &HostFiles, cpu: Option<usize>) -> Vec<u32> {
     processes
 }
 
-/// Whether a thread with this status may run on a processor; true where the status does not say.
+/// Whether a thread with this status may run on a processor. True if the status does not contain it.
 fn may_run_on(status: &str, cpu: Option<usize>) -> bool {
     let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
     let cpus = list.and_then(|list| Cpus::parse(list.trim()));

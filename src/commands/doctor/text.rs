@@ -13,7 +13,7 @@ use crate::output::text_table::{DEFAULT_WIDTH, Left, Right, paragraph, stdout_wi
 const ASSESSMENT_WIDTH: usize = 9;
 const NAME_WIDTH: usize = 17;
 
-/// Measurements shorter than this get a note that they show no rare event \[s\].
+/// Duration below which a note says that the measurement shows no rare event \[s\].
 const LONG_MEASUREMENT_S: f64 = 3600.0;
 
 /// Width and colours of the text.
@@ -24,7 +24,7 @@ pub struct TextStyle {
 }
 
 impl TextStyle {
-    /// The style that suits standard output.
+    /// Style for standard output.
     pub fn of_stdout() -> Self {
         Self { width: stdout_width(), has_colours: colors_enabled() }
     }
@@ -76,7 +76,7 @@ impl TextStyle {
         text + &format!("\n{rate_hz} Hz by {}, in {seconds} s: {verdict}\n", release.name())
     }
 
-    /// A row for each rate and release mode. A narrow table lacks the least used quantiles.
+    /// A row per rate and release mode. A narrow table omits the less important quantiles.
     fn table(&self, rates: &[RateVerdict]) -> String {
         let header = ["Hz", "by", "min", "p50", "p99", "p99.9", "p99.99", "max", "late", "missed", "verdict"];
         let columns = header.map(|name| (name, if ["by", "verdict"].contains(&name) { Left } else { Right }));
@@ -105,7 +105,7 @@ impl TextStyle {
 /// Cells of a row, in the order of the header.
 fn cells(rate: &RateVerdict) -> [String; 11] {
     let Latency { rate_hz, release, wakeup_ns, late_wakeups, missed, .. } = &rate.latency;
-    // A quantile of too few wake-ups is only their maximum.
+    // With too few wake-ups a quantile would only be their maximum.
     let quantile = |time_ns: u64, min_count: u64| {
         if wakeup_ns.count < min_count { "-".into() } else { microseconds(time_ns) }
     };
@@ -185,7 +185,7 @@ mod tests {
 
     const PLAIN: TextStyle = TextStyle { width: 80, has_colours: false };
 
-    /// The words with one blank between two.
+    /// Joins the words with single blanks.
     fn single_spaced(text: &str) -> String {
         text.split_whitespace().collect::<Vec<_>>().join(" ")
     }

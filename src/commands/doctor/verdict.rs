@@ -1,10 +1,17 @@
-//! Verdict on a rate: whether it is feasible on this host, by the distribution of its wake-ups.
+//! Verdict on a rate: whether it is feasible on this host, from the distribution of its wake-ups.
 //!
 //! | verdict | when |
 //! | --- | --- |
 //! | good | 99.9 % of wake-ups within a fifth of the period, all within half, and no fact is bad |
 //! | marginal | neither |
-//! | impossible | 1 % of wake-ups beyond half of the period, or more than 1 % of releases missed, or one wake-up later than a measurement may be old, or the daemon would not start |
+//! | impossible | at least one reason of the list below |
+//!
+//! A rate is impossible if
+//!
+//! - 1 % of wake-ups are later than half of the period,
+//! - more than 1 % of releases are missed,
+//! - one wake-up is later than a measurement may be old, or
+//! - the daemon would not start.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,13 +19,14 @@ use super::latency::Latency;
 use super::text::microseconds;
 use crate::messages::Times;
 
-/// Bound of the 99.9th percentile of a good rate, as a share of the period; the rest is for reading, computing and
+/// Largest 99.9th percentile of a good rate, as a share of the period. The rest is for reading, computing and
 /// sending.
 const GOOD_SHARE: f64 = 0.2;
-/// Bound of the longest wake-up of a good rate and of the 99th percentile of a feasible one, as a share of the period;
-/// beyond, a cycle may not end in time.
+/// Largest wake-up of a good rate, and largest 99th percentile of a feasible one, as a share of the period.
+/// Beyond it, a cycle may not end in time.
 const LATEST_SHARE: f64 = 0.5;
-/// Largest share of missed releases; with more, the loop does not have the rate that its gains were computed for.
+/// Largest share of missed releases. With more, the loop does not run at the rate for which its gains were
+/// computed.
 const MAX_MISSED_SHARE: f64 = 0.01;
 
 /// Feasibility of a rate on a host.
@@ -33,11 +41,11 @@ pub enum Feasibility {
 /// Conditions of the host and the deployment that hold for every rate.
 #[derive(Clone, Debug, Default)]
 pub struct HostConditions {
-    /// `timeouts.measured_ms`: after a longer pause of its thread the loop finds that its measurement is lost.
+    /// `timeouts.measured_ms`. After a longer pause of its thread, the loop treats its measurement as lost.
     pub longest_hold_ns: u64,
-    /// Names of the facts that are bad.
+    /// Names of the bad facts.
     pub bad: Vec<String>,
-    /// Reason for which the daemon would not start.
+    /// Reason why the daemon would not start.
     pub refusal: Option<String>,
 }
 
@@ -61,7 +69,7 @@ pub fn assess(latency: Latency, conditions: &HostConditions) -> RateVerdict {
     RateVerdict { latency, verdict, reasons }
 }
 
-/// Reasons for which a rate is impossible.
+/// Reasons why a rate is impossible.
 fn obstacles(latency: &Latency, conditions: &HostConditions) -> Vec<String> {
     let HostConditions { longest_hold_ns, refusal, .. } = conditions;
     let Latency { wakeup_ns, missed, .. } = latency;
@@ -78,7 +86,7 @@ fn obstacles(latency: &Latency, conditions: &HostConditions) -> Vec<String> {
             100.0 * MAX_MISSED_SHARE
         ));
     }
-    // At a low rate one period is longer than that.
+    // At a low rate one period is longer than the timeout.
     let longest_ns = (*longest_hold_ns).max(latency.period_ns() as u64);
     if wakeup_ns.max > longest_ns {
         reasons.push(format!(
@@ -93,14 +101,14 @@ fn obstacles(latency: &Latency, conditions: &HostConditions) -> Vec<String> {
     reasons
 }
 
-/// Reasons for which a rate is not good.
+/// Reasons why a rate is not good.
 fn shortcomings(latency: &Latency, conditions: &HostConditions) -> Vec<String> {
     let Latency { wakeup_ns, missed, .. } = latency;
     let mut reasons = vec![];
     if share(latency, wakeup_ns.p999) > GOOD_SHARE {
         reasons.push(rare(latency));
     }
-    // With few wake-ups the line above has reported the longest.
+    // With few wake-ups, the line above has already reported the longest.
     if share(latency, wakeup_ns.max) > LATEST_SHARE && wakeup_ns.max > wakeup_ns.p999 {
         reasons.push(within(latency, "the longest wake-up after", wakeup_ns.max, LATEST_SHARE));
     }
@@ -118,7 +126,7 @@ fn share(latency: &Latency, time_ns: u64) -> f64 {
     time_ns as f64 / latency.period_ns()
 }
 
-/// Text for the 99.9th percentile; with too few wake-ups for one, for the longest.
+/// Text for the 99.9th percentile, or for the longest wake-up if there are too few.
 fn rare(latency: &Latency) -> String {
     let Times { count, p999, .. } = latency.wakeup_ns;
     let how_many = if count < 1000 { format!("all {count}") } else { "99.9% of".into() };

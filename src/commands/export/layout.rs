@@ -8,20 +8,20 @@ use crate::model::inverse_geometry::{leg_directions, leg_lengths};
 use crate::model::machine::{Link, Machine, TransverseInertia};
 use crate::model::rigid::Pose;
 
-/// Least difference between the greatest principal moment and the sum of the others, as a share of the former. Flat
-/// plates have none, and engines reject a negative one, which rounding may make.
+/// Least difference between the greatest principal moment and the sum of the others, as a share of the
+/// former. For flat plates it is zero. Rounding may make it negative, and engines reject that.
 const INERTIA_MARGIN: f64 = 1e-12;
 
-/// Least principal moment \[kg m^2\]. MuJoCo refuses 1e-15 and less; thin rods may be configured with none.
+/// Least principal moment \[kg m^2\]. MuJoCo refuses 1e-15 and less; thin rods may be configured with zero.
 const MIN_PRINCIPAL_MOMENT: f64 = 1e-14;
 
-/// Numbers of an XML attribute: shortest digits that read back the same, blanks between.
+/// Numbers of an XML attribute: shortest digits that read back the same, separated by blanks.
 pub(super) struct Numbers<'a>(pub &'a [f64]);
 
 impl fmt::Display for Numbers<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, x) in self.0.iter().enumerate() {
-            // Not "-0".
+            // Avoids "-0".
             write!(f, "{}{:?}", if i == 0 { "" } else { " " }, x + 0.0)?;
         }
         Ok(())
@@ -82,8 +82,8 @@ pub(super) fn link_inertia(link: &Link, length: f64) -> Matrix3<f64> {
     realizable(&Matrix3::from_diagonal(&Vector3::new(transverse, transverse, link.axial_inertia)))
 }
 
-/// The tensor with its principal moments raised, all alike, until the greatest is at most the sum of the
-/// others with [`INERTIA_MARGIN`] to spare, and the least is [`MIN_PRINCIPAL_MOMENT`]. Most bodies stay as they are;
+/// The inertia with all principal moments raised by the same amount, until the greatest is at most the sum of
+/// the others with [`INERTIA_MARGIN`], and the least is [`MIN_PRINCIPAL_MOMENT`]. Most bodies do not change;
 /// none changes by more than 1e-9 of its greatest moment, the tolerance of the configuration.
 pub(super) fn realizable(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     let principal = inertia.symmetric_eigenvalues();
@@ -117,7 +117,7 @@ impl Shapes {
             base.iter().copied().chain(platform.iter().map(|b| position + rotation * b)).collect();
         let center = mean(&all);
         let length = legs.iter().map(|leg| leg.length).sum::<f64>() / legs.len() as f64;
-        // Slim enough for six legs side by side; links that overlap from 0.7 to 1.4 of the length at home.
+        // Slim enough for six legs side by side. The links overlap from 0.7 to 1.4 of the length at home.
         Self {
             cylinder_radius: 0.03 * length,
             rod_radius: 0.018 * length,
@@ -135,13 +135,13 @@ fn mean(points: &[Vector3<f64>]) -> Vector3<f64> {
     points.iter().sum::<Vector3<f64>>() / points.len() as f64
 }
 
-/// Corners of a plate through these points: each on both sides of the plane that fits them best.
+/// Corners of a plate through these points: each on both sides of the best fitting plane.
 fn plate(points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let middle = mean(points);
     let spread: Matrix3<f64> = points.iter().map(|p| (p - middle) * (p - middle).transpose()).sum();
     let SymmetricEigen { eigenvectors, eigenvalues } = spread.symmetric_eigen();
     let normal: Vector3<f64> = eigenvectors.column(eigenvalues.imin()).into();
-    // A thickness that shows.
+    // A visible thickness.
     let half = normal * (0.02 * spread.trace().sqrt());
     points.iter().flat_map(|point| [point + half, point - half]).collect()
 }

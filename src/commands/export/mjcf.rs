@@ -4,17 +4,18 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::layout::{LegLayout, Numbers, Shapes, home, legs, link_inertia, quaternion, realizable};
 use crate::config::Config;
-use crate::model::machine::{Link, Machine};
+use crate::model::machine::{Actuator, Link, Machine};
 use crate::model::rigid::Pose;
 
 /// Time step of MuJoCo \[s\]. With the constraints below the loops of a machine of a tonne stay closed to 1e-9 m.
 const STEP_S: f64 = 1e-4;
-/// The stiffest constraints of that step: MuJoCo holds time constants to two steps and impedances to 0.9999.
+/// Time constant of the stiffest constraints with that step. MuJoCo requires time constants of at least two steps
+/// and impedances of at most 0.9999.
 const CONSTRAINT_TIME_CONSTANT_S: f64 = 2.0 * STEP_S;
 const CONSTRAINT_IMPEDANCE: f64 = 0.9999;
 
 const HEADER_COMMENT: &str = "  Written by `hexad export`. SI units and radians. The world is the base frame of the configuration.
-  Legs i = 1 to 6. At reset the machine stands at home, without brakes: without forces it falls.
+  Legs i = 1 to 6. At reset the machine is at home, without brakes: without forces it falls.
   body platform        origin and axes of the platform; joint platform_free: its position and quaternion w x y z in the
                        world; their rates: velocity of the origin in the world, angular velocity in the platform
   body cylinder_i      origin: joint centre on the base; z: along the leg to the platform; x: second universal axis
@@ -94,7 +95,6 @@ fn law((name, link): (&str, &Link)) -> String {
 
 fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
     let LegLayout { number: i, base, rotation, first_axis, length, .. } = leg;
-    let actuator = &machine.actuator;
     let to = shapes.link_length;
     format!(
         r#"    <body name="cylinder_{i}" pos="{base}" quat="{orientation}">
@@ -104,7 +104,7 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
       <geom type="sphere" size="{ball:?}" material="joint"/>
       <geom type="cylinder" fromto="0 0 0 0 0 {to:?}" size="{cylinder_radius:?}" material="cylinder"/>
       <body name="rod_{i}" pos="0 0 {length:?}">
-        <joint name="prismatic_{i}" type="slide" axis="0 0 1" ref="{length:?}" range="{shortest:?} {longest:?}" armature="{reflected:?}" damping="{viscous:?}" frictionloss="{coulomb:?}"/>
+        {prismatic}
         {rod}
         <geom type="cylinder" fromto="0 0 0 0 0 {back:?}" size="{rod_radius:?}" material="rod"/>
         <site name="ball_rod_{i}" size="{ball:?}" material="joint"/>
@@ -121,11 +121,20 @@ fn leg_body(machine: &Machine, leg: &LegLayout, shapes: &Shapes) -> String {
         cylinder_radius = shapes.cylinder_radius,
         rod_radius = shapes.rod_radius,
         back = -to,
-        shortest = actuator.min_length,
-        longest = actuator.max_length,
-        reflected = actuator.reflected_mass,
-        viscous = actuator.viscous_friction,
-        coulomb = actuator.coulomb_friction,
+        prismatic = prismatic_joint(leg, &machine.actuator),
+    )
+}
+
+/// Prismatic joint of a leg, with the friction and the reflected mass of its drive.
+fn prismatic_joint(leg: &LegLayout, actuator: &Actuator) -> String {
+    let LegLayout { number: i, length, .. } = leg;
+    let [shortest, longest] = [actuator.min_length, actuator.max_length];
+    let [reflected, viscous, coulomb] =
+        [actuator.reflected_mass, actuator.viscous_friction, actuator.coulomb_friction];
+    format!(
+        "<joint name=\"prismatic_{i}\" type=\"slide\" axis=\"0 0 1\" ref=\"{length:?}\" \
+         range=\"{shortest:?} {longest:?}\" armature=\"{reflected:?}\" \
+         damping=\"{viscous:?}\" frictionloss=\"{coulomb:?}\"/>"
     )
 }
 
@@ -163,7 +172,7 @@ fn platform_body(machine: &Machine, legs: &[LegLayout], shapes: &Shapes) -> Stri
     )
 }
 
-/// Meshes, colours, and what the viewer's free camera looks at.
+/// Meshes, colours, and the centre of the viewer's free camera.
 fn looks(shapes: &Shapes) -> String {
     let mesh = |name: &str, corners: &[Vector3<f64>]| {
         let coordinates: Vec<f64> = corners.iter().flatten().copied().collect();
@@ -195,13 +204,13 @@ fn looks(shapes: &Shapes) -> String {
     )
 }
 
-/// The base, a light from above, and a camera for which up is up, wherever gravity points.
+/// The base, a light from above, and a camera that is upright for any direction of gravity.
 fn scenery(machine: &Machine, shapes: &Shapes) -> String {
     let up = (-machine.gravity).try_normalize(f64::MIN_POSITIVE).unwrap_or(Vector3::z());
-    // Any direction that is not up: the axis that is least so.
+    // Any direction that is not up: the base axis that deviates most from it.
     let aside = Vector3::ith(up.iamin(), 1.0);
     let right = aside.cross(&up).normalize();
-    // From the front right, a little above; as far away as all of it fits the picture.
+    // From the front right, a little above. The distance is chosen to show the whole machine.
     let away = (right * 0.5 + right.cross(&up) + up * 0.4).normalize();
     let image_right = up.cross(&away).normalize();
     let image_up = away.cross(&image_right);

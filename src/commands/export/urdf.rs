@@ -115,7 +115,7 @@ fn platform_link(machine: &Machine, legs: &[LegLayout], shapes: &Shapes) -> Stri
             )
         })
         .collect();
-    // URDF has no hull of points: a spoke from the origin to every joint.
+    // URDF has no convex hull of points, so the platform is drawn as a spoke from the origin to every joint.
     let spokes: String = (legs.iter())
         .map(|leg| {
             let length = leg.platform.norm();
@@ -138,8 +138,8 @@ fn platform_link(machine: &Machine, legs: &[LegLayout], shapes: &Shapes) -> Stri
     )
 }
 
-/// Origin element. `rpy` are turns about fixed axes, `R = Rz(yaw) Ry(pitch) Rx(roll)`: the Bryan angles of the transpose,
-/// turned back.
+/// Origin element. `rpy` are rotations about fixed axes, `R = Rz(yaw) Ry(pitch) Rx(roll)`: the negative Bryan
+/// angles of the transpose.
 fn origin(position: &Vector3<f64>, rotation: &Rotation3<f64>) -> String {
     let back = Pose { rotation: rotation.matrix().transpose(), position: Vector3::zeros() };
     let [roll, pitch, yaw, ..] = task_coordinates(&back, &[0.0; 6]).map(|angle| -angle);
@@ -160,7 +160,7 @@ fn inertial(mass: f64, center: &Vector3<f64>, i: &Matrix3<f64>) -> String {
     )
 }
 
-/// A bar along z, its middle at `z`.
+/// A bar along z, with its middle at `z`.
 fn visual(z: f64, radius: f64, length: f64, material: &str) -> String {
     visual_at(&origin(&Vector3::new(0.0, 0.0, z), &Rotation3::identity()), radius, length, material)
 }

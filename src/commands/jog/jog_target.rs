@@ -1,4 +1,5 @@
-//! Target that keys move: no farther ahead of the reference than it brakes, and never out of the workspace.
+//! Target moved by keys. It leads the reference by at most the reference's stopping distance, and stays in
+//! the workspace.
 
 use crate::analysis::target_motion::{TargetRefusal, WorkspaceBound, check_target};
 use crate::commands::jog::keys::Key;
@@ -7,7 +8,7 @@ use crate::control::constants::Constants;
 use crate::control::signals::limits::DerivativeLimits;
 use crate::model::rigid::Pose;
 
-/// Velocities, as shares of those of autonomous motions.
+/// Velocities, as shares of the velocity of autonomous motions.
 const SHARES: [f64; 7] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
 const FIRST_SHARE: usize = 3;
 
@@ -15,15 +16,16 @@ const FIRST_SHARE: usize = 3;
 const STEPS: [[f64; 2]; 4] = [[1e-5, 1.745e-5], [1e-4, 1.745e-4], [1e-3, 1.745e-3], [1e-2, 1.745e-2]];
 const FIRST_STEP: usize = 2;
 
-/// Age of the reference that is compared with the target \[s\]: of a status report, twice its interval.
+/// Age of the reference that is compared with the target \[s\]. It comes from a status report; this is twice
+/// the report interval.
 const REFERENCE_AGE_S: f64 = 0.15;
 
-/// How a key moves the target.
+/// Motion of the target by a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
     /// While keys arrive, with this velocity of position and of angles \[m/s\], \[rad/s\].
     Continuous([f64; 2]),
-    /// By this much for each key \[m\], \[rad\].
+    /// One step per key \[m\], \[rad\].
     Step([f64; 2]),
 }
 
@@ -34,12 +36,12 @@ pub struct JogTarget<'a> {
     is_continuous: bool,
     share: usize,
     step: usize,
-    /// What has held the target back last.
+    /// The last bound that stopped the target.
     blocked: Option<WorkspaceBound>,
 }
 
 impl<'a> JogTarget<'a> {
-    /// At X, to be moved continuously.
+    /// Target at X, in continuous motion.
     pub fn new(constants: &'a Constants, x: [f64; 6]) -> Self {
         Self { constants, x, is_continuous: true, share: FIRST_SHARE, step: FIRST_STEP, blocked: None }
     }
@@ -66,7 +68,7 @@ impl<'a> JogTarget<'a> {
         [share * limits.position.velocity, share * limits.orientation.velocity]
     }
 
-    /// The effect of a key; the key itself if it goes on while it is held.
+    /// Applies a key. Returns the key if the motion continues while it is held.
     pub fn press(&mut self, key: Key, reference: &Pose) -> Option<Key> {
         match (key, self.is_continuous) {
             (Key::Move { .. }, true) => return Some(key),
@@ -110,8 +112,8 @@ impl<'a> JogTarget<'a> {
         }
     }
 
-    /// Distance of a target from the reference, over the largest allowed: the way in which it brakes, and what it has moved
-    /// since its report; at least one step.
+    /// Distance of a target from the reference, as a ratio of the largest allowed. Allowed is the reference's
+    /// stopping distance plus its motion since the report, at least one step.
     fn distance_ratio(&self, reference: &Pose, target: &Pose, step: f64) -> f64 {
         let limits = &self.constants.parameters.limits;
         let left = reference.displacement_to(target);
@@ -148,11 +150,11 @@ mod tests {
             assert_eq!(target.press(UP, &reference), Some(UP));
             target.advance(5, 0.01, &reference);
         }
-        // 10 % of 0.2 m/s; 0.15 s, v / 2a, a / j.
+        // 10 % of 0.2 m/s, times the sum of 0.15 s, v / 2a and a / j.
         let ahead = target.x()[5] - home[5];
         assert!(ahead > 0.002 && ahead < 0.01, "{ahead} m ahead of a platform that does not move");
         assert!(target.blocked().is_none());
-        // A platform that follows, to the end of the workspace.
+        // A platform that follows the target to the end of the workspace.
         for _ in 0..10_000 {
             let reference = pose_of(&target.x());
             target.advance(5, 0.01, &reference);
@@ -173,7 +175,7 @@ mod tests {
         assert_eq!(target.pace(), Pace::Step([1e-2, 1.745e-2]));
         assert_eq!(target.press(UP, &pose_of(&home)), None);
         assert!((target.x()[5] - home[5] - 1e-2).abs() < 1e-12);
-        // The next one when the platform is there.
+        // The next step is possible when the platform has arrived.
         assert_eq!(target.press(UP, &pose_of(&home)), None);
         assert!((target.x()[5] - home[5] - 1e-2).abs() < 1e-12);
     }

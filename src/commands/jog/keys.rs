@@ -10,24 +10,25 @@ pub enum Key {
     },
     Faster,
     Slower,
-    /// Between continuous motion and steps.
+    /// Switches between continuous motion and steps.
     Mode,
-    /// Ends motion, as any other key that has no meaning does.
+    /// Ends the motion. Any key without another meaning does the same.
     Stop,
     /// Ends the command.
     Leave,
 }
 
-/// Keys of each coordinate of X, up and down: two rows of the keyboard right of `q`. `z` is where a German keyboard has `y`.
+/// Keys of each coordinate of X, up and down: two rows of the keyboard, right of `q`. `z` acts as `y`, because German
+/// keyboards have it in that place.
 const KEYS: [(&[u8], &[u8]); 6] =
     [(b"t", b"g"), (b"yz", b"h"), (b"u", b"j"), (b"w", b"s"), (b"e", b"d"), (b"r", b"f")];
 
 const ESCAPE: u8 = 0x1b;
 
-/// Key of what a terminal has sent. Of many at once only the last counts: they may have waited in a
-/// slow connection.
+/// Key from the bytes of a terminal. Of several keys only the last is used, because a slow connection may
+/// have delayed the others.
 pub fn last_key(bytes: &[u8]) -> Option<Key> {
-    // A sequence of an arrow or function key moves nothing.
+    // The escape sequence of an arrow or function key moves nothing.
     if bytes.len() > 1 && bytes.contains(&ESCAPE) {
         return Some(Key::Stop);
     }
@@ -65,7 +66,7 @@ mod tests {
         assert_eq!(moves.len(), 12);
         assert_eq!(last_key(b""), None);
         assert_eq!(last_key(b"wwws"), Some(Key::Move { axis: 3, sign: -1.0 }));
-        // An arrow key whose last byte is a letter of its own.
+        // An arrow key whose last byte is the letter of another key.
         assert_eq!(last_key(b"\x1b[s"), Some(Key::Stop));
         for leaving in [b"q", b"Q", b"\x1b"] {
             assert_eq!(last_key(leaving), Some(Key::Leave), "{leaving:?}");

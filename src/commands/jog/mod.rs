@@ -1,7 +1,8 @@
 //! `hexad jog`: moves the platform by keys on a terminal, one for each direction of each axis.
 //!
-//! Dead-man: motion goes on only while keys arrive. A key moves a target, which the reference generator of the daemon
-//! follows within every limit; the target is never farther ahead than the way in which the platform brakes.
+//! Dead-man control: motion continues only while keys arrive. A key moves a target, and the daemon's
+//! reference generator follows it within every limit. The target leads by at most the reference's stopping
+//! distance.
 
 use std::io::{self, IsTerminal};
 use std::time::{Duration, Instant};
@@ -23,10 +24,11 @@ mod keys;
 mod screen;
 mod terminal;
 
-/// Time after a key after which motion ends, unless another arrives: twice the repetition of a slow keyboard.
+/// Time after a key at which motion ends unless another key arrives: twice the repetition interval of a slow
+/// keyboard.
 const KEY_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Time between two screens: a person reads no faster.
+/// Interval between two screens, short enough for a reader.
 const SCREEN_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Longest time for which a target moves in one cycle \[s\], so that it does not jump after a pause of this process.
@@ -60,7 +62,7 @@ impl JogArguments {
     }
 }
 
-/// Publishes a target that keys move, until `q`, Esc or a signal.
+/// Publishes a target moved by keys, until `q`, Esc or a signal.
 fn jog(source: &mut TargetSource, mut target: JogTarget, stop: &Stop) -> Result<(), Failure> {
     let terminal = Terminal::open().map_err(|error| Failure { exit_code: 2, message: error.to_string() })?;
     let mut held: Option<(Key, Instant)> = None;

@@ -8,7 +8,7 @@ use crate::commands::status::screen::{legs, poses};
 use crate::operator::protocol::AnswerLine as Answer;
 use crate::output::numbers::{AXES, significant};
 
-/// What it shows.
+/// Content of the screen.
 pub struct JogScreen<'a> {
     pub answer: &'a Answer,
     pub target: &'a JogTarget<'a>,

@@ -1,17 +1,18 @@
-//! Terminal whose keys arrive at once and are not shown; as before when dropped.
+//! Terminal that returns keys at once and does not echo them. Its settings are restored when it is dropped.
 
 use std::io::{self, Read, Write, stdin, stdout};
 
 use nix::sys::termios::{LocalFlags, SetArg, SpecialCharacterIndices, Termios, tcgetattr, tcsetattr};
 
-/// To another screen and back; to its first line; clears the rest of a line, and everything below.
+/// Escape sequences: switch to another screen and back, go to its first line, clear the rest of a line, clear
+/// everything below.
 const ENTER: &str = "\x1b[?1049h\x1b[?25l";
 const LEAVE: &str = "\x1b[?25h\x1b[?1049l";
 const HOME: &str = "\x1b[H";
 const CLEAR_LINE: &str = "\x1b[K";
 const CLEAR_BELOW: &str = "\x1b[J";
 
-/// Most bytes of keys read at once.
+/// Largest number of bytes read at once.
 const KEY_BYTES: usize = 256;
 
 /// Terminal of this process.
@@ -20,7 +21,7 @@ pub struct Terminal {
 }
 
 impl Terminal {
-    /// Keys without waiting for a line, and without echo; Ctrl-C remains a signal.
+    /// Switches to keys without line buffering and without echo. Ctrl-C remains a signal.
     pub fn open() -> io::Result<Self> {
         let before = tcgetattr(stdin())?;
         let mut keys = before.clone();
@@ -30,13 +31,13 @@ impl Terminal {
                 *value = 0;
             }
         }
-        // What was typed before belongs to nobody.
+        // Discards earlier input.
         tcsetattr(stdin(), SetArg::TCSAFLUSH, &keys)?;
         show(ENTER);
         Ok(Self { before })
     }
 
-    /// What has been typed since the last call.
+    /// Bytes typed since the last call.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = [0; KEY_BYTES];
         let count = stdin().lock().read(&mut bytes).unwrap_or_default();
@@ -53,12 +54,12 @@ impl Terminal {
 impl Drop for Terminal {
     fn drop(&mut self) {
         show(LEAVE);
-        // Nothing is left to do if it fails.
+        // Nothing can be done if this fails.
         let _ = tcsetattr(stdin(), SetArg::TCSAFLUSH, &self.before);
     }
 }
 
-/// Writes to the terminal; one that has gone shows nothing.
+/// Writes to the terminal. Errors are ignored, for a closed terminal.
 fn show(text: &str) {
     let mut out = stdout().lock();
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());

@@ -5,13 +5,14 @@ use nalgebra::Vector6;
 use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::motion::minimum_jerk::shortest_duration;
 
-/// Share of each limit that the approach uses; the rest is for angles that turn at once and add up.
+/// Share of each limit that the approach uses. The rest is for angles that change at the same time and add
+/// up.
 const APPROACH_SHARE: f64 = 0.5;
 
 /// Duration \[s\] of an approach that keeps the limits, in any direction.
 pub(super) fn approach_s(limits: &Limits, from: &Vector6<f64>, to: &Vector6<f64>) -> f64 {
     let way = to - from;
-    // No angle turns the platform further than by itself.
+    // The rotation is at most the sum of its angles.
     let angle = way.fixed_rows::<3>(0).abs().sum();
     let shortest = |way: f64, limits: &DerivativeLimits| {
         let DerivativeLimits { velocity, acceleration, jerk } = limits.scaled(APPROACH_SHARE);
@@ -29,7 +30,8 @@ mod tests {
     use crate::model::task::TaskState;
     use crate::motion::timeline::Timeline;
 
-    /// From far and turned, under limits of which each binds once; a quarter of the time would not do.
+    /// Long approach with large angles, under limits of which each is active once. A quarter of the duration
+    /// would exceed them.
     #[test]
     fn the_approach_keeps_the_limits() {
         for tight in
@@ -44,7 +46,7 @@ mod tests {
                 let timeline =
                     Timeline::new(&config.machine, &from, &home, 1.0).with_shortest_approach(duration_s);
                 let at = |t| timeline.at(t, |_| TaskState::at_rest(config.machine.home));
-                // In one piece: where the reference begins anew it has fallen behind nothing.
+                // In one piece, because a new start would hide any lag of the reference.
                 precheck.refusal(at, [0.0, timeline.motion_start()])
             };
             assert!(refused(1.0).is_none(), "{tight}: {:?}", refused(1.0));

@@ -1,4 +1,4 @@
-//! Request for control by a setpoint source, beside its setpoints: once they are published, not before.
+//! Request for control by a setpoint source. It is sent only after the first setpoints are published.
 
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
@@ -12,31 +12,31 @@ use crate::messages::{Bus, CommandMessage, PortError, Publisher, StatusMessage};
 use crate::operator::{OperatorError, Order};
 use crate::realtime::stop_request::Stop;
 
-/// Request for control on its way.
+/// Request for control in progress.
 pub enum Engagement {
-    /// Somebody else engages.
+    /// Another process engages.
     None,
-    /// Over the control socket, by a thread.
+    /// Request over the control socket, sent by a separate thread.
     Socket { config: Box<Config>, began: Instant, within: Duration, stop: Stop, result: Option<Outcome> },
-    /// In step with the setpoints, in simulated time; the last request.
+    /// Request in step with the setpoints, in simulated time; `sent` is the last one.
     InStep { commands: Publisher<CommandMessage>, sent: Option<MessageId> },
 }
 
 type Outcome = Receiver<Result<(), OperatorError>>;
 
 impl Engagement {
-    /// Over the control socket.
+    /// Request over the control socket.
     pub fn over_socket(config: &Config, within: Duration, stop: &Stop) -> Self {
         let (config, stop) = (Box::new(config.clone()), stop.clone());
         Self::Socket { config, began: Instant::now(), within, stop, result: None }
     }
 
-    /// In step with the setpoints.
+    /// Request in step with the setpoints.
     pub fn in_step(bus: &Bus) -> Result<Self, PortError> {
         Ok(Self::InStep { commands: bus.publisher()?, sent: None })
     }
 
-    /// An error if the time is over before the request could be sent, for this reason.
+    /// Error if the time has passed before the request could be sent. `reason` says why it could not.
     pub fn check_time(&self, reason: &str) -> Result<(), MoveError> {
         match self {
             Self::Socket { began, within, result: None, .. } if began.elapsed() > *within => {
@@ -46,7 +46,7 @@ impl Engagement {
         }
     }
 
-    /// Sends the request while the setpoints stand where the platform stands; an error if it was refused.
+    /// Sends the request while the setpoints hold the pose of the platform. An error if it was refused.
     pub fn request(&mut self, now_ns: u64, status: &StatusMessage) -> Result<(), MoveError> {
         match self {
             Self::None => Ok(()),

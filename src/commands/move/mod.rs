@@ -1,9 +1,10 @@
 //! `hexad move`: a setpoint source, in real time or in lock-step.
 //!
-//! It starts where the platform stands (the daemon's status contains the pose), moves the platform gently to the start
-//! of the trajectory, plays it and ends at rest. When an operator ends control it ends, too; after a fault or a restart of
-//! the daemon it starts over from wherever the platform stands then. A signal slows the platform down along its path, to
-//! rest under control, and ends the player with exit code 130. `--pause` and `--resume` are requests to the player that runs.
+//! The source begins at the pose of the platform, which the daemon's status contains. It moves the platform
+//! gently to the start of the trajectory, plays it and ends at rest. When an operator ends control, it ends
+//! too. After a fault or a restart of the daemon it starts again from the present pose. A signal slows the
+//! platform down along its path, to rest under control; the exit code is then 130. `--pause` and `--resume`
+//! send requests to the running player.
 
 use std::io;
 use std::path::PathBuf;
@@ -54,7 +55,7 @@ pub struct MoveArguments {
     /// Length of the motion [s]
     #[arg(long, default_value_t = 8.0, value_parser = duration, allow_negative_numbers = true, conflicts_with = "trajectory")]
     seconds: f64,
-    /// Also request control, once, as soon as the setpoints stand where the platform stands
+    /// Also request control, once, as soon as the setpoints hold the pose of the platform
     #[arg(long)]
     engage: bool,
     /// Longest to wait for control [s]
@@ -107,7 +108,11 @@ pub enum SetpointError {
     Port(#[from] PortError),
     #[error(transparent)]
     Table(#[from] TableError),
-    #[error("{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}", name = .motion.name(), share = percent(MIN_AMPLITUDE_SHARE))]
+    #[error(
+        "{name} of {seconds} s would be refused even with {share} of its usual amplitude: {refusal}",
+        name = .motion.name(),
+        share = percent(MIN_AMPLITUDE_SHARE)
+    )]
     TooSmall { motion: BuiltInMotion, seconds: f64, refusal: SetpointRefusal },
 }
 
@@ -149,8 +154,8 @@ impl CommandError for MoveError {
     }
 }
 
-/// Plays the trajectory once. After the first signal of `stop` the platform comes to rest along its path; the second ends
-/// at once. With a time to wait it also requests control.
+/// Plays the trajectory once. After the first signal of `stop` the platform comes to rest along its path;
+/// after the second the function returns at once. With `within` it also requests control.
 fn run(
     config: &Config,
     trajectory: &Trajectory,
@@ -165,7 +170,7 @@ fn run(
         Some(within) => Engagement::over_socket(config, within, stop),
     };
     info!(name = %config.name, seconds = trajectory.duration(), "setpoint source");
-    // Every status counts: a state may last one cycle.
+    // Every status is needed, because a state may last one cycle.
     let playback = Playback::new(config, trajectory, bus.subscriber(usize::MAX)?, engagement);
     if bus.is_simulated() {
         run_in_lockstep(config, bus.subscriber(8)?, playback, setpoints, stop)?;
@@ -201,7 +206,8 @@ fn run_in_real_time(
     Ok(())
 }
 
-/// Publishes a setpoint for each measurement, as the daemon waits for it; home, where the playback has none yet.
+/// Publishes a setpoint for each measurement, because the daemon waits for it: home, while the playback has
+/// none.
 fn run_in_lockstep(
     config: &Config,
     mut measured: Subscriber<MeasuredMessage>,
@@ -210,12 +216,12 @@ fn run_in_lockstep(
     stop: &Stop,
 ) -> Result<(), MoveError> {
     let mut last = None;
-    // Without measurements time stands still: nothing can be slowed down.
+    // Without measurements, simulated time does not advance, so nothing can be slowed down.
     while let Some(measurement) = poll_until(|| stop.is_requested(), || measured.receive()) {
         let time_ns = measurement.header.time_ns;
         let setpoint = match last {
             Some((last_ns, setpoint)) if last_ns == time_ns => {
-                // A plant without a response repeats its message: the daemon may have ended.
+                // A plant without a response repeats its message. The daemon may have ended.
                 playback.receive(time_ns)?;
                 setpoint
             }

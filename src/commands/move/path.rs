@@ -1,4 +1,4 @@
-//! Path of a played motion: its timeline, and where on it the motion goes on after a pause.
+//! Path of a played motion: its timeline, and the point at which it continues after a pause.
 
 use super::rate_change::RateChange;
 use super::trajectory::Trajectory;
@@ -6,7 +6,7 @@ use crate::control::signals::limits::Limits;
 use crate::model::task::TaskState;
 use crate::motion::timeline::Timeline;
 
-/// Timeline that is played from its beginning, or from rest at an instant.
+/// Timeline played from its beginning, or from rest at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Path {
     timeline: Timeline,
@@ -14,25 +14,25 @@ pub struct Path {
 }
 
 impl Path {
-    /// From the beginning.
+    /// Path from the beginning of a timeline.
     pub fn new(timeline: Timeline) -> Self {
         Self { timeline, resumed: None }
     }
 
-    /// From rest at an instant of this path \[s\].
+    /// Path that continues from rest at an instant of this path \[s\].
     pub fn resumed(&self, at_s: f64, limits: &Limits, trajectory: &Trajectory) -> Self {
         let of_timeline = |t: f64| self.timeline.at(t, |t| trajectory.at(t));
         let rise = RateChange::from_rest(self.timeline_s(at_s), limits, of_timeline);
         Self { timeline: self.timeline, resumed: Some(rise) }
     }
 
-    /// X, X', X'' so long after its beginning \[s\].
+    /// X, X', X'' at a time since its beginning \[s\].
     pub fn at(&self, t: f64, trajectory: &Trajectory) -> TaskState {
         let of_timeline = |t: f64| self.timeline.at(t, |t| trajectory.at(t));
         self.resumed.map_or_else(|| of_timeline(t), |rise| rise.at(t, of_timeline))
     }
 
-    /// Whether it has ended so long after its beginning \[s\].
+    /// Whether it has ended at a time since its beginning \[s\].
     pub fn has_ended(&self, t: f64) -> bool {
         self.timeline_s(t) > self.timeline.end()
     }

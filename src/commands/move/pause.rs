@@ -1,7 +1,7 @@
-//! `hexad move --pause | --resume`: a request to the player that runs.
+//! `hexad move --pause | --resume`: request to the running player.
 //!
-//! The player is the process that publishes setpoints, by the daemon's status; the request is a signal, which only its user
-//! and root may send.
+//! The player is the process that publishes setpoints, as the daemon's status reports it. The request is a
+//! signal. Only the player's user and root may send it.
 
 use std::fs::read;
 use std::thread::sleep;
@@ -24,7 +24,7 @@ const REST_TIME: Duration = Duration::from_millis(300);
 const REST_LIMIT: Duration = Duration::from_secs(60);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Requests it, and waits until the setpoints of a paused player rest.
+/// Sends the request. After a pause request, waits until the setpoints are at rest.
 pub fn request(config: &Config, pauses: bool) -> Result<(), MoveError> {
     let player = player(&status(&config.name)?)?;
     kill(Pid::from_raw(player as i32), pause_signal(pauses))
@@ -57,7 +57,7 @@ fn player(answer: &Answer) -> Result<u32, MoveError> {
     let Some(process) = alive.find(|process| !process.is_ignored) else {
         return Err(MoveError::NoPlayer("no process publishes setpoints".into()));
     };
-    // Without a handler the signal would end it.
+    // Without a handler the signal would end the process.
     if is_player(process.process_id) && handles_pause(process.process_id) {
         return Ok(process.process_id);
     }

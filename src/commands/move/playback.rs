@@ -1,4 +1,4 @@
-//! Playback of a trajectory: the setpoint of each instant, from the pose at which the platform stands.
+//! Playback of a trajectory: the setpoint of each instant. It begins at the pose of the platform.
 
 use nalgebra::Vector6;
 use tracing::{info, warn};
@@ -19,10 +19,11 @@ use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 use crate::motion::timeline::Timeline;
 
-/// Longest time without a status of a daemon in control, after which the approach starts over \[ns\].
+/// Time without a status of a daemon in control, after which the approach starts again \[ns\].
 const CONTROL_TIMEOUT_NS: u64 = 200_000_000;
 
-/// Time for which the last pose is published as a target \[ns\]: the daemon reads many of these messages.
+/// Time for which the last pose is published as a target \[ns\], so that the daemon reads many of these
+/// messages.
 const HOLD_TIME_NS: u64 = 100_000_000;
 
 /// Output of the playback at one instant.
@@ -32,19 +33,19 @@ pub(super) enum PlaybackStep {
     Finished,
 }
 
-/// Where the playback is.
+/// Phase of the playback.
 enum Phase {
-    /// Until the pose is known and no other source is followed.
+    /// Until the pose is valid and no other source is followed.
     Waiting,
-    /// At the pose where the platform stands, until the daemon takes control.
+    /// At the pose of the platform, until the daemon takes control.
     Standing(Timeline),
-    /// Since this instant \[ns\].
+    /// Playing since this instant \[ns\].
     Playing(Path, u64),
-    /// To rest along the path, since this instant \[ns\].
+    /// Slowing down along the path since this instant \[ns\].
     Slowing(Path, RateChange, u64),
-    /// At rest at this time of the path \[s\], to go on.
+    /// At rest at this time of the path \[s\], until resumed.
     Paused(Path, f64),
-    /// At this pose, since this instant \[ns\].
+    /// At rest at this pose since this instant \[ns\].
     Holding(TaskState, u64),
 }
 
@@ -60,9 +61,9 @@ pub(super) struct Playback<'a> {
     status: Option<StatusMessage>,
     /// Instant of the last status of a daemon in control \[ns\].
     last_active_ns: u64,
-    /// Why it waits, as last logged.
+    /// Reason for waiting, as last logged.
     reason: String,
-    /// Whether the platform is to come to rest for good, or until the motion is resumed.
+    /// Whether the platform is to come to rest for good, and whether until resumed.
     is_ending: bool,
     is_to_pause: bool,
 }
@@ -91,7 +92,7 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Reads every new status; an error if control has ended.
+    /// Reads all new statuses. An error if control has ended.
     pub fn receive(&mut self, now_ns: u64) -> Result<(), MoveError> {
         while let Some(status) = self.statuses.receive() {
             self.update(now_ns, &status)?;
@@ -100,7 +101,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// Reads every new status and returns the setpoint of an instant.
+    /// Reads all new statuses and returns the setpoint of an instant.
     pub fn step(&mut self, now_ns: u64) -> Result<PlaybackStep, MoveError> {
         self.receive(now_ns)?;
         let is_followed = matches!(self.phase, Phase::Playing(..) | Phase::Slowing(..) | Phase::Paused(..));
@@ -110,7 +111,7 @@ impl<'a> Playback<'a> {
         self.setpoint(now_ns)
     }
 
-    /// Brings the platform to rest along its path and holds it there; true if there is nothing to bring to rest.
+    /// Brings the platform to rest along its path and holds it there. True if no motion is to be ended.
     pub fn slow_down(&mut self, now_ns: u64) -> bool {
         self.is_ending = true;
         match &self.phase {
@@ -133,7 +134,7 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Pauses the motion, or lets it go on: along its path, from rest to rest.
+    /// Pauses or resumes the motion, along its path, from rest to rest.
     pub fn set_paused(&mut self, now_ns: u64, is_to_pause: bool) {
         let has_changed = core::mem::replace(&mut self.is_to_pause, is_to_pause) != is_to_pause;
         match &self.phase {
@@ -174,7 +175,7 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Before the daemon is in control: setpoints where the platform stands, unless it follows another source.
+    /// Before control: holds the pose of the platform, unless the daemon follows another source.
     fn prepare(&mut self, now_ns: u64, status: &StatusMessage, state: State) -> Result<(), MoveError> {
         if let (Phase::Standing(timeline), State::Active) = (&self.phase, state) {
             info!("the daemon is in control: moving");
@@ -182,7 +183,7 @@ impl<'a> Playback<'a> {
             (self.phase, self.last_active_ns) = (Phase::Playing(path, now_ns), now_ns);
             return Ok(());
         }
-        // While the daemon engages, the setpoint must not change.
+        // The setpoint must not change while the daemon engages.
         if !state.has_control() {
             self.phase = match status.pose_valid {
                 1 => Phase::Standing(self.timeline(&Vector6::from(status.x))),
@@ -198,7 +199,7 @@ impl<'a> Playback<'a> {
         timeline.with_shortest_approach(approach_s(self.limits, from, &to))
     }
 
-    /// While the daemon follows: ends with an operator's request, starts over after a fault.
+    /// Under control: ends after an operator's request, starts again after a fault.
     fn follow(&mut self, now_ns: u64, state: State, diagnostic: Diagnostic) -> Result<(), MoveError> {
         let by_operator =
             matches!(diagnostic.code, DiagnosticCode::OperatorRequest | DiagnosticCode::EmergencyStop);
@@ -209,20 +210,20 @@ impl<'a> Playback<'a> {
         if state == State::Active {
             self.last_active_ns = now_ns;
         } else if !state.has_control() {
-            // The status reports the end of control: no need to wait for the timeout.
+            // The status reports the end of control, so the timeout is not needed.
             self.last_active_ns = 0;
         }
         Ok(())
     }
 
-    /// Begins anew; an error if the platform was to come to rest under control.
+    /// Starts again from the present pose. An error if the platform was to come to rest under control.
     fn start_over(&mut self) -> Result<(), MoveError> {
         if self.is_ending {
             let status = self.status.unwrap_or_default();
             let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
             return Err(MoveError::Ended(status.state().unwrap_or_default(), diagnostic));
         }
-        warn!("the daemon gave up control or is gone: starting over from where the platform stands");
+        warn!("the daemon gave up control or is gone: starting again from the present pose");
         self.phase = Phase::Waiting;
         Ok(())
     }
@@ -240,7 +241,7 @@ impl<'a> Playback<'a> {
                     self.engagement.request(now_ns, status)?;
                 }
                 self.log_reason(
-                    "the setpoints stand where the platform stands: waiting for control (hexad engage)",
+                    "the setpoints hold the pose of the platform: waiting for control (hexad engage)",
                 );
                 motion(task)
             }
@@ -277,7 +278,7 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Logs why there is no setpoint yet; an error if that takes too long.
+    /// Logs why there is no setpoint yet. An error if that takes too long.
     fn wait(&mut self) -> Result<(), MoveError> {
         let reason = match &self.status {
             None => "no status of a daemon".into(),
@@ -287,7 +288,7 @@ impl<'a> Playback<'a> {
             }
             Some(status) => {
                 let diagnostic = status.diagnostic.diagnostic().unwrap_or_default();
-                format!("the pose of the platform is not known: {diagnostic}")
+                format!("the pose of the platform is unknown: {diagnostic}")
             }
         };
         self.engagement.check_time(&reason)?;

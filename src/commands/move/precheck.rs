@@ -1,7 +1,8 @@
-//! Precheck of a trajectory: whether the daemon would follow its setpoints, by the daemon's own rules, before anything
-//! moves. The daemon's reference generator follows the whole trajectory, cycle by cycle.
+//! Precheck of a trajectory: whether the daemon would follow its setpoints, before the platform moves. The
+//! daemon's own reference generator follows the whole trajectory, cycle by cycle.
 //!
-//! The precheck does not look at forces, nor at the approach to the first setpoint, which keeps the limits by itself.
+//! The precheck covers neither forces nor the approach to the first setpoint, which keeps the limits by
+//! construction.
 
 use core::fmt;
 use core::ops::ControlFlow;
@@ -25,14 +26,14 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 use crate::model::task::TaskState;
 
-/// Share of each limit that a built-in motion may use; the rest is reserve, as the instant between two setpoints at
-/// which a cycle begins is not known in advance.
+/// Share of each limit that a built-in motion may use. The rest is a reserve, because a cycle may begin at any instant
+/// between two setpoints.
 const USABLE_SHARE: f64 = 0.95;
 
-/// Cycles between two updates of the progress bar: about a millisecond.
+/// Cycles between two updates of the progress bar: about a millisecond of effort.
 const CYCLES_PER_UPDATE: u64 = 1024;
 
-/// Check of setpoints by the rule and the parameters of the daemon.
+/// Check of setpoints with the rules and parameters of the daemon.
 pub struct Precheck<'a> {
     machine: &'a Machine,
     parameters: Parameters,
@@ -42,12 +43,12 @@ impl<'a> Precheck<'a> {
     /// Precheck with the limits of the daemon.
     pub fn new(config: &'a Config) -> Self {
         let machine = &config.machine;
-        // The fidelity has no part in the decision about a setpoint.
+        // The decision about a setpoint does not depend on the fidelity.
         let parameters = daemon::parameters(machine, &config.deployment, Fidelity::Exact);
         Self { machine, parameters }
     }
 
-    /// The same with a reserve to each limit; home at rest keeps the reduced limits too.
+    /// The same with a reserve to each limit. Home at rest satisfies the reduced limits, too.
     pub fn with_reserve(mut self) -> Self {
         let Parameters { limits, envelope, condition, .. } = &mut self.parameters;
         limits.position = limits.position.scaled(USABLE_SHARE);
@@ -63,7 +64,8 @@ impl<'a> Precheck<'a> {
         self
     }
 
-    /// The first setpoint from `from` to `to` that the daemon would refuse, if it follows the trajectory from `from` on.
+    /// The first setpoint from `from` to `to` that the daemon would refuse, if it followed the trajectory
+    /// from `from` on.
     pub fn refusal(&self, at: impl Fn(f64) -> TaskState, span: [f64; 2]) -> Option<SetpointRefusal> {
         let mut first = None;
         self.follow(at, span, |refusal| {
@@ -73,7 +75,8 @@ impl<'a> Precheck<'a> {
         first
     }
 
-    /// Follows the trajectory from `from` to `to`; after a refusal, unless that ends it, from the refused setpoint on.
+    /// Follows the trajectory from `from` to `to`. After a refusal it continues from the refused setpoint,
+    /// unless `refused` breaks.
     pub fn follow(
         &self,
         at: impl Fn(f64) -> TaskState,
@@ -118,7 +121,7 @@ impl<'a> Precheck<'a> {
     }
 }
 
-/// SetpointRefusal of a setpoint: its time, the reason, and the limits that it exceeds.
+/// Refusal of a setpoint: its time, the reason, and the limits that it exceeds.
 #[derive(Clone, Copy, Debug)]
 pub struct SetpointRefusal {
     /// Time since the start of the trajectory \[s\].
@@ -131,7 +134,7 @@ impl fmt::Display for SetpointRefusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { t, diagnostic, active_limits } = self;
         write!(f, "t = {t:.4}: ")?;
-        // In reverse order of the checks, which end at the first limit that is exceeded.
+        // In reverse order of the checks, which end at the first exceeded limit.
         let limits = [Limit::Jerk, Limit::LegRate, Limit::Acceleration, Limit::Velocity];
         let beyond = limits.into_iter().find(|limit| active_limits.contains(*limit));
         if let (DiagnosticCode::SetpointTooFast, Some(limit)) = (diagnostic.code, beyond) {

@@ -1,19 +1,19 @@
-//! Change of the rate of a motion's own time, from one to zero or back: so the platform comes to rest, and goes on, on the
-//! way that was checked, and not beside it.
+//! Change of the rate of a motion's own time, from one to zero or back. So the platform comes to rest, and
+//! continues, on the path that was checked.
 
 use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::model::task::TaskState;
 use crate::motion::minimum_jerk::{Profile, rise};
 
-/// Shortest change \[s\], the factor to the next longer one, and how many are tried: up to half a minute.
+/// Shortest change \[s\], factor to the next longer one, and number of candidates: up to half a minute.
 const SHORTEST_S: f64 = 0.1;
 const FACTOR: f64 = 1.4;
 const CANDIDATES: i32 = 17;
 
-/// Instants at which a candidate is compared with the limits.
+/// Instants at which a candidate is checked against the limits.
 const SAMPLES: u32 = 100;
 
-/// Share of each limit that a change may use. Instants between the samples have the rest.
+/// Share of each limit that a change may use. The rest is for the instants between the samples.
 const USABLE_SHARE: f64 = 0.98;
 
 /// Change of the rate of time.
@@ -23,18 +23,18 @@ pub struct RateChange {
     pub began_s: f64,
     /// Duration \[s\]; the motion's own time advances by half of it.
     pub duration_s: f64,
-    /// From zero to one.
+    /// Whether the rate rises from zero to one.
     pub is_rising: bool,
 }
 
 impl RateChange {
-    /// The shortest slowdown of a motion that keeps the limits of velocity, acceleration and jerk; the longest that is
-    /// tried, where none does.
+    /// The shortest slowdown that keeps the limits of velocity, acceleration and jerk; the longest candidate
+    /// if none does.
     pub fn to_rest(began_s: f64, limits: &Limits, at: impl Fn(f64) -> TaskState) -> Self {
         Self::shortest(began_s, false, limits, at)
     }
 
-    /// The same from rest.
+    /// The shortest return from rest, in the same way.
     pub fn from_rest(began_s: f64, limits: &Limits, at: impl Fn(f64) -> TaskState) -> Self {
         Self::shortest(began_s, true, limits, at)
     }
@@ -44,7 +44,7 @@ impl RateChange {
         (0..CANDIDATES).map(change).find(|change| change.keeps(limits, &at)).unwrap_or(change(CANDIDATES))
     }
 
-    /// The motion's own time so long after the beginning \[s\].
+    /// The motion's own time at a time since the beginning \[s\].
     pub fn own_time_s(&self, since_s: f64) -> f64 {
         let u = (since_s / self.duration_s).clamp(0.0, 1.0);
         let beyond_s = if self.is_rising { (since_s - self.duration_s).max(0.0) } else { 0.0 };
@@ -54,7 +54,7 @@ impl RateChange {
         self.began_s + self.duration_s * share + beyond_s
     }
 
-    /// X, X', X'' so long after the beginning \[s\].
+    /// X, X', X'' at a time since the beginning \[s\].
     pub fn at(&self, since_s: f64, at: impl FnOnce(f64) -> TaskState) -> TaskState {
         let Profile { value, rate, .. } = rise(since_s, self.duration_s);
         let (time_rate, time_accel) = if self.is_rising { (value, rate) } else { (1.0 - value, -rate) };
@@ -62,7 +62,7 @@ impl RateChange {
         TaskState { x, xd: xd * time_rate, xdd: xdd * (time_rate * time_rate) + xd * time_accel }
     }
 
-    /// Whether the rate is the new one.
+    /// Whether the rate has reached its new value.
     pub fn has_ended(&self, since_s: f64) -> bool {
         since_s >= self.duration_s
     }
@@ -99,7 +99,8 @@ mod tests {
     use crate::config::Config;
     use crate::motion::built_in::BuiltInMotion;
 
-    /// At every instant of a motion near its limits: the daemon's own rules accept the way to rest, and on from there.
+    /// At every instant of a motion near its limits, the daemon's own rules accept the path to rest and the
+    /// continuation.
     #[test]
     fn the_daemon_follows_a_slowdown_from_anywhere_and_on() {
         let config = Config::parse(DEFAULT_CONFIG, "a test").unwrap();

@@ -20,11 +20,11 @@ use crate::output::numbers::percent;
 /// Largest X' and X'' at the ends of a trajectory that count as at rest, per second.
 const MAX_REST_RATE: f64 = 1e-3;
 
-/// Largest ratio of the way by the rates to the way by the poses. Rows that are far apart may leave out a part of the way;
-/// a time in milliseconds makes a thousand.
+/// Largest ratio of the distance from the rates to the distance between the poses. Distant rows may leave out
+/// a part of the distance; a time in milliseconds gives a ratio of a thousand.
 const MAX_WAY_RATIO: f64 = 30.0;
 
-/// Least amplitude of a built-in motion, as a share of its usual one; a smaller motion is invisible.
+/// Smallest amplitude of a built-in motion, as a share of its usual one. A smaller motion is invisible.
 pub(super) const MIN_AMPLITUDE_SHARE: f64 = 1e-3;
 
 /// X, X', X'' as a function of time, from rest to rest.
@@ -35,7 +35,7 @@ pub enum Trajectory {
 }
 
 impl Trajectory {
-    /// A built-in motion, as large as the machine can carry and the daemon accepts.
+    /// A built-in motion, as large as the drives allow and the daemon accepts.
     pub fn built_in(config: &Config, motion: BuiltInMotion, seconds: f64) -> Result<Self, SetpointError> {
         let precheck = Precheck::new(config).with_reserve();
         let largest = fit(&config.machine, motion, seconds);
@@ -54,8 +54,8 @@ impl Trajectory {
         Ok(Self::BuiltIn(largest.smaller(share)))
     }
 
-    /// A trajectory from a CSV file, which must begin and end at rest, have times that increase, and be accepted by the
-    /// daemon.
+    /// A trajectory from a CSV file. It must begin and end at rest, its times must increase, and the daemon
+    /// must accept it.
     pub fn from_file(config: &Config, path: &Path) -> Result<Self, SetpointError> {
         let table = read_trajectory(path)?;
         let path = name_of(path);
@@ -64,7 +64,7 @@ impl Trajectory {
         Ok(trajectory)
     }
 
-    /// Reports each row on the way to which the daemon would refuse a setpoint.
+    /// Reports each row before which the daemon would refuse a setpoint.
     fn check(&self, config: &Config, table: &NumberTable, path: &Path) -> Result<(), TableError> {
         let precheck = Precheck::new(config);
         let times: Vec<f64> = table.rows().iter().map(|row| time(row)).collect();
@@ -77,7 +77,7 @@ impl Trajectory {
             |t| self.at(t - first),
             [first, last],
             |refusal| {
-                // The setpoint is that of the row after it, or of the last.
+                // The setpoint belongs to the row after it, or to the last row.
                 let row = times.partition_point(|time| *time < refusal.t);
                 let line = table.lines().get(row).or(table.lines().last());
                 if let Some(line) = line.filter(|line| reported != Some(**line)) {
@@ -90,7 +90,7 @@ impl Trajectory {
         errors.into_result()
     }
 
-    /// A trajectory from a table with its columns; error texts name it `path`.
+    /// A trajectory from a table with its columns. Error texts use the name `path`.
     pub fn from_rows(table: &NumberTable, path: &Path) -> Result<Self, SetpointError> {
         let mut errors = TableErrors::new(path);
         let knots: Vec<_> =
@@ -135,7 +135,7 @@ impl Trajectory {
     }
 }
 
-/// Way by the rates over way by the poses, if it is too large to belong to the same motion.
+/// Ratio of the distance from the rates to the distance between the poses, if it is too large for one motion.
 fn way_ratio(knots: &[Knot]) -> Option<f64> {
     let (mut by_rates, mut by_poses) = (0.0, 0.0);
     for (a, b) in knots.iter().zip(knots.iter().skip(1)) {

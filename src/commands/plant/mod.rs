@@ -1,9 +1,9 @@
-//! `hexad plant`: the simulated platform as a process of its own, in real time or in lock-step.
+//! `hexad plant`: the simulated platform as a separate process, in real time or in lock-step.
 //!
-//! In real time its ticks are the multiples of the period. At each tick it simulates the time since the last one, with
-//! every force applied from the instant its message was sent, as a drive would; then it publishes lengths and rates. A
-//! force is applied no longer than `plant.force_timeout_ms` after it was sent, and only if its message is valid
-//! (`validation`).
+//! In real time its ticks are the multiples of the period. At each tick it simulates the time since the last
+//! tick and applies every force from the instant at which its message was sent, as a drive would. Then it
+//! publishes lengths and rates. A force is applied for at most `plant.force_timeout_ms` after it was sent,
+//! and only if its message is valid (`validation`).
 
 use std::time::Instant;
 
@@ -35,14 +35,14 @@ use crate::realtime::stop_request::Stop;
 mod other_driver;
 mod validation;
 
-/// Forces kept between two ticks: 12.8 ms at 20 kHz, so that a late plant still applies each in its turn.
+/// Forces kept between two ticks: 12.8 ms at 20 kHz. A late plant then still applies each force in order.
 const FORCE_DEPTH: usize = 256;
 
 /// A bit for each leg.
 const ALL_LEGS: u32 = (1 << LEGS) - 1;
 
-/// After a longer pause (the process was stopped) simulated time continues from now, instead of a second of simulation
-/// that all participants would wait for.
+/// Longest pause that is simulated \[ns\]. After a longer one (the process was stopped) simulated time
+/// continues from now, because all participants would wait for the simulation.
 const MAX_PAUSE_NS: u64 = 1_000_000_000;
 
 /// Error that prevents or ends a plant.
@@ -88,7 +88,7 @@ fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortE
             plant.time_ns = tick_ns;
         }
         let before = plant.hardware.simulator().brakes();
-        // A force sent after this tick waits for the next one.
+        // A force sent after this tick is applied at the next one.
         while let Some(message) = pending.take().or_else(|| forces.receive()) {
             if (tick_ns + 1..=monotonic_ns()).contains(&message.header.time_ns) {
                 pending = Some(message);
@@ -102,7 +102,7 @@ fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortE
         plant.advance_to(tick_ns);
         log_brakes(before, plant.hardware.simulator().brakes(), plant.code);
         measured.publish(tick_ns, plant.measure())?;
-        // The newest grid point that is not in the future, or else the next.
+        // The newest grid point that is not in the future, or the next one.
         let now_ns = monotonic_ns();
         tick_ns = grid.next_after(tick_ns.max(now_ns.saturating_sub(grid.period_ns())));
     }
@@ -110,8 +110,8 @@ fn run_in_real_time(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortE
     Ok(())
 }
 
-/// In simulated time, which begins at zero: a force acts from the instant of the measurement that it responds to. The
-/// port validates the response; it cannot be old.
+/// Runs in simulated time, which begins at zero. A force acts from the instant of the measurement that it
+/// responds to. The port validates the response; it cannot be old.
 fn run_in_lockstep(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortError> {
     let mut forces = bus.subscriber(FORCE_DEPTH)?;
     let mut measured = bus.publisher()?;
@@ -130,7 +130,7 @@ fn run_in_lockstep(config: &Config, bus: &Bus, stop: &Stop) -> Result<(), PortEr
     Ok(())
 }
 
-/// Publishes a measurement, repeatedly, until the force of its instant arrives, or until `stop`.
+/// Publishes a measurement repeatedly until the force of its instant arrives, or until `stop`.
 fn exchange(
     measured: &mut Publisher<MeasuredMessage>,
     forces: &mut Subscriber<ForceMessage>,
@@ -157,15 +157,15 @@ fn exchange(
 struct DrivenPlant {
     hardware: Hardware,
     time_ns: u64,
-    /// Forces and the instant they expire.
+    /// Forces, and the instant at which they expire.
     force: Option<([f64; LEGS], u64)>,
-    /// Why the newest message contains no valid force.
+    /// Reason why the newest message contains no valid force.
     code: DiagnosticCode,
     timeout_ns: u64,
 }
 
 impl DrivenPlant {
-    /// At rest at home, brakes closed.
+    /// Plant at rest at home, with closed brakes.
     fn new(config: &Config, time_ns: u64) -> Self {
         let hardware = hardware(config);
         log_terms(config, hardware.simulator().terms());
@@ -174,7 +174,7 @@ impl DrivenPlant {
         Self { hardware, time_ns, force: None, code: DiagnosticCode::None, timeout_ns }
     }
 
-    /// Applies a message from the instant it was sent.
+    /// Applies the force of a message from the instant at which it was sent.
     fn apply(&mut self, message: &ForceMessage) {
         self.advance_to(message.header.time_ns);
         self.code = DiagnosticCode::from_number(message.diagnostic_code).unwrap_or_default();
@@ -219,7 +219,7 @@ impl DrivenPlant {
         }
     }
 
-    /// What drives report: enabled while a valid force is commanded, the brakes and the forces as they are.
+    /// Status of the drives: enabled while a valid force is commanded, with the present brakes and forces.
     fn drive_status(&self) -> DriveStatus {
         let simulator = self.hardware.simulator();
         let all_if = |is_set: bool| Some(if is_set { ALL_LEGS } else { 0 });
@@ -244,7 +244,7 @@ pub fn hardware(config: &Config) -> Hardware {
     )
 }
 
-/// Logs what is simulated beyond the model, and which of it is left out by the tolerance.
+/// Logs the effects simulated beyond the model, and those omitted by the tolerance.
 fn log_terms(config: &Config, terms: &PlantTerms) {
     let plant = &config.deployment.plant;
     if plant.imperfections == (Imperfections { seed: plant.imperfections.seed, ..Imperfections::default() }) {
@@ -279,8 +279,8 @@ fn log_brakes(before: Brakes, now: Brakes, code: DiagnosticCode) {
     }
 }
 
-/// Best effort: a simulator or a setpoint source below the daemon's priority, so that on a busy host it
-/// is as punctual as hardware.
+/// Prepares the thread as well as permitted: a simulator or a setpoint source below the daemon's priority, so
+/// that on a busy host it is as punctual as hardware.
 pub(super) fn prepare_thread(config: &Config) {
     scheduling::set_shortest_timer_slack();
     if let Err(shortfall) = scheduling::fifo_priority((config.deployment.realtime.io_priority - 1).max(1)) {

@@ -1,4 +1,4 @@
-//! Search for a driver that lives: two at once would both move the platform, and only one would be measured.
+//! Search for a living driver. Two at once would both move the platform, and only one would be measured.
 
 use std::thread;
 use std::time::{Duration, Instant};
@@ -8,14 +8,14 @@ use crate::daemon::process_names::named;
 use crate::messages::lockstep::REPEAT_INTERVAL;
 use crate::messages::{Bus, LeasedSubscriber, MeasuredMessage, PortError};
 
-/// Shortest time without a message in which there is no driver: longer than a busy host delays one. In lock-step a plant that
-/// waits repeats its message within it.
+/// Shortest time without a message after which no driver is assumed: longer than a busy host delays one. In
+/// lock-step a waiting plant repeats its message within it.
 const LISTENING_TIME: Duration = REPEAT_INTERVAL.saturating_mul(2);
-/// The same in periods of the loop, for slow loops.
+/// The shortest time in periods of the loop, for slow loops.
 const LISTENING_PERIODS: f64 = 3.0;
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
-/// The process that publishes measurements of a machine, if one does.
+/// The process that publishes measurements of a machine, if there is one.
 pub fn other_driver(config: &Config, bus: &Bus) -> Result<Option<String>, PortError> {
     let mut measured: LeasedSubscriber<MeasuredMessage> = bus.leased_subscriber(1, u64::MAX)?;
     let period_s = config.deployment.realtime.period_s();

@@ -1,8 +1,8 @@
 //! Validation of force messages: which of them the plant applies.
 //!
-//! A rejected message has no effect: the force before it expires by its own age, and then the brakes close. So a bad
-//! message never refreshes the watchdog, and one among good ones does no harm. The port validates schema, checksum and
-//! sequence, before a damaged epoch could take precedence over a good one.
+//! A rejected message has no effect: the last force expires by its own age, and then the brakes close. So a
+//! bad message never refreshes the watchdog, and a bad one among good ones does no harm. The port validates
+//! schema, checksum and sequence, before a damaged epoch could take precedence over a good one.
 
 use tracing::warn;
 
@@ -36,7 +36,7 @@ impl ForceValidation {
         !is_old && !is_future
     }
 
-    /// Takes over the counts of the port, and logs reasons that are new.
+    /// Adopts the counts of the port, and logs new reasons.
     pub fn update(&mut self, rejected: RejectionCounts) {
         let RejectionCounts { schema, other_publisher, repeated, damaged } = rejected;
         let [of_schema, of_damaged, of_older, of_repeated, ..] = &mut self.counts;

@@ -1,4 +1,4 @@
-//! Which cycles of a recording missed a deadline, as the loop counts them ([`crate::realtime::cyclic`]).
+//! Cycles of a recording that missed a deadline, counted as the loop does ([`crate::realtime::cyclic`]).
 
 use crate::config::Config;
 use crate::daemon::timing;
@@ -8,35 +8,36 @@ use crate::realtime::cyclic::{ReleaseMode, Timing, is_overrun};
 /// Deadlines that a cycle missed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Missed {
-    /// It was waited for, and began later after its release than the threshold.
+    /// The thread waited for the release, and began later after it than the threshold.
     pub is_late: bool,
-    /// It began before its next release and was still computing at it.
+    /// The cycle began before its next release and was still computing at it.
     pub is_overrun: bool,
 }
 
-/// Judges consecutive cycles.
+/// Evaluation of consecutive cycles.
 pub struct Deadlines {
     timing: Timing,
-    /// Number of the cycle before, and the instant at which it was done \[ns\].
+    /// Number of the previous cycle, and the instant of its end \[ns\].
     before: Option<(u64, u64)>,
 }
 
 impl Deadlines {
-    /// As a configuration sets them.
+    /// Evaluation by the settings of a configuration.
     pub fn new(config: &Config) -> Self {
         Self { timing: timing(&config.deployment), before: None }
     }
 
-    /// Whether cycles are released by a grid of instants: only then a release can be skipped.
+    /// Whether cycles are released by a grid of instants. Only then a release can be skipped.
     pub fn has_grid(&self) -> bool {
         matches!(self.timing.release, ReleaseMode::Sleep | ReleaseMode::Hybrid)
     }
 
-    /// Judges the next cycle.
+    /// Evaluates the next cycle.
     pub fn check(&mut self, cycle: &CycleMessage) -> Missed {
         let period_ns = self.timing.period_ns.max(1);
         let CycleMessage { due_ns, wakeup_ns, compute_ns, .. } = *cycle;
-        // A cycle that was held for whole periods runs for the last release before it; its wake-up counts from the first.
+        // A cycle held for whole periods runs for the last release before it. Its wake-up latency counts from
+        // the first.
         let skipped = if self.has_grid() { self.timing.on_overrun.skipped(wakeup_ns / period_ns) } else { 0 };
         let behind_ns = wakeup_ns - skipped * period_ns;
         let first_due_ns = due_ns.saturating_sub(skipped * period_ns);
@@ -54,7 +55,8 @@ impl Deadlines {
 mod tests {
     use super::*;
 
-    /// Cycles `(due, wake-up, computation)` \[µs\] at 1 kHz with a policy; which are late and which overruns.
+    /// Evaluates cycles `(due, wake-up, computation)` \[µs\] at 1 kHz with a policy. Returns which are late
+    /// and which overrun.
     fn judged(policy: &str, cycles: &[[u64; 3]]) -> Vec<(bool, bool)> {
         let text = include_str!("../../../config/fried2008.toml");
         let realtime = format!("rate_hz = 1000\nlate_wakeup_us = 200\n{policy}");
@@ -71,7 +73,8 @@ mod tests {
 
     #[test]
     fn a_cycle_held_for_whole_periods_is_late_and_no_overrun() {
-        // The second woke 2.3 ms late, for the release 0.3 ms before; the third computed beyond its next release.
+        // The second woke 2.3 ms late, 0.3 ms after the release for which it ran; the third computed beyond
+        // its next release.
         let cycles = [[1000, 20, 10], [4000, 2300, 10], [5000, 20, 1500], [7000, 20, 979], [8000, 20, 980]];
         let expected = [(false, false), (true, false), (false, true), (false, false), (false, true)];
         assert_eq!(judged("on_overrun = \"skip\"", &cycles), expected);

@@ -1,4 +1,4 @@
-//! The head of a page: everything but the samples, as JSON.
+//! Head of a page as JSON: everything except the samples.
 
 use std::collections::BTreeMap;
 
@@ -46,13 +46,13 @@ pub struct Events<'a> {
 }
 
 impl<'a> Events<'a> {
-    /// Of a run.
+    /// Events of a run.
     pub fn new(run: &Run, history: &'a History) -> Self {
         Self { facts: facts(run), tracks: history.tracks(), distributions: history.distributions() }
     }
 }
 
-/// A level: instants \[s\], and where its samples begin.
+/// Head of a level: instants \[s\], and where its samples begin.
 #[derive(Serialize)]
 struct LevelHead {
     from: f64,
@@ -91,7 +91,7 @@ pub fn of_recording(run: &Run, extents: &[Extent], kept: &str) -> String {
     })
 }
 
-/// Head of a page that a server feeds.
+/// Head of a page with data from a server.
 pub fn of_live(config: &Config) -> String {
     json(&Head { is_live: true, ..head(config, Events::default()) })
 }
@@ -126,7 +126,7 @@ fn machine(machine: &Machine) -> MachineHead {
     MachineHead { base, platform, home: machine.home, gravity: machine.gravity.into() }
 }
 
-/// As JSON; numbers without a value are null.
+/// Text as JSON. Numbers without a value are null.
 pub fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }

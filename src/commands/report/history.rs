@@ -30,18 +30,18 @@ pub struct Bars {
     pub name: &'static str,
     /// Percentiles.
     pub times: Times,
-    /// Upper end of each bar \[µs\], and how many cycles are in it; none where only the percentiles are known.
+    /// Upper end of each bar \[µs\] with its number of cycles; empty if only the percentiles are available.
     pub bars: Vec<(f64, u64)>,
 }
 
 /// Fault of a run.
 #[derive(Clone, Debug)]
 pub struct Fault {
-    /// Index of its cycle.
+    /// Index of the cycle.
     pub index: u64,
-    /// Its instant \[s\].
+    /// Instant of the cycle \[s\].
     pub t: f64,
-    /// The diagnostic in a sentence.
+    /// The diagnostic as a sentence.
     pub text: String,
 }
 
@@ -62,7 +62,7 @@ pub struct History {
     /// Number of cycles in each state.
     in_state: [u64; State::ALL.len()],
     states: Track,
-    /// Number of the configuration and what changed with it, where there are several.
+    /// Number of the configuration and its changes, if there are several.
     configuration: Option<(u32, String)>,
     configurations: Track,
     diagnostics: Track,
@@ -77,14 +77,14 @@ pub struct History {
     worst_time: (u64, u64),
 }
 
-/// Most changes of state around which every cycle is of interest.
+/// Largest number of state changes around which every cycle is kept.
 const MAX_CHANGES: usize = 64;
 
 impl History {
-    /// Without cycles.
+    /// History without cycles.
     pub fn new(config: &Config) -> Self {
         let period_s = config.deployment.realtime.period_s();
-        // Cycles follow each other, however much their releases vary.
+        // Consecutive cycles, however much their releases vary, are one interval.
         let gap = 1.5 * period_s;
         let missed = ["late wake-up", "overrun", "release skipped", "inputs late"];
         Self {
@@ -97,7 +97,7 @@ impl History {
             faults: vec![],
             tracking: TrackingSum::default(),
             in_state: [0; State::ALL.len()],
-            // A state lasts until the next one, also where releases are skipped.
+            // A state lasts until the next one, even if releases are skipped.
             states: Track::new("state", "state", f64::INFINITY),
             configuration: None,
             configurations: Track::new("configuration", "configuration", f64::INFINITY),
@@ -114,13 +114,14 @@ impl History {
         }
     }
 
-    /// Another configuration holds from the next cycle on; `changes` are those of the reload, empty for the first.
+    /// Begins another configuration with the next cycle. `changes` are those of the reload, empty for the
+    /// first.
     pub fn begin_configuration(&mut self, number: u32, changes: &str) {
         let text = if changes.is_empty() { "as started".into() } else { format!("reloaded: {changes}") };
         self.configuration = Some((number, text));
     }
 
-    /// Instant of a cycle \[s\], from the first one.
+    /// Instant of a cycle \[s\], since the first one.
     pub fn seconds(&self, cycle: &CycleMessage) -> f64 {
         seconds_between(self.first.release_ns, cycle.release_ns)
     }
@@ -145,7 +146,7 @@ impl History {
         self.seconds(&self.last)
     }
 
-    /// Adds the next cycle. False if it is not later than those before.
+    /// Adds the next cycle. False if it is not later than the previous ones.
     pub fn add(&mut self, cycle: &CycleMessage) -> bool {
         if self.cycles == 0 {
             (self.first, self.last) = (*cycle, *cycle);
@@ -244,7 +245,7 @@ impl History {
         }
     }
 
-    /// Tracks that have at least one interval, states first. Every interval ends where its last cycle does.
+    /// Tracks with at least one interval, states first. Every interval ends with its last cycle.
     pub fn tracks(&self) -> Vec<&Track> {
         let limits = self.limits.iter().map(|(_, track)| track);
         let all =
@@ -266,7 +267,7 @@ impl History {
         State::ALL.into_iter().zip(lengths).filter(|(_, length)| *length > 0.0).collect()
     }
 
-    /// Adds late wake-ups and overruns that a daemon has counted before an instant \[s\].
+    /// Adds late wake-ups and overruns counted by a daemon before an instant \[s\].
     pub fn add_counted(&mut self, t: f64, late_wakeups: u64, overruns: u64) {
         let [late, overrun, ..] = &mut self.missed;
         for (track, number) in [(late, late_wakeups), (overrun, overruns)] {
@@ -277,7 +278,7 @@ impl History {
         }
     }
 
-    /// Forgets the intervals that ended before an instant \[s\].
+    /// Drops the intervals that ended before an instant \[s\].
     pub fn forget_before(&mut self, t: f64) {
         let limits = self.limits.iter_mut().map(|(_, track)| track);
         let all = [&mut self.states, &mut self.diagnostics, &mut self.requests, &mut self.lost_track];
@@ -300,8 +301,8 @@ impl History {
         [wakeup.histogram.times(), compute.histogram.times()]
     }
 
-    /// Indices of the cycles around which every cycle is of interest, the most important first: faults, the largest tracking
-    /// error, the latest output, changes of state.
+    /// Indices of the cycles around which every cycle is kept, the most important first: faults, the largest
+    /// tracking error, the latest output, changes of state.
     pub fn events(&self) -> Vec<u64> {
         let worst = [self.worst_error.1, self.worst_time.1];
         self.faults.iter().map(|fault| fault.index).chain(worst).chain(self.changes.iter().copied()).collect()

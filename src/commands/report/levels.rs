@@ -1,23 +1,23 @@
-//! A recording as a file that a page can hold: the smallest and the largest value of every signal in equal stretches of
-//! time, in several levels.
+//! Reduction of a recording to the size of a page: the smallest and the largest value of every signal in equal
+//! intervals, in several levels.
 //!
-//! A level has the whole recording, or a window of it. Its sample stands for `step` cycles; two samples are the extremes of
-//! the `2 step` cycles they cover, in the order in which they occurred, so no peak is lost and a line through the samples
-//! stays within the signal. With `step = 1` every cycle is a sample.
+//! A level covers the whole recording, or a window of it. A sample covers `step` cycles. Two samples are the extremes of
+//! their `2 step` cycles, in the order in which they occurred, so no peak is lost and a line through the samples stays
+//! within the signal. With `step = 1` every cycle is a sample.
 
 use super::signals::{COLUMNS, Row};
 
-/// Samples of the level that is drawn first: two for each pixel of a wide chart.
+/// Samples of the level that is drawn first, two per pixel of a wide chart.
 const OVERVIEW_SAMPLES: u64 = 3000;
 
-/// Half of a window around an event in which every cycle is kept \[s\]: a fault and what led to it.
+/// Half of a window around an event in which every cycle is kept \[s\]: a fault and its causes.
 const HALF_WINDOW_S: f64 = 0.5;
 
-/// Share of the size for windows, in reciprocal, and number of windows that fit at least.
+/// Reciprocal of the share of the size for windows, and least number of windows that fit.
 const WINDOWS_SHARE: u64 = 2;
 const LEAST_WINDOWS: u64 = 6;
 
-/// Where a level lies in a recording.
+/// Extent of a level in a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
     /// Index of its first cycle on the grid of the releases.
@@ -29,28 +29,28 @@ pub struct Extent {
 }
 
 impl Extent {
-    /// Of all cycles, in about so many samples.
+    /// Extent of all cycles, in about `samples` samples.
     fn whole(span: u64, samples: u64) -> Self {
         let step = span.div_ceil(samples.max(1)).max(1);
-        // An even number: pairs of extremes.
+        // Even, because samples are pairs of extremes.
         Self { first: 0, step, samples: span.div_ceil(step).next_multiple_of(2) }
     }
 
-    /// Index behind its last cycle.
+    /// Index after its last cycle.
     pub fn end(&self) -> u64 {
         self.first + self.step * self.samples
     }
 }
 
-/// Chooses the levels of a recording of `span` cycles that fit into a number of bytes: a coarse one, one of the whole
-/// recording as fine as possible, and every cycle around the events, the most important of which come first.
+/// Chooses the levels of a recording of `span` cycles that fit into `bytes`: a coarse one, one of the whole
+/// recording as fine as possible, and every cycle around the events. The most important events come first.
 pub fn plan(span: u64, events: &[u64], rate_hz: f64, bytes: usize) -> Vec<Extent> {
     let budget = (bytes / (COLUMNS * size_of::<f32>())) as u64;
     let overview = Extent::whole(span, OVERVIEW_SAMPLES);
     if overview.step == 1 {
         return vec![overview];
     }
-    // Less one, as the number of samples is even.
+    // One less, because the number of samples is even.
     let rest = budget.saturating_sub(overview.samples + 1);
     if span < rest {
         return vec![overview, Extent::whole(span, span)];
@@ -74,13 +74,13 @@ pub fn plan(span: u64, events: &[u64], rate_hz: f64, bytes: usize) -> Vec<Extent
 
 /// A level with its samples, column by column.
 pub struct Level {
-    /// Where it lies.
+    /// Extent of the level.
     pub extent: Extent,
     samples: Vec<f32>,
 }
 
 impl Level {
-    /// Without any cycle: all numbers are NaN.
+    /// Level without cycles: all numbers are NaN.
     pub fn new(extent: Extent) -> Self {
         Self { extent, samples: vec![f32::NAN; extent.samples as usize * COLUMNS] }
     }
@@ -110,13 +110,13 @@ impl Level {
             .filter_map(move |column| column.get(sample).copied())
     }
 
-    /// The samples, column by column, as numbers of four bytes, the lowest byte first.
+    /// The samples, column by column, as little-endian numbers of four bytes.
     pub fn bytes(&self) -> impl Iterator<Item = u8> {
         self.samples.iter().flat_map(|number| number.to_le_bytes())
     }
 }
 
-/// Of the two extremes so far, in the order of their instants, and a later number the two extremes.
+/// Replaces the two extremes, in the order of their instants, by the extremes of both and a later number.
 fn keep_extremes(earlier: &mut f32, later: &mut f32, number: f32) {
     if number.is_nan() {
         return;
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn no_peak_is_lost_and_extremes_stay_in_order() {
         let mut level = Level::new(Extent { first: 10, step: 3, samples: 4 });
-        // Six cycles for each pair; one cycle of the second pair, before the level, behind it.
+        // Six cycles per pair. One cycle of the second pair, one before the level, one after it.
         for (index, number) in
             [(9, 99.0), (10, 1.0), (11, 5.0), (12, -2.0), (13, 0.0), (15, 4.0), (17, 7.0), (22, 99.0)]
         {

@@ -23,8 +23,8 @@ pub mod signals;
 pub mod summary;
 pub mod track;
 
-/// Most samples of a page \[bytes\]; a third more as text. Such a page still fits into an e-mail, and a browser decodes it in
-/// a tenth of a second.
+/// Bound on the samples of a page \[bytes\]; as text they take a third more. Such a page fits into an e-mail,
+/// and a browser decodes it in a tenth of a second.
 const MAX_SAMPLE_BYTES: usize = 12_000_000;
 
 #[derive(Debug, Args)]
@@ -59,7 +59,7 @@ impl ReportArguments {
     }
 }
 
-/// Writes the page of a run that is recorded in some files; returns what it contains, in words.
+/// Writes the page of a run from its files. Returns a description of the content.
 pub fn write(recordings: &[PathBuf], output: &Path) -> Result<String, ReportError> {
     let run = Run::read(recordings)?;
     let levels = run.levels(MAX_SAMPLE_BYTES)?;
@@ -91,7 +91,7 @@ fn kept(extents: &[Extent], span: u64, config: &Config) -> String {
     }
 }
 
-/// Recordings in a folder whose names begin so, the oldest first.
+/// Recordings in a folder whose names have a prefix, the oldest first.
 pub fn recordings_in(folder: &Path, beginning: &str) -> Vec<PathBuf> {
     let Ok(entries) = fs::read_dir(folder) else { return vec![] };
     let names = entries.flatten().map(|entry| entry.path());

@@ -1,14 +1,15 @@
-//! The reference of a recording at any instant: its cycles have it at the end of the hold of their forces.
+//! The reference of a recording at any instant. A cycle contains the reference at the end of the hold of its
+//! force.
 
 use std::collections::VecDeque;
 
 use crate::control::signals::time::seconds_between;
 use crate::model::rigid::{Acceleration, Motion, Twist};
 
-/// References kept: more periods than a measurement is old.
+/// Number of references kept: more periods than the age of any measurement.
 const KEPT: usize = 256;
 
-/// Longest time between references that belong together \[s\].
+/// Longest time between consecutive references of one motion \[s\].
 const MAX_INTERVAL_S: f64 = 0.1;
 
 /// The last references with their instants \[ns\].
@@ -18,7 +19,7 @@ pub struct References {
 }
 
 impl References {
-    /// Adds the reference at a later instant; those before a pause, or before control ended, count no more.
+    /// Adds the reference at a later instant. Drops the references before a pause or the end of control.
     pub fn add(&mut self, instant_ns: u64, motion: Option<&Motion>) {
         let is_continued = |(before_ns, _): &(u64, Motion)| {
             let interval_s = seconds_between(*before_ns, instant_ns);
@@ -33,8 +34,8 @@ impl References {
         self.motions.extend(motion.map(|motion| (instant_ns, *motion)));
     }
 
-    /// The reference at an instant: with constant jerk from one to the next, as the controller moves it; with constant
-    /// acceleration before the first and behind the last.
+    /// The reference at an instant: with constant jerk between two references, as the controller moves it;
+    /// with constant acceleration before the first and after the last.
     pub fn at(&self, instant_ns: u64) -> Option<Motion> {
         let behind = self.motions.partition_point(|(begin_ns, _)| *begin_ns <= instant_ns);
         let (begin_ns, motion) = self.motions.get(behind.saturating_sub(1))?;

@@ -1,4 +1,4 @@
-//! A run in its files, over changes of the configuration.
+//! A run in its files, including changes of the configuration.
 
 use std::path::PathBuf;
 
@@ -13,17 +13,17 @@ use crate::recording::{Item, RecordingError, RunInfo};
 
 /// Part of a run with one configuration.
 pub struct Part {
-    /// What its files say about themselves.
+    /// Information in the head of its files.
     pub info: RunInfo,
     /// The configuration.
     pub config: Config,
-    /// In the order of time.
+    /// Files in the order of time.
     files: Vec<PathBuf>,
     /// Number of the first cycle in the files.
     pub first_cycle: u64,
-    /// Its instant \[s\], from the first of the run.
+    /// Instant of that cycle \[s\], since the first of the run.
     pub from_s: f64,
-    /// What the reload has changed, in words; empty for the first part.
+    /// Changes of the reload, as text; empty for the first part.
     pub changes: String,
 }
 
@@ -31,12 +31,12 @@ pub struct Part {
 pub struct Run {
     first: Part,
     later: Vec<Part>,
-    /// What happened.
+    /// History of the run.
     pub history: History,
 }
 
 impl Run {
-    /// Reads what happened. All files must be of one run of a daemon.
+    /// Reads the history. All files must be of one run of a daemon.
     pub fn read(recordings: &[PathBuf]) -> Result<Self, ReportError> {
         let mut files = vec![];
         for path in recordings {
@@ -93,7 +93,7 @@ impl Run {
         Ok(())
     }
 
-    /// What the first files say about themselves.
+    /// Information in the head of the first files.
     pub fn info(&self) -> &RunInfo {
         &self.first.info
     }
@@ -108,7 +108,7 @@ impl Run {
         core::iter::once(&self.first).chain(&self.later)
     }
 
-    /// The samples that are kept, in so many bytes at most.
+    /// The samples kept, in at most `max_bytes`.
     pub fn levels(&self, max_bytes: usize) -> Result<Vec<Level>, ReportError> {
         let history = &self.history;
         let rate_hz = self.config().deployment.realtime.rate_hz;
@@ -132,7 +132,7 @@ impl Run {
         Ok(levels)
     }
 
-    /// The configuration as the daemon read it; of several, each below a line that says from when on it held.
+    /// The configuration as the daemon read it. Each of several is preceded by a line with its time.
     pub fn configurations(&self) -> String {
         if self.later.is_empty() {
             return self.config().text.clone();
@@ -146,7 +146,7 @@ impl Run {
 }
 
 impl Part {
-    /// With its first file, behind another part.
+    /// Part with its first file, after another part.
     fn new(path: PathBuf, summary: Summary, before: Option<&Self>) -> Result<Self, ReportError> {
         let Summary { info, first, .. } = summary;
         let config = Config::parse(&info.configuration, "configuration of the recording")?;
@@ -157,8 +157,8 @@ impl Part {
     }
 }
 
-/// Whether files are of one run of a daemon: their clocks differ by the same time, to the nanosecond. A reload changes the
-/// configuration, and with it the fidelity.
+/// Whether files are of one run of a daemon: the offset of their clocks is equal to the nanosecond. A reload
+/// may change the configuration, and with it the fidelity.
 fn is_of_run(info: &RunInfo, other: &RunInfo) -> bool {
     let of_run = |info: &RunInfo| {
         let RunInfo { name, version, commit, instruction_set, clock_offset_ns, .. } = info.clone();

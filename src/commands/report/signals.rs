@@ -1,4 +1,4 @@
-//! The curves of a page: numbers of one cycle, in the units in which they are drawn.
+//! Signals of a page: numbers of one cycle, in the units in which they are drawn.
 
 use super::references::References;
 use crate::config::Config;
@@ -13,9 +13,9 @@ use crate::model::machine::Machine;
 use crate::model::rigid::{Pose, Twist};
 use crate::model::task::task_coordinates;
 
-/// Names of the signals and their components, in the order of a [`Row`]. `_ref` is the reference of the controller at the
-/// instant of what it is compared with: of the measurement, of the middle between two of them for accelerations, and of the
-/// middle of the hold for forces.
+/// Names of the signals and numbers of their components, in the order of a [`Row`]. `_ref` is the reference
+/// of the controller at the instant of the compared quantity: of the measurement; of the middle between two
+/// measurements for accelerations; of the middle of the hold for forces.
 pub const SIGNALS: &[(&str, usize)] = &[
     ("angle", 3),
     ("position", 3),
@@ -56,14 +56,14 @@ pub type Row = [f32; COLUMNS];
 /// Instants after the release of a cycle \[ns\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CycleInstants {
-    /// Of its reference: the end of the hold of its force.
+    /// Instant of the reference: the end of the hold of its force.
     pub reference_ns: u64,
-    /// The middle of that hold.
+    /// Instant of the force: the middle of that hold.
     pub force_ns: u64,
 }
 
 impl CycleInstants {
-    /// Of a controller.
+    /// Instants of a controller.
     pub fn of_controller(config: &Config) -> Self {
         let period_ns = nanoseconds(config.deployment.realtime.period_s());
         let begin_ns = nanoseconds(config.deployment.drive.total_delay_s());
@@ -77,7 +77,7 @@ pub struct Signals<'a> {
     instants: CycleInstants,
     references: References,
     model: InverseDynamics,
-    /// Instant of the measurement \[ns\], twist and rates of the legs of the cycle before.
+    /// Previous cycle: instant of the measurement \[ns\], twist, rates of the legs.
     before: Option<(u64, [f64; 6], [f64; LEGS])>,
 }
 
@@ -88,7 +88,7 @@ impl<'a> Signals<'a> {
         Self { machine, instants, references: References::default(), model, before: None }
     }
 
-    /// Row of a cycle. Accelerations are differences to the measurement before.
+    /// Row of a cycle. Accelerations are differences from the previous measurement.
     pub fn row(&mut self, cycle: &CycleMessage) -> Row {
         let mut row = Numbers::default();
         let output = cycle.output().unwrap_or_default();
@@ -112,7 +112,7 @@ impl<'a> Signals<'a> {
         let (mut accelerations, mut leg_accelerations) = (none, none);
         let mut middle_ns = instant_ns;
         if let Some((before_ns, twist_before, rates_before)) = self.before {
-            // Without a new measurement there is no change.
+            // Without a new measurement there is no difference.
             let dt = seconds_between(before_ns, cycle.measured_time_ns);
             let dt = if dt > 0.0 { dt } else { f64::NAN };
             middle_ns = if dt > 0.0 { before_ns.midpoint(cycle.measured_time_ns) } else { instant_ns };
@@ -156,7 +156,7 @@ pub fn norms(displacement: &Twist) -> (f64, f64) {
     (displacement.linear.norm(), displacement.angular.norm())
 }
 
-/// The angular half in degrees.
+/// Converts the angular half to degrees.
 fn degrees([a, b, c, x, y, z]: [f64; 6]) -> [f64; 6] {
     [a.to_degrees(), b.to_degrees(), c.to_degrees(), x, y, z]
 }
@@ -170,7 +170,7 @@ fn rate_of_change(before: [f64; 6], after: [f64; 6], dt: f64) -> [f64; 6] {
     difference(after, before).map(|change| change / dt)
 }
 
-/// A row in the making.
+/// A row under construction.
 struct Numbers {
     row: Row,
     next: usize,
@@ -219,7 +219,7 @@ mod tests {
         SIGNALS.iter().take_while(|(other, _)| *other != name).map(|(_, components)| components).sum()
     }
 
-    /// A platform that follows its reference exactly, measured 1.7 ms before the release.
+    /// The platform follows its reference exactly and is measured 1.7 ms before the release.
     #[test]
     fn the_reference_is_that_of_the_instant_of_the_measurement() {
         const AGE_NS: u64 = 1_700_000;
@@ -253,7 +253,8 @@ mod tests {
             if number < 15 {
                 continue;
             }
-            // As many digits as the numbers of a page have; without alignment the lengths differ by 0.4 mm.
+            // The tolerance is the resolution of the numbers of a page. Without alignment the lengths would
+            // differ by 0.4 mm.
             for (signal, components, tolerance) in [
                 ("position", 3, 1e-6),
                 ("angle", 3, 1e-5),

@@ -1,4 +1,4 @@
-//! A run in words.
+//! Summary of a run as text.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use super::run::Run;
 use crate::config::Config;
 use crate::messages::Times;
 
-/// Most faults that are described; the axis of time shows all.
+/// Largest number of faults described. The time axis shows all.
 const MAX_FAULTS: usize = 20;
 
 /// A fact about the run.
@@ -15,13 +15,13 @@ const MAX_FAULTS: usize = 20;
 pub struct Fact {
     /// Its subject.
     pub name: &'static str,
-    /// In words.
+    /// Text of the fact.
     pub text: String,
     /// Whether it needs attention.
     pub is_bad: bool,
 }
 
-/// The run in words.
+/// Facts of a complete run.
 pub fn facts(run: &Run) -> Vec<Fact> {
     let (config, info, history) = (run.config(), run.info(), &run.history);
     let commit = if info.commit.is_empty() { "unknown" } else { &info.commit };
@@ -35,7 +35,7 @@ pub fn facts(run: &Run) -> Vec<Fact> {
     facts
 }
 
-/// The run so far in words; `times` are those of wake-up and computation.
+/// Facts of the run so far. `times` are those of wake-up and computation.
 pub fn live_facts(config: &Config, history: &History, times: &[Times; 2]) -> Vec<Fact> {
     let good = |name, text| Fact { name, text, is_bad: false };
     let rate_hz = config.deployment.realtime.rate_hz;
@@ -93,7 +93,7 @@ fn missed(config: &Config, history: &History) -> Fact {
     Fact { name: "Missed deadlines", text, is_bad: overruns + skipped > 0 }
 }
 
-/// Times of wake-up and computation in words.
+/// Text of the times of wake-up and computation.
 fn times_in_words([wakeup, compute]: &[Times; 2]) -> String {
     let words = |times: &Times| {
         let [p50, p99, max] = [times.p50, times.p99, times.max].map(|ns| ns as f64 * 1e-3);
@@ -120,9 +120,9 @@ fn lost(history: &History) -> Fact {
     Fact { name: "Records lost", text, is_bad: history.lost > 0 }
 }
 
-/// Seconds as people say them.
+/// Text of a duration, in suitable units.
 pub fn duration(seconds: f64) -> String {
-    // Beyond a minute to a tenth, so that no 60.0 s are left.
+    // Rounds to a tenth beyond a minute, so that no 60.0 s remain.
     let seconds = if seconds < 59.95 { seconds } else { (10.0 * seconds).round() / 10.0 };
     let whole = seconds as u64;
     let (hours, minutes) = (whole / 3600, whole / 60 % 60);
@@ -134,7 +134,7 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// With a narrow space between groups of three digits.
+/// Separates groups of three digits by narrow spaces.
 fn thousands(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
@@ -147,7 +147,7 @@ fn thousands(number: u64) -> String {
     text
 }
 
-/// A number with a prefix of its unit.
+/// Number with a prefix of its unit.
 fn scaled(value: f64, unit: &str) -> String {
     let (factor, prefix) = [(1.0, ""), (1e3, "m"), (1e6, "µ")]
         .into_iter()

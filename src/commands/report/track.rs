@@ -2,19 +2,19 @@
 
 use serde::Serialize;
 
-/// Most intervals of a track: more cannot be seen on a screen.
+/// Largest number of intervals of a track. More cannot be seen on a screen.
 const MAX_INTERVALS: usize = 1000;
 
-/// From an instant to another \[s\].
+/// Interval between two instants \[s\].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Interval {
-    /// Its begin.
+    /// Begin.
     pub from: f64,
-    /// Its end.
+    /// End.
     pub to: f64,
-    /// Number of the state, code of the diagnostic; 1 for events of one kind.
+    /// Number of the state or code of the diagnostic; 1 for events of one kind.
     pub key: u32,
-    /// In words.
+    /// Text of the interval.
     pub text: String,
 }
 
@@ -23,11 +23,11 @@ pub struct Interval {
 pub struct Track {
     /// Heading of a group of tracks.
     pub group: &'static str,
-    /// Name.
+    /// Name of the track.
     pub name: &'static str,
-    /// In the order of time.
+    /// Intervals in the order of time.
     pub intervals: Vec<Interval>,
-    /// Intervals of the same key that are nearer than this become one \[s\].
+    /// Intervals of the same key with a smaller gap are united \[s\].
     #[serde(skip)]
     gap: f64,
     /// Number of instants that were added.
@@ -35,12 +35,12 @@ pub struct Track {
 }
 
 impl Track {
-    /// Without intervals. Instants of the same key that are nearer than `gap` are one interval \[s\].
+    /// Track without intervals. Instants of the same key closer than `gap` are one interval \[s\].
     pub fn new(group: &'static str, name: &'static str, gap: f64) -> Self {
         Self { group, name, intervals: vec![], gap, count: 0 }
     }
 
-    /// Adds an interval behind all others; `text` is called where one begins.
+    /// Adds an interval after all others. `text` is called if a new one begins.
     pub fn add(&mut self, from: f64, to: f64, key: u32, text: impl FnOnce() -> String) {
         self.count += 1;
         if let Some(last) = self.intervals.last_mut().filter(|it| it.key == key && from - it.to <= self.gap) {
@@ -53,7 +53,8 @@ impl Track {
         self.intervals.push(Interval { from, to, key, text: text() });
     }
 
-    /// Unites neighbours until half of the intervals are left, those of different keys under the first of them.
+    /// Unites neighbours until half of the intervals are left. Intervals of different keys get the key of the
+    /// first.
     fn coarsen(&mut self) {
         while self.intervals.len() > MAX_INTERVALS / 2 {
             self.gap *= 2.0;

@@ -11,7 +11,7 @@ use crate::output::files::print;
 use crate::output::numbers::significant;
 use crate::output::text_table::{Left, Right, text_table};
 
-/// Prints a line for each daemon, by name of its machine: a row of a table, or its answer as JSON.
+/// Prints a line per daemon, ordered by the machine's name: a row of a table, or the answer as JSON.
 pub fn show(is_json: bool) -> Result<(), Failure> {
     let mut found = endpoints(None);
     found.sort_by(|a, b| a.machine.cmp(&b.machine));
@@ -35,7 +35,7 @@ pub fn show(is_json: bool) -> Result<(), Failure> {
     Ok(print(text_table(2, &columns, answers.iter().map(row)))?)
 }
 
-/// The daemon's answer; one that says why there is none. `None` if nobody listens.
+/// The daemon's answer, or an answer with the reason why there is none. `None` if no process listens.
 fn answer(endpoint: &Endpoint) -> Option<AnswerLine> {
     let error = match status_of(endpoint) {
         Ok(answer) => return Some(answer),

@@ -1,4 +1,4 @@
-//! `hexad status`: the state of a running daemon, once or again and again, or of all that run on this host.
+//! `hexad status`: the state of a running daemon, once or repeatedly, or of all daemons on this host.
 
 use std::io::{self, IsTerminal};
 use std::path::Path;
@@ -19,12 +19,12 @@ use crate::realtime::stop_request::Stop;
 mod hosted;
 pub(super) mod screen;
 
-/// Time between two screens: a person reads no faster.
+/// Interval between two screens, short enough for a reader.
 const INTERVAL: Duration = Duration::from_millis(200);
 
-/// To the first column of the first line.
+/// Escape sequence: to the first column of the first line.
 const HOME: &str = "\x1b[H";
-/// Clears the rest of a line, and everything below.
+/// Escape sequences: clear the rest of a line, clear everything below.
 const CLEAR_LINE: &str = "\x1b[K";
 const CLEAR_BELOW: &str = "\x1b[J";
 
@@ -58,7 +58,7 @@ impl StatusArguments {
         while !stop.is_requested() {
             match requests::status(&machine) {
                 Ok(answer) => self.show(&answer, is_terminal)?,
-                // The daemon may be about to start again.
+                // The daemon may be restarting.
                 Err(error) if is_terminal && !self.json => {
                     print(format_args!("{HOME}hexad: {error}{CLEAR_LINE}\n{CLEAR_BELOW}"))?;
                 }

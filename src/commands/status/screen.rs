@@ -9,16 +9,16 @@ use crate::output::text_table::paragraph;
 
 /// Columns of the screen.
 const WIDTH: usize = 80;
-/// Lines that a diagnostic may take.
+/// Largest number of lines of a diagnostic.
 const DIAGNOSTIC_LINES: usize = 2;
-/// Digits of a hash that are shown: enough to tell two files apart.
+/// Number of digits of a hash that are shown, enough to distinguish two files.
 const SHA1_DIGITS: usize = 10;
-/// Characters of a bar.
+/// Length of a bar \[characters\].
 const BAR: usize = 26;
-/// Longest time to a singular pose that is shown \[s\]: beyond, the motion will be another.
+/// Longest time to a singular pose that is shown \[s\]. The motion will change within a longer one.
 const MAX_TIME_TO_SINGULARITY_S: f64 = 100.0;
 
-/// Status as it is shown.
+/// Status as text for the screen.
 pub struct Screen<'a>(pub &'a AnswerLine);
 
 impl fmt::Display for Screen<'_> {
@@ -51,7 +51,7 @@ impl fmt::Display for Screen<'_> {
     }
 }
 
-/// The machine file in force; of a long path the end is shown.
+/// Line with the machine file in force; of a long path only the end.
 fn file_line(configuration: &ConfigurationReport) -> String {
     let ConfigurationReport { file, sha1, reloads, .. } = configuration;
     let tail = format!(", sha1 {}, reloads {reloads}", sha1.get(..SHA1_DIGITS).unwrap_or(sha1));
@@ -188,7 +188,7 @@ pub(in crate::commands) mod tests {
     use crate::operator::protocol::{RequestResult, VERSION};
     use crate::operator::status_report::{ProcessReport, TimingReport};
 
-    /// Every field as long as it gets.
+    /// Answer in which every field has its greatest length.
     pub fn answer() -> AnswerLine {
         let process = ProcessReport {
             process_id: 4_194_304,

@@ -1,8 +1,8 @@
-//! Source of targets: poses to move to and stand at, for `goto`, `hold` and `jog`.
+//! Source of targets for `goto`, `hold` and `jog`: poses to move to and hold.
 //!
-//! The reference generator of the daemon takes the way, so no target can exceed a limit. A target holds without end: the
-//! platform stands at it under control after its source has ended, until another source, `stop` or `park`. So a command
-//! that has reached its target ends, and nobody has to go on publishing.
+//! The daemon's reference generator makes the motion, so no target can exceed a limit. A target has no end:
+//! after its source has ended, the platform holds it under control until another source, `stop` or `park`. So
+//! a command ends when its target is reached.
 
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::{Duration, Instant};
@@ -36,16 +36,16 @@ use crate::realtime::stop_request::Stop;
 pub mod pose_options;
 pub mod watch;
 
-/// Time after which the daemon must follow a target that is published.
+/// Time within which the daemon must follow a published target.
 const FOLLOWING_LIMIT: Duration = Duration::from_secs(3);
 
-/// Difference of a coordinate between what is published and what the daemon has received \[rad\], \[m\].
+/// Largest difference between a published coordinate and the received one \[rad\], \[m\].
 const SAME: f64 = 1e-12;
 
 /// Longest time between two status reports from which a velocity is computed \[s\].
 const MAX_REPORT_INTERVAL_S: f64 = 0.5;
 
-/// Why a target is not published, or not followed.
+/// Reason why a target is not published, or not followed.
 #[derive(Debug, thiserror::Error)]
 pub enum TargetError {
     #[error(transparent)]
@@ -60,7 +60,7 @@ pub enum TargetError {
     OtherSource(String),
     #[error("the platform is not under control (state {0}: {1}); --engage takes control")]
     NotInControl(String, String),
-    #[error("the pose of the platform is not known: {0}")]
+    #[error("the pose of the platform is unknown: {0}")]
     UnknownPose(String),
     #[error("the daemon does not follow this target, but another setpoint: does another source run?")]
     NotFollowed,
@@ -93,7 +93,7 @@ impl CommandError for TargetError {
 
 /// Constants of the daemon's controller.
 pub fn constants(config: &Config) -> Constants {
-    // The fidelity has no part in the reference.
+    // The reference does not depend on the fidelity.
     let parameters = daemon::parameters(&config.machine, &config.deployment, Fidelity::Exact);
     Constants::new(&config.machine, parameters)
 }
@@ -128,7 +128,7 @@ pub struct TargetSource<'a> {
     stop: Stop,
     grid: Grid,
     tick_ns: u64,
-    /// Since when the platform is in the state active.
+    /// Instant since which the state is active.
     active_since: Option<Instant>,
     published: Option<([f64; 6], Instant)>,
     /// Share of the limits of autonomous motions.
@@ -136,8 +136,8 @@ pub struct TargetSource<'a> {
 }
 
 impl<'a> TargetSource<'a> {
-    /// Joins the machine, if the platform is under control at rest or may be taken under control within a time, and no
-    /// other source publishes.
+    /// Joins the machine. The platform must be at rest under control, or be taken under control within a
+    /// time, and no other source may publish.
     pub fn open(config: &'a Config, within: Option<Duration>, stop: &Stop) -> Result<Self, TargetError> {
         let answer = status(&config.name)?;
         let bus = config.join()?;
@@ -179,7 +179,7 @@ impl<'a> TargetSource<'a> {
         self.watch.newest()
     }
 
-    /// Since when the platform follows.
+    /// Instant since which the platform follows.
     pub fn active_since(&self) -> Option<Instant> {
         self.active_since
     }
@@ -190,8 +190,8 @@ impl<'a> TargetSource<'a> {
         reference_x(self.config, &answer).ok_or(TargetError::UnknownPose(answer.text))
     }
 
-    /// X at which the platform comes to rest if it brakes now, with the limits of autonomous motions; where it is, if that is
-    /// outside of the workspace.
+    /// X at which the platform comes to rest if it brakes now with the limits of autonomous motions. The
+    /// present X, if that one is outside the workspace.
     pub fn resting_x(&self, constants: &Constants) -> Result<[f64; 6], TargetError> {
         let Watched { newest: (requested, answer), before, .. } = self.watch.newest();
         let of = |answer: &Answer| Some(pose_of(&reference_x(self.config, answer)?));
@@ -219,7 +219,7 @@ impl<'a> TargetSource<'a> {
         Ok(task_coordinates(&pose, &self.config.machine.home))
     }
 
-    /// Waits for the next instant of the loop and publishes a target; an error if control has ended.
+    /// Waits for the next instant of the loop and publishes a target. An error if control has ended.
     pub fn publish(&mut self, x: [f64; 6]) -> Result<(), TargetError> {
         sleep_until(self.tick_ns);
         let task = TaskState::at_rest(x);
@@ -234,7 +234,7 @@ impl<'a> TargetSource<'a> {
         self.check()
     }
 
-    /// Requests control once, if it was not there.
+    /// Requests control once, if the platform is not under control.
     fn engage(&mut self) -> Result<(), TargetError> {
         let Some(timeout) = self.within else { return Ok(()) };
         let engagement = self.engagement.get_or_insert_with(|| {
@@ -242,7 +242,7 @@ impl<'a> TargetSource<'a> {
             carry_out_in_background(&self.config.name, order, &self.stop)
         });
         match engagement.try_recv() {
-            // The command itself has noticed the signal, too.
+            // The command has received the same signal.
             Ok(Err(OperatorError::Interrupted)) => {
                 self.within = None;
                 Ok(())

@@ -1,10 +1,10 @@
-//! A pose as options of a command, in SI units or in those that people read.
+//! Options of a command for a pose, in SI units or in millimetres and degrees.
 
 use clap::Args;
 
 use crate::commands::arguments::number_within;
 
-/// Largest number of an option, in any unit: beyond any machine.
+/// Largest number of an option, in any unit: larger than any machine.
 const LARGEST: f64 = 1e6;
 
 #[derive(Clone, Copy, Debug, Default, Args)]
@@ -49,7 +49,7 @@ pub struct PoseOptions {
 }
 
 impl PoseOptions {
-    /// alpha, beta, gamma, x, y, z as given \[rad\], \[m\].
+    /// Given values of alpha, beta, gamma, x, y, z \[rad\], \[m\].
     pub fn coordinates(&self) -> [Option<f64>; 6] {
         let angle = |rad: Option<f64>, deg: Option<f64>| rad.or(deg.map(f64::to_radians));
         let length = |m: Option<f64>, mm: Option<f64>| m.or(mm.map(|mm| mm * 1e-3));
@@ -63,7 +63,7 @@ impl PoseOptions {
         ]
     }
 
-    /// The pose that they mean: each coordinate as given, or added to that of `base`.
+    /// The pose of the options: each coordinate as given, or added to that of `base`.
     pub fn applied_to(&self, base: [f64; 6], is_relative: bool) -> [f64; 6] {
         let mut x = base;
         for (x, given) in x.iter_mut().zip(self.coordinates()) {
@@ -72,7 +72,7 @@ impl PoseOptions {
         x
     }
 
-    /// Whether none is given.
+    /// Whether no option is given.
     pub fn is_empty(&self) -> bool {
         self.coordinates().iter().all(Option::is_none)
     }

@@ -1,4 +1,5 @@
-//! Status of the daemon, received by a thread of its own: what publishes setpoints or reads keys must not wait for it.
+//! Status of the daemon, received by a separate thread, so that publishing setpoints and reading keys do not
+//! wait for it.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{sleep, spawn};
@@ -9,23 +10,23 @@ use crate::operator::OperatorError;
 use crate::operator::protocol::AnswerLine as Answer;
 use crate::operator::requests::status;
 
-/// Time between two requests: a person sees no faster changes.
+/// Interval between two requests, short enough for a reader.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// The newest status, and the one before.
+/// The two newest statuses.
 #[derive(Clone, Debug)]
 pub struct Watched {
     pub newest: (Instant, Answer),
     pub before: Option<(Instant, Answer)>,
-    /// Why the last request has failed.
+    /// Error of the last request.
     pub error: Option<String>,
 }
 
-/// Receiver of the daemon's status. Its thread ends after it was dropped.
+/// Receiver of the daemon's status. Its thread ends after it is dropped.
 pub struct StatusWatch(Arc<Mutex<Watched>>);
 
 impl StatusWatch {
-    /// Begins with a status.
+    /// Starts the thread with a first status.
     pub fn start(config: &Config, first: Answer) -> Self {
         let watched = Watched { newest: (Instant::now(), first), before: None, error: None };
         let shared = Arc::new(Mutex::new(watched));

@@ -1,4 +1,4 @@
-//! Content of a live page: the samples of the last minute, and the history since the command was started.
+//! Content of a live page: the samples of the last minute, and the history since the start of the command.
 
 use std::collections::VecDeque;
 
@@ -14,13 +14,13 @@ use crate::config::Config;
 use crate::messages::{CycleMessage, LoopCounters, LoopTimes, StatusMessage};
 use crate::output::page::append_base64;
 
-/// Time between two samples, at least \[s\]: an eye sees no shorter one.
+/// Least time between two samples \[s\], short enough for the eye.
 const SAMPLE_S: f64 = 0.01;
 
-/// Samples that a page receives which is opened late \[s\].
+/// Duration of the samples that a newly opened page receives \[s\].
 const KEPT_S: f64 = 60.0;
 
-/// Intervals that are kept \[s\]: as much as a page shows.
+/// Duration for which intervals are kept \[s\], as long as a page shows them.
 const INTERVALS_S: f64 = 120.0;
 
 /// State of the live page.
@@ -28,15 +28,15 @@ pub struct Live<'a> {
     config: &'a Config,
     history: History,
     signals: Signals<'a>,
-    /// Cycles for each sample.
+    /// Cycles per sample.
     step: u64,
-    /// Two samples in the making, by number.
+    /// The incomplete pair of samples, with its number.
     pair: Option<(u64, Level)>,
-    /// Finished pairs of samples with the number of the first.
+    /// Complete pairs of samples, each with the number of its first.
     pairs: VecDeque<(u64, Level)>,
     counters: LoopCounters,
     times: LoopTimes,
-    /// Number of the run, which changes with the daemon.
+    /// Number of the run, raised when the daemon changes.
     run: u64,
 }
 
@@ -48,7 +48,7 @@ struct Fresh<'a> {
     step_s: f64,
     /// Number of the first sample.
     first: u64,
-    /// Sample by sample, in base64.
+    /// The samples, one after another, in base64.
     samples: String,
     facts: Vec<Fact>,
     tracks: Vec<&'a Track>,
@@ -56,7 +56,7 @@ struct Fresh<'a> {
 }
 
 impl<'a> Live<'a> {
-    /// Before the first cycle.
+    /// Live page before the first cycle.
     pub fn new(config: &'a Config) -> Self {
         let rate_hz = config.deployment.realtime.rate_hz;
         Self {
@@ -76,10 +76,10 @@ impl<'a> Live<'a> {
     /// Adds a cycle.
     pub fn add(&mut self, cycle: &CycleMessage, status: &StatusMessage) {
         if status.counters.cycles < self.counters.cycles {
-            // Another daemon.
+            // Another daemon has begun.
             *self = Self { run: self.run + 1, ..Self::new(self.config) };
         }
-        // The times are not those of the cycle: they are shown, and not counted.
+        // The times belong to other cycles. They are shown but not counted.
         let untimed = CycleMessage { wakeup_ns: 0, compute_ns: 0, ..*cycle };
         let is_first = self.history.cycles == 0;
         if !self.history.add(&untimed) {
@@ -118,7 +118,7 @@ impl<'a> Live<'a> {
     /// Samples from a number on, with the history, as JSON.
     pub fn since(&self, after: u64) -> String {
         let fresh = || self.pairs.iter().skip_while(move |(number, _)| *number < after);
-        // Samples follow each other; where cycles are missing they are NaN.
+        // Samples are consecutive; missing ones are NaN.
         let first = fresh().next().map_or(after, |(number, _)| *number);
         let mut bytes: Vec<u8> = vec![];
         let mut next = first;

@@ -1,6 +1,6 @@
 //! `hexad view`: the page of a recording, live, for browsers on this host.
 //!
-//! It subscribes to the topics as any client does and sends nothing: the daemon does not know of it.
+//! It subscribes to the topics as any client does and sends nothing to the daemon.
 
 use std::io;
 use std::sync::{Mutex, PoisonError};
@@ -26,7 +26,7 @@ mod live;
 mod server;
 mod topics;
 
-/// Interval between two polls of the topics, in which they fill by a fraction at 20 kHz.
+/// Interval between two polls of the topics. At 20 kHz they fill only by a fraction in it.
 const POLL_INTERVAL: Duration = Duration::from_millis(3);
 
 #[derive(Debug, Args)]
@@ -48,7 +48,7 @@ struct ViewError {
 
 impl CommandError for ViewError {}
 
-/// Nothing would ever be shown.
+/// Only a daemon of another user runs. Without this error the page would stay empty.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "the daemon of {machine} runs as user {user}, whose topics only {user} can join: run hexad view as that user; hexad status needs no topics"
@@ -86,7 +86,7 @@ impl ViewArguments {
     }
 }
 
-/// An error if only daemons of other users run: their topics are not seen.
+/// An error if only daemons of other users run, because their topics cannot be joined.
 fn check_user(machine: &str) -> Result<(), ForeignDaemon> {
     let found = endpoints(Some(machine));
     let foreign = found.iter().find(|it| it.daemon.is_some() && !it.is_own());

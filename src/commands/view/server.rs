@@ -1,5 +1,5 @@
-//! An HTTP server for a page and its data: on the loopback alone, for those who know its token, without any request that
-//! changes something.
+//! HTTP server for a page and its data. It listens on the loopback only, replies only to requests with its
+//! token, and has no requests that change anything.
 
 use std::collections::VecDeque;
 use std::fs::File;
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use crate::realtime::stop_request::Stop;
 
-/// Threads that accept connections: a page has one or two open at a time.
+/// Threads that accept connections. A page has one or two open at a time.
 pub const THREADS: usize = 4;
 
 /// Longest head of a request \[bytes\].
@@ -19,13 +19,13 @@ const MAX_HEAD: usize = 8192;
 /// Longest time for a request, and for a reply.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Most requests of a thread that are on their way; the oldest makes room for one more.
+/// Largest number of incomplete requests of a thread. One more replaces the oldest.
 const MAX_UNREAD: usize = 64;
 
-/// How often a thread looks for connections and what they have sent.
+/// Interval at which a thread checks for connections and input.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// Bytes of the token: 128 bits cannot be guessed.
+/// Length of the token \[bytes\]: 128 bits cannot be guessed.
 const TOKEN_BYTES: usize = 16;
 
 /// Content of a reply, with its media type.
@@ -42,7 +42,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens on the loopback; port 0 is any that is free.
+    /// Listens on the loopback. Port 0 is any free port.
     pub fn start(port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
         listener.set_nonblocking(true)?;
@@ -58,8 +58,8 @@ impl Server {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
     }
 
-    /// Replies to requests until the stop; `reply` is called with the path and the query of those with the token. A slow
-    /// sender delays no other.
+    /// Replies to requests until the stop. `reply` is called with path and query of requests with the token.
+    /// A slow sender delays no other.
     pub fn serve(&self, stop: &Stop, reply: impl Fn(&str, &[(&str, &str)]) -> Option<Reply>) {
         let mut unread = VecDeque::new();
         while !stop.is_requested() {
@@ -72,7 +72,7 @@ impl Server {
             }
             unread.retain_mut(|request: &mut Request| match request.read() {
                 Ok(true) => {
-                    // A browser that has gone needs no reply.
+                    // A browser that has left needs no reply.
                     let _ = self.answer(request, &reply);
                     false
                 }
@@ -125,7 +125,7 @@ impl Server {
         reply(path, &query).map_or_else(|| refused("404 Not Found"), |reply| ("200 OK", reply))
     }
 
-    /// Whether the browser names this host as it does: the name of another site that resolves to the loopback is refused.
+    /// Whether the browser uses this server's own name. Other names that resolve to the loopback are refused.
     fn is_own_name(&self, head: &str) -> bool {
         let host = head.lines().skip(1).find_map(|line| {
             let (name, value) = line.split_once(':')?;
@@ -136,7 +136,7 @@ impl Server {
     }
 }
 
-/// A connection whose request is on its way.
+/// A connection whose request is incomplete.
 struct Request {
     stream: TcpStream,
     head: Vec<u8>,
@@ -144,13 +144,13 @@ struct Request {
 }
 
 impl Request {
-    /// Of a connection that was just accepted; `None` if it is of no use.
+    /// Request of a newly accepted connection; `None` if its settings cannot be changed.
     fn new(stream: TcpStream) -> Option<Self> {
         stream.set_nonblocking(true).ok()?;
         Some(Self { stream, head: vec![], began: Instant::now() })
     }
 
-    /// Reads what there is; whether the head with its empty line is complete.
+    /// Reads the available bytes. Returns whether the head with its empty line is complete.
     fn read(&mut self) -> io::Result<bool> {
         let mut buffer = [0; MAX_HEAD];
         match self.stream.read(&mut buffer) {
@@ -165,7 +165,7 @@ impl Request {
     }
 }
 
-/// Compares in a time that does not depend on where two texts differ.
+/// Compares two texts in a time that does not depend on their first difference.
 fn is_same(left: &str, right: &str) -> bool {
     let differences = left.bytes().zip(right.bytes()).fold(0, |sum, (left, right)| sum | (left ^ right));
     left.len() == right.len() && differences == 0
@@ -217,7 +217,7 @@ mod tests {
         };
         std::thread::scope(|threads| {
             let serving = threads.spawn(|| server.serve(&stop, |_, _| None));
-            // They stay while the page is asked for, and after it.
+            // They stay connected during the request for the page, and after it.
             let _slow: Vec<_> = (0..3 * MAX_UNREAD).map(|_| connect()).collect();
             let mut stream = connect();
             stream.write_all(b"ET / HTTP/1.1\r\n\r\n").unwrap();

@@ -1,4 +1,4 @@
-//! The cycles of a running daemon, put together from its topics.
+//! Cycles of a running daemon, assembled from its topics.
 
 use std::collections::VecDeque;
 
@@ -16,7 +16,7 @@ use crate::messages::{
 use crate::model::rigid::{Motion, Twist};
 use crate::model::task::TaskState;
 
-/// Messages kept between two polls: all that the topic can hold.
+/// Messages kept between two polls: the full capacity of the topic.
 const TOPIC_DEPTH: usize = usize::MAX;
 
 /// Longest time for which a setpoint counts as the reference \[s\].
@@ -28,10 +28,10 @@ pub struct Topics {
     measured: Subscriber<MeasuredMessage>,
     forces: Subscriber<ForceMessage>,
     statuses: Subscriber<StatusMessage>,
-    /// Newest of each that is not newer than the last cycle, and those that are.
+    /// For each topic: the newest message that is not newer than the last cycle, and later ones.
     setpoint: Newest<SetpointMessage>,
     measurement: Newest<MeasuredMessage>,
-    /// Forces whose status has not arrived.
+    /// Forces whose status has not arrived yet.
     pending: VecDeque<ForceMessage>,
 }
 
@@ -76,7 +76,7 @@ impl Topics {
         self.measurement.later.extend(core::iter::from_fn(|| self.measured.receive()));
         let mut cycles = vec![];
         for status in statuses {
-            // Both have the stamp of the same instant.
+            // Both have the same time stamp.
             let time_ns = status.header.time_ns;
             while self.pending.front().is_some_and(|force| force.header.time_ns < time_ns) {
                 self.pending.pop_front();
@@ -93,8 +93,8 @@ impl Topics {
     }
 }
 
-/// A cycle as far as its messages have it. The reference is not published: while active it is the setpoint. Wake-up and
-/// computation are the largest of the last complete second.
+/// A cycle with the data of its messages. The reference is not published; while active it equals the
+/// setpoint. Wake-up and computation are the largest of the last complete second.
 fn cycle(
     status: &StatusMessage,
     force: &ForceMessage,

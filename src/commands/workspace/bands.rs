@@ -1,15 +1,15 @@
-//! Quantities of a pose that a map shows, and the round thresholds at which the colour changes.
+//! Quantities of a pose shown in a map, and the round thresholds between its colours.
 
 use crate::analysis::pose_quality::PoseQuality;
 
-/// Largest number of bands of colour.
+/// Largest number of colour bands.
 pub const MAX_BANDS: usize = 10;
-/// Least width of the worst band as a share of the range, so that two thresholds do not read the same.
+/// Least width of the worst band as a share of the range, so that two thresholds have different texts.
 const MIN_BAND_SHARE: f64 = 0.05;
-/// Ratio of the ends of a range from which its bands have equal ratios.
+/// Ratio of the ends of a range beyond which its bands have equal ratios.
 const MIN_RATIO_FOR_RATIOS: f64 = 8.0;
 
-/// Quantity of a pose, as a map shows it.
+/// Quantity of a pose in a map.
 #[derive(Clone, Copy)]
 pub struct Quantity {
     /// Name with the unit.
@@ -18,7 +18,7 @@ pub struct Quantity {
     pub better: Better,
     /// Worst value that has a colour.
     pub worst: f64,
-    /// Largest worst force at which a pose has a colour.
+    /// Largest worst force of a pose with a colour.
     pub max_force: f64,
 }
 
@@ -30,7 +30,7 @@ pub enum Better {
 }
 
 impl Quantity {
-    /// How far a pose is better than a threshold; negative where it is worse.
+    /// Margin of a pose from a threshold; negative if it is worse.
     pub fn margin(&self, quality: &PoseQuality, threshold: f64) -> f64 {
         match self.better {
             Better::Higher => (self.value)(quality) - threshold,
@@ -38,7 +38,7 @@ impl Quantity {
         }
     }
 
-    /// Thresholds from the worst to the best, each with some pose beyond it; none where no pose is good enough.
+    /// Thresholds from the worst to the best. Some pose is beyond each. Empty if no pose is good enough.
     pub fn thresholds<'a>(&self, qualities: impl Iterator<Item = &'a PoseQuality> + Clone) -> Vec<f64> {
         let good = |quality: &&PoseQuality| self.margin(quality, self.worst) >= 0.0;
         let values = qualities.clone().filter(good).map(self.value).filter(|value| value.is_finite());
@@ -58,7 +58,7 @@ impl Quantity {
     }
 }
 
-/// Round numbers between two, in order, fewer than [`MAX_BANDS`].
+/// Round numbers between two numbers, in order, fewer than [`MAX_BANDS`].
 fn round_numbers(low: f64, high: f64) -> Vec<f64> {
     let within = |number: &f64| low < *number && *number < high;
     let by_ratio = |leads: &[f64], stride: usize| -> Vec<f64> {
@@ -83,7 +83,7 @@ fn round_numbers(low: f64, high: f64) -> Vec<f64> {
     }
 }
 
-/// A threshold with three digits at most.
+/// Threshold with at most three digits.
 pub fn plain(x: f64) -> String {
     format!("{}", format!("{x:.2e}").parse().unwrap_or(x))
 }

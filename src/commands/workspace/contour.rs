@@ -1,7 +1,8 @@
-//! Outlines of the part of a grid in which some numbers are not negative: marching squares.
+//! Outlines of the part of a grid in which given numbers are not negative, by marching squares.
 //!
-//! A node belongs to the part if all its numbers are at least 0. Between one that does and one that does not, the outline
-//! runs where the first of the numbers vanishes, each taken as linear. Around the grid there is nothing.
+//! A node belongs to the part if all its numbers are at least 0. Between a node inside and a node outside,
+//! the outline is where the first of the linearly interpolated numbers is zero. Everything beyond the grid is
+//! outside.
 
 use std::collections::BTreeMap;
 
@@ -10,17 +11,17 @@ use std::collections::BTreeMap;
 pub struct Corner {
     /// Position along both axes, in nodes.
     pub at: (f64, f64),
-    /// Index of the number that vanishes; `None` at the edge of the grid.
+    /// Index of the number that is zero there; `None` at the edge of the grid.
     pub cause: Option<usize>,
 }
 
-/// Indices of a node, one more than in the grid: 0 is beyond its edge.
+/// Indices of a node, raised by one: 0 is beyond the edge of the grid.
 type Node = (usize, usize);
 
 /// Step from a node of the part to a neighbour outside.
 type Crossing = (Node, Node);
 
-/// Closed outlines of the part, which lies to their left. The grid has `count` by `count` nodes.
+/// Closed outlines, with the part on their left. The grid has `count` by `count` nodes.
 pub fn outlines<const N: usize>(
     count: usize,
     numbers: impl Fn([usize; 2]) -> Option<[f64; N]>,
@@ -30,7 +31,8 @@ pub fn outlines<const N: usize>(
     let mut next = BTreeMap::<Crossing, Crossing>::new();
     for (i, j) in (0..=count).flat_map(|i| (0..=count).map(move |j| (i, j))) {
         let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
-        // Once around the square, counterclockwise: each way out is followed by the way in that comes next.
+        // Once around the square, counterclockwise. Each crossing outwards is followed by the next crossing
+        // inwards.
         let around = || corners.into_iter().zip(corners.into_iter().cycle().skip(1));
         let out = around().enumerate().filter(|(_, (from, to))| inside(*from) && !inside(*to));
         for (k, leaves) in out {
@@ -69,7 +71,8 @@ fn corner<const N: usize>((from, to): Crossing, at: &impl Fn(Node) -> Option<[f6
     Corner { at: (between(i, k), between(j, l)), cause }
 }
 
-/// Share of the way from a number that is not negative to one that is, at which the interpolation vanishes.
+/// Share of the distance from a number that is not negative to one that is, at which the linear interpolation
+/// is zero.
 fn share(from: f64, to: f64) -> f64 {
     let share = from / (from - to);
     if share.is_finite() { share } else { 0.5 }
@@ -115,7 +118,7 @@ mod tests {
         let found = outlines(COUNT, |[i, j]: [usize; 2]| (i < COUNT && j < COUNT).then_some([1.0]));
         assert_eq!(found.len(), 1);
         assert!((area(&found[0]) - 400.0).abs() < 1e-12 && found[0].iter().all(|c| c.cause.is_none()));
-        // Two squares that touch at a corner: still closed.
+        // Two squares that touch at a corner give closed outlines, too.
         let checkered =
             outlines(2, |[i, j]: [usize; 2]| (i < 2 && j < 2).then_some([[1.0, -1.0][(i + j) % 2]]));
         assert_eq!(checkered.iter().map(Vec::len).sum::<usize>(), 8);

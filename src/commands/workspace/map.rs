@@ -1,4 +1,4 @@
-//! Drawing of the maps of a slice: a map of each quantity with the limits of the reach, a legend, and home.
+//! Drawing of the maps of a slice: one map per quantity with the limits of the reach, a legend, and home.
 
 use std::path::Path;
 
@@ -25,20 +25,21 @@ const TICK_COUNT: f64 = 6.0;
 /// Radius of the mark of home.
 const HOME_RADIUS: i32 = 5 * UNIT;
 
-/// Colours from bad to good: viridis (S. van der Walt, N. Smith), which keeps its order in grey and for the colour-blind.
+/// Colours from bad to good: viridis (S. van der Walt, N. Smith). They keep their order in grey and for
+/// colour-blind readers.
 const COLORS: [u32; MAX_BANDS] = [
     0x44_0154, 0x48_2878, 0x3E_4989, 0x31_688E, 0x26_828E, 0x1F_9E89, 0x35_B779, 0x6D_CD59, 0xB4_DE2C,
     0xFD_E725,
 ];
-/// Colour of poses in reach but beyond a limit of the machine; visible on light and dark pages.
+/// Colour of poses in reach but beyond a limit of the machine, visible on light and dark pages.
 const BEYOND_LIMIT: u32 = GRID;
 
-/// The parts that all map drawings of a machine share.
+/// Values shared by all map drawings of a machine.
 pub struct MapDrawing<'a> {
     pub name: &'a str,
     pub machine: &'a Machine,
     pub largest_condition: f64,
-    /// Radius of the ball that is proved free of obstacles at home's orientation \[m\].
+    /// Radius of the ball proved free of obstacles at home's orientation \[m\].
     pub ball: f64,
 }
 
@@ -121,13 +122,13 @@ impl MapDrawing<'_> {
     }
 }
 
-/// Name and unit of an axis, as `x [m]`.
+/// Name and unit of an axis, such as `x [m]`.
 fn axis_label(axis: usize) -> String {
     let names = ["alpha [deg]", "beta [deg]", "gamma [deg]", "x [m]", "y [m]", "z [m]"];
     names.get(axis).copied().unwrap_or_default().into()
 }
 
-/// Both axes, with equal scales where they have the same unit.
+/// Both axes, with equal scales if they have the same unit.
 fn axes(slice: &Slice, room: [f64; 2]) -> [Axis; 2] {
     let [(left, right), (bottom, top)] = slice.ranges;
     let (low, high) = (in_unit(slice, [left, bottom]), in_unit(slice, [right, top]));
@@ -138,13 +139,13 @@ fn axes(slice: &Slice, room: [f64; 2]) -> [Axis; 2] {
     [(low.0, high.0), (low.1, high.1)].map(|(low, high)| Axis::new([low, high].into_iter(), 0.0, TICK_COUNT))
 }
 
-/// A number of colours, from bad to good.
+/// Given number of colours, from bad to good.
 fn colors(count: usize) -> impl Iterator<Item = u32> {
     let last = count.max(2) - 1;
     (0..count).filter_map(move |k| COLORS.get(k * (MAX_BANDS - 1) / last).copied())
 }
 
-/// A line that is visible on any colour: a white one gets a dark outline.
+/// A line visible on any colour: a white one gets a dark outline.
 fn visible(line: Vec<(f64, f64)>, style: ShapeStyle) -> Vec<PathElement<(f64, f64)>> {
     let under =
         (style.color == WHITE.to_rgba()).then(|| PathElement::new(line.clone(), BLACK.stroke_width(32)));
@@ -158,7 +159,7 @@ fn draw_line(area: &Area, line: Vec<(i32, i32)>, style: ShapeStyle) -> Result<()
     area.draw(&PathElement::new(line, style))
 }
 
-/// Draws the legend; the last position is that of the mark of home.
+/// Draws the legend. The last position belongs to the mark of home.
 fn draw_legend(
     area: &Area,
     samples: &[LegendSample],
@@ -177,7 +178,7 @@ fn draw_legend(
     draw_label("home", (*left, *y))
 }
 
-/// Mark of home: a disc where the slice goes through home, a ring where home lies before or behind it.
+/// Mark of home: a disc if the slice contains home, a ring if home is in front of it or behind it.
 fn draw_home(area: &Area, at: (i32, i32), on_slice: bool) -> Result<(), DrawError> {
     area.draw(&Circle::new(at, HOME_RADIUS, BLACK.stroke_width(32)))?;
     if on_slice {
@@ -186,7 +187,7 @@ fn draw_home(area: &Area, at: (i32, i32), on_slice: bool) -> Result<(), DrawErro
     area.draw(&Circle::new(at, HOME_RADIUS, WHITE.stroke_width(15)))
 }
 
-/// Colour scale with the thresholds at which the colour changes, the best on top.
+/// Colour scale with the thresholds between the colours, the best on top.
 fn draw_bar(
     area: &Area,
     (left, top, bottom): (i32, i32, i32),

@@ -11,7 +11,8 @@ use super::slice::Slice;
 use crate::analysis::pose_quality::PoseQuality;
 use crate::output::svg::{DASHED_INK, INK, rgb};
 
-/// Largest coloured force, as a multiple of the least, where every pose needs more than the actuators have.
+/// Largest coloured force, as a multiple of the least one, if every pose needs more force than the actuators
+/// have.
 const MAX_FORCE_RATIO: f64 = 5.0;
 /// Colour of the lines at which a singular pose ends the reach.
 const SINGULAR_COLOR: u32 = 0xC8_430F;
@@ -27,7 +28,7 @@ impl MapDrawing<'_> {
     pub(super) fn quantities(&self, slice: &Slice) -> [Quantity; 4] {
         let max_force = self.machine.actuator.max_force;
         let reached = || slice.qualities.iter().filter(|quality| quality.within_reach());
-        // Where every pose needs more than the actuators have, the map still shows how much.
+        // If every pose needs more force than the actuators have, the map still shows how much.
         let is_possible = reached().any(|quality| quality.worst_force <= max_force);
         let (force_label, payload_label, max_force) = if is_possible {
             ("worst force [N]", "payload [kg]", max_force)
@@ -65,14 +66,14 @@ impl MapDrawing<'_> {
                 label: payload_label,
                 value: |quality| quality.payload,
                 better: Better::Higher,
-                // The payload is 0 for all poses beyond the limit: only the forces show where it begins.
+                // The payload is 0 for all poses beyond the limit, so only the forces show the edge.
                 worst: f64::MIN_POSITIVE,
                 max_force,
             },
         ]
     }
 
-    /// The pose that the slice goes through, as text.
+    /// Text of the pose through which the slice goes.
     pub(super) fn place(&self, slice: &Slice) -> String {
         if slice.through == self.machine.home {
             return "home".into();
@@ -83,7 +84,7 @@ impl MapDrawing<'_> {
         format!("{a}, {b}, {c} deg, {x}, {y}, {z} m")
     }
 
-    /// Limits of the reach, and the ball without obstacle.
+    /// Lines for the limits of the reach and for the ball without obstacle.
     pub(super) fn lines(&self, slice: &Slice) -> Vec<MapLine> {
         let edge = |quality: &PoseQuality| [quality.stroke_margin, quality.determinant];
         let reach = outlines(slice.count, |places| slice.at(places).map(edge));
@@ -110,13 +111,13 @@ impl MapDrawing<'_> {
         lines
     }
 
-    /// Whether the slice cuts the ball through its centre.
+    /// Whether the slice contains the centre of the ball.
     fn has_ball(&self, slice: &Slice) -> bool {
         slice.through == self.machine.home && slice.plane.0.iter().all(|axis| *axis >= 3)
     }
 
-    /// The poses in reach that are as good as a threshold (all of them for NaN) as one polygon: outlines one after the
-    /// other, each connected to the first by a bridge without width.
+    /// One polygon of the poses in reach that satisfy a threshold (all poses for NaN). Its outlines follow
+    /// each other, each connected to the first by a bridge of zero width.
     pub(super) fn polygon(&self, slice: &Slice, quantity: &Quantity, threshold: f64) -> Vec<(f64, f64)> {
         let numbers = |quality: &PoseQuality| {
             let [margin, spare_force] = match threshold {
@@ -147,7 +148,7 @@ fn on_axes(slice: &Slice, (right, up): (f64, f64)) -> (f64, f64) {
     in_unit(slice, [left + right / last * (end - left), bottom + up / last * (top - bottom)])
 }
 
-/// The parts of an outline that one number causes.
+/// Parts of an outline caused by one number.
 fn caused(outline: &[Corner], cause: usize) -> Vec<Vec<(f64, f64)>> {
     let mut parts = vec![];
     let mut part: Vec<(f64, f64)> = vec![];

@@ -1,5 +1,5 @@
-//! `hexad workspace`: maps of the poses that the machine can reach and of their quality, and the largest regions
-//! around home without obstacle.
+//! `hexad workspace`: maps of the reachable poses and their quality, and the largest regions around home
+//! without obstacle.
 
 use core::fmt;
 use std::fs::create_dir_all;
@@ -86,12 +86,12 @@ fn acceleration(text: &str) -> Result<f64, String> {
     number_within(text, 0.0..=1e6, "")
 }
 
-/// Turn of a platform that is still the right way up \[deg\].
+/// Turn of a platform that remains upright \[deg\].
 fn turn_deg(text: &str) -> Result<f64, String> {
     number_within(text, 0.0..=90.0, " deg")
 }
 
-/// Poses along an axis: enough for a picture, few enough for memory.
+/// Number of poses along an axis: enough for a picture, few enough for memory.
 fn resolution(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count) if (11..=1001).contains(&count) => Ok(count),
@@ -184,7 +184,7 @@ fn regions(machine: &Machine, clearance: &Clearance, turn: f64, shape: &Envelope
         RegionShape::Ball { turn },
         RegionShape::Box { low: shape.pose_min, high: shape.pose_max },
     ];
-    // Two searches for a ball, one for a box.
+    // Each ball takes two searches, the box one.
     let bar = item_bar(5 * MAX_CELLS as usize, "cells");
     let regions = shapes.map(|shape| largest_region(machine, clearance, &shape, &bar));
     bar.finish_and_clear();
@@ -207,7 +207,7 @@ fn has_extent(limits: &EnvelopeBounds) -> bool {
     limits.pose_min.iter().chain(&limits.pose_max).any(|x| *x != 0.0)
 }
 
-/// WorkspaceLimit in words, with the limit of the condition.
+/// Text of a workspace limit, with the largest condition number.
 #[derive(Debug)]
 pub struct ObstacleText {
     obstacle: WorkspaceLimit,

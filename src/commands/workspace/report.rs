@@ -1,4 +1,4 @@
-//! Qualities of the poses of some slices and regions without obstacle: one struct for the text and for `--json`.
+//! Qualities of poses in slices, and regions without obstacle: one struct for the text and for `--json`.
 
 use core::fmt;
 use std::path::PathBuf;
@@ -16,12 +16,12 @@ use crate::model::sensitivity::CONDITION_MEANING;
 use crate::output::numbers::{AXES, axis_unit, significant};
 use crate::output::text_table::{Left, Right, paragraph, text_table};
 
-/// Schema of the JSON, raised when a field changes its meaning or goes.
+/// Schema of the JSON. It is raised when a field is removed or changes its meaning.
 pub const SCHEMA: u32 = 1;
-/// Columns of the hint, as of the tables.
+/// Width of the hint and of the tables \[characters\].
 const HINT_WIDTH: usize = 100;
 
-/// Result of `hexad workspace`. Numbers that are infinite are null in JSON.
+/// Result of `hexad workspace`. Infinite numbers are null in JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct WorkspaceReport {
     pub schema: u32,
@@ -34,17 +34,17 @@ pub struct WorkspaceReport {
     /// `actuator.max_force_n`.
     pub max_force_n: f64,
     pub slices: Vec<SliceReport>,
-    /// The ball at home's orientation, the ball with any turn, the box.
+    /// The ball at home's orientation, the ball with any turn, and the box.
     pub regions: Vec<RegionReport>,
     /// Ranges of the largest guaranteed box.
     pub largest_box: Vec<BoxRange>,
-    /// Why there is no payload.
+    /// Reason why there is no payload.
     pub hint: Option<String>,
     /// Maps and their tables.
     pub files: Vec<PathBuf>,
 }
 
-/// Poses of a slice; numbers are of usable poses, lowest and highest.
+/// Poses of a slice. Each range of numbers is over the usable poses.
 #[derive(Clone, Debug, Serialize)]
 pub struct SliceReport {
     pub plane: String,
@@ -57,7 +57,7 @@ pub struct SliceReport {
     pub payload_kg: [f64; 2],
 }
 
-/// Region around home that is proved to be usable.
+/// Region around home that is proved usable.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegionReport {
     pub region: String,
@@ -65,7 +65,7 @@ pub struct RegionReport {
     pub guaranteed: f64,
     /// `m`, or empty for a multiple.
     pub unit: &'static str,
-    /// Size of the nearest violation found, and what it violates.
+    /// Size of the nearest violation found, and the violated limit.
     pub limited_at: Option<f64>,
     pub limited_by: Option<String>,
 }
@@ -114,7 +114,7 @@ impl SliceReport {
     }
 }
 
-/// Reports of the two balls and the box.
+/// Reports of both balls and the box.
 pub fn region_reports(
     regions: [RegionBounds; 3],
     turn_deg: f64,
@@ -161,7 +161,7 @@ impl BoxRange {
 }
 
 impl WorkspaceReport {
-    /// Why no usable pose carries a payload, with the limit that takes most of the force.
+    /// Reason why no usable pose carries a payload, with the limit that requires most of the force.
     pub fn payload_hint(&self, machine: &Machine) -> Option<String> {
         let has_none = |slice: &SliceReport| slice.usable > 0 && slice.payload_kg == [0.0; 2];
         if !self.slices.iter().any(has_none) {

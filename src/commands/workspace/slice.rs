@@ -1,4 +1,4 @@
-//! A slice of the workspace: a grid of poses along two coordinates through one pose.
+//! Slice of the workspace: a grid of poses along two coordinates through one pose.
 
 use core::f64::consts::FRAC_PI_2;
 use core::fmt;
@@ -18,20 +18,21 @@ use crate::output::files::FileError;
 
 /// Poses along each axis during the search for the range.
 const COARSE_POSES: usize = 41;
-/// First range to both sides, in strokes and \[rad\].
+/// First range to both sides: in strokes, and \[rad\].
 const FIRST_RANGE_STROKES: f64 = 0.1;
 const FIRST_RANGE_RAD: f64 = 0.1;
-/// Factor by which the range grows while the reach goes on beyond it.
+/// Growth factor of the range while the reach extends beyond it.
 const RANGE_GROWTH: f64 = 1.5;
-/// Most growths of a range: enough for a thousand times the first range.
+/// Largest number of growths of a range, enough for a thousand times the first range.
 const MAX_RANGE_GROWTHS: usize = 20;
 
-/// Plane of two task coordinates, by their indices in X: to the right, and up.
+/// Plane of two task coordinates, given by their indices in X: to the right, and up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plane(pub [usize; 2]);
 
 impl Plane {
-    /// The horizontal plane, the vertical one, and tilt about both horizontal axes; gravity decides what is up.
+    /// The horizontal plane, the vertical one, and tilt about both horizontal axes. Gravity defines the
+    /// vertical.
     pub fn default_three(gravity: &Vector3<f64>) -> [Self; 3] {
         let up = if gravity.norm() > 0.0 { gravity.iamax() } else { 2 };
         let (first, second) = match up {
@@ -68,7 +69,7 @@ impl FromStr for Plane {
 #[derive(Clone, Debug)]
 pub struct Slice {
     pub plane: Plane,
-    /// X of the pose that the slice goes through.
+    /// X of the pose in the slice.
     pub through: [f64; 6],
     /// Ranges of the coordinates along both axes.
     pub ranges: [(f64, f64); 2],
@@ -78,7 +79,7 @@ pub struct Slice {
 }
 
 impl Slice {
-    /// The part of a plane with all poses in reach around a pose. The bar advances by poses.
+    /// Part of a plane that contains all poses in reach around a pose. The bar advances by poses.
     pub fn new(
         workspace: &PoseEvaluator,
         machine: &Machine,
@@ -101,14 +102,14 @@ impl Slice {
         for ((axis, place), (low, high)) in self.plane.0.into_iter().zip(places).zip(self.ranges) {
             let share = place as f64 / (self.count - 1) as f64;
             if let Some(x) = x.get_mut(axis) {
-                // In this form the ends are exact.
+                // This form is exact at both ends.
                 *x = low * (1.0 - share) + high * share;
             }
         }
         x
     }
 
-    /// PoseQuality of a pose by its indices along both axes.
+    /// Quality of a pose by its indices along both axes; `None` outside the slice.
     pub fn at(&self, [right, up]: [usize; 2]) -> Option<&PoseQuality> {
         if right < self.count { self.qualities.get(up * self.count + right) } else { None }
     }
@@ -124,13 +125,13 @@ impl Slice {
         self.qualities = rows.concat();
     }
 
-    /// Ranges around the pose, grown until the reach ends within them, then shrunk onto the reach.
+    /// Ranges around the pose, grown until the reach ends within them, then reduced to the reach.
     fn range_of_reach(&mut self, workspace: &PoseEvaluator, machine: &Machine) -> [(f64, f64); 2] {
         let stroke = machine.actuator.stroke();
         let middles = self.plane.0.map(|axis| self.through.get(axis).copied().unwrap_or_default());
         let firsts =
             self.plane.0.map(|axis| if axis < 3 { FIRST_RANGE_RAD } else { FIRST_RANGE_STROKES * stroke });
-        // Angles further from the pose than a quarter turn are no tilt, and Bryan's fold over there.
+        // Angles beyond a quarter turn are not tilt, and Bryan angles repeat orientations there.
         let most = self.plane.0.map(|axis| if axis < 3 { FRAC_PI_2 } else { f64::INFINITY });
         let mut sides = firsts.map(|first| [first; 2]);
         for _ in 0..MAX_RANGE_GROWTHS {
@@ -151,7 +152,7 @@ impl Slice {
                 break;
             }
         }
-        // A step more on each side, where the coarse grid has no pose in reach.
+        // One more step on each side, where the coarse grid has no pose in reach.
         let mut ranges = self.ranges;
         for ((low, high), (first, last)) in ranges.iter_mut().zip(self.ends_of_reach()) {
             let (start, step) = (*low, (*high - *low) / (COARSE_POSES - 1) as f64);
@@ -161,7 +162,7 @@ impl Slice {
         ranges
     }
 
-    /// First and last index along both axes with a pose in reach; the middle if there is none.
+    /// First and last index along both axes with a pose in reach; the middle index if there is none.
     fn ends_of_reach(&self) -> [(usize, usize); 2] {
         let mut ends = [(self.count / 2, self.count / 2); 2];
         for (k, _) in self.qualities.iter().enumerate().filter(|(_, quality)| quality.within_reach()) {
@@ -172,7 +173,7 @@ impl Slice {
         ends
     }
 
-    /// Writes a row per pose, SI units and radians.
+    /// Writes a row per pose, in SI units and radians.
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
         let mut columns = coordinates("");
         columns.extend(
@@ -189,7 +190,7 @@ impl Slice {
         writer.save(path)
     }
 
-    /// Name of a file of the slice, as `x-z.svg`.
+    /// Name of a file of the slice, such as `x-z.svg`.
     pub fn file_name(&self, extension: &str) -> String {
         format!("{}.{extension}", self.plane)
     }

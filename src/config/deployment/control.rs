@@ -15,23 +15,24 @@ use crate::control::signals::state::AfterStop;
 use crate::model::fidelity::Fidelity;
 use crate::model::machine::Machine;
 
-/// Default of the bandwidths where the rate carries it \[Hz\]: stiff enough for micrometres, soft enough for
-/// a structure that is not quite rigid.
+/// Default of the bandwidths if the rate permits it \[Hz\]: stiff enough for micrometres, soft enough for a
+/// structure that is not quite rigid.
 const DEFAULT_BANDWIDTH_HZ: f64 = 10.0;
 /// Usual damping ratios; a ratio beyond them is a mistake.
 const DAMPING_RATIO_BOUND: Bound = Bound::Within(0.1, 10.0);
-/// Masses of the platform over that of the model with which the default bandwidths and the estimator are stable; less is
-/// warned of. A payload that is not configured should stay well within them.
+/// Masses of the platform, as ratios of the modelled mass, for which the default bandwidths and the estimator are
+/// stable; a narrower range causes a warning. A payload that is not configured should stay well within them.
 pub const STABLE_MASSES: [f64; 2] = [0.7, 1.5];
-/// Bandwidth of the estimator over the lesser bandwidth of the loops, at most: with the delay of the drives configured, and
-/// without. What is faster only amplifies noise, and a delay that is not known would make it unstable.
+/// Largest bandwidth of the estimator over the lesser bandwidth of the loops: with the delay of the drives configured, and
+/// without. A faster estimator only amplifies noise, and an unknown delay would make it unstable.
 const ESTIMATOR_RATIO: f64 = 3.0;
 const ESTIMATOR_RATIO_DELAY_UNKNOWN: f64 = 1.05;
 /// Steps in which an estimator is slowed down until the loops have their gain margin, each a fifth.
 const ESTIMATOR_STEPS: i32 = 20;
 /// Default of `disturbance_m_s2_per_sqrt_s`: with a reading noise of 10 um an estimator of 30 Hz at 1 kHz.
 const DEFAULT_DISTURBANCE: f64 = 2.0;
-/// Largest distances between platform and setpoint to engage; a greater one is a motion and needs a trajectory \[m\], \[rad\].
+/// Largest distances between platform and setpoint to engage \[m\], \[rad\]. A greater distance needs a
+/// trajectory.
 const MAX_ENGAGE_M: f64 = 0.1;
 const MAX_ENGAGE_RAD: f64 = 0.2;
 /// Largest following errors that a configuration may allow \[m\], \[rad\].
@@ -91,7 +92,7 @@ pub enum FidelityChoice {
     Fixed(Fidelity),
 }
 
-/// What the control law acts on.
+/// Sections that the control law depends on.
 pub(super) struct Plant<'a> {
     pub realtime: &'a Realtime,
     pub machine: &'a Machine,
@@ -171,15 +172,16 @@ fn fidelity(section: &mut SectionReader) -> FidelityChoice {
 }
 
 impl Plant<'_> {
-    /// The loop with its longest delay, and an estimator as fast as it.
+    /// The loop with its longest delay, and an estimator of the same bandwidth.
     fn sampled_loop(&self, damping_ratio: f64, compensates_disturbance: bool) -> SampledLoop {
         let delay_s = self.drive.total_delay_s();
         let sampled = self.realtime.sampled_loop(f64::NAN, damping_ratio, delay_s);
         SampledLoop { compensates_disturbance, ..sampled }
     }
 
-    /// Bandwidth of the estimator \[Hz\]: what noise and disturbances ask for, no more than the delay lets it be, and slower where a
-    /// loop would not be stable with [`STABLE_MASSES`], or as fast as a loop where only that is stable.
+    /// Bandwidth of the estimator \[Hz\]: the optimum for noise and disturbances, bounded by the ratio that the delay
+    /// allows. It is slower if a loop would not be stable with [`STABLE_MASSES`], and as fast as a loop if only that is
+    /// stable.
     fn estimator_hz(&self, disturbance: f64, loops: &[(f64, SampledLoop, f64); 2]) -> f64 {
         let Self { realtime, noise, drive, .. } = self;
         let period_s = realtime.period_s();
@@ -187,7 +189,7 @@ impl Plant<'_> {
         let asked_hz = libm::pow(intensity, 1.0 / 6.0) / TAU;
         let ratio = if drive.delay_s.is_some() { ESTIMATOR_RATIO } else { ESTIMATOR_RATIO_DELAY_UNKNOWN };
         let largest_hz = loops.iter().map(|(hertz, ..)| hertz * ratio).fold(asked_hz, f64::min);
-        // Something else of the file is wrong.
+        // Another value in the file is wrong.
         if !(largest_hz.is_finite() && largest_hz > 0.0) {
             return f64::NAN;
         }
@@ -248,7 +250,7 @@ fn gains(
     [bandwidth_hz, damping_ratio]
 }
 
-/// Largest bandwidth \[Hz\] that is stable, rounded down, so that the number in a message is one that is accepted.
+/// Largest stable bandwidth \[Hz\], rounded down so that the number in a message is accepted.
 fn largest_hz(is_stable: impl Fn(f64) -> bool, rate_hz: f64) -> f64 {
     (edge(0.0, rate_hz, is_stable) * 1e3).floor() / 1e3
 }

@@ -1,4 +1,4 @@
-//! Defaults of `[limits]`: motions that a standing person tolerates, or less where the drives cannot give them at home.
+//! Defaults of `[limits]`: motions that a standing person tolerates, or less if the drives cannot give them at home.
 
 use core::fmt;
 
@@ -8,35 +8,37 @@ use crate::analysis::drive_capability::DriveCapability;
 use crate::control::signals::limits::{DerivativeLimits, Limits};
 use crate::model::machine::Machine;
 
-/// Motions that a standing person tolerates: half of gravity, a hundredth of a second to build it up.
+/// Motions that a standing person tolerates: half of gravity, built up in a hundredth of a second.
 const TOLERATED_POSITION: DerivativeLimits =
     DerivativeLimits { velocity: 1.0, acceleration: 5.0, jerk: 500.0 };
 const TOLERATED_ORIENTATION: DerivativeLimits =
     DerivativeLimits { velocity: 2.0, acceleration: 20.0, jerk: 2000.0 };
-/// Share of the largest force that holding, friction at the largest rate and both accelerations may take together; the rest is for
-/// feedback, and for poses away from home.
+/// Share of the largest force that holding, friction at the largest rate and both accelerations may use
+/// together. The rest is for feedback, and for poses away from home.
 const USABLE_FORCE_RATIO: f64 = 0.9;
-/// Share of the force that holding and friction leave which the linear acceleration may take; the angular one has what is left.
+/// Share of the force left by holding and friction that the linear acceleration may use. The angular
+/// acceleration uses the rest.
 const LINEAR_SHARE: f64 = 0.5;
 
 /// Defaults of the limits of position and orientation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DefaultLimits {
-    /// Of C.
+    /// Limits of C.
     pub position: DerivativeLimits,
-    /// Of the rotation.
+    /// Limits of the rotation.
     pub orientation: DerivativeLimits,
 }
 
 impl DefaultLimits {
-    /// Defaults for a machine. Where its drives cannot hold it at home the accelerations are the tolerated ones: it is refused anyway.
+    /// Defaults for a machine. If its drives cannot hold it at home, the accelerations are the tolerated
+    /// ones; the machine is refused anyway.
     pub fn new(machine: &Machine) -> Self {
         let tolerated = Self { position: TOLERATED_POSITION, orientation: TOLERATED_ORIENTATION };
         let Some(drives) = DriveCapability::new(machine, &machine.home_pose()) else { return tolerated };
         let actuator = &machine.actuator;
         let (_, holding) = drives.hardest_held();
         let usable = USABLE_FORCE_RATIO * actuator.max_force - actuator.viscous_friction * actuator.max_rate;
-        // Some acceleration remains where holding and friction take nearly all.
+        // Some acceleration remains even if holding and friction use nearly all force.
         let usable = usable.max(holding + LINEAR_SHARE * (actuator.max_force - holding));
         let for_linear = holding + LINEAR_SHARE * (usable - holding);
         let linear = lesser(TOLERATED_POSITION.acceleration, drives.linear_acceleration(for_linear, 0.0));
@@ -48,14 +50,14 @@ impl DefaultLimits {
     }
 }
 
-/// Default that is less than the tolerated value, as the drives cannot give that.
+/// Default below the tolerated value, because the drives cannot give that.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DerivedLimit {
     /// Key of the limit.
     pub key: &'static str,
     /// The default.
     pub value: f64,
-    /// The default of machines whose drives can give it.
+    /// Default of machines whose drives can give it.
     pub usual: f64,
     /// Key from which it follows.
     pub cause: &'static str,
@@ -100,7 +102,7 @@ fn scaled(tolerated: DerivativeLimits, velocity: f64, acceleration: f64) -> Deri
     }
 }
 
-/// The tolerated value, or the one that the drives can give, rounded down to two digits, if that is less.
+/// The tolerated value, or the possible one rounded down to two digits if that is less.
 fn lesser(tolerated: f64, possible: f64) -> f64 {
     if possible > 0.0 && possible < tolerated { rounded_down(possible) } else { tolerated }
 }
@@ -108,7 +110,7 @@ fn lesser(tolerated: f64, possible: f64) -> f64 {
 /// A positive number rounded down to two significant digits, as it would be written.
 pub(super) fn rounded_down(x: f64) -> f64 {
     let digit = libm::pow(10.0, libm::log10(x).floor() - 1.0);
-    // A number of two digits is itself, whatever the quotient is rounded to.
+    // A number of two digits remains unchanged, however the quotient is rounded.
     let text = format!("{:.1e}", (x / digit * (1.0 + 1e-9)).floor() * digit);
     text.parse().unwrap_or(x)
 }

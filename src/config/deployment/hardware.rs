@@ -11,7 +11,7 @@ const STEP_DEVIATION: f64 = 0.288_675_134_594_812_9;
 const DEFAULT_POSE_TOLERANCE_M: f64 = 5e-4;
 /// Default of `ready_timeout_ms`: a drive that enables and a brake that opens take 50 to 200 ms.
 const DEFAULT_READY_TIMEOUT_MS: f64 = 500.0;
-/// Longest that a key may set \[ms\]: an operator would take the machine for dead.
+/// Largest value of the key \[ms\]: during a longer wait an operator would think that the machine does not respond.
 const MAX_READY_TIMEOUT_MS: f64 = 10_000.0;
 /// Longest delay of drives \[us\]: with more, a platform a tenth lighter than modelled is unstable.
 const MAX_DELAY_US: f64 = 15_000.0;
@@ -19,20 +19,20 @@ const MAX_DELAY_US: f64 = 15_000.0;
 /// Section `[measured]`: errors of the sensors, as standard deviations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorNoise {
-    /// Of a length.
+    /// Standard deviation of a length.
     pub length_m: f64,
-    /// Resolution of a length; 0 if it is not known.
+    /// Resolution of a length; 0 if unknown.
     pub length_step_m: f64,
-    /// Largest difference of a length from that of a pose that another sensor measures; no standard deviation.
+    /// Largest difference between a length and the length at a pose from another sensor; no standard deviation.
     pub pose_tolerance_m: f64,
-    /// Of a rate; `None` if the rates that the driver sends are only checked.
+    /// Standard deviation of a rate; `None` if the driver's rates are only checked.
     pub rate_m_s: Option<f64>,
 }
 
 /// Section `[drive]`: time from the release of a cycle to the instant at which its force acts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drive {
-    /// Dead time; `None` if it is not known.
+    /// Dead time; `None` if unknown.
     pub delay_s: Option<f64>,
     /// Time constant of the force.
     pub lag_s: f64,

@@ -17,19 +17,20 @@ const FORCE_RISE_S: f64 = 0.01;
 /// Default of the largest condition: an error of a length is up to a hundred times as large at the platform, and
 /// a load needs leg forces of up to a hundred times its size.
 const DEFAULT_CONDITION: f64 = 100.0;
-/// Largest exponent of the growth of a displacement under held forces, until a force computed from it acts. With it a loop with the
-/// default gains of a slow rate stands 0.7 of the modelled mass, as without growth.
+/// Largest exponent of the growth of a displacement under constant forces, until a force computed from it acts. With this
+/// exponent a loop with the default gains of a slow rate is stable with 0.7 of the modelled mass, as without growth.
 const MAX_GROWTH_EXPONENT: f64 = 0.2;
-/// Part of the bound on the change of an acceleration within a hold that motions reach: in the worst direction at the largest velocity
-/// no stop from the worst pose would be verified. Found, not proved: the worst of searches of 2e8 cycles was 0.17, and this is half
-/// as much again.
+/// Part of the bound on the change of an acceleration within a hold that motions reach. The bound itself is
+/// for the worst direction at the largest velocity, where no stop from the worst pose would be verified.
+/// Found, not proved: the worst of searches of 2e8 cycles was 0.17, and this is half as much again.
 const TURNING_SHARE: f64 = 0.25;
 /// From the beginning of a hold to its middle, in periods.
 const MIDDLE_OF_HOLD: f64 = 0.5;
-/// Least default of the condition over that of home: else the platform could not leave it.
+/// Least default of the condition, as a ratio of the condition at home. Otherwise the platform could not
+/// leave home.
 const MIN_CONDITION_PER_HOME: f64 = 1.5;
-/// Default of the distance from the ends of the stroke, as a ratio of the stroke: many times the following error of a
-/// machine in order.
+/// Default of the distance from the ends of the stroke, as a ratio of the stroke: many times the following
+/// error of a faultless machine.
 const DEFAULT_STROKE_MARGIN_RATIO: f64 = 0.005;
 
 /// Section `[limits]`.
@@ -41,7 +42,8 @@ pub struct DeploymentLimits {
     pub feedback_scale: f64,
     /// Change of the payload under control that is no fault \[kg\]; `None`: the default of the machine.
     pub payload_change_kg: Option<f64>,
-    /// Sudden disturbance that is no impact \[m/s^2\]; `None` is the default, which follows from the limit of acceleration.
+    /// Sudden disturbance that is no impact \[m/s^2\]; `None` for the default, which follows from the limit
+    /// of acceleration.
     pub disturbance_step_m_s2: Option<f64>,
     /// Distance that the reference keeps from the ends of the stroke.
     pub stroke_margin_m: f64,
@@ -49,7 +51,7 @@ pub struct DeploymentLimits {
     pub force_rate_n_s: f64,
     /// Largest Frobenius condition of the legs' wrenches under control.
     pub condition: f64,
-    /// Largest pole of the platform under held forces within that condition \[1/s\].
+    /// Largest pole of the platform under constant forces within that condition \[1/s\].
     pub held_pole: f64,
 }
 
@@ -89,13 +91,13 @@ pub(super) fn read(mut section: SectionReader, machine: &Machine, realtime: &Rea
     }
 }
 
-/// A bound of the disturbance, if it is given. The default follows from the controller's model, which is built later.
+/// A given bound of the disturbance. The default follows from the controller's model, which is built later.
 fn allowed(section: &mut SectionReader, key: &'static str) -> Option<f64> {
     let given = section.number_or(key, f64::INFINITY, Bound::PositiveOrInfinite);
     section.has(key).then_some(given)
 }
 
-/// Distance from the ends of the stroke. Home must keep it, or the platform could not park.
+/// Distance from the ends of the stroke. Home must keep it, otherwise the platform could not park.
 fn stroke_margin_m(section: &mut SectionReader, machine: &Machine) -> f64 {
     let lengths = leg_lengths(machine, &machine.home_pose());
     let at_home =
@@ -111,11 +113,12 @@ fn stroke_margin_m(section: &mut SectionReader, machine: &Machine) -> f64 {
     margin
 }
 
-/// Condition up to which forces that are held turn little enough with the legs.
+/// Condition up to which constant forces turn little enough with the legs.
 ///
-/// Forces F that carry a load `m a` are at most `condition m a / |N|`. Held, they turn with the legs: a displacement s of the
-/// joints changes their wrench by at most `|N| F s / L`, the acceleration by `condition a / L s`. Within half of a period the
-/// acceleration departs from its mean, on a way of half a period at the largest velocity, by no more than feedback may add.
+/// Forces F that carry a load `m a` are at most `condition m a / |N|`. Constant forces turn with the legs: a
+/// displacement s of the joints changes their wrench by at most `|N| F s / L`, and the acceleration by
+/// `condition a / L s`. Within half a period at the largest velocity, the acceleration departs from its mean
+/// by no more than feedback may add.
 fn turning_condition(
     machine: &Machine,
     realtime: &Realtime,
@@ -129,9 +132,9 @@ fn turning_condition(
     feedback_scale * position.acceleration / (position.velocity * middle_s) * shortest / load
 }
 
-/// Largest condition, and poses within it. The default is less where the rate is slow, so that no
-/// displacement grows far before a force answers it, and leaves room around a home that is badly conditioned; home must
-/// keep the limit.
+/// Largest condition, and the surveyed poses within it. The default is less at a slow rate, so that no
+/// displacement grows much before a new force acts. It leaves room around a home with a large condition; home
+/// must keep the limit.
 fn condition(
     section: &mut SectionReader,
     machine: &Machine,
@@ -157,9 +160,9 @@ fn condition(
     (limit, survey)
 }
 
-/// Rejects limits of acceleration that forces exceed because they turn with the legs while they are held: within half of a period
-/// the acceleration then departs from its mean by more than feedback may add. Defaults follow from the machine; one whose
-/// joints are wrong is examined as a whole.
+/// Rejects limits of acceleration that forces would exceed, because they turn with the legs while they are
+/// constant: within half a period the acceleration then departs from its mean by more than feedback may add.
+/// Defaults follow from the machine. A machine with wrong joints is examined as a whole.
 fn check_turning(
     section: &SectionReader,
     machine: &Machine,

@@ -2,7 +2,7 @@
 //! `[timeouts]`, `[operator]`, `[plant]`, `[envelope]`.
 //!
 //! Every key has a default that works at the configured rate: a slow loop gets smaller gains and longer
-//! timeouts. What is given is checked against the limits that follow from the rate.
+//! timeouts. Given values are checked against the limits that follow from the rate.
 
 pub use self::control::{Control, FidelityChoice, STABLE_MASSES};
 use self::default_limits::rounded_down;
@@ -27,9 +27,9 @@ mod operator;
 mod plant;
 mod realtime;
 
-/// Least default of a timeout in periods: one late message does not mean that its sender is lost.
+/// Least default of a timeout in periods. One late message does not mean that its sender is lost.
 const MIN_DEFAULT_TIMEOUT_PERIODS: f64 = 4.0;
-/// Default of `measured_ms`, if the loop stands it; and its least default in periods: longer than one.
+/// Default of `measured_ms`, if the loop is stable with it; and its least default in periods: longer than one.
 const MAX_DEFAULT_MEASURED_MS: f64 = 20.0;
 const MIN_MEASURED_PERIODS: f64 = 1.5;
 /// Longest timeout \[ms\]. After a second without messages the pose of the platform is unknown.
@@ -60,7 +60,7 @@ pub struct Deployment {
     pub operator: OperatorAccess,
     /// Simulated hardware.
     pub plant: Plant,
-    /// Ranges of the motions that the machine is used for, if configured.
+    /// Ranges of the machine's motions, if configured.
     pub envelope: Option<envelope::EnvelopeBounds>,
 }
 
@@ -125,12 +125,12 @@ fn timeouts(
 ) -> Timeouts {
     let setpoint_ms = match policy {
         ViolationPolicy::Stop => 50.0,
-        // Sources may send 30 poses a second, and some are lost.
+        // Sources may send 30 poses per second, and some are lost.
         ViolationPolicy::Limit => 200.0,
     };
     let mut measured_ms = default_timeout_ms(MAX_DEFAULT_MEASURED_MS, rate_hz);
     if !section.has("measured_ms") {
-        // Without measurements the platform is controlled for no longer than the loop stands.
+        // Without measurements control continues only up to the age at which the loop is stable.
         let stable_ms = stable_ms(measured_ms).max(MIN_MEASURED_PERIODS * 1e3 / rate_hz);
         measured_ms = if stable_ms < measured_ms { rounded_down(stable_ms) } else { measured_ms };
     }
@@ -163,12 +163,12 @@ fn envelope(mut section: SectionReader) -> Option<envelope::EnvelopeBounds> {
     Some(envelope::EnvelopeBounds { pose_min, pose_max, velocity, acceleration })
 }
 
-/// A default timeout \[ms\], longer where the periods are.
+/// Default of a timeout \[ms\]. It is longer for long periods.
 fn default_timeout_ms(timeout_ms: f64, rate_hz: f64) -> f64 {
     timeout_ms.max(MIN_DEFAULT_TIMEOUT_PERIODS * 1e3 / rate_hz)
 }
 
-/// Reads a timeout \[s\], which must be longer than a period, as messages are sent once a period.
+/// Reads a timeout \[s\]. It must be longer than a period, because messages are sent once per period.
 fn timeout_s(section: &mut SectionReader, key: &'static str, default_ms: f64, rate_hz: f64) -> f64 {
     let period_ms = 1e3 / rate_hz;
     let timeout_ms = section.number_or(key, default_ms, Bound::UpTo(MAX_TIMEOUT_MS));

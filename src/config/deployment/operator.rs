@@ -1,8 +1,8 @@
-//! `[operator]`: who may send requests over the control socket.
+//! `[operator]`: users who may send requests over the control socket.
 
 use crate::config::reader::SectionReader;
 
-/// Longest name of a group, as of useradd.
+/// Longest name of a group, as in useradd.
 const MAX_GROUP_LENGTH: usize = 32;
 
 /// Section `[operator]`.
@@ -10,7 +10,7 @@ const MAX_GROUP_LENGTH: usize = 32;
 pub struct OperatorAccess {
     /// Group of the control socket; `None` for the group of the daemon.
     pub group: Option<String>,
-    /// Permissions of the control socket: to connect is to write.
+    /// Permissions of the control socket. Connecting needs the permission to write.
     pub mode: u32,
     /// Group that may read the status and nothing else, besides those who may send requests.
     pub read_group: Option<String>,

@@ -8,12 +8,12 @@ use crate::config::reader::SectionReader;
 use crate::realtime::cyclic::ReleaseMode;
 use crate::realtime::overrun::OverrunPolicy;
 
-/// Bounds of the rate \[Hz\]. Above, one wake-up takes longer than the period leaves.
+/// Bounds of the rate \[Hz\]. At a higher rate, a wake-up takes longer than the period.
 const RATE_BOUND_HZ: Bound = Bound::Within(10.0, 20_000.0);
-/// Default of `late_wakeup_us` where half a period is longer; the wake-up latency of an ordinary kernel
-/// stays below at the 99th percentile.
+/// Default of `late_wakeup_us`, or half a period if that is less. The wake-up latency of an ordinary kernel
+/// is below it at the 99th percentile.
 const DEFAULT_LATE_WAKEUP_US: f64 = 200.0;
-/// Default of `max_lead_us` where half a period is longer: covers the wake-up latency of an ordinary
+/// Default of `max_lead_us`, or half a period if that is less. It covers the wake-up latency of an ordinary
 /// kernel at the 99.9th percentile.
 const DEFAULT_MAX_LEAD_US: f64 = 200.0;
 /// Defaults of `io_lead_us` where a quarter of the period is longer. An I/O thread that sleeps until then wakes about
@@ -77,7 +77,7 @@ impl Realtime {
         1.0 / self.rate_hz
     }
 
-    /// Whether all times are those of the plant.
+    /// Whether all times are times of the plant.
     pub fn is_simulated(&self) -> bool {
         self.release == ReleaseMode::Lockstep
     }
@@ -88,9 +88,9 @@ impl Realtime {
         bound.filter(|_| !self.is_simulated()).collect()
     }
 
-    /// Longest time from a measurement to its force, in periods, of a loop that misses nothing and whose driver
-    /// measures once a period: the newest message may be a period old when it is read, a lead before the
-    /// release, and the force may come at the next release. What the drives wait or sleep comes on top.
+    /// Longest time from a measurement to its force, in periods, of a loop without missed deadlines whose
+    /// driver measures once a period: the newest message may be a period old when it is read, a lead before
+    /// the release, and the force may begin at the next release. Delays of the drives are added to it.
     pub fn longest_delay(&self) -> f64 {
         match self.release {
             ReleaseMode::Sleep | ReleaseMode::Hybrid => 2.0 + self.io_lead_s * self.rate_hz,
@@ -99,7 +99,7 @@ impl Realtime {
         }
     }
 
-    /// Part of that delay that the estimator knows, in periods: the age of the measurement, by its stamp.
+    /// Part of that delay over which the estimator predicts, in periods: the age of the measurement, by its stamp.
     fn known_delay(&self) -> f64 {
         self.longest_delay() - 1.0
     }

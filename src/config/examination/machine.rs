@@ -11,7 +11,8 @@ use nalgebra::Vector3;
 /// Largest share of the actuators' force that holding the platform may take: a tenth remains for feedback and
 /// friction.
 pub const MAX_HOLDING_RATIO: f64 = 0.9;
-/// Largest cosine between gravity and the direction from base to platform of a platform that stands on its legs: 120 deg.
+/// Largest cosine between gravity and the direction from base to platform, for a platform that stands on its legs:
+/// 120 deg.
 const MAX_STANDING_COSINE: f64 = -0.5;
 
 pub(super) fn examine(examiner: &mut Examiner) {
@@ -114,7 +115,7 @@ fn examine_crossing(examiner: &mut Examiner, crossing: &LegCrossing) {
     }
 }
 
-/// Warns where the platform does not stand on its legs.
+/// Warns if gravity does not press the platform onto its legs.
 fn examine_gravity(examiner: &mut Examiner) {
     let machine = &examiner.config.machine;
     let up = platform_from_base(machine);

@@ -1,4 +1,4 @@
-//! One connection of the control socket: lines in, answers out, without ever blocking.
+//! Connection of the control socket: reads lines and writes answers, without blocking.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
@@ -20,7 +20,7 @@ pub const MAX_LINE_BYTES: usize = 4096;
 /// Longest time for the first line, and for the rest of a line that has begun \[ns\].
 pub const LINE_LIMIT_NS: u64 = 2_000_000_000;
 
-/// User and process at the other end, from the kernel.
+/// User and process of the client, from the kernel.
 #[derive(Clone, Debug)]
 pub struct Peer {
     user_id: Option<u32>,
@@ -34,12 +34,13 @@ impl Peer {
         Self { user_id, process_id }
     }
 
-    /// Name of the user. The system may take long to find it: only for the log, when everything else is done.
+    /// Name of the user. The system may need long to find it, so it is only for the log, after all other
+    /// effort.
     pub fn user(&self) -> String {
         self.user_id.map_or_else(|| "unknown".into(), user_name)
     }
 
-    /// Logs a request of it that was not carried out, and why.
+    /// Logs a request that was not carried out, and the reason.
     pub fn log_failure(&self, answer: &AnswerLine) {
         let AnswerLine { result, request, state, diagnostic, text, .. } = answer;
         let is_success =
@@ -66,27 +67,27 @@ impl Peer {
 pub struct Connection {
     pub stream: UnixStream,
     pub peer: Peer,
-    /// Whether it may send requests, and not only read.
+    /// Whether the client may send requests, and not only read the status.
     pub may_request: bool,
-    /// The request that is not answered yet.
+    /// The request in progress.
     pub pending: Option<PendingOrder>,
-    /// The line that waits for its turn.
+    /// The next line to be processed.
     pub line: Option<RequestLine>,
-    /// Number of the reload that is not answered yet.
+    /// Number of the reload in progress.
     pub reload: Option<u64>,
-    /// The recording that is not written yet.
+    /// The recording of the last seconds in progress.
     pub last_seconds: Option<LastSeconds>,
-    /// The last file that came with a line.
+    /// The last file that the client passed.
     pub file: Option<File>,
-    /// Whether its client wants lines before the answer.
+    /// Whether the client wants lines of progress before the answer.
     pub wants_progress: bool,
     buffer: Vec<u8>,
-    /// Beginning of the line that is incomplete; `None` after a complete line \[ns\].
+    /// Instant at which the incomplete line began \[ns\]; `None` after a complete line.
     line_since_ns: Option<u64>,
-    /// The last line, or the beginning \[ns\].
+    /// Instant of the last line, at first of the connection \[ns\].
     used_ns: u64,
     has_requested: bool,
-    /// Nothing more will be read.
+    /// Whether the client has ended its input.
     pub has_ended: bool,
 }
 
@@ -95,12 +96,12 @@ pub struct Connection {
 pub enum Received {
     Nothing,
     Line(String),
-    /// The line is too long, or no text: the connection is of no use.
+    /// The line is too long or not text. The connection must be closed.
     Garbage(&'static str),
 }
 
 impl Connection {
-    /// A connection that was just accepted.
+    /// A newly accepted connection.
     pub fn new(stream: UnixStream, may_request: bool, now_ns: u64) -> io::Result<Self> {
         stream.set_nonblocking(true)?;
         let peer = Peer::of(&stream);
@@ -122,13 +123,13 @@ impl Connection {
         })
     }
 
-    /// Whether an answer is to come.
+    /// Whether the client waits for an answer.
     pub fn is_waiting(&self) -> bool {
         let Self { pending, line, reload, last_seconds, .. } = self;
         pending.is_some() || line.is_some() || reload.is_some() || last_seconds.is_some()
     }
 
-    /// Reads what there is, up to one line's length, and returns the next complete line.
+    /// Reads at most the length of one line, and returns the next complete line.
     pub fn receive(&mut self, now_ns: u64) -> Received {
         let mut bytes = [0; MAX_LINE_BYTES];
         if !self.has_ended && !self.buffer.contains(&b'\n') {
@@ -145,7 +146,7 @@ impl Connection {
         self.next_line(now_ns)
     }
 
-    /// Whether a line that was read waits to be returned.
+    /// Whether a complete line has been read and not returned yet.
     pub fn has_line(&self) -> bool {
         self.buffer.contains(&b'\n')
     }
@@ -177,14 +178,14 @@ impl Connection {
         !self.is_waiting() && (self.has_ended || is_slow) && !self.has_line()
     }
 
-    /// Sends a line; false if the client does not read its answers or has left.
+    /// Sends a line. False if the client does not read its answers or has left.
     pub fn send(&mut self, answer: &AnswerLine) -> bool {
         let line = answer.to_line();
         matches!(self.stream.write(line.as_bytes()), Ok(count) if count == line.len())
     }
 
-    /// Order in which connections are closed to make room: the smallest first. Those that have requested nothing, then
-    /// the longest unused, then those that wait, those that stop last.
+    /// Rank of connections for closing; the smallest is closed first. Order: clients without a request, then
+    /// the longest unused, then those that wait for an answer, last those that wait for a stop.
     pub fn rank(&self) -> (bool, bool, bool, u64) {
         let stops = self.pending.as_ref().is_some_and(|pending| is_stop(pending.request()));
         (stops, self.is_waiting(), self.has_requested, self.used_ns)
@@ -234,7 +235,7 @@ mod tests {
         assert!(connection.is_done(LINE_LIMIT_NS + 1), "silent from the beginning");
         client.write_all(b"one\n").unwrap();
         assert_eq!(connection.receive(10), Received::Line("one\n".into()));
-        assert!(!connection.is_done(100 * LINE_LIMIT_NS), "it may ask again later");
+        assert!(!connection.is_done(100 * LINE_LIMIT_NS), "a client may send another request later");
         client.write_all(b"ha").unwrap();
         assert_eq!(connection.receive(20), Received::Nothing);
         assert!(connection.is_done(LINE_LIMIT_NS + 21));

@@ -1,4 +1,4 @@
-//! The request `record`: the recorder writes the last seconds to a file that the client passes with the line.
+//! Request `record`: the recorder writes the last seconds to a file that the client passes with the line.
 
 use std::fs::File;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel};
@@ -11,15 +11,15 @@ use crate::operator::protocol::{AnswerLine, RequestResult, VERSION};
 /// Name of the request.
 pub const RECORD: &str = "record";
 
-/// Seconds where the request names none: all that the recorder keeps.
+/// Length if the request gives none \[s\]: all cycles that the recorder keeps.
 const ALL_S: f64 = 1e9;
 
-/// Recording of the last seconds on its way.
+/// Recording of the last seconds in progress.
 #[derive(Debug)]
 pub struct LastSeconds(Receiver<Result<u64, String>>);
 
 impl LastSeconds {
-    /// Passes a request on to the recorder; the error is a sentence for the client.
+    /// Passes a request to the recorder. The error is a sentence for the client.
     pub fn order(
         windows: &SyncSender<WindowOrder>,
         file: Option<File>,
@@ -27,7 +27,7 @@ impl LastSeconds {
     ) -> Result<Self, String> {
         let file =
             file.ok_or("record needs an open file with its line (SCM_RIGHTS); see docs/operator.md")?;
-        // Whatever else it is may hold the recorder for ever.
+        // Only regular files: any other may block the recorder for ever.
         if !file.metadata().is_ok_and(|it| it.is_file()) {
             return Err("record needs a regular file".into());
         }
@@ -37,7 +37,7 @@ impl LastSeconds {
         Ok(Self(answered))
     }
 
-    /// The answer, once there is one.
+    /// The answer, once the recording has ended.
     pub fn answer(&self, state: State) -> Option<AnswerLine> {
         let (result, text) = match self.0.try_recv() {
             Ok(Ok(cycles)) => (RequestResult::Done, format!("{cycles} cycles")),

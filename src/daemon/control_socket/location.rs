@@ -1,4 +1,4 @@
-//! Place and permissions of the control socket.
+//! Location and permissions of the control socket.
 
 use std::fs::{self, Permissions};
 use std::io;
@@ -41,14 +41,15 @@ pub enum SocketError {
 pub struct ControlSocket {
     /// Listener, which does not block.
     pub listener: UnixListener,
-    /// The same of those who may read the status and nothing else.
+    /// Listener for clients that may only read the status.
     pub reading: Option<UnixListener>,
-    /// Path of its file.
+    /// Path of the socket file.
     pub path: PathBuf,
 }
 
 impl ControlSocket {
-    /// The next client, and whether it may send requests: those who may come first.
+    /// Accepts the next client, and returns whether it may send requests. Clients that may send requests come
+    /// first.
     pub fn accept(&self) -> io::Result<(UnixStream, bool)> {
         match (self.listener.accept(), &self.reading) {
             (Err(error), Some(reading)) if error.kind() == io::ErrorKind::WouldBlock => {
@@ -61,7 +62,7 @@ impl ControlSocket {
 
 impl Drop for ControlSocket {
     fn drop(&mut self) {
-        // Fails only if somebody has removed them.
+        // Fails only if somebody has removed the files.
         for path in
             [Some(self.path.clone()), self.reading.as_ref().map(|_| beside(&self.path))].into_iter().flatten()
         {
@@ -70,14 +71,14 @@ impl Drop for ControlSocket {
     }
 }
 
-/// Path of the socket for reading beside that for requests.
+/// Path of the read-only socket beside the socket for requests.
 fn beside(socket: &Path) -> PathBuf {
     let folder = socket.parent().unwrap_or(socket);
     reading_path(folder, &socket.file_stem().unwrap_or_default().to_string_lossy())
 }
 
-/// Opens the control socket of a machine: in [`SYSTEM_FOLDER`] if this process may write there, else in the folder of this
-/// user.
+/// Opens the control socket of a machine: in [`SYSTEM_FOLDER`] if this process may write there, else in the
+/// folder of this user.
 pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, SocketError> {
     let (group, read_group) =
         (Group::find("group", &access.group)?, Group::find("read_group", &access.read_group)?);
@@ -100,7 +101,7 @@ pub fn open(machine: &str, access: &OperatorAccess) -> Result<ControlSocket, Soc
     in_folder(&open_user_folder()?)
 }
 
-/// A group that a key names.
+/// Group named by a key of the configuration.
 struct Group {
     key: &'static str,
     name: String,
@@ -117,7 +118,8 @@ impl Group {
     }
 }
 
-/// Binds under a temporary name: the socket appears with its permissions, and replaces that of a daemon that died.
+/// Binds under a temporary name and renames the socket. So it appears with its permissions, and replaces the
+/// socket of a daemon that died.
 fn bind(path: &Path, mode: u32, group: Option<&Group>) -> Result<UnixListener, SocketError> {
     let temporary = path.with_extension(process::id().to_string());
     let _ = fs::remove_file(&temporary);
@@ -131,7 +133,7 @@ fn bind(path: &Path, mode: u32, group: Option<&Group>) -> Result<UnixListener, S
     bound.map_err(|cause| {
         let _ = fs::remove_file(&temporary);
         match group {
-            // Not EACCES: to change the group is not permitted.
+            // EPERM, not EACCES: the user may not change the group.
             Some(Group { key, name, .. }) if cause.raw_os_error() == Some(libc::EPERM) => {
                 SocketError::NotMember(key, name.clone())
             }
@@ -151,7 +153,7 @@ mod tests {
         let folder = TempDir::new().unwrap();
         let path = socket_path(folder.path(), "m");
         for mode in [0o600, 0o660] {
-            // The file of a daemon that was killed.
+            // Leaves the file of a killed daemon.
             core::mem::forget(bind(&path, 0o666, None).unwrap());
             let listener = bind(&path, mode, None).unwrap();
             let socket = ControlSocket { listener, reading: None, path: path.clone() };

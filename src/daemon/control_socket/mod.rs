@@ -1,11 +1,11 @@
 //! The control thread: requests of operators over a Unix socket, one JSON object per line.
 //!
-//! It is neither the real-time thread nor the I/O thread. Its priority is below theirs and above everything ordinary and the threads
-//! that write files, so that none of these delays a stop; it rests between its rounds: clients that mean no good leave some of the
-//! processor to others.
-//! Stops are served before everything else. Requests reach the real-time thread
-//! through the request word, answers come from the snapshot that the I/O thread writes in every cycle. Number of
-//! connections, length of a line and time for it are bounded, and nothing here waits for a client.
+//! The thread is neither the real-time thread nor the I/O thread. Its priority is below theirs, and above
+//! ordinary processes and the threads that write files, so none of these delays a stop. It rests between its
+//! rounds, so that malicious clients cannot take the whole processor. Stops are served first. Requests reach
+//! the real-time thread through the request word; answers come from the snapshot that the I/O thread writes
+//! in every cycle. The number of connections, the length of a line and the time for it are bounded, and the
+//! thread never waits for a client.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::os::fd::AsFd;
@@ -38,44 +38,46 @@ mod reload;
 mod respond;
 pub mod status;
 
-/// Most connections. One more closes the first in the order of [`Connection::rank`].
+/// Largest number of connections. One more closes the first in the order of [`Connection::rank`].
 const MAX_CONNECTIONS: usize = 64;
 
-/// Wait for clients while nothing is pending \[ms\]: how late the thread notices that the daemon ends.
+/// Longest wait for clients while nothing is pending \[ms\]; also the delay until the thread notices that the
+/// daemon ends.
 const IDLE_WAIT_MS: u8 = 50;
-/// The same while a request is pending \[ms\]: a period of the usual loop.
+/// Longest wait while a request is pending \[ms\]: a period of a usual loop.
 const PENDING_WAIT_MS: u8 = 1;
 
-/// Lines that are answered in a round, besides stops: each is logged, which takes most of the time.
+/// Lines answered per round, besides stops. Logging each takes most of the time.
 const LINES_PER_ROUND: usize = 4;
-/// Longest rest after a round \[ns\]: a stop may come meanwhile, and a log that blocks is no work.
+/// Longest rest after a round \[ns\]. A stop may arrive during the rest, and the time in a blocking log is no
+/// effort.
 const MAX_REST_NS: u64 = 200_000;
 
-/// Time after the process was held in which no request may begin control \[ns\]: it may have been sent before. Enough
-/// rounds to read what every connection has buffered.
+/// Time after the process was held in which no request may begin control \[ns\], because it may be from
+/// before. It suffices for the rounds that read the buffers of all connections.
 const STALE_TIME_NS: u64 = 200_000_000;
 
-/// Least time between two warnings of clients that misbehave \[ns\]: they must not fill the log.
+/// Least time between two warnings about misbehaving clients \[ns\], so that they do not fill the log.
 const WARNING_INTERVAL_NS: u64 = 1_000_000_000;
 
 /// Answer to a request of a client that may only read.
 const READING_ONLY: &str =
     "this socket is for reading: only status; operator.group names who may send requests";
 
-/// Longest that a request may wait \[s\].
+/// Longest waiting time of a request \[s\].
 const MAX_WITHIN_S: f64 = 86_400.0;
 
 /// Links of the control thread to the other threads.
 pub(super) struct ControlLinks<'a> {
     pub socket: ControlSocket,
-    /// From the I/O thread.
+    /// Snapshots, from the I/O thread.
     pub snapshots: Reader<Snapshot>,
-    /// To the real-time thread.
+    /// Request word, to the real-time thread.
     pub word: &'static RequestWord,
-    /// To the reload thread, and back.
+    /// Requests to the reload thread, and its results.
     pub request_reload: Sender<Requester>,
     pub reloaded: Receiver<Reloaded>,
-    /// To the recorder.
+    /// Orders of recordings, to the recorder.
     pub windows: SyncSender<WindowOrder>,
     /// Set when the daemon is to end.
     pub is_ending: &'a AtomicBool,
@@ -120,7 +122,7 @@ struct Server<'a> {
     word: &'static RequestWord,
     request_reload: Sender<Requester>,
     reloaded: Receiver<Reloaded>,
-    /// Requests to reload so far.
+    /// Number of reload requests so far.
     reloads: u64,
     windows: SyncSender<WindowOrder>,
     is_ending: &'a AtomicBool,
@@ -128,23 +130,23 @@ struct Server<'a> {
     status: StatusSource,
     /// End of the last wait \[ns\].
     woke_ns: u64,
-    /// Until then a request may have been sent before the process was held \[ns\].
+    /// Until this instant, a request may be from before the process was held \[ns\].
     stale_until_ns: u64,
-    /// The last warning \[ns\], and the clients without one since then.
+    /// Instant of the last warning \[ns\], and the number of clients since then.
     warned_ns: u64,
     unserved: u64,
-    /// Mistakes of the senders of setpoints and measurements that were logged last.
+    /// The last logged rejections of setpoints and measurements.
     logged: [Option<Rejection>; 2],
 }
 
 impl Server<'_> {
-    /// Rests for as long as the round has worked, up to [`MAX_REST_NS`]: others need the processor, too.
+    /// Rests for as long as the round has run, up to [`MAX_REST_NS`], so that others get the processor.
     fn rest(&self) {
         let worked_ns = monotonic_ns().saturating_sub(self.woke_ns);
         sleep(Duration::from_nanos(worked_ns.min(MAX_REST_NS)));
     }
 
-    /// Waits for something to read, or a short time. Closes connections whose client has left.
+    /// Waits for input, or for a short time. Closes connections whose client has left.
     fn wait(&mut self) {
         let is_busy = |connection: &Connection| connection.is_waiting() || connection.has_line();
         let is_pending = self.connections.iter().any(is_busy);
@@ -156,7 +158,7 @@ impl Server<'_> {
             let events = if connection.has_ended { PollFlags::empty() } else { PollFlags::POLLIN };
             PollFd::new(connection.stream.as_fd(), events)
         }));
-        // Fails only if a signal interrupts it.
+        // Fails only if interrupted by a signal.
         let _ = poll(&mut events, timeout);
         let left = PollFlags::POLLHUP | PollFlags::POLLERR;
         let has_left = |event: &PollFd<'_>| {
@@ -181,8 +183,8 @@ impl Server<'_> {
         self.woke_ns = now_ns;
     }
 
-    /// Accepts who waits, and reads at once: a stop does not wait until what all others have sent is read. Where no more files may be
-    /// open, another connection makes room.
+    /// Accepts all waiting clients and reads from each at once, so that a stop does not wait for the lines of
+    /// all others. If no more files can be opened, an existing connection is closed.
     fn accept(&mut self) {
         let snapshot = *self.snapshots.read();
         for _ in 0..MAX_CONNECTIONS {
@@ -196,7 +198,7 @@ impl Server<'_> {
                         );
                     }
                     if !self.close_least() {
-                        // Whatever holds the files: not in a busy loop.
+                        // Sleeps to avoid a busy loop while other files use up the limit.
                         sleep(Duration::from_millis(PENDING_WAIT_MS.into()));
                         return;
                     }
@@ -211,12 +213,13 @@ impl Server<'_> {
         }
     }
 
-    /// Closes connections beyond the most, after each was read once: however many connect, none is closed before its first line.
+    /// Closes connections beyond the largest number, after each was read once. However many connect, none is
+    /// closed before its first line is read.
     fn make_room(&mut self) {
         while self.connections.len() > MAX_CONNECTIONS && self.close_least() {}
     }
 
-    /// Closes the first connection in the order of [`Connection::rank`]; false if there is none.
+    /// Closes the first connection in the order of [`Connection::rank`]. False if there is none.
     fn close_least(&mut self) -> bool {
         let ranks = self.connections.iter().enumerate().map(|(k, it)| (it.rank(), k));
         let Some((_, least)) = ranks.min() else { return false };
@@ -225,7 +228,8 @@ impl Server<'_> {
         true
     }
 
-    /// Reads at most one line of each connection. Stops are carried out at once, of all else some in each round.
+    /// Reads at most one line of each connection. Stops are carried out at once, other requests a few per
+    /// round.
     fn read(&mut self) {
         let snapshot = *self.snapshots.read();
         let mut connections = core::mem::take(&mut self.connections);
@@ -238,13 +242,13 @@ impl Server<'_> {
             (answered, last) = (answered + 1, place);
             self.respond(connection, &line, &snapshot, &mut status)
         });
-        // Those behind the last are the first of the next round.
+        // The next round begins with the connections after the last one answered.
         let last = last.min(connections.len());
         connections.rotate_left(last);
         self.connections = connections;
     }
 
-    /// Receives a line; false if the connection is of no more use.
+    /// Receives a line. False if the connection must be closed.
     fn receive(&mut self, connection: &mut Connection, snapshot: &Snapshot) -> bool {
         if connection.line.is_some() {
             return true;
@@ -277,7 +281,8 @@ impl Server<'_> {
         }
     }
 
-    /// Counts a client that misbehaves or is not served; their number since the last warning, if it is time for one.
+    /// Counts a client that misbehaves or is not served. Returns the number since the last warning, if a
+    /// warning is due.
     fn warning(&mut self) -> Option<u64> {
         self.unserved += 1;
         let is_time = self.woke_ns.saturating_sub(self.warned_ns) > WARNING_INTERVAL_NS;
@@ -287,7 +292,7 @@ impl Server<'_> {
         })
     }
 
-    /// Logs each mistake of a sender when it is first seen.
+    /// Logs each new reason for rejecting messages of a sender.
     fn log_rejections(&mut self) {
         let snapshot = self.snapshots.read();
         let found = [snapshot.setpoint_rejection, snapshot.measured_rejection];
@@ -301,7 +306,7 @@ impl Server<'_> {
         }
     }
 
-    /// Looks at every pending request and answers.
+    /// Checks every pending request and answers those that have ended.
     fn advance(&mut self) {
         let (snapshot, now_ns, word) = (*self.snapshots.read(), monotonic_ns(), self.word);
         let state = snapshot.status.state().unwrap_or_default();

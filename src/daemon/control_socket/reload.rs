@@ -7,11 +7,12 @@ use crate::daemon::reload::{ReloadError, Reloaded};
 use crate::daemon::snapshot::Snapshot;
 use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
 
-/// Name of the request that is not the controller's.
+/// Name of the request. The controller does not process it.
 pub const RELOAD: &str = "reload";
 
 impl Server<'_> {
-    /// Hands a reload to its thread: reading and examining a file takes time. False if the client has left.
+    /// Passes a reload to the reload thread, because reading and examining a file takes time. False if the
+    /// client has left.
     pub(super) fn begin_reload(
         &mut self,
         connection: &mut Connection,
@@ -20,13 +21,13 @@ impl Server<'_> {
     ) -> bool {
         self.reloads += 1;
         connection.reload = Some(self.reloads);
-        // The thread ends after this one.
+        // Does not fail, because the reload thread ends after this one.
         let _ = self.request_reload.send(connection.reload);
         let text = "the machine file is examined".into();
         !line.progress || connection.send(&answer_to_reload(RequestResult::Accepted, snapshot, text))
     }
 
-    /// Answers the reloads that have ended.
+    /// Answers the completed reloads.
     pub(super) fn answer_reloads(&mut self) {
         while let Ok(Reloaded { requester, loaded, outcome }) = self.reloaded.try_recv() {
             if let Some(loaded) = loaded {

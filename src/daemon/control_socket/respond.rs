@@ -1,4 +1,4 @@
-//! What a line of a client asks for: answered at once, or begun.
+//! Requests of clients, one per line: each is answered at once, or begun and answered later.
 
 use core::sync::atomic::Ordering;
 
@@ -16,7 +16,8 @@ use crate::messages::clock::monotonic_ns;
 use crate::operator::protocol::{AnswerLine, RequestLine, RequestResult};
 
 impl Server<'_> {
-    /// Responds to a line; false if the connection is of no more use. `status` is the answer to `status` in this round.
+    /// Responds to a line. False if the connection must be closed. `status` caches the answer to `status` for
+    /// this round.
     pub(super) fn respond(
         &mut self,
         connection: &mut Connection,
@@ -48,7 +49,7 @@ impl Server<'_> {
             );
             return connection.send(&AnswerLine::invalid(text));
         };
-        // Before anything else, also before the log, which may block.
+        // Before the log, which may block.
         let answer = self.begin(connection, request, line, snapshot);
         info!(user = %connection.peer.user(), process = connection.peer.process_id, "request: {}", request.name());
         answer.is_none_or(|answer| {
@@ -57,7 +58,7 @@ impl Server<'_> {
         })
     }
 
-    /// Posts a request, or returns why not.
+    /// Posts a request, or returns the answer that refuses it.
     fn begin(
         &mut self,
         connection: &mut Connection,

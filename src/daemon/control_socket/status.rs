@@ -1,4 +1,4 @@
-//! Answer to `status`: the newest cycle in the units of the messages, for panels and `hexad status`.
+//! Answer to `status`: the newest cycle, in the units of the messages, for panels and `hexad status`.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;
@@ -37,11 +37,11 @@ impl From<Diagnostic> for DiagnosticReport {
     }
 }
 
-/// What status reports are made of.
+/// Source of status reports.
 pub struct StatusSource {
     loaded: Arc<Loaded>,
     reloads: u64,
-    /// Opened at the first report; `None` if they cannot be opened, which leaves the processes unknown.
+    /// Topics, opened at the first report; `None` if they cannot be opened: then the processes are unknown.
     topics: Option<Option<Topics>>,
 }
 
@@ -61,12 +61,12 @@ impl Topics {
 }
 
 impl StatusSource {
-    /// Reports of a machine.
+    /// Source for a machine.
     pub fn new(loaded: Arc<Loaded>) -> Self {
         Self { loaded, reloads: 0, topics: None }
     }
 
-    /// Goes on with a configuration that was reloaded.
+    /// Replaces the configuration after a reload.
     pub fn set_loaded(&mut self, loaded: Arc<Loaded>) {
         (self.loaded, self.reloads) = (loaded, self.reloads + 1);
     }
@@ -127,7 +127,7 @@ impl StatusSource {
 
     fn sources(&mut self, snapshot: &Snapshot, now_ns: u64) -> Vec<SourceReport> {
         let config = &self.loaded.config;
-        // In simulated time the newest measurement is now.
+        // In simulated time the newest measurement is the present.
         let measured_ns = snapshot.measurement.map(|measurement| measurement.time_ns);
         let is_simulated = config.deployment.realtime.is_simulated();
         let now_ns = measured_ns.filter(|_| is_simulated).unwrap_or(now_ns);
@@ -214,7 +214,7 @@ mod tests {
         };
         snapshot.status.pose_valid = 1;
         (snapshot.status.condition, snapshot.status.time_to_singularity_s) = (f64::INFINITY, f64::INFINITY);
-        // Topics of nobody: the processes stay unknown.
+        // Without topics, the processes are unknown.
         let mut source =
             StatusSource { topics: Some(None), ..StatusSource::new(Arc::new(Loaded::new(config))) };
         let line = source.answer(&snapshot, 2).to_line();

@@ -1,4 +1,4 @@
-//! Inputs of the controller: the newest message of each topic, and the request that is pending.
+//! Inputs of the controller: the newest message of each topic, and the pending request.
 
 use crate::control::signals::inputs::{Input, Measurement, Setpoint};
 use crate::control::signals::state::{MessageId, OperatorRequest, Request};
@@ -10,43 +10,47 @@ use crate::messages::{
     RejectionCounts, SetpointMessage, Subscriber,
 };
 
-/// The daemon's own request before it ends; no message has this epoch.
+/// Request of the daemon itself before it ends. No message has this epoch.
 const STOP_BEFORE_END: OperatorRequest =
     OperatorRequest { request: Request::Stop, message: MessageId { epoch: 0, sequence: 1 } };
 
-/// Messages kept per topic between two reads. Only the newest counts.
+/// Messages kept per topic between two reads. Only the newest is used.
 const DEPTH: usize = 8;
 
-/// Requests of the topic received in one round: a publisher that never pauses must not hold the thread. A tenth of a period at 1 kHz.
+/// Largest number of topic requests received in one round, so that a publisher without pauses does not block
+/// the thread. It takes a tenth of a period at 1 kHz.
 const REQUESTS_PER_ROUND: usize = 256;
 
-/// Subscribers of the daemon, and the input that their messages make.
+/// Subscribers of the daemon, and the input made of their messages.
 pub struct Inputs {
     setpoints: LeasedSubscriber<SetpointMessage>,
     measured: LeasedSubscriber<MeasuredMessage>,
     commands: Subscriber<CommandMessage>,
     cycle: CycleInput,
-    /// The request word of the last call.
+    /// Request word of the last call.
     word: u64,
 }
 
-/// Which publishers and which requests are accepted.
+/// Conditions for accepting publishers and requests.
 #[derive(Clone, Copy)]
 pub struct InputFilter {
-    /// The platform is under control: no publisher takes over from one that lives, nor one that was ignored.
+    /// Whether the platform is under control. Then no publisher replaces a living one, and none that was
+    /// ignored is accepted.
     pub has_control: bool,
     /// The last request that the controller has carried out or refused.
     pub answered_message: MessageId,
-    /// The daemon is to end: no request may start control, and the platform is to come to rest.
+    /// Whether the daemon is to end. Then no request may begin control, and the platform comes to rest.
     pub is_ending: bool,
-    /// The request word. A new one replaces what is pending: it came later, or has precedence.
+    /// The request word. A new word replaces a pending request of the topic, because it is newer or has
+    /// precedence.
     pub word: u64,
-    /// Instant of the word on the clock of the commands \[ns\]: a request for control that was sent before is overtaken.
+    /// Instant of the word on the clock of the commands \[ns\]. Earlier requests that may begin control are
+    /// dropped.
     pub word_ns: u64,
 }
 
 impl Inputs {
-    /// Opens the subscribers. A publisher that is silent for longer than its timeout has left.
+    /// Opens the subscribers. A publisher that is silent for longer than its timeout counts as gone.
     pub fn open(bus: &Bus, timeouts: TimeoutsNs) -> Result<Self, PortError> {
         Ok(Self {
             setpoints: bus.leased_subscriber(DEPTH, timeouts.setpoint_ns)?,
@@ -63,7 +67,7 @@ impl Inputs {
         self.measured.set_timeout_ns(timeouts.measured_ns);
     }
 
-    /// The input for the next cycle, handed over now.
+    /// The input for the next cycle.
     pub fn cycle_input(&mut self) -> CycleInput {
         self.cycle.handed_ns = monotonic_ns();
         self.cycle
@@ -94,15 +98,15 @@ impl Inputs {
         Some((&message).into())
     }
 
-    /// Makes a measurement the one of the next cycle.
+    /// Sets the measurement of the next cycle.
     pub fn set_measurement(&mut self, measurement: Measurement) {
         self.cycle.input.measurement = Some(measurement);
         self.cycle.measurements += 1;
     }
 
-    /// Whether the setpoint of an instant has arrived, or none will because the source has left.
+    /// Whether the setpoint of an instant has arrived, or none can arrive because the source has left.
     pub fn has_setpoint_of(&mut self, time_ns: u64, has_control: bool) -> bool {
-        // In this order: the source sends its last message before it leaves.
+        // In this order, because the source sends its last message before it leaves.
         let has_left = self.setpoints.received_count() > 0 && self.setpoints.publisher_count() == 0;
         self.receive_setpoint(has_control);
         has_left || self.cycle.input.setpoint.is_some_and(|setpoint| setpoint.time_ns == time_ns)
@@ -115,8 +119,8 @@ impl Inputs {
         self.cycle.input.setpoint_publishers = self.setpoints.publishers();
     }
 
-    /// Of the requests that are not yet answered the one of highest precedence counts. The clock is read behind each message: this
-    /// thread may have been held just before it.
+    /// Receives requests. Of the unanswered ones, the request of highest precedence is kept. The clock is
+    /// read after each message, because this thread may have been held just before it.
     pub fn receive_requests(&mut self, clock: impl Fn() -> u64, filter: InputFilter) {
         let InputFilter { answered_message, is_ending, word, word_ns, .. } = filter;
         if word != self.word {
@@ -141,12 +145,12 @@ impl Inputs {
         }
     }
 
-    /// Why the last rejected setpoint and measurement were rejected, where that is for their sender to correct.
+    /// The last reasons for rejecting a setpoint and a measurement, if the sender must correct them.
     pub fn last_rejections(&self) -> [Option<Rejection>; 2] {
         [self.setpoints.last_rejection(), self.measured.last_rejection()]
     }
 
-    /// Messages rejected on all topics.
+    /// Numbers of rejected messages on all topics.
     pub fn rejections(&self) -> RejectionCounts {
         self.setpoints.rejections() + self.measured.rejections() + self.commands.rejections()
     }

@@ -1,9 +1,10 @@
-//! The I/O thread: owner of every port of the daemon, in phase with the cycle.
+//! The I/O thread. It owns every port of the daemon and runs in phase with the cycle.
 //!
-//! It reads the newest messages a lead before the release and publishes when the output of the cycle appears; with
-//! external release it waits for measured messages and signals the real-time thread; in lock-step it waits for all
-//! participants. When a peer connects or disappears, the port calls here allocate and block for a moment; the real-time
-//! thread continues with data of known age.
+//! It reads the newest messages a lead before the release, and publishes as soon as the output of the cycle
+//! appears. With external release it waits for measured messages and signals the real-time thread; in
+//! lock-step it waits for all participants. When a peer connects or disappears, the port calls here allocate
+//! and block for a moment. The real-time thread then continues with older data, whose age it has from the
+//! time stamps.
 
 use crate::control::signals::state::MessageId;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -33,11 +34,11 @@ mod outputs;
 /// Pause between two polls for something that does not arrive at once \[ns\].
 const POLL_INTERVAL_NS: u64 = 10_000;
 
-/// Before that it polls without a pause for this long \[ns\], or an eighth of the period if that is less: an output
-/// arrives one wake-up latency after the release, and a pause costs as much again.
+/// Time for which it first polls without a pause \[ns\], at most an eighth of the period. An output arrives
+/// one wake-up latency after the release, and a pause would cost as much again.
 const BUSY_POLL_TIME_NS: u64 = 50_000;
 
-/// Length of the queue of delays to the log thread, as of the cycle records.
+/// Length of the queue of delays to the log thread, equal to that of the cycle records.
 pub const DELAYS: usize = 1024;
 
 /// Ports of the daemon.
@@ -49,23 +50,23 @@ pub struct Ports {
 /// Links of the I/O thread to the other threads.
 pub struct IoLinks<'a> {
     pub exchange: IoSide,
-    /// Release to force sent \[ns\], to the log thread.
+    /// Delays from release to force sent \[ns\], to the log thread.
     pub delays: Producer<'a, u64>,
-    /// From the log thread.
+    /// Statistics, from the log thread.
     pub statistics: Reader<Statistics>,
-    /// To the control thread, every cycle.
+    /// Snapshot of every cycle, to the control thread.
     pub snapshots: Writer<Snapshot>,
-    /// To the thread that keeps an emergency stop, if there is one.
+    /// Link to the thread of the emergency latch, if there is one.
     pub latch: Option<LatchLink>,
-    /// Requests of the control thread and of signals.
+    /// Request word of the control thread and of signals.
     pub word: &'static RequestWord,
-    /// A reload changes them.
+    /// Timeouts, which a reload changes.
     pub timeouts: &'a MessageTimeouts,
-    /// Set when the daemon is to end: the platform comes to rest.
+    /// Set when the daemon is to end. The platform then comes to rest.
     pub is_ending: &'a AtomicBool,
-    /// To the main thread.
+    /// Progress, for the main thread.
     pub progress: &'a Progress,
-    /// Set here when the daemon is to end and the platform is not under control.
+    /// Set by this thread when the daemon is to end and the platform is not under control.
     pub may_end: &'a AtomicBool,
 }
 
@@ -73,7 +74,7 @@ pub struct IoLinks<'a> {
 #[derive(Clone, Copy)]
 pub struct IoSettings {
     pub timing: Timing,
-    /// Inputs are read this long before the release \[ns\].
+    /// Lead before the release at which inputs are read \[ns\].
     pub lead_ns: u64,
     pub home: [f64; 6],
 }
@@ -84,12 +85,12 @@ pub struct IoReport {
     /// Messages that could not be sent.
     pub send_failures: u64,
     pub rejected: RejectionCounts,
-    /// From the first cycle on. It allocates only while a peer connects or disappears.
+    /// Resources from the first cycle on. The thread allocates only while a peer connects or disappears.
     pub usage: ThreadUsage,
 }
 
 impl Ports {
-    /// Opens all. They belong to the thread that calls this.
+    /// Opens all ports. They belong to the calling thread.
     pub fn open(bus: &Bus, timeouts: TimeoutsNs) -> Result<Self, PortError> {
         Ok(Self { inputs: Inputs::open(bus, timeouts)?, outputs: Outputs::open(bus)? })
     }
@@ -101,7 +102,7 @@ pub fn run(settings: &IoSettings, ports: Ports, links: IoLinks<'_>, stop: &Atomi
     let Ports { inputs, outputs } = ports;
     let allocations_at_start = at_start.allocations;
     let (published, answered_message, snapshot) = (0, MessageId::default(), Snapshot::default());
-    // Every wait looks at it.
+    // Used in the condition of every wait.
     let progress = links.progress;
     let mut io = IoThread {
         settings,
@@ -136,15 +137,15 @@ struct IoThread<'a> {
     inputs: Inputs,
     outputs: Outputs,
     links: IoLinks<'a>,
-    /// Number of the cycle that was published last.
+    /// Number of the last published cycle.
     published: u64,
     /// The last request that the controller has carried out or refused.
     answered_message: MessageId,
-    /// The platform is under control.
+    /// Whether the platform is under control.
     has_control: bool,
-    /// What the control thread received last.
+    /// The last snapshot sent to the control thread.
     snapshot: Snapshot,
-    /// Of this thread, before the first cycle.
+    /// Allocations of this thread before the first cycle.
     allocations_at_start: u64,
 }
 
@@ -191,18 +192,19 @@ impl IoThread<'_> {
         }
     }
 
-    /// Runs a cycle for each measurement, once the setpoint of its instant has arrived, and publishes its output before
-    /// it receives the next. A request that was sent before that setpoint counts in the same cycle.
+    /// Runs a cycle for each measurement, as soon as the setpoint of its instant has arrived, and publishes
+    /// the output before the next measurement is received. A request sent before that setpoint takes effect
+    /// in the same cycle.
     fn run_in_lockstep(&mut self, is_stopped: impl Fn() -> bool) {
         let mut answered_ns = None;
         let next_measurement = |io: &mut Self| {
-            // Whether the daemon may end is updated while all wait, too.
+            // Updates whether the daemon may end, even while all participants wait.
             io.publish_if_new();
             io.inputs.receive_next_measurement(io.has_control)
         };
         while let Some(measurement) = poll_until(&is_stopped, || next_measurement(self)) {
             let time_ns = measurement.time_ns;
-            // A plant that receives no response at once repeats its message.
+            // A plant without a response repeats its message.
             if answered_ns == Some(time_ns) {
                 continue;
             }
@@ -243,7 +245,7 @@ impl IoThread<'_> {
         self.links.exchange.inputs.write(self.inputs.cycle_input());
     }
 
-    /// Publishes the newest output unless it was published before; returns when it was due \[ns\].
+    /// Publishes the newest output unless it was published before. Returns its release \[ns\].
     fn publish_if_new(&mut self) -> u64 {
         let CycleOutput { due_ns, counters, output, .. } = *self.links.exchange.outputs.read();
         (self.answered_message, self.has_control) = (output.answered_message, output.state.has_control());
@@ -294,7 +296,7 @@ impl IoThread<'_> {
     }
 }
 
-/// Polling without a pause at first, then with sleeps.
+/// Polls without a pause at first, then with sleeps.
 struct Polling {
     busy_until_ns: u64,
 }

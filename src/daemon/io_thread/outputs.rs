@@ -18,13 +18,13 @@ pub struct Outputs {
     send_failures: u64,
 }
 
-/// What messages need besides the output of the cycle.
+/// Settings for the messages, besides the output of the cycle.
 #[derive(Clone, Copy)]
 pub struct OutputSettings {
     /// Origin of the angles of X.
     pub home: [f64; 6],
-    /// Forces computed longer ago are not valid any more: the process was held (stopped, or the host took the processor)
-    /// between computing and sending them \[ns\].
+    /// Largest age of a valid force \[ns\]. Older forces mean that the process was held between computing and
+    /// sending them: it was stopped, or the host took the processor.
     pub max_force_age_ns: u64,
 }
 
@@ -57,14 +57,14 @@ impl Outputs {
             self.send_failures += u64::from(self.statuses.publish(now_ns, status).is_err());
             return status;
         }
-        // The status first: a source that responds to the next measurement then has the status of this one.
+        // The status first. A source that responds to the next measurement then has the status of this cycle.
         let status = status(settings, &cycle, io, statistics);
         self.send_failures += u64::from(self.statuses.publish(cycle.release_ns, status).is_err());
         self.publish_force(&cycle, cycle.release_ns, delays);
         status
     }
 
-    /// Messages that could not be sent.
+    /// Number of messages that could not be sent.
     pub fn send_failures(&self) -> u64 {
         self.send_failures
     }
@@ -73,7 +73,7 @@ impl Outputs {
         let message = ForceMessage::new(&cycle.output, cycle.release_ns);
         self.send_failures += u64::from(self.forces.publish(time_ns, message).is_err());
         if cycle.output.state.has_control() {
-            // Full only if the log thread is held; that loses statistics, not forces.
+            // The queue is full only if the log thread is held. Then statistics are lost, but no forces.
             let _ = delays.enqueue(monotonic_ns().saturating_sub(cycle.due_ns));
         }
     }
@@ -93,7 +93,8 @@ fn status(
     }
 }
 
-/// The loop finds the same at its next cycle, by the age of its last measurement.
+/// Makes the forces of a held cycle invalid. The loop detects the same at its next cycle, by the age of its
+/// last measurement.
 fn invalidate_if_held(cycle: &mut CycleOutput, now_ns: u64, max_force_age_ns: u64) {
     let (output, age_ns) = (&mut cycle.output, now_ns.saturating_sub(cycle.due_ns));
     if age_ns > max_force_age_ns && output.state.has_control() {
@@ -113,7 +114,7 @@ mod tests {
     const DUE_NS: u64 = 7_000_000_000;
     const MAX_AGE_NS: u64 = 20_000_000;
 
-    /// Also the last one: nothing follows while the loop is held.
+    /// Includes the last output: no other follows while the loop is held.
     #[test]
     fn what_is_published_of_a_held_loop_is_no_valid_force() {
         let bus = Bus::join(&format!("held-loop-{}", std::process::id())).unwrap();

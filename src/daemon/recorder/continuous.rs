@@ -1,7 +1,7 @@
-//! The recording of every cycle, in files that follow each other.
+//! Recording of every cycle, in consecutive files.
 //!
-//! A disk that takes nothing interrupts it. It then goes on in a new file once there is room, with the first cycle that is not
-//! surely on disk: as long as the tape holds that, none is lost.
+//! If the disk accepts no data, the recording is interrupted. It continues in a new file once there is room,
+//! with the first cycle that may be missing on disk. No cycle is lost while the tape still holds that cycle.
 
 use std::fs;
 
@@ -15,30 +15,30 @@ use crate::messages::CycleMessage;
 use crate::recording::RecordingError;
 use crate::recording::file::RecordingFile;
 
-/// Time between two attempts while the disk takes nothing \[s\].
+/// Time between two attempts while the disk accepts no data \[s\].
 const RETRY_S: u64 = 2;
 
 /// The recording of every cycle.
 pub struct Continuous {
     folder: Folder,
     files: u32,
-    /// Bytes in files that have ended.
+    /// Bytes in completed files.
     ended_bytes: u64,
     stream: Option<Stream>,
-    /// The first cycle that is not surely on disk: the first of a second, or of a file.
+    /// The first cycle that may be missing on disk: the first of a second, or of a file.
     unsaved_cycle: u64,
-    /// Whether the disk has taken nothing of late.
+    /// Whether the disk has recently accepted no data.
     is_interrupted: bool,
-    /// Nothing is tried before this cycle.
+    /// No attempt is made before this cycle.
     retry_cycle: u64,
-    /// Cycles that the disk did not take before memory had no room for them, or before the run ended.
+    /// Cycles that were not on disk when memory had no more room for them, or when the run ended.
     unwritten: u64,
-    /// Those before this cycle are counted.
+    /// Unwritten cycles before this cycle are counted.
     counted_cycle: u64,
 }
 
 impl Continuous {
-    /// Into a folder, from the first cycle on.
+    /// Recording into a folder, from the first cycle on.
     pub fn new(folder: Folder) -> Self {
         Self {
             folder,
@@ -63,7 +63,7 @@ impl Continuous {
         self.unwritten
     }
 
-    /// Writes what the tape has received.
+    /// Writes the new cycles of the tape.
     pub fn advance(&mut self, context: &Context, tape: &Tape) {
         if tape.newest() < self.retry_cycle {
             return;
@@ -74,7 +74,7 @@ impl Continuous {
         }
     }
 
-    /// Begins another file with a cycle; what came before it is forgotten.
+    /// Begins another file with a cycle. Earlier cycles are dropped.
     pub fn begin_at(&mut self, cycle: u64) {
         self.unsaved_cycle = cycle;
     }
@@ -118,7 +118,7 @@ impl Continuous {
         Ok(())
     }
 
-    /// Counts the cycles before another one that are not on disk, once each; returns how many are new.
+    /// Counts the cycles before `before` that are not on disk, each once. Returns the number of new ones.
     fn count_unwritten(&mut self, before: u64) -> u64 {
         let lost = before.saturating_sub(self.unsaved_cycle.max(self.counted_cycle));
         self.unwritten += lost;
@@ -126,7 +126,7 @@ impl Continuous {
         lost
     }
 
-    /// Everything before the cycle is on disk; a full file ends.
+    /// Marks everything before the cycle as saved, and ends a full file.
     fn end_second(&mut self, cycle: &CycleMessage) -> Result<(), RecordingError> {
         let Some(stream) = &mut self.stream else { return Ok(()) };
         stream.flush()?;
@@ -166,7 +166,7 @@ impl Continuous {
         if is_saved {
             self.ended_bytes += bytes;
         } else {
-            // Nothing in it is missing in memory.
+            // Memory still holds everything in this file.
             let _ = fs::remove_file(&path);
         }
     }

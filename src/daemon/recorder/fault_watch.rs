@@ -1,21 +1,21 @@
-//! Which faults end control, and when the cycles around them are complete.
+//! Detection of faults that end control, and of the end of the window around each.
 
 use crate::control::signals::diagnostic::DiagnosticCode;
 use crate::control::signals::state::State;
 use crate::messages::CycleMessage;
 
-/// Finds the cycles of faults.
+/// Detector of the cycles of faults.
 pub struct FaultWatch {
     /// Cycles after a fault that belong to its window: one second.
     after: u64,
     last: u32,
-    /// Code and cycle of the fault whose window is to be written.
+    /// Code and cycle of the fault whose window is not written yet.
     fault: Option<(u32, u64)>,
     newest: u64,
 }
 
 impl FaultWatch {
-    /// Windows end this many cycles after their fault.
+    /// Detector with windows that end `after` cycles after their fault.
     pub fn new(after: u64) -> Self {
         Self { after, last: 0, fault: None, newest: 0 }
     }
@@ -24,7 +24,7 @@ impl FaultWatch {
     pub fn add(&mut self, cycle: &CycleMessage) {
         let code = cycle.diagnostic.code;
         self.newest = cycle.cycle;
-        // A fault is one only if it ends control.
+        // A diagnostic is a fault only if it ends control.
         let ends_control = [State::Stopping, State::Fault].iter().any(|state| *state as u32 == cycle.state);
         let is_fault = DiagnosticCode::from_number(code).is_some_and(DiagnosticCode::is_fault);
         if code != self.last && is_fault && ends_control && self.fault.is_none() {
@@ -33,7 +33,7 @@ impl FaultWatch {
         self.last = code;
     }
 
-    /// Code and cycle of a fault whose window is complete, or as complete as it will be. Each once.
+    /// Code and cycle of a fault whose window is complete, or incomplete because the run ends. Returned once.
     pub fn due(&mut self, is_ending: bool) -> Option<(u32, u64)> {
         let is_complete = |(_, cycle): &(u32, u64)| is_ending || self.newest >= cycle + self.after;
         let due = self.fault.filter(is_complete);

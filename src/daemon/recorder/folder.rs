@@ -1,4 +1,4 @@
-//! Folder of recordings with a bound on their size, over all runs.
+//! Folder of recordings with a bound on their total size, over all runs.
 
 use std::fs;
 use std::io;
@@ -9,15 +9,15 @@ use tracing::info;
 /// Bounds on the sizes of recordings \[bytes\].
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// Of one file; it ends up to a second later.
+    /// Bound on one file. A file ends up to a second later.
     pub file: u64,
-    /// Of all files of a machine in a folder; the oldest are deleted.
+    /// Bound on all files of a machine in a folder. The oldest are deleted.
     pub total: u64,
 }
 
 impl Default for Bounds {
     fn default() -> Self {
-        // Four minutes at 1 kHz, an hour in all.
+        // Four minutes per file and an hour in total, at 1 kHz.
         Self { file: 256 << 20, total: 4 << 30 }
     }
 }
@@ -35,7 +35,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Of a run that started at a Unix time \[s\].
+    /// Folder of a run that started at a Unix time \[s\].
     pub fn new(path: &Path, name: &str, started_s: u64, bounds: Bounds) -> Self {
         Self { path: path.into(), name: name.into(), started_s, bounds }
     }
@@ -45,14 +45,15 @@ impl Folder {
         self.bounds.file
     }
 
-    /// Path of a new file, for which there is room within the bound once the oldest are deleted.
+    /// Path of a new file. Deletes the oldest files to make room for it.
     pub fn next_path(&self, part: &str) -> PathBuf {
-        // A folder that cannot be read has nothing to delete; the file then says what is wrong.
+        // A folder that cannot be read has no files to delete. Opening the new file then reports the error.
         let _ = self.make_room();
         self.path.join(format!("{}.{}.{part}.mcap", self.name, self.started_s))
     }
 
-    /// Deletes the oldest recordings of this machine, those of the present run last: the clock may have been set back since the others.
+    /// Deletes the oldest recordings of this machine. Those of the present run come last, because the clock
+    /// may have been set back since the others.
     fn make_room(&self) -> io::Result<()> {
         let mut files: Vec<(Age, PathBuf, u64)> = vec![];
         for entry in fs::read_dir(&self.path)? {
@@ -74,8 +75,9 @@ impl Folder {
         Ok(())
     }
 
-    /// Order of a recording of this machine by its name: whether it is of the present run, start of its run, and number of its part.
-    /// `None` if it is another file. A name has no dot: no other machine's begins alike.
+    /// Age of a recording of this machine, from its name: whether it is of the present run, the start of its
+    /// run, the number of its part. `None` for other files. A machine's name has no dot, so no other
+    /// machine's files have the same prefix.
     fn age(&self, file: &str) -> Option<Age> {
         let (started_s, part) =
             file.strip_prefix(&self.name)?.strip_prefix('.')?.strip_suffix(".mcap")?.split_once('.')?;

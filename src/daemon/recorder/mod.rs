@@ -1,8 +1,10 @@
-//! The recorder thread: the last cycles in memory, all of them on disk if wanted, and those around each fault.
+//! The recorder thread. It keeps the last cycles in memory, and writes all cycles if configured, and those
+//! around each fault.
 //!
-//! The log thread hands over each cycle through a bounded queue. A disk that stalls holds this thread alone; when the queue
-//! is full cycles are lost, which the recording says. The thread computes each cycle again in a replica of the controller:
-//! so it has the controller's memory at any cycle, and the real-time thread copies its own only after cycles were lost.
+//! The log thread passes each cycle through a bounded queue. A slow disk blocks only this thread. If the
+//! queue is full, cycles are lost, and the recording says so. The thread computes each cycle again in a
+//! replica of the controller, so it has the controller's memory at any cycle. The real-time thread copies its
+//! own memory only after cycles were lost.
 
 use core::time::Duration;
 use std::path::PathBuf;
@@ -37,52 +39,52 @@ mod stream;
 mod tape;
 mod windows;
 
-/// How often the queue is emptied, as by the log thread.
+/// Interval at which the queue is emptied, equal to the log thread's.
 const PERIOD: Duration = Duration::from_millis(20);
-/// The same while a window is written: other threads must not wait for its end.
+/// The interval while a window is written, shorter because other threads must not wait for its end.
 const WINDOW_PERIOD: Duration = Duration::from_millis(1);
 
-/// Cycles that the queue holds \[s\]: disks were seen to stall for 25 ms, and busy ones stall for longer.
+/// Length of the queue in time \[s\]. Disks stalled for 25 ms in tests, and busy disks stall for longer.
 const QUEUE_S: f64 = 2.0;
-/// Bound on the queue: 35 MB, all of it locked.
+/// Largest length of the queue: 35 MB, all locked.
 const MAX_QUEUE: usize = 32_768;
 
-/// Cycles taken from the queue in one step: some milliseconds.
+/// Cycles taken from the queue in one step, some milliseconds of effort.
 const CYCLES_PER_STEP: usize = 2048;
 
-/// Most orders of operators that wait.
+/// Largest number of waiting orders of operators.
 const MAX_ORDERS: usize = 4;
 
-/// Where the recorder writes; what has no folder stays in memory.
+/// Folders of the recorder. Without a folder, cycles stay in memory.
 #[derive(Clone, Debug, Default)]
 pub struct Folders {
-    /// For every cycle.
+    /// Folder for every cycle.
     pub record: Option<PathBuf>,
-    /// For the cycles around each fault.
+    /// Folder for the cycles around each fault.
     pub faults: Option<PathBuf>,
-    /// Bounds on the sizes of the files in each.
+    /// Bounds on the sizes of the files in each folder.
     pub bounds: folder::Bounds,
 }
 
-/// Numbers of a recording over a run.
+/// Numbers of the recorder over a run.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct RecorderReport {
     /// Cycles received.
     pub cycles: u64,
-    /// Cycles that are missing, because a queue was full.
+    /// Cycles lost because a queue was full.
     pub missing: u64,
-    /// Cycles that the disk did not take before memory had no room for them, or before the run ended.
+    /// Cycles that were not on disk when memory had no more room for them, or when the run ended.
     #[serde(default)]
     pub unwritten: u64,
-    /// Bytes written, at most.
+    /// Upper bound of the bytes written.
     pub bytes: u64,
-    /// Whether the replica computed every cycle as the real-time thread did.
+    /// Whether the replica reproduced every cycle of the real-time thread.
     pub is_repeatable: bool,
-    /// Of the thread.
+    /// Resources of the thread.
     pub usage: ThreadUsage,
 }
 
-/// What the log thread hands over, in order.
+/// Items from the log thread, in order.
 #[expect(
     clippy::large_enum_variant,
     reason = "nearly all are cycles, and a box for each would be an allocation"
@@ -90,15 +92,15 @@ pub struct RecorderReport {
 pub enum Recorded {
     /// One cycle.
     Cycle(CycleMessage),
-    /// Holds from the next cycle on.
+    /// Configuration in force from the next cycle on.
     Configuration(Arc<Loaded>),
 }
 
 /// Ends of the queues to the recorder.
 pub struct RecorderLinks {
-    /// For the log thread. When it is full, cycles are lost.
+    /// Cycles, from the log thread. If the queue is full, cycles are lost.
     pub cycles: SyncSender<Recorded>,
-    /// For the control thread.
+    /// Orders, from the control thread.
     pub orders: SyncSender<WindowOrder>,
 }
 
@@ -109,30 +111,30 @@ pub struct Recorder<'a> {
     context: Context,
     tape: Tape,
     replica: Replica,
-    /// Before this cycle the replica does not go on from another memory of the real-time thread.
+    /// Before this cycle, the replica does not resume from another memory of the real-time thread.
     resume_cycle: u64,
     recording: Option<Continuous>,
     windows: Windows,
     report: RecorderReport,
 }
 
-/// What all files of a run share.
+/// Values shared by all files of a run.
 pub(super) struct Context {
     info: RunInfo,
     scene: Scene,
-    /// Cycles in a second.
+    /// Cycles per second.
     rate: u64,
 }
 
 impl Context {
-    /// Whether a second of the run begins with a cycle.
+    /// Whether a cycle begins a second of the run.
     fn begins_second(&self, cycle: u64) -> bool {
         cycle % self.rate == 1 % self.rate
     }
 }
 
 impl<'a> Recorder<'a> {
-    /// Allocates all memory but that of the files.
+    /// Allocates all memory except that of the files.
     pub fn new(loaded: &Loaded, memories: MemoryConsumer<'a>, folders: &Folders) -> (Self, RecorderLinks) {
         let Loaded { config, controller, .. } = loaded;
         let rate_hz = config.deployment.realtime.rate_hz;
@@ -190,7 +192,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Takes cycles from the queue: how many, and whether more may come.
+    /// Takes cycles from the queue. Returns their number, and whether more may come.
     fn receive(&mut self) -> (usize, bool) {
         for received in 0..CYCLES_PER_STEP {
             match self.queue.try_recv() {
@@ -212,7 +214,8 @@ impl<'a> Recorder<'a> {
         self.windows.add(&self.context, &self.tape, cycle);
     }
 
-    /// Goes on with another configuration, in new files: each has one, so that its replay needs no other.
+    /// Continues with another configuration in new files, because a file has one configuration for its
+    /// replay.
     fn reconfigure(&mut self, loaded: &Loaded) {
         self.windows.finish(&self.context, &self.tape);
         if let Some(recording) = &mut self.recording {
@@ -225,12 +228,13 @@ impl<'a> Recorder<'a> {
         self.tape.clear();
     }
 
-    /// Lets the replica go on where the real-time thread has copied its memory, at most once a second; whether it does.
+    /// Resumes the replica from a memory of the real-time thread, at most once a second. Returns whether it
+    /// did.
     fn resume(&mut self, cycle: u64) -> bool {
         if cycle < self.resume_cycle {
             return false;
         }
-        // An older copy makes room for a new one.
+        // Removes older copies to make room for a new one.
         while self.memories.peek().is_some_and(|copy| copy.cycle < cycle) {
             let _ = self.memories.dequeue();
         }

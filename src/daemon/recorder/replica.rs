@@ -1,4 +1,4 @@
-//! A controller that repeats every cycle in the recorder.
+//! Replica: a controller that repeats every cycle in the recorder.
 
 use tracing::warn;
 
@@ -6,17 +6,17 @@ use crate::control::controller::{Controller, Memory};
 use crate::messages::CycleMessage;
 use crate::messages::layout::Declared as _;
 
-/// Repeats the cycles of the real-time thread. Behind a missing cycle it goes on from a memory of that thread.
+/// Repeats the cycles of the real-time thread. After a missing cycle it resumes from a memory of that thread.
 pub struct Replica {
     controller: Controller,
     next_cycle: u64,
     is_in_step: bool,
-    /// Cycles that it did not repeat to the bit.
+    /// Number of cycles not repeated to the bit.
     unrepeated: u64,
 }
 
 impl Replica {
-    /// Begins with a controller before its first cycle.
+    /// Replica with a controller before its first cycle.
     pub fn new(controller: Controller) -> Self {
         Self { controller, next_cycle: 1, is_in_step: true, unrepeated: 0 }
     }
@@ -26,12 +26,12 @@ impl Replica {
         self.controller.exchange_configuration(&mut new);
     }
 
-    /// Number of the cycle that follows.
+    /// Number of the next cycle.
     pub fn next_cycle(&self) -> u64 {
         self.next_cycle
     }
 
-    /// Whether its memory is that of the real-time thread before the next cycle.
+    /// Whether its memory equals the real-time thread's before the next cycle.
     pub fn is_in_step(&self) -> bool {
         self.is_in_step
     }
@@ -46,7 +46,7 @@ impl Replica {
         self.is_in_step.then(|| self.controller.memory())
     }
 
-    /// Skips the cycles before another one: how many are missing.
+    /// Skips to a cycle. Returns the number of missing cycles.
     pub fn skip_to(&mut self, cycle: u64) -> u64 {
         let missing = cycle.saturating_sub(self.next_cycle);
         if missing > 0 {
@@ -59,7 +59,7 @@ impl Replica {
         missing
     }
 
-    /// Goes on from the memory before the next cycle.
+    /// Resumes from the memory before the next cycle.
     pub fn resume(&mut self, memory: &Memory) {
         self.controller.set_memory(memory.clone());
         self.is_in_step = true;

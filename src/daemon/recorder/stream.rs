@@ -1,4 +1,4 @@
-//! Part of the tape on its way to one file.
+//! Stream: a part of the tape that is being written to one file.
 
 use std::path::PathBuf;
 
@@ -8,10 +8,10 @@ use crate::messages::{CycleMessage, GapMessage};
 use crate::recording::file::RecordingFile;
 use crate::recording::{RecordingError, memory_bytes};
 
-/// Frames and joints in a second.
+/// Rate of frames and joints \[1/s\].
 const SCENES_PER_S: u64 = 100;
 
-/// Part of the tape on its way to one file.
+/// Part of the tape that is being written to one file.
 pub struct Stream {
     file: RecordingFile,
     first_cycle: u64,
@@ -19,7 +19,7 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// Begins a file with a cycle; a later one in its place leaves a gap.
+    /// Begins a file with a cycle. If the first written cycle is later, the file begins with a gap.
     pub fn new(file: RecordingFile, first_cycle: u64) -> Self {
         Self { file, first_cycle, next_cycle: first_cycle }
     }
@@ -29,17 +29,17 @@ impl Stream {
         &self.file
     }
 
-    /// Number of the cycle that it began with.
+    /// Number of the first cycle.
     pub fn first_cycle(&self) -> u64 {
         self.first_cycle
     }
 
-    /// Number of the cycle that follows.
+    /// Number of the next cycle.
     pub fn next_cycle(&self) -> u64 {
         self.next_cycle
     }
 
-    /// Writes a cycle, and what belongs to it.
+    /// Writes a cycle with its memory, frames and joints.
     pub fn write(
         &mut self,
         context: &Context,
@@ -62,7 +62,7 @@ impl Stream {
         Ok(())
     }
 
-    /// Writes the chunk that has begun.
+    /// Writes the current chunk.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.file.flush()
     }

@@ -1,27 +1,28 @@
-//! The last cycles, with the memory of the controller once a second.
+//! Tape: the last cycles, with the memory of the controller once a second.
 
 use std::collections::VecDeque;
 
 use crate::control::controller::Memory;
 use crate::messages::CycleMessage;
 
-/// Cycles kept \[s\].
+/// Length of the tape \[s\].
 const TAPE_S: f64 = 30.0;
-/// Bound on their memory, all of it locked \[bytes\]: 30 s at 4 kHz.
+/// Bound on the memory of the cycles, all locked \[bytes\]: 30 s at 4 kHz.
 const MAX_TAPE_BYTES: usize = 128 << 20;
-/// Memories kept: one a second, and as many behind gaps.
+/// Number of memories kept: one per second, and as many after gaps.
 const MEMORIES: usize = 2 * TAPE_S as usize;
 
 /// The last cycles.
 pub struct Tape {
     cycles: VecDeque<CycleMessage>,
     capacity: usize,
-    /// Each with the cycle before which the controller had it; 0 before there was one.
+    /// Memories of the controller, each with the number of the cycle that follows it; 0 in an unused place.
     memories: VecDeque<(u64, Box<Memory>)>,
 }
 
 impl Tape {
-    /// Allocates all memory, and writes to all of it: a host that lacks it shows this at the start. `memory` is any.
+    /// Allocates all memory and writes to all of it, so that a lack of memory shows at the start. The content
+    /// of `memory` is not used.
     pub fn new(rate_hz: f64, memory: &Memory) -> Self {
         let capacity = ((TAPE_S * rate_hz) as usize).clamp(1, MAX_TAPE_BYTES / size_of::<CycleMessage>());
         let mut cycles = VecDeque::from(vec![CycleMessage::default(); capacity]);
@@ -30,7 +31,7 @@ impl Tape {
         Self { cycles, capacity, memories }
     }
 
-    /// Adds a cycle, with the memory before it.
+    /// Adds a cycle, and the memory before it.
     pub fn push(&mut self, cycle: &CycleMessage, memory: Option<&Memory>) {
         if self.cycles.len() == self.capacity {
             self.cycles.pop_front();
@@ -43,7 +44,7 @@ impl Tape {
         }
     }
 
-    /// Forgets everything.
+    /// Removes everything.
     pub fn clear(&mut self) {
         self.cycles.clear();
         for (cycle, _) in &mut self.memories {
@@ -51,7 +52,7 @@ impl Tape {
         }
     }
 
-    /// Whether there is no cycle.
+    /// Whether the tape has no cycle.
     pub fn is_empty(&self) -> bool {
         self.cycles.is_empty()
     }
@@ -62,13 +63,13 @@ impl Tape {
         self.cycles.range(begin..)
     }
 
-    /// The memory of the controller before a cycle.
+    /// Memory of the controller before a cycle.
     pub fn memory_before(&self, cycle: u64) -> Option<&Memory> {
         self.memories.iter().find(|(kept, _)| *kept == cycle).map(|(_, memory)| &**memory)
     }
 
-    /// The cycle at which a replay of those from a number on begins: the last with a memory up to it, else the first behind it,
-    /// else the oldest kept. 0 if there is none.
+    /// First cycle from which a replay of `from` and later cycles is possible: the last cycle up to it with a
+    /// memory, else the first later one, else the oldest cycle kept. 0 if there is none.
     pub fn first_repeatable(&self, from: u64) -> u64 {
         let oldest = self.oldest();
         let with_memory =

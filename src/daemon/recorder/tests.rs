@@ -15,7 +15,7 @@ use crate::model::task::TaskState;
 use crate::recording::Item;
 use crate::recording::reader::Recording;
 
-/// What a test looks at: the items of the only file, and its replay.
+/// Items of the only file of a test, and its replay.
 struct Outcome {
     report: RecorderReport,
     items: Vec<Item>,
@@ -27,7 +27,7 @@ fn loaded(gains: &str) -> Loaded {
     Loaded::new(Config::parse(&format!("{text}\n[control]\n{gains}"), "a test").unwrap())
 }
 
-/// Input of a cycle: the platform is moved by hand, so that the memory of each cycle is another.
+/// Input of a cycle. The platform is moved by hand, so that the memory differs in each cycle.
 fn input(machine: &Machine, cycle: u64) -> Input {
     let mut x = machine.home;
     x[3] += 1e-3 * (cycle as f64 * 0.01).sin();
@@ -37,7 +37,7 @@ fn input(machine: &Machine, cycle: u64) -> Input {
     Input { release_ns, measurement, ..Input::default() }
 }
 
-/// The real-time thread and the log thread: runs cycles, and hands over those that are not lost, each changed
+/// Runs cycles as the real-time thread and the log thread do. Passes on those that are not lost, each changed
 /// by `change`.
 fn run_cycles(
     controller: &mut Controller,
@@ -60,7 +60,7 @@ fn run_cycles(
     }
 }
 
-/// Records what is handed over; the report, and of each file the items and the replay.
+/// Records the cycles. Returns the report, and for each file the items and the replay.
 fn files_of(
     loaded: &Loaded,
     hand_over: impl FnOnce(&mut Controller, &mut MemoryProducer<'_>, &SyncSender<Recorded>),
@@ -91,7 +91,7 @@ fn files_of(
     (report, paths.iter().map(file).collect())
 }
 
-/// Records cycles without those that `is_lost`.
+/// Records cycles except those for which `is_lost` is true.
 fn recorded(count: u64, is_lost: impl Fn(u64) -> bool, change: impl Fn(&mut CycleMessage)) -> Outcome {
     let (report, mut files) = files_of(&loaded(""), |controller, memories, queue| {
         run_cycles(controller, memories, queue, 1..=count, is_lost, change);
@@ -114,7 +114,7 @@ fn a_whole_recording_is_repeated() {
 
 #[test]
 fn lost_cycles_are_counted_and_marked_and_the_replay_goes_on_behind_them() {
-    // The queue holds 2000 cycles: so far the copy of the memory may be ahead of the recorder.
+    // The queue holds 2000 cycles. The copy of the memory may be ahead of the recorder by as many.
     let Outcome { report, items, replay } = recorded(9000, |cycle| (1501..=1510).contains(&cycle), |_| ());
     assert_eq!((report.cycles, report.missing, report.is_repeatable), (8990, 10, false));
     let mark = Item::Gap(GapMessage { first_cycle: 1501, cycles: 10 });
@@ -161,7 +161,7 @@ fn both_sides_of_a_reload_are_repeated_and_each_has_its_configuration() {
     assert!(matches!(items.first(), Some(Item::Memory { cycle: 1501, .. })), "{:?}", items.first());
 }
 
-/// A recorder without folders, by hand.
+/// A recorder without folders, advanced by the test.
 fn in_memory(count: u64) -> (Recorder<'static>, SyncSender<WindowOrder>) {
     let loaded = loaded("");
     let queue: &'static mut MemoryQueue = Box::leak(Box::new(MemoryQueue::new()));
@@ -178,7 +178,7 @@ fn in_memory(count: u64) -> (Recorder<'static>, SyncSender<WindowOrder>) {
     (recorder, links.orders)
 }
 
-/// The cycles of a window of the last seconds, which a replay repeats.
+/// Cycles of a window of the last seconds. Asserts that a replay repeats them.
 fn window(recorder: &mut Recorder<'_>, orders: &SyncSender<WindowOrder>, last_s: f64) -> Vec<u64> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("last.mcap");
@@ -226,7 +226,7 @@ fn the_copy_of_a_memory_is_that_before_its_cycle_and_is_made_only_where_there_is
     assert_eq!((copy.cycle, crate::recording::memory_bytes(&copy.memory)), (51, before));
 }
 
-/// A disk that takes nothing for longer than memory lasts.
+/// The disk accepts no data for longer than memory lasts.
 #[test]
 fn a_long_outage_of_the_disk_is_counted_and_the_recording_goes_on() {
     const OUTAGE: u64 = 45_000;
@@ -264,7 +264,8 @@ fn a_long_outage_of_the_disk_is_counted_and_the_recording_goes_on() {
     assert_eq!((cycles, missing, is_repeatable), (END, 0, true));
     assert_eq!((summary.first.cycle, summary.cycles), (unwritten + 1, END - unwritten));
     assert_eq!(gaps, [GapMessage { first_cycle: 1, cycles: unwritten }], "the file says so, too");
-    // Memory holds 30 s. The disk is tried again 2 s later, behind what a busy recorder takes at once: at most the queue, 2 s.
+    // Memory holds 30 s. The next attempt is 2 s later, after the cycles that a busy recorder takes at once:
+    // at most the queue, 2 s.
     let least = OUTAGE - 30_000 - 2_000 - 1_000;
     assert!((least..=OUTAGE - 30_000 + 2_000 + 2_000).contains(&unwritten), "{unwritten}");
 }

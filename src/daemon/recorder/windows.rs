@@ -1,4 +1,4 @@
-//! Windows of the tape in files of their own: around each fault, and the last seconds for an operator.
+//! Windows of the tape in separate files: around each fault, and the last seconds for an operator.
 
 use std::fs::File;
 use std::path::Path;
@@ -15,13 +15,13 @@ use crate::messages::CycleMessage;
 use crate::recording::RecordingError;
 use crate::recording::file::RecordingFile;
 
-/// Cycles of a window that are written in one step: a millisecond.
+/// Cycles of a window written in one step: a millisecond of effort.
 const CYCLES_PER_STEP: usize = 256;
 
-/// Most windows of faults of one run.
+/// Largest number of fault windows of a run.
 const MAX_FAULT_WINDOWS: u32 = 100;
 
-/// Name in messages of the file that an operator has passed.
+/// Name used in messages for the file that an operator has passed.
 const PASSED_FILE: &str = "the file";
 
 /// Order of an operator for the last seconds.
@@ -30,13 +30,13 @@ pub struct WindowOrder {
     pub file: File,
     /// Length \[s\].
     pub last_s: f64,
-    /// Receives the number of cycles written, or why there are none.
+    /// Channel for the number of cycles written, or the reason why there are none.
     pub answer: Sender<Result<u64, String>>,
 }
 
-/// Writes windows, one after the other.
+/// Writer of windows, one after another.
 pub struct Windows {
-    /// For faults; without it theirs are not written.
+    /// Folder for fault windows. Without it they are not written.
     folder: Option<Folder>,
     watch: FaultWatch,
     faults: u32,
@@ -45,22 +45,22 @@ pub struct Windows {
     bytes: u64,
 }
 
-/// Window on its way to its file.
+/// Window that is being written.
 struct Window {
     stream: Stream,
     last: u64,
     cycles: u64,
-    /// The operator who ordered it; none if it is that of a fault.
+    /// Channel to the operator who ordered it; `None` for a fault window.
     answer: Option<Sender<Result<u64, String>>>,
 }
 
 impl Windows {
-    /// Windows of faults go into the folder.
+    /// Writer that puts fault windows into the folder.
     pub fn new(folder: Option<Folder>, rate: u64, orders: Receiver<WindowOrder>) -> Self {
         Self { folder, watch: FaultWatch::new(rate), faults: 0, orders, window: None, bytes: 0 }
     }
 
-    /// Bytes written, at most.
+    /// Upper bound of the bytes written.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
@@ -70,7 +70,7 @@ impl Windows {
         self.window.is_some()
     }
 
-    /// Looks for a fault in a cycle that the tape has received.
+    /// Checks a new cycle of the tape for a fault.
     pub fn add(&mut self, context: &Context, tape: &Tape, cycle: &CycleMessage) {
         self.watch.add(cycle);
         if self.window.is_none() {
@@ -78,7 +78,7 @@ impl Windows {
         }
     }
 
-    /// Writes some of a window, and begins the next that is ordered.
+    /// Writes a part of a window, and begins the next one ordered.
     pub fn advance(&mut self, context: &Context, tape: &Tape) {
         if self.window.is_none()
             && let Ok(order) = self.orders.try_recv()
@@ -97,7 +97,7 @@ impl Windows {
         }
     }
 
-    /// Writes what is left.
+    /// Writes the remaining windows.
     pub fn finish(&mut self, context: &Context, tape: &Tape) {
         loop {
             while self.window.is_some() {
@@ -147,7 +147,7 @@ impl Windows {
 }
 
 impl Window {
-    /// What the tape holds from a cycle on.
+    /// Window of the tape from a cycle on.
     fn new(
         file: RecordingFile,
         tape: &Tape,
@@ -157,7 +157,7 @@ impl Window {
         Self { stream: Stream::new(file, first), last: tape.newest(), cycles: 0, answer }
     }
 
-    /// Writes some cycles; whether the last one is written.
+    /// Writes some cycles. Returns whether the last one is written.
     fn advance(&mut self, context: &Context, tape: &Tape) -> Result<bool, RecordingError> {
         let last = self.last;
         let cycles = tape.from(self.stream.next_cycle()).take_while(|cycle| cycle.cycle <= last);
@@ -168,12 +168,12 @@ impl Window {
         Ok(self.stream.next_cycle() > last)
     }
 
-    /// Completes the file, and reports to whom it is for.
+    /// Completes the file, and reports the result to the operator or the log.
     fn conclude(self, written: Result<(), RecordingError>) {
         let Self { stream, cycles, answer, .. } = self;
         let result = written.and_then(|()| stream.finish());
         match answer {
-            // Nobody receives it if the client has left.
+            // The receiver is gone if the client has left.
             Some(answer) => {
                 let _ = answer.send(result.map(|_| cycles).map_err(|error| error.to_string()));
             }

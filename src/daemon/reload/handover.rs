@@ -1,8 +1,9 @@
 //! Handover of new constants to the real-time thread, which neither allocates nor waits for it.
 //!
-//! One [`Offer`] is allocated at the start and circulates as a reference: the reload thread fills it, the real-time thread
-//! exchanges its constants for those in it, in a cycle without control, and the log thread returns it. So the old constants are
-//! dropped by the reload thread, and the log thread knows the first cycle with the new ones before it receives that cycle.
+//! One [`Offer`] is allocated at the start and circulates as a reference. The reload thread fills it. In a cycle without
+//! control, the real-time thread exchanges its constants for the offered ones. The log thread returns the offer. So the
+//! reload thread drops the old constants, and the log thread receives the number of the first cycle with the new
+//! constants before it receives that cycle.
 //!
 //! ```text
 //! reload thread --offers--> real-time thread --answers--> log thread --returned--> reload thread
@@ -18,53 +19,54 @@ use crate::control::controller::Controller;
 use crate::control::signals::state::State;
 use crate::messages::MAX_REQUEST_AGE_NS;
 
-/// Room for the one offer: a queue holds one less than its length.
+/// Length of a queue for one offer: a queue holds one element less than its length.
 pub const LENGTH: usize = 2;
 
 /// Queue of offers.
 pub type OfferQueue<'o> = Queue<&'o mut Offer, LENGTH>;
 
-/// New constants on their way to the real-time thread, or its old ones on their way back.
+/// Offer of new constants on their way to the real-time thread, or of the old ones on their way back.
 pub struct Offer {
-    /// Its constants are exchanged.
+    /// Controller whose constants are exchanged.
     pub controller: Controller,
-    /// The ages that go with them.
+    /// Timeouts of the same configuration.
     pub timeouts: TimeoutsNs,
-    /// What they were computed from, for the recorder; the real-time thread leaves it alone.
+    /// Configuration of the constants, for the recorder. The real-time thread does not use it.
     pub loaded: Arc<Loaded>,
     /// Instant of the offer \[ns\].
     pub offered_ns: u64,
-    /// Written by the real-time thread.
+    /// Answer, written by the real-time thread.
     pub answer: Answer,
 }
 
 /// Answer of the real-time thread to an offer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// It has not seen the offer.
+    /// No answer yet.
     None,
     /// The new constants are in force from this cycle on.
     Taken(u64),
     /// The platform is under control.
     Refused(State),
-    /// The loop ran no cycle for so long that the offer counts as withdrawn.
+    /// The offer was too old, because the loop ran no cycle for a long time.
     TooOld,
 }
 
 impl Offer {
-    /// An offer of what is in force already.
+    /// Offer of the configuration that is in force.
     pub fn new(loaded: Arc<Loaded>) -> Self {
         let (controller, timeouts) = (loaded.controller.clone(), loaded.timeouts());
         Self { controller, timeouts, loaded, offered_ns: 0, answer: Answer::None }
     }
 
-    /// Whether all cycles before it have been received when `cycle` is received.
+    /// Whether all cycles before the first with the new constants have been received when `cycle` is
+    /// received.
     pub fn is_due(&self, cycle: u64) -> bool {
         !matches!(self.answer, Answer::Taken(first) if first > cycle)
     }
 }
 
-/// The real-time thread's ends.
+/// Real-time thread's ends of the queues.
 pub struct Handover<'q, 'o> {
     offers: Consumer<'q, &'o mut Offer>,
     answers: Producer<'q, &'o mut Offer>,
@@ -74,7 +76,7 @@ pub struct Handover<'q, 'o> {
 }
 
 impl<'q, 'o> Handover<'q, 'o> {
-    /// Before the first cycle. Both queues have the length [`LENGTH`].
+    /// Handover before the first cycle. Both queues have the length [`LENGTH`].
     pub fn new(
         offers: Consumer<'q, &'o mut Offer>,
         answers: Producer<'q, &'o mut Offer>,
@@ -83,11 +85,12 @@ impl<'q, 'o> Handover<'q, 'o> {
         Self { offers, answers, timeouts, cycle: 0 }
     }
 
-    /// Called at the beginning of each cycle, before the controller's step: takes an offer, or refuses it.
+    /// Accepts or refuses an offer. Call it at the beginning of each cycle, before the controller's step.
     #[inline(never)]
     pub fn begin_cycle(&mut self, controller: &mut Controller, woke_ns: u64) {
         self.cycle += 1;
-        // A queue divides by its length; there is none of another, and at each call the compiler sees that it is not zero.
+        // Never true, but a queue divides by its length, and at each call the compiler must see that it is
+        // not zero.
         if self.offers.capacity() != LENGTH - 1 {
             return;
         }
@@ -102,7 +105,7 @@ impl<'q, 'o> Handover<'q, 'o> {
             self.timeouts.set(offer.timeouts);
             Answer::Taken(self.cycle)
         };
-        // There is one offer, so there is room.
+        // There is only one offer, so there is room.
         if self.answers.capacity() == LENGTH - 1 {
             let _ = self.answers.enqueue(offer);
         }

@@ -1,8 +1,8 @@
-//! `reload`: a running daemon takes over the control law, limits and timeouts of its machine file.
+//! Reload: a running daemon reads its machine file again and uses the new control law, limits and timeouts.
 //!
-//! The reload thread reads the file, examines it as at the start, and offers the constants of the controller to the real-time
-//! thread, which takes them in a cycle without control ([`handover`]). All of the file is taken over, or nothing. What a
-//! running daemon cannot change is refused by name.
+//! The reload thread reads the file, examines it as at the start, and offers the new constants to the
+//! real-time thread. That thread accepts them in a cycle without control ([`handover`]). Either the whole
+//! file is accepted, or nothing. A change that needs a restart is refused, with the name of its key.
 
 use core::time::Duration;
 use std::sync::Arc;
@@ -27,26 +27,26 @@ use crate::realtime::cyclic::ReleaseMode;
 pub mod handover;
 pub mod timeouts;
 
-/// Longest wait for the real-time thread: beyond it, an offer is too old to be taken.
+/// Longest wait for the real-time thread. After it, an offer is too old to be accepted.
 const ANSWER_LIMIT: Duration = Duration::from_millis(1200);
 
-/// A configuration with what was computed from it.
+/// A configuration and the values computed from it.
 #[derive(Debug)]
 pub struct Loaded {
-    /// The file.
+    /// The configuration.
     pub config: Config,
-    /// Fidelity that it resolves to.
+    /// Result of its choice of fidelity.
     pub fidelity: Fidelity,
-    /// Before its first cycle.
+    /// Controller before its first cycle.
     pub controller: Controller,
     /// SHA-1 of the file, as `sha1sum` prints it.
     pub sha1: String,
-    /// Unix time at which it was read \[s\].
+    /// Unix time at which the file was read \[s\].
     pub loaded_unix_s: u64,
 }
 
 impl Loaded {
-    /// Computes the rest from a configuration that was examined.
+    /// Computes the other fields from an examined configuration.
     pub fn new(config: Config) -> Self {
         let fidelity = fidelity::fidelity(&config);
         let parameters = parameters(&config.machine, &config.deployment, fidelity);
@@ -60,13 +60,13 @@ impl Loaded {
         }
     }
 
-    /// Its timeouts.
+    /// Timeouts of the configuration.
     pub fn timeouts(&self) -> TimeoutsNs {
         (&self.config.deployment.timeouts).into()
     }
 }
 
-/// Why a configuration was not taken over.
+/// Reason why a configuration was not accepted.
 #[derive(Debug, thiserror::Error)]
 pub enum ReloadError {
     /// The configuration did not come from a file.
@@ -75,13 +75,13 @@ pub enum ReloadError {
     /// The file cannot be read, or is not valid.
     #[error(transparent)]
     Config(#[from] ConfigError),
-    /// Keys differ that a running daemon cannot change.
+    /// Keys have changed that a running daemon cannot change.
     #[error("{}", .0.iter().map(|key| format!("{key}: needs a restart")).collect::<Vec<_>>().join("\n"))]
     NeedsRestart(Vec<String>),
     /// The platform is under control.
     #[error("not possible in state {}, in which the platform is under control; hexad stop or park first", .0.name())]
     UnderControl(State),
-    /// No cycle was run.
+    /// No cycle has run.
     #[error("the control loop runs no cycle; nothing has changed")]
     NoCycle,
 }
@@ -89,29 +89,29 @@ pub enum ReloadError {
 /// Origin of a request: the number of a connection, or `None` for a signal.
 pub type Requester = Option<u64>;
 
-/// What became of a request.
+/// Result of a request.
 pub struct Reloaded {
-    /// Who asked for it.
+    /// Origin of the request.
     pub requester: Requester,
-    /// The configuration in force from now on; `None` if it has not changed.
+    /// The new configuration in force; `None` if it has not changed.
     pub loaded: Option<Arc<Loaded>>,
-    /// In words.
+    /// Changes or error, as text.
     pub outcome: Result<String, ReloadError>,
 }
 
 /// Links of the reload thread to the other threads.
 pub struct ReloadLinks<'q, 'o> {
-    /// It ends when nobody can request any more.
+    /// Requests. The thread ends when all senders are dropped.
     pub requests: Receiver<Requester>,
-    /// To the control thread.
+    /// Results, to the control thread.
     pub results: Sender<Reloaded>,
-    /// To the real-time thread.
+    /// Offers, to the real-time thread.
     pub offers: Producer<'q, &'o mut Offer>,
-    /// From the log thread.
+    /// Answered offers, from the log thread.
     pub returned: Receiver<&'o mut Offer>,
 }
 
-/// Serves requests until nobody can request any more. `offer` is the one that circulates.
+/// Serves requests until all senders are dropped. `offer` is the one offer that circulates.
 pub fn run<'o>(current: Arc<Loaded>, offer: &'o mut Offer, links: ReloadLinks<'_, 'o>) {
     let mut reloading = Reloading { current, offer: Some(offer), links };
     while let Ok(requester) = reloading.links.requests.recv() {
@@ -129,7 +129,7 @@ pub fn run<'o>(current: Arc<Loaded>, offer: &'o mut Offer, links: ReloadLinks<'_
 
 struct Reloading<'q, 'o> {
     current: Arc<Loaded>,
-    /// `None` while it is on its way.
+    /// The offer; `None` while another thread has it.
     offer: Option<&'o mut Offer>,
     links: ReloadLinks<'q, 'o>,
 }
@@ -155,7 +155,7 @@ impl Reloading<'_, '_> {
         Ok(format!("{place}, from cycle {cycle} on: {changed}"))
     }
 
-    /// Offers a configuration to the real-time thread and waits for its answer: the first cycle with it.
+    /// Offers a configuration to the real-time thread. Returns the first cycle with it.
     fn offer(&mut self, loaded: Loaded) -> Result<u64, ReloadError> {
         let offer = self.offer.take().ok_or(ReloadError::NoCycle)?;
         *offer = Offer { offered_ns: monotonic_ns(), ..Offer::new(Arc::new(loaded)) };
@@ -170,7 +170,7 @@ impl Reloading<'_, '_> {
         }
     }
 
-    /// Receives the offer back, if it is on its way, with its answer.
+    /// Receives the offer back if another thread has it. Returns its answer.
     fn receive(&mut self, limit: Duration) -> Option<Answer> {
         if self.offer.is_some() {
             return None;
@@ -185,12 +185,13 @@ impl Reloading<'_, '_> {
     }
 }
 
-/// Refuses what a running daemon cannot change, all at once.
+/// Refuses all changes that need a restart, in one error.
 fn refuse_restarts(current: &Config, new: &Config, changes: &[Change]) -> Result<(), ReloadError> {
     let mut refused: Vec<_> =
         changes.iter().filter(|change| !change.is_reloadable()).map(Change::to_string).collect();
     let [now, then] = [current, new].map(|config| timing(&config.deployment));
-    // With release by messages the loop itself waits that long. It may also follow from other keys, such as the gains.
+    // With external release the loop itself waits for this timeout. The timeout may also follow from other
+    // keys, such as the gains.
     if refused.is_empty()
         && now.timeout_ns != then.timeout_ns
         && current.deployment.realtime.release == ReleaseMode::External

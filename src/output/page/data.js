@@ -23,7 +23,7 @@ function decodedLevels() {
     for (let k = 0; k < COLUMN_COUNT; k++, offset += level.samples) {
       columns.push(numbers.subarray(offset, offset + level.samples));
     }
-    // A sample that stands for one cycle is at its instant, others are in the middle of their cycles.
+    // A sample of one cycle is at its instant, a sample of several in the middle of its cycles.
     const shift = level.step > 1.5 * HEAD.period_s ? 0.5 * level.step : 0;
     return { from: level.from, shift, step: level.step, samples: level.samples, columns };
   });

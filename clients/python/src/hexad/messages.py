@@ -120,7 +120,7 @@ class Setpoint(Message):
     schema = 7
     _fields_ = [
         ("header", Header),  # Schema version, publisher, sequence number and time stamp.
-        ("kind", c_uint64),  # 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and stand at.
+        ("kind", c_uint64),  # 0: X, X' and X'' of a motion; 1: X alone, samples of a motion; 2: X alone, a pose to move to and hold.
         ("x", c_double * 6),  # X. [rad, m]
         ("x_rate", c_double * 6),  # X'. [rad/s, m/s]
         ("x_accel", c_double * 6),  # X''. [rad/s^2, m/s^2]

@@ -4,11 +4,11 @@ use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::clock_cost::ClockCost;
 
-/// Least share of the time that real-time threads must be allowed: a loop that sleeps or spins for half of its
-/// period, and the I/O thread beside it, stay below.
+/// Least share of the time that real-time threads must be allowed. A loop that sleeps or spins for half of
+/// its period needs less, including the I/O thread.
 const MIN_RUNTIME_SHARE: f64 = 0.9;
 
-/// Cost of a clock reading above which it is a system call, as a share of the cost of a system call.
+/// Largest cost of a clock reading without a system call, as a share of the cost of a system call.
 const MAX_READING_SHARE: f64 = 0.75;
 
 const REALTIME_KERNEL: &str =
@@ -46,7 +46,7 @@ fn dynamic(host: &HostFiles, release: &str) -> Examined {
     }
 }
 
-/// Preemption mode of the running kernel: as it reports, or else as it was booted, or built.
+/// Preemption mode of the running kernel: as reported, else from the boot parameters, else from the build.
 fn mode(host: &HostFiles, release: &str) -> Result<String, String> {
     let reported = host.text("sys/kernel/debug/sched/preempt").and_then(|text| {
         let chosen = text.split_whitespace().find_map(|word| word.strip_prefix('(')?.strip_suffix(')'));

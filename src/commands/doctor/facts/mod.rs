@@ -37,9 +37,9 @@ pub enum Assessment {
 pub struct Fact {
     pub name: String,
     pub assessment: Assessment,
-    /// The finding, or the reason why there is none.
+    /// The finding, or the reason why it is unknown.
     pub found: String,
-    /// Action that improves the fact, where it is not good.
+    /// Action that improves a fact that is not good.
     pub remedy: Option<String>,
 }
 
@@ -104,7 +104,7 @@ pub fn all(
     facts.into_iter().map(|(name, examined)| named(name, examined)).collect()
 }
 
-/// The fact under a name, unknown if its examination failed.
+/// The fact with a name; unknown if its examination failed.
 fn named(name: &str, examined: Examined) -> Fact {
     Fact { name: name.into(), ..examined.unwrap_or_else(|reason| Fact::unknown(reason, None)) }
 }
@@ -113,7 +113,7 @@ fn named(name: &str, examined: Examined) -> Fact {
 mod tests {
     use super::*;
 
-    /// A fact as [`all`] has it, but for the name.
+    /// A fact as [`all`] returns it, without the name.
     pub fn examined(examined: Examined) -> Fact {
         named("", examined)
     }

@@ -1,4 +1,5 @@
-//! Facts about the rights of this process: found by requesting what the daemon requests, explained by kernel files.
+//! Facts about the rights of this process. They are found by requesting the daemon's rights, and explained by
+//! kernel files.
 
 use super::Fact;
 use crate::config::deployment::{Realtime, Scheduler};

@@ -5,7 +5,7 @@ use super::{Examined, Fact};
 use crate::commands::doctor::files::HostFiles;
 use crate::realtime::setup::Shortfall;
 
-/// Exit latency below which an idle state does not matter beside a wake-up, which takes tens of microseconds \[us\].
+/// Exit latency up to which an idle state hardly affects a wake-up, which takes tens of microseconds \[us\].
 const MAX_SHALLOW_EXIT_US: i64 = 10;
 
 /// Frequency governors of the processors.
@@ -27,7 +27,8 @@ pub fn frequency(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     Ok(Fact::fair(format!("governor {}", others.join(", ")), "cpupower frequency-set --governor performance"))
 }
 
-/// Deepest idle state of the processors. `bound_us` is the bound that the daemon requests while it runs, `refused` the reason if it may not.
+/// Deepest idle state of the processors. `bound_us` is the bound that the daemon requests while it runs;
+/// `refused` is the reason if it may not.
 pub fn idle(host: &HostFiles, chosen: &LoopCpus, bound_us: i32, refused: Option<&Shortfall>) -> Examined {
     let Some((latency_us, state)) =
         deepest_state(host, chosen)?.filter(|(latency_us, _)| *latency_us > MAX_SHALLOW_EXIT_US)
@@ -49,7 +50,7 @@ pub fn idle(host: &HostFiles, chosen: &LoopCpus, bound_us: i32, refused: Option<
     }
 }
 
-/// Latency and name of the deepest enabled idle state; `None` if there are no states.
+/// Latency and name of the deepest enabled idle state; `None` if the processors have none.
 fn deepest_state(host: &HostFiles, chosen: &LoopCpus) -> Result<Option<(i64, String)>, String> {
     let driver = host.text(&format!("{CPU}/cpuidle/current_driver"))?;
     if driver == "none" {

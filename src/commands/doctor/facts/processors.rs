@@ -22,7 +22,8 @@ pub struct LoopCpus {
 }
 
 impl LoopCpus {
-    /// CPUs that the threads may run on: the configured ones, or all permitted ones where one is not configured.
+    /// CPUs on which the threads may run: the configured ones, or all permitted ones if a thread has no
+    /// configured CPU.
     pub(super) fn used(&self) -> Vec<usize> {
         match (self.realtime, self.io) {
             (Some(realtime), Some(io)) if realtime == io => vec![realtime],
@@ -32,7 +33,7 @@ impl LoopCpus {
     }
 }
 
-/// Set of processors in a file; empty where the file contains `(null)`.
+/// Set of processors in a file; empty if the file contains `(null)`.
 fn set(host: &HostFiles, path: &str) -> Result<Cpus, String> {
     let text = host.text(path)?;
     if text == "(null)" {
@@ -61,7 +62,7 @@ pub fn count(chosen: &LoopCpus) -> Fact {
     Fact::good(format!("{number} (CPU {permitted})"))
 }
 
-/// Whether the kernel keeps other work off the processor of the real-time thread.
+/// Whether the kernel keeps other threads and interrupts off the processor of the real-time thread.
 pub fn isolation(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     let isolated = set(host, &format!("{CPU}/isolated"))?;
     let Some(cpu) = chosen.realtime else {
@@ -74,7 +75,7 @@ pub fn isolation(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     }
     let no_ticks = set(host, &format!("{CPU}/nohz_full")).is_ok_and(|cpus| cpus.contains(cpu));
     let listed = boot_parameter(host, "rcu_nocbs").and_then(|list| Cpus::parse(&list));
-    // The former implies the latter.
+    // `no_ticks` implies `no_callbacks`.
     let no_callbacks = no_ticks || listed.is_some_and(|cpus| cpus.contains(cpu));
     match (no_ticks, no_callbacks) {
         (true, _) => Ok(Fact::good(format!("CPU {cpu}: isolated, without ticks and RCU callbacks"))),
@@ -108,7 +109,7 @@ pub fn siblings(host: &HostFiles, chosen: &LoopCpus) -> Examined {
     }
 }
 
-/// Interrupts that the processor of the real-time thread may get. `None` where no processor is configured.
+/// Interrupts that the processor of the real-time thread may receive. `None` if no processor is configured.
 pub fn interrupts(host: &HostFiles, chosen: &LoopCpus) -> Option<Fact> {
     let cpu = chosen.realtime?;
     let lines = host.numbered("proc/irq");

@@ -13,7 +13,7 @@ pub fn virtual_machine() -> Fact {
     )
 }
 
-/// Whether the host is a virtual machine, whose own host may take the processors away.
+/// Whether the host is a virtual machine, whose own host may preempt the processors.
 pub fn machine(host: &HostFiles) -> Examined {
     let processors = host.text("proc/cpuinfo")?;
     let flags = processors.lines().find_map(|line| line.strip_prefix("flags"));
@@ -38,7 +38,7 @@ pub fn swap(host: &HostFiles) -> Examined {
     }
 }
 
-/// Whether the kernel rearranges memory into huge pages by itself.
+/// Whether the kernel moves memory into huge pages automatically.
 pub fn huge_pages(host: &HostFiles) -> Examined {
     let setting = "sys/kernel/mm/transparent_hugepage/enabled";
     match host.text(setting) {
@@ -53,10 +53,10 @@ pub fn huge_pages(host: &HostFiles) -> Examined {
     }
 }
 
-/// File system of the shared memory, and the `folder` of this user's book-keeping.
+/// File system of the shared memory, and `folder` with the files of iceoryx2 of this user.
 pub fn shared_memory(host: &HostFiles, folder: &Path) -> Examined {
     let mounts = host.text("proc/self/mountinfo")?;
-    // The last mount hides those before it.
+    // The last mount hides earlier ones.
     let kind = mounts.lines().rev().find_map(|line| {
         let (mount, kind) = line.split_once(" - ")?;
         (mount.split(' ').nth(4)? == "/dev/shm").then(|| kind.split(' ').next())?
@@ -72,7 +72,7 @@ pub fn shared_memory(host: &HostFiles, folder: &Path) -> Examined {
     }
 }
 
-/// Largest user ID of a system user, whose shared memory logind leaves alone.
+/// Largest user ID of a system user. logind does not delete the shared memory of system users.
 const MAX_SYSTEM_USER: u32 = 999;
 
 /// Whether systemd-logind deletes the shared memory of this user when the user's last session ends.

@@ -51,7 +51,10 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
-        let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| dispatch!(machine.level, simd => balls.prove_knot_from_kept(simd, constants, &pose, Pair { angular: 0.0, linear: reach }));
+        let covered = |balls: &mut RegularBalls, constants: &Constants, reach: f64| {
+            let reach = Pair { angular: 0.0, linear: reach };
+            dispatch!(machine.level, simd => balls.prove_knot_from_kept(simd, constants, &pose, reach))
+        };
         let mut balls = RegularBalls::default();
         assert!(!covered(&mut balls, &constants, 0.0));
         // A ball that is too small for the reach is kept for the knot itself.

@@ -13,59 +13,59 @@ use crate::realtime::request_word::RequestWord;
 /// Interval between two attempts of a request that waits until it is possible \[ns\].
 const RETRY_INTERVAL_NS: u64 = 100_000_000;
 
-/// Longest wait for the controller to answer \[ns\]: no longer does a request for control stay valid.
+/// Longest wait for the controller's answer \[ns\]. A request for control is not valid for longer.
 const ANSWER_LIMIT_NS: u64 = MAX_REQUEST_AGE_NS + 200_000_000;
 
-/// What a client has requested.
+/// Request of a client, with its options.
 #[derive(Clone, Copy, Debug)]
 pub struct Order {
     pub request: Request,
-    /// Whether the answer comes when the request is completed.
+    /// Whether the client is answered only when the request is completed.
     pub waits: bool,
-    /// Whether to wait for measurements and setpoint where they are missing, instead of being refused.
+    /// Whether to wait for missing measurements and setpoints instead of being refused.
     pub is_patient: bool,
-    /// Instant of the end of all waiting \[ns\].
+    /// Instant at which all waiting ends \[ns\].
     pub deadline_ns: u64,
 }
 
-/// An order on its way.
+/// An order in progress.
 #[derive(Clone, Copy, Debug)]
 pub struct PendingOrder {
     order: Order,
     stage: Stage,
     /// Beginning of the stage \[ns\].
     since_ns: u64,
-    /// Diagnostic that the client was last informed of.
+    /// The last diagnostic sent to the client.
     reported: DiagnosticCode,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// A request of higher precedence is waiting for the controller, or no cycle has run yet.
+    /// Not posted yet: a request of higher precedence is pending, or no cycle has run.
     Posting,
-    /// This word waits for the controller.
+    /// This word is posted and not answered yet.
     Posted(u64),
-    /// The controller has refused it for now.
+    /// The controller has refused it, and it will be posted again.
     Retrying,
     /// The controller has accepted it.
     Accepted,
-    /// A later request has taken the place of a stop: whether the platform is stopped says its state.
+    /// A later request has replaced a stop. The state shows whether the platform has stopped.
     Replaced,
 }
 
-/// Result of a look at a pending order.
+/// Result of a check of a pending order.
 #[derive(Debug)]
 pub enum Step {
-    /// Nothing new.
+    /// Nothing has changed.
     Wait,
-    /// Something new on the way.
+    /// A line of progress for the client.
     Progress(AnswerLine),
     /// The order has ended.
     Answer(AnswerLine),
 }
 
 impl PendingOrder {
-    /// Posts an order at once, if nothing of higher precedence waits.
+    /// Creates an order and posts it at once, unless a request of higher precedence is pending.
     pub fn post(order: Order, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Self {
         let mut pending =
             Self { order, stage: Stage::Posting, since_ns: now_ns, reported: DiagnosticCode::None };
@@ -78,7 +78,7 @@ impl PendingOrder {
         self.order.request
     }
 
-    /// Looks at the newest cycle.
+    /// Checks the newest cycle.
     pub fn step(&mut self, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) -> Step {
         let age_ns = now_ns.saturating_sub(self.since_ns);
         match self.stage {
@@ -110,7 +110,7 @@ impl PendingOrder {
         self.check_deadline(snapshot, now_ns)
     }
 
-    /// Withdraws what the controller has not seen, as its sender has left. A stop remains.
+    /// Withdraws a request that the controller has not read, because its sender has left. A stop remains.
     pub fn cancel(&self, word: &RequestWord) {
         if let Stage::Posted(posted) = self.stage {
             self.cancel_posted(posted, word);
@@ -127,7 +127,7 @@ impl PendingOrder {
         )
     }
 
-    /// No control begins before the first cycle was published.
+    /// Tries to post the request. Before the first cycle is published, no request for control is posted.
     fn try_post(&mut self, snapshot: &Snapshot, word: &RequestWord, now_ns: u64) {
         if snapshot.time_ns == 0 && self.order.request.can_begin_control() {
             return;
@@ -143,7 +143,7 @@ impl PendingOrder {
         }
     }
 
-    /// The controller has answered.
+    /// Evaluates the controller's answer.
     fn answered(&mut self, snapshot: &Snapshot, now_ns: u64) -> Step {
         let refusal = snapshot.refusal;
         if refusal.code == DiagnosticCode::None {
@@ -158,7 +158,7 @@ impl PendingOrder {
             };
         }
         let text = refusal_text(snapshot);
-        // Only an operator ends a fault.
+        // A fault ends only by an operator, so waiting does not help.
         if self.order.is_patient && may_resolve(refusal.code) && state(snapshot) != State::Fault {
             (self.stage, self.since_ns) = (Stage::Retrying, now_ns);
             if self.reported == refusal.code || now_ns > self.order.deadline_ns {
@@ -170,7 +170,7 @@ impl PendingOrder {
         Step::Answer(self.line(RequestResult::Refused, snapshot, refusal, text))
     }
 
-    /// Whether the state that the accepted request leads to is reached.
+    /// Checks whether the state that the accepted request leads to is reached.
     fn completion(&self, snapshot: &Snapshot, now_ns: u64) -> Step {
         match outcome(self.order.request, state(snapshot)) {
             Some(true) => self.answer(RequestResult::Done, snapshot, state(snapshot).name().into()),
@@ -179,7 +179,7 @@ impl PendingOrder {
         }
     }
 
-    /// The request that has replaced this stop may not have been seen yet.
+    /// Checks a replaced stop. The real-time thread may not have read the replacing request yet.
     fn replaced(&self, snapshot: &Snapshot, now_ns: u64) -> Step {
         let is_new = now_ns.saturating_sub(self.since_ns) <= ANSWER_LIMIT_NS;
         if is_new && state(snapshot).has_control() {
@@ -219,7 +219,7 @@ impl PendingOrder {
     }
 }
 
-/// Whether a state is the one that an accepted request leads to; `None` on the way there.
+/// Whether a state is the result of an accepted request; `None` while it is on the way.
 fn outcome(request: Request, state: State) -> Option<bool> {
     match (request, state) {
         (Request::Engage, State::Engaging) => None,
@@ -227,15 +227,15 @@ fn outcome(request: Request, state: State) -> Option<bool> {
         (Request::Stop | Request::Park, State::Stopping) | (Request::Park, State::Parking) => None,
         (Request::Stop, state) => Some(!state.has_control() && state != State::Fault),
         (Request::Park, state) => Some(state == State::Off),
-        // A fault stays one, and has no force either.
+        // A fault remains a fault; it has no force either.
         (Request::Off, state) => Some(!state.has_control()),
         (Request::Clear, state) => Some(state != State::Fault),
         (Request::Estop, state) => Some(state == State::Fault),
     }
 }
 
-/// Whether the reason of a refusal may disappear without a correction: a source that was lost may be about to return, and the last
-/// message before it was lost has an old time stamp.
+/// Whether the reason of a refusal may disappear without a correction. A lost source may return; until then,
+/// its last message has an old time stamp.
 fn may_resolve(code: DiagnosticCode) -> bool {
     use DiagnosticCode::{MeasurementLost, MeasurementStampInvalid, SetpointLost, SetpointStampInvalid};
     let may_return = [MeasurementLost, MeasurementStampInvalid, SetpointLost, SetpointStampInvalid];
@@ -254,7 +254,7 @@ fn state_text(snapshot: &Snapshot) -> String {
     format!("the daemon is in {}: {}", state(snapshot).name(), sentence(&diagnostic(snapshot)))
 }
 
-/// Why the last request was refused, with what an operator needs to correct it.
+/// Text of the last refusal, with what an operator must correct.
 fn refusal_text(snapshot: &Snapshot) -> String {
     let Snapshot { status, refusal, .. } = snapshot;
     let norm = |v: [f64; 3]| Vector3::from(v).norm();

@@ -1,4 +1,4 @@
-//! Orders on their way, against snapshots as the I/O thread writes them.
+//! Orders in progress, against snapshots as the I/O thread writes them.
 
 use super::*;
 
@@ -68,13 +68,13 @@ fn a_stop_that_another_replaces_ends_with_whether_the_platform_is_stopped() {
     ] {
         let word = RequestWord::default();
         let mut first = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 1000);
-        // The loop has seen it, and before its order looks, a later request is posted and answered.
+        // The loop has read the word. Before the order is checked, a later request is posted and answered.
         word.set_seen(word.load());
         let _later = PendingOrder::post(order(later, false), &first_cycle(), &word, 2000);
         let step = first.step(&snapshot(state, word.load(), none), &word, 3000);
         assert_eq!(result(&step), Some(expected), "{later:?}");
     }
-    // An emergency stop in place of a stop that the loop has not seen.
+    // An emergency stop replaces a stop that the loop has not read.
     let word = RequestWord::default();
     let mut stop = PendingOrder::post(order(Request::Stop, false), &first_cycle(), &word, 1000);
     let _estop = PendingOrder::post(order(Request::Estop, false), &first_cycle(), &word, 2000);
@@ -116,7 +116,7 @@ fn a_patient_order_says_once_why_it_waits_and_tries_again() {
     assert_ne!(word.load(), first);
     let again = snapshot(State::Standby, word.load(), DiagnosticCode::NoSetpoint.into());
     assert_eq!(result(&pending.step(&again, &word, RETRY_INTERVAL_NS + 3000)), None, "the same reason");
-    // The last message of a source that was away, before it sends again.
+    // The last message of a source before a pause.
     word.set_seen(word.load());
     assert_eq!(result(&pending.step(&again, &word, 2 * RETRY_INTERVAL_NS + 4000)), None);
     let old = snapshot(State::Standby, word.load(), DiagnosticCode::SetpointStampInvalid.into());
