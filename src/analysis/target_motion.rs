@@ -215,7 +215,7 @@ pub fn target_motion(
     while left > 1.0 {
         let before = *reference.motion();
         let end_ns = reference.time_ns() + period_ns;
-        reference.advance(constants, end_ns, Some(&Target::Pose(to, speed)));
+        reference.advance(constants, end_ns, Some(&Target::Pose { pose: to, speed_share: speed }));
         observe(&reference, &before);
         survey.add(constants, &reference);
         left = distance(&reference.motion().pose, to);

@@ -22,7 +22,7 @@ pub(in crate::control) fn actuate(
     let constants = cycle.constants;
     let parameters = &constants.parameters;
     let estimator = errors.estimator();
-    let mut at_begin = *estimator.state();
+    let mut at_begin = *estimator.at_measurement();
     estimator.predict(&mut at_begin, begin_ns);
     let wanted = parameters.law.feedback_acceleration(&at_begin, &constants.input_matrix);
     let acceleration = feedback.limit(cycle, &desired.acceleration, &wanted);

@@ -87,13 +87,13 @@ impl ErrorTracker {
         let innovation = estimator.correct(&constants.estimator, time_ns, &deviation);
         let is_new = innovation.is_some();
         if let Some(innovation) = innovation {
-            self.residual = deviation.value - estimator.state().value;
+            self.residual = deviation.value - estimator.at_measurement().value;
             let legs = || {
                 let feedback = feedback_forces(constants, sent_acceleration, &desired.pose);
                 [leg_lengths(constants.machine(), &desired.pose), feedback]
             };
             let EstimatorConstants { reading_errors, .. } = &constants.estimator;
-            let disturbance_now = &estimator.state().disturbance;
+            let disturbance_now = &estimator.at_measurement().disturbance;
             let mut check = || {
                 sensors.check(&located.measurement.length, reading_errors, &constants.frozen_leg, legs)?;
                 check_innovation(constants, &innovation, interval_s, located)?;
@@ -103,7 +103,7 @@ impl ErrorTracker {
             self.disturbance_diagnostic = disturbance
                 .check(
                     &constants.disturbance_bounds,
-                    estimator.state(),
+                    estimator.at_measurement(),
                     &desired,
                     drives.sudden_disturbance_squared,
                     interval_s,
@@ -113,7 +113,7 @@ impl ErrorTracker {
         let mut twist = located.platform.twist;
         // A measurement from before the start of control shows another motion.
         if located.measurement.rate.is_none() && interval_s >= 0.0 {
-            let rate = &estimator.state().rate;
+            let rate = &estimator.at_measurement().rate;
             error.twist = if acts_on_legs {
                 localization.twist_of(constants, rate).unwrap_or(error.twist)
             } else {
@@ -125,7 +125,7 @@ impl ErrorTracker {
         if is_new {
             self.error = error;
         } else if !acts_on_legs {
-            let mut predicted = *estimator.state();
+            let mut predicted = *estimator.at_measurement();
             estimator.predict(&mut predicted, cycle.release_ns);
             self.error = PoseError::from(&predicted.error());
         }

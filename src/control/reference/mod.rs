@@ -95,7 +95,7 @@ const IN_PROPORTION_STEPS: u32 = 50;
 /// reference.begin_at(0);
 /// let mut fastest = 0.0_f64;
 /// for cycle in 1..5000 {
-///     reference.advance(&constants, cycle * parameters.period_ns, Some(&Target::Pose(&goal, 1.0)));
+///     reference.advance(&constants, cycle * parameters.period_ns, Some(&Target::Pose { pose: &goal, speed_share: 1.0 }));
 ///     fastest = fastest.max(reference.motion().twist.linear.norm());
 /// }
 /// assert!((reference.motion().pose.position.z - goal.position.z).abs() < 1e-6);
@@ -129,7 +129,7 @@ impl ReferenceGenerator {
             time_ns: 0,
             mean_acceleration: Acceleration::default(),
             stop: HeldStop::default(),
-            bounds: PoseBounds::nominal(constants),
+            bounds: PoseBounds::configured(constants),
             verifier: Verifier::default(),
             history: History::default(),
             closing_scale: 1.0,
@@ -196,14 +196,14 @@ impl ReferenceGenerator {
     }
 
     /// Target minus reference at the end of the last cycle.
-    pub fn deviation(&self, constants: &Constants, target: &Target<'_>) -> Option<PoseError> {
+    pub fn offset_to(&self, constants: &Constants, target: &Target<'_>) -> Option<PoseError> {
         let desired = target.motion_at(&constants.parameters, self.time_ns)?;
         Some(PoseError::new(&desired, &self.motion.pose, &self.motion.twist))
     }
 
     /// Motion of a setpoint minus the reference, at the end of the last cycle. The setpoint is extrapolated
     /// to this instant, to first order in the angle covered.
-    pub fn deviation_of(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> PoseError {
+    pub fn offset_to_setpoint(&self, parameters: &Parameters, setpoint: &SetpointMotion) -> PoseError {
         let motion = &setpoint.motion;
         let continued = setpoint.continued(setpoint.bounded_extrapolation_s(parameters, self.time_ns));
         let error = PoseError::new(motion, &self.motion.pose, &self.motion.twist);

@@ -15,7 +15,12 @@ pub enum Target<'a> {
     /// Samples of a motion.
     Samples(&'a PoseSamples),
     /// Pose to move to and stand at, with a share of the limits of autonomous motions.
-    Pose(&'a Pose, f64),
+    Pose {
+        /// Goal.
+        pose: &'a Pose,
+        /// Share of the limits of autonomous motions.
+        speed_share: f64,
+    },
 }
 
 /// Least share of the limits of autonomous motions: with less, the approach loses its numerical precision.
@@ -28,7 +33,7 @@ impl<'a> Target<'a> {
         if setpoint.setpoint.kind == SetpointKind::Pose {
             Self::Samples(samples)
         } else if setpoint.setpoint.kind == SetpointKind::Target {
-            Self::Pose(&setpoint.motion.pose, share(setpoint.setpoint.target_speed))
+            Self::Pose { pose: &setpoint.motion.pose, speed_share: share(setpoint.setpoint.target_speed) }
         } else {
             Self::Motion(setpoint)
         }
@@ -39,7 +44,7 @@ impl<'a> Target<'a> {
         match self {
             Self::Motion(setpoint) => Some(setpoint.motion_at(parameters, instant_ns)),
             Self::Samples(samples) => samples.target(instant_ns),
-            Self::Pose(pose, _) => Some(at_rest(pose)),
+            Self::Pose { pose, .. } => Some(at_rest(pose)),
         }
     }
 
@@ -62,14 +67,14 @@ impl<'a> Target<'a> {
 
     /// Share of the target's limits for closing the distance. The limits of a pose are scaled already.
     pub(in crate::control) fn closing_scale(&self, scale: f64) -> f64 {
-        if let Self::Pose(..) = self { 1.0 } else { scale }
+        if let Self::Pose { .. } = self { 1.0 } else { scale }
     }
 
     /// Limits for the way to the target.
     pub(in crate::control) fn limits(&self, limits: &Limits) -> Limits {
         match self {
             Self::Motion(_) | Self::Samples(_) => *limits,
-            Self::Pose(_, share) => limits.scaled(limits.autonomous_scale * share),
+            Self::Pose { speed_share, .. } => limits.scaled(limits.autonomous_scale * speed_share),
         }
     }
 }

@@ -24,7 +24,7 @@ impl<'a> ValidatedSetpoint<'a> {
     pub fn target_in(&self, constants: &'a Constants, state: State) -> Option<Target<'a>> {
         match state {
             State::Engaging | State::Active => self.target.filter(|_| self.status.is_ok()),
-            State::Parking => Some(Target::Pose(constants.home.pose(), 1.0)),
+            State::Parking => Some(Target::Pose { pose: constants.home.pose(), speed_share: 1.0 }),
             State::Off | State::Standby | State::Stopping | State::Fault => None,
         }
     }

@@ -180,7 +180,7 @@ pub fn check_deviation(
     before: &SetpointMotion,
     setpoint: &SetpointMotion,
 ) -> Result<(), Diagnostic> {
-    let ratio = parameters.tolerance_ratio(&reference.deviation_of(parameters, setpoint));
+    let ratio = parameters.tolerance_ratio(&reference.offset_to_setpoint(parameters, setpoint));
     if ratio <= 1.0 {
         return Ok(());
     }

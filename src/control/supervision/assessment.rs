@@ -127,13 +127,15 @@ fn check_reports(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
 fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &ReferenceGenerator) -> bool {
     let parameters = &cycle.constants.parameters;
     let is_within = |target: &Target<'_>, ratio: f64| {
-        let deviation = reference.deviation(cycle.constants, target);
+        let deviation = reference.offset_to(cycle.constants, target);
         deviation.is_some_and(|deviation| parameters.tolerance_ratio(&deviation) <= ratio)
     };
     match cycle.state {
         State::Engaging => setpoint.target.as_ref().is_some_and(|target| is_within(target, REACHED_RATIO)),
         State::Stopping => reference.is_at_rest(),
-        State::Parking => is_within(&Target::Pose(cycle.constants.home.pose(), 1.0), AT_HOME_RATIO),
+        State::Parking => {
+            is_within(&Target::Pose { pose: cycle.constants.home.pose(), speed_share: 1.0 }, AT_HOME_RATIO)
+        }
         State::Off | State::Standby | State::Active | State::Fault => false,
     }
 }

@@ -184,7 +184,7 @@ impl Estimator {
     }
 
     /// Estimate at the instant of the last measurement.
-    pub fn state(&self) -> &ErrorEstimate {
+    pub fn at_measurement(&self) -> &ErrorEstimate {
         &self.filter.state
     }
 

@@ -24,7 +24,7 @@ pub(in crate::control::reference) struct PoseBounds {
 
 impl PoseBounds {
     /// Nominal bounds: the stroke less the stroke margin at both ends, and the configured envelope.
-    pub fn nominal(constants: &Constants) -> Self {
+    pub fn configured(constants: &Constants) -> Self {
         let (actuator, parameters) = (&constants.machine().actuator, &constants.parameters);
         Self {
             shortest: [actuator.min_length + parameters.stroke_margin; LEGS],
@@ -39,7 +39,7 @@ impl PoseBounds {
 
     /// Nominal bounds, relaxed where a pose exceeds them.
     pub fn around(constants: &Constants, pose: &Pose) -> Self {
-        let mut bounds = Self::nominal(constants);
+        let mut bounds = Self::configured(constants);
         let actuator = &constants.machine().actuator;
         let [stroke_room, end_room] = [START_RATIO, END_STOP_RATIO].map(|ratio| ratio * actuator.stroke());
         let lengths = leg_lengths(constants.machine(), pose);

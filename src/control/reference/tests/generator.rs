@@ -142,7 +142,7 @@ fn the_way_to_a_target_takes_its_share_of_the_limits() {
         [shift / LIMITS.position.velocity, turn / LIMITS.orientation.velocity]
     };
     let scaled = Target::Motion(&there);
-    let pose = Target::Pose(&there.motion.pose, 1.0);
+    let pose = Target::Pose { pose: &there.motion.pose, speed_share: 1.0 };
     for (found, share) in [
         (cruise(&scaled, 0.3), 0.3),
         (cruise(&pose, 1.0), 0.3 * 0.999),
@@ -163,7 +163,7 @@ fn each_kind_of_setpoint_has_its_target() {
         let target = Target::of_setpoint(&setpoint, &samples);
         assert_eq!(matches!(target, Target::Motion(_)), kind == SetpointKind::Motion);
         assert_eq!(matches!(target, Target::Samples(_)), kind == SetpointKind::Pose);
-        assert_eq!(matches!(target, Target::Pose(..)), kind == SetpointKind::Target);
+        assert_eq!(matches!(target, Target::Pose { .. }), kind == SetpointKind::Target);
     }
 }
 

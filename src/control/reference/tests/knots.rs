@@ -26,7 +26,7 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
         let mut constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
         (constants.reference_condition, constants.parameters.condition) = (1e4, 1e9);
-        let mut bounds = PoseBounds::nominal(&constants);
+        let mut bounds = PoseBounds::configured(&constants);
         (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
         let verified = |constants: &Constants, from: Option<&Pose>| {
             let step = Step { from, ..Step::default() };
@@ -104,7 +104,7 @@ fn a_step_without_effort_left_is_refused() {
             let step = Step { effort, ..Step::default() };
             Verifier::default().verify(
                 &constants,
-                &PoseBounds::nominal(&constants),
+                &PoseBounds::configured(&constants),
                 &at_rest(&pose),
                 &step,
                 &mut PoseStop::default(),

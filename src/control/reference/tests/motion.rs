@@ -109,7 +109,7 @@ fn the_deviation_of_a_setpoint_is_right_to_first_order() {
             setpoint.setpoint.time_ns = 1000 * MS - dt_ns;
             let dt = dt_ns as f64 * 1e-9;
             let desired = integrated(&setpoint.motion, &Vector6::zeros(), dt);
-            let deviation = reference.deviation_of(&constants.parameters, &setpoint);
+            let deviation = reference.offset_to_setpoint(&constants.parameters, &setpoint);
             let expected = motion.pose.displacement_to(&desired.pose).vector();
             // Remainder: half of the product of the two rotations.
             let rest = offset.angular.norm() * 0.5 * dt + 0.5 * dt * dt * dt + 1e-9;
@@ -134,7 +134,7 @@ fn steps_and_stops_move_the_pose_as_their_twist_says() {
         reference.verify_start(&constants, &motion).ok();
         reference.begin_at(0);
         let home = at_rest(constants.home.pose()).pose;
-        let target = Target::Pose(&home, 1.0);
+        let target = Target::Pose { pose: &home, speed_share: 1.0 };
         let mut expected = motion;
         for step in 1..=200 {
             let target = (k % 2 == 0).then_some(&target);
@@ -169,7 +169,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
         highest: [0.1, 0.1, 0.1, 0.1, 0.1, 1.6],
     });
     let constants = Constants::new(&machine, parameters);
-    let nominal = PoseBounds::nominal(&constants);
+    let nominal = PoseBounds::configured(&constants);
     let [shortest, longest] = [machine.actuator.min_length + 0.1, machine.actuator.max_length - 0.1];
     assert_eq!((nominal.shortest, nominal.longest), ([shortest; LEGS], [longest; LEGS]));
     let room = 2.5e-5 * machine.actuator.stroke();

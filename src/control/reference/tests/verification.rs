@@ -169,7 +169,7 @@ impl Scene {
         let mut constants = Constants::new(&machine, parameters);
         let (motion, step) = motion(samples, &constants);
         constants.reference_condition = 1e4;
-        let mut bounds = PoseBounds::nominal(&constants);
+        let mut bounds = PoseBounds::configured(&constants);
         (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
         Self { constants, bounds, motion, step, is_free: samples.below(3) == 0 }
     }

@@ -100,7 +100,7 @@ impl PoseSamples {
             self.samples = [None; CAPACITY];
             return self.append(time_ns, pose);
         }
-        let is_first = self.timing.count == 0.0;
+        let is_first = self.timing.averaged_intervals == 0.0;
         self.timing.update(interval, seconds_between(last.time_ns, now_ns));
         let delay = self.timing.delay();
         self.delay = if is_first { Delay::new(delay, now_ns) } else { self.delay.toward(delay, now_ns) };

@@ -26,7 +26,7 @@ const JITTER_PER_DEVIATION: f64 = 2.25;
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control::setpoint::pose_samples) struct Timing {
     /// Number of intervals seen, up to the length of the average.
-    pub count: f64,
+    pub averaged_intervals: f64,
     pub interval: f64,
     /// Mean age of the newest sample when the next one arrives.
     age: f64,
@@ -38,11 +38,11 @@ pub(in crate::control::setpoint::pose_samples) struct Timing {
 
 impl Timing {
     pub fn update(&mut self, interval: f64, age: f64) {
-        if self.count == 0.0 {
+        if self.averaged_intervals == 0.0 {
             (self.interval, self.age, self.before) = (interval, age, [[interval, age]; 2]);
         }
-        self.count = (self.count + 1.0).min(1.0 / ESTIMATION_GAIN);
-        let gain = 1.0 / self.count;
+        self.averaged_intervals = (self.averaged_intervals + 1.0).min(1.0 / ESTIMATION_GAIN);
+        let gain = 1.0 / self.averaged_intervals;
         let deviation = (age - self.age).abs().min(MAX_JITTER_RATIO * self.interval);
         self.deviation += gain * (deviation - self.deviation);
         // Medians of three: a single lost sample changes no estimate, and a new rate changes it at once.

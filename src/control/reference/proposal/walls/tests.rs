@@ -55,7 +55,7 @@ impl Scene {
         let constants = Constants::new(&machine, parameters);
         let twist = Twist { angular: samples.vector(0.8), linear: samples.vector(0.8) };
         let motion = Motion { twist, ..at_rest(&pose(samples, &constants)) };
-        Self { bounds: PoseBounds::nominal(&constants), constants, motion }
+        Self { bounds: PoseBounds::configured(&constants), constants, motion }
     }
 
     fn walls(&self) -> Walls {
