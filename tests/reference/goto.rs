@@ -83,6 +83,7 @@ fn pose_inside(random: &mut Random, constants: &Constants) -> Pose {
 
 /// One pair: from a pose in the workspace to another, of which a fifth may be anywhere. The way uses the limits of autonomous
 /// motions, or a share of them; a stop before a bound may use all.
+#[expect(clippy::too_many_lines, reason = "a motion and all that is asserted about it")]
 fn pair(constants: &Constants, seed: u64) -> Outcome {
     let mut random = Random::new(seed);
     let from = pose_inside(&mut random, constants);

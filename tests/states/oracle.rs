@@ -40,6 +40,7 @@ fn changes(cause: Option<Diagnostic>) -> Option<Diagnostic> {
     cause.filter(|it| [DiagnosticCode::PayloadChanged, DiagnosticCode::Impact].contains(&it.code))
 }
 
+#[expect(clippy::too_many_lines, reason = "the state machine again, written from its table")]
 pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, after_loss: AfterStop) -> Next {
     use Request::{Clear, Engage, Estop, Off, Park, Stop};
     use State as S;

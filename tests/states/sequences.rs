@@ -158,6 +158,7 @@ impl Watched {
     }
 
     /// What must hold in every cycle.
+    #[expect(clippy::cognitive_complexity, reason = "assertions count as branches")]
     fn check(&mut self, request: Option<Request>, now: &Output) {
         let before = self.before;
         let (had, has) = (before.state.has_control(), now.state.has_control());

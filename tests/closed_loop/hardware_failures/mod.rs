@@ -79,6 +79,7 @@ fn config() -> Config {
 
 /// A failure of a machine whose sensors have the noise of its file, or less than their resolution: those are watched until the forces
 /// end, as a stop under control would follow what a frozen sensor says.
+#[expect(clippy::too_many_lines, reason = "one arm for each failure")]
 fn cell(config: &Config, part: &Part, situation: Situation, is_quiet: bool, rates: Rates) -> Cell {
     let length_noise = if is_quiet { QUIET_NOISE_M } else { NOISE_M };
     let sensor = SensorErrors { length_noise, length_step: STEP_M, ..SensorErrors::default() };

@@ -126,6 +126,7 @@ impl<'a> Play<'a> {
     }
 
     /// One instruction; false at the end.
+    #[expect(clippy::too_many_lines, reason = "one arm for each kind of input")]
     fn cycle(&mut self) -> bool {
         let Some(op) = self.byte() else { return false };
         let high = op >> 4;
