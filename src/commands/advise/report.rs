@@ -34,7 +34,7 @@ pub struct AdviceReport {
     pub recommended: &'static str,
 }
 
-/// Errors of the force of a leg, absolute and as ratios of the peak force, and the median time of an evaluation.
+/// Errors of the force of a leg, absolute and as ratios of the peak force, and the shortest time of an evaluation.
 #[derive(Clone, Debug, Serialize)]
 pub struct FidelityRow {
     #[serde(serialize_with = "by_name")]

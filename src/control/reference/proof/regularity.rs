@@ -43,7 +43,7 @@ const ANGLE_PER_CHORD: f64 = core::f64::consts::FRAC_PI_3;
 /// Effort for the regularity of a pose, in knots of an [examination](super::examination), and the additional
 /// effort if its factorization has pivots.
 pub(in crate::control::reference) const REGULARITY_EFFORT: u32 = 1;
-const PIVOTING_WORK: u32 = 2;
+const PIVOTING_EFFORT: u32 = 2;
 
 /// Least sine between knots as a ratio of the reference's least sine, whatever the limits of the condition.
 const LEAST_SINE_SHARE: f64 = 0.5;
@@ -193,7 +193,7 @@ impl Ball {
         let Conditioning { sensitivity, shortest, universal_sine, is_pivoted } =
             Conditioning::new(constants.machine(), center);
         if is_pivoted {
-            *effort = effort.saturating_sub(PIVOTING_WORK);
+            *effort = effort.saturating_sub(PIVOTING_EFFORT);
         }
         let Sensitivity { condition, norm, .. } = sensitivity;
         let regularity = Regularity { condition, universal_sine };

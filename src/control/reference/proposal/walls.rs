@@ -56,7 +56,7 @@ const MAX_VISITS: usize = 24;
 /// Period of the sweeps over all walls. The other sweeps cover only the active walls.
 const FULL_SWEEP: usize = 3;
 /// Visits to walls that take about as long as the examination of a knot.
-const VISITS_PER_WORK: usize = 24;
+const VISITS_PER_KNOT: usize = 24;
 /// Time constant of the return from a negative gap, as a multiple of the approach's time constant.
 const RETURN_RATIO: f64 = 4.0;
 
@@ -226,7 +226,7 @@ impl Walls {
 
     /// Effort so far, in knots of an examination.
     pub fn effort(&self) -> u32 {
-        (self.visits / VISITS_PER_WORK) as u32
+        (self.visits / VISITS_PER_KNOT) as u32
     }
 
     /// Changes the wanted velocities of rotation and translation by the least amount such that no wall is
