@@ -130,8 +130,9 @@ struct Period<'a> {
 
 impl<'a> Period<'a> {
     fn new(of: &'a SampledLoop) -> Self {
-        let bandwidth = of.estimator_ratio * of.wn_t;
-        let (_, gains) = NoiseModel { bandwidth, rate_noise_ratio: of.rate_noise, period_s: 1.0 }.steady();
+        let bandwidth_rad_s = of.estimator_ratio * of.wn_t;
+        let (_, gains) =
+            NoiseModel { bandwidth_rad_s, rate_noise_ratio: of.rate_noise, period_s: 1.0 }.steady();
         Self { of, gains, pending: of.delay.max(of.known_delay).ceil() as usize + 1 }
     }
 

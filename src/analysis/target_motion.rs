@@ -155,7 +155,7 @@ pub fn workspace_bounds(constants: &Constants, pose: &Pose) -> Vec<WorkspaceBoun
         );
     }
     let state = KinematicState::new(machine, *pose);
-    let (condition, largest) = (state.sensitivity().condition, constants.reference_condition);
+    let (condition, largest) = (state.sensitivity().condition, constants.max_reference_condition);
     let sine = universal_sine(machine, pose);
     let side = state.sensitivity().determinant * constants.home.sensitivity().determinant.signum();
     let quantity = BoundedQuantity::Determinant;
@@ -206,7 +206,7 @@ pub fn target_motion(
     let mut reference = ReferenceGenerator::new(constants);
     let start = Motion { pose: *from, twist: Twist::default(), acceleration: Acceleration::default() };
     reference.verify_start(constants, &start).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     let whole = distance(from, to);
     let mut survey = Survey::new(constants, &start);
     let (mut nearest_yet, mut progress_ns, mut stopped_by) = (whole, 0, LimitSet::default());

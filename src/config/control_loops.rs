@@ -38,7 +38,7 @@ fn loops_of(
         (control.orientation_bandwidth_hz, control.orientation_damping_ratio),
     ];
     let each = if control.mode.acts_on_legs() {
-        vec![("legs", position, control.leg_masses.stiffest)]
+        vec![("legs", position, control.leg_masses.stiffest_mode_gain)]
     } else {
         vec![("position", position, 1.0), ("orientation", orientation, 1.0)]
     };

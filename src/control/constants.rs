@@ -17,7 +17,7 @@ use crate::model::kinematic_state::KinematicState;
 use crate::model::machine::Machine;
 
 /// Share of the range from the condition at home to its limit that the reference may use.
-const CONDITION_SHARE: f64 = 0.85;
+const REFERENCE_CONDITION_RANGE_SHARE: f64 = 0.85;
 /// Least sine of the angle between a leg and the first axis of its universal joint: 6 degrees, less than any
 /// joint allows. The moment of the leg's spin grows with the inverse third power of the sine. At this angle
 /// the moment still changes by less than itself in a cycle of 10 ms.
@@ -37,7 +37,7 @@ pub struct Constants {
     /// Largest distance of a joint on the platform from C \[m\].
     pub arm: f64,
     /// Matrix from the acceleration that the law commands to the acceleration of the platform.
-    pub input_matrix: InputMatrix,
+    pub acceleration_by_command: InputMatrix,
     /// Constants of the estimator under control.
     pub estimator: EstimatorConstants,
     /// Square of the least disturbance that may come from a force that a drive does not deliver; infinite if
@@ -53,7 +53,7 @@ pub struct Constants {
     pub leg_rate_estimator: EstimatorConstants,
     /// Largest condition of the reference. It is below the platform's limit, to leave room for the following
     /// error.
-    pub reference_condition: f64,
+    pub max_reference_condition: f64,
     /// Least sine of the angle between a leg and the first axis of its universal joint, for the reference.
     pub universal_sine: f64,
 }
@@ -64,28 +64,33 @@ impl Constants {
         let home = KinematicState::new(machine, machine.home_pose());
         let arms = machine.joints.triples.unpack_vectors(&machine.joints.platform);
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
-        let NoiseModel { bandwidth, period_s, .. } = parameters.noise;
-        let lengths_only = NoiseModel { bandwidth, period_s, rate_noise_ratio: None };
-        let input_matrix = InputMatrix::at_home(
+        let NoiseModel { bandwidth_rad_s, period_s, .. } = parameters.noise;
+        let lengths_only = NoiseModel { bandwidth_rad_s, period_s, rate_noise_ratio: None };
+        let acceleration_by_command = InputMatrix::at_home(
             machine,
             parameters.law.mode,
             &parameters.law.leg_masses,
             parameters.fidelity,
         );
-        let Law { saturation, compensates_disturbance, .. } = &parameters.law;
-        let disturbance = input_matrix.largest_compensable(saturation);
-        let error_radius = if parameters.law.mode.acts_on_legs() { 1.0 } else { arm };
-        let by_force = input_matrix.acceleration_by_force(machine, home.pose());
+        let Law { max_compensated_disturbance, compensates_disturbance, .. } = &parameters.law;
+        let disturbance = acceleration_by_command.largest_compensable(max_compensated_disturbance);
+        let angle_weighting_radius_m = if parameters.law.mode.acts_on_legs() { 1.0 } else { arm };
+        let by_force = acceleration_by_command.acceleration_by_force(machine, home.pose());
         let least_missing =
-            least_missing_force_acceleration(&by_force, error_radius, machine.actuator.max_force);
+            least_missing_force_acceleration(&by_force, angle_weighting_radius_m, machine.actuator.max_force);
         let expects_forces = parameters.law.mode.includes_inertia();
         let unbounded = Vector6::repeat(f64::INFINITY);
-        let disturbance_bounds =
-            DisturbanceBounds::new(machine, &parameters, &input_matrix, least_missing, error_radius);
+        let disturbance_bounds = DisturbanceBounds::new(
+            machine,
+            &parameters,
+            &acceleration_by_command,
+            least_missing,
+            angle_weighting_radius_m,
+        );
         Self {
             disturbance_bounds,
             dynamics: InverseDynamics::new(machine),
-            input_matrix,
+            acceleration_by_command,
             least_missing_acceleration_squared: if expects_forces {
                 least_missing * least_missing
             } else {
@@ -101,7 +106,11 @@ impl Constants {
                 parameters.reading_errors,
                 if *compensates_disturbance { disturbance } else { unbounded },
                 parameters.limits.position.acceleration
-                    + parameters.law.acceleration_left_to_feedback(&parameters.limits, arm, &disturbance),
+                    + parameters.law.max_leg_acceleration_without_feedforward(
+                        &parameters.limits,
+                        arm,
+                        &disturbance,
+                    ),
             ),
             rest_window_s: window_s(&parameters),
             leg_rate_estimator: EstimatorConstants::new(
@@ -112,7 +121,7 @@ impl Constants {
             ),
             parameters,
             arm,
-            reference_condition: reference_condition(&home, parameters.condition),
+            max_reference_condition: max_reference_condition(&home, parameters.condition),
             universal_sine: least_universal_sine(machine, &home),
             home,
         }
@@ -120,7 +129,7 @@ impl Constants {
 
     /// Length that converts angles of the error to distances \[m\]; 1 for errors of legs, which have no
     /// angles.
-    pub(super) fn error_radius(&self) -> f64 {
+    pub(super) fn angle_weighting_radius_m(&self) -> f64 {
         if self.parameters.law.mode.acts_on_legs() { 1.0 } else { self.arm }
     }
 
@@ -131,9 +140,9 @@ impl Constants {
 }
 
 /// Largest condition of the reference: a part of the way from that at home to the limit of the platform.
-fn reference_condition(home: &KinematicState, limit: f64) -> f64 {
+fn max_reference_condition(home: &KinematicState, limit: f64) -> f64 {
     let at_home = home.sensitivity().condition;
-    at_home + CONDITION_SHARE * (limit - at_home)
+    at_home + REFERENCE_CONDITION_RANGE_SHARE * (limit - at_home)
 }
 
 /// Least sine of the angle between a leg and the first axis of its universal joint that the reference keeps.

@@ -171,7 +171,7 @@ impl Controller {
             localization: located.as_ref().map(drop).map_err(|cause| *cause),
             error: error.as_ref(),
             start,
-            reports: &reports,
+            drive_and_pose_checks: &reports,
             is_ready: drives.is_ready,
             feedback: &memory.feedback,
             measurement_diagnostic: errors.measurement_diagnostic(),
@@ -190,7 +190,7 @@ impl Controller {
         if next.has_control() {
             let begin_ns = cycle.release_ns.saturating_add(constants.parameters.force_delay_ns);
             if !cycle.state.has_control() {
-                reference.begin_at(begin_ns);
+                reference.begin_placed_motion(begin_ns);
                 let measured_ns = located.as_ref().map_or(begin_ns, |located| located.measurement.time_ns);
                 error = Some(errors.start(constants, measured_ns, begin_ns));
             }
@@ -206,7 +206,8 @@ impl Controller {
         output.active_limits = active_limits.union(reference.active_limits()).union(limited.active_limits);
         // Written in place: the largest fields, and the count, whose struct `located` borrows until here.
         output.platform = located.as_ref().ok().map(|located| located.platform);
-        (output.missed_measurements, output.missed_setpoints) = (measurements.missed, setpoints.missed);
+        (output.missed_measurements, output.missed_setpoints) =
+            (measurements.missed_cycles, setpoints.missed_cycles);
         output.reference = output.state.has_control().then(|| *reference.motion());
         output
     }
@@ -268,7 +269,9 @@ pub(in crate::control) fn verify_start(
         return Ok(());
     }
     reference.verify_start(cycle.constants, &free_motion?).map_err(|refusal| match refusal {
-        Refusal::Limit(Limit::Condition) => localization.near_singular(cycle.constants.reference_condition),
+        Refusal::Limit(Limit::Condition) => {
+            localization.near_singular(cycle.constants.max_reference_condition)
+        }
         Refusal::Limit(_) | Refusal::Effort => DiagnosticCode::PlatformMoving.into(),
     })
 }
@@ -291,5 +294,5 @@ fn advance(
     let target = setpoint.target_in(cycle.constants, next).filter(|_| !is_waiting);
     reference.set_closing_scale(if next == State::Engaging { limits.autonomous_scale } else { 1.0 });
     reference.advance(cycle.constants, begin_ns.saturating_add(*period_ns), target.as_ref());
-    reference.motion_of_hold(begin_ns.saturating_add(period_ns / 2))
+    reference.motion_for_held_force(begin_ns.saturating_add(period_ns / 2))
 }

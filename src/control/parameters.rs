@@ -84,7 +84,7 @@ impl Parameters {
 
     /// Error as a ratio of the engage tolerance, the largest of its four parts. A velocity error is divided
     /// by `wn = sqrt(Kp)`, so that it compares with a pose error.
-    pub(super) fn tolerance_ratio(&self, error: &PoseError) -> f64 {
+    pub(super) fn engage_tolerance_ratio(&self, error: &PoseError) -> f64 {
         let Self { law, engage_position, engage_orientation, .. } = self;
         let PoseError { pose, twist } = error;
         largest_ratio([
@@ -96,7 +96,7 @@ impl Parameters {
     }
 
     /// Longest extrapolation of a setpoint \[s\]: until the first cycle that finds it too old.
-    pub(super) fn max_extrapolation_s(&self) -> f64 {
+    pub(super) fn max_setpoint_extrapolation_s(&self) -> f64 {
         self.setpoint_timeout_ns.saturating_add(self.period_ns) as f64 * 1e-9
     }
 }

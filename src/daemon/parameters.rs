@@ -38,7 +38,7 @@ pub fn parameters(machine: &Machine, deployment: &Deployment, fidelity: Fidelity
             &limits.reference,
         ),
         noise: NoiseModel {
-            bandwidth: TAU * control.estimator_bandwidth_hz,
+            bandwidth_rad_s: TAU * control.estimator_bandwidth_hz,
             rate_noise_ratio: deployment.noise.rate_m_s.map(|rate| rate / deployment.noise.length_m),
             period_s: deployment.realtime.period_s(),
         },

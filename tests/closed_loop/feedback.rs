@@ -163,7 +163,9 @@ fn feedback_of_the_legs_is_shortened_for_all_alike() {
         let arm = legs.platform.iter().map(Vector3::norm).fold(0.0, f64::max);
         let limit =
             parameters.limits.position.acceleration + arm * parameters.limits.orientation.acceleration;
-        let bounds = law.saturation.map(|saturation| (1.0 + parameters.feedback_scale) * limit + saturation);
+        let bounds = law
+            .max_compensated_disturbance
+            .map(|saturation| (1.0 + parameters.feedback_scale) * limit + saturation);
         let mass = law.leg_masses.mass;
         let still = rig.input(&home);
         // What the model commands without feedback.

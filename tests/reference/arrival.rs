@@ -47,7 +47,7 @@ fn arrival(constants: &Constants, displacement: &Vector6<f64>) -> [f64; 2] {
     let mut reference = ReferenceGenerator::new(constants);
     let start = *reference.motion();
     reference.verify_start(constants, &start).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     let way = start.pose.displacement_to(&setpoint.motion.pose).vector();
     let period_ns = constants.parameters.period_ns;
     let (mut arrived_s, mut overshoot) = (f64::INFINITY, 0.0_f64);

@@ -82,7 +82,7 @@ fn run(name: &str, seed: u64) -> (Largest, u64) {
     let mut reference = ReferenceGenerator::new(&constants);
     let home = *reference.motion();
     reference.verify_start(&constants, &home).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     let samples = Default::default();
     let mut largest = Largest::default();
     let cycles = (SECONDS / period_s) as u64;

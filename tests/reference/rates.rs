@@ -34,7 +34,7 @@ fn motion(rate_hz: u64) -> Vec<Pose> {
     let mut reference = ReferenceGenerator::new(&constants);
     let home = *reference.motion();
     reference.verify_start(&constants, &home).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     let mut poses = Vec::new();
     for k in 1..=SECONDS * rate_hz {
         let end_ns = k * parameters.period_ns;

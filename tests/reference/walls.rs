@@ -51,7 +51,7 @@ fn press(machine: &str, rate_hz: u64, half: Option<Vector6<f64>>, sines: &Sines)
     let mut reference = ReferenceGenerator::new(&constants);
     let start = *reference.motion();
     reference.verify_start(&constants, &start).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     let period_s = parameters.period_ns as f64 * 1e-9;
     let (mut squares, mut count, mut reversals, mut largest) = ([0.0; 2], 0.0, 0, Largest::default());
     let mut last = [Vector3::zeros(); 2];
@@ -146,7 +146,7 @@ fn certificate_a_platform_pressed_into_any_corner_comes_back() {
                 let mut reference = ReferenceGenerator::new(&constants);
                 let home = *reference.motion();
                 reference.verify_start(&constants, &home).ok();
-                reference.begin_at(0);
+                reference.begin_placed_motion(0);
                 let far = direction.component_mul(&Vector6::new(1.5, 1.5, 1.5, 2.0, 2.0, 2.0));
                 let away = Vector6::from(config.machine.home) + far;
                 for (seconds, x) in [(4, away.into()), (8, config.machine.home)] {

@@ -91,13 +91,13 @@ fn every(
         let mut count = 0;
         for [localization, tracking] in &courses {
             for [start, engagement] in starts {
-                for (has_ended, is_doubtful) in [(false, false), (true, false), (false, true)] {
+                for (has_ended, sensor_may_be_frozen) in [(false, false), (true, false), (false, true)] {
                     let found = Findings {
                         localization: *localization,
                         start: *start,
                         engagement: *engagement,
                         tracking: *tracking,
-                        is_doubtful,
+                        sensor_may_be_frozen,
                         has_ended,
                     };
                     for request in &requests {

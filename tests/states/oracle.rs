@@ -73,12 +73,13 @@ pub fn next(now: SupervisorState, request: Option<Request>, found: &Findings, af
         (controls && lost.is_some(), &|| (plain(S::Fault, lost.unwrap()), None)),
         (controls && brakes.is_some(), &|| (plain(S::Fault, brakes.unwrap()), None)),
         // A payload or an impact, found now or stopped for, that a sensor which repeats itself may have made.
-        (controls && found.is_doubtful && changes(trouble).is_some(), &|| {
+        (controls && found.sensor_may_be_frozen && changes(trouble).is_some(), &|| {
             (plain(S::Fault, changes(trouble).unwrap()), None)
         }),
-        (now.state == S::Stopping && found.is_doubtful && changes(Some(now.diagnostic)).is_some(), &|| {
-            (plain(S::Fault, now.diagnostic), None)
-        }),
+        (
+            now.state == S::Stopping && found.sensor_may_be_frozen && changes(Some(now.diagnostic)).is_some(),
+            &|| (plain(S::Fault, now.diagnostic), None),
+        ),
         // A fault stays until it is cleared, whatever else is asked.
         (now.state == S::Fault && is(Clear), &|| (plain(S::Off, DiagnosticCode::None), None)),
         (now.state == S::Fault && (is(Engage) || is(Park)), &|| refuse(DiagnosticCode::InvalidInState)),

@@ -102,7 +102,7 @@ impl CheckReport {
         let others = other_modes(machine, &kinematic_state);
         let root = |gain: f64| gain.sqrt() * control.position_bandwidth_hz;
         let masses = &control.leg_masses;
-        let leg_modes_hz = [root(masses.softest), root(masses.stiffest)];
+        let leg_modes_hz = [root(masses.softest_mode_gain), root(masses.stiffest_mode_gain)];
         let constants = Constants::new(machine, daemon::parameters(machine, deployment, Fidelity::Exact));
         Self {
             schema: SCHEMA,
@@ -124,8 +124,8 @@ impl CheckReport {
             control_mode: control.mode.name(),
             estimator_hz: control.estimator_bandwidth_hz,
             compensates_disturbances: control.compensate_disturbances,
-            payload_change_kg: constants.disturbance_bounds.payload,
-            disturbance_step_m_s2: constants.disturbance_bounds.impact,
+            payload_change_kg: constants.disturbance_bounds.max_payload_change_kg,
+            disturbance_step_m_s2: constants.disturbance_bounds.max_sudden_disturbance,
             leg_modes_hz: control.mode.acts_on_legs().then_some(leg_modes_hz),
             loops: margins(config),
             stable_age_s: longest_age_s(deployment),

@@ -90,7 +90,7 @@ impl<'a> Precheck<'a> {
         let mut now = setpoint(0);
         let mut before = now;
         reference.verify_start(&constants, &now.motion).ok();
-        reference.begin_at(0);
+        reference.begin_placed_motion(0);
         let steps = ((to - from) / self.time(0.0, 1)).ceil() as u64;
         let bar = time_bar(to - from).with_message("checking the whole motion");
         for k in 0..=steps {
@@ -107,7 +107,7 @@ impl<'a> Precheck<'a> {
                     break;
                 }
                 reference.verify_start(&constants, &now.motion).ok();
-                reference.begin_at(k * period_ns);
+                reference.begin_placed_motion(k * period_ns);
             }
             reference.advance(&constants, (k + 1) * period_ns, Some(&Target::Motion(&now)));
             (before, now) = (now, setpoint(k + 1));

@@ -31,7 +31,7 @@ pub(in crate::control) fn setpoint_error(
     setpoint: &ValidatedSetpoint<'_>,
     Located { measurement, platform, .. }: &Located<'_>,
 ) -> Option<PoseError> {
-    let target = setpoint.target.as_ref().filter(|_| setpoint.status.is_ok())?;
+    let target = setpoint.target.as_ref().filter(|_| setpoint.age_check.is_ok())?;
     let desired = target.motion_at(&cycle.constants.parameters, measurement.time_ns)?;
     Some(PoseError::new(&desired, &platform.pose, &platform.twist))
 }
@@ -49,7 +49,7 @@ pub(in crate::control) struct ErrorTracker {
     /// Measured error; without a new measurement, the predicted error.
     error: PoseError,
     /// Measured minus estimated error, after the last measurement has corrected the estimate.
-    residual: Vector6<f64>,
+    post_fit_residual: Vector6<f64>,
     /// Fault of a sensor or drive at the last measurement, or an implausible innovation.
     measurement_diagnostic: Option<Diagnostic>,
     /// Change of payload, impact or oscillation at the last measurement.
@@ -64,7 +64,7 @@ impl ErrorTracker {
         (self.sensors, self.drives, self.measurement_diagnostic) =
             (FrozenSensors::default(), DriveResponse::default(), None);
         (self.disturbance, self.disturbance_diagnostic) = (DisturbanceMonitor::default(), None);
-        (self.error, self.residual) = (PoseError::default(), Vector6::zeros());
+        (self.error, self.post_fit_residual) = (PoseError::default(), Vector6::zeros());
         self.error
     }
 
@@ -87,7 +87,7 @@ impl ErrorTracker {
         let innovation = estimator.correct(&constants.estimator, time_ns, &deviation);
         let is_new = innovation.is_some();
         if let Some(innovation) = innovation {
-            self.residual = deviation.value - estimator.at_measurement().value;
+            self.post_fit_residual = deviation.value - estimator.at_measurement().value;
             let legs = || {
                 let feedback = feedback_forces(constants, sent_acceleration, &desired.pose);
                 [leg_lengths(constants.machine(), &desired.pose), feedback]
@@ -156,12 +156,12 @@ impl ErrorTracker {
     /// lags behind the legs, and forces for a lagging pose act as a negative stiffness, which grows with the
     /// condition.
     pub fn corrected_to_last_measurement(&self, predicted: &ErrorEstimate) -> ErrorCoordinates {
-        ErrorCoordinates { value: predicted.value + self.residual, rate: predicted.rate }
+        ErrorCoordinates { value: predicted.value + self.post_fit_residual, rate: predicted.rate }
     }
 
     /// Records the acceleration that force limits removed.
-    pub fn record_missing(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
-        self.disturbance.record_missing(&constants.disturbance_bounds, acceleration);
+    pub fn record_removed_acceleration(&mut self, constants: &Constants, acceleration: &Vector6<f64>) {
+        self.disturbance.record_removed_acceleration(&constants.disturbance_bounds, acceleration);
     }
 
     /// Records force and feedback acceleration that are sent, after all limits, and the instant from which

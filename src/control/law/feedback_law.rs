@@ -55,12 +55,12 @@ pub struct Law {
     pub leg_masses: LegMasses,
     /// Largest disturbance that the estimator compensates: \[rad/s^2\] and \[m/s^2\], or \[m/s^2\] of each
     /// leg.
-    pub saturation: Vector6<f64>,
+    pub max_compensated_disturbance: Vector6<f64>,
 }
 
 /// Largest disturbance, relative to the acceleration limit: a payload or friction that the model lacks.
 /// A larger disturbance is a collision.
-const SATURATION_RATIO: f64 = 0.5;
+const COMPENSATED_DISTURBANCE_RATIO: f64 = 0.5;
 
 impl Law {
     /// Builds the law of a machine.
@@ -72,26 +72,26 @@ impl Law {
         compensates_disturbance: bool,
         limits: &Limits,
     ) -> Self {
-        let [angular, linear] =
-            [&limits.orientation, &limits.position].map(|limits| SATURATION_RATIO * limits.acceleration);
-        let mut saturation = Vector6::repeat(linear);
+        let [angular, linear] = [&limits.orientation, &limits.position]
+            .map(|limits| COMPENSATED_DISTURBANCE_RATIO * limits.acceleration);
+        let mut max_compensated_disturbance = Vector6::repeat(linear);
         match mode {
-            ControlMode::ComputedTorque => saturation.fixed_rows_mut::<3>(0).fill(angular),
+            ControlMode::ComputedTorque => max_compensated_disturbance.fixed_rows_mut::<3>(0).fill(angular),
             // The model of this mode lacks the weight as well.
             ControlMode::JointPd => {
                 let home = TaskState::at_rest(machine.home).motion();
                 let weight = InverseDynamics::new(machine).forces::<Gravity>(&home).unwrap_or_default();
-                saturation += Vector6::from(weight).abs().component_div(&leg_masses.mass);
+                max_compensated_disturbance += Vector6::from(weight).abs().component_div(&leg_masses.mass);
             }
             ControlMode::FeedforwardJointPd | ControlMode::GravityJointPd => {}
         }
         let Pair { angular: orientation, linear: position } = gains;
-        Self { mode, position, orientation, compensates_disturbance, leg_masses, saturation }
+        Self { mode, position, orientation, compensates_disturbance, leg_masses, max_compensated_disturbance }
     }
 
     /// Largest acceleration of a leg that a mode without inertia leaves to feedback: the reference's largest
     /// acceleration plus the largest disturbance.
-    pub(in crate::control) fn acceleration_left_to_feedback(
+    pub(in crate::control) fn max_leg_acceleration_without_feedforward(
         &self,
         limits: &Limits,
         arm: f64,

@@ -32,7 +32,7 @@ pub struct InputMatrix {
     mobility: Matrix6<f64>,
     acts_on_legs: bool,
     /// B and its inverse; `None` if B is the identity.
-    by_command: Option<[Matrix6<f64>; 2]>,
+    matrix_and_inverse: Option<[Matrix6<f64>; 2]>,
 }
 
 impl InputMatrix {
@@ -43,31 +43,31 @@ impl InputMatrix {
         let mobility = MassMatrix::new(machine).at(&home).try_inverse().unwrap_or_default();
         let by_force = mobility * wrenches;
         let acts_on_legs = mode.acts_on_legs();
-        let by_command = if acts_on_legs {
+        let matrix_and_inverse = if acts_on_legs {
             with_inverse(wrenches.transpose() * by_force * Matrix6::from_diagonal(&leg_masses.mass))
         } else if fidelity == Fidelity::Exact {
             None
         } else {
-            with_inverse(by_force * unit_forces(machine, fidelity))
+            with_inverse(by_force * forces_by_unit_acceleration(machine, fidelity))
         };
-        Self { mobility, acts_on_legs, by_command }
+        Self { mobility, acts_on_legs, matrix_and_inverse }
     }
 
     /// Acceleration of the platform for an acceleration that the law commands: `B a`.
-    pub fn acceleration(&self, commanded: &Vector6<f64>) -> Vector6<f64> {
-        self.by_command.map_or(*commanded, |[matrix, _]| matrix * commanded)
+    pub fn platform_acceleration(&self, commanded: &Vector6<f64>) -> Vector6<f64> {
+        self.matrix_and_inverse.map_or(*commanded, |[matrix, _]| matrix * commanded)
     }
 
     /// Largest disturbance of each axis that a law with this acceleration bound can compensate.
     pub fn largest_compensable(&self, bound: &Vector6<f64>) -> Vector6<f64> {
-        self.by_command.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
+        self.matrix_and_inverse.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
     }
 
     /// Acceleration by an additional wrench at a pose: the forces that limits removed.
     /// N is taken at the pose, because near flat legs a force moves the platform far less than at home.
     // Rarely called, hence out of line: the cycle stays short.
     #[inline(never)]
-    pub fn acceleration_of(&self, machine: &Machine, pose: &Pose, wrench: &Wrench) -> Vector6<f64> {
+    pub fn acceleration_by_wrench(&self, machine: &Machine, pose: &Pose, wrench: &Wrench) -> Vector6<f64> {
         let acceleration = self.mobility * wrench.vector();
         if self.acts_on_legs { leg_wrenches(machine, pose).tr_mul(&acceleration) } else { acceleration }
     }
@@ -91,7 +91,7 @@ impl InputMatrix {
 
     /// Acceleration that the law must command for an acceleration of the platform: `B^-1 a`.
     pub fn command(&self, acceleration: &Vector6<f64>) -> Vector6<f64> {
-        self.by_command.map_or(*acceleration, |[_, inverse]| inverse * acceleration)
+        self.matrix_and_inverse.map_or(*acceleration, |[_, inverse]| inverse * acceleration)
     }
 }
 
@@ -100,7 +100,7 @@ fn with_inverse(matrix: Matrix6<f64>) -> Option<[Matrix6<f64>; 2]> {
 }
 
 /// Leg forces of a fidelity at home without gravity, one column per unit acceleration.
-fn unit_forces(machine: &Machine, fidelity: Fidelity) -> Matrix6<f64> {
+fn forces_by_unit_acceleration(machine: &Machine, fidelity: Fidelity) -> Matrix6<f64> {
     let weightless = InverseDynamics::new(&Machine { gravity: Vector3::zeros(), ..machine.clone() });
     let pose = machine.home_pose();
     let column = |k: usize| {

@@ -41,18 +41,18 @@ const USUAL_PAYLOAD_TIME_CONSTANT_S: f64 = 1.0;
 const START_S: f64 = 1.0;
 /// Default of `limits.payload_change_kg`, relative to the mass of the platform and to the mass that all
 /// drives can lift: friction that the model lacks looks like a payload.
-const PAYLOAD_RATIO: f64 = 0.1;
-const HIDDEN_LIFT_RATIO: f64 = 0.02;
+const DEFAULT_PAYLOAD_PER_PLATFORM_MASS: f64 = 0.1;
+const DEFAULT_PAYLOAD_PER_LIFT: f64 = 0.02;
 /// Time constant with which removed forces are forgotten \[s\]: the same as for the usual payload.
-const LIMITED_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
+const REMOVED_FORCE_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
 /// Smallest weight in a motion, relative to the weight at rest: a falling platform has no weight to compare
 /// with.
 const LEAST_APPARENT_GRAVITY_RATIO: f64 = 0.3;
 
 /// Default of `limits.disturbance_step_m_s2`, relative to the acceleration limit, of which 0.5 is
 /// compensated, and relative to the acceleration by the smallest missing force of a drive.
-const IMPACT_RATIO: f64 = 0.4;
-const IMPACT_BY_FRICTION: f64 = 1.5;
+const DEFAULT_IMPACT_PER_ACCELERATION_LIMIT: f64 = 0.4;
+const DEFAULT_IMPACT_PER_FRICTION: f64 = 1.5;
 /// Longest impact \[s\].
 const MAX_IMPACT_S: f64 = 0.02;
 
@@ -88,17 +88,17 @@ pub struct DisturbanceBounds {
     /// Largest payload per unit disturbance in any direction \[kg / (m/s^2)\].
     payload_by_norm: f64,
     /// Gravity over its square \[s^2/m\].
-    gravity: Vector3<f64>,
+    gravity_over_square: Vector3<f64>,
     /// Bound on a payload change \[kg\].
-    pub payload: f64,
+    pub max_payload_change_kg: f64,
     /// Bound on a sudden disturbance \[m/s^2\].
-    pub impact: f64,
+    pub max_sudden_disturbance: f64,
     /// Bound on a swing of the error \[m\].
     swing: f64,
     /// Swing of the error per acceleration of the reference \[m / (m/s^2)\].
     swing_by_acceleration: f64,
     /// Longest time between two reversals \[s\].
-    longest_swing_s: f64,
+    max_reversal_interval_s: f64,
     /// Square of the radius that weights angles \[m^2\].
     arm_squared: f64,
 }
@@ -117,12 +117,15 @@ impl DisturbanceBounds {
         let ReadingErrors { deviation: noise, .. } = parameters.reading_errors;
         let expects_forces = law.mode.includes_inertia();
         let has_weight = expects_forces && machine.gravity.norm_squared() > 0.0;
-        let gravity = machine.gravity / machine.gravity.norm_squared().max(f64::MIN_POSITIVE);
-        let along_gravity = Vector6::new(0.0, 0.0, 0.0, gravity.x, gravity.y, gravity.z);
+        let gravity_over_square = machine.gravity / machine.gravity.norm_squared().max(f64::MIN_POSITIVE);
+        let along_gravity =
+            Vector6::new(0.0, 0.0, 0.0, gravity_over_square.x, gravity_over_square.y, gravity_over_square.z);
         let by_legs = leg_wrenches(machine, &machine.home_pose()).tr_mul(&along_gravity).abs().sum();
         let largest_lift_kg = machine.actuator.max_force * by_legs;
-        let default_kg = (PAYLOAD_RATIO * machine.platform.mass).max(HIDDEN_LIFT_RATIO * largest_lift_kg);
-        let default_step = (IMPACT_RATIO * limits.position.acceleration).max(IMPACT_BY_FRICTION * friction);
+        let default_kg = (DEFAULT_PAYLOAD_PER_PLATFORM_MASS * machine.platform.mass)
+            .max(DEFAULT_PAYLOAD_PER_LIFT * largest_lift_kg);
+        let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT * limits.position.acceleration)
+            .max(DEFAULT_IMPACT_PER_FRICTION * friction);
         let softest = law.position.stiffness.min(law.orientation.stiffness);
         let softness = (SWING_STIFFNESS / softest).max(1.0);
         let swing = (SWING_M * softness * softness).min(MAX_SWING_M);
@@ -133,12 +136,20 @@ impl DisturbanceBounds {
         Self {
             payload_by_disturbance,
             payload_by_norm: by_angles.hypot(payload_by_disturbance.fixed_rows::<3>(3).norm()),
-            gravity,
-            payload: if has_weight { payload_change_kg.unwrap_or(default_kg) } else { f64::INFINITY },
-            impact: if expects_forces { disturbance_step.unwrap_or(default_step) } else { f64::INFINITY },
+            gravity_over_square,
+            max_payload_change_kg: if has_weight {
+                payload_change_kg.unwrap_or(default_kg)
+            } else {
+                f64::INFINITY
+            },
+            max_sudden_disturbance: if expects_forces {
+                disturbance_step.unwrap_or(default_step)
+            } else {
+                f64::INFINITY
+            },
             swing: by_step + swing.max(SWING_DEVIATIONS * noise).max(SWING_BY_FRICTION * friction / softest),
             swing_by_acceleration: shaking / softest,
-            longest_swing_s: core::f64::consts::TAU / softest.sqrt(),
+            max_reversal_interval_s: core::f64::consts::TAU / softest.sqrt(),
             arm_squared: arm * arm,
         }
     }
@@ -157,7 +168,7 @@ pub(in crate::control) struct DisturbanceMonitor {
     usual_payload: f64,
     impact_s: f64,
     /// Acceleration by forces that limits removed recently \[m/s^2\].
-    limited: f64,
+    removed_acceleration: f64,
     oscillation: Oscillation,
 }
 
@@ -165,7 +176,7 @@ pub(in crate::control) struct DisturbanceMonitor {
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Oscillation {
     /// Error at the last reversal, and the error farthest from it since.
-    turn: Vector6<f64>,
+    error_at_reversal: Vector6<f64>,
     farthest: Vector6<f64>,
     swing_squared: f64,
     last_swing_squared: f64,
@@ -178,8 +189,8 @@ struct Oscillation {
 
 impl DisturbanceMonitor {
     /// Records the acceleration by forces that limits removed.
-    pub fn record_missing(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
-        self.limited = self.limited.max(bounds.norm_squared(acceleration).sqrt());
+    pub fn record_removed_acceleration(&mut self, bounds: &DisturbanceBounds, acceleration: &Vector6<f64>) {
+        self.removed_acceleration = self.removed_acceleration.max(bounds.norm_squared(acceleration).sqrt());
     }
 
     /// Checks the estimate after a measurement, `dt` seconds after the previous one. `sudden_squared` is the
@@ -193,7 +204,7 @@ impl DisturbanceMonitor {
         dt: f64,
     ) -> Result<(), Diagnostic> {
         self.since_start_s += dt;
-        self.limited *= 1.0 - (dt / LIMITED_TIME_CONSTANT_S).min(1.0);
+        self.removed_acceleration *= 1.0 - (dt / REMOVED_FORCE_TIME_CONSTANT_S).min(1.0);
         let payload = self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, dt);
         let impact = self.check_impact(bounds, sudden_squared, dt);
         let oscillation =
@@ -212,14 +223,15 @@ impl DisturbanceMonitor {
         acceleration: &Acceleration,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let weight_ratio = (1.0 - acceleration.linear.dot(&bounds.gravity)).max(LEAST_APPARENT_GRAVITY_RATIO);
+        let weight_ratio =
+            (1.0 - acceleration.linear.dot(&bounds.gravity_over_square)).max(LEAST_APPARENT_GRAVITY_RATIO);
         let payload = bounds.payload_by_disturbance.dot(disturbance) / weight_ratio;
         self.payload += (payload - self.payload) * (dt / PAYLOAD_TIME_CONSTANT_S).min(1.0);
         let change = self.payload - self.usual_payload;
         let is_starting = self.since_start_s < START_S;
         let share = if is_starting { 1.0 } else { (dt / USUAL_PAYLOAD_TIME_CONSTANT_S).min(1.0) };
         self.usual_payload += change * share;
-        let bound = bounds.payload + bounds.payload_by_norm * self.limited;
+        let bound = bounds.max_payload_change_kg + bounds.payload_by_norm * self.removed_acceleration;
         if is_starting || change.abs() <= bound {
             return Ok(());
         }
@@ -232,7 +244,7 @@ impl DisturbanceMonitor {
         sudden_squared: f64,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let bound = bounds.impact + self.limited;
+        let bound = bounds.max_sudden_disturbance + self.removed_acceleration;
         if sudden_squared <= bound * bound {
             self.impact_s = 0.0;
             return Ok(());
@@ -253,7 +265,7 @@ impl Oscillation {
         acceleration: &Vector6<f64>,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let share = (dt * core::f64::consts::PI / bounds.longest_swing_s).min(1.0);
+        let share = (dt * core::f64::consts::PI / bounds.max_reversal_interval_s).min(1.0);
         let shaking = acceleration - self.slow_acceleration;
         self.slow_acceleration += shaking * share;
         self.shaking_squared =
@@ -261,15 +273,15 @@ impl Oscillation {
         self.since_turn_s += dt;
         let back = error - self.farthest;
         if bounds.norm_squared(&back) > bounds.swing * bounds.swing
-            && back.dot(&(self.farthest - self.turn)) <= 0.0
+            && back.dot(&(self.farthest - self.error_at_reversal)) <= 0.0
         {
             return self.count(bounds, error, bounds.norm_squared(&back));
         }
-        let swing_squared = bounds.norm_squared(&(error - self.turn));
+        let swing_squared = bounds.norm_squared(&(error - self.error_at_reversal));
         if swing_squared >= self.swing_squared {
             (self.farthest, self.swing_squared) = (*error, swing_squared);
         }
-        if self.since_turn_s > bounds.longest_swing_s {
+        if self.since_turn_s > bounds.max_reversal_interval_s {
             self.restart(error);
         }
         Ok(())
@@ -280,7 +292,7 @@ impl Oscillation {
     #[cold]
     #[inline]
     fn restart(&mut self, error: &Vector6<f64>) {
-        (self.turn, self.farthest, self.swing_squared) = (*error, *error, 0.0);
+        (self.error_at_reversal, self.farthest, self.swing_squared) = (*error, *error, 0.0);
         (self.since_turn_s, self.swings, self.last_swing_squared) = (0.0, 0, 0.0);
     }
 
@@ -299,7 +311,7 @@ impl Oscillation {
         }
         let swing_squared = self.swing_squared;
         let decays = swing_squared < LEAST_GROWTH * LEAST_GROWTH * self.last_swing_squared;
-        (self.turn, self.farthest, self.swing_squared) = (self.farthest, *error, back_squared);
+        (self.error_at_reversal, self.farthest, self.swing_squared) = (self.farthest, *error, back_squared);
         self.last_swing_squared = swing_squared;
         (self.since_turn_s, self.swings) = (0.0, if decays { 1 } else { self.swings.saturating_add(1) });
         if self.swings < SWINGS {

@@ -21,7 +21,7 @@ use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
-use crate::control::monitoring::weighting::{LEAST_FORCE_RATIO, weighted};
+use crate::control::monitoring::weighting::{MIN_MISSING_PER_MAX_FORCE, weighted};
 use crate::control::signals::diagnostic::{Diagnostic, DiagnosticCode};
 use crate::model::LEGS;
 use crate::model::rigid::Pose;
@@ -32,10 +32,10 @@ const USUAL_TIME_CONSTANT_S: f64 = 0.15;
 /// unknown.
 const START_S: f64 = 0.25;
 /// Smallest missing force, relative to the force that is usually sent.
-const LEAST_MISSING_RATIO: f64 = 0.4;
+const MIN_MISSING_PER_USUAL_FORCE: f64 = 0.4;
 /// Largest missing force, relative to the force that was sent: a drive that pushes the wrong way, with
 /// reserve.
-const MOST_MISSING_RATIO: f64 = 2.5;
+const MAX_MISSING_PER_SENT_FORCE: f64 = 2.5;
 /// Smallest square of the cosine: 18 degrees. The accelerations by two legs differ by more.
 const LEAST_COSINE_SQUARED: f64 = 0.9;
 /// Time for which a force must be missing \[s\]. An impact is shorter, or passes through other directions.
@@ -44,7 +44,7 @@ const LEAST_MISSING_S: f64 = 0.006;
 /// State of the drive response check.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(in crate::control) struct DriveResponse {
-    usual: Vector6<f64>,
+    usual_disturbance: Vector6<f64>,
     /// Forces that are usually sent, low-pass filtered \[N\].
     usual_force: Vector6<f64>,
     since_start_s: f64,
@@ -63,14 +63,14 @@ impl DriveResponse {
         pose: &Pose,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let sudden = disturbance - self.usual;
+        let sudden = disturbance - self.usual_disturbance;
         self.since_start_s += dt;
         let is_starting = self.since_start_s < START_S;
         let share = if is_starting { 1.0 } else { (dt / USUAL_TIME_CONSTANT_S).min(1.0) };
-        self.usual += sudden * share;
+        self.usual_disturbance += sudden * share;
         let sent = Vector6::from(*sent);
         self.usual_force += (sent - self.usual_force) * share;
-        let arm = constants.error_radius();
+        let arm = constants.angle_weighting_radius_m();
         let sudden = weighted(&sudden, arm);
         self.sudden_disturbance_squared = if is_starting { 0.0 } else { sudden.norm_squared() };
         if is_starting || self.sudden_disturbance_squared < constants.least_missing_acceleration_squared {
@@ -90,8 +90,8 @@ impl DriveResponse {
         pose: &Pose,
         dt: f64,
     ) -> Result<(), Diagnostic> {
-        let arm = constants.error_radius();
-        let mut by_force = constants.input_matrix.acceleration_by_force(constants.machine(), pose);
+        let arm = constants.angle_weighting_radius_m();
+        let mut by_force = constants.acceleration_by_command.acceleration_by_force(constants.machine(), pose);
         by_force.column_iter_mut().for_each(|mut column| {
             let scaled = weighted(&column.clone_owned(), arm);
             column.copy_from(&scaled);
@@ -108,8 +108,9 @@ impl DriveResponse {
             if explains {
                 self.sudden_disturbance_squared = 0.0;
             }
-            let bound = (LEAST_MISSING_RATIO * usual.abs()).max(LEAST_FORCE_RATIO * max_force);
-            if explains && force >= bound && force <= MOST_MISSING_RATIO * sent.abs() {
+            let bound =
+                (MIN_MISSING_PER_USUAL_FORCE * usual.abs()).max(MIN_MISSING_PER_MAX_FORCE * max_force);
+            if explains && force >= bound && force <= MAX_MISSING_PER_SENT_FORCE * sent.abs() {
                 missing = Some(Diagnostic::new(DiagnosticCode::DriveForceMissing, force, bound).at(leg));
             }
         }

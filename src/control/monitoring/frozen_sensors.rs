@@ -48,7 +48,7 @@ const BOUND_STEPS: f64 = 17.0;
 impl ReadingErrors {
     /// Equal readings in a row that noise permits; `None` if the noise is less than a step or the step is
     /// unknown.
-    fn most_equal(&self) -> Option<f64> {
+    fn max_equal_readings(&self) -> Option<f64> {
         let steps = self.deviation / self.resolution;
         (self.resolution > 0.0 && steps >= 1.0)
             .then(|| (MAX_EQUAL_AT_ONE_STEP / (steps * steps)).max(MAX_EQUAL_NOISY_READINGS))
@@ -153,7 +153,7 @@ impl FrozenSensors {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, least_motion).at(leg));
             }
             let repeats = |most| f64::from(*equal + 1) > most;
-            if errors.most_equal().is_some_and(repeats) && result.is_ok() {
+            if errors.max_equal_readings().is_some_and(repeats) && result.is_ok() {
                 result = Err(Diagnostic::new(DiagnosticCode::SensorFrozen, moved, errors.resolution).at(leg));
             }
         }

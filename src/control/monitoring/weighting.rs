@@ -4,7 +4,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 /// Smallest missing force, relative to the largest force: twice the friction that a model leaves out.
-pub(in crate::control) const LEAST_FORCE_RATIO: f64 = 0.06;
+pub(in crate::control) const MIN_MISSING_PER_MAX_FORCE: f64 = 0.06;
 
 /// Smallest disturbance that may be a missing force, weighted by [`weighted`]; evaluated at home.
 pub(in crate::control) fn least_missing_force_acceleration(
@@ -14,7 +14,7 @@ pub(in crate::control) fn least_missing_force_acceleration(
 ) -> f64 {
     let columns = by_force.column_iter().map(|column| weighted(&column.into(), arm).norm());
     // At other poses a force may accelerate the platform less, hence the factor one half.
-    0.5 * LEAST_FORCE_RATIO * max_force * columns.fold(f64::INFINITY, f64::min)
+    0.5 * MIN_MISSING_PER_MAX_FORCE * max_force * columns.fold(f64::INFINITY, f64::min)
 }
 
 /// Converts angular accelerations to accelerations of a joint on the platform. Legs have no angles: their

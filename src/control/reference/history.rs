@@ -23,36 +23,37 @@ struct Segment {
 pub(super) struct History {
     #[serde(with = "serde_big_array::BigArray")]
     segments: [Option<Segment>; SEGMENT_COUNT],
-    /// Number of segments ever recorded; the last one has the index `count - 1`.
-    count: usize,
+    /// Number of segments ever recorded; the last one has the index `total_recorded - 1`.
+    total_recorded: usize,
 }
 
 impl Default for History {
     fn default() -> Self {
-        Self { segments: [None; SEGMENT_COUNT], count: 0 }
+        Self { segments: [None; SEGMENT_COUNT], total_recorded: 0 }
     }
 }
 
 impl History {
     /// Forgets all segments.
     pub fn clear(&mut self) {
-        self.count = 0;
+        self.total_recorded = 0;
     }
 
     /// Records the segment from `motion` at `begin_ns` to the acceleration `next`, `dt` seconds later.
     pub fn record(&mut self, begin_ns: u64, motion: &Motion, next: &Acceleration, dt: f64) {
         let jerk = Acceleration::from_vector(&((next.vector() - motion.acceleration.vector()) / dt));
-        if let Some(slot) = self.segments.get_mut(self.count % SEGMENT_COUNT) {
+        if let Some(slot) = self.segments.get_mut(self.total_recorded % SEGMENT_COUNT) {
             *slot = Some(Segment { begin_ns, motion: *motion, jerk });
         }
-        self.count += 1;
+        self.total_recorded += 1;
     }
 
     /// Motion at an instant, extrapolated before the first and after the last segment.
     pub fn motion_at(&self, instant_ns: u64) -> Option<Motion> {
-        let kept = self.count.min(SEGMENT_COUNT);
-        let recorded =
-            |age: usize| self.segments.get((self.count - age) % SEGMENT_COUNT).and_then(Option::as_ref);
+        let kept = self.total_recorded.min(SEGMENT_COUNT);
+        let recorded = |age: usize| {
+            self.segments.get((self.total_recorded - age) % SEGMENT_COUNT).and_then(Option::as_ref)
+        };
         let contains = |age| recorded(age).is_some_and(|segment| segment.begin_ns <= instant_ns);
         // The newest segment that begins no later than the instant: most often one of the last, else found by
         // bisection.

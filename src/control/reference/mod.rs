@@ -72,7 +72,7 @@ const MAX_STEPS: f64 = 32.0;
 /// Steps after a refusal in which rotation and translation change in proportion, as they do at walls
 /// (2026-11-25). Separate limits of jerk would turn the direction of the first steps, away from the target
 /// and perhaps against a bound.
-const IN_PROPORTION_STEPS: u32 = 50;
+const PROPORTIONAL_STEPS_AFTER_REFUSAL: u32 = 50;
 
 /// Reference generator.
 ///
@@ -92,7 +92,7 @@ const IN_PROPORTION_STEPS: u32 = 50;
 /// goal.position.z += 0.01;
 /// let start = *reference.motion();
 /// assert!(reference.verify_start(&constants, &start).is_ok());
-/// reference.begin_at(0);
+/// reference.begin_placed_motion(0);
 /// let mut fastest = 0.0_f64;
 /// for cycle in 1..5000 {
 ///     reference.advance(&constants, cycle * parameters.period_ns, Some(&Target::Pose { pose: &goal, speed_share: 1.0 }));
@@ -118,7 +118,7 @@ pub struct ReferenceGenerator {
     /// Limits that restricted the reference in the last cycle.
     active_limits: LimitSet,
     /// Steps after a refusal in which rotation and translation still change in proportion.
-    in_proportion_steps: u32,
+    proportional_steps_left: u32,
 }
 
 impl ReferenceGenerator {
@@ -134,7 +134,7 @@ impl ReferenceGenerator {
             history: History::default(),
             closing_scale: 1.0,
             active_limits: LimitSet::default(),
-            in_proportion_steps: 0,
+            proportional_steps_left: 0,
         }
     }
 
@@ -144,7 +144,7 @@ impl ReferenceGenerator {
     #[inline(never)]
     pub fn verify_start(&mut self, constants: &Constants, motion: &Motion) -> Result<(), Refusal> {
         self.motion = *motion;
-        self.bounds = PoseBounds::around(constants, &motion.pose);
+        self.bounds = PoseBounds::relaxed_to(constants, &motion.pose);
         let (step, spare) = (Step::default(), self.stop.spare());
         let verified = self.verifier.verify(constants, &self.bounds, &self.motion, &step, spare);
         self.stop.adopt(verified.unwrap_or(StopKind::BrakeAtOnce));
@@ -152,8 +152,8 @@ impl ReferenceGenerator {
     }
 
     /// Begins at an instant, with the motion of the last [`Self::verify_start`].
-    pub fn begin_at(&mut self, time_ns: u64) {
-        (self.time_ns, self.in_proportion_steps) = (time_ns, 0);
+    pub fn begin_placed_motion(&mut self, time_ns: u64) {
+        (self.time_ns, self.proportional_steps_left) = (time_ns, 0);
         self.history.clear();
     }
 
@@ -186,7 +186,7 @@ impl ReferenceGenerator {
     /// Motion of the reference for a force that is held over the last cycle's period: pose and twist at an
     /// instant in the middle of the period, and the mean acceleration, which leads to the velocity at the
     /// end.
-    pub fn motion_of_hold(&self, middle_ns: u64) -> Motion {
+    pub fn motion_for_held_force(&self, middle_ns: u64) -> Motion {
         Motion { acceleration: self.mean_acceleration, ..self.motion_at(middle_ns) }
     }
 
@@ -256,9 +256,9 @@ impl ReferenceGenerator {
             let step = Step { from: Some(&begin.pose), duration: step_s, acceleration_change, effort };
             let verified =
                 self.verifier.verify(constants, &self.bounds, &self.motion, &step, self.stop.spare());
-            self.in_proportion_steps = match verified {
-                Ok(_) => self.in_proportion_steps.saturating_sub(1),
-                Err(_) => IN_PROPORTION_STEPS,
+            self.proportional_steps_left = match verified {
+                Ok(_) => self.proportional_steps_left.saturating_sub(1),
+                Err(_) => PROPORTIONAL_STEPS_AFTER_REFUSAL,
             };
             verified
         });
@@ -311,7 +311,7 @@ impl ReferenceGenerator {
         if limit_leg_rates(constants, pose, &mut turn, &mut shift) {
             self.active_limits = self.active_limits.with(Limit::LegRate, true);
         }
-        let (mut effort, mut in_proportion) = (0, self.in_proportion_steps > 0);
+        let (mut effort, mut in_proportion) = (0, self.proportional_steps_left > 0);
         if constants.parameters.on_violation == ViolationPolicy::Limit {
             let mut walls = Walls::new(constants, &self.bounds, &self.motion, &led, h);
             let restricting = walls.project(constants.machine().level, &mut turn, &mut shift);

@@ -53,9 +53,9 @@ impl DriveMonitor {
         // most.
         let dt = seconds_between(self.measured_ns, *time_ns).clamp(0.0, FORCE_FILTER_TIME_CONSTANT_S);
         self.measured_ns = *time_ns;
-        let unready = drives.unready();
+        let unready = drives.first_unready_leg();
         self.is_ready = unready.is_none();
-        if let Some(leg) = drives.faulty() {
+        if let Some(leg) = drives.first_faulty_leg() {
             return Err(Diagnostic::from(DiagnosticCode::DriveFault).at(leg));
         }
         if !cycle.state.has_control() {

@@ -67,7 +67,7 @@ struct SingularityApproach {
 pub(in crate::control) struct Localization {
     tracker: Tracker,
     /// Whether the pose was followed from home on without a gap.
-    is_known: bool,
+    is_tracked_from_home: bool,
     approach: Option<SingularityApproach>,
     /// Why the assembly mode is uncertain, until cleared.
     assembly_mode_fault: Option<Diagnostic>,
@@ -78,7 +78,7 @@ impl Localization {
     pub fn new(constants: &Constants) -> Self {
         Self {
             tracker: Tracker::new(constants.machine(), *constants.home.pose()),
-            is_known: false,
+            is_tracked_from_home: false,
             approach: None,
             assembly_mode_fault: None,
         }
@@ -103,7 +103,7 @@ impl Localization {
                 tracked = self.tracker.advance(machine, &measurement.length).0;
             }
         }
-        let is_uncertain = self.is_known
+        let is_uncertain = self.is_tracked_from_home
             && match tracked {
                 TrackingResult::NotConverged => self.tracker.outcome() == Outcome::NearSingular,
                 _ => self.is_assembly_mode_uncertain(constants, &start),
@@ -112,13 +112,13 @@ impl Localization {
             return Err(self.fail_assembly_mode(parameters));
         }
         match tracked {
-            TrackingResult::Found => self.is_known = true,
+            TrackingResult::Found => self.is_tracked_from_home = true,
             TrackingResult::Approaching if state.has_control() => {
                 return Err(self.jump_diagnostic(constants, &start_length, &measurement.length));
             }
             TrackingResult::Approaching => return Err(DiagnosticCode::FindingPose.into()),
             TrackingResult::NotConverged => {
-                self.is_known = false;
+                self.is_tracked_from_home = false;
                 self.restart(&constants.home);
                 return Err(DiagnosticCode::PoseNotFound.into());
             }
@@ -180,7 +180,7 @@ impl Localization {
     }
 
     fn fail_assembly_mode(&mut self, parameters: &Parameters) -> Diagnostic {
-        self.is_known = false;
+        self.is_tracked_from_home = false;
         let condition = self.tracker.kinematic_state().sensitivity().condition;
         let bound = assembly_mode_condition_bound(parameters);
         *self.assembly_mode_fault.insert(Diagnostic::new(DiagnosticCode::SingularPose, condition, bound))

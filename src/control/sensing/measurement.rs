@@ -18,7 +18,7 @@ use crate::model::machine::Actuator;
 const LEG_RATE_FACTOR: f64 = 1.5;
 
 /// Change of length that is always plausible, as a ratio of the stroke: noise.
-const LENGTH_NOISE_RATIO: f64 = 1e-3;
+const PLAUSIBLE_LENGTH_CHANGE_RATIO: f64 = 1e-3;
 
 /// Tolerance of lengths against integrated rates, as a ratio of the travel: rates are filtered, late and not
 /// quite to scale. A wrong sign gives twice the travel, a wrong unit a thousand times.
@@ -26,7 +26,7 @@ const RATE_INTEGRAL_TOLERANCE_PER_TRAVEL: f64 = 0.3;
 
 /// Constant part of that tolerance, as a ratio of the stroke: noise and delay of the rates. It is small
 /// because rates of the wrong sign double the error of the loop within milliseconds.
-const RESIDUAL_NOISE_RATIO: f64 = 3e-4;
+const RATE_INTEGRAL_TOLERANCE_PER_STROKE: f64 = 3e-4;
 
 /// Time constant of residual and travel \[s\]: long compared with the delay of a filter, short compared with
 /// a motion.
@@ -38,13 +38,13 @@ const MAX_LEG_ACCELERATION_M_S2: f64 = 50.0;
 const ACCELERATION_LIMIT_FACTOR: f64 = 10.0;
 
 /// Change of a rate that is always plausible, as a ratio of the largest rate: noise.
-const RATE_NOISE_RATIO: f64 = 0.02;
+const PLAUSIBLE_RATE_CHANGE_RATIO: f64 = 0.02;
 
 /// Plausible lead of a stamp over the release, as a ratio of the period. No measurement is made in the
 /// future; the estimator would misplace one by velocity times lead.
 const LEAD_RATIO: f64 = 0.1;
 /// Least bound on the lead, for high rates \[ns\]: clocks of processors and of drives agree no better.
-const MIN_LEAD_NS: u64 = 10_000;
+const MIN_STAMP_LEAD_BOUND_NS: u64 = 10_000;
 
 /// Residual and travel of each leg. The residual is the change of length minus the integral of the rate. Both
 /// decay.
@@ -85,7 +85,7 @@ impl RateConsistency {
     fn check(&self, actuator: &Actuator, step_error: f64) -> Result<(), Diagnostic> {
         for (leg, (residual, travel)) in self.residual.iter().zip(&self.travel).enumerate() {
             let bound = RATE_INTEGRAL_TOLERANCE_PER_TRAVEL * travel
-                + RESIDUAL_NOISE_RATIO * actuator.stroke()
+                + RATE_INTEGRAL_TOLERANCE_PER_STROKE * actuator.stroke()
                 + step_error;
             if residual.abs() > bound {
                 let code = DiagnosticCode::RateInconsistent;
@@ -102,7 +102,7 @@ pub(in crate::control) struct MeasurementValidator {
     last: LastValid<Measurement, Measurement>,
     consistency: RateConsistency,
     /// Cycles under control without a new valid measurement.
-    pub missed: u64,
+    pub missed_cycles: u64,
     /// Release of the cycle before \[ns\]; 0 before the first.
     released_before_ns: u64,
     /// Release of this cycle \[ns\].
@@ -121,7 +121,7 @@ impl MeasurementValidator {
         let continuity = self.check_input_continuity(cycle);
         let new = newest.filter(|newest| self.last.is_new(newest));
         let is_accepted = new.is_some_and(|new| self.accept(cycle, new).is_ok());
-        self.missed += u64::from(cycle.state.has_control() && !is_accepted);
+        self.missed_cycles += u64::from(cycle.state.has_control() && !is_accepted);
         continuity?;
         let Some(valid) = &self.last.valid else {
             return Err(self.last.rejection_or(DiagnosticCode::NoMeasurement));
@@ -199,13 +199,17 @@ fn check_measurement(
     if dt < 0.0 {
         return Err(Diagnostic::new(DiagnosticCode::MeasurementStampInvalid, -dt, 0.0));
     }
-    let noise = LENGTH_NOISE_RATIO * actuator.stroke();
+    let noise = PLAUSIBLE_LENGTH_CHANGE_RATIO * actuator.stroke();
     let bound = LEG_RATE_FACTOR * actuator.max_rate * dt.min(window_s) + noise;
     check_change(DiagnosticCode::MeasurementJumped, &now.length, &before.length, bound)?;
     match (&now.rate, &before.rate) {
-        (Some(rate), Some(before_rate)) => {
-            check_rates(cycle, [now, before], [rate, before_rate], dt.min(window_s), consistency)
-        }
+        (Some(rate), Some(before_rate)) => check_rate_jump_and_consistency(
+            cycle,
+            [now, before],
+            [rate, before_rate],
+            dt.min(window_s),
+            consistency,
+        ),
         _ => {
             *consistency = RateConsistency::default();
             Ok(())
@@ -214,30 +218,30 @@ fn check_measurement(
 }
 
 /// Whether actuators can change the rates as measured, and the rates are the derivatives of the lengths.
-fn check_rates(
+fn check_rate_jump_and_consistency(
     cycle: &Cycle<'_>,
     [now, before]: [&Measurement; 2],
     [rate, before_rate]: [&[f64; LEGS]; 2],
-    plausible_s: f64,
+    bounded_dt_s: f64,
     consistency: &mut RateConsistency,
 ) -> Result<(), Diagnostic> {
     let actuator = &cycle.constants.machine().actuator;
     let limits = &cycle.constants.parameters.limits;
     let acceleration =
         MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
-    let bound = acceleration * plausible_s + RATE_NOISE_RATIO * actuator.max_rate;
+    let bound = acceleration * bounded_dt_s + PLAUSIBLE_RATE_CHANGE_RATIO * actuator.max_rate;
     check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
     let updated = consistency.updated(now, before, [rate, before_rate]);
     // J dt^3 / 12 per step, times the steps within the time constant.
     let jerk = limits.position.jerk + cycle.constants.arm * limits.orientation.jerk;
-    updated.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * plausible_s.powi(2) / 12.0)?;
+    updated.check(actuator, RESIDUAL_TIME_CONSTANT_S * jerk * bounded_dt_s.powi(2) / 12.0)?;
     *consistency = updated;
     Ok(())
 }
 
 /// Whether a stamp is not in the future.
 fn check_lead(time_ns: u64, now_ns: u64, period_ns: u64) -> Result<(), Diagnostic> {
-    let bound_ns = MIN_LEAD_NS.max((LEAD_RATIO * period_ns as f64) as u64);
+    let bound_ns = MIN_STAMP_LEAD_BOUND_NS.max((LEAD_RATIO * period_ns as f64) as u64);
     if time_ns <= now_ns.saturating_add(bound_ns) {
         return Ok(());
     }

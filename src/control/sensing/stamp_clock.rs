@@ -20,7 +20,7 @@ pub(in crate::control) struct StampClock {
     /// Clock of the stamps minus the daemon's clock, as tracked \[ns\].
     offset_ns: i64,
     /// The daemon's clock at the last cycle \[ns\].
-    clock_ns: u64,
+    daemon_clock_ns: u64,
 }
 
 impl StampClock {
@@ -28,9 +28,9 @@ impl StampClock {
     /// larger offset, which the freshest message has, is taken over at once.
     pub fn check(&mut self, cycle: &Cycle<'_>, offset_ns: i64) -> Result<(), Diagnostic> {
         let bound_ns = cycle.constants.parameters.measured_timeout_ns;
-        let clock_ns = cycle.release_ns.wrapping_sub(offset_ns as u64);
-        let drift_ns = (MAX_DRIFT * clock_ns.saturating_sub(self.clock_ns) as f64) as i64;
-        self.clock_ns = clock_ns;
+        let daemon_clock_ns = cycle.release_ns.wrapping_sub(offset_ns as u64);
+        let drift_ns = (MAX_DRIFT * daemon_clock_ns.saturating_sub(self.daemon_clock_ns) as f64) as i64;
+        self.daemon_clock_ns = daemon_clock_ns;
         let deviation_ns = offset_ns.saturating_sub(self.offset_ns);
         let is_beyond = deviation_ns.unsigned_abs() > bound_ns;
         if !cycle.state.has_control() && (is_beyond || deviation_ns > 0) {

@@ -56,7 +56,7 @@ impl SetpointMotion {
 
     /// Sets the jerk from the change of acceleration since the setpoint `before`. An acceleration that is
     /// held until the instant of the force would lag by the time between; the error would be `jerk dt / Kp`.
-    pub fn lead_on(&mut self, parameters: &Parameters, before: Option<&Self>) {
+    pub fn set_jerk_from_previous(&mut self, parameters: &Parameters, before: Option<&Self>) {
         let Some(before) = before.filter(|_| self.setpoint.kind == SetpointKind::Motion) else { return };
         let dt = seconds_between(before.setpoint.time_ns, self.setpoint.time_ns);
         if !(dt > 0.0 && dt <= MAX_JERK_INTERVAL_S) || before.setpoint.kind != SetpointKind::Motion {
@@ -108,7 +108,7 @@ impl SetpointMotion {
         parameters: &Parameters,
         instant_ns: u64,
     ) -> f64 {
-        let longest = parameters.max_extrapolation_s();
+        let longest = parameters.max_setpoint_extrapolation_s();
         seconds_between(self.setpoint.time_ns, instant_ns).max(-longest).min(longest)
     }
 }

@@ -13,7 +13,7 @@ pub(in crate::control) struct ValidatedSetpoint<'a> {
     /// Target of the reference that the setpoint requests.
     pub target: Option<Target<'a>>,
     /// Whether the valid setpoint is recent enough.
-    pub status: Result<(), Diagnostic>,
+    pub age_check: Result<(), Diagnostic>,
     /// Limits that the newest setpoint is near.
     pub active_limits: LimitSet,
 }
@@ -23,7 +23,7 @@ impl<'a> ValidatedSetpoint<'a> {
     #[inline(never)]
     pub fn target_in(&self, constants: &'a Constants, state: State) -> Option<Target<'a>> {
         match state {
-            State::Engaging | State::Active => self.target.filter(|_| self.status.is_ok()),
+            State::Engaging | State::Active => self.target.filter(|_| self.age_check.is_ok()),
             State::Parking => Some(Target::Pose { pose: constants.home.pose(), speed_share: 1.0 }),
             State::Off | State::Standby | State::Stopping | State::Fault => None,
         }

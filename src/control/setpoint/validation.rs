@@ -48,7 +48,7 @@ pub(in crate::control) struct SetpointValidator {
     /// Limits that the newest setpoint is near.
     active_limits: LimitSet,
     /// Cycles under control without a new valid setpoint.
-    pub missed: u64,
+    pub missed_cycles: u64,
 }
 
 impl SetpointValidator {
@@ -63,22 +63,22 @@ impl SetpointValidator {
         let is_accepted = new.is_some_and(|new| {
             let parameters = &cycle.constants.parameters;
             let mut new = SetpointMotion::new(*new);
-            new.lead_on(parameters, self.last.valid.as_ref());
+            new.set_jerk_from_previous(parameters, self.last.valid.as_ref());
             self.accept(cycle, &new, reference)
         });
-        self.missed += u64::from(cycle.state.has_control() && !is_accepted);
+        self.missed_cycles += u64::from(cycle.state.has_control() && !is_accepted);
         let valid = self.last.valid.as_ref();
         ValidatedSetpoint {
             valid,
             target: valid.map(|valid| Target::of_setpoint(valid, &self.samples)),
-            status: self.check_age(cycle),
+            age_check: self.check_age(cycle),
             active_limits: self.active_limits,
         }
     }
 
     /// Forgets every setpoint. The newest is then validated again.
     pub fn forget(&mut self) {
-        *self = Self { missed: self.missed, ..Self::default() };
+        *self = Self { missed_cycles: self.missed_cycles, ..Self::default() };
     }
 
     /// Whether the valid setpoint is recent enough to be followed. A target has no end and stays valid while
@@ -180,7 +180,7 @@ pub fn check_deviation(
     before: &SetpointMotion,
     setpoint: &SetpointMotion,
 ) -> Result<(), Diagnostic> {
-    let ratio = parameters.tolerance_ratio(&reference.offset_to_setpoint(parameters, setpoint));
+    let ratio = parameters.engage_tolerance_ratio(&reference.offset_to_setpoint(parameters, setpoint));
     if ratio <= 1.0 {
         return Ok(());
     }
@@ -192,7 +192,7 @@ pub fn check_deviation(
 /// Deviation of a setpoint from the continuation of the previous one, as a ratio of the engage tolerance.
 fn jump_ratio(parameters: &Parameters, before: &SetpointMotion, setpoint: &SetpointMotion) -> f64 {
     let continued = before.motion_at(parameters, setpoint.setpoint.time_ns);
-    parameters.tolerance_ratio(&PoseError::new(&setpoint.motion, &continued.pose, &continued.twist))
+    parameters.engage_tolerance_ratio(&PoseError::new(&setpoint.motion, &continued.pose, &continued.twist))
 }
 
 /// Whether a setpoint keeps the limits at its instant. Adds the limits that it is near, up to the check that

@@ -84,12 +84,12 @@ pub struct DriveStatus {
 
 impl DriveStatus {
     /// The first drive that is not enabled, or whose brake is closed.
-    pub(in crate::control) fn unready(&self) -> Option<usize> {
+    pub(in crate::control) fn first_unready_leg(&self) -> Option<usize> {
         let ready = self.enabled.unwrap_or(u32::MAX) & self.brake_open.unwrap_or(u32::MAX);
         (0..LEGS).find(|leg| ready >> leg & 1 == 0)
     }
 
-    pub(in crate::control) fn faulty(&self) -> Option<usize> {
+    pub(in crate::control) fn first_faulty_leg(&self) -> Option<usize> {
         (0..LEGS).find(|leg| self.fault.unwrap_or_default() >> leg & 1 == 1)
     }
 }

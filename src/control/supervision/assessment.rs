@@ -30,7 +30,7 @@ pub(in crate::control) struct Evidence<'a> {
     /// Without control: whether the reference was placed where control would begin, with a verified stop.
     pub start: Result<(), Diagnostic>,
     /// Results of the checks of drives and external pose.
-    pub reports: &'a [Result<(), Diagnostic>; 2],
+    pub drive_and_pose_checks: &'a [Result<(), Diagnostic>; 2],
     /// Whether the drives are ready, or the driver does not report it.
     pub is_ready: bool,
     pub feedback: &'a FeedbackLimiter,
@@ -70,8 +70,8 @@ pub(in crate::control) fn assess(
     };
     let is_waiting = cycle.state == State::Engaging && !is_ready;
     let has_ended = !is_waiting && has_ended(cycle, setpoint, reference);
-    let is_doubtful = evidence.may_be_frozen;
-    Findings { localization: *located, start, engagement, tracking, is_doubtful, has_ended }
+    let sensor_may_be_frozen = evidence.may_be_frozen;
+    Findings { localization: *located, start, engagement, tracking, sensor_may_be_frozen, has_ended }
 }
 
 // The checks read each result in place, because copying many results without an error takes time.
@@ -83,7 +83,7 @@ fn check_tracking(
     active_limits: &mut LimitSet,
 ) -> Result<(), Diagnostic> {
     let Evidence { input, setpoint, error, feedback, .. } = evidence;
-    check_reports(evidence)?;
+    check_drives_and_external_pose(evidence)?;
     if let Some(diagnostic) = evidence.measurement_diagnostic {
         return Err(*diagnostic);
     }
@@ -94,7 +94,7 @@ fn check_tracking(
     }
     check_deadline(input)?;
     if let State::Engaging | State::Active = cycle.state {
-        setpoint.status?;
+        setpoint.age_check?;
     }
     *conditioned
 }
@@ -109,15 +109,15 @@ fn check_engagement(
     let Evidence { input, setpoint, error, .. } = evidence;
     check_publishers(DiagnosticCode::TwoMeasuredSources, input.measured_publishers)?;
     check_publishers(DiagnosticCode::TwoSetpointSources, input.setpoint_publishers)?;
-    check_reports(evidence)?;
+    check_drives_and_external_pose(evidence)?;
     (*conditioned)?;
-    setpoint.status?;
+    setpoint.age_check?;
     check_engage_tolerance(&cycle.constants.parameters, setpoint, *error)?;
     *start
 }
 
-fn check_reports(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
-    let [drives, external_pose] = evidence.reports;
+fn check_drives_and_external_pose(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
+    let [drives, external_pose] = evidence.drive_and_pose_checks;
     (*drives)?;
     *external_pose
 }
@@ -128,7 +128,7 @@ fn has_ended(cycle: &Cycle<'_>, setpoint: &ValidatedSetpoint<'_>, reference: &Re
     let parameters = &cycle.constants.parameters;
     let is_within = |target: &Target<'_>, ratio: f64| {
         let deviation = reference.offset_to(cycle.constants, target);
-        deviation.is_some_and(|deviation| parameters.tolerance_ratio(&deviation) <= ratio)
+        deviation.is_some_and(|deviation| parameters.engage_tolerance_ratio(&deviation) <= ratio)
     };
     match cycle.state {
         State::Engaging => setpoint.target.as_ref().is_some_and(|target| is_within(target, REACHED_RATIO)),
@@ -149,7 +149,7 @@ fn check_engage_tolerance(
 ) -> Result<(), Diagnostic> {
     let Some(error) = error else { return Err(DiagnosticCode::NoSetpoint.into()) };
     let is_target = setpoint.valid.is_some_and(|valid| valid.setpoint.kind == SetpointKind::Target);
-    let ratio = parameters.tolerance_ratio(error);
+    let ratio = parameters.engage_tolerance_ratio(error);
     if ratio <= 1.0 || is_target {
         return Ok(());
     }
@@ -166,7 +166,7 @@ fn check_publishers(code: DiagnosticCode, publishers: Publishers) -> Result<(), 
 /// Whether the motion without force is known and a stop from it was verified.
 fn check_start(evidence: &Evidence<'_>) -> Result<(), Diagnostic> {
     check_publishers(DiagnosticCode::TwoMeasuredSources, evidence.input.measured_publishers)?;
-    check_reports(evidence)?;
+    check_drives_and_external_pose(evidence)?;
     evidence.start
 }
 

@@ -39,7 +39,7 @@ pub struct Findings {
     /// Whether the reference can be followed further. A diagnostic that is no fault ends control by a stop.
     pub tracking: Result<(), Diagnostic>,
     /// Whether a length repeats itself: a stop under control might rely on a frozen sensor.
-    pub is_doubtful: bool,
+    pub sensor_may_be_frozen: bool,
     /// Whether the motion of engaging, stopping or parking has ended.
     pub has_ended: bool,
 }
@@ -104,8 +104,13 @@ pub fn next(
         }
         // The readings of a frozen sensor may look like a change of payload or an impact.
         let under_way = (current.state == State::Stopping).then_some(current.diagnostic);
-        let change = findings.tracking.err().into_iter().chain(under_way).find(|cause| is_change(cause.code));
-        if let Some(cause) = change.filter(|_| findings.is_doubtful) {
+        let change = findings
+            .tracking
+            .err()
+            .into_iter()
+            .chain(under_way)
+            .find(|cause| is_payload_change_or_impact(cause.code));
+        if let Some(cause) = change.filter(|_| findings.sensor_may_be_frozen) {
             return (fault(cause), None);
         }
     }
@@ -122,7 +127,7 @@ pub fn next(
 }
 
 /// Whether readings alone have shown the event, and its reaction is a stop under control.
-fn is_change(code: DiagnosticCode) -> bool {
+fn is_payload_change_or_impact(code: DiagnosticCode) -> bool {
     matches!(code, DiagnosticCode::PayloadChanged | DiagnosticCode::Impact)
 }
 
@@ -278,7 +283,7 @@ mod tests {
         start: Ok(()),
         engagement: Ok(()),
         tracking: Ok(()),
-        is_doubtful: false,
+        sensor_may_be_frozen: false,
         has_ended: false,
     };
 
@@ -348,11 +353,11 @@ mod tests {
                 let state = if brakes { State::Fault } else { State::Stopping };
                 assert_eq!((current.state, current.diagnostic.code), (state, code));
             };
-            expected(after(active, &Findings { is_doubtful: true, ..found }));
+            expected(after(active, &Findings { sensor_may_be_frozen: true, ..found }));
             let stopping = after(active, &found);
             assert_eq!(stopping.state, State::Stopping);
-            expected(after(stopping, &Findings { is_doubtful: true, ..IN_ORDER }));
+            expected(after(stopping, &Findings { sensor_may_be_frozen: true, ..IN_ORDER }));
         }
-        assert_eq!(after(active, &Findings { is_doubtful: true, ..IN_ORDER }).state, State::Active);
+        assert_eq!(after(active, &Findings { sensor_may_be_frozen: true, ..IN_ORDER }).state, State::Active);
     }
 }

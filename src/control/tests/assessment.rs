@@ -68,7 +68,7 @@ impl Scene {
         let setpoint = ValidatedSetpoint {
             valid: Some(&motion),
             target: Some(Target::Motion(&motion)),
-            status: self.status,
+            age_check: self.status,
             active_limits: LimitSet::default(),
         };
         let free_motion =
@@ -96,7 +96,7 @@ impl Scene {
             feedback: &self.feedback,
             measurement_diagnostic: self.measurement_diagnostic.as_ref(),
             disturbance_diagnostic: self.disturbance_diagnostic.as_ref(),
-            reports: &self.reports,
+            drive_and_pose_checks: &self.reports,
             is_ready: self.is_ready,
             start,
             may_be_frozen: false,
@@ -251,7 +251,7 @@ fn engaging_ends_on_the_setpoint_once_the_drives_are_ready() {
 fn a_start_near_a_singular_pose_is_refused_as_such() {
     let machine = machine(&mut RandomVectors::new(61));
     let mut constants = Constants::new(&machine, parameters(&machine));
-    constants.reference_condition = 1.0;
+    constants.max_reference_condition = 1.0;
     let (pose, condition) = (*constants.home.pose(), constants.home.sensitivity().condition);
     let cycle = Cycle { constants: &constants, release_ns: 0, state: State::Standby };
     let (measurement, twist) = (Measurement::default(), Twist::default());

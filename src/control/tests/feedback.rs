@@ -16,7 +16,7 @@ fn constants(mode: ControlMode) -> Constants {
     let machine = machine(&mut RandomVectors::new(41));
     let mut parameters = parameters(&machine);
     parameters.law.mode = mode;
-    parameters.law.saturation = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
+    parameters.law.max_compensated_disturbance = Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0);
     Constants::new(&machine, parameters)
 }
 

@@ -93,7 +93,7 @@ pub(in crate::control) fn parameters(machine: &Machine) -> Parameters {
             false,
             &LIMITS,
         ),
-        noise: NoiseModel { bandwidth: 50.0, rate_noise_ratio: None, period_s: 1e-3 },
+        noise: NoiseModel { bandwidth_rad_s: 50.0, rate_noise_ratio: None, period_s: 1e-3 },
         reading_errors: ReadingErrors::default(),
         force_delay_ns: 0,
         fidelity: Fidelity::Exact,
@@ -132,7 +132,7 @@ pub(in crate::control) fn pose(samples: &mut RandomVectors, constants: &Constant
         let is_within = leg_lengths(constants.machine(), &pose)
             .iter()
             .all(|length| constants.machine().actuator.contains(*length));
-        if is_within && condition < constants.reference_condition {
+        if is_within && condition < constants.max_reference_condition {
             return pose;
         }
     }

@@ -38,7 +38,7 @@ fn a_setpoint_that_is_not_valid_is_neither_approached_nor_compared_with() {
         let setpoint = ValidatedSetpoint {
             valid: Some(&motion),
             target: Some(Target::of_setpoint(&motion, &samples)),
-            status,
+            age_check: status,
             active_limits: LimitSet::default(),
         };
         for state in [State::Engaging, State::Active] {
@@ -65,7 +65,7 @@ fn the_jerk_of_a_setpoint_is_that_of_motions_without_a_gap() {
     for (dt_ms, has_jerk) in [(0, false), (1, true), (25, true), (26, false), (1000, false), (-1, false)] {
         let before = motion(5000 * MS, 0.0);
         let mut next = motion((5000 * MS).saturating_add_signed(dt_ms * 1_000_000), 0.05);
-        next.lead_on(&parameters, Some(&before));
+        next.set_jerk_from_previous(&parameters, Some(&before));
         let after = next.continued(1e-3);
         let change = after.acceleration.linear.x - 0.05;
         let jerk = if has_jerk { 0.05 / (dt_ms as f64 * 1e-3) } else { 0.0 };

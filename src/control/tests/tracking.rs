@@ -24,7 +24,7 @@ fn updated(constants: &Constants, tracker: &mut ErrorTracker, measured: &[(u64, 
     let home = *constants.home.pose();
     let mut reference = ReferenceGenerator::new(constants);
     reference.verify_start(constants, &at_rest(&home)).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     tracker.start(constants, 0, 0);
     let mut error = PoseError::default();
     for (k, (time_ms, displacement)) in measured.iter().enumerate() {

@@ -161,9 +161,9 @@ fn parameters(config: &Config, setup: &Setup) -> Parameters {
         &parameters.limits,
     );
     Parameters {
-        law: Law { saturation: Vector6::repeat(UNLIMITED), ..law },
+        law: Law { max_compensated_disturbance: Vector6::repeat(UNLIMITED), ..law },
         noise: NoiseModel {
-            bandwidth: estimator_ratio * wn,
+            bandwidth_rad_s: estimator_ratio * wn,
             rate_noise_ratio: rate_noise.map(|ratio| ratio * config.deployment.realtime.rate_hz),
             period_s: parameters.noise.period_s,
         },

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseModel {
     /// Bandwidth of the filter, `we` \[rad/s\].
-    pub bandwidth: f64,
+    pub bandwidth_rad_s: f64,
     /// Standard deviation of a rate reading over that of a length reading \[1/s\]; `None` if rates are not
     /// used.
     pub rate_noise_ratio: Option<f64>,
@@ -60,8 +60,9 @@ impl NoiseModel {
             let before = gains[0];
             covariance.advance(self, 1.0);
             gains[0] = covariance.correct_value();
-            gains[1] =
-                self.rate_noise().map_or(KalmanGains::default(), |noise| covariance.correct_rate(noise));
+            gains[1] = self
+                .scaled_rate_variance()
+                .map_or(KalmanGains::default(), |noise| covariance.correct_rate(noise));
             let [e, _, d] = gains[0];
             if (e - before[0]).abs() <= STEADY_CHANGE * e && (d - before[2]).abs() <= STEADY_CHANGE * d.abs()
             {
@@ -72,7 +73,7 @@ impl NoiseModel {
     }
 
     /// Variance of a rate reading, in the units of the state.
-    pub(in crate::control::law::estimator) fn rate_noise(&self) -> Option<f64> {
+    pub(in crate::control::law::estimator) fn scaled_rate_variance(&self) -> Option<f64> {
         self.rate_noise_ratio.map(|ratio| (ratio * self.period_s) * (ratio * self.period_s))
     }
 }
@@ -84,7 +85,7 @@ impl Covariance {
         let (n, half) = (periods, 0.5 * periods * periods);
         let (by_e, by_w, by_d) = (ee + n * ew + half * ed, ew + n * ww + half * wd, ed + n * wd + half * dd);
         let (rate_by_w, rate_by_d) = (ww + n * wd, wd + n * dd);
-        let third = (model.bandwidth * model.period_s) * (model.bandwidth * model.period_s);
+        let third = (model.bandwidth_rad_s * model.period_s) * (model.bandwidth_rad_s * model.period_s);
         let intensity = third * third * third * n;
         let square = n * n;
         *self = Self {
@@ -134,7 +135,11 @@ mod tests {
     use super::*;
 
     fn model(bandwidth_hz: f64, rate_noise_ratio: Option<f64>) -> NoiseModel {
-        NoiseModel { bandwidth: core::f64::consts::TAU * bandwidth_hz, rate_noise_ratio, period_s: 1e-3 }
+        NoiseModel {
+            bandwidth_rad_s: core::f64::consts::TAU * bandwidth_hz,
+            rate_noise_ratio,
+            period_s: 1e-3,
+        }
     }
 
     /// A slow filter has `K ~ [2 we T, 2 (we T)^2, (we T)^3]`: the poles of Butterworth,

@@ -77,7 +77,7 @@ impl Filter {
         covariance.advance(noise, seconds_between(self.time_ns, time_ns) * rate_hz);
         let innovation = measured.value - state.value;
         state.correct(covariance.correct_value(), rate_hz, &innovation);
-        if let Some(variance) = noise.rate_noise() {
+        if let Some(variance) = noise.scaled_rate_variance() {
             let difference = (measured.rate - state.rate) * noise.period_s;
             state.correct(covariance.correct_rate(variance), rate_hz, &difference);
         }
@@ -138,7 +138,7 @@ impl EstimatorConstants {
     /// Largest plausible innovation of a leg, `dt` after the last measurement \[m\]: noise, plus the
     /// displacement by a disturbance that the estimate does not yet contain, `a (1 / we^2 + dt^2 / 2)`.
     pub fn innovation_bound(&self, dt: f64) -> f64 {
-        let lag = 1.0 / self.noise.bandwidth;
+        let lag = 1.0 / self.noise.bandwidth_rad_s;
         MIN_INNOVATION_BOUND_M.max(NOISE_DEVIATIONS * self.reading_errors.deviation)
             + self.largest_disturbance * (lag * lag + 0.5 * dt * dt)
     }

@@ -24,36 +24,36 @@ struct SentAcceleration {
 pub(in crate::control::law::estimator) struct SentAccelerations {
     #[serde(with = "serde_big_array::BigArray")]
     ring: [SentAcceleration; CAPACITY],
-    /// Number of accelerations ever recorded; the last one has index `count - 1`.
-    count: usize,
+    /// Number of accelerations ever recorded; the last one has index `total_recorded - 1`.
+    total_recorded: usize,
 }
 
 impl Default for SentAccelerations {
     fn default() -> Self {
-        Self { ring: [SentAcceleration::default(); CAPACITY], count: 0 }
+        Self { ring: [SentAcceleration::default(); CAPACITY], total_recorded: 0 }
     }
 }
 
 impl SentAccelerations {
     /// Removes all accelerations. None acts until the next one is recorded and begins.
     pub fn clear(&mut self) {
-        self.count = 0;
+        self.total_recorded = 0;
     }
 
     /// Records an acceleration that acts from an instant on.
     pub fn record(&mut self, begin_ns: u64, acceleration: &Vector6<f64>) {
-        if let Some(slot) = self.ring.get_mut(self.count % CAPACITY) {
+        if let Some(slot) = self.ring.get_mut(self.total_recorded % CAPACITY) {
             *slot = SentAcceleration { begin_ns, acceleration: *acceleration };
         }
-        self.count += 1;
+        self.total_recorded += 1;
     }
 
     /// Acceleration that was recorded `age` before the last one.
     fn recorded(&self, age: usize) -> Option<&SentAcceleration> {
-        if age >= self.count.min(CAPACITY) {
+        if age >= self.total_recorded.min(CAPACITY) {
             return None;
         }
-        self.ring.get((self.count - 1 - age) % CAPACITY)
+        self.ring.get((self.total_recorded - 1 - age) % CAPACITY)
     }
 
     /// Advances an error estimate from one instant to a later one, under the accelerations that act in

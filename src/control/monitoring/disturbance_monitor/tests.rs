@@ -9,12 +9,12 @@ use crate::model::task::TaskState;
 const BOUNDS: DisturbanceBounds = DisturbanceBounds {
     payload_by_disturbance: Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.2),
     payload_by_norm: 0.2,
-    gravity: Vector3::new(0.0, 0.0, -1.0 / 9.81),
-    payload: 0.1,
-    impact: 2.0,
+    gravity_over_square: Vector3::new(0.0, 0.0, -1.0 / 9.81),
+    max_payload_change_kg: 0.1,
+    max_sudden_disturbance: 2.0,
     swing: SWING_M,
     swing_by_acceleration: 1.0 / SWING_STIFFNESS,
-    longest_swing_s: 0.1,
+    max_reversal_interval_s: 0.1,
     arm_squared: 1.0,
 };
 
@@ -109,7 +109,7 @@ fn what_limits_took_away_is_no_change() {
         (0..2000).find_map(|cycle| {
             let is_cut = cycle >= 1500;
             if is_cut {
-                monitor.record_missing(&BOUNDS, &along_z(limited));
+                monitor.record_removed_acceleration(&BOUNDS, &along_z(limited));
             }
             let disturbance = if is_cut { disturbance } else { 0.0 };
             let reference = TaskState::at_rest([0.0; 6]).motion();
@@ -124,9 +124,9 @@ fn what_limits_took_away_is_no_change() {
     assert_eq!(changed(2.0, 4.1), Some(DiagnosticCode::Impact));
     // Forgotten after some seconds.
     let mut monitor = DisturbanceMonitor::default();
-    monitor.record_missing(&BOUNDS, &along_z(1e3));
-    assert_eq!(monitor.limited, 1e3);
+    monitor.record_removed_acceleration(&BOUNDS, &along_z(1e3));
+    assert_eq!(monitor.removed_acceleration, 1e3);
     let rest = TaskState::at_rest([0.0; 6]).motion();
     (0..12_000).for_each(|_| assert_eq!(monitor.check(&BOUNDS, &with(0.0, 0.0), &rest, 0.0, 1e-3), Ok(())));
-    assert!(monitor.limited < 0.01, "{}", monitor.limited);
+    assert!(monitor.removed_acceleration < 0.01, "{}", monitor.removed_acceleration);
 }

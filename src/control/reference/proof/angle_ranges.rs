@@ -79,7 +79,7 @@ impl AngleRanges {
     }
 
     /// Ranges of an envelope, for a stop from X. `None` if they have room for every rotation of the stop.
-    pub fn without_room(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<Self> {
+    pub fn if_stop_may_leave(envelope: &Envelope, x: &[f64; 6], stop: &Stop) -> Option<Self> {
         let Envelope { lowest, highest } = envelope;
         let [_, beta, ..] = x;
         let turn = stop.peak_velocity * stop.duration;

@@ -30,7 +30,7 @@ pub(in crate::control::reference) const CUBIC_RATE_DEPARTURE: f64 = 1.0 / 30.0;
 const TURNING_SHARE: f64 = 1.154_700_538_379_251_7;
 
 /// Bound on the third derivative of a leg's length, for the peak velocities v and w of a stop.
-pub(in crate::control::reference) fn length_jerk(constants: &Constants, v: f64, w: f64) -> f64 {
+pub(in crate::control::reference) fn length_jerk_bound(constants: &Constants, v: f64, w: f64) -> f64 {
     let Limits { orientation, position, .. } = &constants.parameters.limits;
     let (arm, joint) = (constants.arm, v + constants.arm * w);
     let joint_acceleration = position.acceleration + arm * (orientation.acceleration + w * w);
@@ -41,7 +41,7 @@ pub(in crate::control::reference) fn length_jerk(constants: &Constants, v: f64, 
 }
 
 /// Bound on the second derivative of a leg's length, for the peak velocities v and w of a stop.
-pub(in crate::control::reference) fn curvature(constants: &Constants, v: f64, w: f64) -> f64 {
+pub(in crate::control::reference) fn length_acceleration_bound(constants: &Constants, v: f64, w: f64) -> f64 {
     let Limits { orientation, position, .. } = &constants.parameters.limits;
     let joint = v + constants.arm * w;
     position.acceleration

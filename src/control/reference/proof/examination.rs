@@ -22,7 +22,7 @@ use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
 use crate::control::reference::proof::angle_ranges::{AngleRanges, cosine_of_beta};
 use crate::control::reference::proof::cubic_departure::{
-    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk,
+    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, length_acceleration_bound, length_jerk_bound,
 };
 use crate::control::reference::proof::knots::{AdjacentIntervals, Knots, MAX_INTERVALS};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
@@ -33,7 +33,9 @@ use crate::control::reference::proof::regularity::{
 };
 use crate::control::reference::proof::step::Step;
 use crate::control::reference::proof::tolerances::{ANGLE_ROUNDING, BETWEEN_KNOTS_RATIO, ROUNDING};
-use crate::control::reference::stop::pose_stop::{PoseStop, PoseStopState, advanced_to_knot};
+use crate::control::reference::stop::pose_stop::{
+    PoseStop, PoseStopState, advanced_without_orthonormalizing,
+};
 use crate::control::signals::limits::{Limit, Limits};
 use crate::model::inverse_geometry::length_and_rate_lanes;
 use crate::model::machine::Machine;
@@ -63,7 +65,7 @@ pub(in crate::control::reference) struct StopExamination<'a> {
     knots: Knots,
     /// Bound on the third derivative of a length, and largest departures within the step that leads to the
     /// stop: of a length \[m\], of a rate \[m/s\], and of a coordinate of C \[m\].
-    length_jerk: f64,
+    length_jerk_bound: f64,
     step_departure: [f64; 3],
     step_s: f64,
     /// `2 |u| + |e|` for each coordinate of C.
@@ -110,17 +112,17 @@ impl<'a> StopExamination<'a> {
         if !is_slow {
             return Err(Limit::Velocity.into());
         }
-        let curvature = curvature(constants, v, w);
+        let curvature = length_acceleration_bound(constants, v, w);
         let actuator = &constants.machine().actuator;
         let needs_rates = v + constants.arm * w > actuator.max_rate;
-        let length_jerk = length_jerk(constants, v, w);
+        let length_jerk_bound = length_jerk_bound(constants, v, w);
         // Enough knots that the departures of lengths are small, and of rates if these matter.
         let duration = stop.duration();
         let (square, cube) = (duration * duration, duration * duration * duration);
-        let length_share = CUBIC_DEPARTURE * length_jerk * cube / LENGTH_DEPARTURE_M;
+        let length_share = CUBIC_DEPARTURE * length_jerk_bound * cube / LENGTH_DEPARTURE_M;
         let max_departure = RATE_DEPARTURE_RATIO * actuator.max_rate;
         let rate_share =
-            if needs_rates { CUBIC_RATE_DEPARTURE * length_jerk * square / max_departure } else { 0.0 };
+            if needs_rates { CUBIC_RATE_DEPARTURE * length_jerk_bound * square / max_departure } else { 0.0 };
         let knots = Knots::new(duration, rate_share, length_share);
         let chord = step.duration * step.duration / 8.0;
         // The jerk is along the velocity u and, across it, along the remaining part of the acceleration's
@@ -132,8 +134,8 @@ impl<'a> StopExamination<'a> {
             constants,
             bounds,
             knots,
-            length_jerk,
-            step_departure: [curvature, length_jerk, position.acceleration].map(|bound| bound * chord),
+            length_jerk_bound,
+            step_departure: [curvature, length_jerk_bound, position.acceleration].map(|bound| bound * chord),
             step_s: step.duration,
             directions: u.abs() * 2.0 + e.abs(),
             needs_rates,
@@ -142,7 +144,7 @@ impl<'a> StopExamination<'a> {
                 .envelope
                 .as_ref()
                 .zip(x)
-                .and_then(|(envelope, x)| AngleRanges::without_room(envelope, x, &stop.orientation)),
+                .and_then(|(envelope, x)| AngleRanges::if_stop_may_leave(envelope, x, &stop.orientation)),
             from: step.from,
             length_excess: step.from.map_or(0.0, |from| bounds.length_excess(constants, from)),
             start_regularity: None,
@@ -183,7 +185,7 @@ impl<'a> StopExamination<'a> {
                 return Ok(());
             }
             let next = self.stop.at(simd, next_t);
-            pose = advanced_to_knot(&pose, &state, &next, adjacent.after_s);
+            pose = advanced_without_orthonormalizing(&pose, &state, &next, adjacent.after_s);
             (t, state) = (next_t, next);
             k += 1;
         }
@@ -213,12 +215,12 @@ impl<'a> StopExamination<'a> {
         let (short, long) = (length + next.min(last), length + next.max(last));
         let room = (short - load(&self.shortest)).min(load(&self.longest) - long);
         let [in_step, ..] = self.step_departure;
-        let departure = (self.length_jerk * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
+        let departure = (self.length_jerk_bound * CUBIC_DEPARTURE * dt * dt * dt).max(in_step);
         let margin = (departure - BETWEEN_KNOTS_RATIO * self.constants.machine().actuator.stroke()).max(0.0);
         if !room.simd_ge(splat(margin - self.length_excess)).all_true() {
             return Err(Limit::Stroke.into());
         }
-        if !self.is_in_envelope(simd, pose, state, adjacent) && !self.is_nearer_than_start(pose) {
+        if !self.is_in_envelope(simd, pose, state, adjacent) && !self.is_no_farther_beyond_envelope(pose) {
             return Err(Limit::Envelope.into());
         }
         self.check_condition(simd, balls, pose, state, dt)?;
@@ -236,7 +238,7 @@ impl<'a> StopExamination<'a> {
     ) -> bool {
         let dt = adjacent.longest();
         let [_, in_step, _] = self.step_departure;
-        let margin = (self.length_jerk * CUBIC_RATE_DEPARTURE * dt * dt).max(in_step);
+        let margin = (self.length_jerk_bound * CUBIC_RATE_DEPARTURE * dt * dt).max(in_step);
         let limit = f64x8::splat(simd, self.constants.machine().actuator.max_rate - margin);
         let between = before.map_or(*rate, |(length_before, rate_before)| {
             (*length - *length_before) * f64x8::splat(simd, 3.0 / adjacent.before_s) - *rate_before - *rate
@@ -259,10 +261,10 @@ impl<'a> StopExamination<'a> {
         if balls.prove_knot_from_kept(simd, constants, pose, reach) {
             return Ok(());
         }
-        let around = RegularityQuery { pose, reach, required: Regularity::around_reference(constants) };
+        let around = RegularityQuery { pose, reach, required: Regularity::between_knots_bounds(constants) };
         let regularity = balls.prove_from_new(constants, &around, &mut self.effort)?;
-        let at_knot = Regularity::of_reference(constants);
-        if at_knot.is_kept_by(&regularity) || self.is_nearer_to_regular(&regularity)? {
+        let at_knot = Regularity::reference_bounds(constants);
+        if at_knot.is_kept_by(&regularity) || self.is_no_worse_than_start(&regularity)? {
             return Ok(());
         }
         Err(Limit::Condition.into())
@@ -271,13 +273,13 @@ impl<'a> StopExamination<'a> {
     /// Whether a regularity keeps the reference's bounds, or is no worse than at the start of the step.
     // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
-    fn is_nearer_to_regular(&mut self, regularity: &Regularity) -> Result<bool, Refusal> {
+    fn is_no_worse_than_start(&mut self, regularity: &Regularity) -> Result<bool, Refusal> {
         let Self { constants, from: Some(from), .. } = *self else { return Ok(false) };
         let start = match self.start_regularity {
             Some(start) => start,
             None => *self.start_regularity.insert(Regularity::at(constants, from, &mut self.effort)?),
         };
-        let at_knot = Regularity::of_reference(constants);
+        let at_knot = Regularity::reference_bounds(constants);
         Ok(at_knot.looser_of(&start).is_kept_by(regularity))
     }
 
@@ -322,7 +324,7 @@ impl<'a> StopExamination<'a> {
     /// Whether the start of the step is beyond the envelope, and a pose is no farther beyond it.
     // Out of line because it is rare: the code of the cycle stays short.
     #[inline(never)]
-    fn is_nearer_than_start(&mut self, pose: &Pose) -> bool {
+    fn is_no_farther_beyond_envelope(&mut self, pose: &Pose) -> bool {
         let (Some(from), Some(envelope)) = (self.from, &self.bounds.envelope) else { return false };
         let Machine { home, level, .. } = *self.constants.machine();
         let (relaxed, angles) = self.relaxed.get_or_insert_with(|| {

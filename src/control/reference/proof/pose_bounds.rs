@@ -38,7 +38,7 @@ impl PoseBounds {
     }
 
     /// Nominal bounds, relaxed where a pose exceeds them.
-    pub fn around(constants: &Constants, pose: &Pose) -> Self {
+    pub fn relaxed_to(constants: &Constants, pose: &Pose) -> Self {
         let mut bounds = Self::configured(constants);
         let actuator = &constants.machine().actuator;
         let [stroke_room, end_room] = [START_RATIO, END_STOP_RATIO].map(|ratio| ratio * actuator.stroke());
@@ -76,7 +76,7 @@ impl PoseBounds {
         if !self.is_relaxed {
             return;
         }
-        let around = Self::around(constants, pose);
+        let around = Self::relaxed_to(constants, pose);
         let inner = |bound: &mut [f64; LEGS], other: &[f64; LEGS], pick: fn(f64, f64) -> f64| {
             bound.iter_mut().zip(other).for_each(|(bound, other)| *bound = pick(*bound, *other));
         };

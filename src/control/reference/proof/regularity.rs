@@ -64,15 +64,15 @@ impl Regularity {
     }
 
     /// Bounds that the reference must keep.
-    pub fn of_reference(constants: &Constants) -> Self {
-        Self { condition: constants.reference_condition, universal_sine: constants.universal_sine }
+    pub fn reference_bounds(constants: &Constants) -> Self {
+        Self { condition: constants.max_reference_condition, universal_sine: constants.universal_sine }
     }
 
     /// Bounds that poses between knots must keep: the platform's limit of the condition, and a sine that is
     /// smaller in the same ratio.
-    pub fn around_reference(constants: &Constants) -> Self {
+    pub fn between_knots_bounds(constants: &Constants) -> Self {
         let condition = constants.parameters.condition;
-        let share = (constants.reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0);
+        let share = (constants.max_reference_condition / condition).clamp(LEAST_SINE_SHARE, 1.0);
         Self { condition, universal_sine: constants.universal_sine * share }
     }
 
@@ -219,7 +219,7 @@ pub(in crate::control::reference) struct RegularBalls {
     /// Index of the group that covered the last pose.
     recent: usize,
     /// Number of balls that were kept, modulo the capacity. The next ball replaces the oldest.
-    kept: usize,
+    next_slot: usize,
 }
 
 impl RegularBalls {
@@ -266,7 +266,7 @@ impl RegularBalls {
         reach: Reach,
     ) -> bool {
         let [at_knot, around] =
-            [Regularity::of_reference(constants), Regularity::around_reference(constants)];
+            [Regularity::reference_bounds(constants), Regularity::between_knots_bounds(constants)];
         let mut are_surroundings_covered = false;
         for index in self.recent_first() {
             let Some(group) = self.groups.get(index) else { continue };
@@ -293,9 +293,9 @@ impl RegularBalls {
     ) -> Result<Regularity, Refusal> {
         let RegularityQuery { pose, reach, required } = around;
         let ball = Ball::new(constants, pose, effort)?;
-        let index = self.kept / LANES;
+        let index = self.next_slot / LANES;
         let group = self.groups.get_mut(index).ok_or(Refusal::Effort)?;
-        group.set(self.kept % LANES, pose, &ball);
+        group.set(self.next_slot % LANES, pose, &ball);
         // Another ball of the group may cover the poses as well. A new ball that is too small for the reach
         // may still prove a knot: it stays until the next new ball.
         let is_covered = dispatch!(constants.machine().level, simd => {
@@ -306,7 +306,7 @@ impl RegularBalls {
             return Err(Limit::Condition.into());
         }
         self.recent = index;
-        self.kept = (self.kept + 1) % (GROUPS * LANES);
+        self.next_slot = (self.next_slot + 1) % (GROUPS * LANES);
         Ok(ball.regularity)
     }
 }

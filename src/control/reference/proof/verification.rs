@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::control::constants::Constants;
 use crate::control::parameters::Envelope;
-use crate::control::reference::proof::cubic_departure::curvature;
+use crate::control::reference::proof::cubic_departure::length_acceleration_bound;
 use crate::control::reference::proof::examination::{MAX_STEP_EFFORT, StopExamination};
 use crate::control::reference::proof::pose_bounds::PoseBounds;
 use crate::control::reference::proof::refusal::Refusal;
@@ -47,7 +47,7 @@ impl Verifier {
         let around = RegularityQuery {
             pose,
             reach: Pair { angular: turn.length, linear: shift.length },
-            required: Regularity::of_reference(constants),
+            required: Regularity::reference_bounds(constants),
         };
         let mut effort = MAX_STEP_EFFORT.saturating_sub(step.effort);
         let is_free = shift.peak_velocity + overshoot.linear <= position.velocity
@@ -81,7 +81,8 @@ fn has_room(
     turn: &StopExtent,
     step_s: f64,
 ) -> bool {
-    let margin = curvature(constants, shift.peak_velocity, turn.peak_velocity) * step_s * step_s / 8.0;
+    let margin =
+        length_acceleration_bound(constants, shift.peak_velocity, turn.peak_velocity) * step_s * step_s / 8.0;
     let need = shift.length + constants.arm * turn.length + margin;
     let lengths = leg_lengths(constants.machine(), pose);
     let legs = lengths.iter().zip(bounds.shortest.iter().zip(&bounds.longest));

@@ -128,7 +128,7 @@ impl Approach {
     }
 
     /// phi' at distance zero \[1/s\].
-    pub fn slowest_slope(&self) -> f64 {
+    pub fn closing_slope_at_target(&self) -> f64 {
         1.0 / self.outer_s
     }
 
@@ -138,7 +138,7 @@ impl Approach {
     }
 
     /// phi and phi' at a distance.
-    pub fn closing_velocity(&self, distance: f64) -> (f64, f64) {
+    pub fn closing_velocity_and_slope(&self, distance: f64) -> (f64, f64) {
         self.closing_velocity_of(distance, || closing_roots([self], [distance])[0])
     }
 
@@ -168,7 +168,10 @@ impl Approach {
         present: Pair<&Vector3<f64>>,
         in_proportion: bool,
     ) -> (Pair<Vector3<f64>>, LimitSet) {
-        let aim = approaches.zip(wanted).zip(ahead).map(|((it, wanted), ahead)| it.aim(wanted, ahead));
+        let aim = approaches
+            .zip(wanted)
+            .zip(ahead)
+            .map(|((it, wanted), ahead)| it.unlimited_acceleration(wanted, ahead));
         let largest = approaches.map(|approach| approach.limits.acceleration);
         let (aim, by_acceleration) = limited(aim, largest, in_proportion);
         let change = aim.zip(present).map(|(aim, present)| aim - present);
@@ -180,7 +183,7 @@ impl Approach {
     }
 
     /// `a*` without limits.
-    fn aim(&self, wanted: &WantedVelocity, ahead: &Vector3<f64>) -> Vector3<f64> {
+    fn unlimited_acceleration(&self, wanted: &WantedVelocity, ahead: &Vector3<f64>) -> Vector3<f64> {
         let x = wanted.velocity - ahead;
         let time = INNER_TIME_RATIO * self.outer_s;
         let jerk = INNER_JERK_SHARE * self.limits.jerk;

@@ -79,10 +79,10 @@ impl End {
     /// `per_way`: ratio of a rate to the stopping distance \[1/s\].
     fn new(approach: &Approach, gap: f64, closing: f64, curvature: f64, per_way: f64) -> Self {
         let (rate, slope) = if gap > 0.0 {
-            let (rate, slope) = approach.closing_velocity(gap);
+            let (rate, slope) = approach.closing_velocity_and_slope(gap);
             if gap * per_way < rate { (gap * per_way, per_way) } else { (rate, slope) }
         } else {
-            let slope = approach.slowest_slope() / RETURN_RATIO;
+            let slope = approach.closing_slope_at_target() / RETURN_RATIO;
             (gap * slope, slope)
         };
         Self { rate, derivative: -slope * closing - curvature }

@@ -125,7 +125,7 @@ pub(in crate::control::reference) fn advanced(
 
 /// The same pose without orthonormalizing the rotation, for the few knots of an examination.
 #[inline(always)]
-pub(in crate::control::reference) fn advanced_to_knot(
+pub(in crate::control::reference) fn advanced_without_orthonormalizing(
     pose: &Pose,
     from: &PoseStopState,
     to: &PoseStopState,

@@ -36,17 +36,17 @@ fn the_closing_velocity_is_the_inverse_of_the_braking_way() {
         for k in 1..1000 {
             let v = top * f64::from(k) / 1000.0;
             let way = braking_way(v, scale, step_s);
-            let (found, slope) = approach.closing_velocity(way);
+            let (found, slope) = approach.closing_velocity_and_slope(way);
             assert!((found / v - 1.0).abs() < 1e-4, "{scale} {step_s}: {found}, not {v}");
             if (v - corner).abs() > 1e-3 * top {
                 let [after, before] =
-                    [1.0, -1.0].map(|sign| approach.closing_velocity(way * (1.0 + sign * 1e-6)).0);
+                    [1.0, -1.0].map(|sign| approach.closing_velocity_and_slope(way * (1.0 + sign * 1e-6)).0);
                 let difference = (after - before) / (2e-6 * way);
                 assert!((slope / difference - 1.0).abs() < 1e-3, "{scale} {v}: {slope}, not {difference}");
             }
         }
-        assert_eq!(approach.closing_velocity(2.0 * braking_way(top, scale, step_s)), (top, 0.0));
-        assert!((approach.slowest_slope() * outer_s - 1.0).abs() < 1e-12);
+        assert_eq!(approach.closing_velocity_and_slope(2.0 * braking_way(top, scale, step_s)), (top, 0.0));
+        assert!((approach.closing_slope_at_target() * outer_s - 1.0).abs() < 1e-12);
     }
 }
 

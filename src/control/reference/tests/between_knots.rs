@@ -20,7 +20,7 @@ pub(super) fn scene(samples: &mut RandomVectors, acceleration: f64, jerk: f64) -
         limits.acceleration *= acceleration;
         limits.jerk *= jerk;
     }
-    scene.constants.reference_condition = 1e9;
+    scene.constants.max_reference_condition = 1e9;
     scene.constants.parameters.condition = 1e9;
     scene.motion = Motion {
         pose: *scene.constants.home.pose(),
@@ -266,7 +266,7 @@ fn the_condition_at_knots_keeps_the_limit_of_the_reference() {
     for _ in 0..300 {
         let mut scene = Scene::new(&mut samples);
         scene.constants.parameters.condition = 1e9;
-        let set = |scene: &mut Scene, bound: f64| scene.constants.reference_condition = bound;
+        let set = |scene: &mut Scene, bound: f64| scene.constants.max_reference_condition = bound;
         let before =
             KinematicState::new(scene.constants.machine(), scene.motion.pose).sensitivity().condition;
         let Some((extremes, bound)) = scene.tightened(1e4, 1.0, set) else { continue };

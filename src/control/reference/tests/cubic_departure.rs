@@ -1,7 +1,7 @@
 //! Tests of the bounds on derivatives of lengths, term by term, and on the departure between two knots.
 
 use crate::control::reference::proof::cubic_departure::{
-    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, curvature, length_jerk,
+    CUBIC_DEPARTURE, CUBIC_RATE_DEPARTURE, length_acceleration_bound, length_jerk_bound,
 };
 use crate::control::reference::tests::between_knots::scene;
 use crate::control::reference::tests::*;
@@ -27,7 +27,7 @@ fn no_length_is_curved_more_than_its_bound() {
             Twist { angular: unit(&mut samples) * sizes[3], linear: unit(&mut samples) * sizes[2] };
         scene.motion.acceleration =
             Acceleration { angular: unit(&mut samples) * alpha, linear: unit(&mut samples) * a };
-        let bound = curvature(&scene.constants, sizes[2], sizes[3]);
+        let bound = length_acceleration_bound(&scene.constants, sizes[2], sizes[3]);
         let legs = leg_motion(scene.constants.machine(), &scene.motion);
         let largest = legs.accel.iter().fold(0.0_f64, |largest, accel| largest.max(accel.abs()));
         used[term] = used[term].max(largest / bound);
@@ -114,7 +114,7 @@ fn no_length_has_a_third_derivative_beyond_its_bound() {
         let mut machine = scene.constants.machine().clone();
         machine.actuator.min_length = leg_lengths(&machine, &pose).into_iter().fold(f64::INFINITY, f64::min);
         let constants = Constants::new(&machine, scene.constants.parameters);
-        let bound = length_jerk(&constants, v, w);
+        let bound = length_jerk_bound(&constants, v, w);
         let largest =
             accel(H).into_iter().zip(accel(-H)).map(|(after, before)| ((after - before) / (2.0 * H)).abs());
         used[term] = used[term].max(largest.fold(0.0, f64::max) / bound);

@@ -35,7 +35,7 @@ pub(super) fn standing(constants: &Constants, offset: [f64; 6]) -> SetpointMotio
 pub(super) fn started(constants: &Constants, motion: &Motion) -> ReferenceGenerator {
     let mut reference = ReferenceGenerator::new(constants);
     reference.verify_start(constants, motion).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     reference
 }
 
@@ -90,7 +90,7 @@ fn a_long_cycle_moves_as_several_short_ones() {
     let before = reference.clone();
     reference.advance(&constants, MS, Some(&target));
     assert_eq!((reference.motion(), reference.time_ns()), (before.motion(), MS));
-    assert_eq!(reference.motion_of_hold(MS), before.motion_of_hold(MS));
+    assert_eq!(reference.motion_for_held_force(MS), before.motion_for_held_force(MS));
 }
 
 /// The largest rate of a leg is 97 % of its limit during a long motion.
@@ -124,7 +124,7 @@ fn a_start_clears_the_history() {
     let mut reference = started(&constants, &at_rest(constants.home.pose()));
     run(&constants, &mut reference, &Target::Motion(&aside), 50);
     reference.verify_start(&constants, &aside.motion).ok();
-    reference.begin_at(50 * MS);
+    reference.begin_placed_motion(50 * MS);
     assert_eq!(reference.motion_at(50 * MS), aside.motion);
     assert_eq!(reference.motion_at(49 * MS).pose, aside.motion.pose);
 }
@@ -233,7 +233,7 @@ fn rotation_and_translation_change_in_proportion_after_a_refusal() {
         .map(|k| {
             reference.motion = if [2, 5].contains(&k) { fast } else { rest };
             run(&constants, &mut reference, &Target::Motion(&aside), 1);
-            reference.in_proportion_steps
+            reference.proportional_steps_left
         })
         .collect();
     assert_eq!(steps[..8], [0, 0, 50, 49, 48, 50, 49, 48]);

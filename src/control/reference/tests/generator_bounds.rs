@@ -38,7 +38,7 @@ fn bounds_that_were_relaxed_at_the_start_hold_after_the_return() {
     // Control begins again within the envelope, before the bounds have followed the platform back.
     let mut reference = started(&constants, &at_rest(&beyond.motion.pose));
     reference.verify_start(&constants, &home.motion).ok();
-    reference.begin_at(0);
+    reference.begin_placed_motion(0);
     run(&constants, &mut reference, &Target::Motion(&beyond), 2000);
     assert!((0.09..=0.1 + 2e-9).contains(&x(&constants, &reference)[3]), "{:?}", x(&constants, &reference));
 }
@@ -103,7 +103,7 @@ fn a_start_beside_an_end_stop_never_leads_into_it() {
         }
         begun += 1;
         reference.verify_start(&at_end, &Motion { twist, ..at_rest(&pose) }).ok();
-        reference.begin_at(0);
+        reference.begin_placed_motion(0);
         let mut time_ns = 0;
         while !reference.is_at_rest() {
             time_ns += MS / 10;
@@ -170,7 +170,7 @@ fn a_reference_beyond_a_bound_by_rounding_only_returns() {
                 reference.bounds.envelope.as_mut().unwrap().highest = x.map(|x| x - 1e-8);
             }
             _ => {
-                constants.reference_condition = condition * (1.0 - 1e-5);
+                constants.max_reference_condition = condition * (1.0 - 1e-5);
                 constants.parameters.condition = condition * 1.1;
             }
         }

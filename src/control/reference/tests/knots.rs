@@ -25,7 +25,7 @@ fn the_universal_joints_at_knots_keep_the_limit_of_the_reference() {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
         let pose = pose(&mut samples, &constants);
-        (constants.reference_condition, constants.parameters.condition) = (1e4, 1e9);
+        (constants.max_reference_condition, constants.parameters.condition) = (1e4, 1e9);
         let mut bounds = PoseBounds::configured(&constants);
         (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
         let verified = |constants: &Constants, from: Option<&Pose>| {
@@ -60,7 +60,7 @@ fn a_knot_is_covered_with_the_poses_around_it() {
         // A ball that is too small for the reach is kept for the knot itself.
         assert!(!is_covered(&mut balls, &constants, &pose, Pair { angular: 0.0, linear: 10.0 }));
         assert!(covered(&mut balls, &constants, 0.0) && !covered(&mut balls, &constants, 10.0));
-        constants.reference_condition = 1.0;
+        constants.max_reference_condition = 1.0;
         assert!(!covered(&mut balls, &constants, 0.0));
     }
 }
@@ -74,7 +74,7 @@ fn a_stop_that_needs_many_balls_is_verified_over_several_cycles() {
     for _ in 0..2000 {
         let mut scene = Scene::new(&mut samples);
         scene.constants.parameters.condition = 60.0;
-        scene.constants.reference_condition = 50.0;
+        scene.constants.max_reference_condition = 50.0;
         let (mut verifier, mut brake_at_once) = (Verifier::default(), PoseStop::default());
         let mut verified = || {
             verifier.verify(

@@ -18,6 +18,6 @@ mod verification;
 /// Whether balls prove all poses within a reach of a pose, with the reference's bounds. New balls are added
 /// as needed.
 fn is_covered(balls: &mut RegularBalls, constants: &Constants, pose: &Pose, reach: Pair<f64>) -> bool {
-    let around = RegularityQuery { pose, reach, required: Regularity::of_reference(constants) };
+    let around = RegularityQuery { pose, reach, required: Regularity::reference_bounds(constants) };
     balls.prove(constants, &around, &mut u32::MAX.clone())
 }

@@ -99,7 +99,7 @@ fn the_deviation_of_a_setpoint_is_right_to_first_order() {
         let motion = moving(&mut samples, &constants);
         let mut reference = ReferenceGenerator::new(&constants);
         reference.verify_start(&constants, &motion).ok();
-        reference.begin_at(1000 * MS);
+        reference.begin_placed_motion(1000 * MS);
         let offset = Twist { angular: samples.vector(1e-3), linear: samples.vector(1e-2) };
         let task = TaskState::at_rest(crate::model::task::task_coordinates(&motion.pose, &machine.home));
         let mut setpoint = SetpointMotion::new(Setpoint::motion(0, task));
@@ -132,7 +132,7 @@ fn steps_and_stops_move_the_pose_as_their_twist_says() {
         motion.acceleration = Acceleration::default();
         let mut reference = ReferenceGenerator::new(&constants);
         reference.verify_start(&constants, &motion).ok();
-        reference.begin_at(0);
+        reference.begin_placed_motion(0);
         let home = at_rest(constants.home.pose()).pose;
         let target = Target::Pose { pose: &home, speed_share: 1.0 };
         let mut expected = motion;
@@ -147,7 +147,7 @@ fn steps_and_stops_move_the_pose_as_their_twist_says() {
                 assert_near(next, &moved, [1e-9, 1e-12, 1e-9]);
                 steps += 1;
             }
-            let mean = reference.motion_of_hold(step * MS - MS / 2).acceleration.vector();
+            let mean = reference.motion_for_held_force(step * MS - MS / 2).acceleration.vector();
             assert!((expected.twist.vector() + mean * 1e-3 - next.twist.vector()).norm() < 1e-12);
             expected = *next;
         }
@@ -186,7 +186,7 @@ fn bounds_that_are_relaxed_around_a_pose_follow_it_back_and_never_out() {
             let shift = Vector3::new(0.3, 0.2, 0.9) * (share * sign);
             TaskState::at_rest([turn.x, turn.y, turn.z, shift.x, shift.y, 1.5 + shift.z]).motion().pose
         };
-        let mut bounds = PoseBounds::around(&constants, &at(1.0));
+        let mut bounds = PoseBounds::relaxed_to(&constants, &at(1.0));
         let mut before = ends(&bounds);
         let x = crate::model::task::task_coordinates(&at(1.0), &machine.home);
         let end = if sign < 0.0 { before[1][0] - x[0] } else { before[3][0] + x[0] };
@@ -231,7 +231,7 @@ fn relaxed_bounds_keep_their_distance_from_the_end_stops() {
         machine.actuator.min_length =
             if is_long { longest + half_room - stroke } else { shortest - half_room };
         machine.actuator.max_length = machine.actuator.min_length + stroke;
-        let bounds = PoseBounds::around(&Constants::new(&machine, free.parameters), pose);
+        let bounds = PoseBounds::relaxed_to(&Constants::new(&machine, free.parameters), pose);
         let bounds = if is_long { bounds.longest } else { bounds.shortest };
         let leg = lengths.iter().position(|&length| length == at_stop).unwrap();
         assert_eq!(bounds[leg], at_stop, "{is_long}");

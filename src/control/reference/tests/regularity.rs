@@ -58,7 +58,7 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
                 position: near.position + samples.vector(0.05),
             };
             let at = KinematicState::new(&machine, near).sensitivity().condition;
-            constants.reference_condition = at * (1.0 + 10.0_f64.powf(3.0 * samples.uniform() - 2.0));
+            constants.max_reference_condition = at * (1.0 + 10.0_f64.powf(3.0 * samples.uniform() - 2.0));
             let [linear, angular] =
                 [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });
             // The poses of the query are beside the ball that is kept.
@@ -71,7 +71,7 @@ fn no_pose_of_a_ball_just_accepted_is_beyond_the_limit() {
             let size =
                 bisected(0.0, 2.0, |size| is_covered(&mut { balls }, &constants, &center, reach(size)));
             let found = worst(&mut samples, &constants, &center, reach(size));
-            let used = 1.0 / (found * constants.reference_condition);
+            let used = 1.0 / (found * constants.max_reference_condition);
             assert!(
                 size == 0.0 || found > 0.0 && used <= 1.0 + 1e-9,
                 "{used}, {size}, {ratio:?}, {center:?}"
@@ -101,7 +101,7 @@ fn a_ball_ends_where_its_equations_say() {
             let norm = (wrenches.norm() + change).min(12.0_f64.sqrt());
             s < shortest
                 && inverse * change < 1.0
-                && norm * inverse / (1.0 - inverse * change) <= constants.reference_condition
+                && norm * inverse / (1.0 - inverse * change) <= constants.max_reference_condition
         };
         for _ in 0..30 {
             let center = pose(&mut samples, &constants);

@@ -28,7 +28,7 @@ fn no_leg_of_a_ball_just_accepted_is_nearer_to_its_axis_than_the_limit() {
     for _ in 0..40 {
         let machine = machine(&mut samples);
         let mut constants = Constants::new(&machine, parameters(&machine));
-        (constants.reference_condition, constants.parameters.condition) = (1e9, 1e9);
+        (constants.max_reference_condition, constants.parameters.condition) = (1e9, 1e9);
         let center = pose(&mut samples, &constants);
         constants.universal_sine = universal_sine(&machine, &center) * samples.uniform();
         let [linear, angular] = [samples.uniform(), samples.uniform()].map(|u| if u < 0.3 { 0.0 } else { u });

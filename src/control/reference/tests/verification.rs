@@ -168,7 +168,7 @@ impl Scene {
         }
         let mut constants = Constants::new(&machine, parameters);
         let (motion, step) = motion(samples, &constants);
-        constants.reference_condition = 1e4;
+        constants.max_reference_condition = 1e4;
         let mut bounds = PoseBounds::configured(&constants);
         (bounds.shortest, bounds.longest) = ([0.0; LEGS], [100.0; LEGS]);
         Self { constants, bounds, motion, step, is_free: samples.below(3) == 0 }
@@ -177,9 +177,9 @@ impl Scene {
     pub fn set_max_rate(&mut self, rate: f64) {
         let mut machine = self.constants.machine().clone();
         machine.actuator.max_rate = rate;
-        let condition = self.constants.reference_condition;
+        let condition = self.constants.max_reference_condition;
         self.constants = Constants::new(&machine, self.constants.parameters);
-        self.constants.reference_condition = condition;
+        self.constants.max_reference_condition = condition;
     }
 
     /// Verifies the stop, in up to three cycles that share its effort.
@@ -286,7 +286,7 @@ fn coordinates_stay_within_an_envelope_that_is_just_accepted() {
         if samples.below(2) == 0 {
             let tilt = Vector3::y() * (1.0 * samples.uniform());
             scene.motion.pose.rotation = exp(&tilt);
-            scene.constants.reference_condition = 1e9;
+            scene.constants.max_reference_condition = 1e9;
         }
         let axis = k % 6;
         let excess = if samples.below(2) == 0 {
@@ -313,7 +313,7 @@ fn the_condition_stays_within_a_limit_that_is_just_accepted() {
     for _ in 0..400 {
         let mut scene = Scene::new(&mut samples);
         let set = |scene: &mut Scene, bound: f64| {
-            (scene.constants.reference_condition, scene.constants.parameters.condition) = (bound, bound);
+            (scene.constants.max_reference_condition, scene.constants.parameters.condition) = (bound, bound);
         };
         let Some((extremes, bound)) = scene.tightened(1e4, 1.0, set) else { continue };
         let worst = 1.0 / extremes.inverse_condition;

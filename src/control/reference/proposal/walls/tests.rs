@@ -143,11 +143,11 @@ fn each_wall_has_the_gradient_the_gap_and_the_curvature_of_its_quantity() {
             let approach = approach(constants, is_angle);
             let (rate, slope) = if gap > 0.0 {
                 let straight = 2.0 / stop_s;
-                let (rate, slope) = approach.closing_velocity(gap);
+                let (rate, slope) = approach.closing_velocity_and_slope(gap);
                 if straight * gap < rate { (straight * gap, straight) } else { (rate, slope) }
             } else {
                 outside += 1;
-                (gap * approach.slowest_slope() / 4.0, approach.slowest_slope() / 4.0)
+                (gap * approach.closing_slope_at_target() / 4.0, approach.closing_slope_at_target() / 4.0)
             };
             // Equal to second order in the step.
             assert!((wall.end.rate - rate).abs() < 2e-4, "{k}: {} not {rate}, gap {gap}", wall.end.rate);
