@@ -75,11 +75,11 @@ fn processes(machine: &Machine, topic: &str) -> Vec<(u64, bool)> {
     source["processes"].as_array().expect("processes").iter().map(process).collect()
 }
 
-fn words(what: &str, counts: u32, ignored: u32) -> [String; 2] {
+fn words(what: &str, used: u32, ignored: u32) -> [String; 2] {
     let name =
         |id: u32| std::fs::read_to_string(format!("/proc/{id}/comm")).expect("a name").trim_end().to_owned();
-    let [first, second] = [counts, ignored].map(|id| format!("process {id} ({})", name(id)));
-    [format!("two sources of {what}: {first} counts"), format!("{second} does not; end one of them")]
+    let [first, second] = [used, ignored].map(|id| format!("process {id} ({})", name(id)));
+    [format!("two sources of {what}: {first} is used"), format!("{second} is ignored; end one of them")]
 }
 
 #[test]
@@ -89,8 +89,8 @@ fn a_second_driver_never_takes_over_and_control_does_not_begin_with_two() {
     let recorder = Recorder::start(&machine.name);
     let Controlled { peer, daemon, plant, machine } = Controlled::start(machine);
     let second = Second::start(&machine, lengths_of(&machine, 0.02));
-    let [counts, ignored] = words("measurements", plant.id(), process::id());
-    daemon.says(&counts);
+    let [used, ignored] = words("measurements", plant.id(), process::id());
+    daemon.says(&used);
     daemon.says(&ignored);
     let (from_ns, _) = let_pass(SILENCE);
     let recording = recorder.so_far();
@@ -103,7 +103,7 @@ fn a_second_driver_never_takes_over_and_control_does_not_begin_with_two() {
     assert!(processes(&machine, "measured").contains(&(process::id().into(), true)));
     assert!(processes(&machine, "measured").contains(&(plant.id().into(), false)));
     does(&machine, "stop", &[], &["standby"]);
-    is_refused(&machine, "engage", &[], &counts);
+    is_refused(&machine, "engage", &[], &used);
     is_refused(&machine, "park", &[], &ignored);
     drop(second);
     engage(&machine);
@@ -128,8 +128,8 @@ fn a_second_setpoint_source_never_takes_over_and_control_does_not_begin_with_two
     let mut far = SetpointMessage { kind: 2, ..SetpointMessage::default() };
     far.x[3] = 1.15;
     let second = Second::start(&machine, far);
-    let [counts, _] = words("setpoints", peer.id(), process::id());
-    daemon.says(&counts);
+    let [used, _] = words("setpoints", peer.id(), process::id());
+    daemon.says(&used);
     let_pass(SILENCE);
     assert_eq!(status(&machine)["state"], "active");
     // It is not followed under control even when the other has ended.
