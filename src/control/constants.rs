@@ -73,7 +73,8 @@ impl Constants {
             parameters.fidelity,
         );
         let Law { max_compensated_disturbance, compensates_disturbance, .. } = &parameters.law;
-        let disturbance = acceleration_by_command.largest_compensable(max_compensated_disturbance);
+        let disturbance =
+            acceleration_by_command.largest_compensable_disturbance(max_compensated_disturbance);
         let angle_weighting_radius_m = if parameters.law.mode.acts_on_legs() { 1.0 } else { arm };
         let by_force = acceleration_by_command.acceleration_by_force(machine, home.pose());
         let least_missing =

@@ -160,7 +160,8 @@ impl Controller {
             localization.locate(&cycle, measurement, rate)
         });
         let free_motion = free_motion.update(&cycle, localization, located.as_ref().ok());
-        let mut error = platform_error(&cycle, &setpoint, errors, reference, localization, &mut located);
+        let mut error =
+            update_error_and_twist(&cycle, &setpoint, errors, reference, localization, &mut located);
 
         // Decide the state.
         let mut active_limits = setpoint.active_limits;
@@ -238,7 +239,7 @@ impl Output {
 /// Error of the platform: from the reference under control, else from the setpoint. Under control it also
 /// sets the platform's twist to the estimate if the driver sends no rates.
 #[inline(always)]
-fn platform_error(
+fn update_error_and_twist(
     cycle: &Cycle<'_>,
     setpoint: &ValidatedSetpoint<'_>,
     errors: &mut ErrorTracker,

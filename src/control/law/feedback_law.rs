@@ -60,7 +60,7 @@ pub struct Law {
 
 /// Largest disturbance, relative to the acceleration limit: a payload or friction that the model lacks.
 /// A larger disturbance is a collision.
-const COMPENSATED_DISTURBANCE_RATIO: f64 = 0.5;
+const COMPENSATED_DISTURBANCE_PER_ACCELERATION_LIMIT: f64 = 0.5;
 
 impl Law {
     /// Builds the law of a machine.
@@ -73,7 +73,7 @@ impl Law {
         limits: &Limits,
     ) -> Self {
         let [angular, linear] = [&limits.orientation, &limits.position]
-            .map(|limits| COMPENSATED_DISTURBANCE_RATIO * limits.acceleration);
+            .map(|limits| COMPENSATED_DISTURBANCE_PER_ACCELERATION_LIMIT * limits.acceleration);
         let mut max_compensated_disturbance = Vector6::repeat(linear);
         match mode {
             ControlMode::ComputedTorque => max_compensated_disturbance.fixed_rows_mut::<3>(0).fill(angular),

@@ -54,7 +54,7 @@ impl FeedbackLimiter {
         let parameters = &cycle.constants.parameters;
         let limited = match parameters.law.mode.acts_on_legs() {
             true => scale_leg_accelerations(cycle, wanted),
-            false => limit_pose(parameters, desired, wanted),
+            false => scale_platform_acceleration(parameters, desired, wanted),
         };
         let rate = if limited != *wanted { 1.0 } else { -FORGETTING_RATIO };
         self.saturated_s = (self.saturated_s + rate * parameters.period_s()).max(0.0);
@@ -62,7 +62,11 @@ impl FeedbackLimiter {
     }
 }
 
-fn limit_pose(parameters: &Parameters, desired: &Acceleration, wanted: &Vector6<f64>) -> Vector6<f64> {
+fn scale_platform_acceleration(
+    parameters: &Parameters,
+    desired: &Acceleration,
+    wanted: &Vector6<f64>,
+) -> Vector6<f64> {
     let Parameters { limits, feedback_scale, .. } = parameters;
     let added = Acceleration::from_vector(wanted);
     let bounded = |desired: &Vector3<f64>, added: &Vector3<f64>, limit: f64| {

@@ -59,7 +59,7 @@ impl InputMatrix {
     }
 
     /// Largest disturbance of each axis that a law with this acceleration bound can compensate.
-    pub fn largest_compensable(&self, bound: &Vector6<f64>) -> Vector6<f64> {
+    pub fn largest_compensable_disturbance(&self, bound: &Vector6<f64>) -> Vector6<f64> {
         self.matrix_and_inverse.map_or(*bound, |[matrix, _]| matrix.abs() * bound)
     }
 

@@ -41,10 +41,10 @@ const USUAL_PAYLOAD_TIME_CONSTANT_S: f64 = 1.0;
 const START_S: f64 = 1.0;
 /// Default of `limits.payload_change_kg`, relative to the mass of the platform and to the mass that all
 /// drives can lift: friction that the model lacks looks like a payload.
-const DEFAULT_PAYLOAD_PER_PLATFORM_MASS: f64 = 0.1;
-const DEFAULT_PAYLOAD_PER_LIFT: f64 = 0.02;
+const DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS: f64 = 0.1;
+const DEFAULT_PAYLOAD_CHANGE_PER_LIFT: f64 = 0.02;
 /// Time constant with which removed forces are forgotten \[s\]: the same as for the usual payload.
-const REMOVED_FORCE_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
+const CUT_FORCE_DECAY_TIME_CONSTANT_S: f64 = USUAL_PAYLOAD_TIME_CONSTANT_S;
 /// Smallest weight in a motion, relative to the weight at rest: a falling platform has no weight to compare
 /// with.
 const LEAST_APPARENT_GRAVITY_RATIO: f64 = 0.3;
@@ -57,7 +57,7 @@ const DEFAULT_IMPACT_PER_FRICTION: f64 = 1.5;
 const MAX_IMPACT_S: f64 = 0.02;
 
 /// Change of the error between two reversals in a loop of 10 Hz \[m\].
-const SWING_M: f64 = 8e-5;
+const MIN_SWING_PEAK_TO_PEAK_M: f64 = 8e-5;
 /// Square of the natural frequency of a 10 Hz loop \[1/s^2\], and largest change for a softer loop \[m\].
 const SWING_STIFFNESS: f64 = 3948.0;
 const MAX_SWING_M: f64 = 5e-3;
@@ -122,13 +122,13 @@ impl DisturbanceBounds {
             Vector6::new(0.0, 0.0, 0.0, gravity_over_square.x, gravity_over_square.y, gravity_over_square.z);
         let by_legs = leg_wrenches(machine, &machine.home_pose()).tr_mul(&along_gravity).abs().sum();
         let largest_lift_kg = machine.actuator.max_force * by_legs;
-        let default_kg = (DEFAULT_PAYLOAD_PER_PLATFORM_MASS * machine.platform.mass)
-            .max(DEFAULT_PAYLOAD_PER_LIFT * largest_lift_kg);
+        let default_kg = (DEFAULT_PAYLOAD_CHANGE_PER_PLATFORM_MASS * machine.platform.mass)
+            .max(DEFAULT_PAYLOAD_CHANGE_PER_LIFT * largest_lift_kg);
         let default_step = (DEFAULT_IMPACT_PER_ACCELERATION_LIMIT * limits.position.acceleration)
             .max(DEFAULT_IMPACT_PER_FRICTION * friction);
         let softest = law.position.stiffness.min(law.orientation.stiffness);
         let softness = (SWING_STIFFNESS / softest).max(1.0);
-        let swing = (SWING_M * softness * softness).min(MAX_SWING_M);
+        let swing = (MIN_SWING_PEAK_TO_PEAK_M * softness * softness).min(MAX_SWING_M);
         let by_step = MAX_SWING_BY_DISTURBANCE_STEP * disturbance_step.unwrap_or(0.0) / softest;
         let shaking = if expects_forces { SHAKING_RATIO } else { SHAKING_RATIO_WITHOUT_INERTIA };
         let payload_by_disturbance = -input_matrix.home_wrench_by_disturbance(machine).tr_mul(&along_gravity);
@@ -204,7 +204,7 @@ impl DisturbanceMonitor {
         dt: f64,
     ) -> Result<(), Diagnostic> {
         self.since_start_s += dt;
-        self.removed_acceleration *= 1.0 - (dt / REMOVED_FORCE_TIME_CONSTANT_S).min(1.0);
+        self.removed_acceleration *= 1.0 - (dt / CUT_FORCE_DECAY_TIME_CONSTANT_S).min(1.0);
         let payload = self.check_payload(bounds, &estimate.disturbance, &reference.acceleration, dt);
         let impact = self.check_impact(bounds, sudden_squared, dt);
         let oscillation =

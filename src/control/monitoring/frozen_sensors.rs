@@ -43,7 +43,7 @@ const MAX_EQUAL_AT_ONE_STEP: f64 = 100.0;
 const MAX_EQUAL_NOISY_READINGS: f64 = 12.0;
 /// Bound on the motion in steps of a coarse sensor. In the same ten hours, with payload and friction known to
 /// 20 %, the largest motion was 15.2 steps.
-const BOUND_STEPS: f64 = 17.0;
+const MIN_BOUND_SENSOR_STEPS: f64 = 17.0;
 
 impl ReadingErrors {
     /// Equal readings in a row that noise permits; `None` if the noise is less than a step or the step is
@@ -135,7 +135,7 @@ impl FrozenSensors {
     ) -> Result<(), Diagnostic> {
         let are_all_equal = self.equal_readings.iter().all(|equal| *equal + 1 >= MIN_EQUAL_READINGS);
         let bound = if are_all_equal { ALL_LEGS_BOUND_M } else { one_leg.motion };
-        let bound = (bound + errors.resolution).max(BOUND_STEPS * errors.resolution);
+        let bound = (bound + errors.resolution).max(MIN_BOUND_SENSOR_STEPS * errors.resolution);
         let least_motion = LEAST_MOTION_M.max(LEAST_MOTION_STEPS * errors.resolution);
         let mut result = Ok(());
         let first = self.reference.iter_mut().zip(&mut self.feedback);

@@ -34,7 +34,7 @@ const RESIDUAL_TIME_CONSTANT_S: f64 = 0.03;
 
 /// Largest plausible acceleration of a leg \[m/s^2\], five times gravity. No drive gives more; more is an
 /// impact. The bound is the larger of this value and ten times the linear acceleration limit.
-const MAX_LEG_ACCELERATION_M_S2: f64 = 50.0;
+const MIN_ACCELERATION_BOUND_M_S2: f64 = 50.0;
 const ACCELERATION_LIMIT_FACTOR: f64 = 10.0;
 
 /// Change of a rate that is always plausible, as a ratio of the largest rate: noise.
@@ -228,7 +228,7 @@ fn check_rate_jump_and_consistency(
     let actuator = &cycle.constants.machine().actuator;
     let limits = &cycle.constants.parameters.limits;
     let acceleration =
-        MAX_LEG_ACCELERATION_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
+        MIN_ACCELERATION_BOUND_M_S2.max(ACCELERATION_LIMIT_FACTOR * limits.position.acceleration);
     let bound = acceleration * bounded_dt_s + PLAUSIBLE_RATE_CHANGE_RATIO * actuator.max_rate;
     check_change(DiagnosticCode::RateJumped, rate, before_rate, bound)?;
     let updated = consistency.updated(now, before, [rate, before_rate]);

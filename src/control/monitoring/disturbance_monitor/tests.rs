@@ -12,7 +12,7 @@ const BOUNDS: DisturbanceBounds = DisturbanceBounds {
     gravity_over_square: Vector3::new(0.0, 0.0, -1.0 / 9.81),
     max_payload_change_kg: 0.1,
     max_sudden_disturbance: 2.0,
-    swing: SWING_M,
+    swing: MIN_SWING_PEAK_TO_PEAK_M,
     swing_by_acceleration: 1.0 / SWING_STIFFNESS,
     max_reversal_interval_s: 0.1,
     arm_squared: 1.0,

@@ -27,7 +27,7 @@ use crate::control::signals::limits::Limits;
 pub(in crate::control::reference) const CUBIC_DEPARTURE: f64 = 1.0 / 96.0;
 pub(in crate::control::reference) const CUBIC_RATE_DEPARTURE: f64 = 1.0 / 30.0;
 /// `2 / sqrt 3`: factor in the third derivative of a length, due to the turning of the leg alone.
-const TURNING_SHARE: f64 = 1.154_700_538_379_251_7;
+const LEG_TURNING_JERK_FACTOR: f64 = 1.154_700_538_379_251_7;
 
 /// Bound on the third derivative of a leg's length, for the peak velocities v and w of a stop.
 pub(in crate::control::reference) fn length_jerk_bound(constants: &Constants, v: f64, w: f64) -> f64 {
@@ -37,7 +37,7 @@ pub(in crate::control::reference) fn length_jerk_bound(constants: &Constants, v:
     let joint_jerk =
         position.jerk + arm * (orientation.jerk + 3.0 * w * orientation.acceleration + w * w * w);
     let turning = joint / constants.machine().actuator.min_length;
-    joint_jerk + turning * (3.0 * joint_acceleration + TURNING_SHARE * turning * joint)
+    joint_jerk + turning * (3.0 * joint_acceleration + LEG_TURNING_JERK_FACTOR * turning * joint)
 }
 
 /// Bound on the second derivative of a leg's length, for the peak velocities v and w of a stop.

@@ -11,7 +11,7 @@ const MAX_DELAY_S: f64 = 0.15;
 const MAX_DELAY_RATE: f64 = 0.1;
 /// Time in which the delay moves to its estimate \[s\]: many samples, so that noise of the estimate causes no
 /// motion.
-const DELAY_RELAXATION_S: f64 = 0.5;
+const DELAY_TRANSITION_S: f64 = 0.5;
 /// Weight of the newest sample in the estimates of interval and jitter: an average over half a second at
 /// 60 Hz.
 const ESTIMATION_GAIN: f64 = 1.0 / 32.0;
@@ -72,17 +72,17 @@ impl Delay {
     }
 
     pub fn at(&self, instant_ns: u64) -> f64 {
-        self.value + self.rate * seconds_between(self.since_ns, instant_ns).clamp(0.0, DELAY_RELAXATION_S)
+        self.value + self.rate * seconds_between(self.since_ns, instant_ns).clamp(0.0, DELAY_TRANSITION_S)
     }
 
     pub fn rate_at(&self, instant_ns: u64) -> f64 {
-        if seconds_between(self.since_ns, instant_ns) < DELAY_RELAXATION_S { self.rate } else { 0.0 }
+        if seconds_between(self.since_ns, instant_ns) < DELAY_TRANSITION_S { self.rate } else { 0.0 }
     }
 
     /// Delay that moves from its present value toward `goal`.
     pub fn toward(&self, goal: f64, now_ns: u64) -> Self {
         let value = self.at(now_ns);
-        let rate = ((goal - value) / DELAY_RELAXATION_S).clamp(-MAX_DELAY_RATE, MAX_DELAY_RATE);
+        let rate = ((goal - value) / DELAY_TRANSITION_S).clamp(-MAX_DELAY_RATE, MAX_DELAY_RATE);
         Self { since_ns: now_ns, value, rate }
     }
 }
