@@ -152,7 +152,10 @@ fn would_be_different_with_another_configuration(machine: &Machine, file: &Path)
     let (_, cycles) = read(file);
     let cycle = cycles.iter().find(|cycle| cycle.cycle == first).unwrap();
     assert!([State::Engaging, State::Active].iter().any(|state| *state as u32 == cycle.state), "{cycle:?}");
-    assert!(stdout.contains(" cycles differ\n") && stdout.contains(" s), force_n_"), "{stdout}");
+    // After a pause of the host a slower loop may refuse a measurement as too old.
+    let is_refused = cycle.missed_measurements > 0 && stdout.contains(" s), missed_measurements: ");
+    let is_force = stdout.contains(" s), force_n_");
+    assert!(stdout.contains(" cycles differ\n") && (is_force || is_refused), "{stdout}");
 }
 
 fn a_part_is_repeated_alone(machine: &Machine, file: &Path) {
