@@ -66,20 +66,18 @@ impl Constants {
         let arm = arms.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
         let NoiseModel { bandwidth_rad_s, period_s, .. } = parameters.noise;
         let lengths_only = NoiseModel { bandwidth_rad_s, period_s, rate_noise_ratio: None };
-        let acceleration_by_command = InputMatrix::at_home(
-            machine,
-            parameters.law.mode,
-            &parameters.law.leg_masses,
-            parameters.fidelity,
-        );
-        let Law { max_compensated_disturbance, compensates_disturbance, .. } = &parameters.law;
+        let Law { mode, leg_masses, max_compensated_disturbance, .. } = &parameters.law;
+        let acceleration_by_command = InputMatrix::at_home(machine, *mode, leg_masses, parameters.fidelity);
         let disturbance =
             acceleration_by_command.largest_compensable_disturbance(max_compensated_disturbance);
-        let angle_weighting_radius_m = if parameters.law.mode.acts_on_legs() { 1.0 } else { arm };
+        let feedback_only =
+            parameters.law.max_leg_acceleration_without_feedforward(&parameters.limits, arm, &disturbance);
+        let angle_weighting_radius_m = if mode.acts_on_legs() { 1.0 } else { arm };
         let by_force = acceleration_by_command.acceleration_by_force(machine, home.pose());
         let least_missing =
             least_missing_force_acceleration(&by_force, angle_weighting_radius_m, machine.actuator.max_force);
-        let expects_forces = parameters.law.mode.includes_inertia();
+        let least_missing_acceleration_squared =
+            if mode.includes_inertia() { least_missing * least_missing } else { f64::INFINITY };
         let unbounded = Vector6::repeat(f64::INFINITY);
         let disturbance_bounds = DisturbanceBounds::new(
             machine,
@@ -92,11 +90,7 @@ impl Constants {
             disturbance_bounds,
             dynamics: InverseDynamics::new(machine),
             acceleration_by_command,
-            least_missing_acceleration_squared: if expects_forces {
-                least_missing * least_missing
-            } else {
-                f64::INFINITY
-            },
+            least_missing_acceleration_squared,
             frozen_leg: FrozenLegBounds::new(
                 parameters.law.position.stiffness,
                 machine.actuator.max_force,
@@ -105,13 +99,8 @@ impl Constants {
             estimator: EstimatorConstants::new(
                 parameters.noise,
                 parameters.reading_errors,
-                if *compensates_disturbance { disturbance } else { unbounded },
-                parameters.limits.position.acceleration
-                    + parameters.law.max_leg_acceleration_without_feedforward(
-                        &parameters.limits,
-                        arm,
-                        &disturbance,
-                    ),
+                if parameters.law.compensates_disturbance { disturbance } else { unbounded },
+                parameters.limits.position.acceleration + feedback_only,
             ),
             rest_window_s: window_s(&parameters),
             leg_rate_estimator: EstimatorConstants::new(

@@ -106,11 +106,9 @@ pub(super) fn read(mut section: SectionReader, plant: &Plant<'_>) -> Control {
     let modes = ControlMode::ALL.map(|mode| (mode.name(), mode));
     let mode = section.choice_or("mode", ControlMode::default(), &modes);
     let leg_masses = LegMasses::at_home(machine);
-    let [softest, stiffest] = if mode.acts_on_legs() {
-        [leg_masses.softest_mode_gain, leg_masses.stiffest_mode_gain]
-    } else {
-        [1.0; 2]
-    };
+    let LegMasses { softest_mode_gain, stiffest_mode_gain, .. } = leg_masses;
+    let gains_on_legs = [softest_mode_gain, stiffest_mode_gain];
+    let [softest, stiffest] = if mode.acts_on_legs() { gains_on_legs } else { [1.0; 2] };
     let compensate_disturbances = section.flag_or("compensate_disturbances", mode.includes_inertia());
     let of = |damping_ratio: f64| plant.sampled_loop(damping_ratio, compensate_disturbances);
     let [position_bandwidth_hz, position_damping_ratio] =
