@@ -17,8 +17,8 @@ use core::hint::black_box;
 use core::panic::PanicInfo;
 
 use hexad::control::controller::{Controller, Output};
-use hexad::control::signals::inputs::Input;
 use hexad::control::parameters::Parameters;
+use hexad::control::signals::inputs::Input;
 use hexad::model::LEGS;
 use hexad::model::machine::Machine;
 use hexad::motion::built_in::{BuiltInMotion, FittedMotion, fit};
